@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 
 import springcheck
-from springcheck import driver, engines
+from springcheck import driver, engines, schemes
 from springcheck.physics import exact, scenefile
 from springcheck.physics.arrays import WIDE
 from springcheck.physics.exact.mathieu import floquet
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import ModulatedSpring
 from springcheck.physics.trajectory import Outcome
-from springcheck.studies.stability import measure, multipliers
+from springcheck.studies.stability import longest, measure, multipliers
 
 ORDERS = 60
 """Of Hill's series to both sides: the terms fall like (r/4 n**2)**n."""
@@ -213,3 +213,11 @@ def test_a_place_of_rest_far_from_0_rounds_what_is_displaced_from_it() -> None:
     assert far.off <= far.bound
     assert far.off > near.bound or not WIDE
     assert far.bound == pytest.approx(near.bound * (1 + 1e6), rel=1e-6)
+
+
+def test_the_largest_step_of_a_modulated_spring_is_that_of_its_stiffest_moment() -> None:
+    scene = scenefile.load_scene("mathieu-tongue")
+    # at the start cos(phase) = 0.92 of the modulation is there
+    w = np.sqrt(2.9 * (1 + 0.3) / 3.7)
+    assert longest.fastest(scene) == pytest.approx(w, rel=1e-12)
+    assert longest.longest(schemes.scheme("velocity-verlet"), scene) == pytest.approx(2 / w, rel=1e-9)

@@ -16,8 +16,10 @@ from springcheck import schemes
 from springcheck.errors import SceneError
 from springcheck.physics import exact
 from springcheck.physics.arrays import ROUNDOFF, Extended, Floats, Force, Reals
+from springcheck.physics.driven import ModulatedSpring
 from springcheck.physics.scene import Scene
 from springcheck.physics.system import MOST_DENSE, System
+from springcheck.physics.terms import WallSpring
 from springcheck.schemes import Scheme
 from springcheck.studies.stability import propagators
 
@@ -66,6 +68,16 @@ class Linear:
 
 
 @lru_cache(maxsize=8)
+def _at_its_stiffest(scene: Scene) -> Scene:
+    """The scene with each spring of modulated stiffness as it is where that is largest."""
+    terms = tuple(
+        WallSpring(i=x.i, k=x.k + np.abs(x.k * x.depth), at=x.at) if isinstance(x, ModulatedSpring) else x
+        for x in scene.terms
+    )
+    return scene if terms == scene.terms else scene.derived(terms=terms)
+
+
+@lru_cache(maxsize=8)
 def stiffest(scene: Scene) -> Floats:
     """Positions (n,) where the exact solution of an anharmonic scene is stiffest; elsewhere the start."""
     system = scene.system
@@ -103,7 +115,7 @@ def fastest(scene: Scene) -> float:
     Of an anharmonic scene that of small oscillations where it is `stiffest`.  SceneError where forces
     overflow there.
     """
-    system = scene.system
+    system = _at_its_stiffest(scene).system
     largest = float(np.max(system.modes.w2)) if system.has_modes else _largest(system, stiffest(scene))
     if not np.isfinite(largest):
         raise SceneError(f"scene {scene.name}: its forces at the start are beyond the range of numbers")
@@ -113,7 +125,7 @@ def fastest(scene: Scene) -> float:
 def linear(scene: Scene, scheme: Scheme) -> Linear | None:
     """What decides of a scheme's stability on a scene; None of more coupled particles than are looked at, and
     in a magnetic field, which is no stiffness, and where friction that depends on positions joins them."""
-    system = scene.system
+    system = _at_its_stiffest(scene).system
     if "magnetic" in system.acting or (system.brakes_by_place and not system.is_separate):
         return None
     if (scheme.has("mixes") and system.fast) or not (system.is_separate or system.has_one_friction_rate):
@@ -124,9 +136,9 @@ def linear(scene: Scene, scheme: Scheme) -> Linear | None:
             _scaled(System(scene.derived(terms=tuple(x for x in terms if x.kind == "potential"))), at)[None]
             for terms in (system.slow, system.fast)
         ]
-        w2, modes = np.linalg.eigh(np.asarray(parts[0][0] + parts[1][0], np.float64))
-        if scheme.b and w2[0] >= -GROWTH * w2[-1]:
-            return _oscillators(w2, modes, np.asarray(system.friction_rates, np.float64))
+        squares, turned = np.linalg.eigh(np.asarray(parts[0][0] + parts[1][0], np.float64))
+        if scheme.b and squares[0] >= -GROWTH * squares[-1]:
+            return _oscillators(squares, turned, np.asarray(system.friction_rates, np.float64))
         return Linear(slow=parts[0], fast=parts[1], rate=system.friction_rates[None])
     if system.has_modes:
         modes, rate = system.modes, system.modes.rate
