@@ -45,7 +45,7 @@ GROWTH = 1e-7
 """Growth per step from which coupled modes count as growing: eigenvalues of their matrix that are nearly
 equal are known to the square root of the rounding only."""
 
-DECAY = 2.0**-80
+LEAST_DECAY = 2.0**-80
 """Decay below which a mode has none, over the largest friction rate: the square of 2**12 roundings."""
 
 
@@ -167,7 +167,7 @@ def _oscillators(w2: Floats, modes: Floats, rate: Floats) -> Linear:
     size, v = np.abs(vectors) ** 2, vectors[len(w) :]
     decay = np.real(np.sum(v.conj() * (c @ v), axis=0)) / size.sum(axis=0)
     # a vector is known to some roundings, and the decay of what no friction acts on to their square
-    decay = np.where(decay > DECAY * np.max(rate), decay, 0.0)
+    decay = np.where(decay > LEAST_DECAY * np.max(rate), decay, 0.0)
     turns, alone = values.imag > 0, np.sort(decay[values.imag == 0])
     one, other = alone[::2], alone[1::2]
     return Linear.of_modes(
