@@ -362,6 +362,36 @@ def test_an_orbit_that_has_collapsed_at_once_has_spiralled_in() -> None:
     assert "implicit Euler spirals in; 2 keep to their orbits" in of_runs(scene, made, made)[0].heading
 
 
+def test_an_orbit_of_negative_energy_that_stays_has_not_spiralled_in() -> None:
+    scene = scenefile.load_scene("rigid-pendulum")
+    assert scene.system.energy(scene.q, scene.p) < 0
+    made = runs(scene, "own:velocity-verlet", "own:semi-implicit-euler")
+    assert "in gravity: states off by at most" in of_runs(scene, made, made)[0].heading
+
+
+def test_each_method_in_a_bath_has_a_line_and_states_of_its_own() -> None:
+    """Of one scheme, with noise of their own; and the name of the bath has a row above those of methods."""
+    scene = replace(scenefile.load_scene("bath-dumbbell"), steps=600)
+    run = driver.run(scene, "own:baoa", seed=1)
+    both = {
+        run.label: run,
+        "lammps:baoa": replace(driver.run(scene, "own:baoa", seed=2), label="lammps:baoa"),
+    }
+    banks = {bank.name: bank for bank in of_runs(scene, both, both)}
+    for name in ("energy", "phase-portrait"):
+        assert [one.name for one in banks[name].charts[0].curves if not one.over] == list(both), name
+    assert [one.text for one in banks["energy"].charts[0].labels] == ["BAOA"]
+    assert "(phase portrait of particle 0 of 2, x)" in banks["phase-portrait"].heading
+    assert "a few periods" not in banks["position"].heading
+    drawn = render.picture(banks["temperature"])
+    assert drawn.axes[0].get_ylim()[1] >= len(both)
+    assert "\u25ca lammps" in "".join(text.get_text() for text in drawn.legends[0].get_texts())
+    made = replace(scenefile.load_scene("bath-dumbbell"), bath=None, steps=20, quantities=("q", "p"))
+    paths = figures(made, runs(made, "own:velocity-verlet"))["path"]
+    assert "(path of particle 0 of 2)" in " ".join(paths.get_suptitle().split())
+    assert all(axes.yaxis.get_tick_params().get("labelleft", True) for axes in paths.axes[:3])
+
+
 def test_an_engine_far_off_the_others_of_its_scheme_has_its_line_in_its_panel() -> None:
     scene = scenefile.load_scene("spring-uneven")
     (made,) = runs(scene, "sundials:adams").values()

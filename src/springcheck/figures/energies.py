@@ -166,8 +166,8 @@ def orbits(runs: Runs, exact: Exact) -> str:
             unit = CHANGED * float(scene.system.norm.unit) ** 2
             # what ran away did not turn
             out = not np.isfinite(e).all() or np.min(last) > np.max(first) + unit
-            # at once, or more and more
-            inwards = not out and np.max(last) < max(np.min(first), e[0] / 2) - unit
+            # at once, or more and more; half of a negative energy is more of it
+            inwards = not out and np.max(last) < max(np.min(first), min(e[0], e[0] / 2)) - unit
             way = "spirals out" if out else "spirals in" if inwards else "keeps to its orbit"
             said[way].append(group.title)
     turns = max(periods(x) for x in runs.longest.q.T[:MOST_TURNING])
@@ -313,7 +313,7 @@ def means(runs: Runs, thermal: float) -> Bank:
     low, high = (f(some, key=lambda x: some[x]) for f in (min, max))
     linear = scene.system.has_modes and bool(np.all(scene.system.modes.w2 > 0))
     equal = linear and ys.low < scene.n < ys.high
-    curves = runs.curves(lambda run: (run.t, np.clip(found[run.label], *ys.far)))
+    curves = runs.curves(lambda run: (run.t, np.clip(found[run.label], *ys.far)), alike=False)
     chart = Chart(
         title="Mean energy up to each time, over kT.",
         x=runs.time(),

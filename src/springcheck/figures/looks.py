@@ -124,6 +124,7 @@ MARKS = {
     "rebound": ("*", "\u2606"),
     "dart": ("p", "\u2b20"),
     "box2d": ("h", "\u2b21"),
+    "lammps": ("d", "\u25ca"),
     "rapier": ("X", "\u2716"),
     "drake": ("P", "\u271a"),
     "fault": ("H", "\u2b22"),

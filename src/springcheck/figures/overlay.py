@@ -119,11 +119,12 @@ class Runs:
         faint: bool = False,
         timed: bool = False,
         groups: Sequence[Group] | None = None,
+        alike: bool = True,
     ) -> list[Curve]:
         """A curve of each run, the first of each motion as a line or `dots`.
 
         `faint`: lines between the dots that are seen to be none of the motion; `timed`: the time of each
-        point is said.
+        point is said; `alike`: whether runs of one scheme are one motion.
         """
         found = []
         for group in self.groups if groups is None else groups:
@@ -139,7 +140,7 @@ class Runs:
                         line=not dots or faint,
                         dots=dots,
                         marks=True,
-                        over=j > 0,
+                        over=alike and j > 0,
                         notes=[f"t {t!r}" for t in run.t[: len(x)].tolist()] if timed else (),
                     )
                 )
@@ -148,7 +149,9 @@ class Runs:
     def first(self, curves: Sequence[Curve]) -> Iterable[tuple[str, Curve]]:
         """Of each motion its title and its first curve."""
         titles = {run.label: group.title for group in self.groups for run in group.members}
-        return [(titles[curve.name], curve) for curve in curves if curve.name in titles and not curve.over]
+        known = [curve for curve in curves[::-1] if curve.name in titles and not curve.over]
+        found = {(titles[curve.name], curve.group): curve for curve in known}
+        return [(title, curve) for (title, _), curve in reversed(found.items())]
 
     def leaving(self, when: Callable[[Trajectory], int | None]) -> str:
         """Which schemes leave a picture for good, and when: at which frame, None where never."""

@@ -65,7 +65,11 @@ def _heading(runs: Runs, what: str, said: str) -> str:
 
 def _of(runs: Runs, shown: Sequence[View]) -> str:
     title = shown[0].title if len(shown) == 1 else ""
-    return f" of {title}" + (f" of {runs.scene.n}" if title.startswith("particle") else "") if title else ""
+    if shown[0].what == "path" and runs.scene.particles > 1:
+        title = "particle 0"
+    particle, comma, axis = title.partition(",")
+    of = f" of {runs.scene.particles}" if title.startswith("particle") else ""
+    return f" of {particle}{of}{comma}{axis}" if title else ""
 
 
 def _portrait(runs: Runs, view: View, truth: Motion | None, *, alone: bool) -> Chart:
@@ -95,9 +99,10 @@ def _portrait(runs: Runs, view: View, truth: Motion | None, *, alone: bool) -> C
     square = view.what == "path" or (alone and runs.scene.units == "reduced" and not view.turn)
     # where the motion itself runs away all of them leave
     note = runs.leaving(when) if _steep(picked, true) is None else ""
+    of = f" of {view.title}" if view.title and view.what != "path" else ""
     named = [*runs.first(curves), *((SEPARATRIX, one) for one in lines[:1] if parting)]
     return Chart(
-        title=f"{view.y_name} over {view.x_name}{f' of {view.title}' if view.title else ''}.".capitalize(),
+        title=f"{view.y_name} over {view.x_name}{of}.".capitalize(),
         short="" if alone else view.title,
         x=xs.axis(view.x_name, view.x_unit),
         y=ys.axis(view.y_name, view.y_unit),
@@ -124,7 +129,7 @@ def clouds(runs: Runs, view: View, thermal: float) -> Bank:
     ring = [Curve(name="H = kT", group=GUIDE, x=x, y=y) for x, y in view.ring(xs.low, xs.high, thermal)]
     charts = []
     for group in groups:
-        curves = runs.curves(lambda run: picked[run.label], dots=True, groups=[group])
+        curves = runs.curves(lambda run: picked[run.label], dots=True, groups=[group], alike=False)
         charts.append(
             Chart(
                 title=f"States of {group.title}.",
@@ -219,7 +224,8 @@ def positions(runs: Runs, shown: Sequence[View], truth: Motion | None) -> Bank:
     spans = _spans(runs, shown, truth)
     charts = [_position(runs, view, truth, span, alone=len(shown) == 1) for view in shown for span in spans]
     parts = "" if len(spans) == 1 else f"; the first and the last {PERIODS_SHOWN} periods"
-    bath = "every method draws noise of its own; a few periods"
+    few = "; a few periods" if spans[-1][1] < _last(runs) else ""
+    bath = f"every method draws noise of its own{few}"
     off = _off(runs, shown[0]) if runs.scene.bath is None else bath
     return Bank(
         name="position", title="Methods drawn", charts=charts, columns=len(spans),

@@ -104,10 +104,11 @@ def _shared(grid: Sequence[Axes], charts: Sequence[Chart], columns: int) -> None
     """Charts with the same axis beside or above one another name it once."""
     for j, (axes, chart) in enumerate(zip(grid, charts, strict=True)):
         below = charts[j + columns] if j + columns < len(charts) else None
-        if below and below.x == chart.x:
+        # scales that are equal along both axes make boxes of unlike sizes
+        if below and below.x == chart.x and not chart.equal:
             axes.set_xlabel("")
             axes.tick_params(labelbottom=False)
-        if j % columns and charts[j - 1].y == chart.y:
+        if j % columns and charts[j - 1].y == chart.y and not chart.equal:
             axes.set_ylabel("")
             axes.tick_params(labelleft=False)
 
@@ -135,7 +136,7 @@ def _entries(curves: Sequence[Curve]) -> list[Line2D]:
         if group == REJECTED:
             sign = looks.mark(looks.engine(name))[1]
             label = f"FAILED: {name}\n{sign} {textwrap.fill(mine[0].title, 30)}"
-        if group in OTHER_LINES:
+        if group in OTHER_LINES and (mine[0].line or group == BEGIN):
             found.append(Line2D([], [], **OTHER_LINES[group], label=label))
         elif group != GUIDE:
             look = looks.look(group)

@@ -41,7 +41,7 @@ class Chart {
   // The picture that is shown at first, as the axes draw.
   whole() {
     return [this.spec.x, this.spec.y].flatMap(({ shown, named, values }, which) => {
-      if (this.spec.tiles || named) return [-0.5, values.length - 0.5];
+      if (this.spec.tiles || (named && !shown)) return [-0.5, values.length - 0.5];
       if (shown) return shown.map(this.ways[which]);
       const found = this.seen().flatMap((curve) => this.points.get(curve)[which]).filter(Number.isFinite);
       const [low, high] = found.reduce(([a, b], v) => [Math.min(a, v), Math.max(b, v)], [found[0], found[0]]);
@@ -65,8 +65,8 @@ class Chart {
     const beyond = ({ named, values }, n) => Math.max(0, ...values.map((v) => (named ? v.length - n : 0)));
     const L = 62 + 6.8 * beyond(spec.y, 5), B = 46 + 7.4 * beyond(spec.x, 2);
     const usual = Math.min(420, Math.max(260, Math.round(W * 0.72)));
-    const H = spec.y.named ? spec.y.values.length * 14 + T + B : usual;
-    const all = this.whole(), across = W - L - R, up = H - T - B;
+    const all = this.whole(), H = spec.y.named ? (all[3] - all[2]) * 14 + T + B : usual;
+    const across = W - L - R, up = H - T - B;
     let [x0, x1, y0, y1] = view || all, [sx, sy] = [across / (x1 - x0), up / (y1 - y0)];
     if (spec.equal) {
       sx = sy = Math.min(sx, sy);
@@ -93,15 +93,15 @@ class Chart {
     if (spec.tiles) this.tiles(inside, x, y);
     for (const { axis, at, name, look } of spec.rules) {
       const v = this.ways["xy".indexOf(axis)](at);
-      const place = axis === "x" ? { x: x(v) + 5, y: T + 14 } : { x: W - R - 5, y: y(v) - 5, ...END };
+      const place = axis === "x" ? { x: x(v) + 5, y: T + 11 } : { x: W - R - 5, y: y(v) - 5, ...END };
       inside.append(line(axis, v, look || "limit"), element("text", place, name));
     }
     for (const curve of this.seen()) this.curve(inside, curve, x, y);
     const fills = new Map(this.seen().map(({ group, look }) => [group, colourOf(look)])), [a, b, c, d] = all;
     for (const one of spec.labels.filter(({ group }) => fills.has(group))) {
       const style = { fill: fills.get(one.group) }, [off, more] = one.x > 0.6 ? [-4, END] : [4, {}];
-      const place = { x: x(a + one.x * (b - a)) + off, y: y(c + one.y * (d - c)) - 4, ...more };
-      inside.append(element("text", { class: "name", ...place, style }, one.text));
+      const place = { x: x(a + one.x * (b - a)) + off, y: Math.max(T + 9, y(c + one.y * (d - c)) - 4) };
+      inside.append(element("text", { class: "name", ...place, ...more, style }, one.text));
     }
     this.ring = element("circle", { class: "ring", r: 6, cx: -99, cy: -99 });
     this.frame = element("rect", { class: "drag", width: 0, height: 0 });

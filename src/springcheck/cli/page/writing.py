@@ -110,8 +110,8 @@ def write(content: Content, path: Path) -> int:
 def _with_looks(data: Mapping[str, Any]) -> dict[str, Any]:
     """The data with a look of each curve: colours on white and on black, dash, dash in print, mark.
 
-    Curves of one name have one look; those of one scheme share a colour, and their dashes take turns.  In
-    print, where all are black, schemes differ by their dashes in the order in which they come.
+    Curves of one name and scheme have one look; those of one scheme share a colour, and their dashes take
+    turns.  In print, where all are black, schemes differ by their dashes in the order in which they come.
     """
     order: dict[str, int] = {}
 
@@ -129,15 +129,17 @@ def _with_looks(data: Mapping[str, Any]) -> dict[str, Any]:
 
     def seen(bank: Mapping[str, Any]) -> dict[str, Any]:
         counts: Counter[tuple[str, bool]] = Counter()
-        found: dict[str, dict[str, Any]] = {}
+        found: dict[tuple[str, str], dict[str, Any]] = {}
         for curve in (curve for chart in bank["charts"] for curve in chart["curves"]):
-            if curve["name"] not in found:
+            if (curve["name"], curve["group"]) not in found:
                 # a theory's line and the marks on it are of one look
                 kind = curve["group"], curve["line"]
-                found[curve["name"]] = look(curve["group"], counts[kind])
+                found[curve["name"], curve["group"]] = look(curve["group"], counts[kind])
                 counts[kind] += 1
         return {**bank, "charts": [
-            {**chart, "curves": [{**curve, "look": found[curve["name"]]} for curve in chart["curves"]]}
+            {**chart, "curves": [
+                {**curve, "look": found[curve["name"], curve["group"]]} for curve in chart["curves"]
+            ]}
             for chart in bank["charts"]
         ]}  # fmt: skip
 

@@ -140,7 +140,8 @@ def _temperatures(runs: Runs, heated: Sequence[Heated]) -> list[Bank]:
                     name=f"{what} / that of the bath",
                     shown=(float(np.min(middle)) - room, float(np.max(middle)) + room),
                 ),
-                y=Scale(name="method", names=[one.method for one in found]),
+                # the name of the rule has a row of its own
+                y=Scale(name="method", names=[one.method for one in found], shown=(-0.6, len(found) + 0.1)),
                 curves=[*bars, *marks, law],
                 rules=[Rule(axis="x", at=1.0, name="the bath", look="here")],
             )
