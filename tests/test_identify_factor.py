@@ -73,12 +73,12 @@ def test_two_baths_and_a_force_that_is_not_linear_are_none() -> None:
 
 @pytest.mark.slow
 def test_identify_says_that_all_momenta_have_one_factor() -> None:
-    scene = particles(3, steps=1000)
+    scene = particles(3, steps=500)
     chain = springcheck.identify(driver.run(scene, "own:nose-hoover", seed=4), mass=scene.m)
     assert chain.statement.startswith("One factor a step multiplies the momenta of all 3 coordinates, before")
     assert (chain.verdict, chain.fits, chain.candidates) == ("none", False, ())
     rescaled = springcheck.identify(driver.run(scene, "own:bussi", seed=4), mass=scene.m)
     assert [x.scheme for x in rescaled.candidates] == ["bussi", "bussi-unsigned"]
-    alone = particles(1, steps=1000)
+    alone = particles(1, steps=500)
     found = springcheck.identify(driver.run(alone, "own:nose-hoover", seed=4), mass=alone.m)
     assert "shows in two particles or more" in found.explanations[0].remedy

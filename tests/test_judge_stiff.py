@@ -93,10 +93,11 @@ def test_the_momenta_of_a_stiff_pair_are_judged(name: str, ratio: float) -> None
 def test_every_way_to_write_an_implicit_step_of_a_stiff_pair_passes(name: str, form: str) -> None:
     for seed in range(2):
         rng = np.random.default_rng([5, seed])
-        for ratio in (1.0, 1e2, 1e4, 1e6, 1e8, 1e10):
+        for i, ratio in enumerate((1.0, 1e2, 1e4, 1e6, 1e8, 1e10)):
             scene = pair(ratio, rng, float(10 ** rng.uniform(-1, 0.5)))
-            for per_row in (True, False):
-                assert alarms(scene, written(scene, name, form, per_row=per_row)) == [], (seed, ratio)
+            # at every ratio both ways, each from a start of its own
+            run = written(scene, name, form, per_row=(seed + i) % 2 == 0)
+            assert alarms(scene, run) == [], (seed, ratio)
 
 
 def soft_body(rng: np.random.Generator, hw: float) -> Scene:

@@ -229,7 +229,7 @@ def test_what_the_grader_holds_for_right_is_what_the_laws_of_thermostats_say() -
     assert QUESTIONS["kinetic"].right(h, w, kT) == pytest.approx(kinetic, rel=1e-12)
     hot = law("obabo").configurational[0]
     assert QUESTIONS["configurational"].right(h, w) == pytest.approx(hot, rel=1e-12)
-    n, r = 4000, 0.6
+    n, r = 1000, 0.6
     correlation = r ** (2.0 * np.abs(np.subtract.outer(np.arange(n), np.arange(n))))
     # the ends have neighbours on one side alone: a share r**2/(n (1 - r**4)) of the whole
     assert QUESTIONS["error"].right(n, r) == pytest.approx((2 * correlation.mean()) ** 0.5, rel=1 / n)

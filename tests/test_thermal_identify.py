@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,7 @@ from springcheck.physics.terms import Spring, WallSpring
 from springcheck.thermal import THERMOSTATS, Law
 from springcheck.thermal.collisions import between_collisions
 from springcheck.thermal.likelihood import FULL_RANK, likely_apart
-from springcheck.thermal.states import identify_thermal
+from springcheck.thermal.states import Thermal, identify_thermal
 
 pytestmark = pytest.mark.slow
 
@@ -202,11 +203,17 @@ def test_steps_that_turn_little_are_counted_as_well(name: str) -> None:
     assert {4, 5, 6} <= set(one.strides)
 
 
+@cache
+def in_units_of_one(name: str) -> tuple[tuple[np.ndarray, np.ndarray, np.ndarray], Thermal | None]:
+    made = run(name, 1000)
+    return made, identify_thermal(*made)
+
+
 @pytest.mark.parametrize("name", ["obabo", "baoab"])
 @pytest.mark.parametrize(("length", "time"), [(1e-10, 1e-13), (1e-80, 1.0), (1e60, 1e-6)])
 def test_a_unit_is_of_no_account(name: str, length: float, time: float) -> None:
-    t, q, v = run(name, 1000)
-    wanted, found = identify_thermal(t, q, v), identify_thermal(t * time, q * length, v * length / time)
+    (t, q, v), wanted = in_units_of_one(name)
+    found = identify_thermal(t * time, q * length, v * length / time)
     assert wanted is not None
     assert found is not None
     assert [x.scheme for x in found.candidates] == [x.scheme for x in wanted.candidates]

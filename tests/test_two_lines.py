@@ -66,7 +66,7 @@ def test_every_command_has_a_scheme_that_is_two_lines(name: str, tmp_path: Path)
         ["identify", "run.h5"],
         ["report", "run.h5", "-o", "page.html"],
         ["stability", scene, *method, "-o", "stability.h5"],
-        ["precision", scene, *method, "--budget", "0.4", "-o", "precision.h5"],
+        ["precision", scene, *method, "--budget", "0.1", "-o", "precision.h5"],
     ]
     program = PROGRAM.format(line=LINE.format(how=how), commands=commands)
     done = subprocess.run(

@@ -7,10 +7,14 @@ standard errors one of the three statistical ones is off its law by chance once 
 from __future__ import annotations
 
 import re
+import runpy
 import shutil
 import subprocess
 import sys
+import warnings
+from contextlib import redirect_stdout
 from importlib.metadata import PackageNotFoundError, distribution
+from io import StringIO
 from pathlib import Path
 
 import numpy as np
@@ -76,6 +80,23 @@ def command(script: Path, folder: Path) -> list[str]:
     return ["node", str(script)]
 
 
+HERE = ("ase", "openmm")
+"""Engines that other tests have imported: a process of its own takes longer to start than most of them."""
+
+
+def printed(script: str) -> str:
+    """What a script prints, run in this process; skips where OpenMM has no OpenCL."""
+    with redirect_stdout(StringIO()) as out, warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        try:
+            runpy.run_path(script, run_name="__main__")
+        except Exception as error:
+            if "no registered Platform" in str(error):
+                pytest.skip("OpenMM finds no OpenCL here")
+            raise
+    return out.getvalue()
+
+
 @pytest.mark.parametrize("script", SCRIPTS, ids=lambda x: x.stem)
 def test_a_finding_is_still_there(script: Path, tmp_path: Path) -> None:
     words = command(script, tmp_path)
@@ -84,12 +105,14 @@ def test_a_finding_is_still_there(script: Path, tmp_path: Path) -> None:
         assert text.count(FEWER[script.stem][0]) == 1
         words[-1] = str(tmp_path / script.name)
         Path(words[-1]).write_text(text.replace(*FEWER[script.stem]))
-    ran = subprocess.run(words, capture_output=True, text=True, timeout=300, check=False)
-    if "no registered Platform" in ran.stderr:
-        pytest.skip("OpenMM finds no OpenCL here")
-    assert ran.returncode == 0, ran.stderr
-    found = LINE.search(ran.stdout)
-    assert found, ran.stdout
+    if script.suffix == ".py" and script.stem.startswith(HERE):
+        out = printed(words[-1])
+    else:
+        ran = subprocess.run(words, capture_output=True, text=True, timeout=300, check=False)
+        assert ran.returncode == 0, ran.stderr
+        out = ran.stdout
+    found = LINE.search(out)
+    assert found, out
     measured, law, uncertainty, promised = map(float, found.groups())
     reach = STANDARD_ERRORS * uncertainty
     gone = f"{script.stem}: the engine now does what it promises; take the finding from the table"
