@@ -25,10 +25,12 @@ WRONG_BEFORE = {
     134: ("gj-iv", "coupled"), 135: ("gj-v", "coupled"), 148: ("lammps-langevin", "coupled"),
     154: ("andersen-leapfrog", "coupled"), 185: ("andersen-leapfrog", "whole"), 292: ("gj-vii", "coupled"),
     596: ("gj-i", "coupled"), 597: ("gj-ii", "coupled"), 1031: ("gj-ii", "text"),
-    60041: ("gj-iii", "strided"), 60056: ("bbk", "strided"),
+    40110: ("gj-viii", "text"), 60041: ("gj-iii", "strided"), 60056: ("bbk", "strided"),
+    60120: ("bbk", "text"), 60212: ("gj-vi-half", "strided"), 60302: ("gj-viii", "coupled"),
     60881: ("gj-iii-half", "single"), 70073: ("lammps-langevin", "coupled"),
 }  # fmt: skip
-"""Cases that had a wrong name, a list without the right one or no end, with their schemes and kinds."""
+"""Cases that had a wrong name, a list without the right one, nothing said or no end, with their schemes and
+kinds."""
 
 
 @pytest.mark.parametrize("case", WRONG_BEFORE)

@@ -29,7 +29,8 @@ def modes(q: Floats, v: Floats, m: Floats) -> tuple[Floats, bool] | None:
     free = turned[-n:, : 4 * n]
     if weights[-n] < FREE_OF_NOISE * weights[-n - 1] and np.linalg.cond(free[:, :n]) < 1 / FREE_OF_NOISE:
         best, apart = _least_alike(np.linalg.solve(free[:, :n], free[:, n:]))
-        if apart > np.sqrt(FREE_OF_NOISE):
+        # modes are off by what these are off by, over what tells them apart
+        if apart**2 > max(weights[-n] / weights[-n - 1], 2.0**-52):
             return np.asarray(np.linalg.eigh(best + best.T)[1].T * root), True
     A = np.linalg.lstsq(frames[:, 2 * n :], frames[:, : 2 * n], rcond=None)[0][: 2 * n].T
     best, _ = _least_alike(np.concatenate(np.split(A, 2), axis=1))

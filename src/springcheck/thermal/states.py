@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from math import inf, nan
 from typing import Any
 
@@ -100,8 +101,8 @@ def identify_thermal(
         return found and replace(found, known=found.known and not bent)
 
     # what is left of a number that takes no noise is rounding
-    apart = min(map(_together, left[sizes_left > NOISE]), default=1.0)
-    even = apart > EVEN and _is_even(sizes_left[1] * left[1], u[1:])
+    added = partial(_is_added, left[sizes_left > NOISE], sizes_left[1] * left[1], u[1:])
+    even = added(1)
     rest = frames @ turned[4] / max(float(np.std(frames @ turned[4])), 1e-300)
     if beside is not None:
         moved = np.concatenate([beside[:-1], np.diff(beside, axis=0)], axis=1)
@@ -115,25 +116,24 @@ def identify_thermal(
         free = turned[4][:4] / np.tile(sizes, 2)
         misfit = weights[4] / weights[3]
         # what digits leave of it is white but for neighbours, which share a frame
-        digits = misfit < 1e-9 or _is_white(rest[::2])
+        digits = misfit < 1e-9 or _is_of_digits(rest[::2])
         # of one draw the position and the momentum leave the same
         return (
             clear(_of_one(q, v, h, free / free[0], misfit, left[1], even, mixed))
             if free[0] and digits
             else None
         )
-    jump = q[2:] - q[:-2] - 2 * h * v[1:-1]
-    if np.std(jump) < 1e-6 * sizes[0]:
-        return clear(_of_two_halves(q, h, float(np.std(jump) / sizes[0]), beside, mixed))
+    jump = (x[2:] - x[:-2]) - 2 * h * sizes[1] / sizes[0] * u[1:-1]
+    off = float(np.std(jump))
+    # and of what frames two steps apart share none three steps apart do
+    if off < 1e-6 or (off < 1e-3 * sizes_left[0] and _is_of_digits(jump[::3])):
+        return clear(_of_two_halves(q, h, off, beside, mixed))
     if collided := tuple(between_collisions(q, v, h)):
         return Thermal(candidates=collided, free=(), misfit=nan, uniform=False)
     white = all(map(_is_white, left))
-    if not white:
-        # draws that are carried on into the next frame are in no other
-        halves = [x[i::2] for x in left for i in (0, 1)]
-        apart = min(map(_together, halves)) if all(map(_is_white, halves)) else 0.0
-        even = apart > EVEN and _is_even(sizes_left[1] * left[1], u[1:])
-    if not even:
+    # draws that are carried on into the next frame are in no other
+    carried = all(_is_white(x[i::2]) for x in left for i in (0, 1)) and added(2)
+    if not (white and even) and not carried:
         return None
     found = tuple(likely_apart(q, v, h, white=white))
     return Thermal(
@@ -161,15 +161,15 @@ def _left_of(z: Floats, beside: Floats) -> tuple[Floats, Floats]:
     return np.asarray(size), np.asarray(left / np.maximum(size, 1e-300)[:, None])
 
 
-def _is_even(left: Floats, u: Floats) -> bool:
+def _is_added(noisy: Floats, left: Floats, u: Floats, every: int) -> bool:
     """Whether what is left is added to the momenta u - left, and no factor of them: its size says nothing of
-    theirs, and its sign over theirs nothing of the next one's."""
+    theirs, its sign over theirs nothing of that so many frames later, nor does what `noisy` numbers leave."""
     made = u - np.mean(u) - left
     large = [np.sign(np.abs(x) - np.median(np.abs(x))) for x in (left, made)]
-    after = [
-        chance.neighbours(x[:, None]) for x in (np.sign(left * made), left / max(float(np.std(left)), 1e-300))
-    ]
-    return min(chance.mean(large[0] * large[1]), *after) > EVEN
+    after = (np.sign(left * made), left / max(float(np.std(left)), 1e-300))
+    chances = [chance.neighbours(x[j::every, None]) for x in after for j in range(every)]
+    chances += [_together(x[j::every]) for x in noisy for j in range(every)]
+    return min(chance.mean(large[0] * large[1]), *chances) > EVEN
 
 
 def _together(x: Floats) -> float:
@@ -183,6 +183,11 @@ def _together(x: Floats) -> float:
 
 def _is_white(x: Floats) -> bool:
     return min(chance.neighbours(x[:, None]), chance.repeats(x[:, None])) > WHITE
+
+
+def _is_of_digits(x: Floats) -> bool:
+    """Whether what is left are digits, whose size goes with a number's, and whose sign with nothing."""
+    return _is_white(np.sign(x - np.median(x)))
 
 
 def _is_uniform(x: Floats) -> bool:
