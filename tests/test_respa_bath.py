@@ -1,4 +1,4 @@
-"""BAOAB-RESPA: a thermostat that takes fast springs twice between two half kicks of the slow ones."""
+"""BAOAB-RESPA: a thermostat that takes fast springs several times between two half kicks of the slow ones."""
 
 from __future__ import annotations
 
@@ -8,16 +8,22 @@ import numpy as np
 import pytest
 
 import springcheck
-from springcheck import driver, engines
+from springcheck import checks, driver, engines
 from springcheck.checks.seeds import SEEDED, by_engine, noise_map
+from springcheck.identify.thermal import of_bath
+from springcheck.physics.arrays import Floats
 from springcheck.physics.bath import Bath
 from springcheck.physics.scene import Scene
-from springcheck.physics.terms import Spring, WallSpring
+from springcheck.physics.terms import Quartic, Spring, WallSpring
 from springcheck.studies.run.tally import heated_of
-from springcheck.thermal import THERMOSTATS
-from springcheck.thermal.likelihood import FULL_RANK, likely
+from springcheck.thermal import THERMOSTATS, Stepper, Thermostat
+from springcheck.thermal.catalogue import by_groups
+from springcheck.thermal.likelihood import FULL_RANK, SUBSTEPS, likely
 
-LABELS = ("own:baoab-respa2", "openmm:mts-langevin-2")
+LABELS = (
+    "own:baoab-respa2", "openmm:mts-langevin-2", "own:baoab-respa3", "openmm:mts-langevin-3",
+    "openmm:mts-langevin-4",
+)  # fmt: skip
 
 
 def two_scales(*, joined: bool = False, steps: int = 400) -> Scene:
@@ -60,6 +66,27 @@ def test_springs_that_are_not_taken_apart_are_another_map(label: str) -> None:
     assert noise_map(wrong).passed is False
 
 
+@pytest.mark.parametrize("joined", [False, True], ids=["apart", "joined"])
+@pytest.mark.parametrize("wrong", [{"temperature": 2.1}, {"friction": 1.2}])
+def test_sums_of_many_draws_a_step_show_another_bath(wrong: dict[str, float], joined: bool) -> None:
+    scene = two_scales(joined=joined)
+    assert scene.bath is not None
+    run = driver.run(scene, "own:baoab-respa4", seed=5)
+    told = checks.judge(replace(scene, bath=replace(scene.bath, **wrong)), run)
+    assert "draws-variance" in {v.check for v in checks.shared(told) if v.passed is False}
+
+
+def test_three_draws_a_step_are_not_told_by_forces_that_are_not_linear() -> None:
+    scene = two_scales()
+    well = Quartic(i=np.arange(2), b=np.array([1.1, 0.7]), at=np.zeros(2))
+    scene = replace(scene, terms=(*scene.terms, well), steps=100)
+    verdicts = springcheck.judge(scene, driver.run(scene, "own:baoab-respa3", seed=5))
+    assert [v.check for v in verdicts if v.passed is False] == []
+    (variance,) = (v for v in verdicts if v.check == "draws-variance")
+    assert variance.passed is None
+    assert "linear forces alone" in variance.why
+
+
 def test_its_temperatures_are_those_of_its_law() -> None:
     scene = two_scales(steps=20_000)
     found = heated_of(scene, [driver.run(scene, LABELS[0], seed=8)])
@@ -76,15 +103,47 @@ def test_joined_particles_have_no_law_by_modes() -> None:
     assert found.kinetic > 0
 
 
-def test_a_file_of_it_is_told_with_its_share_of_fast_springs() -> None:
+@pytest.mark.parametrize(("substeps", "frames"), [(2, 20_000)])
+def test_a_long_file_of_it_is_told_with_its_substeps_and_its_share_of_fast_springs(
+    substeps: int, frames: int
+) -> None:
+    scene = two_scales(steps=frames)
+    run = driver.run(scene, f"own:baoab-respa{substeps}", seed=3)
+    found = likely(FULL_RANK, run.q[:, 0], run.p[:, 0] / scene.m[0], scene.step)
+    assert found[0].scheme == f"baoab-respa{substeps}"
+    assert found[1].nats > 13.8
+    assert found[0].fast == pytest.approx(41 / 43.9, abs=0.03)
+
+
+@pytest.mark.parametrize(("substeps", "every"), [(3, 1), (4, 3), (20, 1)])
+def test_a_short_file_of_it_is_listed_with_every_count_that_it_leaves_open(substeps: int, every: int) -> None:
+    q, v = stepped(by_groups(substeps), 1000 * every)
+    t = every * np.arange(1000.0)
+    found = of_bath(t, q[::every, None], v[::every, None], None, np.ones(1))
+    assert found is not None
+    assert found.scheme is None
+    names = [one.scheme for one in found.candidates]
+    assert f"baoab-respa{min(substeps, SUBSTEPS[-1])}" in names
+    assert len(set(names)) == len(names)
+    assert found.statement.count("baoab-respa") == 1
+    assert substeps <= 12 or "12 or more" in found.statement
+
+
+def stepped(scheme: Thermostat, steps: int) -> tuple[Floats, Floats]:
+    """Positions and velocities by a scheme of unit step and mass, half of its spring fast."""
+    rng, k = np.random.default_rng(4), 0.65**2
+    stepper = Stepper(scheme, h=1.0, m=np.ones(1), rate=0.17, thermal=1.0, width=np.float64)
+    parts = dict.fromkeys(("slow", "fast"), lambda q, p: -k / 2 * q)
+    q, p, out = np.ones(1), np.zeros(1), np.empty((2, steps))
+    for i in range(steps):
+        out[:, i] = q[0], p[0]
+        q, p = stepper(q, p, parts, list(rng.normal(size=(scheme.draws, 1))))
+    return out[0], out[1]
+
+
+def test_obabo_is_not_told_as_it() -> None:
     scene = two_scales(steps=1000)
-    run = driver.run(scene, LABELS[0], seed=3)
-    for j, fast in enumerate([41 / 43.9, 17 / 18.1]):
-        found = likely(FULL_RANK, run.q[:, j], run.p[:, j] / scene.m[j], scene.step)
-        assert found[0].scheme == "baoab-respa2"
-        assert found[1].nats > 13.8
-        assert found[0].fast == pytest.approx(fast, abs=0.1)
     other = driver.run(scene, "own:obabo", seed=3)
     found = likely(FULL_RANK, other.q[:, 0], other.p[:, 0] / scene.m[0], scene.step)
     assert found[0].scheme == "obabo"
-    assert {x.scheme: x.nats for x in found}["baoab-respa2"] > 13.8
+    assert all(x.nats > 13.8 for x in found if x.scheme.startswith("baoab-respa"))

@@ -16,7 +16,9 @@ from springcheck.thermal import THERMOSTATS, Law, Stepper
 
 LINEAR = [name for name, one in THERMOSTATS.items() if not one.rescales]
 
-NO_TABLE = ("vanden-eijnden-ciccotti", "baoab-respa2")
+SUBSTEPS = {"baoab-respa2": 2, "baoab-respa3": 3, "baoab-respa4": 4}
+
+NO_TABLE = ("vanden-eijnden-ciccotti", *SUBSTEPS)
 """Those without covariances in the literature: their recurrences are held against their papers'."""
 
 SPRINGS = [(0.35, 3.7, 2.9, 0.8, 1.7), (0.11, 0.4, 31.0, 2.3, 0.02), (1.3, 5.0, 2.0, 0.05, 40.0)]
@@ -84,8 +86,9 @@ def by_hand(
     """A and G of one step on (x, v, last draw), from the recurrences as their papers print them."""
     H, g = mp.mpf(h), mp.mpf(rate)
     M, K, T = mp.mpf(m), mp.mpf(k), mp.mpf(thermal)
-    unit = [mp.matrix([[int(i == j) for j in range(5)]]) for i in range(5)]
-    x, v, old, one, two = unit
+    unit = [mp.matrix([[int(i == j) for j in range(7)]]) for i in range(7)]
+    x, v, old, *draws = unit
+    one, two = draws[:2]
     sigma = mp.sqrt(2 * T * g / M)
     F = -K / M
     if name == "bbk":
@@ -115,10 +118,10 @@ def by_hand(
         rows = [x1, v1, 0 * x]
     elif name == "euler-maruyama":
         rows = [x + H * v, v + H * (F * x - g * v) + sigma * mp.sqrt(H) * one, 0 * x]
-    elif name == "baoab-respa2":
-        d, s = H / 2, mp.exp(-g * H / 2)
+    elif name in SUBSTEPS:
+        d, s = H / SUBSTEPS[name], mp.exp(-g * H / SUBSTEPS[name])
         q, u = x, v + H / 2 * F * (1 - mp.mpf(FAST)) * x
-        for xi in (one, two):
+        for xi in draws[: SUBSTEPS[name]]:
             u = u + d / 2 * F * mp.mpf(FAST) * q
             q = q + d / 2 * u
             u = s * u + mp.sqrt((1 - s * s) * T / M) * xi
@@ -132,11 +135,11 @@ def by_hand(
         x1 = x + H * u
         u = s * u + mp.sqrt((1 - s * s) * T / M) * two
         rows = [x1, u + H / 2 * F * x1, 0 * x]
-    A, G = mp.zeros(3), mp.zeros(3, 2)
+    A, G = mp.zeros(3), mp.zeros(3, 4)
     for i, row in enumerate(rows):
         for j in range(3):
             A[i, j] = row[j]
-        for j in range(2):
+        for j in range(4):
             G[i, j] = row[3 + j]
     return A, G
 
@@ -144,7 +147,7 @@ def by_hand(
 @pytest.mark.parametrize("spring", SPRINGS)
 @pytest.mark.parametrize(
     "name",
-    ["bbk", "lammps-langevin", "vanden-eijnden-ciccotti", "euler-maruyama", "boaob", "baoab-respa2"],
+    ["bbk", "lammps-langevin", "vanden-eijnden-ciccotti", "euler-maruyama", "boaob", *SUBSTEPS],
 )
 def test_laws_agree_with_the_recurrences_of_the_papers(name: str, spring: tuple[float, ...]) -> None:
     mp.mp.dps = 40
@@ -180,9 +183,10 @@ def test_diffusion_is_that_of_the_table(name: str) -> None:
     found = law(name, h, m, 1.0, rate, thermal).diffusion[0]
     if name in {"baoab", "baoa", "aboba", "obabo", "oabao"} or name.startswith("andersen"):
         assert found == pytest.approx(x / 2 / math.tanh(x / 2), rel=1e-12)
-    elif name == "baoab-respa2":
-        # BAOAB at half the step
-        assert found == pytest.approx(x / 4 / math.tanh(x / 4), rel=1e-12)
+    elif name in SUBSTEPS:
+        # BAOAB at that part of the step
+        part = x / 2 / SUBSTEPS[name]
+        assert found == pytest.approx(part / math.tanh(part), rel=1e-12)
     elif name in {"aoboa", "boaob"}:
         # one kick of the bath between two flights, or flights with the half decayed velocity
         assert found == pytest.approx(

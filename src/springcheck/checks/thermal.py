@@ -19,6 +19,8 @@ from springcheck.thermal.draws import SMALLEST, Reading, law_of, read
 
 HIDDEN = "the motion is so much larger than its noise that rounding hides the draws"
 
+NOT_LINEAR = "two numbers of a state tell three draws or more by linear forces alone"
+
 NO_DRAWS = "it takes no draws: its bath is a chain"
 
 
@@ -64,7 +66,7 @@ def noise_direction(case: Case) -> Finding | str:
             return "squares of so small momenta underflow"
     found = reading(case)
     if found.across is None:
-        return "two fresh draws a step reach every state: their covariance is judged"
+        return "fresh draws of a step reach every state: their covariance is judged"
     worst = np.where(np.isfinite(found.across), found.across, np.inf).max(axis=1)
     off = np.flatnonzero(~(worst <= found.roundings))
     where = f"; first at step {case.steps[0] + int(off[0]) + 1}" if len(off) else ""
@@ -80,10 +82,10 @@ def _draws(case: Case) -> tuple[Floats, Reading] | str:
         return NO_DRAWS
     if limit := small_move(case.trajectory):
         return limit
-    found = reading(case)
+    scheme, found = THERMOSTATS[case.trajectory.scheme], reading(case)
     if not found.known:
-        return HIDDEN
-    scheme, x = THERMOSTATS[case.trajectory.scheme], found.draws
+        return HIDDEN if scheme.fresh < 3 or case.judged.system.is_linear else NOT_LINEAR
+    x = found.draws
     if scheme.uniform and not case.scene.system.rods:
         x = chance.normal_scores(x)
     if found.hits is not None:

@@ -13,7 +13,7 @@ import numpy as np
 
 from springcheck.identify.result import Explanation, Identification
 from springcheck.physics.arrays import Floats
-from springcheck.thermal import THERMOSTATS
+from springcheck.thermal.catalogue import random_scheme
 
 PLACES_OF_FACTOR = ("before velocity Verlet", "after velocity Verlet", "amid the drift of leapfrog")
 
@@ -57,7 +57,7 @@ def by_a_factor(found: Identification, h: float, q: Floats, v: Floats) -> Identi
         return found
     place, misfit, factor = seen
     low, high = np.quantile(factor, [0.1, 0.9])
-    kept = tuple(x for x in found.candidates if THERMOSTATS[x.scheme].rescales)
+    kept = tuple(x for x in found.candidates if random_scheme(x.scheme).rescales)
     which = " or ".join(x.scheme for x in kept) or "a Nose-Hoover chain, or a thermostat that rescales"
     cause = (
         f"One factor a step multiplies the momenta of all {q.shape[1]} coordinates, {place}: {low:.3g} to "

@@ -12,6 +12,8 @@ from springcheck.identify.factor import by_a_factor
 from springcheck.identify.result import Candidate, Explanation, Identification
 from springcheck.physics.arrays import Floats
 from springcheck.thermal import THERMOSTATS
+from springcheck.thermal.catalogue import GROUPS
+from springcheck.thermal.likelihood import SUBSTEPS
 from springcheck.thermal.modes import FREE_OF_NOISE, modes
 from springcheck.thermal.states import FEWEST, Thermal, identify_thermal
 
@@ -119,7 +121,15 @@ def _said(found: list[Thermal], h: float, m: Any, *, with_mass: bool, joined: bo
         late = "" if THERMOSTATS[best].synchronised else "; its velocities are of another time"
         statement = f"{head}, {THERMOSTATS[best].title}{late}"
     elif best:
-        which = [_with_strides(name, rows[name][0].strides) for name in kept]
+        every_count = [name for name in kept if name.startswith(GROUPS)]
+        of_counts = tuple({s for name in every_count for s in rows[name][0].strides})
+        which = [
+            _with_strides(name, rows[name][0].strides)
+            if name not in every_count or len(every_count) == 1
+            else _with_strides(_counts(every_count), of_counts)
+            for name in kept
+            if name not in every_count[1:]
+        ]
         statement = f"{head}, {' or '.join(which)}{'' if first.known else ' or one that is not known here'}"
     else:
         statement = (
@@ -138,6 +148,12 @@ def _said(found: list[Thermal], h: float, m: Any, *, with_mass: bool, joined: bo
         notes=tuple(notes),
         explanations=() if best else (Explanation(cause=statement, remedy=REMEDY, misfit=math.nan),),
     )  # fmt: skip
+
+
+def _counts(names: list[str]) -> str:
+    """A family of schemes that are told by a count of substeps."""
+    counts = sorted(int(x.removeprefix(GROUPS)) for x in names)
+    return f"{GROUPS}{counts[0]} to {counts[-1]}{' or more' if counts[-1] == SUBSTEPS[-1] else ''}"
 
 
 def _with_strides(name: str, strides: tuple[int, ...]) -> str:

@@ -17,6 +17,7 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cache
 from math import inf
 from typing import Any, Literal, NamedTuple, TypeAlias
 
@@ -77,6 +78,8 @@ class Thermostat:
     acts: tuple[Act, ...]
     draws: int = 1
     """Draws that act in a step."""
+    substeps: int = 1
+    """How often fast terms act in a step, by slow and by fast ones apart where that is more than once."""
     carried: int = 0
     """How many of them, its first, were the last of the step before."""
     uniform: bool = False
@@ -116,7 +119,7 @@ class Thermostat:
     @property
     def splits(self) -> bool:
         """Whether it kicks by slow and by fast terms apart."""
-        return any(act.kind == "fast" for act in self.acts)
+        return self.substeps > 1
 
     @property
     def kinetic_of_rods(self) -> bool:
@@ -183,15 +186,19 @@ def _by_letters(letters: str) -> Thermostat:
     )  # fmt: skip
 
 
-def _by_groups(substeps: int) -> Thermostat:
-    """BAOAB of fast terms, so often between two half kicks of slow ones."""
+GROUPS = "baoab-respa"
+
+
+@cache
+def by_groups(substeps: int) -> Thermostat:
+    """BAOAB of fast terms, so often between two half kicks of slow ones: of any number of substeps a scheme."""
     share, slow = Fraction(1, 2 * substeps), Act("slow", HALF)
     acts = [slow]
     for j in range(substeps):
         inner = Act("fast", share), Act("drift", share)
         acts += [*inner, Act("exchange", decay(substeps), j), *inner[::-1]]
     return Thermostat(
-        name=f"baoab-respa{substeps}", title=f"BAOAB-RESPA: fast springs {substeps} times a step",
+        name=f"{GROUPS}{substeps}", substeps=substeps, title=f"BAOAB-RESPA: fast springs {substeps} times a step",
         acts=(*acts, slow), draws=substeps, source="Lagardere et al., J. Phys. Chem. Lett. 10 (2019) 2593",
     )  # fmt: skip
 
@@ -268,7 +275,7 @@ _LAMMPS = (
 """Up to where rods have their lengths again, and the rest."""
 
 _OTHERS = (
-    _by_groups(2),
+    *map(by_groups, (2, 3, 4)),
     Thermostat(
         name="bbk", title="BBK, each random force used in two half kicks",
         acts=(
@@ -356,3 +363,8 @@ THERMOSTATS: dict[str, Thermostat] = {
     one.name: one
     for one in (*map(_by_letters, _SAID), *map(_gj, GJ), *map(_gj_half, GJ), *_OTHERS, *_RESCALED, *_CHAINS)
 }
+
+
+def random_scheme(name: str) -> Thermostat:
+    """The thermostat of a name, of the catalogue or of a count of substeps beyond it."""
+    return THERMOSTATS.get(name) or by_groups(int(name.removeprefix(GROUPS)))

@@ -139,6 +139,9 @@ class _Reader:
             return self._rescaled(start, end)
         if self.scheme.collides:
             return self._collided(start, end)
+        if self.scheme.fresh > 2:
+            draws, unit = self._summed(start, end)
+            return self._reading(draws.transpose(1, 0, 2).reshape(-1, draws.shape[2]), None, unit)
         draws, across, unit, unseen = self._solved(start, end, hit=False)
         c = self.scheme.carried
         if draws.shape[0] == 1:
@@ -258,6 +261,35 @@ class _Reader:
     ) -> tuple[Extended, Extended]:
         """One rounding of everything that a step adds up."""
         return one_rounding(self.scene, self.sizer, start, list(np.abs(draws)), hit, self.how, self.rebuilt)
+
+    def _summed(
+        self, start: tuple[Extended, Extended], end: tuple[Extended, Extended]
+    ) -> tuple[Extended, Extended]:
+        """Of more draws a step than a state has numbers: that many independent sums of them (2, f-1, n), and
+        one rounding of each, by the Cholesky factor of what draws make of all particles together.  Infinite
+        ones where particles are too many, or forces not linear: what a draw makes then depends on others."""
+        f, n = start[0].shape
+        r, unknown = self.scheme.draws, np.full((2, f, n), np.inf, np.longdouble)
+        if n > MOST_JOINTLY or not self.scene.system.is_linear:
+            return unknown, unknown
+        still, each = np.zeros((r * n, n), np.longdouble), np.eye(r * n, dtype=np.longdouble)
+        made = [
+            np.stack(self.stepper(still, still, self._force, list(of_each), False, still))
+            for of_each in (each.reshape(-1, r, n).transpose(1, 0, 2), np.zeros((r, r * n, n), np.longdouble))
+        ]
+        J = (made[0] - made[1]).transpose(0, 2, 1).reshape(2 * n, r * n).astype(np.float64)
+        size = np.linalg.norm(J, axis=1)
+        try:
+            J = J / size[:, None]
+            inverse = np.linalg.inv(np.linalg.cholesky(J @ J.T))
+        except np.linalg.LinAlgError:
+            return unknown, unknown
+        none = np.stack(self.stepper(*start, self._force, list(np.zeros((r, f, n))), False, end[0]))
+        left = (np.stack(end) - none).transpose(1, 0, 2).reshape(f, 2 * n) / size
+        sums = left @ inverse.T
+        draws = (sums @ (inverse @ J)).reshape(f, r, n).transpose(1, 0, 2)
+        of = np.stack(self._allowed(start, draws)).transpose(1, 0, 2).reshape(f, 2 * n) / size
+        return tuple(x.reshape(f, 2, n).transpose(1, 0, 2) for x in (sums, of @ np.abs(inverse).T))
 
     def _solved(
         self, start: tuple[Extended, Extended], end: tuple[Extended, Extended], *, hit: bool

@@ -10,12 +10,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import pairwise
 from math import inf, nan
 
 import numpy as np
 
 from springcheck.physics.arrays import Floats
-from springcheck.thermal.catalogue import THERMOSTATS
+from springcheck.thermal.catalogue import THERMOSTATS, Thermostat, by_groups
 from springcheck.thermal.laws import Law
 
 ODDS = float(np.log(1e6))
@@ -27,8 +28,16 @@ GAINED_BY_CHANCE = 25.0
 STEPS_A_FRAME = (2, 3, 4, 5, 6, 8)
 """Steps from frame to frame that are tried where they are not known."""
 
-FULL_RANK = tuple(name for name, one in THERMOSTATS.items() if one.full_rank and not one.carried)
-"""Schemes whose every step has new noise of rank two."""
+SUBSTEPS = (3, 4, 5, 8, 12)
+"""Substeps of fast terms that are tried where two may be too few: more than the last are like as many."""
+
+UNLIKE_A_FRAME = 0.2
+"""Nats a frame by which two substeps may fall short of the best, for more of them to be tried."""
+
+FULL_RANK = tuple(
+    name for name, one in THERMOSTATS.items() if one.full_rank and not one.carried and one.substeps <= 2
+)
+"""Schemes whose every step has new noise of rank two, of those that are told by a count the first."""
 
 EITHER_WAY = 0.5
 """Sine of the turn between two frames, below which it is taken both ways."""
@@ -72,7 +81,8 @@ def likely(
     None where every one falls short of a free map and a free noise by more than chance allows.
     """
     q, v, unit = _scaled(q, v, h)
-    found = [y for name in names for y in _of_scheme(name, q, v, h, (1,), turn)]
+    found = [y for name in names for y in _of_scheme(THERMOSTATS[name], q, v, h, (1,), turn)]
+    found += _of_more_substeps(found, q, v, h)
     return _in_units(_compared(found, q, v, fits=not THERMOSTATS[names[0]].full_rank), unit)
 
 
@@ -85,10 +95,11 @@ def likely_apart(q: Floats, v: Floats, h: float, *, white: bool = True) -> list[
     """
     found: list[Candidate] = []
     q, v, unit = _scaled(q, v, h)
-    for name, scheme in THERMOSTATS.items():
-        if not scheme.rescales:
+    for scheme in THERMOSTATS.values():
+        if not scheme.rescales and scheme.substeps <= 2:
             at_once = scheme.full_rank and white != bool(scheme.carried)
-            found += _of_scheme(name, q, v, h, (1,) * at_once + STEPS_A_FRAME)
+            found += _of_scheme(scheme, q, v, h, (1,) * at_once + STEPS_A_FRAME)
+    found += _of_more_substeps(found, q, v, h)
     kept: dict[str, Candidate] = {}
     for one in _compared(found, q, v):
         before = kept.get(one.scheme)
@@ -125,17 +136,42 @@ def _compared(found: list[Candidate], q: Floats, v: Floats, *, fits: bool = Fals
     return sorted((replace(y, nats=y.nats - best) for y in found), key=lambda y: y.nats)
 
 
+def _of_more_substeps(found: list[Candidate], q: Floats, v: Floats, h: float) -> list[Candidate]:
+    """Those found of two substeps with more of them: each count begins where the one before ends, and is the
+    last where it is less likely, and by more than `ODDS` than the best.  Counts between two are as likely as
+    the likelier one, so that none of them is named unseen."""
+    best, out = min((y.nats for y in found), default=inf), []
+    far = best + UNLIKE_A_FRAME * len(q)
+    last = {y.strides[0]: y for y in found if y.scheme == by_groups(2).name and y.nats < far}
+    for before, count in pairwise((2, *SUBSTEPS)):
+        shares = {s: np.clip(y.fast, 0.1, 0.9) for s, y in last.items()}
+        starts = [
+            [y.friction * h / s, (y.omega * h / s) ** 2, shares[s] / (1 - shares[s])] for s, y in last.items()
+        ]
+        more = _of_scheme(by_groups(count), q, v, h, tuple(last), starts=np.log(starts)) if last else []
+        best = min([best, *(y.nats for y in more)])
+        for one in more:
+            likelier = min(one, last[one.strides[0]], key=lambda y: y.nats)
+            out += [replace(likelier, scheme=by_groups(c).name) for c in range(before + 1, count)]
+        out += more
+        last = {s: y for y in more for s in y.strides if y.nats <= max(last[s].nats, best + ODDS)}
+    return out
+
+
 def _of_scheme(
-    name: str, q: Floats, v: Floats, h: float, strides: tuple[int, ...], turn: float | None = None
-) -> list[Candidate]:
-    """The best of a scheme at each stride; nats are those of its likelihood."""
+    scheme: Thermostat, q: Floats, v: Floats, h: float, strides: tuple[int, ...], turn: float | None = None,
+    starts: Floats | None = None,
+) -> list[Candidate]:  # fmt: skip
+    """The best of a scheme at each stride, or from a start at each; nats are those of its likelihood."""
     moments, n = _moments(q, v * h)
     begins, every = _starts(_free(moments), strides)
-    if turn is not None:
+    if starts is not None:
+        begins, every = starts, np.array(strides)
+    elif turn is not None:
         begins = begins[:, :1]
-    elif THERMOSTATS[name].splits:
+    elif scheme.splits:
         begins = np.column_stack([begins, np.zeros(len(begins))])
-    of = partial(_profile, name, moments, n, turn)
+    of = partial(_profile, scheme, moments, n, turn)
     with np.errstate(all="ignore"):
         at, nats, curved = _descend(of, begins, every)
         thermal = of(at, every)[1]
@@ -145,12 +181,12 @@ def _of_scheme(
         if not len(rows) or not np.isfinite(nats[rows]).any():
             continue
         i = rows[np.nanargmin(nats[rows])]
-        errors = _errors(of, at[i], s, curved[i], 1 / n if THERMOSTATS[name].full_rank or s > 1 else 2 / n)
+        errors = _errors(of, at[i], s, curved[i], 1 / n if scheme.full_rank or s > 1 else 2 / n)
         w = float(np.sqrt(turn if turn is not None else np.exp(at[i, 1])) * s / h)
         rate, heat = float(np.exp(at[i, 0]) * s / h), float(thermal[i] * (s / h) ** 2)
         out.append(
             Candidate(
-                scheme=name, omega=w, omega_error=0.0 if turn is not None else float(w * errors[1] / 2),
+                scheme=scheme.name, omega=w, omega_error=0.0 if turn is not None else float(w * errors[1] / 2),
                 friction=rate, friction_error=float(rate * errors[0]), thermal=heat,
                 thermal_error=float(heat * errors[-1]), fast=float(_share(at[i])) if at.shape[1] > 2 else 0.0,
                 # a unit of velocity is no news
@@ -166,11 +202,10 @@ def _share(at: Floats) -> Floats:
 
 
 def _profile(
-    name: str, moments: Floats, n: int, turn: float | None, at: Floats, every: Floats
+    scheme: Thermostat, moments: Floats, n: int, turn: float | None, at: Floats, every: Floats
 ) -> tuple[Floats, Floats]:
     """Minus the logarithm of the likelihood (k,) at log gamma h and log (h w)**2 (k, 2) of strides (k,), in
     units of a frame, and the best kT/m in those of a step."""
-    scheme = THERMOSTATS[name]
     turns = np.full(len(at), turn) if turn is not None else np.exp(at[:, 1])
     law = Law(
         scheme=scheme, h=1.0, m=np.ones(len(at)), k=turns, rate=np.exp(at[:, 0]), thermal=1.0,

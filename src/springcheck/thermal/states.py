@@ -16,6 +16,7 @@ import numpy as np
 
 from springcheck.physics.arrays import Floats
 from springcheck.thermal import chance
+from springcheck.thermal.catalogue import random_scheme
 from springcheck.thermal.collisions import between_collisions
 from springcheck.thermal.decays import GJ
 from springcheck.thermal.likelihood import ODDS, Candidate, likely, likely_apart
@@ -131,11 +132,13 @@ def identify_thermal(
     if collided := tuple(between_collisions(q, v, h)):
         return Thermal(candidates=collided, free=(), misfit=nan, uniform=False)
     white = all(map(_is_white, left))
+    coloured = not (white and even)
     # draws that are carried on into the next frame are in no other
-    carried = all(_is_white(x[i::2]) for x in left for i in (0, 1)) and added(2)
-    if not (white and even) and not carried:
+    if coloured and not (all(_is_white(x[i::2]) for x in left for i in (0, 1)) and added(2)):
         return None
     found = tuple(likely_apart(q, v, h, white=white))
+    if white and coloured and not (found and random_scheme(found[0].scheme).carried):
+        return None
     return Thermal(
         candidates=found, free=(), misfit=nan, uniform=_is_uniform(left[1]), known=not bent and white
     )
@@ -164,6 +167,8 @@ def _left_of(z: Floats, beside: Floats) -> tuple[Floats, Floats]:
 def _is_added(noisy: Floats, left: Floats, u: Floats, every: int) -> bool:
     """Whether what is left is added to the momenta u - left, and no factor of them: its size says nothing of
     theirs, its sign over theirs nothing of that so many frames later, nor does what `noisy` numbers leave."""
+    if len(u) < FEWEST * every:
+        return False
     made = u - np.mean(u) - left
     large = [np.sign(np.abs(x) - np.median(np.abs(x))) for x in (left, made)]
     after = (np.sign(left * made), left / max(float(np.std(left)), 1e-300))

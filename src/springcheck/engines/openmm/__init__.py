@@ -143,9 +143,12 @@ ENGINE = Engine(
             "mts-langevin", "baoab", "MTSLangevinIntegrator, one group of forces once a step", _DRAWS,
             _ON_A_LINE, default=False,
         ),
-        thermostat(
-            "mts-langevin-2", "baoab-respa2", "MTSLangevinIntegrator, fast springs twice a step", _DRAWS,
-            _ON_A_LINE, default=False,
+        *(
+            thermostat(
+                f"mts-langevin-{n}", f"baoab-respa{n}", f"MTSLangevinIntegrator, fast springs {n} times a step",
+                _DRAWS, _ON_A_LINE, default=False,
+            )
+            for n in (2, 3, 4)
         ),
         thermostat(
             "variable-langevin", "baoa",

@@ -36,8 +36,9 @@ def thermostat(scene: Scene, name: str, step: float, seed: int, system: mm.Syste
         noise = made = mm.MTSLangevinIntegrator(temperature, rate, step, [(0, 1)])
         for force in system.getForces():
             force.setForceGroup(0)
-    elif name == "mts-langevin-2":
-        noise = made = mm.MTSLangevinIntegrator(temperature, rate, step, [(0, 1), (1, 2)])
+    elif name.startswith("mts-langevin-"):
+        groups = [(0, 1), (1, int(name.rpartition("-")[2]))]
+        noise = made = mm.MTSLangevinIntegrator(temperature, rate, step, groups)
     elif name == "variable-langevin":
         noise = made = mm.VariableLangevinIntegrator(temperature, rate, LOOSE)
         made.setStepSize(step)
