@@ -191,15 +191,16 @@ GROUPS = "baoab-respa"
 
 @cache
 def by_groups(substeps: int) -> Thermostat:
-    """BAOAB of fast terms, so often between two half kicks of slow ones: of any number of substeps a scheme."""
+    """BAOAB of fast terms, so often between two half kicks of slow ones."""
     share, slow = Fraction(1, 2 * substeps), Act("slow", HALF)
     acts = [slow]
     for j in range(substeps):
         inner = Act("fast", share), Act("drift", share)
         acts += [*inner, Act("exchange", decay(substeps), j), *inner[::-1]]
     return Thermostat(
-        name=f"{GROUPS}{substeps}", substeps=substeps, title=f"BAOAB-RESPA: fast springs {substeps} times a step",
-        acts=(*acts, slow), draws=substeps, source="Lagardere et al., J. Phys. Chem. Lett. 10 (2019) 2593",
+        name=f"{GROUPS}{substeps}", title=f"BAOAB-RESPA: fast springs {substeps} times a step",
+        acts=(*acts, slow), draws=substeps, substeps=substeps,
+        source="Lagardere et al., J. Phys. Chem. Lett. 10 (2019) 2593",
     )  # fmt: skip
 
 

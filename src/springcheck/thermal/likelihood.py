@@ -186,9 +186,11 @@ def _of_scheme(
         rate, heat = float(np.exp(at[i, 0]) * s / h), float(thermal[i] * (s / h) ** 2)
         out.append(
             Candidate(
-                scheme=scheme.name, omega=w, omega_error=0.0 if turn is not None else float(w * errors[1] / 2),
-                friction=rate, friction_error=float(rate * errors[0]), thermal=heat,
-                thermal_error=float(heat * errors[-1]), fast=float(_share(at[i])) if at.shape[1] > 2 else 0.0,
+                scheme=scheme.name, omega=w,
+                omega_error=0.0 if turn is not None else float(w * errors[1] / 2), friction=rate,
+                friction_error=float(rate * errors[0]), thermal=heat,
+                thermal_error=float(heat * errors[-1]),
+                fast=float(_share(at[i])) if at.shape[1] > 2 else 0.0,
                 # a unit of velocity is no news
                 nats=float(nats[i] - n * np.log(h)), strides=(s,),
             )

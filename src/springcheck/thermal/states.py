@@ -137,7 +137,7 @@ def identify_thermal(
     if coloured and not (all(_is_white(x[i::2]) for x in left for i in (0, 1)) and added(2)):
         return None
     found = tuple(likely_apart(q, v, h, white=white))
-    if white and coloured and not (found and random_scheme(found[0].scheme).carried):
+    if white and coloured and not any(random_scheme(one.scheme).carried for one in found):
         return None
     return Thermal(
         candidates=found, free=(), misfit=nan, uniform=_is_uniform(left[1]), known=not bent and white
@@ -281,8 +281,9 @@ def _of_one(
 
 
 def _is_correlated(x: Floats) -> bool:
-    """Whether neighbours share something, and others nothing, as draws that act in two steps."""
-    far = [abs(float(np.mean(x[lag:] * x[:-lag]))) for lag in range(3, 30)]
+    """Whether neighbours share something, and others nothing, as draws that act in two steps; what these
+    leave of the best map fades in a few."""
+    far = [abs(float(np.mean(x[lag:] * x[:-lag]))) for lag in range(6, 30)]
     return max(far) < 0.3
 
 

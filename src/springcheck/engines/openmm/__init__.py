@@ -145,8 +145,8 @@ ENGINE = Engine(
         ),
         *(
             thermostat(
-                f"mts-langevin-{n}", f"baoab-respa{n}", f"MTSLangevinIntegrator, fast springs {n} times a step",
-                _DRAWS, _ON_A_LINE, default=False,
+                f"mts-langevin-{n}", f"baoab-respa{n}",
+                f"MTSLangevinIntegrator, fast springs {n} times a step", _DRAWS, _ON_A_LINE, default=False,
             )
             for n in (2, 3, 4)
         ),
