@@ -6,7 +6,7 @@ acts in two steps, they over-determine it: what is left over is rounding, at eve
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from springcheck.physics.arrays import Arithmetic, Extended, Floats, Reals
 from springcheck.physics.scene import Scene
 from springcheck.thermal.catalogue import ENERGY_LEFT, Thermostat, value_of
+from springcheck.thermal.jointly import MOST_JOINTLY, independent_sums, jointly
 from springcheck.thermal.laws import Law
 from springcheck.thermal.stepper import Met, Stepper, forces
 
@@ -266,30 +267,20 @@ class _Reader:
         self, start: tuple[Extended, Extended], end: tuple[Extended, Extended]
     ) -> tuple[Extended, Extended]:
         """Of more draws a step than a state has numbers: that many independent sums of them (2, f-1, n), and
-        one rounding of each, by the Cholesky factor of what draws make of all particles together.  Infinite
-        ones where particles are too many, or forces not linear: what a draw makes then depends on others."""
-        f, n = start[0].shape
-        r, unknown = self.scheme.draws, np.full((2, f, n), np.inf, np.longdouble)
+        one rounding of each."""
+        (f, n), r = start[0].shape, self.scheme.draws
         if n > MOST_JOINTLY or not self.scene.system.is_linear:
+            # what a draw makes then depends on others
+            unknown = np.full((2, f, n), np.inf, np.longdouble)
             return unknown, unknown
         still, each = np.zeros((r * n, n), np.longdouble), np.eye(r * n, dtype=np.longdouble)
         made = [
             np.stack(self.stepper(still, still, self._force, list(of_each), False, still))
             for of_each in (each.reshape(-1, r, n).transpose(1, 0, 2), np.zeros((r, r * n, n), np.longdouble))
         ]
-        J = (made[0] - made[1]).transpose(0, 2, 1).reshape(2 * n, r * n).astype(np.float64)
-        size = np.linalg.norm(J, axis=1)
-        try:
-            J = J / size[:, None]
-            inverse = np.linalg.inv(np.linalg.cholesky(J @ J.T))
-        except np.linalg.LinAlgError:
-            return unknown, unknown
         none = np.stack(self.stepper(*start, self._force, list(np.zeros((r, f, n))), False, end[0]))
-        left = (np.stack(end) - none).transpose(1, 0, 2).reshape(f, 2 * n) / size
-        sums = left @ inverse.T
-        draws = (sums @ (inverse @ J)).reshape(f, r, n).transpose(1, 0, 2)
-        of = np.stack(self._allowed(start, draws)).transpose(1, 0, 2).reshape(f, 2 * n) / size
-        return tuple(x.reshape(f, 2, n).transpose(1, 0, 2) for x in (sums, of @ np.abs(inverse).T))
+        J, left = made[0] - made[1], np.stack(end) - none
+        return independent_sums(J, left, lambda draws: np.stack(self._allowed(start, draws)))
 
     def _solved(
         self, start: tuple[Extended, Extended], end: tuple[Extended, Extended], *, hit: bool
@@ -333,7 +324,7 @@ class _Reader:
             unit, across = unit / np.abs(a * d - b * c), np.zeros_like(of[0])
             if not np.all(np.abs(target - at(found)) <= self.roundings * of):
                 # the force of the middle of a step has draws of particles that are joined in it
-                found, unit = _jointly(at, target, found, of)
+                found, unit = jointly(at, target, found, of)
         unseen = ~(self.roundings * np.max(unit, axis=0) <= 1)
         if np.any(unseen):
             # what no draw explains is then at most the largest one
@@ -349,41 +340,6 @@ def _unit(u: int, j: int, like: Extended) -> Extended:
     out = np.zeros_like(like)
     out[j] = 1
     return out
-
-
-MOST_JOINTLY = 64
-"""Particles up to which draws are solved for together: a square matrix of twice their number a step."""
-
-
-def _jointly(
-    at: Callable[[Extended], Extended], target: Extended, found: Extended, of: Extended
-) -> tuple[Extended, Extended]:
-    """Draws (2, f, n) that lead to the target (2, f, n), from a first guess, and a rounding of each where
-    the target has those `of`; infinite ones where they are too many, or are not found."""
-    u, f, n = found.shape
-    unknown = np.full_like(found, np.inf)
-    if n > MOST_JOINTLY:
-        return found, unknown
-    for _ in range(6):
-        now = at(found)
-        J = np.empty((f, u * n, u * n))
-        for column in range(u * n):
-            one = np.zeros_like(found)
-            one[column // n, :, column % n] = 1
-            J[:, :, column] = (at(found + one) - now).transpose(1, 0, 2).reshape(f, u * n)
-        try:
-            inverse = np.linalg.inv(J)
-        except np.linalg.LinAlgError:
-            return found, unknown
-        change = (inverse @ (target - now).transpose(1, 0, 2).reshape(f, u * n, 1)).reshape(f, u, n)
-        found = found + change.transpose(1, 0, 2)
-        if np.all(np.abs(change) <= 1e-9 * (1 + np.abs(found.transpose(1, 0, 2)))):
-            break
-    else:
-        return found, unknown
-    unit = np.abs(inverse) @ of.transpose(1, 0, 2).reshape(f, u * n, 1)
-    # the inverse is a double's: what it leaves is beside the rounding
-    return found, np.asarray((unit.reshape(f, u, n) + np.abs(change)).transpose(1, 0, 2))
 
 
 def _directions(scheme: Thermostat, scene: Scene) -> tuple[Extended, bool]:

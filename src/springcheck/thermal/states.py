@@ -330,6 +330,16 @@ def _as_gj(number: str, decay: float, slow: float, error: float, t: float, h: fl
     return Candidate(scheme=f"gj-{number}", omega=omega, omega_error=known, friction=float(x[best] / h))
 
 
+def _regressed(known: Floats, x: Floats) -> tuple[Floats, Floats, Floats]:
+    """Of x (f,) by what is `known` (f, k): entries (k,), what they leave (f,), and their standard errors."""
+    entries = np.linalg.lstsq(known, x, rcond=None)[0]
+    left = x - known @ entries
+    # columns unlike in size leave an inverse no digits
+    size = np.linalg.norm(known, axis=0)
+    of = np.sqrt(np.diag(np.linalg.inv((known / size).T @ (known / size)))) / size
+    return np.asarray(entries), np.asarray(left), np.asarray(np.std(left) * of)
+
+
 def _of_no_memory(q: Floats, v: Floats, close: float) -> tuple[str, ...]:
     """Of positions that follow their velocities, v = (x' - x)/h: those that a bath draws anew at every step,
     or at some, between which leapfrog leaves v'' - 2 v' + v = -h w**2 (x' - x)."""
@@ -338,12 +348,8 @@ def _of_no_memory(q: Floats, v: Floats, close: float) -> tuple[str, ...]:
         together = slopes[4:] - slopes[:-4]
         if np.any(together < 1e-6 * np.abs(slopes[2:-2])):
             return ("andersen-leapfrog",)
-    known = np.stack([v[:-1], q[:-1], np.ones(len(v) - 1)], axis=1)
-    left, inverse = (
-        v[1:] - known @ np.linalg.lstsq(known, v[1:], rcond=None)[0],
-        np.linalg.inv(known.T @ known),
-    )
-    memory = np.linalg.lstsq(known, v[1:], rcond=None)[0][0] / np.sqrt(np.var(left) * inverse[0, 0])
+    entries, _, errors = _regressed(np.stack([v[:-1], q[:-1], np.ones(len(v) - 1)], axis=1), v[1:])
+    memory = entries[0] / errors[0]
     if abs(memory) > 5:
         # digits may hide that five steps of leapfrog have one slope, and few frames that a draw is carried on
         return ("gj-iii-half", *(() if close < 1e-6 else ("andersen-leapfrog",)))
@@ -355,20 +361,16 @@ def _of_two_halves(q: Floats, h: float, misfit: float, beside: Floats | None, mi
     """Of a draw that acts in two half kicks: velocities of the half steps have a draw of their own each."""
     half = np.diff(q) / h
     known = np.stack([half[:-1], q[1:-1], np.ones(len(half) - 1)], axis=1)
-    entries = np.linalg.lstsq(known, half[1:], rcond=None)[0]
-    c, kick = float(entries[0]), float(entries[1])
-    left = half[1:] - known @ entries
-    noise = float(np.std(left))
+    entries, left, (of_c, of_kick, _) = _regressed(known, half[1:])
+    c, kick, noise = float(entries[0]), float(entries[1]), float(np.std(left))
     if noise == 0 or not _is_white(left / noise):
         return None
     # a force that is not linear leaves more than draws
     bent = _follows(left / noise, np.stack([q**2, q**3], axis=1)[1:-1], known)
-    of_c, of_kick = noise * np.sqrt(np.diag(np.linalg.inv(known.T @ known)))[:2]
     draws = left / noise
     if beside is not None:
         # a weak joint to what stands beside, which does not show by itself, is no draw
-        more = np.concatenate([known, beside[1:-1]], axis=1)
-        draws = draws - more @ np.linalg.lstsq(more, draws, rcond=None)[0]
+        draws = _regressed(np.concatenate([known, beside[1:-1]], axis=1), draws)[1]
         draws /= np.std(draws)
     uniform, normal = _is_uniform(draws), bool(np.max(np.abs(draws)) > 2.2) and not mixed
     found = []
@@ -381,21 +383,12 @@ def _of_two_halves(q: Floats, h: float, misfit: float, beside: Floats | None, mi
         w, thermal = float(np.sqrt(a) / h), float((noise * over) ** 2 / (2 * x))
         found.append(
             Candidate(
-                scheme=name,
-                omega=w,
-                omega_error=float(of_kick * over / (2 * w)),
-                friction=float(x / h),
-                friction_error=float(of_c * slope / h),
-                thermal=thermal,
+                scheme=name, omega=w, omega_error=float(of_kick * over / (2 * w)), friction=float(x / h),
+                friction_error=float(of_c * slope / h), thermal=thermal,
                 thermal_error=thermal * float(np.hypot(np.sqrt(2 / len(left)), of_c * slope / x)),
                 # each draws as its library does, where that shows: uniform draws end at 1.73
                 nats=inf if (uniform and name == "bbk") or (normal and name != "bbk") else 0.0,
             )
-        )
-    return Thermal(
-        candidates=tuple(sorted(found, key=lambda y: y.nats)),
-        free=(),
-        misfit=misfit,
-        uniform=uniform,
-        known=not bent,
-    )
+        )  # fmt: skip
+    ordered = tuple(sorted(found, key=lambda y: y.nats))
+    return Thermal(candidates=ordered, free=(), misfit=misfit, uniform=uniform, known=not bent)
