@@ -18,7 +18,7 @@ from springcheck.physics.terms import Quartic, Spring, WallSpring
 from springcheck.studies.run.tally import heated_of
 from springcheck.thermal import THERMOSTATS, Stepper, Thermostat
 from springcheck.thermal.catalogue import by_groups
-from springcheck.thermal.likelihood import FULL_RANK, SUBSTEPS, likely
+from springcheck.thermal.likelihood import FULL_RANK, SUBSTEPS_TRIED, likely
 
 LABELS = (
     "own:baoab-respa2", "openmm:mts-langevin-2", "own:baoab-respa3", "openmm:mts-langevin-3",
@@ -123,7 +123,7 @@ def test_a_short_file_of_it_is_listed_with_every_count_that_it_leaves_open(subst
     assert found is not None
     assert found.scheme is None
     names = [one.scheme for one in found.candidates]
-    assert f"baoab-respa{min(substeps, SUBSTEPS[-1])}" in names
+    assert f"baoab-respa{min(substeps, SUBSTEPS_TRIED[-1])}" in names
     assert len(set(names)) == len(names)
     assert found.statement.count("baoab-respa") == 1
     assert substeps <= 12 or "12 or more" in found.statement

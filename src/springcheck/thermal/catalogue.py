@@ -186,7 +186,7 @@ def _by_letters(letters: str) -> Thermostat:
     )  # fmt: skip
 
 
-GROUPS = "baoab-respa"
+BY_SUBSTEPS = "baoab-respa"
 
 
 @cache
@@ -198,7 +198,7 @@ def by_groups(substeps: int) -> Thermostat:
         inner = Act("fast", share), Act("drift", share)
         acts += [*inner, Act("exchange", decay(substeps), j), *inner[::-1]]
     return Thermostat(
-        name=f"{GROUPS}{substeps}", title=f"BAOAB-RESPA: fast springs {substeps} times a step",
+        name=f"{BY_SUBSTEPS}{substeps}", title=f"BAOAB-RESPA: fast springs {substeps} times a step",
         acts=(*acts, slow), draws=substeps, substeps=substeps,
         source="Lagardere et al., J. Phys. Chem. Lett. 10 (2019) 2593",
     )  # fmt: skip
@@ -368,4 +368,4 @@ THERMOSTATS: dict[str, Thermostat] = {
 
 def random_scheme(name: str) -> Thermostat:
     """The thermostat of a name, of the catalogue or of a count of substeps beyond it."""
-    return THERMOSTATS.get(name) or by_groups(int(name.removeprefix(GROUPS)))
+    return THERMOSTATS.get(name) or by_groups(int(name.removeprefix(BY_SUBSTEPS)))

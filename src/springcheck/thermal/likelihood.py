@@ -28,7 +28,7 @@ GAINED_BY_CHANCE = 25.0
 STEPS_A_FRAME = (2, 3, 4, 5, 6, 8)
 """Steps from frame to frame that are tried where they are not known."""
 
-SUBSTEPS = (3, 4, 5, 8, 12)
+SUBSTEPS_TRIED = (3, 4, 5, 8, 12)
 """Substeps of fast terms that are tried where two may be too few: more than the last are like as many."""
 
 UNLIKE_A_FRAME = 0.2
@@ -143,7 +143,7 @@ def _of_more_substeps(found: list[Candidate], q: Floats, v: Floats, h: float) ->
     best, out = min((y.nats for y in found), default=inf), []
     far = best + UNLIKE_A_FRAME * len(q)
     last = {y.strides[0]: y for y in found if y.scheme == by_groups(2).name and y.nats < far}
-    for before, count in pairwise((2, *SUBSTEPS)):
+    for before, count in pairwise((2, *SUBSTEPS_TRIED)):
         shares = {s: np.clip(y.fast, 0.1, 0.9) for s, y in last.items()}
         starts = [
             [y.friction * h / s, (y.omega * h / s) ** 2, shares[s] / (1 - shares[s])] for s, y in last.items()
