@@ -15,7 +15,7 @@ import pytest
 from springcheck import cli, driver, store
 from springcheck.errors import SpringcheckError
 from springcheck.physics import scenefile
-from springcheck.studies.ensemble import measure, page, vary
+from springcheck.studies.ensemble import measure, page, text, vary
 from springcheck.studies.run.tally import Tally
 from springcheck.studies.team import Processes
 
@@ -299,3 +299,12 @@ def test_a_figure_says_what_was_found_and_where_the_limit_is() -> None:
     h = np.interp(np.asarray(curve.get_ydata(), float), [0, 1, 2], [0.1, 0.5, 0.9])
     assert len(k) > 9
     np.testing.assert_allclose(h * np.sqrt(k), 2, rtol=1e-12)
+
+
+@pytest.mark.parametrize(("name", "said"), [("overdamped", "H exact"), ("spring-uneven", "H0")])
+def test_the_column_of_energies_says_whose_energy_is_taken_off(name: str, said: str, tmp_path: Path) -> None:
+    cells = vary.plan(["time.step=0.001,0.002"], text=text_of(name))
+    found = measure.record(scenefile.load_scene(name), cells, tmp_path / "e.h5", ["own:rk4"])
+    assert f"energy: (H - {said})/|H0|" in "\n".join(map(str, text.lines(found)))
+    (drawn,) = page.banks(found, quantity="energy_drift")
+    assert drawn.charts[0].y.name == f"|H - {said}| / |H0| where it is largest"

@@ -262,3 +262,22 @@ def test_draws_that_are_carried_on_are_no_reason_to_be_silent() -> None:
     assert 2 in schemes["bbk"].strides
     # what carries nothing on leaves white frames of every step
     assert not [x for x in schemes if x in FULL_RANK and 1 in schemes[x].strides]
+
+
+@pytest.mark.parametrize("digits", [17, 8])
+def test_a_loop_of_ones_own_with_explicit_friction_may_be_a_scheme_that_is_not_known(digits: int) -> None:
+    # v += h (F/m - friction v) + noise; x += h v
+    rng, h, x, v = np.random.default_rng(4), 0.21, 0.4, -0.3
+    states = [(0.0, x, v)]
+    for i in range(1, 2001):
+        v += h * (-K / M * x - RATE * v) + np.sqrt(2 * RATE * THERMAL / M * h) * rng.standard_normal()
+        x += h * v
+        states.append((i * h, x, v))
+    t, q, u = np.array([[float(f"{y:.{digits}g}") for y in row] for row in states]).T
+    found = springcheck.identify(t, q, v=u)
+    assert found.verdict == "not told apart"
+    assert not found.fits
+    assert found.statement.endswith("or one that is not known here")
+    # one name, or several, in the first line that is printed
+    first = str(found).splitlines()[0]
+    assert first.startswith("the states: each step takes noise" if digits == 17 else "the states: several")

@@ -205,7 +205,10 @@ def identification(label: str, found: Identification) -> Lines:
     if found.undecided and found.scheme:
         misfit = ", but whether it fits cannot be judged"
     said = IDENTIFIED.get(found.verdict, found.scheme)
-    if found.statement.endswith(OR_UNKNOWN):
+    if found.verdict == "not told apart" and not several:
+        # one is left, which is not enough to be named
+        said = found.statement
+    elif found.statement.endswith(OR_UNKNOWN):
         misfit += OR_UNKNOWN
     if found.explanations:
         # the diagnosis is the headline, and what to do stands below it
@@ -221,7 +224,7 @@ def identification(label: str, found: Identification) -> Lines:
     for name, text in rows:
         if text and "nan" not in text:
             out += hanging(f"  {name + ':':24}", text)
-    notes = [found.statement, *found.notes] if found.undecided else found.notes
+    notes = [found.statement, *found.notes] if found.undecided and said != found.statement else found.notes
     for note in notes:
         out += hanging("  note: ", note)
     return out

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from springcheck.physics.exact import has_true_motion
+from springcheck.physics.scene import Scene
 from springcheck.studies.choose import LeftOut
 from springcheck.text.lines import Lines, plain
 from springcheck.text.wording import count
@@ -24,3 +26,14 @@ def resumed(pieces: int, what: str) -> Lines:
         return []
     were = "was" if pieces == 1 else "were"
     return [plain(f"  {count(pieces, what)} {were} finished by an interrupted call and resumed")]
+
+
+def of_energy(scene: Scene) -> str:
+    """What the column of energies holds."""
+    system = scene.system
+    if system.keeps_energy:
+        return "(H - H0)/|H0| where it is largest"
+    changes = ["loss by friction"] * system.is_damped + ["work of the drive"] * system.is_driven
+    if has_true_motion(scene):
+        return f"(H - H exact)/|H0| where it is largest, the exact {' and '.join(changes)} taken off"
+    return f"(H - H0)/|H0| where it is largest, the {' and '.join(changes)} in it"

@@ -13,6 +13,7 @@ from springcheck.figures.charts import GUIDE, Bank, Chart, Curve, Rule, Scale, T
 from springcheck.figures.looks import scheme_of
 from springcheck.figures.views import with_unit
 from springcheck.physics.arrays import Floats
+from springcheck.physics.exact import has_true_motion
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import WallSpring
 from springcheck.studies.ensemble.measure import OUTCOMES
@@ -75,6 +76,13 @@ class Choice:
 
     quantity: str
     over: tuple[str, ...]
+
+
+def _title(quantity: str, scene: Scene) -> str:
+    """The title of a quantity: with friction or a drive the energy is that beside the exact solution's."""
+    if quantity == "energy_drift" and not scene.system.keeps_energy and has_true_motion(scene):
+        return "|H - H exact| / |H0| where it is largest"
+    return TITLES[quantity]
 
 
 def choices(found: Ensemble, quantity: str | None = None, over: str | None = None) -> list[Choice]:
@@ -203,7 +211,7 @@ def banks(found: Ensemble, *, quantity: str | None = None, over: str | None = No
         maps = {method: one for method, one in shown.items() if isinstance(one, Map)}
         charts = [_lines(found.scene, choice, lines)] if lines else _maps(found.scene, choice, maps)
         fields = "" if over is None else "-over-" + "-".join(choice.over)
-        title = "Methods drawn" if lines else f"Colour: {TITLES[choice.quantity]}"
+        title = "Methods drawn" if lines else f"Colour: {_title(choice.quantity, found.scene)}"
         out.append(
             Bank(
                 name=f"ensemble-{choice.quantity}{fields}", title=title, charts=charts,
@@ -219,7 +227,7 @@ def _heading(scene: Scene, choice: Choice, shown: Mapping[str, Line | Map]) -> s
     typical = {x: float(np.nanmedian(y.y if isinstance(y, Line) else y.values)) for x, y in shown.items()}
     best = min(typical, key=lambda x: abs(typical[x]))
     over = " and ".join(named(x, scene) for x in choice.over)
-    said = [f"{scene.title}: {TITLES[choice.quantity].partition(',')[0]} over {over}"]
+    said = [f"{scene.title}: {_title(choice.quantity, scene).partition(',')[0]} over {over}"]
     if len(shown) > 1 and choice.quantity in SIZES:
         same = [
             x for x in typical if x != best and abs(typical[x] - typical[best]) <= 1e-9 * abs(typical[best])
@@ -252,9 +260,11 @@ def _limits(scene: Scene) -> dict[str, float]:
 
 
 def _lines(scene: Scene, choice: Choice, shown: Mapping[str, Line]) -> Chart:
-    title, (over,) = TITLES[choice.quantity], choice.over
+    title, (over,) = _title(choice.quantity, scene), choice.over
     y = _axis(
-        choice.quantity, np.concatenate([x for one in shown.values() for x in (one.low, one.y, one.high)])
+        choice.quantity,
+        scene,
+        np.concatenate([x for one in shown.values() for x in (one.low, one.y, one.high)]),
     )
     seen: set[str] = set()
     curves = []
@@ -280,9 +290,9 @@ def _lines(scene: Scene, choice: Choice, shown: Mapping[str, Line]) -> Chart:
     )
 
 
-def _axis(quantity: str, values: Floats) -> Scale:
+def _axis(quantity: str, scene: Scene, values: Floats) -> Scale:
     """Of a quantity, up to where nothing is read off it."""
-    name, good = TITLES[quantity].partition(",")[0], values[np.isfinite(values)]
+    name, good = _title(quantity, scene).partition(",")[0], values[np.isfinite(values)]
     if quantity == "outcome":
         return Scale(name=name, names=OUTCOMES)
     least = good[good > 0]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 
 from springcheck.studies.ensemble.result import Ensemble, Tally
-from springcheck.studies.text import left_out, resumed
+from springcheck.studies.text import left_out, of_energy, resumed
 from springcheck.text.lines import Lines, plain, table
 from springcheck.text.wording import count
 
@@ -25,7 +25,7 @@ def lines(found: Ensemble, options: Namespace | None = None) -> Lines:
         plain(),
         table(titles, rows),
         plain(
-            "error: largest distance from the exact solution; energy: (H - H0)/|H0| where it is largest",
+            f"error: largest distance from the exact solution; energy: {of_energy(found.scene)}",
             "dim",
         ),
         plain("no cell is judged: `springcheck run SCENE --set FIELD=NUMBER` judges one of them", "dim"),

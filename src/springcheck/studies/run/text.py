@@ -11,12 +11,10 @@ import numpy as np
 from rich.text import Text
 
 from springcheck import checks, schemes
-from springcheck.physics.exact import has_true_motion
-from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Comparison, Limits, Verdict
 from springcheck.studies.ensemble import STUDY as ENSEMBLE
 from springcheck.studies.run.result import MethodRun, Repeat, Repeats, Report, Stored
-from springcheck.studies.text import left_out
+from springcheck.studies.text import left_out, of_energy
 from springcheck.text.lines import Lines, Row, TextTable, hanging, plain, table
 from springcheck.text.wording import count, number, seconds
 
@@ -57,7 +55,7 @@ def _report(report: Report) -> Lines:
     out += [
         plain("error: largest distance from the exact solution, over the initial energy norm", "dim"),
         *[plain(f"<: {BELOW}", "dim") for run in report.runs[:1] if any(x.error_below for x in report.runs)],
-        plain(f"energy: {_energy(report.scene)}", "dim"),
+        plain(f"energy: {of_energy(report.scene)}", "dim"),
     ]
     out += [
         plain(f"  {run.method}: {run.outcome} after step {run.steps}: {run.message}")
@@ -139,17 +137,6 @@ def _runs(runs: Sequence[MethodRun]) -> TextTable:
         ]
     titles = ("method", "error", "energy", "start", "run", "outcome")
     return table(titles, rows, left=("method", "outcome"))
-
-
-def _energy(scene: Scene) -> str:
-    """What the column of energies holds."""
-    system = scene.system
-    if system.keeps_energy:
-        return "(H - H0)/|H0| where it is largest"
-    changes = ["loss by friction"] * system.is_damped + ["work of the drive"] * system.is_driven
-    if has_true_motion(scene):
-        return f"(H - H exact)/|H0| where it is largest, the exact {' and '.join(changes)} taken off"
-    return f"(H - H0)/|H0| where it is largest, the {' and '.join(changes)} in it"
 
 
 def _error(x: float) -> str:
