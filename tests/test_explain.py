@@ -144,3 +144,16 @@ def test_a_splitting_with_a_stage_of_friction_is_conformally_symplectic() -> Non
 def test_a_held_force_speeds_up_along_itself() -> None:
     # F is the force, -k q on a spring: v' = v + h F/m
     assert "v' = v + h F/m" in " ".join(explain.lines("held-force"))
+
+
+def test_a_thermostat_is_explained_by_numbers_that_make_its_step() -> None:
+    """Each stage of OBABO has half the friction and a draw of its own, and what is printed is the step."""
+    printed = [line.strip() for line in explain.scheme_lines(schemes.scheme("obabo"))]
+    first, last = (next(x for x in printed if x.endswith(f"xi_{i}")) for i in (1, 2))
+    c = float(np.exp(-0.1 / 2))
+    assert first == f"p = {c:.6g} p + {np.sqrt(1 - c * c):.6g} sqrt(m kT) xi_1"
+    assert last == first.replace("xi_1", "xi_2")
+    assert "with the numbers of x = gamma h = 0.1" in printed
+    kinds = {name: "\n".join(explain.scheme_lines(schemes.scheme(name))) for name in THERMOSTATS}
+    assert not any("c(x)" in text for text in kinds.values())
+    assert kinds["gj-iv"] != kinds["gj-vi"].replace("VI", "IV").replace("gj-vi", "gj-iv")

@@ -19,6 +19,7 @@ from springcheck.schemes import Scheme
 from springcheck.studies.faults.seeded import Fault
 from springcheck.studies.faults.table import FAULTS
 from springcheck.thermal import THERMOSTATS, Law
+from springcheck.thermal.catalogue import Act
 
 if TYPE_CHECKING:
     from springcheck.identify.meanings import Meaning
@@ -183,32 +184,49 @@ def scheme_lines(scheme: Scheme) -> Iterator[str]:
 
 
 _ACTS = {
-    "kick": "p = p + {c} h F", "slow": "p = p + {c} h F of slow terms",
-    "fast": "p = p + {c} h F of fast terms", "held": "p = p + {c} h F, as it was last evaluated",
-    "drift": "q = q + {c} h p/m",
-    "exchange": "p = c p + sqrt((1 - c**2) m kT) xi, c of x = gamma h", "damp": "p = (1 - {c}) p",
-    "undamp": "p = p / (1 + {c})", "noise": "p = p + {c} sqrt(2 x m kT) xi",
-    "jump": "q = q + {c} h sqrt(2 x kT/m) xi", "creep": "q = q + {c} h**2 F/m", "rebuild": "p = m (q' - q)/h",
+    "kick": "p = p + {c}h F", "slow": "p = p + {c}h F of slow terms",
+    "fast": "p = p + {c}h F of fast terms", "held": "p = p + {c}h F, as it was last evaluated",
+    "drift": "q = q + {c}h p/m",
+    "exchange": "p = {c}p + {rest:.6g} sqrt(m kT) {xi}", "damp": "p = (1 - {c}) p",
+    "undamp": "p = p / (1 + {c})", "noise": "p = p + {c}sqrt(2 x m kT) {xi}",
+    "jump": "q = q + {c}h sqrt(2 x kT/m) {xi}", "creep": "q = q + {c}h**2 F/m", "rebuild": "p = m (q' - q)/h",
     "rescale": "p = alpha p: alpha**2 = b ((xi_1 + sqrt(c/b))**2 + xi_2**2 + ...), c = exp(-2 x), "
                "b = (1 - c) kT / sum p**2/m; alpha has the sign of xi_1 + sqrt(c/b)",
     "scale": "p = |alpha| p: alpha**2 = b ((xi_1 + sqrt(c/b))**2 + xi_2**2 + ...), c = exp(-2 x), "
              "b = (1 - c) kT / sum p**2/m",
-    "chain": "p = p exp(-{c} h s0/Q0) and the like, s0' = 2K - N kT - s0 s1/Q1, s1' = s0**2/Q0 - kT ...",
+    "chain": "p = p exp(-{c}h s0/Q0) and the like, s0' = 2K - N kT - s0 s1/Q1, s1' = s0**2/Q0 - kT ...",
     "collide": "with the chance 1 - exp(-x): p = sqrt(m kT) xi",
 }  # fmt: skip
+
+SHOWN = 0.5, 0.1
+"""The h omega and the x = gamma h at which a thermostat is shown in numbers."""
+
+
+def _act(act: Act, draws: int) -> str:
+    """A stage of a thermostat, a coefficient that depends on x by its number."""
+    c = float(act.part(np.float64(SHOWN[1]))) if callable(act.part) else float(act.part)
+    if act.kind == "kick" and c == 0:
+        return "F is evaluated at q"
+    share = f"{c:.6g}" if callable(act.part) else str(act.part)
+    rest = math.sqrt(max(1 - c * c, 0.0)) if act.kind == "exchange" else 0.0
+    xi = f"xi_{act.draw + 1}" if draws > 1 else "xi"
+    whole = act.kind in ("damp", "undamp")
+    return _ACTS[act.kind].format(c=share if whole else "" if c == 1 else f"{share} ", rest=rest, xi=xi)
 
 
 def _thermostat(name: str) -> Iterator[str]:
     """Stages of a random scheme, and what its law is on a spring."""
     scheme = THERMOSTATS[name]
     for act in scheme.acts:
-        yield f"  {_ACTS[act.kind].format(c='c(x)' if callable(act.part) else act.part)}"
+        yield f"  {_act(act, scheme.draws)}"
+    if any(callable(act.part) for act in scheme.acts):
+        yield f"  with the numbers of x = gamma h = {SHOWN[1]}"
     if scheme.held:
         letters = {"kick": "B", "drift": "A", "exchange": "O"}
         held = ", ".join(letters.get(act.kind, act.kind) for act in scheme.held)
         yield f"  with rods: {held} (shake brings back lengths, project what moves ends apart)"
     if scheme.carried:
-        yield "  the first draw xi of a step is the last of the step before"
+        yield "  the first draw xi_1 of a step is the last of the step before"
     if scheme.rescales:
         yield "No linear map: " + (
             "the chain's own state is carried along those of the motion, and predicts each of them"
@@ -216,7 +234,7 @@ def _thermostat(name: str) -> Iterator[str]:
             else "kinetic energies are noncentral chi-squared, whose ranks are judged"
         )
         return
-    turn, x = 0.5, 0.1
+    turn, x = SHOWN
     of = Law(scheme=scheme, h=turn, m=np.ones(1), k=np.ones(1), rate=x / turn, thermal=1.0)
     yield (
         f"At h omega {turn} and gamma h {x}: k<q**2>/kT {of.configurational[0]:.6f}, <p**2>/m kT "

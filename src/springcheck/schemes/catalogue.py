@@ -252,8 +252,8 @@ _ALL = (
               f"Leimkuhler & Matthews, Appl. Math. Res. Express 2013, 34; {_ZHANG}"),
     splitting("respa8", "r-RESPA: velocity Verlet of the slow springs around 8 of the fast ones", 2, 16.0,
               (("slow", HALF), *_EIGHT, ("slow", HALF)),
-              f"{_TUCKERMAN}; the limit is that of a fast spring alone, in company it resonates from "
-              "h w = 16 sin(pi/16) on"),
+              f"{_TUCKERMAN}; the limit is that of a fast spring alone, in company it resonates first just "
+              "below h w = 16 sin(pi/16)"),
     splitting("langevin-middle-early",
               "Langevin middle at T = 0, momenta half a step early: kick, half drift, friction, half drift",
               1, 2.0, (("pull", ONE), ("drift", HALF), ("friction", ONE), ("drift", HALF)),
