@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from springcheck import checks, engines, schemes
@@ -13,6 +14,7 @@ from springcheck.errors import SpringcheckError
 from springcheck.identify.meanings import MEANINGS
 from springcheck.physics import scenefile
 from springcheck.studies.faults.table import FAULTS
+from springcheck.thermal import THERMOSTATS
 
 
 @pytest.mark.parametrize("check", checks.ALL, ids=lambda check: check.name)
