@@ -642,3 +642,21 @@ def test_neither_springs_nor_what_goes_straight_on_are_taken_for_rods() -> None:
     assert rod_of(straight) == rod_of(swinging) == rod_of(np.ones((9, 5))) == rod_of(None) == ""
     swinging[:, 2] /= 1.01
     assert rod_of(swinging).startswith("particles 0 and 1 turn")
+
+
+@pytest.mark.parametrize("axes", [2, 3])
+def test_a_particle_that_swings_on_a_rod_is_seen_and_neither_an_orbit_nor_another_curve(axes: int) -> None:
+    t = np.arange(60) * 0.1
+    for most in (0.3, 0.9, 2.5):
+        angle = most * np.cos(t)
+        across = [np.sin(angle)] if axes == 2 else [0.8 * np.sin(angle), 0.6 * np.sin(angle)]
+        arc = 0.7 * np.stack([*across, -np.cos(angle)], axis=1) + 5
+        assert rod_of(arc).startswith("particle 0 swings and keeps its distance from a fixed point, 0.7 to ")
+    z = [0.4 + 0 * t] * (axes - 2)
+    curves = (
+        [np.cos(t), np.sin(t)],
+        [np.cos(t), 0.99 * np.sin(t)],
+        [t, 0.02 * t * t],
+        [np.cos(t), 2 * np.cos(t)],
+    )
+    assert [rod_of(np.stack([*one, *z], axis=1)) for one in curves] == [""] * 4

@@ -34,6 +34,9 @@ RIGID, TURNED = 1e-3, 0.05
 """Part by which a distance may change that is a rod's, programs' own tolerances being 1e-4, and by which the
 way has to turn for it to show."""
 
+FEWEST_ON_ARC = 8
+"""Frames, of which a circle in space takes up to four numbers."""
+
 LENGTHS = {"nm": 1.0, "Angstrom": 0.1, "angstrom": 0.1, "A": 0.1, "Å": 0.1, "pm": 1e-3, "m": 1e9, "um": 1e3}
 TIMES = {"ps": 1.0, "fs": 1e-3, "ns": 1e3, "s": 1e12, "us": 1e6}
 """Lengths in nm and times in ps, by the names that H5MD files use."""
@@ -182,7 +185,8 @@ def _chosen(q: Floats, p: Floats, notes: list[str]) -> tuple[Integers, tuple[str
 
 
 def rod_of(q: Floats | None) -> str:
-    """Two particles of positions q (f, N), in space or a plane, that turn and keep their distance; or ""."""
+    """What particles of positions q (f, N), in space or a plane, keep as a rod does: two that turn their
+    distance, or one that swings its distance from a fixed point; or ""."""
     for axes in (3, 2):
         if q is None or q.shape[1] % axes:
             continue
@@ -193,6 +197,20 @@ def rod_of(q: Floats | None) -> str:
             length, off = float(np.mean(size)), float(np.ptp(size))
             if off <= RIGID * length and np.max(np.ptp(way, axis=0)) >= TURNED * length:
                 return f"particles {a} and {b} turn and keep their distance, {length:.6g} to {off:.1g}: a rod"
+        for i in range(x.shape[1] if len(x) > FEWEST_ON_ARC else 0):
+            way = x[:, i] - np.mean(x[:, i], axis=0)
+            # |way - c| = l is linear in c and l**2 - c**2
+            centre = np.linalg.lstsq(np.column_stack([2 * way, np.ones(len(way))]), np.sum(way**2, axis=1))[0]
+            size, each = (
+                np.linalg.norm(way - centre[:-1], axis=1),
+                np.linalg.norm(np.diff(way, axis=0), axis=1),
+            )
+            length, off = float(np.mean(size)), float(np.ptp(size))
+            # a straight way keeps to any circle, and at one speed an orbit may keep to one without a rod
+            bent = np.linalg.svd(way, compute_uv=False)[1] / np.sqrt(len(way))
+            if off <= RIGID * bent and bent >= TURNED**2 * length and np.ptp(each) > RIGID * np.max(each):
+                kept = f"keeps its distance from a fixed point, {length:.6g} to {off:.1g}: a rod"
+                return f"particle {i} swings and {kept}"
     return ""
 
 
