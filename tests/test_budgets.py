@@ -18,7 +18,7 @@ BUDGETS = {
     ("engines",): 2619,
     ("driver", "conformance", "doors"): 1197,
     ("checks",): 4812,
-    ("identify",): 8204,
+    ("identify",): 8222,
     ("formats", "store"): 5151,
     ("studies",): 1626,
     ("studies/*",): 11203,
