@@ -28,18 +28,14 @@ Exit status 0 while the claim holds, 1 otherwise.
 from __future__ import annotations
 
 import argparse
-import json
-import subprocess
 import sys
-import tempfile
-from contextlib import redirect_stdout
-from io import StringIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from springcheck.cli import main as springcheck
+import gromacs
+from gromacs import told
 from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
 
@@ -61,18 +57,6 @@ CASES = {
 }
 """Each file, and the scheme that made it."""
 
-RUN = """integrator = {integrator}
-dt = {step!r}
-nsteps = {steps}
-nstxout = 1
-nstvout = 1
-nstcalcenergy = 1
-comm-mode = none
-cutoff-scheme = verlet
-verlet-buffer-tolerance = -1
-rlist = 1.2
-"""
-
 
 def scene_of(name: str) -> Path:
     """The scene of a file: at rest as a whole, or drifting."""
@@ -84,34 +68,6 @@ def _start(scene: Scene) -> tuple[Any, Any, Any, float, float]:
     bond: Any = scene.terms[0]
     q, v = scene.q.reshape(-1, 3), (scene.p / scene.m).reshape(-1, 3)
     return scene.masses, q, v, float(bond.k[0]), float(bond.rest[0])
-
-
-def gromacs(scene: Scene, program: str, integrator: str, path: Path) -> None:
-    """Bond type 6: harmonic, and no chemical bond that excludes others."""
-    masses, q, v, k, rest = _start(scene)
-    lines = ["[ defaults ]", "1 1 no 1.0 1.0", "[ atomtypes ]"]
-    lines += [f"T{i} 0 {float(m)!r} 0.0 A 0.0 0.0" for i, m in enumerate(masses, 1)]
-    lines += ["[ moleculetype ]", "M 3", "[ atoms ]"]
-    lines += [f"{i} T{i} 1 M A{i} {i} 0.0 {float(m)!r}" for i, m in enumerate(masses, 1)]
-    lines += ["[ bonds ]", f"1 2 6 {rest!r} {k!r}", "[ exclusions ]", "1 2", "2 1"]
-    lines += ["[ system ]", "one", "[ molecules ]", "M 1", ""]
-    rows = [
-        f"{1:5d}{'M':<5s}{f'A{i + 1}':>5s}{i + 1:5d}" + "".join(f"{x:25.17f}" for x in q[i])
-        + "".join(f"{x:25.18f}" for x in v[i])
-        for i in range(len(q))
-    ]  # fmt: skip
-    with tempfile.TemporaryDirectory() as place:
-        folder = Path(place)
-        (folder / "x.top").write_text("\n".join(lines))
-        (folder / "x.gro").write_text("\n".join(["start", "2", *rows, "20.0 20.0 20.0", ""]))
-        settings = RUN.format(integrator=integrator, step=scene.step, steps=scene.steps)
-        (folder / "x.mdp").write_text(settings)
-        for command in (
-            f"{program} grompp -f x.mdp -c x.gro -p x.top -o x.tpr -maxwarn 5",
-            f"{program} mdrun -s x.tpr -o x.trr -nt 1",
-        ):
-            subprocess.run(command.split(), cwd=folder, check=True, capture_output=True)
-        path.write_bytes((folder / "x.trr").read_bytes())
 
 
 def lammps(scene: Scene, path: Path) -> None:
@@ -166,19 +122,13 @@ def write(name: str) -> None:
     """Run the program of a file."""
     scene, path = scenefile.load_scene(scene_of(name)), FOLDER / name
     if name.startswith("gromacs"):
-        integrator = "md-vv" if "md-vv" in name else "md"
-        gromacs(scene, "gmx" if "single" in name else "gmx_d", integrator, path)
+        bond: Any = scene.terms[0]
+        # type 6: harmonic, and no chemical bond that excludes others
+        held = ["[ bonds ]", f"1 2 6 {float(bond.rest[0])!r} {float(bond.k[0])!r}"]
+        program = "gmx" if "single" in name else "gmx_d"
+        gromacs.run(scene, held, path, program=program, integrator="md-vv" if "md-vv" in name else "md")
     else:
         (lammps if name.startswith("lammps") else mujoco)(scene, path)
-
-
-def told(*arguments: str) -> dict[str, Any]:
-    """The document that a command of springcheck prints, with its exit status."""
-    out = StringIO()
-    with redirect_stdout(out):
-        status = springcheck([*arguments, "--json"])
-    found: dict[str, Any] = json.loads(out.getvalue())
-    return found | {"status": status}
 
 
 def named(name: str) -> dict[str, Any]:

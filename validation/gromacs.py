@@ -35,6 +35,7 @@ import tempfile
 from contextlib import redirect_stdout
 from io import StringIO
 from pathlib import Path
+from typing import Any
 
 from springcheck.cli import main as springcheck
 from springcheck.physics import scenefile
@@ -61,7 +62,7 @@ CASES: dict[str, set[str]] = {
 }
 """Each trajectory, and the checks that reject it: what no tolerance declares is an error."""
 
-RUN = """integrator = md-vv
+RUN = """integrator = {integrator}
 dt = {step!r}
 nsteps = {steps}
 nstxout = 1
@@ -74,26 +75,29 @@ rlist = 1.2
 """
 
 
-def topology(scene: Scene, settle: bool) -> str:
-    """The molecule of a scene, without any force."""
+def molecule(scene: Scene, held: list[str]) -> str:
+    """The topology of particles that feel nothing but what is said of them."""
+    masses, n = scene.masses.tolist(), scene.particles
+    return "\n".join([
+        "[ defaults ]", "1 1 no 1.0 1.0", "[ atomtypes ]",
+        *(f"T{i} 0 {m!r} 0.0 A 0.0 0.0" for i, m in enumerate(masses, 1)),
+        "[ moleculetype ]", "M 3", "[ atoms ]",
+        *(f"{i} T{i} 1 M A{i} {i} 0.0 {m!r}" for i, m in enumerate(masses, 1)), *held, "[ exclusions ]",
+        *(" ".join(map(str, [i, *(j for j in range(1, n + 1) if j != i)])) for i in range(1, n + 1)),
+        "[ system ]", "one", "[ molecules ]", "M 1", "",
+    ])  # fmt: skip
+
+
+def _held(scene: Scene, settle: bool) -> list[str]:
+    """The rods of a scene."""
     rods = scene.system.rods
     assert rods is not None
-    masses, n = scene.masses.tolist(), scene.particles
-    lines = ["[ defaults ]", "1 1 no 1.0 1.0", "[ atomtypes ]"]
-    lines += [f"T{i} 0 {m!r} 0.0 A 0.0 0.0" for i, m in enumerate(masses, 1)]
-    lines += ["[ moleculetype ]", "M 3", "[ atoms ]"]
-    lines += [f"{i} T{i} 1 M A{i} {i} 0.0 {m!r}" for i, m in enumerate(masses, 1)]
     if settle:
-        lines += ["[ settles ]", f"1 1 {float(rods.length[0])!r} {float(rods.length[2])!r}"]
-    else:
-        joints = rods.joints()
-        lines += ["[ constraints ]", *(f"{ends[0] + 1} {ends[1] + 1} 2 {x!r}" for ends, x, _ in joints)]
-    lines += ["[ exclusions ]"]
-    lines += [" ".join(map(str, [i, *(j for j in range(1, n + 1) if j != i)])) for i in range(1, n + 1)]
-    return "\n".join([*lines, "[ system ]", "one", "[ molecules ]", "M 1", ""])
+        return ["[ settles ]", f"1 1 {float(rods.length[0])!r} {float(rods.length[2])!r}"]
+    return ["[ constraints ]", *(f"{a + 1} {b + 1} 2 {x!r}" for (a, b), x, _ in rods.joints())]
 
 
-def start(scene: Scene) -> str:
+def _start(scene: Scene) -> str:
     """A .gro file of the start, with all digits."""
     q, v = scene.q.reshape(-1, 3), (scene.p / scene.m).reshape(-1, 3)
     rows = [
@@ -104,31 +108,52 @@ def start(scene: Scene) -> str:
     return "\n".join(["start", str(len(q)), *rows, "20.0 20.0 20.0", ""])
 
 
+def run(
+    scene: Scene,
+    held: list[str],
+    path: Path,
+    *,
+    program: str = "gmx_d",
+    integrator: str = "md-vv",
+    more: str = "",
+) -> None:
+    """Run GROMACS on a scene and keep its trajectory, of every step."""
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place)
+        (folder / "x.top").write_text(molecule(scene, held))
+        (folder / "x.gro").write_text(_start(scene))
+        settings = RUN.format(integrator=integrator, step=scene.step, steps=scene.steps)
+        (folder / "x.mdp").write_text(f"{settings}{more}\n")
+        for command in (
+            f"{program} grompp -f x.mdp -c x.gro -p x.top -o x.tpr -maxwarn 5",
+            f"{program} mdrun -s x.tpr -o x.trr -nt 1",
+        ):
+            subprocess.run(command.split(), cwd=folder, check=True, capture_output=True)
+        path.write_bytes((folder / "x.trr").read_bytes())
+
+
 def write(name: str) -> None:
     """Run GROMACS in double precision and keep its trajectory."""
     which, _, algorithm = name.partition("-")
     scene = scenefile.load_scene(FOLDER / f"{which}.toml")
-    with tempfile.TemporaryDirectory() as place:
-        folder = Path(place)
-        (folder / "x.top").write_text(topology(scene, algorithm == "settle"))
-        (folder / "x.gro").write_text(start(scene))
-        settings = RUN.format(step=scene.step, steps=scene.steps) + ALGORITHMS[algorithm]
-        (folder / "x.mdp").write_text(settings + "\n")
-        for command in (
-            "gmx_d grompp -f x.mdp -c x.gro -p x.top -o x.tpr -maxwarn 5",
-            "gmx_d mdrun -s x.tpr -o x.trr -nt 1",
-        ):
-            subprocess.run(command.split(), cwd=folder, check=True, capture_output=True)
-        (FOLDER / f"{name}.trr").write_bytes((folder / "x.trr").read_bytes())
+    held = _held(scene, algorithm == "settle")
+    run(scene, held, FOLDER / f"{name}.trr", more=ALGORITHMS[algorithm])
+
+
+def told(*arguments: str) -> dict[str, Any]:
+    """The document that a command of springcheck prints, with its exit status."""
+    out = StringIO()
+    with redirect_stdout(out):
+        status = springcheck([*arguments, "--json"])
+    found: dict[str, Any] = json.loads(out.getvalue())
+    return found | {"status": status}
 
 
 def judged(name: str) -> dict[str, dict[str, float]]:
     """The verdicts of `springcheck judge` by check."""
-    scene, out = FOLDER / f"{name.partition('-')[0]}.toml", StringIO()
-    with redirect_stdout(out):
-        of = ["--scene", str(scene), "--scheme", "velocity-verlet", "--json"]
-        springcheck(["judge", str(FOLDER / f"{name}.trr"), *of])
-    return {one["check"]: one for one in json.loads(out.getvalue())["verdicts"]}
+    scene = FOLDER / f"{name.partition('-')[0]}.toml"
+    found = told("judge", str(FOLDER / f"{name}.trr"), "--scene", str(scene), "--scheme", "velocity-verlet")
+    return {one["check"]: one for one in found["verdicts"]}
 
 
 def main() -> int:
