@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from springcheck import schemes
+from springcheck import schemes, thermal
 from springcheck.checks.case import Case
 from springcheck.checks.check import Finding, check
 from springcheck.checks.requires import MAP, missing
@@ -15,7 +15,6 @@ from springcheck.physics.trajectory import Limits
 from springcheck.text.wording import count
 from springcheck.thermal import THERMOSTATS
 from springcheck.thermal.catalogue import PROJECT
-from springcheck.thermal.draws import roundings_of
 
 
 def _rods(case: Case) -> Rods:
@@ -34,7 +33,7 @@ def rod_length(case: Case) -> Finding:
     rods, how = _rods(case), case.trajectory.arithmetic
     q = case.trajectory.q[1:].astype(np.longdouble)
     heated = case.law.has("random")
-    roundings = roundings_of(thermostat(case), case.judged) if heated else case.roundings
+    roundings = thermal.draws.roundings_of(thermostat(case), case.judged) if heated else case.roundings
     with np.errstate(all="ignore"):
         off = np.abs(rods.strain(q))
         bound = roundings * how.state * (1 + rods.magnitude(q)) + how.lengths

@@ -6,16 +6,20 @@ A draw is what a state must have taken to come from the one before it.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from springcheck import thermal
 from springcheck.checks.case import Case, small_move
 from springcheck.checks.check import Chance, Finding, check
 from springcheck.errors import MethodError
 from springcheck.physics.arrays import Floats
 from springcheck.text.wording import count
-from springcheck.thermal import THERMOSTATS, Thermostat, chance, rigid
-from springcheck.thermal.draws import SMALLEST, Reading, law_of, read
+from springcheck.thermal import THERMOSTATS, Thermostat
+
+if TYPE_CHECKING:
+    from springcheck.thermal.draws import Reading
 
 HIDDEN = "the motion is so much larger than its noise that rounding hides the draws"
 
@@ -43,7 +47,7 @@ def _reading(case: Case) -> Reading:
     skipped = 1 if scheme.carried and case.steps[0] == 0 else 0
     q, p = run.q[skipped:], run.p[skipped:]
     with np.errstate(all="ignore"):
-        by = rigid.read if case.judged.system.rods else read
+        by = thermal.rigid.read if case.judged.system.rods else thermal.draws.read
         return by(scheme, case.judged, q, p, how=run.arithmetic, rebuilt=run.rebuilds_velocity)
 
 
@@ -62,7 +66,7 @@ def noise_direction(case: Case) -> Finding | str:
         assert bath is not None
         # of momenta, and of the links
         squares = scene.thermal * min(np.min(scene.m), scene.thermal / bath.friction**2)
-        if not squares > SMALLEST / case.trajectory.arithmetic.unit:
+        if not squares > thermal.draws.SMALLEST / case.trajectory.arithmetic.unit:
             return "squares of so small momenta underflow"
     found = reading(case)
     if found.across is None:
@@ -87,7 +91,7 @@ def _draws(case: Case) -> tuple[Floats, Reading] | str:
         return HIDDEN if scheme.fresh < 3 or case.judged.system.is_linear else NOT_LINEAR
     x = found.draws
     if scheme.uniform and not case.scene.system.rods:
-        x = chance.normal_scores(x)
+        x = thermal.chance.normal_scores(x)
     if found.hits is not None:
         x = x[found.hits][:, None]
     return (x, found) if x.size >= 2 else "there were no draws"
@@ -105,13 +109,13 @@ def _of(case: Case, probability: Callable[[Floats], float], value: Callable[[Flo
 @check("mean", family="noise", requires={"every-step"})
 def draws_mean(case: Case) -> Chance | str:
     """The draws have mean 0."""
-    return _of(case, chance.mean, lambda x: f"mean {np.mean(x):+.2e}")
+    return _of(case, thermal.chance.mean, lambda x: f"mean {np.mean(x):+.2e}")
 
 
 @check("var", family="noise", requires={"every-step"})
 def draws_variance(case: Case) -> Chance | str:
     """The draws have variance 1: the temperature of the bath, the masses and the friction are right."""
-    return _of(case, chance.variance, lambda x: f"variance {np.mean(x * x):.6f}")
+    return _of(case, thermal.chance.variance, lambda x: f"variance {np.mean(x * x):.6f}")
 
 
 @check("shape", family="noise", requires={"every-step"})
@@ -122,13 +126,15 @@ def draws_shape(case: Case) -> Chance | str:
     """
     if case.scene.system.rods and THERMOSTATS[case.trajectory.scheme].uniform:
         return "a rod mixes uniform draws of its ends, and the tails of such sums are others"
-    return _of(case, chance.shape, lambda x: f"fourth moment {np.mean(x**4) / np.mean(x * x) ** 2:.4f}")
+    return _of(
+        case, thermal.chance.shape, lambda x: f"fourth moment {np.mean(x**4) / np.mean(x * x) ** 2:.4f}"
+    )
 
 
 @check("lag 1", family="noise", requires={"every-step"})
 def draws_neighbours(case: Case) -> Chance | str:
     """The draws of one step say nothing of those of the next."""
-    return _of(case, chance.neighbours, lambda x: f"correlation {np.mean(x[1:] * x[:-1]):+.2e}")
+    return _of(case, thermal.chance.neighbours, lambda x: f"correlation {np.mean(x[1:] * x[:-1]):+.2e}")
 
 
 @check("repeat", family="noise", requires={"every-step"})
@@ -136,7 +142,7 @@ def draws_repeat(case: Case) -> Chance | str:
     """The draws of one step do not come again, nor opposite, any number of steps later."""
     if len(case.trajectory.t) < 1010:
         return "fewer than a thousand steps"
-    return _of(case, chance.repeats, lambda x: "largest correlation of all lags")
+    return _of(case, thermal.chance.repeats, lambda x: "largest correlation of all lags")
 
 
 @check("apart", family="noise", requires={"company", "every-step"})
@@ -147,7 +153,9 @@ def draws_particles(case: Case) -> Chance | str:
     if THERMOSTATS[case.trajectory.scheme].rescales:
         return "one number acts on all particles"
     return _of(
-        case, lambda x: chance.neighbours(x.T), lambda x: f"correlation {np.mean(x[:, 1:] * x[:, :-1]):+.2e}"
+        case,
+        lambda x: thermal.chance.neighbours(x.T),
+        lambda x: f"correlation {np.mean(x[:, 1:] * x[:, :-1]):+.2e}",
     )
 
 
@@ -161,9 +169,9 @@ def collisions(case: Case) -> Chance | str:
         return "the axes of one particle may collide together"
     if limit := small_move(case.trajectory):
         return limit
-    p = law_of(THERMOSTATS[case.trajectory.scheme], case.judged).collision
+    p = thermal.draws.law_of(THERMOSTATS[case.trajectory.scheme], case.judged).collision
     hits, n = int(np.count_nonzero(found.hits)), found.hits.size
-    return Chance(chance.count(hits, n, p), f"{hits} of {n} steps, expected {n * p:.1f}")
+    return Chance(thermal.chance.count(hits, n, p), f"{hits} of {n} steps, expected {n * p:.1f}")
 
 
 DRAWN = (

@@ -1,13 +1,33 @@
-"""Thermostats: random schemes as data, their exact laws on springs, and what their states tell."""
+"""Thermostats: random schemes as data, their exact laws on springs, and what their states tell.
+
+What a scene without a bath needs is their names: all but the catalogue is imported when it is first used.
+"""
 
 from __future__ import annotations
 
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
 from springcheck import schemes
 from springcheck.thermal.catalogue import THERMOSTATS, Thermostat
-from springcheck.thermal.laws import Law
-from springcheck.thermal.stepper import Stepper
 
-__all__ = ["THERMOSTATS", "Law", "Stepper", "Thermostat"]
+if TYPE_CHECKING:
+    from springcheck.thermal import chance, draws, rigid
+    from springcheck.thermal.laws import Law
+    from springcheck.thermal.stepper import Stepper
+
+__all__ = ["THERMOSTATS", "Law", "Stepper", "Thermostat", "chance", "draws", "rigid"]
+
+_LATER = {"Law": "laws", "Stepper": "stepper", **{name: name for name in ("chance", "draws", "rigid")}}
+"""What no run without a bath needs, and the module that it is imported from when it is first used."""
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _LATER:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    home = import_module(f"{__name__}.{_LATER[name]}")
+    return home if name == _LATER[name] else getattr(home, name)
+
 
 for _one in THERMOSTATS.values():
     # known by name and title wherever schemes are

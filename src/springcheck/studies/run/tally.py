@@ -7,14 +7,13 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from springcheck import checks
+from springcheck import checks, thermal
 from springcheck.physics import exact
 from springcheck.physics.arrays import Reals
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory
 from springcheck.studies.run.result import Heated, MethodRun
-from springcheck.thermal import THERMOSTATS, Law
-from springcheck.thermal.draws import law_of
+from springcheck.thermal import THERMOSTATS
 
 SETTLED = 5.0
 """Times over which the slowest part of the motion decays before frames count: exp(-5) of a start is left in
@@ -35,7 +34,7 @@ class Heat:
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
-        self._law: Law | None = None
+        self._law: thermal.Law | None = None
         rods = scene.system.rods
         self._freedoms = rods.freedoms(scene.q) if rods else scene.n
         self._sums = np.zeros((2, scene.n))
@@ -75,13 +74,13 @@ class Heat:
         linear = scene.system.has_modes and bool(np.all(scene.system.modes.w2 > 0))
         if piece.scheme in THERMOSTATS and linear and not THERMOSTATS[piece.scheme].rescales:
             if not THERMOSTATS[piece.scheme].splits:
-                self._law = Law(
+                self._law = thermal.Law(
                     scheme=THERMOSTATS[piece.scheme], h=piece.step, m=np.ones(scene.n),
                     k=scene.system.modes.w2, rate=scene.bath.friction, thermal=scene.thermal,
                 )  # fmt: skip
             elif scene.system.is_separate:
                 # modes of all terms are not those of the fast ones
-                self._law = law_of(THERMOSTATS[piece.scheme], scene.derived(step=piece.step))
+                self._law = thermal.draws.law_of(THERMOSTATS[piece.scheme], scene.derived(step=piece.step))
             else:
                 return
             left = self._law.slowest
