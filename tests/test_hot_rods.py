@@ -166,12 +166,12 @@ def test_what_openmm_stores_is_hotter_and_what_ase_runs_is_colder() -> None:
 
 
 def test_the_table_counts_degrees_of_freedom() -> None:
-    scene = replace(load_scene("bath-dumbbell"), steps=8000)
+    scene = replace(load_scene("bath-dumbbell"), steps=4000)
     line = heated_of(scene, [driver.run(scene, "own:baoab", seed=2)])
     assert line.kinetic_law == 1.0
     assert abs(line.kinetic - 1) < 5 * line.kinetic_error
     # six of them would make it too cold by more than that error tells over a longer run
-    assert line.kinetic_error == pytest.approx(np.sqrt(2 / (7875 * np.tanh(0.04) * 5)), rel=0.01)
+    assert line.kinetic_error == pytest.approx(np.sqrt(2 / (3875 * np.tanh(0.04) * 5)), rel=0.01)
 
 
 def test_noise_in_space_moves_no_rod_of_a_plane(

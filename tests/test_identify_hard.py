@@ -499,7 +499,7 @@ def written(x: np.ndarray, digits: int) -> np.ndarray:
 @pytest.mark.parametrize(("substeps", "h", "frames", "digits"), [(3, 0.0678, 5, 3), (4, 0.05, 10, 3)])
 def test_few_frames_of_few_digits_do_not_tell_substeps_from_steps(substeps, h, frames, digits) -> None:
     rng, judged = np.random.default_rng(1), 0
-    for _ in range(20):
+    for _ in range(10):
         q, v = rng.standard_normal(2)
         rows = []
         for _ in range(frames):
@@ -515,7 +515,7 @@ def test_few_frames_of_few_digits_do_not_tell_substeps_from_steps(substeps, h, f
             continue
         assert "held-force" in {x.scheme for x in found.candidates}, found.statement
         judged += 1
-    assert judged > 10
+    assert judged > 5
 
 
 def test_few_frames_about_an_equilibrium_away_from_0_are_no_friction() -> None:

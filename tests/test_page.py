@@ -435,7 +435,7 @@ EVERY = ("own:*", "openmm:*", "ase:*", "sundials:*", "scipy:*")
 def test_every_scheme_of_one_particle_is_computed_again(tmp_path: Path, opened: Any, name: str) -> None:
     base = scenes.load_scene(name)
     # at the tolerance of the scene an implicit solver takes thousands of steps
-    measure.run(replace(base, steps=min(base.steps, 100), tolerance=1e-10), tmp_path / "a.h5", methods=EVERY)
+    measure.run(replace(base, steps=min(base.steps, 50), tolerance=1e-9), tmp_path / "a.h5", methods=EVERY)
     content = page.gather(tmp_path / "a.h5")
     found, said = _checked(opened(content))
     assert found == "equal", said

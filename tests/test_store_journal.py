@@ -338,6 +338,6 @@ def test_a_loss_of_power_at_any_moment_loses_nothing(monkeypatch: pytest.MonkeyP
     with warnings.catch_warnings():
         # parts that a loss has torn were never reported
         warnings.simplefilter("ignore", store.StoreWarning)
-        assert power.losses(30, promises=True) == 0
+        assert power.losses(20, promises=True) == 0
         # the check sees losses: nine of ten such states lose something
         assert power.losses(5, promises=False) > 0
