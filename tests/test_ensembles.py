@@ -176,7 +176,7 @@ def test_the_command_line_runs_inspects_and_draws_an_ensemble(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     vary_two = ["--vary", "spring.0.stiffness=0.5:8:6:log", "--vary", "time.step=0.01:0.2:5"]
-    arguments = ["run", "spring-uneven", *vary_two, "--method", "own:*", "--workers", "2"]
+    arguments = ["run", "spring-uneven", *vary_two, "--method", "own:*euler", "--workers", "2"]
     assert cli.main(arguments) == 0
     told = capsys.readouterr().out
     assert "30 cells, a grid over spring.0.stiffness, time.step" in told

@@ -29,6 +29,7 @@ from springcheck.figures.overlay import Frame
 from springcheck.figures.style import save
 from springcheck.physics import exact
 from springcheck.physics import scenefile as scenes
+from springcheck.studies.extremes import grid
 from springcheck.studies.extremes import measure as extremes
 from springcheck.studies.precision import measure as precision
 from springcheck.studies.precision import text as report
@@ -200,10 +201,12 @@ def test_a_store_that_lacks_a_part_of_its_study_is_refused_in_one_line(
 
 
 def test_a_study_with_nothing_to_draw_says_so(
-    tmp_path: Path, need: Need, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, need: Need, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     need("sundials:bdf")
     path = tmp_path / "solver.h5"
+    few = grid.solver_specs(quick=True)[:20]
+    monkeypatch.setattr(grid, "solver_specs", lambda *, quick=False: few)
     extremes.record(path, ["sundials:bdf"], quick=True)
     assert main(["plot", str(path), "-o", str(tmp_path)]) == 2
     assert "can be drawn" in capsys.readouterr().err

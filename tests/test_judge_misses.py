@@ -75,7 +75,7 @@ def test_a_stiff_spring_is_judged_to_rounding_by_implicit_schemes(name: str) -> 
 def fast_and_slow(slow: float) -> Scene:
     fast = WallSpring(i=np.array([0]), k=np.array([290.0]), at=np.zeros(1), fast=True)
     return clean.scene(
-        np.array([3.7]), (wall(slow), fast), np.array([0.3]), np.array([0.7]), step=0.05, steps=2000
+        np.array([3.7]), (wall(slow), fast), np.array([0.3]), np.array([0.7]), step=0.05, steps=1000
     )
 
 

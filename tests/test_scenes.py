@@ -295,7 +295,7 @@ def test_own_methods_compiled_and_interpreted_agree_to_the_last_bit(name: str) -
     for method in able:
         states = []
         for compiled in (False, True):
-            q, p = np.empty((2, 20, scene.n))
+            q, p = np.empty((2, 8, scene.n))
             with np.errstate(all="ignore"):
                 own.prepare(scene, method.scheme, scene.step, compiled=compiled).advance(3, q, p)
             states.append((q, p))
