@@ -8,7 +8,8 @@ import pytest
 
 from springcheck.identify.families import FAMILIES, KNOWN_ELSEWHERE
 from springcheck.identify.maps import unit
-from springcheck.schemes import ELSEWHERE, SCHEMES
+from springcheck.schemes import SCHEMES
+from springcheck.schemes.elsewhere import ELSEWHERE
 
 
 def stability(name: str, z: mpmath.mpf) -> mpmath.mpf:

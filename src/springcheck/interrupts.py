@@ -8,6 +8,7 @@ What is imported here is what the interpreter has loaded by itself, so that no m
 from __future__ import annotations
 
 import _thread
+import atexit
 import contextlib
 import os
 import signal
@@ -194,6 +195,20 @@ def unread() -> int:
         # of what stands in a buffer the interpreter's shutdown would say that it cannot be written
         os.dup2(os.open(os.devnull, os.O_WRONLY), stream)
     return BROKEN_PIPE
+
+
+def over(status: int) -> int:
+    """End a process of `supervised` after what libraries do at exit; the status, in any other process.
+
+    The interpreter would take every module apart first, a twentieth of the smallest run's time.
+    """
+    if _State.board is not None:
+        atexit._run_exitfuncs()
+        for stream in (sys.stdout, sys.stderr):
+            with contextlib.suppress(OSError, ValueError, AttributeError):
+                stream.flush()
+        os._exit(status)
+    return status
 
 
 def seen() -> bool:

@@ -229,7 +229,7 @@ def match(patterns: tuple[str, ...], *, bath: bool | None = False) -> tuple[Labe
             continue
         found = [
             f"{name}:{m}{at}{place}"
-            for name in names()
+            for name in names(head.partition(":")[0] if ":" in head else "*")
             for m in _methods_meant(name, head, bath)
             if fnmatchcase(f"{name}:{m}", head) and (not at or place in engine(name).platforms)
         ]

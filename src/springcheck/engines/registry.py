@@ -8,6 +8,7 @@ import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
 from functools import cache, partial
 from hashlib import sha256
 from pathlib import Path
@@ -158,9 +159,11 @@ def _checked(found: object, name: str = "") -> Engine:
     return found
 
 
-def names() -> tuple[str, ...]:
-    """Names of all engines that can be loaded, our own first."""
-    return tuple(name for name in _known() if isinstance(_find(name), Engine))
+def names(like: str = "*") -> tuple[str, ...]:
+    """Names of all engines that can be loaded, our own first, or of those that a glob fits."""
+    # a call that names one of ours loads no other
+    known = [like] if like in _ours() else [name for name in _known() if fnmatchcase(name, like)]
+    return tuple(name for name in known if isinstance(_find(name), Engine))
 
 
 def unusable() -> dict[str, str]:

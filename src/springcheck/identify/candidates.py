@@ -20,7 +20,8 @@ from springcheck.identify.result import Candidate, Explanation, Identification
 from springcheck.identify.search import SINGLE_ROOM, coincident, disagreements, numbers
 from springcheck.identify.wrong import stiffness_ratio
 from springcheck.physics.arrays import Floats
-from springcheck.schemes import ELSEWHERE, SCHEMES
+from springcheck.schemes import SCHEMES
+from springcheck.schemes.elsewhere import ELSEWHERE
 from springcheck.text.wording import either
 
 T = TypeVar("T")

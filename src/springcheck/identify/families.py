@@ -15,7 +15,8 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from springcheck.schemes import ELSEWHERE, SCHEMES, Scheme, roundings
+from springcheck.schemes import SCHEMES, Scheme, roundings
+from springcheck.schemes.elsewhere import ELSEWHERE
 
 Stage: TypeAlias = tuple[str, Fraction | str]
 """kick, drift, friction (decay of v), and kicks with the friction in them: `explicit`, `implicit`, `centred`

@@ -53,7 +53,7 @@ from springcheck.identify.thermal import explained, of_bath
 from springcheck.identify.together import at_rest, distance, of_a_bond, of_a_pair, of_rotation
 from springcheck.identify.wrong import faults_like, faults_of
 from springcheck.physics.arrays import Floats
-from springcheck.schemes import ELSEWHERE
+from springcheck.schemes.elsewhere import ELSEWHERE
 
 VELOCITY_OFFSET = {
     "semi-implicit-euler": -0.5,

@@ -15,7 +15,8 @@ from springcheck.identify.report import identify_arrays
 from springcheck.identify.result import Explanation, Identification
 from springcheck.identify.wrong import faults_like
 from springcheck.physics.arrays import Floats
-from springcheck.schemes import ELSEWHERE, SCHEMES
+from springcheck.schemes import SCHEMES
+from springcheck.schemes.elsewhere import ELSEWHERE
 
 Stepper: TypeAlias = Callable[..., Any]
 

@@ -18,7 +18,7 @@ Units: TypeAlias = Literal["reduced", "md", "si"]
 Quantity: TypeAlias = Literal["q", "p", "energy"]
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False, init=False)
 class SceneFields:
     """The fields of a `Scene`, as they are: only a `Scene` checks them and knows what follows from them."""
 

@@ -24,7 +24,7 @@ MOST_STEPS = 2**53
 """Numbers of steps up to which each is a double of its own, so that t = i h tells them apart."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Scene(SceneFields):
     """What is to be simulated: a system, its start, its time grid, and what is asked of it.
 

@@ -9,7 +9,6 @@ from springcheck.schemes.catalogue import (
     number,
     solver,
 )
-from springcheck.schemes.elsewhere import ELSEWHERE
 from springcheck.schemes.kinds import KINDS
 from springcheck.schemes.law import Law, Trait
 from springcheck.schemes.linear import (
@@ -26,7 +25,7 @@ from springcheck.schemes.rounding import magnitude_step, roundings
 from springcheck.schemes.stepping import step
 
 __all__ = [
-    "ATTACHED", "ELSEWHERE", "KINDS", "Law", "Scheme", "Trait", "SCHEMES", "bring", "known", "scheme",
+    "ATTACHED", "KINDS", "Law", "Scheme", "Trait", "SCHEMES", "bring", "known", "scheme",
     "solver", "title", "number", "step", "magnitude_step", "roundings", "amplification", "condition",
     "invariant", "matrix", "noise", "propagate", "rotation",
 ]  # fmt: skip

@@ -20,6 +20,7 @@ from springcheck.identify.families import FAMILIES
 from springcheck.physics.scene import Scene
 from springcheck.physics.scenefile import load_scene
 from springcheck.physics.trajectory import Trajectory
+from springcheck.schemes.elsewhere import ELSEWHERE
 from springcheck.studies import keeper
 from springcheck.studies.arguments import Progress
 from springcheck.studies.census import baths, rigid, table
@@ -194,7 +195,7 @@ def _name(scene: Scene, run: Trajectory, found: Identification | None) -> str:
         inside = f"{found.scheme}-{found.stride}"
         if inside in schemes.ATTACHED:
             return inside
-        if found.scheme in schemes.SCHEMES or found.scheme in schemes.ELSEWHERE:
+        if found.scheme in schemes.SCHEMES or found.scheme in ELSEWHERE:
             return found.scheme
     elif found is not None and found.verdict == "not told apart":
         return " or ".join(dict.fromkeys(x.scheme for x in found.candidates))

@@ -12,6 +12,7 @@ from typing import Any
 
 from springcheck import engines, interrupts, schemes
 from springcheck.errors import SpringcheckError, StoreError, plain
+from springcheck.schemes.elsewhere import ELSEWHERE
 from springcheck.text.wording import number
 
 Row = Mapping[str, Any]
@@ -116,9 +117,7 @@ def _row(x: Row) -> dict[str, str]:
 
 
 def _titles(names: str) -> str:
-    found = (
-        getattr(schemes.ELSEWHERE.get(name), "title", schemes.title(name)) for name in names.split(" or ")
-    )
+    found = (getattr(ELSEWHERE.get(name), "title", schemes.title(name)) for name in names.split(" or "))
     return " or ".join(found)
 
 
