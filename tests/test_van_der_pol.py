@@ -17,7 +17,7 @@ import pytest
 
 import springcheck
 from springcheck import checks, engines
-from springcheck.physics import exact
+from springcheck.physics import builders, exact
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
@@ -178,3 +178,15 @@ def test_backwards_in_time_and_joined_to_others_nothing_is_claimed_that_is_not_k
     for label in ("own:implicit-midpoint", "own:rk4"):
         found = {v.check: v for v in checks.judge(joined, springcheck.simulate(joined, label))}
         assert found["step-defect"].passed is True
+
+
+@pytest.mark.parametrize("every", [1, 7])
+def test_an_implicit_step_of_joined_masses_is_judged_where_friction_depends_on_the_place(every: int) -> None:
+    """Newton's matrix has a factor of its own in each row, whatever axes stand before the rows."""
+    chain = builders.chain(3, [0.7, 0.28, 0.1], [6.7, 4.3, 5.0, 4.6], q=[0.1, -0.2, 0.3], step=0.05, steps=14)
+    brake = VanDerPol(i=[0, 2], c=[1.3, 0.4], width=[0.2, 0.3], at=[0.04, 0.0])
+    joined = replace(chain, terms=(*chain.terms, brake), every=every)
+    for method in ("own:implicit-euler", "own:implicit-midpoint"):
+        found = springcheck.judge(joined, springcheck.simulate(joined, method))
+        (step,) = (v for v in found if v.check == "step-defect")
+        assert step.passed, step.why

@@ -237,7 +237,7 @@ def _newton(residual: Reals, stiffness: Reals, joined: bool, factor: Reals) -> R
     if not isinstance(stiffness, np.ndarray):
         solve = sparse_solver(stiffness, factor)
         return np.asarray(solve(residual) * size)
-    matrix = np.eye(residual.shape[-1]) + np.asarray(stiffness * factor[:, None], np.float64)
+    matrix = np.eye(residual.shape[-1]) + np.asarray(stiffness * factor[..., None], np.float64)
     right = residual.astype(np.float64)
     try:
         if matrix.ndim == 2:
