@@ -13,6 +13,8 @@ import springcheck
 from springcheck.cli import main
 from springcheck.physics import scenefile
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize("name", bonds_in_space.CASES)
 def test_a_file_of_a_bond_along_no_axis_is_named_and_judged(name: str) -> None:

@@ -197,6 +197,7 @@ def test_a_custom_integrator_on_opencl_takes_two_to_the_32_for_one_less(need: Ne
         assert ("step-defect" in judged(scene, as_documented)) == bool(factor)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("precision", ["single", "mixed", "double"])
 @pytest.mark.parametrize(
     ("method", "size", "step"), [("euler", 1, 289), ("verlet", 1e3, 2), ("leapfrog", 1e3, 2)]

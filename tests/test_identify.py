@@ -171,6 +171,7 @@ def test_what_rounding_hides_is_said_and_not_guessed() -> None:
     assert any("more digits" in note for note in found.notes)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", ["single", "text"])
 @pytest.mark.parametrize("name", ["rk4", "ruth3", "forest-ruth", "yoshida4"])
 def test_a_scheme_of_high_order_in_coarse_numbers_is_named_or_listed_and_never_called_another(

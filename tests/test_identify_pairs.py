@@ -9,6 +9,8 @@ import pytest
 
 from springcheck.identify import identify
 
+pytestmark = pytest.mark.slow
+
 M, K, REST, H, N = (3.7, 1.9), 2.9, 1.1, 0.1, 300
 WAY = np.array([1.0, 2.0, -2.0]) / 3
 
@@ -100,7 +102,6 @@ def test_a_pair_in_single_precision_away_from_the_origin_is_named_with_its_arith
     assert "single" in str(found)
 
 
-@pytest.mark.slow
 def test_a_force_from_outside_or_one_that_is_late_is_no_scheme() -> None:
     drift = (0.031, -0.017, 0.023)
     assert named(*swing(drift=drift, more=1e-3), step=H).scheme is None
