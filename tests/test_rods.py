@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import csv
 import itertools
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -347,6 +348,8 @@ def test_a_length_that_is_left_out_is_that_of_the_start() -> None:
     [
         ("[0.8, -0.6]", "{ends = [0, 1], length = 0.6}", "its length is 0.6, and its ends are 0.5 apart"),
         ("[0.8, 0.6]", "{ends = [0, 1]}", "its ends come apart by 0.457 a unit of time at the start"),
+        ("[-0.8, -0.6]", "{ends = [0, 1]}", "its ends approach each other by 0.457 a unit of time"),
+        ("[0.8, -0.6]", "{ends = [0, 1]}, {ends = [0, 1]}", "the rods before it keep its length too"),
         ("[0.8, -0.6]", "{ends = [0, 0]}", "the two ends are the same particle"),
         ("[0.8, -0.6]", "{ends = [0, 2]}", "rod[0].ends = 2: there are 2 particles"),
         ("[0.8, -0.6]", "{ends = ['wall', 'wall']}", "a rod between two walls holds nothing"),
@@ -362,6 +365,35 @@ def test_mistakes_in_rods_are_said_in_a_line(momentum: str, rod: str, said: str)
         scenefile.parse(FILE % (momentum, rod), name="a")
     assert said in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_a_rod_along_others_that_keep_its_length_is_named_and_a_body_with_all_that_it_needs_is_not() -> None:
+    """Three on a line; and four particles on six rods, whose rods are as many as their lengths."""
+    line = FILE.replace("]\ntime", ",\n {mass = 0.7, position = [0.6, 0.8], momentum = [0, 0]}]\ntime")
+    three = "{ends = [0, 1]}, {ends = [1, 2]}, {ends = [0, 2]}"
+    with pytest.raises(
+        SceneError, match="the rod of particles 0 and 2: at the start the rods before it keep"
+    ):
+        scenefile.parse(line % ("[0, 0]", three), name="a")
+    bent = line.replace("[0.6, 0.8]", "[0.6, 0.8001]")
+    assert len(rods(scenefile.parse(bent % ("[0, 0]", three), name="a"))) == 3
+    corners = np.vstack([np.zeros(3), np.diag([1.0, 0.7, 1.3])]).ravel()
+    pairs = [(a, b) for a in range(4) for b in range(a)]
+    ends = np.array([[3 * i + axis for i in pair] for pair in pairs for axis in range(3)])
+    far = [np.linalg.norm(corners.reshape(4, 3)[a] - corners.reshape(4, 3)[b]) for a, b in pairs]
+    rod = Rod(a=ends[:, 0], b=ends[:, 1], length=np.repeat(far, 3))
+    body = Scene(
+        m=np.repeat([1.3, 2.1, 0.7, 0.9], 3), q=corners, p=np.zeros(12), terms=(rod,), step=0.1, steps=3,
+        places=np.arange(12),
+    )  # fmt: skip
+    assert rods(body).freedoms(body.q) == 6
+
+
+def test_rounding_that_hides_a_momentum_in_space_is_said_of_a_particle_and_its_axis() -> None:
+    scene = replace(scenefile.load_scene("dumbbell"), steps=30)
+    run = driver.run(scene, "own:velocity-verlet")
+    (found,) = checks.judge(scene, replace(run, p=run.p + 1e-6), [checks.step_defect])
+    assert re.search(r"p_x of particle 0 \(\S+\), p_y of particle 0 \(\S+\), p_x of particle 1 ", found.why)
 
 
 def test_a_run_and_its_page_say_what_a_pass_does_not_cover(

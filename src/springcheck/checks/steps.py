@@ -111,7 +111,7 @@ def _blind(case: Case, told: NDArray[np.bool_], *, passed: bool) -> str:
             coarser = run.arithmetic.state / Arithmetic().state
             known &= off <= OF_RECORDING * coarser * np.spacing(np.max(np.abs(ends), axis=1)) / 2
         coarse = (way > 0) & ~hidden & ~known
-    return _list(hidden, BLIND) + _list(coarse, NO_BETTER, worst)
+    return _list(case, hidden, BLIND) + _list(case, coarse, NO_BETTER, worst)
 
 
 OF_DIGITS, OF_WAY = 512.0, 1e-9
@@ -122,10 +122,12 @@ OF_RECORDING = 20.0
 said to be known no better than to what rounding allows."""
 
 
-def _list(which: NDArray[np.bool_], said: str, size: Reals | None = None) -> str:
+def _list(case: Case, which: NDArray[np.bool_], said: str, size: Reals | None = None) -> str:
     """What is said of these positions and momenta (2, n), each with its size, or nothing."""
+    of, axes = np.divmod(case.scene.all_places, 3)
+    along = [""] * len(of) if case.scene.places is None else [f"_{'xyz'[axis]}" for axis in axes]
     names = [
-        f"{'qp'[i]} of particle {j}" + ("" if size is None else f" ({float(size[i, j]):.1e})")
+        f"{'qp'[i]}{along[j]} of particle {of[j]}" + ("" if size is None else f" ({float(size[i, j]):.1e})")
         for i, j in np.argwhere(which)
     ]
     more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""

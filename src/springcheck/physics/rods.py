@@ -187,7 +187,7 @@ class Rods:
         found = np.zeros_like(wanted)
         # solved in double precision, and made as wide as the numbers by its residual
         for _ in range(3):
-            moved = self.apart(self.spread(self.each(found) * right) / self.m.astype(wanted.dtype))
+            moved = self.apart(self._push(found, right) / self.m.astype(wanted.dtype))
             lacks = np.asarray(wanted - self.dot(left, moved), np.float64)
             found = found + _where_regular(np.linalg.solve, matrix, lacks[..., None])[..., 0]
         return found
@@ -231,17 +231,23 @@ class Rods:
         solved = ~going & (last < np.sqrt(np.finfo(s.dtype).eps))
         return np.where(solved[..., None], k, np.nan)
 
+    def _push(self, k: Reals, r: Reals) -> Reals:
+        return self.spread(self.each(k) * r)
+
+    def _along(self, r: Reals, p: Reals) -> Reals:
+        """The multipliers of what changes lengths in momenta p (..., n), at ways r (..., s)."""
+        return self.solve(r, r, self.dot(r, self.apart(p / self.m.astype(p.dtype))))
+
     def drifted(self, before: Reals, q: Reals, p: Reals, x: Any) -> tuple[Reals, Reals]:
         """A drift for the time x from `before` to q, with its momenta p, brought back to the lengths."""
         r = self.ways(before)
-        push = self.spread(self.each(self.multiplier(r, self.ways(q))) * r)
+        push = self._push(self.multiplier(r, self.ways(q)), r)
         return q + push / self.m.astype(q.dtype), p + push / x
 
     def projected(self, q: Reals, p: Reals) -> Reals:
         """Momenta without what would change a length: RATTLE's second half."""
         r = self.ways(q)
-        k = self.solve(r, r, self.dot(r, self.apart(p / self.m.astype(p.dtype))))
-        return np.asarray(p - self.spread(self.each(k) * r))
+        return np.asarray(p - self._push(self._along(r, p), r))
 
     def sizes(
         self, before: Reals | None, q: Reals, p: Reals, x: Any, of: tuple[Reals, Reals], loose: float
@@ -263,7 +269,7 @@ class Rods:
             across = np.abs(r - s * self.each(self.dot(r, s) / self.dot(s, s)))
             of_p = of_p + self.spread(across * self.each(k), size=True) / np.abs(x)
             around = self._most(of_q)
-        along = np.abs(self.solve(s, s, self.dot(s, self.apart(p / m))))
+        along = np.abs(self._along(s, p))
         seen = self.sum_of_sizes(s, of_p / m)
         held = np.abs(s) * self.each(self._enlarged(s, s, seen)) + around * self.each(along)
         return of_q, of_p + self.spread(held, size=True)
@@ -338,13 +344,25 @@ class Rods:
                 f"{self.named(j)}: its length is {float(self.length[j])!r}, and its ends are "
                 f"{float(np.sqrt(self.dot(r, r))[j])!r} apart at the start; leave the length out to keep that"
             )
+        if self.share:
+            matrix = self._matrix(r, r)
+            unit = np.sqrt(np.diag(matrix))
+            # of a push that those of the rods before it make together nothing is left
+            left = np.abs(np.diag(np.linalg.qr(matrix / np.outer(unit, unit), mode="r")))
+            wrong = left <= UNTRUE * len(self)
+            if np.any(wrong):
+                raise SceneError(
+                    f"{self.named(int(np.argmax(wrong)))}: at the start the rods before it keep its length "
+                    "too, and their multipliers have no one solution; leave it out"
+                )
         wrong = ~(along <= UNTRUE * size)
         if np.any(wrong):
             j = int(np.argmax(wrong))
             rate = float(self.dot(r, v)[j] / self.length[j])
             raise SceneError(
-                f"{self.named(j)}: its ends come apart by {rate:.3g} a unit of time at the start; momenta "
-                f"that keep its length are p = {np.asarray(self.projected(q, p)).tolist()}"
+                f"{self.named(j)}: its ends {'come apart' if rate > 0 else 'approach each other'} by "
+                f"{abs(rate):.3g} a unit of time at the start; momenta that keep its length are "
+                f"p = {np.asarray(self.projected(q, p)).tolist()}"
             )
 
 
@@ -353,35 +371,29 @@ def rods_of(m: Floats, places: Integers | None, terms: Sequence[Term]) -> Rods |
     return Rods(m, places, terms) if any(term.kind == "constraint" for term in terms) else None
 
 
-class Variation:
+class Variation(Rods):
     """The rods on states (1 + d, ..., n): the first is a motion, the others are changes of it.
 
     The change of a multiplier follows from the length that stays (implicit differentiation).
     """
 
     def __init__(self, rods: Rods) -> None:
-        self._rods = rods
+        self.__dict__.update(rods.__dict__)
 
     def drifted(self, before: Reals, q: Reals, p: Reals, x: Any) -> tuple[Reals, Reals]:
         """As of `Rods`."""
-        rods, m = self._rods, self._rods.m.astype(q.dtype)
-        r, dr = rods.ways(before[0]), rods.apart(before[1:])
-        k = rods.multiplier(r, rods.ways(q[0]))
-        push = rods.spread(rods.each(k) * r)
-        s = rods.ways(q[0] + push / m)
-        turned = rods.spread(rods.each(k) * dr)
-        lacks = rods.dot(s, rods.apart(q[1:] + turned / m))
-        change = turned - rods.spread(rods.each(rods.solve(s, r, lacks)) * r)
-        whole = np.concatenate([push[None], change])
+        m, r, dr = self.m.astype(q.dtype), self.ways(before[0]), self.apart(before[1:])
+        k = self.multiplier(r, self.ways(q[0]))
+        push, turned = self._push(k, r), self._push(k, dr)
+        s = self.ways(q[0] + push / m)
+        lacks = self.dot(s, self.apart(q[1:] + turned / m))
+        whole = np.concatenate([push[None], turned - self._push(self.solve(s, r, lacks), r)])
         return q + whole / m, p + whole / x
 
     def projected(self, q: Reals, p: Reals) -> Reals:
         """As of `Rods`."""
-        rods, m = self._rods, self._rods.m.astype(q.dtype)
-        r, dr = rods.ways(q[0]), rods.apart(q[1:])
-        k = rods.solve(r, r, rods.dot(r, rods.apart(p[0] / m)))
-        first = p[0] - rods.spread(rods.each(k) * r)
-        change = p[1:] - rods.spread(rods.each(k) * dr)
-        lacks = rods.dot(r, rods.apart(change / m)) + rods.dot(dr, rods.apart(first / m))
-        change = change - rods.spread(rods.each(rods.solve(r, r, lacks)) * r)
-        return np.concatenate([first[None], change])
+        m, r, dr = self.m.astype(q.dtype), self.ways(q[0]), self.apart(q[1:])
+        k = self._along(r, p[0])
+        first, change = p[0] - self._push(k, r), p[1:] - self._push(k, dr)
+        lacks = self.dot(r, self.apart(change / m)) + self.dot(dr, self.apart(first / m))
+        return np.concatenate([first[None], change - self._push(self.solve(r, r, lacks), r)])

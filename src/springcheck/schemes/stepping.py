@@ -9,7 +9,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from springcheck.physics.arrays import Floats, Force, Reals
-from springcheck.physics.rods import Rods, Variation
+from springcheck.physics.rods import Rods
 from springcheck.schemes.catalogue import Scheme, number
 from springcheck.schemes.kinds import Acting, Setting
 
@@ -44,7 +44,7 @@ def step(
     near: Reals | None = None,
     draws: Sequence[Reals] | None = None,
     kT: Any = 0,
-    hold: Rods | Variation | None = None,
+    hold: Rods | None = None,
 ) -> tuple[Reals, Reals]:
     """One step from (q, p), each (..., n), in the width of q.
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from springcheck.physics.arrays import Extended
-from springcheck.physics.exact.well import LAST, States, Well, one_each, wide
+from springcheck.physics.exact.well import LAST, States, Well, one_each, sums, wide
 from springcheck.physics.rods import UNTRUE
 from springcheck.physics.system import System
 
@@ -53,9 +53,7 @@ def _swings(system: System[Any]) -> _Swing | None:
 
     def summed(values: Extended) -> Extended:
         # over the axes, of which each end has all
-        total = np.zeros(int(np.max(bond)) + 1, np.longdouble)
-        np.add.at(total, bond, values)
-        return np.asarray(total[bond] / 2)
+        return sums(bond, values) / 2
 
     with np.errstate(all="ignore"):
         s = np.sqrt(summed(d * d))

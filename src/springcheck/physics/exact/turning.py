@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from springcheck.physics.arrays import Extended, Integers, Reals
-from springcheck.physics.exact.well import LAST, States, Well, wide
+from springcheck.physics.arrays import Extended, Integers
+from springcheck.physics.exact.well import LAST, States, Well, sums, wide
 from springcheck.physics.rods import UNTRUE, Rods
 from springcheck.physics.system import System
 
@@ -29,13 +29,6 @@ class _Turning:
     reach: Extended
     w: Extended
     drift: Extended
-
-
-def _sums(of: Integers, values: Reals) -> Extended:
-    """Sums of values (n,) over all with the same number, where each of them stands."""
-    out = np.zeros(int(np.max(of)) + 1, np.longdouble)
-    np.add.at(out, of, values)
-    return np.asarray(out[of])
 
 
 def _is_flat(places: Integers, x: Extended, v: Extended) -> bool:
@@ -60,15 +53,15 @@ def _turning(system: System[Any]) -> _Turning | None:
     body, held = of[places // 3], np.isin(places // 3, [ends[0] for ends in rods.ends if len(ends) == 1])
     along = 3 * body + places % 3
     p = rods.projected(wide(system.q), wide(system.p))
-    drift = np.where(held, 0, _sums(along, p) / _sums(along, m))
+    drift = np.where(held, 0, sums(along, p) / sums(along, m))
     x = np.where(
-        held, rods.spread(rods.ways(wide(system.q))), system.q - _sums(along, m * system.q) / _sums(along, m)
+        held, rods.spread(rods.ways(wide(system.q))), system.q - sums(along, m * system.q) / sums(along, m)
     )
     v = p / m - drift
-    w = np.sqrt(_sums(body, m * v * v) / _sums(body, m * x * x))
+    w = np.sqrt(sums(body, m * v * v) / sums(body, m * x * x))
     if rods.share and not all(_is_flat(places[of], (w * x)[of], v[of]) for of in _groups(body)):
         return None
-    reach = np.sqrt(_sums(places // 3, x * x))
+    reach = np.sqrt(sums(places // 3, x * x))
     return _Turning(x=wide(x), v=wide(v), reach=reach, w=wide(w), drift=wide(drift))
 
 

@@ -8,7 +8,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from springcheck.physics.arrays import Extended
+from springcheck.physics.arrays import Extended, Integers, Reals
 from springcheck.physics.exact.elliptic import EPS
 from springcheck.physics.system import System
 
@@ -43,6 +43,13 @@ class Well:
 def wide(x: Any) -> Extended:
     """Doubles in extended precision."""
     return np.asarray(x, np.longdouble)
+
+
+def sums(of: Integers, values: Reals) -> Extended:
+    """Sums of values (n,) over all with the same number, where each of them stands."""
+    out = np.zeros(int(np.max(of)) + 1, np.longdouble)
+    np.add.at(out, of, values)
+    return np.asarray(out[of])
 
 
 def one_each(system: System[Any]) -> bool:
