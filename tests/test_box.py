@@ -121,3 +121,24 @@ def test_engines_without_a_box_say_so(capsys: pytest.CaptureFixture[str], tmp_pa
     assert "ASE is given no periodic box here" in capsys.readouterr().err
     assert main(["run", "periodic-box", "--method", "own:euler", "-o", path]) == 0
     assert "periodic boxes" not in capsys.readouterr().out
+
+
+def test_the_border_is_named_where_only_steps_across_it_are_off() -> None:
+    """A spring that is wrong is wrong within the box too: that has another cause."""
+    scene = boxed()
+    run = springcheck.simulate(scene, "own:velocity-verlet")
+    right = {v.check: v for v in checks.judge(scene, run)}["border"]
+    assert right.passed is True
+    assert "46 of 200 pairs of frames" in right.why
+    stiffer = scene.derived(terms=tuple(term.scaled(1 + 1e-9) for term in scene.terms))
+    found = {v.check: v for v in checks.judge(scene, springcheck.simulate(stiffer, "own:velocity-verlet"))}
+    assert found["step-defect"].passed is False
+    assert found["border"].passed is None
+    assert "another cause" in found["border"].why
+    period = scene.periods[0]
+    late = int(np.flatnonzero(np.diff(np.floor(run.q[:, 0] / period)))[0]) + 1
+    q = run.q.copy()
+    q[late, 0] -= period * np.sign(q[late, 0] - q[late - 1, 0])
+    found = {v.check: v for v in checks.judge(scene, replace(run, q=q))}
+    assert found["border"].passed is False
+    assert f"at step {late}" in found["border"].why

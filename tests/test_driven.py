@@ -460,3 +460,15 @@ def test_a_driven_mode_that_neither_turns_nor_grows_has_no_closed_form_here() ->
     )
     assert found.passed is None
     assert "neither turns nor grows" in found.why
+
+
+def test_the_check_of_the_drive_holds_its_tongue_where_the_spring_is_wrong() -> None:
+    scene = measure.scene("driven")
+    wall = next(term for term in scene.terms if isinstance(term, WallSpring))
+    stiffer = scene.derived(
+        terms=tuple(replace(x, k=x.k * (1 + 1e-9)) if x is wall else x for x in scene.terms)
+    )
+    found = {v.check: v for v in checks.judge(scene, springcheck.simulate(stiffer, "own:velocity-verlet"))}
+    assert found["step-defect"].passed is False
+    assert found["drive"].passed is None
+    assert "not by the time of the drive" in found["drive"].why

@@ -38,7 +38,7 @@ from springcheck.checks.record import energies, grid, line, start, times
 from springcheck.checks.requires import CONTRACTED
 from springcheck.checks.rods import rod_length, rod_velocity, turn
 from springcheck.checks.solver import energy_gain, replay, tolerance, tolerance_bound
-from springcheck.checks.steps import BLIND, arithmetic, bridges, first_off, step_defect
+from springcheck.checks.steps import BLIND, arithmetic, border, bridges, drive, first_off, step_defect
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Limits, Trajectory, Verdict
 from springcheck.text.wording import STATES_SHOW
@@ -56,7 +56,8 @@ Experiment: TypeAlias = check.Check[Bench]
 
 CHECKS: tuple[Check, ...] = (
     start, times, grid, line, step_defect, arithmetic, closed_form, shadow_energy, frequency, momentum,
-    angular_momentum, rod_length, rod_velocity, turn, gyration, energies, tolerance, replay, energy_gain,
+    angular_momentum, rod_length, rod_velocity, turn, gyration, border, drive, energies, tolerance, replay,
+    energy_gain,
 )  # fmt: skip
 
 THOROUGH: tuple[Experiment, ...] = (
@@ -75,7 +76,7 @@ _TELLING = [
     one.name
     for one in ALL
     if one.family in ("motion", "map", "law")
-    and one not in (momentum, angular_momentum, rod_length, rod_velocity)
+    and one not in (momentum, angular_momentum, rod_length, rod_velocity, border, drive)
 ]
 TELLING = frozenset(["identified", *_TELLING, *(one.name for one in thermal.DRAWN)])
 """Checks that tell the scheme that a method claims from another one; `identified` is of a file's states."""

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from springcheck.checks.case import Case
+from springcheck.checks.check import Finding
 from springcheck.checks.requires import MAP, missing
 from springcheck.physics.arrays import Extended, Reals
 from springcheck.physics.driven import CLOCK
@@ -102,6 +103,30 @@ def _later(case: Case) -> float:
                 return 0.0
             later -= move
     return later
+
+
+def time_taken(case: Case) -> Finding | str:
+    """By which part of a step all drives are taken later, by linear least squares over all steps.
+
+    Each residual may be off by the scheme's roundings: they are added up with their signs in the worst way.
+    Where no time and no other drive explains the states, the cause is not the drive.
+    """
+    given, case = case, case.clocked
+    unit, change = np.stack(case.allowance)[..., :-1], 1e-6
+    with np.errstate(all="ignore"):
+        off, moved = (_off(case, _Clock(later=later)) / unit for later in (0.0, change))
+        slope = np.where(unit > 0, (moved - off) / change, 0)
+        weight = np.sum(slope * slope)
+        later = -np.sum(np.where(unit > 0, off, 0) * slope) / weight
+        bound = case.roundings * np.sum(np.abs(slope)) / weight
+    if not bound < 1:
+        return "rounding may be as large as what a drive a whole step later does"
+    why = "the roundings of every step, and how far each may shift the time at which a drive fits them best"
+    if not abs(later) <= bound:
+        why = found(given)
+        if not why:
+            return "steps are off, and not by the time of the drive or by another drive that is known here"
+    return Finding(abs(later), bound, "of a step", why)
 
 
 def _other_drives(scene: Scene) -> Iterator[tuple[str, Scene]]:

@@ -69,6 +69,45 @@ def _step_defect(case: Case) -> Finding | str:
     return Finding(value, most, "roundings", why + hidden, sees)
 
 
+@check("border", family="motion", requires=MAP | {"box", "resolved"})
+def border(case: Case) -> Finding | str:
+    """Steps across a border of the box, of a particle or of a bond, are as good as those within it."""
+    run, box = case.trajectory, case.scene.periods
+    with np.errstate(all="ignore"):
+        seen = _in_roundings(case, run.q[1:], run.p[1:])
+        image = np.floor(run.q / box)
+        moved = (image[1:] != image[:-1]) | (np.abs(np.diff(run.q, axis=0)) > box / 2)
+    apart = np.zeros(len(run.q), np.bool_)
+    for term in case.scene.terms:
+        if term.bodies == 2:
+            a, b = term.particles
+            apart |= np.any(image[:, a] != image[:, b], axis=1)
+    across = np.any(moved, axis=1) | apart[1:] | apart[:-1]
+    bound, told = _allowed(case)
+    off, across, within = ~(seen <= bound), across & told, ~across & told
+    if not np.any(across):
+        return "nothing crosses a border of the box in this run, and no bond lies across one"
+    if np.any(off & within):
+        return "steps within the box are off as well, which has another cause"
+    worst = int(np.argmax(np.where(across, np.where(np.isfinite(seen), seen / bound, np.inf), -1)))
+    why = (
+        f"roundings along one step, however many borders it crosses: {np.count_nonzero(across)} of "
+        f"{count(len(across), 'pair')} of frames lie across one"
+    )
+    return Finding(seen[worst], bound[worst], "roundings", why + _where(case, off & across))
+
+
+@check("drive", family="motion", requires=MAP | {"driven", "resolved"})
+def drive(case: Case) -> Finding | str:
+    """The time of a drive is that at which the scheme takes it within its step."""
+    if case.trajectory.every > 1:
+        return f"{case.trajectory.every} steps lie between frames"
+    # scenes without a drive do without what looks for its time
+    from springcheck.checks import driven
+
+    return driven.time_taken(case)
+
+
 def _allowed(case: Case) -> tuple[Floats, NDArray[np.bool_]]:
     """By how many roundings each frame but the first may be off, and whether that is known (f-1,).
 

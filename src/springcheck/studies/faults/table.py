@@ -215,21 +215,23 @@ AXES = (
           scene="orbit"),
 )  # fmt: skip
 
+_OF_DRIVES, _AT_BORDERS = (*_MOTION_CHECKS, "drive"), (*_MOTION_CHECKS, "border")
+
 DRIVES = (
     Fault("late-drive", "the drive is taken later by a part of the step",
-          _MOTION_CHECKS, seeded.stepping(fields.late), size=1e-9, scene="driven"),
+          _OF_DRIVES, seeded.stepping(fields.late), size=1e-9, scene="driven"),
     Fault("held-drive", "the drive of the step's start is held over its stages",
-          _MOTION_CHECKS, seeded.stepping(fields.held), scene="driven"),
+          _OF_DRIVES, seeded.stepping(fields.held), scene="driven"),
     Fault("drive-of-the-step-before", "the drive is that of the step before, as of a callback that is late",
-          _MOTION_CHECKS, seeded.stepping(lambda s, k, x: fields.late(s, k, -1.0)), scene="driven"),
+          _OF_DRIVES, seeded.stepping(lambda s, k, x: fields.late(s, k, -1.0)), scene="driven"),
     Fault("drive-phase", "the phase of the drive has the wrong sign",
-          _MOTION_CHECKS, seeded.moving(lambda s, x: fields.other(s, phase=-1)), scene="driven"),
+          _OF_DRIVES, seeded.moving(lambda s, x: fields.other(s, phase=-1)), scene="driven"),
     Fault("drive-over-mass", "the amplitude of the drive is divided by the mass",
-          _MOTION_CHECKS, seeded.moving(lambda s, x: fields.other(s, amplitude=1 / s.m)), scene="driven"),
+          _OF_DRIVES, seeded.moving(lambda s, x: fields.other(s, amplitude=1 / s.m)), scene="driven"),
     Fault("drive-in-degrees", "the phase of the drive is taken for degrees",
-          _MOTION_CHECKS, seeded.moving(lambda s, x: fields.other(s, phase=np.pi / 180)), scene="driven"),
+          _OF_DRIVES, seeded.moving(lambda s, x: fields.other(s, phase=np.pi / 180)), scene="driven"),
     Fault("drive-in-cycles", "the angular frequency of the drive is taken for cycles in a unit of time",
-          _MOTION_CHECKS, seeded.moving(lambda s, x: fields.other(s, frequency=2 * np.pi)), scene="driven"),
+          _OF_DRIVES, seeded.moving(lambda s, x: fields.other(s, frequency=2 * np.pi)), scene="driven"),
 )  # fmt: skip
 
 
@@ -294,17 +296,17 @@ RIGID = (
 
 BOX = (
     Fault("far-image", "a bond across the border of a periodic box pulls the long way round",
-          _MOTION_CHECKS, seeded.stepping(space.imaged(lambda d, box: d)), scene="box"),
+          _AT_BORDERS, seeded.stepping(space.imaged(lambda d, box: d)), scene="box"),
     Fault("image-to-the-right", "the image of a bond's end is the next one to the right, not the nearest",
-          _MOTION_CHECKS, seeded.stepping(space.imaged(lambda d, box: d - box * np.floor(d / box))),
+          _AT_BORDERS, seeded.stepping(space.imaged(lambda d, box: d - box * np.floor(d / box))),
           scene="box"),
     Fault("cubic-box", "images along y are as far apart as those along x",
-          _MOTION_CHECKS, seeded.stepping(space.imaged(lambda d, box: d - box[0] * np.round(d / box[0]))),
+          _AT_BORDERS, seeded.stepping(space.imaged(lambda d, box: d - box[0] * np.round(d / box[0]))),
           scene="box"),
     Fault("swapped-images", "borders crossed along x are counted along y, and those along y along x",
-          _MOTION_CHECKS, seeded.reporting(space.swapped_images), scene="box"),
+          _AT_BORDERS, seeded.reporting(space.swapped_images), scene="box"),
     Fault("late-image", "a border that is crossed is counted a frame later",
-          _MOTION_CHECKS, seeded.reporting(space.late_images), scene="box"),
+          _AT_BORDERS, seeded.reporting(space.late_images), scene="box"),
 )  # fmt: skip
 
 ADAPTIVE = (
