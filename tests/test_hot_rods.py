@@ -242,6 +242,17 @@ def test_frames_that_tell_no_draw_leave_the_lengths_to_judge_and_no_velocity_alo
     assert {v.check: v for v in checks.judge(scene, longer)}["rod-length"].passed is False
 
 
+@pytest.mark.parametrize(("step", "said"), [(0.25, True), (0.05, False)])
+def test_a_length_that_no_push_could_keep_is_said_to_ask_for_a_shorter_step(step: float, said: bool) -> None:
+    scene = replace(load_scene("bath-dumbbell"), steps=6, step=step)
+    run = driver.run(scene, "own:baoab", seed=11)
+    longer = replace(run, q=run.q * (1 + 1e-3 * (np.arange(len(run.q)) >= 4))[:, None], energy=None)
+    found = {v.check: v for v in checks.judge(scene, longer)}["rod-length"]
+    assert found.passed is False
+    assert ("; first at step 4, where a rod turns by h w = " in found.why) == said
+    assert found.why.endswith("take a shorter step") == said
+
+
 def test_where_no_rounding_is_known_nothing_is_said_of_velocities_along_rods() -> None:
     scene = replace(load_scene("dumbbell"), steps=8)
     case = checks.Case(scene=scene, trajectory=driver.run(scene, "own:velocity-verlet"))

@@ -45,6 +45,17 @@ def rod_length(case: Case) -> Finding:
     if np.any(lost):
         step = int(case.steps[int(np.argmax(lost))])
         why += f"; after step {step} a rod turns by h w of 1 or more, and no push along it keeps its length"
+    elif heated and np.any(wrong := np.any(~(off <= bound), axis=1)):
+        # of the frames beside the step, whose draws may have turned it three times as fast as is usual
+        i = int(np.argmax(wrong))
+        near = rods.rates(case.trajectory.q[i : i + 2], case.trajectory.p[i : i + 2])
+        usual = np.sqrt(case.judged.thermal * rods.inverse_mass) / rods.length
+        turn, more = (float(abs(case.judged.step) * np.max(w)) for w in (near, usual))
+        if turn + 3 * more >= 1:
+            why += (
+                f"; first at step {case.steps[i + 1]}, where a rod turns by h w = {turn:.2g} beside draws of "
+            )
+            why += f"{more:.2g}: from 1 on no push along it keeps its length; take a shorter step"
     return Finding(off[worst], bound[worst], "of the length", why)
 
 
