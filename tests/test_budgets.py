@@ -17,7 +17,7 @@ BUDGETS = {
     ("engines/openmm", "engines/ase", "engines/sundials"): 1379,
     ("engines",): 2622,
     ("driver", "conformance", "doors"): 1197,
-    ("checks",): 4890,
+    ("checks",): 4901,
     ("identify",): 8225,
     ("formats", "store"): 5151,
     ("studies",): 1626,
