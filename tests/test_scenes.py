@@ -45,7 +45,7 @@ def shortened(name: str) -> Scene:
             text = text.replace(f"{field} = {value}", f"{field} = {SHORT if field == 'masses' else 200}")
         text = text.replace("mode = 400", "mode = 40")
     scene = scenes.parse(text, name=name)
-    return replace(scene, steps=min(scene.steps, 400))
+    return replace(scene, steps=min(scene.steps, 200))
 
 
 SHIPPED = {name: scenes.load_scene(name) for name in scenes.names()}
