@@ -124,7 +124,7 @@ def test_a_short_file_of_it_is_listed_with_every_count_that_it_leaves_open(subst
     assert found.scheme is None
     names = [one.scheme for one in found.candidates]
     assert f"baoab-respa{min(substeps, SUBSTEPS_TRIED[-1])}" in names
-    assert len(set(names)) == len(names)
+    assert sum("respa" in one for one in found.choice) <= 2
     assert found.statement.count("baoab-respa") == 1
     assert substeps <= 12 or "12 or more" in found.statement
 

@@ -13,6 +13,7 @@ import pytest
 import springcheck
 from springcheck import driver
 from springcheck.cli import main
+from springcheck.identify.result import Candidate, Explanation, nothing
 from springcheck.physics import scenefile
 from springcheck.physics.bath import Bath
 from springcheck.physics.scene import Scene
@@ -281,3 +282,41 @@ def test_a_loop_of_ones_own_with_explicit_friction_may_be_a_scheme_that_is_not_k
     # one name, or several, in the first line that is printed
     first = str(found).splitlines()[0]
     assert first.startswith("the states: each step takes noise" if digits == 17 else "the states: several")
+
+
+@pytest.mark.parametrize("name", ["bbk", "lammps-langevin"])
+def test_the_numbers_of_two_halves_are_off_by_their_errors(name: str) -> None:
+    """Of 12 files with a step far from 1: squares over those of the errors are 1 on the average."""
+    w, rate, thermal, m = 126.0, 20.0, 1.7, 3.7
+    fast = Scene(
+        m=np.array([m]), q=np.array([0.003]), p=np.array([0.7]), step=0.001, steps=1500, name="fast",
+        terms=(WallSpring(i=np.array([0]), k=np.array([m * w * w]), at=np.zeros(1)),),
+        bath=Bath(temperature=thermal, friction=rate),
+    )  # fmt: skip
+    off = []
+    for seed in range(12):
+        run = driver.run(fast, f"own:{name}", seed=seed + 1)
+        found = identify_thermal(run.t, run.q[:, 0], run.p[:, 0] / m)
+        assert found is not None
+        one = found.candidates[0]
+        assert one.scheme == name
+        off.append(
+            [
+                (one.omega - w) / one.omega_error,
+                (one.friction - rate) / one.friction_error,
+                (one.thermal - thermal / m) / one.thermal_error,
+            ]
+        )
+    assert np.all(np.mean(np.square(off), axis=0) < 3)
+    assert np.all(np.mean(np.square(off), axis=0) > 0.2)
+
+
+def test_of_schemes_that_a_count_tells_apart_one_entry_is_said() -> None:
+    one = Candidate(scheme="", aliases=(), stride=1, step=0.1, turns=0, omega=(), stiffness=None, friction=())
+    names = [("baoab-respa2", 1), ("obabo", 2), ("baoab-respa4", 1), ("baoab-respa3", 1), ("obabo", 3)]
+    found = nothing(
+        (Explanation(cause="", remedy="", misfit=0.0),), determinant=(), symplectic_defect=0.0,
+        defect_ulp=0.0, notes=[],
+    )  # fmt: skip
+    several = replace(found, candidates=tuple(replace(one, scheme=x, stride=n) for x, n in names))
+    assert several.choice == ["baoab-respa2 to 4", "obabo, 2 to 3 steps a frame"]

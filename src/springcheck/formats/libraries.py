@@ -62,7 +62,7 @@ def read_ase(path: Path, columns: list[str], step: float | None) -> States:
             if bare is not None or atoms.has("momenta"):
                 v.append(bare if bare is not None else atoms.get_velocities() * units.fs)
         named = [atoms.info.get("time", atoms.info.get("t")) for atoms in found]
-        t = named if all(x is not None for x in named) else times(path, range(len(found)), step)
+        t = named if all(x is not None for x in named) else times(path, range(len(found)), step, "fs")
         written = 2.0**-53 if kind == "traj" else _written(path.read_text().splitlines())
         moving = v if len(v) == len(found) else None
         q = [atoms.positions for atoms in found]

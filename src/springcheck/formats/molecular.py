@@ -20,10 +20,11 @@ from springcheck.formats.lines import MOST_NUMBERS, Lines, number
 from springcheck.formats.tables import SHOWN, of_rows, roundoff
 
 
-def times(path: Path, steps: Any, step: float | None) -> Floats:
+def times(path: Path, steps: Any, step: float | None, unit: str = "") -> Floats:
     """Times of counted steps; StoreError where the time step is not stated."""
     if step is None:
-        raise StoreError(f"{path}: counts steps and knows no times; give its time step, as --step H")
+        how = f"as --step H{unit and f' in {unit}'}"
+        raise StoreError(f"{path}: counts steps and knows no times; give its time step, {how}")
     return np.asarray(np.asarray(steps, np.float64) * step)
 
 

@@ -114,15 +114,17 @@ class Identification:
 
     @property
     def choice(self) -> list[str]:
-        """The schemes of the candidates, each once with its numbers of steps: "rk4, 5 to 9 steps a frame"."""
-        strides: dict[str, list[int]] = {}
+        """The schemes of the candidates, each once with its numbers of steps: "rk4, 5 to 9 steps a frame";
+        those that a number alone tells apart together."""
+        strides: dict[str, set[int]] = {}
         for x in self.candidates:
-            known = strides.setdefault(x.scheme, [])
-            known += [x.stride] if x.stride not in known else []
-        return [
-            name if found == [1] else f"{name}, {_ranges(sorted(found))} steps a frame"
-            for name, found in strides.items()
-        ]
+            strides.setdefault(x.scheme, set()).add(x.stride)
+        alike: dict[tuple[str, str], list[int]] = {}
+        for name, found in strides.items():
+            stem = name.rstrip("0123456789")
+            often = "" if found == {1} else f", {_ranges(sorted(found))} steps a frame"
+            alike.setdefault((stem, often), []).extend(int(x) for x in [name[len(stem) :]] if x)
+        return [f"{stem}{_ranges(sorted(counts))}{often}" for (stem, often), counts in alike.items()]
 
     def document(self) -> dict[str, Any]:
         """For JSON: numbers for one oscillator, lists for several, null for what is not known."""

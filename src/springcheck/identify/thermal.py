@@ -88,17 +88,21 @@ def _said(found: list[Thermal], h: float, m: Any, *, with_mass: bool, joined: bo
     rows = {name: [next(y for y in one.candidates if y.scheme == name) for one in found] for name in schemes}
     kept = [name for name in schemes if all(y.nats < math.inf for y in rows[name])]
     every = {name: rows[name][0].strides[0] for name in kept}
+    several = len(kept) > 1
     candidates = tuple(
         Candidate(
-            scheme=name, aliases=(), stride=every[name], step=h / every[name], turns=0,
-            omega=tuple(y.omega for y in rows[name]),
+            scheme=name, aliases=(), stride=stride, step=h / stride, turns=0,
+            omega=tuple(y.omega if stride == every[name] else math.nan for y in rows[name]),
             stiffness=tuple(float(k * y.omega**2) for k, y in zip(m, rows[name], strict=True))
-            if with_mass and not joined else None,
-            friction=tuple(y.friction for y in rows[name]), law="of the bath",
+            if with_mass and not joined and stride == every[name] else None,
+            friction=tuple(y.friction if stride == every[name] else math.nan for y in rows[name]),
+            law="of the bath",
         )
         for name in kept
+        for stride in rows[name][0].strides[: None if several else 1]
     )  # fmt: skip
-    notes = [_numbers(name, rows[name][0], m[0] if with_mass else None) for name in kept[:3]]
+    numbers = [_numbers(name, rows[name][0], m[0] if with_mass else None) for name in kept[:3]]
+    notes = [x for x in numbers if not x.endswith(": ")]
     if joined:
         notes.append("joined particles: omega is that of each mode, and the numbers are those of the first")
     if first.uniform:
@@ -172,7 +176,13 @@ def _numbers(name: str, one: Any, m: float | None) -> str:
         ("kT/m" if m is None else "kT", one.thermal * scale, one.thermal_error * scale),
     )  # fmt: skip
     return f"{_with_strides(name, one.strides[:1])}: " + ", ".join(
-        f"{word} {x:.12g}" + ("" if error == 0 else f" +- {error:.1g}" if error > 0 else "")
-        for word, x, error in of
-        if math.isfinite(x)
+        f"{word} {_measured(x, error)}" for word, x, error in of if math.isfinite(x)
     )
+
+
+def _measured(x: float, error: float) -> str:
+    """A number to a digit more than its error leaves it."""
+    if not (0 < error < abs(x)):
+        return f"{x:.12g}" + (f" +- {error:.1g}" if error > 0 else "")
+    digits = math.floor(math.log10(abs(x))) - math.floor(math.log10(error)) + 2
+    return f"{x:.{min(digits, 12)}g} +- {error:.1g}"

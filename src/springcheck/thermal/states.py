@@ -385,7 +385,7 @@ def _of_two_halves(q: Floats, h: float, misfit: float, beside: Floats | None, mi
         w, thermal = float(np.sqrt(a) / h), float((noise * over) ** 2 / (2 * x))
         found.append(
             Candidate(
-                scheme=name, omega=w, omega_error=float(of_kick * over / (2 * w)), friction=float(x / h),
+                scheme=name, omega=w, omega_error=float(of_kick * over / (2 * w * h)), friction=float(x / h),
                 friction_error=float(of_c * slope / h), thermal=thermal,
                 thermal_error=thermal * float(np.hypot(np.sqrt(2 / len(left)), of_c * slope / x)),
                 # each draws as its library does, where that shows: uniform draws end at 1.73
