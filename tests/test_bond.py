@@ -13,7 +13,7 @@ import pytest
 from springcheck import checks, driver, engines, schemes
 from springcheck.cli import main
 from springcheck.errors import MethodError, SceneError
-from springcheck.physics import scenefile
+from springcheck.physics import exact, scenefile
 from springcheck.physics.arrays import Floats, Reals
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import RadialSpring
@@ -59,6 +59,28 @@ def test_right_engines_pass_where_bonds_turn_and_share_particles(label: str, nee
     verdicts = checks.judge(scene, driver.run(scene, label))
     assert [v for v in verdicts if v.passed is False] == []
     assert {"step-defect", "momentum"} <= {v.check for v in verdicts if v.passed}
+
+
+@pytest.mark.parametrize("key", ["bond", "morse"])
+def test_a_pair_of_which_one_end_is_on_a_spring_too_is_run_and_judged(key: str) -> None:
+    """The other end by itself is no pair, of which the exact solution would be asked."""
+    lines = (
+        ["rest = 0.7", "stiffness = 3.1"]
+        if key == "bond"
+        else ["rest = 0.7", "depth = 3.1", "steepness = 0.9"]
+    )
+    axes = (lambda x, y: [x, y]) if key == "bond" else (lambda x, y: x)
+    text = "".join(
+        f"[[particle]]\nmass = {m}\nposition = {axes(*q)}\nmomentum = {axes(0.3, -0.2)}\n"
+        for m, q in ((1.3, (0.1, 0.2)), (0.9, (0.9, -0.1)))
+    )
+    text += "\n".join([f"[[{key}]]", "ends = [0, 1]", *lines])
+    text += '\n[[spring]]\nends = ["wall", 0]\nstiffness = 2.3\n[time]\nstep = 0.05\nsteps = 40\n'
+    scene = scenefile.parse(f'title = "held"\n{text}', name="held")
+    assert not exact.has_true_motion(scene)
+    verdicts = checks.judge(scene, driver.run(scene, "own:velocity-verlet"))
+    assert {v.check: v.passed for v in verdicts}["step-defect"] is True
+    assert [v for v in verdicts if v.passed is False] == []
 
 
 def test_an_engine_whose_bond_may_reach_half_of_the_box_refuses(need: Need) -> None:

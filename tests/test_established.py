@@ -246,6 +246,14 @@ def test_a_hinge_in_gravity_is_semi_implicit_euler_in_the_angle(
             driver.run(replace(several, terms=(replace(term, **wrong),)), label)
 
 
+def test_chipmunks_spring_takes_no_negative_step_and_is_not_blamed_for_it(need: Need) -> None:
+    need("pymunk:damped-spring")
+    scene = replace(load_scene("spring-uneven"), step=-0.1)
+    with pytest.raises(MethodError, match="DampedSpring takes no negative step"):
+        run(scene, "pymunk:damped-spring")
+    assert failed(scene, run(scene, "pymunk:force")) == []
+
+
 @pytest.mark.parametrize("method", ["force", "joint-spring", "hinge"])
 def test_dart_takes_no_negative_step_and_is_not_blamed_for_it(method: str, need: Need) -> None:
     need(f"dart:{method}")

@@ -107,6 +107,19 @@ def test_a_tolerance_that_takes_too_many_steps_is_refused_and_one_that_takes_man
     assert found["tolerance"].passed is True
 
 
+def test_a_first_step_where_no_force_acts_is_as_long_as_its_rule_has_it_and_no_fault() -> None:
+    # the blog's spring starts at rest length, so that the first step is that of the frame
+    scene = replace(scenefile.load_scene("spring"), tolerance=1e-10, steps=3)
+    run = springcheck.simulate(scene, "openmm:variable-verlet")
+    (found,) = (v for v in springcheck.judge(scene, run) if v.check == "tolerance")
+    assert found.passed, found.why
+    # velocity Verlet's step of 0.1 from (0, 1)
+    assert found.value == pytest.approx(np.hypot(0.1 - np.sin(0.1), 1 - 0.005 - np.cos(0.1)), rel=1e-3)
+    assert found.bound < 1.1 * found.value
+    late = replace(run, q=run.q + 2e-5)
+    assert next(v for v in springcheck.judge(scene, late) if v.check == "tolerance").passed is False
+
+
 def test_steps_by_a_rule_meet_the_times_of_frames_and_follow_the_rule_between() -> None:
     scene = replace(scenefile.load_scene("spring-uneven"), tolerance=1e-4)
     scheme = schemes.SCHEMES["variable-verlet"]

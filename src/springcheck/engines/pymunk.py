@@ -18,6 +18,7 @@ from springcheck.engines.contract import (
     by_name,
     named,
 )
+from springcheck.errors import MethodError
 from springcheck.physics.arrays import Arithmetic
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Spring, WallSpring
@@ -43,6 +44,9 @@ class _Space(Bodies):
     def begin(self, label: Label, step: float) -> None:
         import pymunk
 
+        if step < 0 and label.method == "damped-spring":
+            # it would end in numbers that are none
+            raise MethodError(f"{label}: Chipmunk's DampedSpring takes no negative step")
         self._library, self._h, self._space = pymunk, step, pymunk.Space()
 
     def add(self, m: float, q: float, v: float) -> Any:

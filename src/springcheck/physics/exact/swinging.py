@@ -36,9 +36,10 @@ class _Swing:
 
 def _swings(system: System[Any]) -> _Swing | None:
     """None where some bond turns, may close, or shares a particle with another."""
-    term: Any = system.terms[0]
     if not one_each(system):
+        # nor has an end a bond whose other end something else acts on
         return None
+    term: Any = system.terms[0]
     m, q, p = (wide(x) for x in (system.m, system.q, system.p))
     both = np.concatenate([term.a, term.b])
     bond = np.empty(system.n, np.int64)
