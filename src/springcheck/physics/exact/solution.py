@@ -133,6 +133,9 @@ def _solution(system: SolvedSystem[Any]) -> Solution | None:
             chosen = np.flatnonzero(mine)
             if len(chosen):
                 part = system.beside(system.part(chosen))
+                if law is not linear.LINEAR and np.any(part.pulls() == 0):
+                    # the end of a pair whose other end something else acts on
+                    return None
                 ready = law.prepare(part)
                 if ready is None:
                     return None

@@ -36,10 +36,9 @@ class _Swing:
 
 def _swings(system: System[Any]) -> _Swing | None:
     """None where some bond turns, may close, or shares a particle with another."""
-    if not one_each(system):
-        # nor has an end a bond whose other end something else acts on
-        return None
     term: Any = system.terms[0]
+    if not one_each(system):
+        return None
     m, q, p = (wide(x) for x in (system.m, system.q, system.p))
     both = np.concatenate([term.a, term.b])
     bond = np.empty(system.n, np.int64)
