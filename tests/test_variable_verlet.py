@@ -97,10 +97,14 @@ def test_what_nothing_anchors_and_what_is_heavy_counts_in_the_mean_as_in_openmm(
         assert judged(scene)["replay"].passed is True
 
 
-def test_a_tolerance_that_takes_too_many_steps_is_refused_and_one_that_takes_many_is_not_replayed() -> None:
+def test_a_tolerance_that_takes_too_many_steps_is_refused_and_one_that_takes_many_is_not_replayed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     scene = replace(scenefile.load_scene("spring-uneven"), steps=20, tolerance=1e-9)
     with pytest.raises(MethodError, match="at most 1e"):
         springcheck.simulate(replace(scene, steps=200, tolerance=1e-16), LABEL)
+    # fewer than from one frame to the next
+    monkeypatch.setattr(replayed, "MOST_REPLAYED", 100)
     found = judged(scene)
     assert found["replay"].passed is None
     assert "not replayed" in found["replay"].why
@@ -247,9 +251,26 @@ def test_a_file_that_claims_few_force_calls_is_replayed_no_longer_than_another(
     monkeypatch.setattr(replayed, "taken", counted)
     monkeypatch.setattr(replayed, "MOST_REPLAYED", 200)
     found = {v.check: v for v in checks.judge(scene, run)}["replay"]
-    assert found.passed is None
-    assert "not replayed" in found.why
+    assert "of 3 frames: more than 200 steps" in found.why
     assert len(met) <= 3 * 201
+
+
+def test_of_a_long_run_the_beginning_is_replayed_and_the_verdict_says_how_much(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    scene = replace(scenefile.load_scene("spring-uneven"), steps=40, tolerance=1e-3)
+    run = springcheck.simulate(scene, LABEL)
+    monkeypatch.setattr(replayed, "MOST_REPLAYED", run.force_calls // 2)
+    for wrong_from, passed in ((None, True), (30, True), (10, False)):
+        p = run.p.copy()
+        if wrong_from:
+            p[wrong_from:] *= 1 + 1e-6
+        found = {v.check: v for v in checks.judge(scene, replace(run, p=p))}
+        assert found["replay"].passed is passed
+        if passed:
+            for name in ("replay", "energy-gain"):
+                assert found[name].passed is True
+                assert "of 40 frames: more than" in found[name].why
 
 
 def test_what_a_step_before_may_be_off_is_tried_both_ways(monkeypatch: pytest.MonkeyPatch) -> None:

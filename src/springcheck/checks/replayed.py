@@ -26,9 +26,9 @@ Times: TypeAlias = tuple[float, float]
 
 
 class _Replayed(NamedTuple):
-    """Of each stretch: where its steps lead, one rounding of all that they add up, and what the roundings of
-    the time may do, (f-1, n) each; the energy that they add by their law, and what the time may do to it, how
-    many they are, and the shortest, (f-1,) each."""
+    """Of each stretch that is replayed, which are the first ones: where its steps lead, one rounding of all that
+    they add up, and what the roundings of the time may do, (f-1, n) each; the energy that they add by their
+    law, and what the time may do to it, how many they are, and the shortest, (f-1,) each."""
 
     ends: tuple[Extended, Extended]
     bounds: tuple[Extended, Extended]
@@ -42,8 +42,6 @@ class _Replayed(NamedTuple):
 def _follow(case: Case) -> _Replayed | str:
     """Or the reason why the steps are not replayed."""
     run, system, m = case.trajectory, case.system, case.judged.m.astype(np.longdouble)
-    if run.force_calls > MOST_REPLAYED:
-        return TOO_MANY
     if case.steps[0] != 0:
         return "the length of the step before its first frame is not recorded"
     state, before, unsure = run.arithmetic.state + ROUNDOFF, 0.0, 0.0
@@ -67,7 +65,8 @@ def _follow(case: Case) -> _Replayed | str:
         if not steps:
             return "two of its frames lie at one time"
         if max(map(len, (steps, *others))) > left:
-            return TOO_MANY
+            # of a longer run the beginning is replayed
+            break
         left -= len(steps)
         end, of_q, of_p = steps[-1].end, *_rounded(case, steps, before)
         # the time is a sum of lengths, each rounded: what is left of it is the last step, and the next one
@@ -84,6 +83,8 @@ def _follow(case: Case) -> _Replayed | str:
         before, unsure = last, float(off)
         shortest = min(abs(step.h) for step in steps)
         rows.append((*end, of_q, of_p, *late, gain, loose, *map(np.longdouble, (len(steps), shortest))))
+    if not rows:
+        return TOO_MANY
     found = [np.stack(column) for column in zip(*rows, strict=True)]
     return _Replayed((found[0], found[1]), (found[2], found[3]), (found[4], found[5]), *found[6:])
 
@@ -125,6 +126,16 @@ def _roundings(case: Case) -> int:
 TOO_MANY = f"its steps are more than {MOST_REPLAYED}, which are not replayed"
 
 
+def _until(case: Case, stretches: int) -> str:
+    """What of a run is not replayed, where that is so."""
+    every = len(case.trajectory.t) - 1
+    if stretches == every:
+        return ""
+    return (
+        f"; replayed are the first {stretches} of {every} frames: more than {MOST_REPLAYED} steps take long"
+    )
+
+
 def steps(case: Case) -> Finding | str:
     """How far the frames are from where the steps of the rule lead, in roundings."""
     with np.errstate(all="ignore"):
@@ -135,20 +146,20 @@ def steps(case: Case) -> Finding | str:
         ratios, still = [], []
         for at, end, one, late in zip((run.q, run.p), found.ends, found.bounds, found.late, strict=True):
             unit = one + late / number
-            ratios.append(np.max(np.abs(at[1:] - end) / unit, axis=1))
-            still.append(np.max(np.abs(at[:-1] - end) / unit, axis=1))
+            ratios.append(np.max(np.abs(at[1 : len(end) + 1] - end) / unit, axis=1))
+            still.append(np.max(np.abs(at[: len(end)] - end) / unit, axis=1))
         seen = np.max(ratios, axis=0)
         worst = int(np.argmax(np.where(np.isfinite(seen), seen, np.inf)))
         if seen[worst] <= number and not np.any(np.max(still, axis=0) > number):
             return "rounding may be as large as the way from frame to frame"
-    lengths = np.abs(np.diff(run.t)) / found.counts
+    lengths = np.abs(np.diff(run.t[: len(seen) + 1])) / found.counts
     return Finding(
         seen[worst],
         number,
         "roundings",
         f"roundings of {count(int(found.counts[worst]), 'step')} from the frame before, each carried on, and "
         f"of the time; {int(np.sum(found.counts))} steps by the rule, {np.min(lengths):.3g} to "
-        f"{np.max(lengths):.3g} long in the mean between two frames",
+        f"{np.max(lengths):.3g} long in the mean between two frames{_until(case, len(seen))}",
     )
 
 
@@ -158,8 +169,8 @@ def gain(case: Case) -> Finding | str:
         found = case.once(_follow)
         if isinstance(found, str):
             return found
-        run, number = case.trajectory, _roundings(case)
-        q, p = (x.astype(np.longdouble) for x in (run.q, run.p))
+        run, number, held = case.trajectory, _roundings(case), slice(len(found.gains) + 1)
+        q, p = (x[held].astype(np.longdouble) for x in (run.q, run.p))
         energy = case.judged.system.energy(q, p).astype(np.longdouble)
         size = energy[0]
         if not size > 0:
@@ -186,7 +197,7 @@ def gain(case: Case) -> Finding | str:
             told = (
                 f"; a step of {np.min(found.shortest):.1e} leaves a velocity rebuilt from positions no digit"
             )
-    turns = abs(float(run.t[-1])) * float(np.sqrt(np.max(np.abs(case.system.modes.w2)))) / (2 * np.pi)
+    turns = abs(float(run.t[held][-1])) * float(np.sqrt(np.max(np.abs(case.system.modes.w2)))) / (2 * np.pi)
     span = "a period of the fastest mode" if turns > 0 else "the run"
     grown, said = (float(x / size / (turns or 1)) for x in (energy[-1] - energy[0], law[-1]))
     return Finding(
@@ -194,5 +205,5 @@ def gain(case: Case) -> Finding | str:
         bound[worst] / size,
         "of the energy",
         f"(h**2/8) (F'**2 - F**2)/m at each step; {span} adds {grown:.6g} of the "
-        f"energy, by the sum over the steps {said:.6g}{told}",
+        f"energy, by the sum over the steps {said:.6g}{told}{_until(case, len(law))}",
     )
