@@ -26,9 +26,9 @@ Times: TypeAlias = tuple[float, float]
 
 
 class _Replayed(NamedTuple):
-    """Of each stretch that is replayed, which are the first ones: where its steps lead, one rounding of all that
-    they add up, and what the roundings of the time may do, (f-1, n) each; the energy that they add by their
-    law, and what the time may do to it, how many they are, and the shortest, (f-1,) each."""
+    """Of each stretch that is replayed, the first ones: where its steps lead, one rounding of all that they
+    add up, and what the roundings of the time may do, (f-1, n) each; the energy that they add by their law,
+    and what the time may do to it, how many they are, and the shortest, (f-1,) each."""
 
     ends: tuple[Extended, Extended]
     bounds: tuple[Extended, Extended]
