@@ -83,6 +83,19 @@ def test_a_pair_of_which_one_end_is_on_a_spring_too_is_run_and_judged(key: str) 
     assert [v for v in verdicts if v.passed is False] == []
 
 
+def test_a_pair_is_no_pair_of_which_one_end_is_braked_and_the_other_has_a_bond_more() -> None:
+    text = 'title = "chain"\n'
+    text += "".join(
+        f"[[particle]]\nmass = {1 + 0.1 * i}\nposition = {0.8 * i}\nmomentum = 0.1\n" for i in range(3)
+    )
+    for a, b in ((0, 1), (1, 2)):
+        text += f"[[morse]]\nends = [{a}, {b}]\ndepth = 3.0\nsteepness = 0.7\nrest = 0.8\n"
+    text += "[[damping]]\nparticle = 0\ncoefficient = 1.0\n[time]\nstep = 0.05\nsteps = 40\n"
+    scene = scenefile.parse(text, name="chain")
+    # the bond of 1 to 2 was taken for all of their motion, and that of 0 for free
+    assert not exact.has_true_motion(scene)
+
+
 def test_an_engine_whose_bond_may_reach_half_of_the_box_refuses(need: Need) -> None:
     need("openmm:verlet")
     with pytest.raises(MethodError, match="as long as half of the box"):

@@ -132,10 +132,10 @@ def _solution(system: SolvedSystem[Any]) -> Solution | None:
             mine = left if law is linear.LINEAR else acting.get(law.key, nothing) & ~other
             chosen = np.flatnonzero(mine)
             if len(chosen):
-                part = system.beside(system.part(chosen))
-                if law is not linear.LINEAR and np.any(part.pulls() == 0):
+                if any(np.any(mine[x.particles[0]] != mine[x.particles[-1]]) for x in system.terms):
                     # the end of a pair whose other end something else acts on
                     return None
+                part = system.beside(system.part(chosen))
                 ready = law.prepare(part)
                 if ready is None:
                     return None
