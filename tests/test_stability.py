@@ -192,7 +192,8 @@ def test_of_joined_masses_with_unlike_friction_the_weakest_decay_sets_explicit_e
     # |1 + h x| = 1; the growth there is 1e-7 a step at 1.6 times that only
     limit = min(-2 * x.real / abs(x) ** 2 for x in np.linalg.eigvals(motion))
     assert limit == pytest.approx(5.34128e-05, rel=1e-5)
-    assert longest(schemes.scheme("explicit-euler"), scene) == pytest.approx(limit, rel=1e-8)
+    # a growth of 64 roundings is seen, 7e-8 above it where long double is no wider than double
+    assert longest(schemes.scheme("explicit-euler"), scene) == pytest.approx(limit, rel=1e-6)
     # of three masses with friction on the middle one, the mode that leaves it at rest has none
     even = builders.chain(3, 1.3, 2.9)
     even = replace(even, terms=(*even.terms, Damping(i=[1], c=[0.2])))
