@@ -118,9 +118,10 @@ def identify_thermal(
         misfit = weights[4] / weights[3]
         # what digits leave of it is white but for neighbours, which share a frame
         digits = misfit < 1e-9 or _is_of_digits(rest[::2])
-        # of one draw the position and the momentum leave the same
+        # of one draw the position and the momentum leave the same; a joint to what is beside may not show
+        several = mixed or (beside is not None and beside.size > 0)
         return (
-            clear(_of_one(q, v, h, free / free[0], misfit, left[1], even, mixed))
+            clear(_of_one(q, v, h, free / free[0], misfit, left[1], even, several))
             if free[0] and digits
             else None
         )
@@ -245,19 +246,22 @@ def _of_one(
         known = {"omega": float(np.sqrt(2 * (1 + c)) / h), "omega_error": 0.0}
         found, left = [Candidate(scheme="bussi-after", **known)], np.empty(0)
     elif near(c, -1) and abs(d) <= close * h:
+        roots = {n: (lambda x, c2=c2: np.sqrt((1 - c2(x)) / x)) for n, c2 in GJ.items()}
         if near(b, -h):
             if not _is_white(left) and _is_correlated(left):
                 found, left = likely(("gj-iii-half",), q, v, h), np.empty(0)
+                if found and close > 1e-6:
+                    # of little friction few digits do not show a step that is not stretched
+                    x = max(h * (found[0].friction - 5 * found[0].friction_error), 1e-9)
+                    near_1 = [n for n in GJ if n != "iii" and roots[n](np.asarray(x)) > 1 - 2 * close]
+                    found += [Candidate(scheme=f"gj-{n}-half") for n in near_1]
             else:
                 # of several particles' collisions each mode has a part
                 names = _of_no_memory(q, v, inf if mixed else close)
-                found = [
-                    y
-                    for name in names
-                    for y in (likely((name,), q, v, h) if name == "gj-iii-half" else [Candidate(scheme=name)])
-                ]
+                one = "gj-iii-half"
+                found = likely((one,), q, v, h) if one in names else []
+                found += [Candidate(scheme=name) for name in names if name != one]
         elif -b < h and _is_correlated(left):
-            roots = {n: (lambda x, c2=c2: np.sqrt((1 - c2(x)) / x)) for n, c2 in GJ.items()}
             rates = {n: _rate(root, -b / h) for n, root in roots.items()}
             found = [
                 Candidate(scheme=f"gj-{n}-half", friction=x / h, friction_error=0.0)
