@@ -10,8 +10,8 @@ Command: python validation/hinges.py             (reads what is stored; 2 s)
 1.3 on an arm of 0.9 in a gravity of 9.81, from 1.1 rad at -0.7 rad/T, 200 steps of 0.01; dartpy 6.20.0,
 MuJoCo 4.0.0.  Expected, the step defect in roundings:
 
-  dart.csv    3.3 of 13 passed; without that inertia 1.1e+04 of 13 FAILED; as velocity Verlet 9.9e+12 of 19 FAILED
-  mujoco.csv  2.7 of 13 passed; without that inertia 1.1e+04 of 13 FAILED; as velocity Verlet 9.9e+12 of 19 FAILED
+  dart.csv    3.3 of 13 passed; without that inertia 1.1e+04 of 13 FAILED; as Verlet 9.9e+12 of 19 FAILED
+  mujoco.csv  2.7 of 13 passed; without that inertia 1.1e+04 of 13 FAILED; as Verlet 9.9e+12 of 19 FAILED
 
 Exit status 0 while the claim holds, 1 otherwise.
 """
@@ -127,7 +127,7 @@ def main() -> int:
             f"{x['value']:.2g} of {x['bound']:.0f} {'passed' if x['passed'] else 'FAILED'}"
             for x in (ours, bare, other)
         ]
-        print(f"  {name + '.csv':10}  {said[0]}; without that inertia {said[1]}; as velocity Verlet {said[2]}")
+        print(f"  {name + '.csv':10}  {said[0]}; without that inertia {said[1]}; as Verlet {said[2]}")
     return 0 if right else 1
 
 
