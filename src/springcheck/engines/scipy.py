@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from springcheck.engines import solvers
 from springcheck.engines.contract import (
     BRAKES,
     DRIVEN,
@@ -41,6 +42,7 @@ class _Solver:
     def __init__(self, scene: Scene, method: Method, label: Label, step: float) -> None:
         from scipy import integrate
 
+        solvers.refuse_hours(scene, label, step)
         name = SOLVERS[method.name]
         self.force_calls = 0
         self._n, self._h, self._done = scene.n, step, 0

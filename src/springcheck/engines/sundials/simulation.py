@@ -14,7 +14,7 @@ import numpy as np
 import sksundae
 from sksundae.cvode import CVODE
 
-from springcheck.engines import quiet
+from springcheck.engines import quiet, solvers
 from springcheck.engines.contract import Label, Method, Simulation, Stopped
 from springcheck.engines.sundials import circuit, sparse
 from springcheck.errors import MethodError
@@ -33,39 +33,9 @@ STEPS_A_RADIAN = 1000
 takes at a tolerance of 1e-15."""
 
 
-MOST_RADIANS = 3e7
-"""Between two outputs.  Each takes three internal steps or more: 1e8 of them, an hour at 40 us."""
-
-
-def _turned(scene: Scene, step: float) -> float:
-    """Radians of the fastest rate at the start between two outputs."""
-    system = scene.system
-    with np.errstate(all="ignore"):
-        rows = system.gershgorin(scene.q) / scene.m
-        return abs(step) * scene.every * float(np.max(np.sqrt(rows) + system.friction_rates))
-
-
-def followed(scene: Scene, step: float) -> float:
-    """Radians that a solver has to follow between two outputs, 0 where no such bound is known.
-
-    Those of the fastest mode that moves by more than the tolerance, until friction has taken it below.
-    """
-    system, duration = scene.system, abs(step) * scene.every
-    turned = _turned(scene, step)
-    if not MOST_RADIANS < turned < np.inf or not system.is_linear or not system.has_modes:
-        return turned if MOST_RADIANS < turned < np.inf and not system.is_damped else 0.0
-    modes = system.modes
-    w = np.sqrt(np.maximum(modes.w2 - modes.rate**2 / 4, 0))
-    size = np.abs(modes.start.u) * np.sqrt(np.abs(modes.w2)) + np.abs(modes.start.v)
-    moves = (size > scene.tolerance * np.max(size)) & (size > 0)
-    lives = -2 * np.log(scene.tolerance) / np.where(modes.rate > 0, modes.rate, 1)
-    turns = w * np.where(modes.rate > 0, np.minimum(duration, lives), duration)
-    return float(np.max(turns[moves])) if np.any(moves) else 0.0
-
-
 def most_steps(scene: Scene, step: float) -> int:
     """Internal steps allowed between two outputs."""
-    turned = _turned(scene, step)
+    turned = solvers.turned(scene, step)
     return int(max(MOST_STEPS, min(STEPS_A_RADIAN * turned, 1e9) if np.isfinite(turned) else 0))
 
 
@@ -81,13 +51,7 @@ def start(scene: Scene, method: Method, label: Label, step: float) -> Simulation
     """
     if abs(step) * scene.every < np.finfo(np.float64).tiny:
         raise MethodError(f"{label}: frames {abs(step) * scene.every:.0e} apart, whose inverse is no number")
-    radians = followed(scene, step)
-    if radians > MOST_RADIANS:
-        raise MethodError(
-            f"{label}: the motion turns through {radians:.3g} radians between two frames, which takes "
-            f"{3 * radians:.0e} internal steps or more, hours and longer; {MOST_RADIANS:.0e} radians are the "
-            "most, take shorter steps or record more frames"
-        )
+    solvers.refuse_hours(scene, label, step)
     return _Solver(scene, KINDS[method.name], step)
 
 

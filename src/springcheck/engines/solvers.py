@@ -1,0 +1,49 @@
+"""How far adaptive solvers have to go between two outputs."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from springcheck.engines.contract import Label
+from springcheck.errors import MethodError
+from springcheck.physics.scene import Scene
+
+MOST_RADIANS = 3e7
+"""Between two outputs.  Each takes three internal steps or more: 1e8 of them, an hour at 40 us."""
+
+
+def turned(scene: Scene, step: float) -> float:
+    """Radians of the fastest rate at the start between two outputs."""
+    system = scene.system
+    with np.errstate(all="ignore"):
+        rows = system.gershgorin(scene.q) / scene.m
+        return abs(step) * scene.every * float(np.max(np.sqrt(rows) + system.friction_rates))
+
+
+def followed(scene: Scene, step: float) -> float:
+    """Radians that a solver has to follow between two outputs, 0 where no such bound is known.
+
+    Those of the fastest mode that moves by more than the tolerance, until friction has taken it below.
+    """
+    system, duration = scene.system, abs(step) * scene.every
+    radians = turned(scene, step)
+    if not MOST_RADIANS < radians < np.inf or not system.is_linear or not system.has_modes:
+        return radians if MOST_RADIANS < radians < np.inf and not system.is_damped else 0.0
+    modes = system.modes
+    w = np.sqrt(np.maximum(modes.w2 - modes.rate**2 / 4, 0))
+    size = np.abs(modes.start.u) * np.sqrt(np.abs(modes.w2)) + np.abs(modes.start.v)
+    moves = (size > scene.tolerance * np.max(size)) & (size > 0)
+    lives = -2 * np.log(scene.tolerance) / np.where(modes.rate > 0, modes.rate, 1)
+    turns = w * np.where(modes.rate > 0, np.minimum(duration, lives), duration)
+    return float(np.max(turns[moves])) if np.any(moves) else 0.0
+
+
+def refuse_hours(scene: Scene, label: Label, step: float) -> None:
+    """MethodError where a solver would not come to its first output in an hour."""
+    radians = followed(scene, step)
+    if radians > MOST_RADIANS:
+        raise MethodError(
+            f"{label}: the motion turns through {radians:.3g} radians between two frames, which takes "
+            f"{3 * radians:.0e} internal steps or more, hours and longer; {MOST_RADIANS:.0e} radians are the "
+            "most, take shorter steps or record more frames"
+        )
