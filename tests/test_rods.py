@@ -676,6 +676,25 @@ def test_neither_springs_nor_what_goes_straight_on_are_taken_for_rods() -> None:
     assert rod_of(swinging).startswith("particles 0 and 1 turn")
 
 
+def test_orbits_that_go_round_are_no_rods_however_near_to_a_circle_they_are() -> None:
+    t = np.linspace(0, 6, 200)
+
+    def orbit(e: float) -> np.ndarray:
+        angle = t.copy()
+        for _ in range(50):
+            angle = t + e * np.sin(angle)
+        return np.stack([np.cos(angle) - e, np.sqrt(1 - e * e) * np.sin(angle), 0 * t], axis=1)
+
+    missing = np.delete(t, 50)
+    circle = np.stack([np.cos(missing), np.sin(missing)], axis=1)
+    assert {rod_of(orbit(e)) for e in (0.005, 0.02, 0.036)} == {rod_of(circle)} == {""}
+    swing = 0.8 * np.sin(3 * t)
+    pendulum = np.stack([0.3 + 0.9 * np.sin(swing), 0.1 - 0.9 * np.cos(swing), 0 * t + 0.5], axis=1)
+    assert rod_of(pendulum).startswith("particle 0 swings and keeps its distance from a fixed point, 0.9 to ")
+    pendulum[3] = np.nan
+    assert rod_of(pendulum) == ""
+
+
 @pytest.mark.parametrize("axes", [2, 3])
 def test_a_particle_that_swings_on_a_rod_is_seen_and_neither_an_orbit_nor_another_curve(axes: int) -> None:
     t = np.arange(60) * 0.1

@@ -12,7 +12,7 @@ from springcheck import interrupts
 def main() -> int:
     """The command line as a program of its own, which can be interrupted from its first line on."""
     status = interrupts.supervised()
-    return interrupts.over(interrupts.ends(_main()) if status is None else status)
+    return interrupts.over(interrupts.ends(_main())) if status is None else status
 
 
 def _main() -> int:

@@ -198,11 +198,12 @@ def unread() -> int:
 
 
 def over(status: int) -> int:
-    """End a process of `supervised` after what libraries do at exit; the status, in any other process.
+    """End the process that `supervised` has made after what libraries do at exit; the status, in any other.
 
-    The interpreter would take every module apart first, a twentieth of the smallest run's time.
+    The interpreter would take every module apart first, a twentieth of the smallest run's time.  What looks
+    on has something to do yet: a profiler, a debugger, what measures coverage.
     """
-    if _State.board is not None:
+    if _State.board is not None and sys.getprofile() is None and sys.gettrace() is None:
         atexit._run_exitfuncs()
         for stream in (sys.stdout, sys.stderr):
             with contextlib.suppress(OSError, ValueError, AttributeError):

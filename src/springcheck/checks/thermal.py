@@ -25,6 +25,8 @@ HIDDEN = "the motion is so much larger than its noise that rounding hides the dr
 
 NOT_LINEAR = "two numbers of a state tell three draws or more by linear forces alone"
 
+NOT_SUMMED = "sums of three draws or more are told of 64 coordinates at most"
+
 NO_DRAWS = "it takes no draws: its bath is a chain"
 
 
@@ -88,7 +90,11 @@ def _draws(case: Case) -> tuple[Floats, Reading] | str:
         return limit
     scheme, found = THERMOSTATS[case.trajectory.scheme], reading(case)
     if not found.known:
-        return HIDDEN if scheme.fresh < 3 or case.judged.system.is_linear else NOT_LINEAR
+        if scheme.fresh < 3:
+            return HIDDEN
+        if not case.judged.system.is_linear:
+            return NOT_LINEAR
+        return HIDDEN if case.scene.n <= thermal.jointly.MOST_JOINTLY else NOT_SUMMED
     x = found.draws
     if scheme.uniform and not case.scene.system.rods:
         x = thermal.chance.normal_scores(x)

@@ -121,7 +121,8 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
         prog="springcheck",
         description="Simulation engines judged to rounding by a mass on a spring.",
         epilog="Exit status: 0 every verdict passed; 1 some verdict failed; "
-        f"2 bad input, or nothing was measured; {INTERRUPTED} interrupted.",
+        f"2 bad input, or nothing was measured; {INTERRUPTED} interrupted; "
+        f"{interrupts.BROKEN_PIPE} nobody reads the output.",
     )
     version = f"springcheck {springcheck.__version__}"
     parser.add_argument("--version", action="version", version=version, help="print the version and exit")

@@ -197,21 +197,27 @@ def rod_of(q: Floats | None) -> str:
             length, off = float(np.mean(size)), float(np.ptp(size))
             if off <= RIGID * length and np.max(np.ptp(way, axis=0)) >= TURNED * length:
                 return f"particles {a} and {b} turn and keep their distance, {length:.6g} to {off:.1g}: a rod"
-        for i in range(x.shape[1] if len(x) > FEWEST_ON_ARC else 0):
+        for i in range(x.shape[1] if len(x) > FEWEST_ON_ARC and np.isfinite(x).all() else 0):
             way = x[:, i] - np.mean(x[:, i], axis=0)
             # |way - c| = l is linear in c and l**2 - c**2
             centre = np.linalg.lstsq(np.column_stack([2 * way, np.ones(len(way))]), np.sum(way**2, axis=1))[0]
-            size, each = (
-                np.linalg.norm(way - centre[:-1], axis=1),
-                np.linalg.norm(np.diff(way, axis=0), axis=1),
-            )
+            size = np.linalg.norm(way - centre[:-1], axis=1)
             length, off = float(np.mean(size)), float(np.ptp(size))
-            # a straight way keeps to any circle, and at one speed an orbit may keep to one without a rod
+            # a straight way keeps to any circle, and an orbit may keep to one without a rod: it goes round
             bent = np.linalg.svd(way, compute_uv=False)[1] / np.sqrt(len(way))
-            if off <= RIGID * bent and bent >= TURNED**2 * length and np.ptp(each) > RIGID * np.max(each):
+            if off <= RIGID * bent and bent >= TURNED**2 * length and _turns_back(way - centre[:-1]):
                 kept = f"keeps its distance from a fixed point, {length:.6g} to {off:.1g}: a rod"
                 return f"particle {i} swings and {kept}"
     return ""
+
+
+def _turns_back(arm: Floats) -> bool:
+    """Whether an arm (f, 2 or 3) from a centre swings, by less than a right angle a frame, and turns back."""
+    outer = np.einsum("fi,fj->fij", arm[:-1], arm[1:])
+    turned = (outer - outer.transpose(0, 2, 1)).reshape(len(outer), -1)
+    along = turned @ turned[np.argmax(np.linalg.norm(turned, axis=1))]
+    near = np.all(np.sum(arm[1:] * arm[:-1], axis=1) > 0)
+    return bool(near and np.min(along) < -RIGID * np.max(along))
 
 
 def sentence(run: Trajectory, mass: Floats, stiffness: Floats | None = None, *, about: int = 0) -> str:

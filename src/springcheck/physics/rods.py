@@ -353,7 +353,7 @@ class Rods:
             if np.any(wrong):
                 raise SceneError(
                     f"{self.named(int(np.argmax(wrong)))}: at the start the rods before it keep its length "
-                    "too, and their multipliers have no one solution; leave it out"
+                    "too, or masses are too unlike to tell, and their multipliers have no one solution"
                 )
         wrong = ~(along <= UNTRUE * size)
         if np.any(wrong):

@@ -12,13 +12,17 @@ from springcheck import schemes
 from springcheck.thermal.catalogue import THERMOSTATS, Thermostat
 
 if TYPE_CHECKING:
-    from springcheck.thermal import chance, draws, rigid
+    from springcheck.thermal import chance, draws, jointly, rigid
     from springcheck.thermal.laws import Law
     from springcheck.thermal.stepper import Stepper
 
-__all__ = ["THERMOSTATS", "Law", "Stepper", "Thermostat", "chance", "draws", "rigid"]
+__all__ = ["THERMOSTATS", "Law", "Stepper", "Thermostat", "chance", "draws", "jointly", "rigid"]
 
-_LATER = {"Law": "laws", "Stepper": "stepper", **{name: name for name in ("chance", "draws", "rigid")}}
+_LATER = {
+    "Law": "laws",
+    "Stepper": "stepper",
+    **{name: name for name in ("chance", "draws", "jointly", "rigid")},
+}
 """What no run without a bath needs, and the module that it is imported from when it is first used."""
 
 

@@ -31,6 +31,9 @@ STEPS_A_FRAME = (2, 3, 4, 5, 6, 8)
 SUBSTEPS_TRIED = (3, 4, 5, 8, 12)
 """Substeps of fast terms that are tried where two may be too few: more than the last are like as many."""
 
+NO_RATE = 1e-300
+"""Friction or frequency of a start that is none, so that it has a logarithm."""
+
 UNLIKE_A_FRAME = 0.2
 """Nats a frame by which two substeps may fall short of the best, for more of them to be tried."""
 
@@ -145,10 +148,11 @@ def _of_more_substeps(found: list[Candidate], q: Floats, v: Floats, h: float) ->
     last = {y.strides[0]: y for y in found if y.scheme == by_groups(2).name and y.nats < far}
     for before, count in pairwise((2, *SUBSTEPS_TRIED)):
         shares = {s: np.clip(y.fast, 0.1, 0.9) for s, y in last.items()}
-        starts = [
+        begins = [
             [y.friction * h / s, (y.omega * h / s) ** 2, shares[s] / (1 - shares[s])] for s, y in last.items()
         ]
-        more = _of_scheme(by_groups(count), q, v, h, tuple(last), starts=np.log(starts)) if last else []
+        starts = np.log(np.maximum(begins, NO_RATE))
+        more = _of_scheme(by_groups(count), q, v, h, tuple(last), starts=starts) if last else []
         best = min([best, *(y.nats for y in more)])
         for one in more:
             likelier = min(one, last[one.strides[0]], key=lambda y: y.nats)

@@ -85,6 +85,8 @@ class _Reader:
                 if not np.any(beyond := last & ~np.all(np.isfinite(now), axis=-1)):
                     break
                 change[beyond] /= 2
+            else:
+                now = self._at(x + change)
             x = x + change
             if iteration == 1:
                 of = self._allowed(x)
