@@ -17,7 +17,7 @@ BUDGETS = {
     ("engines/openmm", "engines/ase", "engines/sundials"): 1379,
     ("engines",): 2677,
     ("driver", "conformance", "doors"): 1197,
-    ("checks",): 4942,
+    ("checks",): 4951,
     ("identify",): 8245,
     ("formats", "store"): 5152,
     ("studies",): 1626,

@@ -13,6 +13,7 @@ import pytest
 
 import springcheck
 from springcheck.cli import main
+from springcheck.engines import solvers
 from springcheck.physics import scenefile
 
 pytestmark = pytest.mark.slow
@@ -252,9 +253,6 @@ def test_a_step_that_an_adaptive_solver_cannot_follow_is_refused_with_its_radian
 
 
 def test_what_has_decayed_before_it_turns_is_left_to_the_solver() -> None:
-    pytest.importorskip("sksundae")
-    from springcheck.engines.sundials import simulation
-
     def followed(stiffness: float, friction: float, every: int = 1) -> float:
         text = SPRING.replace("stiffness = 1.0", f"stiffness = {stiffness}").replace(
             "steps = 200", "steps = 3"
@@ -262,14 +260,14 @@ def test_what_has_decayed_before_it_turns_is_left_to_the_solver() -> None:
         scene = scenefile.parse(
             text + f"\n[[damping]]\nparticle = 0\ncoefficient = {friction}\n", name="damped"
         )
-        return simulation.followed(scene, 1e9)
+        return solvers.followed(scene, 1e9)
 
     # critical at 2; a rate of 0.2 lets the amplitude fall below 1e-12 in 276 units of time
     assert 200 < followed(1.0, 0.2) < 300
     assert followed(1.0, 3.0) == 0
     spring = springcheck.load_scene("spring")
-    assert simulation.followed(spring, 1e6) == 0
-    assert simulation.followed(spring, 1e9) == pytest.approx(1e9)
+    assert solvers.followed(spring, 1e6) == 0
+    assert solvers.followed(spring, 1e9) == pytest.approx(1e9)
 
 
 def test_a_run_that_decays_into_subnormal_numbers_says_so(capsys: pytest.CaptureFixture[str]) -> None:

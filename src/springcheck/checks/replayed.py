@@ -22,6 +22,11 @@ from springcheck.text.wording import count
 MOST_REPLAYED = 10_000
 """Steps: two seconds."""
 
+LOST = 0.1
+"""Part of itself to which a step is known, up to which a longer and a shorter one stand for all between.  The
+last step before a frame is what the others leave of its time: its rounding grows from frame to frame, until
+the rule has a step that does not depend on it, or nothing is known of it."""
+
 Times: TypeAlias = tuple[float, float]
 
 
@@ -37,6 +42,8 @@ class _Replayed(NamedTuple):
     loose: Extended
     counts: Extended
     shortest: Extended
+    ended: str
+    """Why not all are."""
 
 
 def _follow(case: Case) -> _Replayed | str:
@@ -45,7 +52,7 @@ def _follow(case: Case) -> _Replayed | str:
     if case.steps[0] != 0:
         return "the length of the step before its first frame is not recorded"
     state, before, unsure = run.arithmetic.state + ROUNDOFF, 0.0, 0.0
-    left = MOST_REPLAYED
+    left, ended = MOST_REPLAYED, ""
     rows: list[tuple[Any, ...]] = []
     for i in range(len(run.t) - 1):
         first = tuple(x[i].astype(np.longdouble) for x in (run.q, run.p))
@@ -58,6 +65,9 @@ def _follow(case: Case) -> _Replayed | str:
             steps = taken(case.scheme, case.judged, at, before=before, times=times, tolerance=allow)
             return list(islice(steps, most))
 
+        if unsure > LOST * before:
+            ended = "the last step before the next hangs on roundings alone"
+            break
         steps = stretch(before)
         # the rule jumps where it holds a step: either side may leave it
         sides = (before + unsure, before - unsure) if unsure else ()
@@ -65,7 +75,7 @@ def _follow(case: Case) -> _Replayed | str:
         if not steps:
             return "two of its frames lie at one time"
         if max(map(len, (steps, *others))) > left:
-            # of a longer run the beginning is replayed
+            ended = f"more than {MOST_REPLAYED} steps take long"
             break
         left -= len(steps)
         end, of_q, of_p = steps[-1].end, *_rounded(case, steps, before)
@@ -86,7 +96,8 @@ def _follow(case: Case) -> _Replayed | str:
     if not rows:
         return TOO_MANY
     found = [np.stack(column) for column in zip(*rows, strict=True)]
-    return _Replayed((found[0], found[1]), (found[2], found[3]), (found[4], found[5]), *found[6:])
+    ends, bounds, late = ((found[i], found[i + 1]) for i in (0, 2, 4))
+    return _Replayed(ends, bounds, late, found[6], found[7], found[8], found[9], ended)
 
 
 def _gain(case: Case, steps: list[Taken]) -> Extended:
@@ -126,14 +137,12 @@ def _roundings(case: Case) -> int:
 TOO_MANY = f"its steps are more than {MOST_REPLAYED}, which are not replayed"
 
 
-def _until(case: Case, stretches: int) -> str:
+def _until(case: Case, found: _Replayed) -> str:
     """What of a run is not replayed, where that is so."""
-    every = len(case.trajectory.t) - 1
-    if stretches == every:
+    if not found.ended:
         return ""
-    return (
-        f"; replayed are the first {stretches} of {every} frames: more than {MOST_REPLAYED} steps take long"
-    )
+    first, every = len(found.counts), len(case.trajectory.t) - 1
+    return f"; replayed are the first {first} of {every} frames: {found.ended}"
 
 
 def steps(case: Case) -> Finding | str:
@@ -159,7 +168,7 @@ def steps(case: Case) -> Finding | str:
         "roundings",
         f"roundings of {count(int(found.counts[worst]), 'step')} from the frame before, each carried on, and "
         f"of the time; {int(np.sum(found.counts))} steps by the rule, {np.min(lengths):.3g} to "
-        f"{np.max(lengths):.3g} long in the mean between two frames{_until(case, len(seen))}",
+        f"{np.max(lengths):.3g} long in the mean between two frames{_until(case, found)}",
     )
 
 
@@ -205,5 +214,5 @@ def gain(case: Case) -> Finding | str:
         bound[worst] / size,
         "of the energy",
         f"(h**2/8) (F'**2 - F**2)/m at each step; {span} adds {grown:.6g} of the "
-        f"energy, by the sum over the steps {said:.6g}{told}{_until(case, len(law))}",
+        f"energy, by the sum over the steps {said:.6g}{told}{_until(case, found)}",
     )
