@@ -18,7 +18,7 @@ BUDGETS = {
     ("engines",): 2677,
     ("driver", "conformance", "doors"): 1197,
     ("checks",): 4951,
-    ("identify",): 8245,
+    ("identify",): 8246,
     ("formats", "store"): 5152,
     ("studies",): 1626,
     ("studies/*",): 11203,

@@ -229,3 +229,15 @@ def test_no_longest_step_is_said_in_a_field_whose_part_in_it_is_not_known() -> N
 def test_lammps_with_a_field_as_a_force_of_the_velocity_is_explicit_euler_of_half_steps(need: Any) -> None:
     need("lammps:external")
     assert lammps_field.off() < lammps_field.LAST
+
+
+def test_noise_that_an_unstable_step_makes_large_turns_nothing() -> None:
+    """Brownian steps too long for a joint: all frames lie along one growing direction but the first ones."""
+    rng, q = np.random.default_rng(4), [np.array([0.3, -0.2])]
+    step = np.array([[0.999, -0.02], [-0.02, -1.028]])
+    for _ in range(1001):
+        q.append(step @ q[-1] + rng.normal(size=2))
+    x = np.array(q)
+    assert np.max(np.abs(x)) > 1e11
+    found = springcheck.identify(0.1 * np.arange(1001), x[1:], np.diff(x, axis=0) / 0.1, mass=1.0)
+    assert "magnetic" not in str(found)

@@ -33,7 +33,8 @@ def of_plane(record: Record) -> list[Explanation]:
     z = np.stack([x + 1j * y, u + 1j * v, np.ones(len(x))], axis=1)
     size = np.max(np.abs(z), axis=0)
     # of what grows or dies every frame counts by its size
-    weight = 1 / np.max(np.abs(z[:-1]) / size, axis=1, keepdims=True) if np.all(np.any(z, axis=1)) else 1.0
+    each = np.max(np.abs(z[:-1, :2]) / np.where(size > 0, size, 1)[:2], axis=1, keepdims=True)
+    weight = 1 / each if np.all(each > 0) else 1.0
     scaled = weight * z[:-1] / size
     rows = np.linalg.lstsq(scaled, weight * z[1:] / size)[0]
     off = np.max(np.abs(weight * z[1:] / size - scaled @ rows))
