@@ -31,7 +31,7 @@ WRONG_BEFORE = {
     60120: ("bbk", "text"), 60212: ("gj-vi-half", "strided"), 60302: ("gj-viii", "coupled"),
     60881: ("gj-iii-half", "single"), 70073: ("lammps-langevin", "coupled"), 70451: ("gj-v-half", "strided"),
     70705: ("gj-iii-half", "coupled"), 101829: ("andersen-leapfrog", "coupled"),
-    102124: ("gj-viii-half", "text"),
+    102124: ("gj-viii-half", "text"), 301471: ("lammps-langevin", "strided"),
 }  # fmt: skip
 """Cases that had a wrong name, a list without the right one, nothing said or no end, with their schemes and
 kinds."""

@@ -168,7 +168,7 @@ def _of_scheme(
 ) -> list[Candidate]:  # fmt: skip
     """The best of a scheme at each stride, or from a start at each; nats are those of its likelihood."""
     moments, n = _moments(q, v * h)
-    begins, every = _starts(_free(moments), strides)
+    begins, every = _starts(_free(moments), strides, n)
     if starts is not None:
         begins, every = starts, np.array(strides)
     elif turn is not None:
@@ -237,23 +237,24 @@ def _profile(
     return np.where(np.isfinite(value), value, inf), np.asarray(thermal)
 
 
-def _starts(A: Floats, strides: tuple[int, ...]) -> tuple[Floats, Floats]:
-    """Log gamma h and log (h w)**2 (k, 2) of which a free map A of a frame has its decay and its turn, at
+def _starts(A: Floats, strides: tuple[int, ...], n: int) -> tuple[Floats, Floats]:
+    """Log gamma h and log (h w)**2 (k, 2) of which a free map A of n frames has its decay and its turn, at
     strides (k,); whole turns between frames leave several of a stride."""
     det = min(max(float(np.linalg.det(A)), 1e-6), 1 - 1e-6)
-    half = float(np.trace(A)) / 2
+    half, known = float(np.trace(A)) / 2, 1 / np.sqrt(n)
     out, every = [], []
-    for s in strides:
-        decay = det ** (1 / s)
-        if half * half < det or half < 0:
-            cosine = max(half / np.sqrt(det), -1.0)
+    # of a decay below what so many frames tell, the largest is as likely
+    for s, left in [(s, x) for s in strides for x in ([det] if det > known else [det, known])]:
+        decay = left ** (1 / s)
+        if half * half < left or half < 0:
+            cosine = max(half / np.sqrt(left), -1.0)
             angle, sine = float(np.arccos(cosine)), np.sqrt(1 - cosine * cosine)
             # of half a turn, more or less, the frames may not tell which way it was
             ways = [angle, 2 * np.pi - angle][:: 1 if A[0, 1] > 0 else -1][: 2 if sine < EITHER_WAY else 1]
             angles = [angle] if s == 1 else [(x + 2 * np.pi * m) / s for m in range(s) for x in ways]
             traces = [2 * np.sqrt(decay) * np.cos(x) for x in angles if x < np.pi]
         else:
-            roots = half + np.array([1, -1]) * np.sqrt(half * half - det)
+            roots = half + np.array([1, -1]) * np.sqrt(half * half - left)
             traces = [float(np.sum(np.maximum(roots, 1e-6) ** (1 / s)))]
         for trace in traces or [0.0]:
             turn = min(max(2 * (1 - trace / (1 + decay)), 1e-6), 3.9)
