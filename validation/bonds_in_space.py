@@ -35,7 +35,7 @@ from typing import Any
 import numpy as np
 
 import gromacs
-from gromacs import told
+from documents import told
 from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
 

@@ -28,16 +28,12 @@ Exit status 0 while the claim holds, 1 otherwise.
 from __future__ import annotations
 
 import argparse
-import json
 import subprocess
 import sys
 import tempfile
-from contextlib import redirect_stdout
-from io import StringIO
 from pathlib import Path
-from typing import Any
 
-from springcheck.cli import main as springcheck
+from documents import told
 from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
 
@@ -138,15 +134,6 @@ def write(name: str) -> None:
     scene = scenefile.load_scene(FOLDER / f"{which}.toml")
     held = _held(scene, algorithm == "settle")
     run(scene, held, FOLDER / f"{name}.trr", more=ALGORITHMS[algorithm])
-
-
-def told(*arguments: str) -> dict[str, Any]:
-    """The document that a command of springcheck prints, with its exit status."""
-    out = StringIO()
-    with redirect_stdout(out):
-        status = springcheck([*arguments, "--json"])
-    found: dict[str, Any] = json.loads(out.getvalue())
-    return found | {"status": status}
 
 
 def judged(name: str) -> dict[str, dict[str, float]]:

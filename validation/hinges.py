@@ -27,7 +27,7 @@ from typing import Any
 
 import numpy as np
 
-from gromacs import told
+from documents import told
 
 FOLDER = Path(__file__).parents[1] / "data" / "reference" / "hinges"
 MASS, ARM, GRAVITY, OWN, STEP, STEPS, START = 1.3, 0.9, 9.81, 1e-12, 0.01, 200, (1.1, -0.7)

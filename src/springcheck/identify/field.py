@@ -33,7 +33,7 @@ def of_plane(record: Record) -> list[Explanation]:
     z = np.stack([x + 1j * y, u + 1j * v, np.ones(len(x))], axis=1)
     size = np.max(np.abs(z), axis=0)
     # of what grows or dies every frame counts by its size
-    each = np.max(np.abs(z[:-1, :2]) / np.where(size > 0, size, 1)[:2], axis=1, keepdims=True)
+    each = np.max(np.abs(z[:-1, :2]) / size[:2], axis=1, keepdims=True)
     weight = 1 / each if np.all(each > 0) else 1.0
     scaled = weight * z[:-1] / size
     rows = np.linalg.lstsq(scaled, weight * z[1:] / size)[0]

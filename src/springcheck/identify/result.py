@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import numpy as np
 
-from springcheck.thermal.catalogue import BY_SUBSTEPS
+from springcheck.thermal.catalogue import family_of
 
 if TYPE_CHECKING:
     from springcheck.text.lines import Lines
@@ -123,9 +123,9 @@ class Identification:
             strides.setdefault(x.scheme, set()).add(x.stride)
         alike: dict[tuple[str, str], list[int]] = {}
         for name, found in strides.items():
-            stem = name.rstrip("0123456789") if name.startswith(BY_SUBSTEPS) else name
+            stem, number = family_of(name)
             often = "" if found == {1} else f", {_ranges(sorted(found))} steps a frame"
-            alike.setdefault((stem, often), []).extend(int(x) for x in [name[len(stem) :]] if x)
+            alike.setdefault((stem, often), []).extend([number] if number else [])
         return [f"{stem}{_ranges(sorted(counts))}{often}" for (stem, often), counts in alike.items()]
 
     def document(self) -> dict[str, Any]:

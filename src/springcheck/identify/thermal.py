@@ -12,7 +12,7 @@ from springcheck.identify.factor import by_a_factor
 from springcheck.identify.result import Candidate, Explanation, Identification
 from springcheck.physics.arrays import Floats
 from springcheck.thermal import THERMOSTATS
-from springcheck.thermal.catalogue import BY_SUBSTEPS
+from springcheck.thermal.catalogue import family_of
 from springcheck.thermal.likelihood import SUBSTEPS_TRIED
 from springcheck.thermal.modes import FREE_OF_NOISE, modes
 from springcheck.thermal.states import FEWEST, Thermal, identify_thermal
@@ -125,7 +125,7 @@ def _said(found: list[Thermal], h: float, m: Any, *, with_mass: bool, joined: bo
         late = "" if THERMOSTATS[best].synchronised else "; its velocities are of another time"
         statement = f"{head}, {THERMOSTATS[best].title}{late}"
     elif best:
-        every_count = [name for name in kept if name.startswith(BY_SUBSTEPS)]
+        every_count = [name for name in kept if family_of(name)[1]]
         of_counts = tuple({s for name in every_count for s in rows[name][0].strides})
         which = [
             _with_strides(name, rows[name][0].strides)
@@ -156,8 +156,8 @@ def _said(found: list[Thermal], h: float, m: Any, *, with_mass: bool, joined: bo
 
 def _counts(names: list[str]) -> str:
     """A family of schemes that are told by a count of substeps."""
-    counts = sorted(int(x.removeprefix(BY_SUBSTEPS)) for x in names)
-    return f"{BY_SUBSTEPS}{counts[0]} to {counts[-1]}{' or more' if counts[-1] == SUBSTEPS_TRIED[-1] else ''}"
+    (stem, _), counts = family_of(names[0]), sorted(family_of(x)[1] for x in names)
+    return f"{stem}{counts[0]} to {counts[-1]}{' or more' if counts[-1] == SUBSTEPS_TRIED[-1] else ''}"
 
 
 def _with_strides(name: str, strides: tuple[int, ...]) -> str:

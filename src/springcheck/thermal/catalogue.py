@@ -366,6 +366,12 @@ THERMOSTATS: dict[str, Thermostat] = {
 }
 
 
+def family_of(name: str) -> tuple[str, int]:
+    """What a name says before the count of substeps that alone tells it from others, and that count, or 0."""
+    count = name.removeprefix(BY_SUBSTEPS)
+    return (name, 0) if count == name else (BY_SUBSTEPS, int(count))
+
+
 def random_scheme(name: str) -> Thermostat:
     """The thermostat of a name, of the catalogue or of a count of substeps beyond it."""
-    return THERMOSTATS.get(name) or by_groups(int(name.removeprefix(BY_SUBSTEPS)))
+    return THERMOSTATS.get(name) or by_groups(family_of(name)[1])
