@@ -12,9 +12,9 @@ import mpmath as mp
 import numpy as np
 import pytest
 
+from clean import clean_bath
 from springcheck import checks, driver, engines
 from springcheck.studies.faults import baths
-from springcheck.studies.faults.measure import clean_bath
 from springcheck.studies.faults.seeded import Fault
 from springcheck.thermal import THERMOSTATS, Stepper
 from springcheck.thermal.draws import read

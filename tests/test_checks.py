@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import clean
 import springcheck
 from springcheck import checks, schemes
 from springcheck.checks.case import strongest
@@ -17,7 +18,7 @@ from springcheck.physics.arrays import WIDE, Arithmetic
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Spring, WallSpring
 from springcheck.physics.trajectory import Trajectory, Verdict
-from springcheck.studies.faults import clean, steppers
+from springcheck.studies.faults import steppers
 
 Need = Callable[[str], None]
 

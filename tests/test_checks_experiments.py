@@ -9,6 +9,7 @@ import mpmath
 import numpy as np
 import pytest
 
+import clean
 from onestep import propagator
 from springcheck import checks, driver, schemes
 from springcheck.checks import experiments, laws
@@ -21,7 +22,7 @@ from springcheck.physics.builders import spring
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Morse, Spring, WallSpring
 from springcheck.physics.trajectory import Trajectory
-from springcheck.studies.faults import clean, steppers
+from springcheck.studies.faults import steppers
 
 Need = Callable[[str], None]
 

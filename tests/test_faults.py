@@ -4,6 +4,7 @@ it rejects, and relative errors of 1e-12 in stiffness, mass or step are seen."""
 from __future__ import annotations
 
 import json
+import pickle
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
@@ -11,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+import clean
 import springcheck
 from springcheck import checks, driver, store
 from springcheck.physics import scenefile as scenes
@@ -18,7 +20,7 @@ from springcheck.studies import keeper
 from springcheck.studies.faults import baths
 from springcheck.studies.faults import measure as trial
 from springcheck.studies.faults.measure import examine
-from springcheck.studies.faults.result import Clean, FaultReport, Result
+from springcheck.studies.faults.result import FaultReport, Result
 from springcheck.studies.faults.seeded import Fault
 from springcheck.studies.faults.table import FAULTS
 
@@ -83,24 +85,30 @@ def test_a_limit_is_the_smallest_size_that_is_seen() -> None:
 
 
 def test_clean_scenes_raise_no_alarm_and_are_counted() -> None:
-    parts = [trial.clean_scene(seed) for seed in range(24)]
-    assert [alarm for part in parts for alarm in part.alarms] == []
-    assert sum(part.runs for part in parts) == 24
+    parts = [clean.clean_scene(seed) for seed in range(24)]
+    found = clean.together(parts)
+    assert found.alarms == ()
+    assert found.runs == 24
     assert all(part.verdicts >= 5 for part in parts)
+
+
+def test_every_clean_run_of_the_script_is_one_that_another_process_can_carry_out() -> None:
+    parts = clean.parts()
+    batches = (clean.CLEAN + clean.BATHS + clean.BY_ENGINES * len(clean.judged_labels())) / clean.BATCH
+    assert len(parts) == len(clean.FIXED) + batches
+    assert len(pickle.loads(pickle.dumps(parts))) == len(parts)
 
 
 def test_a_broken_engine_among_the_clean_ones_is_a_false_alarm_that_is_reported() -> None:
     fault = next(fault for fault in FAULTS if fault.name == "friction")
-    found = trial.clean_engine(fault.run, "friction", 0)
+    found = clean.clean_engine(fault.run, "friction", 0)
     assert found.alarms
 
 
 def test_the_report_is_one_json_document() -> None:
     results = tuple(result(fault) for fault in FAULTS[:3])
-    report = FaultReport(results=results, clean=Clean(runs=3, verdicts=30, alarms=()))
+    report = FaultReport(results=results)
     document = json.loads(json.dumps(report.document(), allow_nan=False))
-    assert document["clean_runs"] == 3
-    assert document["false_alarms"] == []
     assert document["faults"][0]["rejected_by"]
     assert report.status == 0
     missed = replace(results[0], missed_by=("step-defect",))
@@ -129,11 +137,6 @@ def test_faults_of_the_command_line_print_one_document_and_are_kept(
 
     few = FAULTS[:2]
     monkeypatch.setattr(trial, "FAULTS", few)
-    monkeypatch.setattr(trial, "CLEAN", 4)
-    monkeypatch.setattr(trial, "BATHS", 0)
-    monkeypatch.setattr(trial, "_BATCH", 4)
-    monkeypatch.setattr(trial, "BY_ENGINES", 0)
-    monkeypatch.setattr(trial, "_FIXED", ("velocity-verlet",))
     named = {"shadow-energy", "order"}.union(*(fault.caught_by for fault in few))
     monkeypatch.setattr(trial, "checks_of", lambda fault: tuple(sorted(named)))
     assert cli.main(["faults", "--json", "--workers", "1"]) == 0
@@ -141,7 +144,6 @@ def test_faults_of_the_command_line_print_one_document_and_are_kept(
     assert document.pop("schema") == "springcheck/faults/1"
     assert [fault["name"] for fault in document["faults"]] == [fault.name for fault in few]
     assert document["limits"]["stiffness"]["step-defect"] < 1e-14
-    assert document["clean_runs"] == 5
     monkeypatch.chdir(tmp_path)
     assert cli.main(["faults", "-o", "f.h5", "--workers", "1"]) == 0
     said = capsys.readouterr().out
@@ -156,14 +158,14 @@ def test_faults_of_the_command_line_print_one_document_and_are_kept(
     assert store.check("f.h5") == []
 
     def interrupt(done: float, whole: float, what: str = "") -> None:
-        if done == 3:
+        if done == 1:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt), keeper.kept("g.h5", "faults", progress=interrupt) as kept:
         trial.study(kept=kept)
     with keeper.kept("g.h5", "faults") as kept:
         again = trial.study(kept=kept)
-    assert again.resumed == 3
+    assert again.resumed == 1
     assert again.document() == document
 
 

@@ -23,7 +23,7 @@ from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory
 from springcheck.schemes.attached import ATTACHED
 from springcheck.studies.faults import page as faults_page
-from springcheck.studies.faults.result import Clean, FaultReport, Result
+from springcheck.studies.faults.result import FaultReport, Result
 from springcheck.studies.run.page import of_runs
 
 mpl.use("agg")
@@ -470,14 +470,12 @@ def test_a_file_of_any_program_says_what_it_does_and_joins_no_frames_too_far_apa
 
 def test_a_fault_is_named_by_the_check_that_sees_it_first() -> None:
     from springcheck.studies.faults import page
-    from springcheck.studies.faults.result import Clean, FaultReport, Result
+    from springcheck.studies.faults.result import FaultReport, Result
 
     def one(name: str, **limits: float) -> Result:
         return Result(name=name, about="", size=1e-3, rejected_by=tuple(limits), missed_by=(), limits=limits)
 
-    found = FaultReport(
-        results=(one("a", x=1e-9, y=1e-12), one("b", x=1e-6)), clean=Clean(runs=1, verdicts=1, alarms=())
-    )
+    found = FaultReport(results=(one("a", x=1e-9, y=1e-12), one("b", x=1e-6)))
     chart = page.banks(found)[1].charts[0]
     first = chart.curves[0]
     assert dict(zip(first.y, first.notes, strict=True)) == {0.0: "x", 1.0: "y"}
@@ -492,8 +490,7 @@ def test_a_map_of_many_faults_stands_in_columns_with_the_checks_of_each() -> Non
         )
         for i in range(100)
     )
-    clean = Clean(runs=1, verdicts=1, alarms=())
-    (bank,) = faults_page.banks(FaultReport(clean=clean, results=results))
+    (bank,) = faults_page.banks(FaultReport(results=results))
     assert [chart.y.names[-1] for chart in bank.charts] == ["fault-0", "fault-34", "fault-68"]
     assert [list(chart.x.names) for chart in bank.charts] == [
         ["check-0", "check-1"], ["check-1", "check-2"], ["check-2", "check-3"],

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import clean
 import springcheck
 from springcheck import checks, schemes
 from springcheck.physics import exact
@@ -17,7 +18,7 @@ from springcheck.physics.arrays import Arithmetic, Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Cosine, Morse, Quartic, Spring, Term, WallSpring
 from springcheck.physics.trajectory import Trajectory, Verdict
-from springcheck.studies.faults import clean, steppers
+from springcheck.studies.faults import steppers
 
 FIXED = [
     n for n, s in schemes.SCHEMES.items() if s.has("one-step") and not s.has("flow") and not s.has("mixes")

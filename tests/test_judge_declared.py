@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import clean
 import springcheck
 from springcheck import checks, store
 from springcheck.checks import compare
@@ -20,7 +21,6 @@ from springcheck.physics.arrays import Arithmetic, Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Outcome, Trajectory
 from springcheck.store.records import KEPT
-from springcheck.studies.faults import clean
 
 
 def uneven(**changes: Any) -> Scene:

@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import clean
 from springcheck import driver
 from springcheck.cli import file, main
 from springcheck.errors import StoreError
 from springcheck.physics import scenefile
 from springcheck.physics.arrays import Floats
 from springcheck.physics.trajectory import Verdict
-from springcheck.studies.faults import clean
 
 SCENE = scenefile.load_scene("spring-uneven")
 RUN = driver.run(SCENE, "own:velocity-verlet")

@@ -9,12 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import clean
 from springcheck import checks, schemes
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Quartic
 from springcheck.studies import keeper
-from springcheck.studies.faults import clean, steppers
+from springcheck.studies.faults import steppers
 from springcheck.studies.run import measure, text
 from springcheck.studies.run.result import Report
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import clean
 import springcheck
 from springcheck import checks, schemes
 from springcheck.errors import SpringcheckError
@@ -17,7 +18,7 @@ from springcheck.physics.arrays import WIDE
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Cosine, Damping, Quartic, Spring, WallSpring
 from springcheck.physics.trajectory import Trajectory
-from springcheck.studies.faults import clean, steppers
+from springcheck.studies.faults import steppers
 
 EXTENDED = pytest.mark.skipif(not WIDE, reason="so sharp are references of more digits than a double")
 

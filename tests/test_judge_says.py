@@ -11,6 +11,7 @@ import h5py
 import numpy as np
 import pytest
 
+import clean
 import springcheck
 from springcheck import checks, driver, engines, schemes
 from springcheck.checks import experiments
@@ -21,7 +22,7 @@ from springcheck.physics.arrays import WIDE
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Cosine, Quartic, WallSpring
 from springcheck.studies.extremes import grid, running
-from springcheck.studies.faults import clean, steppers
+from springcheck.studies.faults import steppers
 from springcheck.studies.run import measure, text
 
 Need = Callable[[str], None]

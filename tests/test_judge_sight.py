@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import clean
 import springcheck
 from springcheck import checks, schemes, store
 from springcheck.checks import experiments
@@ -22,7 +23,6 @@ from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Quartic, Spring, WallSpring
 from springcheck.physics.trajectory import NOT_KNOWN, Limits, Trajectory, Verdict
 from springcheck.store import tables
-from springcheck.studies.faults import clean
 
 pytestmark = pytest.mark.slow
 

@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from clean import clean_bath
 from springcheck import checks, driver, engines
 from springcheck.errors import MethodError
 from springcheck.physics.scene import Scene
 from springcheck.studies.faults import baths
-from springcheck.studies.faults.measure import clean_bath
 from springcheck.studies.faults.table import FAULTS
 from springcheck.thermal import THERMOSTATS, Stepper
 

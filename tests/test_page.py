@@ -27,7 +27,7 @@ from springcheck.physics import scenefile as scenes
 from springcheck.studies import STUDIES, keeper
 from springcheck.studies.extremes import measure as atlas
 from springcheck.studies.faults import measure as faults
-from springcheck.studies.faults.result import Clean, FaultReport
+from springcheck.studies.faults.result import FaultReport
 from springcheck.studies.faults.table import FAULTS
 from springcheck.studies.run import measure
 from springcheck.studies.sampling import measure as sampling
@@ -294,8 +294,7 @@ def studies(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
         found = tuple(
             replace(faults.examine(fault, limits=False), limits={"step-defect": 5e-15}) for fault in FEW
         )
-        clean = Clean(runs=3, verdicts=20, alarms=())
-        faults.keep(kept, FaultReport(results=found, clean=clean))
+        faults.keep(kept, FaultReport(results=found))
     return {name: folder / f"{name}.h5" for name in NAMES}
 
 

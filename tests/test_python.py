@@ -139,7 +139,7 @@ def test_a_study_keeps_a_store_that_it_writes_anew_when_it_is_told_to() -> None:
 def test_an_atlas_and_the_faults_show_themselves() -> None:
     from springcheck.studies.extremes.judging import Cell
     from springcheck.studies.extremes.result import Atlas
-    from springcheck.studies.faults.result import Clean, FaultReport, Result
+    from springcheck.studies.faults.result import FaultReport, Result
 
     cell = Cell(
         method="own:euler", block="a", parameters={"h_w": 0.1}, outcome="right", reason="", value=0, bound=1
@@ -148,8 +148,8 @@ def test_an_atlas_and_the_faults_show_themselves() -> None:
     assert repr(atlas) == "Atlas(2 right)"
     assert len(atlas.to_dataframe() if need("pandas") else ()) == 2
     one = Result(name="a", about="b", size=None, rejected_by=("x",), missed_by=("y",), limits={})
-    faults = FaultReport(results=(one,), clean=Clean(runs=3, verdicts=9, alarms=()))
-    assert repr(faults) == "FaultReport(1 fault, 1 missed, 0 false alarms in 9 verdicts)"
+    faults = FaultReport(results=(one,))
+    assert repr(faults) == "FaultReport(1 fault, 1 missed)"
     assert list(faults.to_dataframe()["missed_by"]) == [["y"]]
 
 

@@ -8,9 +8,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from clean import clean_bath
 from springcheck import checks, cli, engines
 from springcheck.studies.faults import baths
-from springcheck.studies.faults.measure import clean_bath, probe, scene
+from springcheck.studies.faults.measure import probe, scene
 from springcheck.studies.faults.seeded import Fault
 from springcheck.studies.faults.table import FAULTS
 from springcheck.thermal import chance

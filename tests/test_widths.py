@@ -147,10 +147,7 @@ def test_every_word_of_the_faults_is_on_every_terminal(monkeypatch: Patch, capsy
         )
         for j, fault in enumerate(FAULTS)
     )
-    clean = faults_result.Clean(runs=1, verdicts=1, alarms=("own:euler, scene 7: step-defect 3 of 2",))
-    on_terminals(
-        faults_text.lines(faults_result.FaultReport(results=results, clean=clean)), monkeypatch, capsys
-    )
+    on_terminals(faults_text.lines(faults_result.FaultReport(results=results)), monkeypatch, capsys)
 
 
 def test_every_word_of_a_census_is_on_every_terminal(monkeypatch: Patch, capsys: Captured) -> None:

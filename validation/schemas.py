@@ -62,15 +62,7 @@ WAYS = {
 }
 """What is run of each command; `table.csv` is half a drift, `run.h5` the store of the first."""
 
-FEW: dict[str, Any] = {
-    "FAULTS": FAULTS[:1],
-    "HALVINGS": 0,
-    "CLEAN": 1,
-    "BATHS": 0,
-    "_BATCH": 4,
-    "BY_ENGINES": 0,
-    "_FIXED": ("velocity-verlet",),
-}
+FEW: dict[str, Any] = {"FAULTS": FAULTS[:1], "HALVINGS": 0}
 """What of the study of faults is enough for a document of it."""
 
 

@@ -28,6 +28,7 @@ from typing import Any
 import numpy as np
 
 import springcheck
+from clean import clean_bath
 from springcheck import checks, driver, engines
 from springcheck.engines.contract import Label
 from springcheck.errors import SpringcheckError
@@ -35,7 +36,6 @@ from springcheck.identify.thermal import of_bath
 from springcheck.physics.bath import Bath
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Spring, WallSpring
-from springcheck.studies.faults.measure import clean_bath
 from springcheck.thermal import THERMOSTATS
 
 HERE = Path(__file__).parents[1] / "data" / "reference" / "thermostats"

@@ -72,10 +72,7 @@ def extremes(
 
 
 def faults(*, path: str | Path | None = None, force: bool = False, workers: int = 1) -> FaultReport:
-    """Engines broken on purpose: which checks see each, down to which size, and no alarm on right ones.
-
-    It takes minutes.
-    """
+    """Engines broken on purpose: which checks see each, and down to which size.  It takes minutes."""
     from springcheck.studies.faults import measure
 
     with spoken():

@@ -16,9 +16,8 @@ from springcheck.physics.bath import Bath
 from springcheck.physics.rods import Rods
 from springcheck.physics.scene import Scene
 from springcheck.physics.term import Term
+from springcheck.physics.terms import WallSpring
 from springcheck.physics.trajectory import Trajectory
-from springcheck.studies.faults import clean
-from springcheck.studies.faults.clean import walls
 from springcheck.studies.faults.seeded import Fault, Make
 from springcheck.studies.faults.steppers import trajectory
 from springcheck.thermal import THERMOSTATS, Stepper
@@ -38,18 +37,11 @@ O = THERMOSTATS["baoab"].acts[2]  # noqa: E741 - the letter of the literature
 def springs(n: int, *, name: str = "bath", steps: int = 1200) -> Scene:
     """Unlike particles on unlike springs in a bath: nothing is 1."""
     m, k = np.geomspace(0.7, 9.0, n), np.geomspace(5.0, 1.9, n)
+    walls = WallSpring(i=np.arange(n), k=k, at=np.zeros(n))
     return Scene(
-        m=m, q=np.full(n, 0.3), p=np.full(n, 0.2), terms=(walls(k, np.zeros(n)),), step=0.35, steps=steps,
+        m=m, q=np.full(n, 0.3), p=np.full(n, 0.2), terms=(walls,), step=0.35, steps=steps,
         name=name, bath=Bath(temperature=1.7, friction=0.8),
     )  # fmt: skip
-
-
-def random_scene(rng: np.random.Generator) -> Scene:
-    """A random scene of `clean` in a bath of any temperature, of gamma h from 1e-3 to 0.9."""
-    scene = clean.random_scene(rng, steps=300)
-    h = abs(scene.step)
-    bath = Bath(temperature=10 ** rng.uniform(-6, 6), friction=np.exp(rng.uniform(-6.9, -0.1)) / h)
-    return replace(scene, every=1, step=h, bath=bath)
 
 
 def subject(fault: Fault, size: float | None, scene: Scene | None = None, seed: int = 20261122) -> Seeded:

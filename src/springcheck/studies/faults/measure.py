@@ -1,9 +1,9 @@
-"""The study of the faults: what rejects each of them, how small it may be, and no alarm without one."""
+"""The study of the faults: what rejects each of them, and how small it may be."""
 
 from __future__ import annotations
 
 from argparse import Namespace
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
@@ -11,24 +11,19 @@ from typing import Any, Unpack
 
 import numpy as np
 
-from springcheck import checks, driver, engines, schemes
-from springcheck.checks import Experiment, Run
+from springcheck import checks
 from springcheck.checks.seeds import SEEDED
-from springcheck.errors import MethodError
 from springcheck.physics.builders import spring
 from springcheck.physics.scene import Scene
 from springcheck.physics.scenefile import load_scene
 from springcheck.physics.terms import Drive, Spring
-from springcheck.physics.trajectory import Trajectory, Verdict
 from springcheck.studies import keeper
 from springcheck.studies.arguments import Progress
-from springcheck.studies.faults import baths, clean, space, steppers
-from springcheck.studies.faults.result import CLEANS, RESULTS, SEEN, Clean, FaultReport, Result, seen
+from springcheck.studies.faults import baths, space
+from springcheck.studies.faults.result import RESULTS, SEEN, FaultReport, Result, seen
 from springcheck.studies.faults.seeded import Fault, Where
 from springcheck.studies.faults.table import FAULTS
 from springcheck.studies.keeper import How, Keeper, Piece
-from springcheck.studies.tables import Documents
-from springcheck.thermal import THERMOSTATS
 
 SHIPPED = {
     "dumbbell": ("dumbbell", 200), "triangle": ("rigid-triangle", 40), "field": ("foucault", 200),
@@ -77,15 +72,6 @@ def scene(where: Where) -> Scene:
 
 SLOW = frozenset(check.name for check in checks.THOROUGH if check.family == "law")
 """Experiments that do not look at the scene, and take most of the time."""
-CLEAN = 320
-"""Random scenes for the plain engine; each meets one scheme."""
-RESCALING = 0.1
-"""Share of random baths whose thermostat has one factor for all momenta."""
-
-BATHS = 160
-"""Random scenes in a bath; each meets one thermostat."""
-BY_ENGINES = 40
-"""Random scenes for each method of the engines."""
 SMALLEST, LARGEST = 1e-20, 0.3
 """Sizes between which a detection limit is looked for."""
 HALVINGS = 4
@@ -181,96 +167,15 @@ def examine(fault: Fault, *, limits: bool = True) -> Result:
     )
 
 
-def clean_scene(seed: int) -> Clean:
-    """A random scene by the plain engine, one of all schemes, through every check that looks at it."""
-    rng = np.random.default_rng([2026, seed])
-    where = clean.random_scene(rng)
-    scheme = schemes.SCHEMES[str(rng.choice(_FIXED))]
-    return _judged(where, f"plain:{scheme.name}", _plain(scheme), seed, _QUICK)
-
-
-def clean_bath(seed: int) -> Clean:
-    """A random scene in a bath by a right thermostat, one of all, through every check of thermostats."""
-    rng = np.random.default_rng([2028, seed])
-    where = baths.random_scene(rng)
-    linear, others = ([x for x, one in THERMOSTATS.items() if one.rescales == kind] for kind in (False, True))
-    scheme = str(rng.choice(linear))
-    right = Fault(
-        "thermostat", "", (), baths.broken(),
-        scheme=str(rng.choice(others)) if rng.random() < RESCALING and np.any(where.p) else scheme,
-    )  # fmt: skip
-    subject = baths.subject(right, None, where, seed + 1)
-    verdicts = checks.judge(where, right.run(where, seed=seed + 1)) + [one(subject) for one in SEEDED]
-    return _counted(checks.shared(verdicts), f"plain:{right.scheme}", seed)
-
-
-def clean_laws(name: str) -> Clean:
-    """The laws that hold over many runs, for the plain engine and one scheme."""
-    slow = tuple(check for check in checks.THOROUGH if check.name in SLOW)
-    return _judged(scene("spring"), f"plain:{name}", _plain(schemes.SCHEMES[name]), -1, slow)
-
-
-def clean_engine(run: Run, label: str, seed: int) -> Clean:
-    """A random scene by a method of an engine."""
-    where = clean.random_scene(np.random.default_rng([2027, seed]))
-    return _judged(where, label, run, seed, _QUICK)
-
-
-_FIXED = tuple(
-    name
-    for name, scheme in schemes.SCHEMES.items()
-    if scheme.has("one-step") and not scheme.has("flow") and not scheme.has("mixes")
-)
-_QUICK = tuple(check for check in checks.THOROUGH if check.name not in SLOW)
-
-
-def _plain(scheme: schemes.Scheme) -> Run:
-    def run(s: Scene, label: str) -> Trajectory:
-        return steppers.record(s, scheme, steppers.textbook(s, scheme), label=label)
-
-    return run
-
-
-def _judged(where: Scene, label: str, run: Run, seed: int, experiments: tuple[Experiment, ...]) -> Clean:
-    try:
-        verdicts = checks.judge(where, run(where, label))
-    except MethodError:
-        return Clean(runs=0, verdicts=0, alarms=())
-    return _counted(verdicts + checks.judge_thoroughly(where, label, run, experiments), label, seed)
-
-
-def _counted(verdicts: Sequence[Verdict], label: str, seed: int) -> Clean:
-    return Clean(
-        runs=1,
-        verdicts=sum(verdict.passed is not None for verdict in verdicts),
-        alarms=tuple(
-            f"{label}, scene {seed}: {v.check} {v.value:.3g} of {v.bound:.3g}"
-            for v in verdicts
-            if v.passed is False
-        ),
-    )
-
-
-def judged_labels() -> list[str]:
-    """Default methods of fixed step that are here: their right runs are judged too."""
-    return [
-        str(label)
-        for label in engines.match(("*",))
-        if engines.absence(label.engine) is None and not engines.method(label).adaptive
-    ]
-
-
 def perform(options: Namespace, progress: Progress | None) -> FaultReport:
     """What `springcheck faults` does."""
     return record(options.output, **keeper.how(options, progress))
 
 
 def record(path: str | Path | None, **how: Unpack[How]) -> FaultReport:
-    """The whole study, by the engines that are here too, kept in a store where there is a path."""
-    labels = judged_labels()
-    command = keeper.command("faults", list(map(engines.parse, labels)))
-    with keeper.kept(path, command, **how) as kept:
-        found = study(driver.run, labels, kept=kept)
+    """The whole study, kept in a store where there is a path."""
+    with keeper.kept(path, keeper.command("faults", ()), **how) as kept:
+        found = study(kept=kept)
         keep(kept, found)
     return found
 
@@ -287,53 +192,18 @@ def stored(kept: keeper.Kept) -> FaultReport:
     known = kept.document
     limits = known["limits"]
     results = tuple(Result(**one, limits=limits.get(one["name"], {})) for one in known["faults"])
-    clean = Clean(
-        runs=known["clean_runs"], verdicts=known["clean_verdicts"], alarms=tuple(known["false_alarms"])
-    )
-    return FaultReport(results=results, clean=clean, path=kept.path)
+    return FaultReport(results=results, path=kept.path)
 
 
-def study(run: Run | None = None, labels: Sequence[str] = (), *, kept: Keeper | None = None) -> FaultReport:
-    """All faults, their limits, and the clean runs; `run` and `labels` add those of the engines.
-
-    `run` must be a function that another process can import.
-    """
-    faults = [_piece(RESULTS, fault.name, partial(_examine, fault.name)) for fault in FAULTS]
-    cleans = [_piece(CLEANS, f"laws of {name}", partial(clean_laws, name)) for name in _FIXED]
-    scenes: list[tuple[str, Callable[[int], Clean], int]] = [
-        ("random scenes", clean_scene, CLEAN), ("random baths", clean_bath, BATHS),
-    ]  # fmt: skip
-    if run is not None:
-        scenes += [(label, partial(clean_engine, run, label), BY_ENGINES) for label in labels]
-    cleans += [
-        _piece(CLEANS, f"{what} {first}", partial(_batch, judged, first))
-        for what, judged, count in scenes
-        for first in range(0, count, _BATCH)
-    ]
+def study(*, kept: Keeper | None = None) -> FaultReport:
+    """All faults and their limits."""
     kept = kept or Keeper()
-    found = kept.results([*faults, *cleans])
-    clean = _together(found[len(faults) :])
-    return FaultReport(results=tuple(found[: len(faults)]), clean=clean, resumed=kept.resumed, path=kept.path)
-
-
-_BATCH = 20
-
-
-def _piece(form: Documents[Any], key: str, measure: Callable[[], Result | Clean]) -> Piece:
-    return Piece(key=key, what=key, measure=measure, form=form)
+    pieces = [
+        Piece(key=one.name, what=one.name, measure=partial(_examine, one.name), form=RESULTS)
+        for one in FAULTS
+    ]
+    return FaultReport(results=tuple(kept.results(pieces)), resumed=kept.resumed, path=kept.path)
 
 
 def _examine(name: str) -> Result:
     return examine(next(fault for fault in FAULTS if fault.name == name))
-
-
-def _batch(judged: Callable[[int], Clean], first: int) -> Clean:
-    return _together([judged(seed) for seed in range(first, first + _BATCH)])
-
-
-def _together(parts: Sequence[Clean]) -> Clean:
-    return Clean(
-        runs=sum(part.runs for part in parts),
-        verdicts=sum(part.verdicts for part in parts),
-        alarms=tuple(alarm for part in parts for alarm in part.alarms),
-    )

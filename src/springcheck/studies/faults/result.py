@@ -25,15 +25,6 @@ class Result:
     """Smallest size that each check rejects."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Clean:
-    """Right engines: trajectories judged, verdicts passed on them, and those that were false alarms."""
-
-    runs: int
-    verdicts: int
-    alarms: tuple[str, ...]
-
-
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class FaultReport(Studied):
     """The whole study; a row of its table is a fault."""
@@ -41,17 +32,15 @@ class FaultReport(Studied):
     table_of: ClassVar[str] = "faults"
 
     results: tuple[Result, ...]
-    clean: Clean
 
     def __repr__(self) -> str:
         missed = sum(bool(result.missed_by) for result in self.results)
-        clean = f"{len(self.clean.alarms)} false alarms in {self.clean.verdicts} verdicts"
-        return f"FaultReport({count(len(self.results), 'fault')}, {missed} missed, {clean})"
+        return f"FaultReport({count(len(self.results), 'fault')}, {missed} missed)"
 
     @property
     def status(self) -> Literal[0, 1]:
-        """Exit status: 0 where every fault was rejected by all that must reject it, and nothing else was."""
-        return 1 if self.clean.alarms or any(result.missed_by for result in self.results) else 0
+        """Exit status: 0 where every fault was rejected by all that must reject it."""
+        return 1 if any(result.missed_by for result in self.results) else 0
 
     def document(self) -> dict[str, Any]:
         """As one JSON document."""
@@ -59,9 +48,6 @@ class FaultReport(Studied):
         return document(
             faults=[{name: getattr(result, name) for name in names} for result in self.results],
             limits={result.name: result.limits for result in self.results if result.limits},
-            clean_runs=self.clean.runs,
-            clean_verdicts=self.clean.verdicts,
-            false_alarms=self.clean.alarms,
         )
 
 
@@ -75,7 +61,6 @@ class Seen:
 
 
 RESULTS: Documents[Result] = Documents(kind=Result, beginning="faults/results/", named="", joined=True)
-CLEANS: Documents[Clean] = Documents(kind=Clean, beginning="faults/clean/", named="", joined=True)
 SEEN: Rows[Seen] = Rows(kind=Seen, beginning="faults/", named="")
 
 

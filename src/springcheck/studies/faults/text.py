@@ -7,11 +7,10 @@ from argparse import Namespace
 from springcheck.studies.faults.result import FaultReport
 from springcheck.studies.text import resumed
 from springcheck.text.lines import Lines, Row, plain, table
-from springcheck.text.wording import count
 
 
 def lines(found: FaultReport, options: Namespace | None = None) -> Lines:
-    """Every fault with what rejects it and the smallest size that is seen; the right engines' runs."""
+    """Every fault with what rejects it and the smallest size that is seen."""
     rows: list[Row] = []
     for result in found.results:
         limit = min(result.limits.values(), default=None)
@@ -24,7 +23,6 @@ def lines(found: FaultReport, options: Namespace | None = None) -> Lines:
             )
         )
         rows.append(plain(f"  {result.about}", "dim"))
-    clean = found.clean
     rejected = sum(bool(result.rejected_by) for result in found.results)
     out: Lines = [
         *resumed(found.resumed, "piece"),
@@ -35,10 +33,6 @@ def lines(found: FaultReport, options: Namespace | None = None) -> Lines:
             for result in found.results
             if result.missed_by
         ),
-        *(plain(f"FALSE ALARM {alarm}", "bold red") for alarm in clean.alarms),
-        plain(
-            f"{rejected} of {len(found.results)} faults rejected; {count(clean.runs, 'clean run')}, "
-            f"{count(clean.verdicts, 'verdict')}, {count(len(clean.alarms), 'false alarm')}"
-        ),
+        plain(f"{rejected} of {len(found.results)} faults rejected"),
     ]
     return out
