@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,8 +12,9 @@ import pytest
 
 import springcheck
 import variable_verlet
-from springcheck import checks, schemes
+from springcheck import checks, schemes, store
 from springcheck.checks import replayed
+from springcheck.checks.check import Finding
 from springcheck.engines.contract import Label, Stopped
 from springcheck.engines.openmm import ENGINE
 from springcheck.engines.openmm.variable import Variable
@@ -19,6 +22,7 @@ from springcheck.errors import MethodError, SceneError
 from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Quartic, Spring, WallSpring
+from springcheck.physics.trajectory import Trajectory, Verdict
 from springcheck.schemes.variable import allowed, taken
 
 
@@ -251,7 +255,7 @@ def test_a_file_that_claims_few_force_calls_is_replayed_no_longer_than_another(
     monkeypatch.setattr(replayed, "taken", counted)
     monkeypatch.setattr(replayed, "MOST_REPLAYED", 200)
     found = {v.check: v for v in checks.judge(scene, run)}["replay"]
-    assert "of 3 frames: more than 200 steps" in found.why
+    assert "of 3 frames: more than 200 steps are not replayed" in found.why
     assert len(met) <= 3 * 201
 
 
@@ -274,15 +278,82 @@ def test_of_a_long_run_the_beginning_is_replayed_and_the_verdict_says_how_much(
 
 
 @pytest.mark.parametrize(("tolerance", "steps"), [(1e-6, 20), (1e-7, 12)])
-def test_a_right_engine_is_not_judged_by_a_last_step_that_hangs_on_roundings(
+def test_a_right_engine_is_judged_to_its_end_by_steps_that_it_tells_else_to_one_that_hangs_on_roundings(
     tolerance: float, steps: int
 ) -> None:
     """26000 roundings of 19 in 60 frames: two sides of a step that is not known did not bracket it."""
     scene = replace(scenefile.load_scene("spring-uneven"), steps=steps, tolerance=tolerance)
-    found = {v.check: v for v in checks.judge(scene, springcheck.simulate(scene, LABEL))}
+    run = springcheck.simulate(scene, LABEL)
+    told, silent = ({v.check: v for v in checks.judge(scene, x)} for x in (run, replace(run, last_step=None)))
     for name in ("replay", "energy-gain"):
-        assert found[name].passed is True
-        assert f"of {steps} frames: the last step before the next hangs on roundings alone" in found[name].why
+        assert told[name].passed is silent[name].passed is True
+        assert "replayed are the first" not in told[name].why
+        words = f"of {steps} frames: the last step before the next hangs on roundings alone"
+        assert words in silent[name].why
+
+
+def replay(scene: Scene, run: Trajectory) -> Verdict:
+    return next(one for one in checks.CHECKS if one.name == "replay")(
+        checks.Case(trajectory=run, scene=scene)
+    )
+
+
+def test_a_last_step_that_is_not_what_the_times_and_the_rule_say_is_a_fault() -> None:
+    scene = replace(scenefile.load_scene("spring-uneven"), steps=20, tolerance=1e-3)
+    run = springcheck.simulate(scene, LABEL)
+    assert run.last_step is not None
+    for row, wrong in itertools.product((5, 20), (1 + 1e-11, 1 - 1e-11, 2.0, 0.0, -1.0, np.nan, np.inf)):
+        last = run.last_step.copy()
+        last[row] *= wrong
+        found = replay(scene, replace(run, last_step=last))
+        assert found.passed is False
+        assert f"recorded as the last before t = {scene.step * row:g} " in found.why
+    # no step ends at the start
+    assert replay(scene, replace(run, last_step=run.last_step + 1e-9 * (run.t == 0))).passed is False
+    assert replay(scene, run).passed is True
+
+
+def test_a_step_left_over_by_roundings_alone_is_followed_where_it_is_told() -> None:
+    """Steps come to a frame's time but for 9e-16, which is a step too."""
+    scene = replace(scenefile.load_scene("spring-uneven"), steps=200, tolerance=1e-3)
+    run = springcheck.simulate(scene, LABEL)
+    assert run.last_step is not None
+    row = int(np.argmin(run.last_step[1:])) + 1
+    assert run.last_step[row] < 1e-14
+    near = run.at(slice(row - 3, row + 4))
+    case = checks.Case(trajectory=near, scene=scene, piece=True)
+    found = replayed.steps(case)
+    assert isinstance(found, Finding)
+    assert found.value <= found.bound
+
+
+def test_a_rule_off_by_1e_12_shows_in_the_steps_that_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = replace(scenefile.load_scene("anharmonic"), steps=40, tolerance=1e-3)
+    other = springcheck.simulate(replace(scene, tolerance=1e-3 * (1 + 1e-12)), LABEL)
+    for told, passed in ((other.last_step, False), (None, True)):
+        run = replace(other, tolerance=1e-3, last_step=told)
+        assert replay(scene, run).passed is passed
+
+
+def test_a_file_keeps_the_last_steps_and_its_pieces_are_replayed_from_where_they_begin(
+    tmp_path: Path,
+) -> None:
+    scene = replace(scenefile.load_scene("spring-uneven"), steps=40, tolerance=1e-3)
+    run = springcheck.simulate(scene, LABEL)
+    assert run.last_step is not None
+    assert run.last_step[0] == 0
+    assert np.all(run.last_step[1:] <= scene.step * (1 + 1e-14))
+    with store.open_new(tmp_path / "s.h5", "test") as journal:
+        journal.save(run, scene)
+        journal.save(replace(run, label="silent", last_step=None), scene)
+    assert store.check(tmp_path / "s.h5") == []
+    kept = store.read(tmp_path / "s.h5")
+    assert np.array_equal(kept[LABEL].last_step, run.last_step)
+    assert kept["silent"].last_step is None
+    first, *later = store.windows(tmp_path / "s.h5", LABEL, 15)
+    assert len(later) == 2
+    for piece in (first, *later):
+        assert replay(scene, piece).passed is True
 
 
 def test_what_a_step_before_may_be_off_is_tried_both_ways(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -295,7 +366,7 @@ def test_what_a_step_before_may_be_off_is_tried_both_ways(monkeypatch: pytest.Mo
         return taken(*state, **given)
 
     monkeypatch.setattr(replayed, "taken", seen)
-    checks.judge(scene, run)
+    checks.judge(scene, replace(run, last_step=None))
     first, *others = before
     assert first == 0
     assert len(others) == 3 * 3

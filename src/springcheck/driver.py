@@ -38,9 +38,12 @@ UNHEARD = 0.25
 
 
 class Sink(Protocol):
-    """Takes recorded frames: t (f,), q and p (f, n), energy (f,) or None.  The arrays are reused."""
+    """Takes recorded frames: t (f,), q and p (f, n), energy and last steps (f,) or None.  The arrays are
+    reused."""
 
-    def __call__(self, t: Floats, q: Floats, p: Floats, energy: Floats | None) -> None: ...
+    def __call__(
+        self, t: Floats, q: Floats, p: Floats, energy: Floats | None, last_step: Floats | None, /
+    ) -> None: ...
 
 
 Progress = Callable[[int], None]
@@ -103,14 +106,14 @@ def play(
     simulation = engines.start(ahead, label, seed)
     start_seconds = perf_counter() - began
 
-    with_energy = "energy" in scene.quantities
     rows = max(1, min(CHUNK // scene.n, scene.frames))
     piece = scene.every if method.adaptive else min(scene.every, PIECE, WORK // scene.n or 1)
     ready = min(rows, FIRST, WORK // (piece * scene.n) or 1)
     # an engine that fills nothing must not pass for one that has
     q, p = np.full((rows, scene.n), np.nan), np.full((rows, scene.n), np.nan)
     q[0], p[0] = scene.q, scene.p
-    _hand_over(scene, sink, 0, q[:1], p[:1], with_energy)
+    told = hasattr(simulation, "last_steps")
+    _hand_over(scene, sink, 0, q[:1], p[:1], np.zeros(1) if told else None)
     run_seconds = 0.0
     outcome = Outcome(status="complete", step=scene.steps)
     frame = 1
@@ -121,7 +124,8 @@ def play(
         run_seconds += seconds
         ready = min(rows, 4 * ready) if seconds < QUICK else ready
         if good:
-            _hand_over(scene, sink, frame, q[:good], p[:good], with_energy)
+            last = simulation.last_steps[:good] if told else None  # type: ignore[attr-defined]
+            _hand_over(scene, sink, frame, q[:good], p[:good], last)
         frame += good
         if progress:
             progress(good * scene.every - part.told)
@@ -202,13 +206,13 @@ class _Part:
                     self.told += steps
 
 
-def _hand_over(scene: Scene, sink: Sink, frame: int, q: Floats, p: Floats, with_energy: bool) -> None:
+def _hand_over(scene: Scene, sink: Sink, frame: int, q: Floats, p: Floats, last: Floats | None) -> None:
     t = np.arange(frame, frame + len(q), dtype=np.float64) * scene.every * scene.step
     energy = None
-    if with_energy:
+    if "energy" in scene.quantities:
         with np.errstate(over="ignore", invalid="ignore", under="ignore"):
             energy = np.asarray(scene.system.energy(q, p), dtype=np.float64)
-    sink(t, q, p, energy)
+    sink(t, q, p, energy, last)
 
 
 class Gather:
@@ -223,20 +227,24 @@ class Gather:
         self._frames = 0
         self._t = np.empty(scene.frames)
         self._q, self._p = np.empty((scene.frames, scene.n)), np.empty((scene.frames, scene.n))
-        self._energy = np.empty(scene.frames) if "energy" in scene.quantities else None
+        self._more: dict[str, Floats] = {}
 
-    def __call__(self, t: Floats, q: Floats, p: Floats, energy: Floats | None) -> None:
+    def __call__(
+        self, t: Floats, q: Floats, p: Floats, energy: Floats | None, last_step: Floats | None
+    ) -> None:
         a, b = self._frames, self._frames + len(t)
         self._t[a:b], self._q[a:b], self._p[a:b] = t, q, p
-        if self._energy is not None and energy is not None:
-            self._energy[a:b] = energy
+        for name, values in (("energy", energy), ("last_step", last_step)):
+            if values is not None:
+                if a == 0:
+                    self._more[name] = np.empty(len(self._t))
+                self._more[name][a:b] = values
         self._frames = b
 
     def onto(self, run: Trajectory) -> Trajectory:
         """The run with these frames."""
-        f = self._frames
-        energy = None if self._energy is None else self._energy[:f]
-        return replace(run, t=self._t[:f], q=self._q[:f], p=self._p[:f], energy=energy)
+        whole = replace(run, t=self._t, q=self._q, p=self._p, energy=self._more.get("energy"))
+        return replace(whole, last_step=self._more.get("last_step")).at(slice(self._frames))
 
 
 def run(

@@ -1,12 +1,14 @@
 """A solver whose steps follow a rule, replayed from the recorded frames: each stretch from its own first one.
 
-Only the length of the step before goes on from one stretch to the next.  Where a step of velocity Verlet of
+Only the length of the step before goes on from one stretch to the next, known where the engine tells it, as
+the last of a stretch that is replayed where it does not.  Where a step of velocity Verlet of
 length h ends, E' - E = (h**2/8) sum (F'**2 - F**2)/m of linear forces, exactly: it keeps the energy less
 (h**2/8) sum F**2/m, each step with its own h.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from itertools import islice
 from typing import Any, NamedTuple, TypeAlias
 
@@ -16,7 +18,7 @@ from springcheck import schemes
 from springcheck.checks.case import Case
 from springcheck.checks.check import Finding
 from springcheck.physics.arrays import ROUNDOFF, Extended
-from springcheck.schemes.variable import Taken, allowed, taken
+from springcheck.schemes.variable import Taken, allowed, push_of, taken
 from springcheck.text.wording import count
 
 MOST_REPLAYED = 10_000
@@ -24,8 +26,8 @@ MOST_REPLAYED = 10_000
 
 LOST = 0.1
 """Part of itself to which a step is known, up to which a longer and a shorter one stand for all between.  The
-last step before a frame is what the others leave of its time: its rounding grows from frame to frame, until
-the rule has a step that does not depend on it, or nothing is known of it."""
+last step before a frame is what the others leave of its time: where it is not told, its rounding grows from
+frame to frame, until the rule has a step that does not depend on it, or nothing is known of it."""
 
 Times: TypeAlias = tuple[float, float]
 
@@ -33,7 +35,8 @@ Times: TypeAlias = tuple[float, float]
 class _Replayed(NamedTuple):
     """Of each stretch that is replayed, the first ones: where its steps lead, one rounding of all that they
     add up, and what the roundings of the time may do, (f-1, n) each; the energy that they add by their law,
-    and what the time may do to it, how many they are, and the shortest, (f-1,) each."""
+    and what the time may do to it, how many they are, the shortest, and by how many roundings the last one
+    that is told is not what the others leave of the time, or more than the rule allows, (f-1,) each."""
 
     ends: tuple[Extended, Extended]
     bounds: tuple[Extended, Extended]
@@ -42,6 +45,7 @@ class _Replayed(NamedTuple):
     loose: Extended
     counts: Extended
     shortest: Extended
+    untrue: Extended
     ended: str
     """Why not all are."""
 
@@ -49,7 +53,8 @@ class _Replayed(NamedTuple):
 def _follow(case: Case) -> _Replayed | str:
     """Or the reason why the steps are not replayed."""
     run, system, m = case.trajectory, case.system, case.judged.m.astype(np.longdouble)
-    if case.steps[0] != 0:
+    told = None if run.last_step is None or run.last_step.shape != run.t.shape else run.last_step
+    if case.steps[0] != 0 and told is None:
         return "the length of the step before its first frame is not recorded"
     state, before, unsure = run.arithmetic.state + ROUNDOFF, 0.0, 0.0
     left, ended = MOST_REPLAYED, ""
@@ -59,12 +64,17 @@ def _follow(case: Case) -> _Replayed | str:
         times = float(case.steps[i] * run.step), float(case.steps[i + 1] * run.step)
 
         def stretch(
-            before: float, at: tuple[Extended, Extended] = first, times: Times = times, most: int = left + 1
-        ) -> list[Taken]:
+            before: float, at: tuple[Extended, Extended] = first, times: Times = times, most: int = left + 1,
+            last: float | None = None if told is None else float(told[i + 1]),
+        ) -> list[Taken]:  # fmt: skip
             allow = allowed(case.scene)
-            steps = taken(case.scheme, case.judged, at, before=before, times=times, tolerance=allow)
+            steps = taken(
+                case.scheme, case.judged, at, before=before, times=times, tolerance=allow, last=last
+            )
             return list(islice(steps, most))
 
+        if told is not None and case.steps[i]:
+            before, unsure = float(told[i]), 0.0
         if unsure > LOST * before:
             ended = "the last step before the next hangs on roundings alone"
             break
@@ -75,13 +85,18 @@ def _follow(case: Case) -> _Replayed | str:
         if not steps:
             return "two of its frames lie at one time"
         if max(map(len, (steps, *others))) > left:
-            ended = f"more than {MOST_REPLAYED} steps take long"
+            ended = _too_many()
             break
         left -= len(steps)
-        end, of_q, of_p = steps[-1].end, *_rounded(case, steps, before)
+        every = list(_rounded(case, steps, before))
+        end, (of_q, of_p), untrue, amiss = steps[-1].end, every[-1], 0.0, 0.0
+        if told is not None:
+            untrue, amiss = _untrue(case, steps, every, before, times)
+            if not (told[i + 1] > 0 and (case.steps[i] or told[i] == 0)):
+                untrue = np.inf
         # the time is a sum of lengths, each rounded: what is left of it is the last step, and the next one
         # follows from that
-        off = len(steps) * state * abs(np.longdouble(times[1]))
+        off = len(steps) * state * abs(np.longdouble(times[1])) + amiss
         late = off * np.abs(end[1] / m), off * np.abs(system.force(*end))
         gain, loose, last = _gain(case, steps), np.longdouble(0), abs(steps[-1].h)
         if others:
@@ -92,12 +107,13 @@ def _follow(case: Case) -> _Replayed | str:
             off += 2 * max(abs(abs(x[-1].h) - last) for x in others)
         before, unsure = last, float(off)
         shortest = min(abs(step.h) for step in steps)
-        rows.append((*end, of_q, of_p, *late, gain, loose, *map(np.longdouble, (len(steps), shortest))))
+        known = len(steps), shortest, untrue
+        rows.append((*end, of_q, of_p, *late, gain, loose, *map(np.longdouble, known)))
     if not rows:
-        return TOO_MANY
+        return ended
     found = [np.stack(column) for column in zip(*rows, strict=True)]
     ends, bounds, late = ((found[i], found[i + 1]) for i in (0, 2, 4))
-    return _Replayed(ends, bounds, late, found[6], found[7], found[8], found[9], ended)
+    return _Replayed(ends, bounds, late, found[6], found[7], found[8], found[9], found[10], ended)
 
 
 def _gain(case: Case, steps: list[Taken]) -> Extended:
@@ -109,15 +125,17 @@ def _gain(case: Case, steps: list[Taken]) -> Extended:
     return np.asarray(total)
 
 
-def _rounded(case: Case, steps: list[Taken], before: float) -> tuple[Extended, Extended]:
-    """One rounding of all that these steps add up, each carried to the end by the steps after it (n,)."""
+def _rounded(case: Case, steps: list[Taken], before: float) -> Iterator[tuple[Extended, Extended]]:
+    """One rounding of all that these steps add up (n,), each carried on by the steps after it: before the
+    first, and after each of them."""
     run, system, m = case.trajectory, case.system, case.judged.m
     state = run.arithmetic.state + ROUNDOFF
     q, p = steps[0].start
     sizes, stiff = system.magnitude(None if system.is_linear else q), np.abs(system.hessian(q))
     # the momentum was read half a step on
     of_q, of_p = np.zeros_like(q), state * (np.abs(p) + before * sizes(np.abs(q) + case.origins, np.abs(p)))
-    for length, (q, p), (end, _) in steps:
+    yield of_q, of_p
+    for length, (q, p), (end, _), _ in steps:
         h, reach = abs(length), np.abs(q) + np.abs(end) + case.origins
         if not system.is_linear:
             sizes, stiff = system.magnitude(q), np.abs(system.hessian(q))
@@ -127,14 +145,45 @@ def _rounded(case: Case, steps: list[Taken], before: float) -> tuple[Extended, E
         one = of_q + h / m * (of_p + h / 2 * (stiff @ of_q)) + state * (reach + h * np.abs(p) / m)
         of_p = of_p + h / 2 * (stiff @ (of_q + one)) + pushed
         of_q = one
-    return np.asarray(of_q), np.asarray(of_p)
+        yield of_q, of_p
+
+
+def _untrue(
+    case: Case, steps: list[Taken], bounds: list[tuple[Extended, Extended]], before: float, times: Times
+) -> tuple[float, float]:
+    """By how many roundings the last step, as it is told, is not what the others leave of the time, or more
+    than the rule allows; and the first of both as a time, as far as roundings explain it.
+
+    A step is known as the force at its start is: to what rounding has made of positions and of the time.
+    """
+    system, m, rule, q = case.system, case.judged.m, case.scheme.rule, steps[0].start[0]
+    state, allow = case.trajectory.arithmetic.state + ROUNDOFF, allowed(case.scene)
+    assert rule is not None
+    clock, of_h, of_t = abs(np.longdouble(times[0])), np.longdouble(0), np.longdouble(0)
+    sizes, stiff = system.magnitude(None if system.is_linear else q), np.abs(system.hessian(q))
+    for (length, (q, p), _, longest), (of_q, _) in zip(steps, bounds, strict=False):
+        of_t += of_h
+        if not system.is_linear:
+            sizes, stiff = system.magnitude(q), np.abs(system.hessian(q))
+        moved = stiff @ (of_q + np.abs(p) / m * of_t) + state * sizes(np.abs(q) + case.origins, np.abs(p))
+        push, off = push_of(case.judged, system.force(q, p)), push_of(case.judged, moved)
+        # the rule jumps where it holds a step
+        pushes, steps_before = (np.maximum(push - off, 0), push + off), (before - of_h, before + of_h)
+        sides = [rule(float(x), float(y), allow) for x in pushes for y in steps_before]
+        of_h = np.max(np.abs(np.array(sides) - longest)) + 2 * state * longest
+        clock, before = clock + abs(length), longest
+        of_t += state * clock
+    number, amiss, excess = _roundings(case), abs(clock - abs(times[1])), abs(steps[-1].h) - longest
+    found = amiss / of_t, excess / of_h if excess > 0 else excess * 0
+    return float(np.max(np.array(found))), float(min(amiss, number * of_t))
 
 
 def _roundings(case: Case) -> int:
     return schemes.roundings(schemes.scheme(case.scheme.steps_of))
 
 
-TOO_MANY = f"its steps are more than {MOST_REPLAYED}, which are not replayed"
+def _too_many() -> str:
+    return f"more than {MOST_REPLAYED} steps are not replayed"
 
 
 def _until(case: Case, found: _Replayed) -> str:
@@ -143,6 +192,20 @@ def _until(case: Case, found: _Replayed) -> str:
         return ""
     first, every = len(found.counts), len(case.trajectory.t) - 1
     return f"; replayed are the first {first} of {every} frames: {found.ended}"
+
+
+def _told(case: Case, found: _Replayed) -> str:
+    """What the last steps before frames say, where the engine tells them."""
+    told, wrong = case.trajectory.last_step, ~(found.untrue <= _roundings(case))
+    if told is None:
+        return ""
+    if not np.any(wrong):
+        return ", and the last one is as long as it is recorded"
+    row = int(np.argmax(wrong))
+    return (
+        f"; the step of {told[row + 1]:.6g} that is recorded as the last before t = "
+        f"{case.trajectory.t[row + 1]:g} is none by the rule from the frame before"
+    )
 
 
 def steps(case: Case) -> Finding | str:
@@ -157,7 +220,7 @@ def steps(case: Case) -> Finding | str:
             unit = one + late / number
             ratios.append(np.max(np.abs(at[1 : len(end) + 1] - end) / unit, axis=1))
             still.append(np.max(np.abs(at[: len(end)] - end) / unit, axis=1))
-        seen = np.max(ratios, axis=0)
+        seen = np.max([*ratios, found.untrue], axis=0)
         worst = int(np.argmax(np.where(np.isfinite(seen), seen, np.inf)))
         if seen[worst] <= number and not np.any(np.max(still, axis=0) > number):
             return "rounding may be as large as the way from frame to frame"
@@ -167,8 +230,9 @@ def steps(case: Case) -> Finding | str:
         number,
         "roundings",
         f"roundings of {count(int(found.counts[worst]), 'step')} from the frame before, each carried on, and "
-        f"of the time; {int(np.sum(found.counts))} steps by the rule, {np.min(lengths):.3g} to "
-        f"{np.max(lengths):.3g} long in the mean between two frames{_until(case, found)}",
+        f"of the time{_told(case, found)}; {int(np.sum(found.counts))} steps by the rule, "
+        f"{np.min(lengths):.3g} to {np.max(lengths):.3g} long in the mean between two frames"
+        f"{_until(case, found)}",
     )
 
 

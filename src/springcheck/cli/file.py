@@ -303,6 +303,7 @@ def as_trajectory(
         run = replace(
             run, energy=energy, rebuilds_velocity=ours.rebuilds_velocity, off_axis=ours.off_axis,
             tolerance=ours.tolerance if ours.scheme == scheme else None, force_calls=ours.force_calls,
+            last_step=ours.last_step,
         )  # fmt: skip
     return judged, run, tuple(notes)
 

@@ -94,10 +94,14 @@ def _frames(run: Trajectory, stride: int, last: Trajectory) -> Lines:
     if n > shown:
         title += f", the first {shown} of {n} particles"
     names = [f"{name}{i}" if n > 1 else name for name in ("q", "p") for i in range(shown)]
+    if run.last_step is not None:
+        names.append("last step")
     rows = [
-        [repr(float(x)) for x in (t, *q[:shown], *p[:shown])]
+        [repr(float(x)) for x in (t, *q[:shown], *p[:shown], *h)]
         for one in (run, last)
-        for t, q, p in zip(one.t, one.q, one.p, strict=True)
+        for t, q, p, *h in zip(
+            *(x for x in (one.t, one.q, one.p, one.last_step) if x is not None), strict=True
+        )
     ]
     if rows[-2:-1] == rows[-1:]:
         del rows[-1]
@@ -114,7 +118,8 @@ def document(summary: store.Summary, options: Namespace) -> dict[str, Any]:
         else:
             documents[study.name] = result.document()
     run, stride = _asked_for(summary, options)
-    shown = run and {"label": run.label, "stride": stride, "t": run.t, "q": run.q, "p": run.p}
+    more = {} if run is None or run.last_step is None else {"last_step": run.last_step}
+    shown = run and {"label": run.label, "stride": stride, "t": run.t, "q": run.q, "p": run.p, **more}
     return keeper.document(
         store=summary.path,
         bytes=summary.size,

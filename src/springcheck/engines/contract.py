@@ -110,7 +110,8 @@ class Simulation(Protocol):
     """A started engine.  It moves and does nothing else: the driver records, times and judges.
 
     An engine in three dimensions may have an attribute `off_axis`, the largest size that it has seen of
-    a coordinate that the scene leaves out.
+    a coordinate that the scene leaves out; one that chooses its steps by a rule an attribute `last_steps`
+    (f,), the lengths of those that ended at the rows which `advance` has filled last.
     """
 
     @property

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -54,6 +54,9 @@ class Trajectory:
     """Relative tolerance per step; None for a method of fixed step."""
     energy: Floats | None = None
     """Total energy of each frame, (f,) [M L2/T2]; None where the scene asks for none."""
+    last_step: Floats | None = None
+    """Of a solver that chooses its steps: the length of that which ended at each frame, (f,) [T], of either
+    direction of time, 0 at the start; None where it tells none."""
     arithmetic: Arithmetic = field(default_factory=Arithmetic)
     rebuilds_velocity: bool = False
     off_axis: float | None = None
@@ -134,6 +137,11 @@ class Trajectory:
         steps = np.arange(len(self.t), dtype=np.int64) * self.every
         q, p = exact.true_motion(scene, steps, self.step)
         return scene.system.norm(self.q - q, self.p - p)
+
+    def at(self, rows: slice) -> Trajectory:
+        """These frames alone."""
+        more = {x: y[rows] for x in ("energy", "last_step") if (y := getattr(self, x)) is not None}
+        return replace(self, t=self.t[rows], q=self.q[rows], p=self.p[rows], **more)
 
     def save(self, path: str | Path) -> Path:
         """Write t, q, p (and m, energy) as .csv or .npz, every double so that it reads back as it is.

@@ -21,38 +21,46 @@ def allowed(scene: Scene) -> float:
 
 
 class Taken(NamedTuple):
-    """A step: its length, of either sign, and the states (n,) at its start and end."""
+    """A step: its length, of either sign, the states (n,) at its start and end, and how long its rule lets it
+    be."""
 
     h: float
     start: tuple[Reals, Reals]
     end: tuple[Reals, Reals]
+    longest: float
+
+
+def push_of(scene: Scene, force: Reals) -> Reals:
+    """By which a rule measures forces (n,), or their errors: their root mean square over the mass."""
+    return np.asarray(np.sqrt(np.sum((force / scene.m) ** 2) / (3 * scene.particles)))
 
 
 def taken(
     scheme: Scheme, scene: Scene, state: tuple[Reals, Reals], *, before: float, times: tuple[float, float],
-    tolerance: float,
+    tolerance: float, last: float | None = None,
 ) -> Iterator[Taken]:  # fmt: skip
     """Steps from a state at the first of two times to the second, which the last one is shortened to meet.
 
     `before` is the length of the step before, 0 at the start; the tolerance is a length.  Lengths and times
-    are summed up in double precision, as an engine does.
+    are summed up in double precision, as an engine does.  Where the length of the last step is known it is
+    taken as it is, where it leaves less than half of what the rule allows: roundings do not say how many
+    steps there are.
     """
     assert scheme.rule is not None
     law = Law(scheme=named(scheme.steps_of), scene=scene, h=0.0)
     clock, end = (abs(time) for time in times)
     sign = 1.0 if times[1] >= times[0] else -1.0
-    while clock < end:
-        force = scene.system.force(*state)
-        push = np.sqrt(np.sum((force / scene.m) ** 2) / (3 * scene.particles))
+    while clock < end or last is not None:
+        push = push_of(scene, scene.system.force(*state))
         h, left = scheme.rule(float(push), before, tolerance), end - clock
-        last = not h < left
-        if not last and clock + h == clock:
+        ends = not h < left if last is None else not left - last >= h / 2
+        if not ends and clock + h == clock:
             # the motion escapes in finite time, and no step ends there
             return
-        before = left if last else h
+        before = h if not ends else left if last is None else last
         clock += before
         after = replace(law, h=sign * before).step(*state)
-        yield Taken(sign * before, state, after)
+        yield Taken(sign * before, state, after, h)
         state = after
-        if last or not np.all(np.isfinite(after)):
+        if ends or not np.all(np.isfinite(after)):
             return

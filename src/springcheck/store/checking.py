@@ -170,7 +170,7 @@ def _trajectory(file: Any, label: str, *, arrays: bool) -> Iterator[Damage]:
     whole = True
     columns: dict[str, Column] = {}
     for name in known.kept:
-        shape = (known.frames,) if name == "energy" else (known.frames, known.particles)
+        shape = layout.shape(name, known.frames, known.particles)
         for kind, expected in (("value", shape), ("time", shape[:1]), ("step", shape[:1])):
             at = f"/observables/{label}/{name}/{kind}"
             try:

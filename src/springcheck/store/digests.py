@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from springcheck.store import access
-from springcheck.store.layout import Column
+from springcheck.store.layout import QUANTITIES, Column
 
 PIECE = 1 << 20
 """Numbers that are read at a time."""
@@ -24,14 +24,12 @@ KEY = "digests"
 
 
 def combined(digests: Mapping[str, str], columns: Mapping[str, Column]) -> str:
-    """The digest of a trajectory: sha256 over the sha256 of time, q, p and energy, with their shapes.
+    """The digest of a trajectory: sha256 over the sha256 of its times and quantities, with their shapes.
 
     Little-endian float64, nothing of clock or machine: equal exactly when two runs agree bit for bit.
     """
     lines = [
-        f"{name} {columns[name].shape} {digests[name]}"
-        for name in ("time", "q", "p", "energy")
-        if name in digests
+        f"{name} {columns[name].shape} {digests[name]}" for name in ("time", *QUANTITIES) if name in digests
     ]
     return hashlib.sha256("\n".join(lines).encode()).hexdigest()
 

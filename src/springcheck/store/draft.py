@@ -45,15 +45,8 @@ class Draft:
         self.path, self.label, self.scene, self.sequence, self.run = path, label, scene, sequence, run
         self.rows = 0
         self._temporary = files.temporary(path)
-        self._columns = layout.columns(label, scene, scene.frames)
-        self._hash = {name: hashlib.sha256() for name in self._columns}
-        widest = max(column.size for column in self._columns.values()) // scene.frames
-        length = max(1, min(scene.frames, BUFFER // widest))
-        self._buffer, self._spare = (
-            {name: np.empty((length, *c.shape[1:]), c.dtype) for name, c in self._columns.items()}
-            for _ in range(2)
-        )
-        self._held, self._length = 0, length
+        self._lay_out(steps=False)
+        self._held = 0
         self._offsets: dict[str, int] = {}
         self._files: dict[str, FileIO] = {}
         """One for each column, at its next byte: columns are written side by side."""
@@ -61,12 +54,28 @@ class Draft:
         self._running: list[Future[None]] = []
         self._stack = ExitStack()
 
-    def append(self, t: Floats, q: Floats, p: Floats, energy: Floats | None = None) -> None:
-        """Add frames: t (f,), q and p (f, n), energy (f,) where the scene keeps energies.
+    def _lay_out(self, *, steps: bool) -> None:
+        self._steps, frames = steps, self.scene.frames
+        self._columns = layout.columns(self.label, self.scene, frames, steps=steps)
+        self._hash = {name: hashlib.sha256() for name in self._columns}
+        widest = max(column.size for column in self._columns.values()) // frames
+        self._length = max(1, min(frames, BUFFER // widest))
+        self._buffer, self._spare = (
+            {name: np.empty((self._length, *c.shape[1:]), c.dtype) for name, c in self._columns.items()}
+            for _ in range(2)
+        )
+
+    def append(
+        self, t: Floats, q: Floats, p: Floats, energy: Floats | None = None, last_step: Floats | None = None
+    ) -> None:
+        """Add frames: t (f,), q and p (f, n), energy (f,) where the scene keeps energies, and last steps (f,)
+        where the solver tells them: of all frames, or of none.
 
         What the scene does not keep is not looked at.  Raises StoreError when the disk is full.
         """
-        given: dict[str, Floats | None] = {"time": t, "q": q, "p": p, "energy": energy}
+        given = {"time": t, "q": q, "p": p, "energy": energy, "last_step": last_step}
+        if last_step is not None and not self.rows:
+            self._lay_out(steps=True)
         f = len(t)
         for name, values in given.items():
             if name in self._columns:
@@ -114,9 +123,9 @@ class Draft:
         return digest
 
     def _create(self, frames: int) -> None:
-        self._columns = layout.columns(self.label, self.scene, frames)
+        self._columns = layout.columns(self.label, self.scene, frames, steps=self._steps)
         with layout.fresh(self._temporary, sum(column.size for column in self._columns.values())) as file:
-            self._offsets = layout.skeleton(file, self.label, self.scene, frames)
+            self._offsets = layout.skeleton(file, self.label, self.scene, self._columns)
         for name, offset in self._offsets.items():
             self._files[name] = self._temporary.open("rb+", buffering=0)
             self._files[name].seek(offset)
@@ -187,7 +196,7 @@ class Draft:
                 "frames": self.rows,
                 "particles": self.scene.n,
                 **({} if self.scene.places is None else {"axes": space.axes_of(self.scene)}),
-                "quantities": " ".join(n for n in ("q", "p", "energy") if n in self._columns),
+                "quantities": " ".join(n for n in layout.QUANTITIES if n in self._columns),
                 "sequence": self.sequence,
                 "finished": now,
                 "sha256": digest,

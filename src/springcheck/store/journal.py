@@ -212,7 +212,7 @@ class Journal:
     def save(self, trajectory: Trajectory, scene: Scene) -> str:
         """Store a trajectory that is at hand in full -> digest."""
         with self.draft(trajectory.label, scene) as draft:
-            draft.append(trajectory.t, trajectory.q, trajectory.p, trajectory.energy)
+            draft.append(*(getattr(trajectory, x) for x in ("t", *layout.QUANTITIES)))
             return draft.finish(records.attributes(trajectory))
 
     def add(self, table: Table, *, by: Sequence[pieces.Worker] = (), rows: bool = False) -> None:

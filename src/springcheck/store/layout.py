@@ -4,7 +4,8 @@
 
     /h5md                      version, author, creator, modules/units
     /particles/<label>/        position and velocity (frames, n, 3), mass; scenes of particles only
-    /observables/<label>/      q, p (frames, n), energy (frames,), velocity: elements {step, time, value}
+    /observables/<label>/      q, p (frames, n), energy (frames,), velocity: elements {step, time, value};
+                               last_step (frames,) of a solver that chooses its steps and tells them
     /parameters/<label>        attributes: scene, method, versions, machine, outcome, digest
     /comparison /verdicts      tables of one column per dataset
     /plots                     NXentry of NXdata; root @default leads there
@@ -48,10 +49,18 @@ CHUNK = 1 << 20
 """Bytes of a chunk of an exported array."""
 
 RESERVED = ("h5md", "particles", "observables", "parameters", "comparison", "verdicts", "documents", "plots")
+QUANTITIES = ("q", "p", "energy", "last_step")
+"""What may be kept of a trajectory beside its times."""
 _STRING = h5py.string_dtype("utf-8")
 
-_MD = {"q": "nm", "p": "u nm ps-1", "energy": "kJ mol-1", "velocity": "nm ps-1", "time": "ps", "mass": "u"}
-_SI = {"q": "m", "p": "kg m s-1", "energy": "J", "velocity": "m s-1", "time": "s", "mass": "kg"}
+_MD = {
+    "q": "nm", "p": "u nm ps-1", "energy": "kJ mol-1", "velocity": "nm ps-1", "time": "ps", "mass": "u",
+    "last_step": "ps",
+}  # fmt: skip
+_SI = {
+    "q": "m", "p": "kg m s-1", "energy": "J", "velocity": "m s-1", "time": "s", "mass": "kg",
+    "last_step": "s",
+}  # fmt: skip
 _MD_ROTOR = {**_MD, "q": "rad", "p": "u nm2 ps-1", "velocity": "rad ps-1", "mass": "u nm2"}
 _SI_ROTOR = {**_SI, "q": "rad", "p": "kg m2 s-1", "velocity": "rad s-1", "mass": "kg m2"}
 _SI_CIRCUIT = {**_SI, "q": "C", "p": "Wb", "velocity": "A", "mass": "H"}
@@ -107,16 +116,23 @@ def units(scene: Scene) -> UnitsOf:
     return UNITS[scene.kind, scene.units]
 
 
-def columns(label: str, scene: Scene, frames: int) -> dict[str, Column]:
-    """The arrays that a trajectory of this scene is made of, by short name."""
-    kept: list[str] = [name for name in ("q", "p", "energy") if name in scene.quantities]
+def shape(name: str, frames: int, n: int) -> tuple[int, ...]:
+    """That of one of the quantities."""
+    return (frames, n) if name in ("q", "p") else (frames,)
+
+
+def columns(label: str, scene: Scene, frames: int, *, steps: bool = False) -> dict[str, Column]:
+    """The arrays that a trajectory of this scene is made of, by short name; `steps` adds the last ones."""
+    kept: list[str] = [name for name in QUANTITIES if name in scene.quantities]
     if not kept:
         raise StoreError(f"scene {scene.name!r} records nothing: ask for q, p or energy in [record]")
     base = f"/observables/{label}"
-    wide: dict[str, tuple[int, ...]] = {"q": (frames, scene.n), "p": (frames, scene.n), "energy": (frames,)}
-    found: dict[str, Column] = {name: Column(path=f"{base}/{name}/value", shape=wide[name]) for name in kept}
+    more = ["last_step"] if steps else []
+    found: dict[str, Column] = {
+        name: Column(path=f"{base}/{name}/value", shape=shape(name, frames, scene.n)) for name in kept + more
+    }
     if scene.kind == "particles" and "p" in kept and np.any(scene.m != 1):
-        found["velocity"] = Column(path=f"{base}/velocity/value", shape=wide["p"])
+        found["velocity"] = Column(path=f"{base}/velocity/value", shape=found["p"].shape)
     found["time"] = Column(path=f"{base}/{kept[0]}/time", shape=(frames,))
     step = "<i4" if scene.steps < 2**31 else "<i8"
     found["step"] = Column(path=f"{base}/{kept[0]}/step", shape=(frames,), dtype=step)
@@ -191,10 +207,9 @@ def recorded(kind: str, of: str) -> UnitsOf:
     return {name: "1" if of == "reduced" and name != "time" else unit for name, unit in found.items()}
 
 
-def skeleton(file: Any, label: str, scene: Scene, frames: int) -> dict[str, int]:
+def skeleton(file: Any, label: str, scene: Scene, found: Mapping[str, Column]) -> dict[str, int]:
     """Create a trajectory's groups and arrays without their numbers -> offset of each array [B]."""
     unit = recorded(scene.kind, scene.units)
-    found = columns(label, scene, frames)
     base = file.create_group(f"observables/{label}")
     if scene.units == "reduced":
         write_attributes(base, {"units_are": REDUCED})

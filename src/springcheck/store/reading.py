@@ -62,12 +62,11 @@ def known_of(file: Any, label: str) -> tuple[RunRecord, dict[str, Any]]:
 
 
 def _datasets(file: Any, label: str, known: RunRecord) -> dict[str, Any]:
-    """The arrays of a trajectory, looked at: time, and of q, p and energy those that are recorded."""
+    """The arrays of a trajectory, looked at: time, and of the quantities those that are recorded."""
     base = f"observables/{label}"
-    wide = (known.frames, known.particles)
     found = {"time": access.array(file, f"{base}/{known.kept[0]}/time", (known.frames,))}
     for name in known.kept:
-        shape = wide[:1] if name == "energy" else wide
+        shape = layout.shape(name, known.frames, known.particles)
         found[name] = access.array(file, f"{base}/{name}/value", shape)
     return found
 

@@ -15,6 +15,7 @@ from springcheck.physics.arrays import Arithmetic, Floats
 from springcheck.physics.fields import Kind, Units
 from springcheck.physics.trajectory import Outcome, Timing, Trajectory
 from springcheck.store.access import Scalar
+from springcheck.store.layout import QUANTITIES
 
 Count = Annotated[int, msgspec.Meta(ge=0, lt=2**53)]
 Size = Annotated[int, msgspec.Meta(ge=1, lt=2**48)]
@@ -93,7 +94,7 @@ class RunRecord(msgspec.Struct, frozen=True, kw_only=True):
     @property
     def kept(self) -> tuple[str, ...]:
         """The quantities that are recorded."""
-        return tuple(name for name in ("q", "p", "energy") if name in self.quantities.split())
+        return tuple(name for name in QUANTITIES if name in self.quantities.split())
 
 
 def record(place: str, known: Mapping[str, Any]) -> RunRecord:
@@ -130,6 +131,7 @@ def trajectory(
         q=arrays.get("q", empty),
         p=arrays.get("p", empty),
         energy=arrays.get("energy"),
+        last_step=arrays.get("last_step"),
         outcome=Outcome(**parts["outcome"]),
         timing=Timing(**parts["timing"]),
         arithmetic=Arithmetic(**parts["arithmetic"]),

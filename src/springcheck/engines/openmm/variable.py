@@ -65,16 +65,17 @@ class Variable(_Context):
             )
         _stays(scene, label, step)
         super().__init__(scene, method, label, step)
+        self.last_steps = np.zeros(0)
         # the mean is over all particles, anchors among them
         count = self._context.getSystem().getNumParticles()
         self._integrator.setErrorTolerance(allowed(scene) * np.sqrt(scene.particles / count))
 
     def advance(self, every: int, q: Floats, p: Floats) -> None:
-        halves, row = np.zeros((len(q), 1)), 0
+        lasts, row = np.zeros(len(q)), 0
         try:
             while row < len(q):
                 self._integrator.stepTo((self._done + every) * abs(self._step))
-                halves[row] = self._integrator.getStepSize()._value / 2
+                lasts[row] = self._integrator.getStepSize()._value
                 state = self._context.getState(positions=True, velocities=True)
                 state._getVectorAsNumpy(mm.State.Positions, self._x)
                 state._getVectorAsNumpy(mm.State.Velocities, self._v)
@@ -85,8 +86,8 @@ class Variable(_Context):
         except mm.OpenMMException as error:
             raise Stopped(row, str(error)) from error
         finally:
-            q, p = q[:row], p[:row]
+            q, p, self.last_steps = q[:row], p[:row], lasts[:row]
             self._synchronise(every, q, p)
             with np.errstate(over="ignore", invalid="ignore"):
-                p += np.copysign(halves[:row], self._step) * self._force(0.0, q, p)
+                p += np.copysign(lasts[:row, None] / 2, self._step) * self._force(0.0, q, p)
             self.force_calls = self._context.getStepCount()

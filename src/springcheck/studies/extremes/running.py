@@ -190,7 +190,5 @@ def _within_range(case: checks.Case) -> tuple[checks.Case, str]:
     if not np.any(beyond):
         return case, ""
     held = slice(int(np.argmax(beyond)) + 1)
-    energy = None if run.energy is None else run.energy[held]
-    before = replace(run, t=run.t[held], q=run.q[held], p=run.p[held], energy=energy)
     reason = f"grown out of range after step {case.steps[held][-1]}: {overflows(run.arithmetic)}"
-    return checks.Case(trajectory=before, scene=case.scene), reason
+    return checks.Case(trajectory=run.at(held), scene=case.scene), reason

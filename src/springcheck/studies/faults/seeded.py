@@ -279,9 +279,7 @@ def swapped_frames(scene: Scene, size: float, run: Trajectory) -> Trajectory:
 def given_up(scene: Scene, size: float, run: Trajectory) -> Trajectory:
     """The run ends half-way."""
     half = slice(len(run.t) // 2)
-    energy = None if run.energy is None else run.energy[half]
-    outcome = Outcome(status="stopped", step=(half.stop - 1) * run.every)
-    return replace(run, t=run.t[half], q=run.q[half], p=run.p[half], energy=energy, outcome=outcome)
+    return replace(run.at(half), outcome=Outcome(status="stopped", step=(half.stop - 1) * run.every))
 
 
 def accumulated(scene: Scene, size: float, run: Trajectory) -> Trajectory:

@@ -127,7 +127,7 @@ class Errors:
         self._own = _own_motion(judged or known.scene, scheme, h)
         self._rounded = 0.0
 
-    def __call__(self, t: Floats, q: Floats, p: Floats, energy: Floats | None) -> None:
+    def __call__(self, t: Floats, q: Floats, p: Floats, *_: Floats | None) -> None:
         """Take frames into account."""
         known, norm = self._truth, self._truth.scene.system.norm
         steps = np.arange(self._frame, self._frame + len(t)) * self._every

@@ -49,7 +49,7 @@ class Broken:
                 f"{self.fault.scene} such as that of `springcheck faults` ({error})"
             ) from error
         energy = made.energy if "energy" in scene.quantities else None
-        draft.append(made.t, made.q, made.p, energy)
+        draft.append(made.t, made.q, made.p, energy, made.last_step)
         origin = {"engine": "broken on purpose", "method": self.about, "velocity": "as it says"}
         draft.finish(attributes(replace(made, origin=origin)))
 
