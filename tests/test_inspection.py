@@ -64,7 +64,6 @@ def assert_same_rows(fresh: tuple[Any, ...], kept: tuple[Any, ...]) -> None:
     [
         ("spring-uneven", ("own:*",), "limits"),
         ("overdamped", ("own:euler", "own:implicit-euler"), "regions"),
-        ("overdamped", ("own:implicit-euler", "sundials:bdf"), "costs"),
         ("multiple-time-steps", ("openmm:mts",), "resonances"),
     ],
 )
@@ -78,7 +77,7 @@ def test_a_study_of_stability_is_read_back_bit_for_bit(
     fresh = stability.record(scene, path, methods)
     kept = stability.stored(path)
     assert getattr(fresh, kind)
-    for part in ("limits", "regions", "resonances", "costs"):
+    for part in ("limits", "regions", "resonances"):
         assert_same_rows(getattr(fresh, part), getattr(kept, part))
     assert kept.left_out == fresh.left_out
     assert kept.document() == fresh.document()
@@ -124,7 +123,7 @@ def stores(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, steady_c
 
 def test_plot_and_inspect_serve_every_study(stores: Path, capsys: pytest.CaptureFixture[str]) -> None:
     pictures = {
-        "stability": {"stability-limits", "stability-regions", "stability-costs-overdamped"},
+        "stability": {"stability-limits", "stability-regions"},
         "extremes": {"extremes"},
         "precision": {"precision"},
     }

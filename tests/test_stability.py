@@ -15,13 +15,14 @@ import numpy as np
 import pytest
 from rich.text import Text
 
+import stiffness_costs
 from springcheck import driver, engines, schemes
 from springcheck.physics import builders
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.arrays import Extended
 from springcheck.physics.terms import Damping
 from springcheck.studies.choose import LeftOut
-from springcheck.studies.stability import STUDY, costs, limits, propagators, regions, resonance
+from springcheck.studies.stability import STUDY, limits, propagators, regions, resonance
 from springcheck.studies.stability import measure as stability
 from springcheck.studies.stability.longest import longest
 from springcheck.studies.stability.propagators import Springs
@@ -111,8 +112,8 @@ def test_a_scene_without_fast_springs_has_no_resonances() -> None:
 
 def test_bdf_leaves_the_stiff_mode_behind_where_adams_cannot(need: Need) -> None:
     need("sundials:bdf")
-    (bdf,) = costs.measure(engines.parse("sundials:bdf"), "two-scales", [1e10])
-    (adams,) = costs.measure(engines.parse("sundials:adams"), "two-scales", [1e10])
+    (bdf,) = stiffness_costs.measure(engines.parse("sundials:bdf"), "two-scales", [1e10])
+    (adams,) = stiffness_costs.measure(engines.parse("sundials:adams"), "two-scales", [1e10])
     assert bdf.outcome == "complete"
     assert bdf.error < 1e-3
     assert adams.steps > 100 * bdf.steps
@@ -146,6 +147,8 @@ def test_every_figure_of_stability_is_drawn(tmp_path: Path, need: Need) -> None:
     )
     damped = stability.measure(scenes.load_scene("overdamped"), ["own:implicit-euler"])
     written = [path.name for one in (study, damped) for path in STUDY.draw(one, tmp_path)]
+    costs = stiffness_costs.study("overdamped", ["own:implicit-euler"])
+    written += [path.name for path in stiffness_costs.draw(costs, tmp_path)]
     for name in ("limits", "resonances", "regions", "costs-overdamped"):
         assert f"stability-{name}.png" in written
         assert (tmp_path / f"stability-{name}.png").stat().st_size > 10_000

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 import springcheck
+import stiffness_costs
 from springcheck import checks, engines
 from springcheck.physics import builders, exact
 from springcheck.physics import scenefile as scenes
@@ -23,7 +24,7 @@ from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Damping, Spring, VanDerPol, WallSpring
 from springcheck.schemes import scheme
-from springcheck.studies.stability import costs, longest
+from springcheck.studies.stability import longest
 
 FOLDER = Path(__file__).parents[1] / "data" / "reference" / "stiff"
 STATES = json.loads((FOLDER / "van-der-pol.json").read_text(encoding="utf-8"))["states"]
@@ -140,12 +141,12 @@ def test_the_longest_explicit_step_is_that_of_the_strongest_friction() -> None:
     assert longest.longest(scheme("implicit-euler"), scene) == np.inf
 
 
-def test_its_costs_are_a_family_of_the_study_of_stability(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(costs, "OUTPUTS", 300)
-    fixed = costs.measure(engines.parse("own:implicit-midpoint"), "van-der-pol", [1.0, 1e3])
+def test_its_costs_are_a_family_of_stiffness(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(stiffness_costs, "OUTPUTS", 300)
+    fixed = stiffness_costs.measure(engines.parse("own:implicit-midpoint"), "van-der-pol", [1.0, 1e3])
     assert [row.outcome for row in fixed] == ["complete", "complete"]
     assert fixed[0].error < 1e-2 < fixed[1].error
-    explicit = costs.measure(engines.parse("own:rk4"), "van-der-pol", [1e6])
+    explicit = stiffness_costs.measure(engines.parse("own:rk4"), "van-der-pol", [1e6])
     assert explicit[0].outcome.startswith("not run")
 
 

@@ -309,7 +309,7 @@ def a_document_that_is_no_study(file: Any, rng: random.Random, folder: Path) -> 
             "3",
             '"x"',
             "{}",
-            '{"methods": [], "regions": [], "resonances": [], "costs": [], "left_out": []}',
+            '{"methods": [], "regions": [], "resonances": [], "left_out": []}',
             '{"tables": ["verdicts"], "windows": [], "left_out": [], "quick": true}',
             "{",
             "\x00",

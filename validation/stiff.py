@@ -16,12 +16,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import stiffness_costs
 from arguments import arguments
 from springcheck.physics import scenefile as scenes
 from springcheck.studies.stability import STUDY
 from springcheck.studies.stability import measure as stability
+from springcheck.text.lines import as_text
 
 SCENES = ("detest-b1", "multiple-time-steps", "two-scales", "overdamped")
+FAMILIES: tuple[stiffness_costs.Family, ...] = ("two-scales", "overdamped")
 
 
 def main() -> int:
@@ -40,12 +43,12 @@ def main() -> int:
                 )
         for line in study.sentences:
             print(line)
-        for cost in study.costs:
-            print(
-                f"{cost.method:28} {cost.ratio:7.0e} {cost.steps:10d} steps {cost.rejected:6d} rejected "
-                f"{cost.force_calls:10d} calls, error {cost.error:.1e}, {cost.outcome}"
-            )
         for path in STUDY.draw(study, folder):
+            print(path)
+    for family in FAMILIES:
+        costs = stiffness_costs.study(family)
+        print(f"## {family}", as_text([stiffness_costs.as_table(costs)]), sep="\n")
+        for path in stiffness_costs.draw(costs, folder):
             print(path)
     return 0 if passed else 1
 

@@ -1,4 +1,4 @@
-"""Where methods stop being stable, and what stiffness costs."""
+"""Where methods stop being stable."""
 
 from __future__ import annotations
 

@@ -2,8 +2,7 @@
 
 Every method of fixed step gets its limit on a spring (`limits`).  A scene with friction adds the region
 of stability of a damped spring (`regions`), one with springs marked fast the resonances of multiple time
-steps (`resonance`), a modulated spring the Floquet multipliers of methods (`multipliers`), and the scenes
-`two-scales` and `overdamped` what stiffness costs (`costs`).
+steps (`resonance`), a modulated spring the Floquet multipliers of methods (`multipliers`).
 """
 
 from __future__ import annotations
@@ -26,9 +25,9 @@ from springcheck.studies import keeper
 from springcheck.studies.arguments import Progress
 from springcheck.studies.choose import LeftOut, sorted_out
 from springcheck.studies.keeper import How, Keeper, each
-from springcheck.studies.stability import costs, limits, multipliers, propagators, regions, resonance
+from springcheck.studies.stability import limits, multipliers, propagators, regions, resonance
 from springcheck.studies.stability.longest import fastest
-from springcheck.studies.stability.result import COSTS, LIMITS, MULTIPLIERS, REGIONS, RESONANCES, Stability
+from springcheck.studies.stability.result import LIMITS, MULTIPLIERS, REGIONS, RESONANCES, Stability
 from springcheck.studies.tables import Form
 
 
@@ -58,35 +57,29 @@ def measure(scene: Scene, methods: Sequence[str] = (), *, kept: Keeper | None = 
         return "it has no fixed step and no limit" if adaptive else "it moves no springs"
 
     usable, left_out = sorted_out(chosen, why)
+    if not usable:
+        reasons = "; ".join(f"{one.method}: {one.reason}" for one in left_out)
+        raise MethodError(f"none of these methods has a limit to measure: {reasons}")
     braked = [label for label in usable if "damping" in engines.method(label).terms]
     damped = braked if scene.system.is_damped else []
     resonant = [label for label in usable if resonance.serves(scene, label)]
     modulated = [label for label in usable if multipliers.serves(scene, label)]
-    family = next((name for name in costs.RATIOS if name == scene.name), None)
-    stiff = [label for label in chosen if family and costs.serves(label, family)]
     plan = [
         each(usable, "limit of", partial(partial, limits.measure), LIMITS),
         each(damped, "region of", partial(partial, regions.measure), REGIONS),
         each(resonant, "resonances of", lambda label: partial(resonance.measure, scene, label), RESONANCES),
-        each(stiff, "stiffness,", lambda label: partial(costs.measure, label, family or "two-scales"), COSTS),
         each(
             modulated, "multiplier of", lambda label: partial(multipliers.measure, scene, label), MULTIPLIERS
         ),
     ]
     kept = kept or Keeper()
     found = iter(kept.results([piece for part in plan for piece in part]))
-    of_limits, of_regions, of_resonances, of_costs, of_multipliers = (
-        [next(found) for _ in part] for part in plan
-    )
-    if not usable and not of_costs:
-        reasons = "; ".join(f"{one.method}: {one.reason}" for one in left_out)
-        raise MethodError(f"none of these methods has a limit to measure: {reasons}")
+    of_limits, of_regions, of_resonances, of_multipliers = ([next(found) for _ in part] for part in plan)
     return Stability(
         scene=scene,
         limits=tuple(of_limits),
         regions=tuple(of_regions),
         resonances=tuple(of_resonances),
-        costs=tuple(row for rows in of_costs for row in rows),
         multipliers=tuple(x for x in of_multipliers if not x.why),
         left_out=(*left_out, *(LeftOut(method=x.method, reason=x.why) for x in of_multipliers if x.why)),
         resumed=kept.resumed,
@@ -127,7 +120,6 @@ def stored(kept: keeper.Kept) -> Stability:
         limits=under(LIMITS, "methods"),
         regions=under(REGIONS, "regions"),
         resonances=under(RESONANCES, "resonances"),
-        costs=tuple(row for rows in under(COSTS, "costs") for row in rows),
         multipliers=under(MULTIPLIERS, "multipliers"),
         left_out=kept.left_out,
     )

@@ -1,15 +1,14 @@
-"""Charts of limits, regions, resonances and costs, in figures and in the report page."""
+"""Charts of limits, regions and resonances, in figures and in the report page."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from springcheck.figures.charts import Bank, Chart, Curve, Rule, Scale, Tiles
 from springcheck.figures.looks import scheme_of
 from springcheck.figures.overlay import labelled
-from springcheck.studies.stability.costs import RATIO_NAMES, Cost
 from springcheck.studies.stability.limits import Limit
 from springcheck.studies.stability.longest import fastest
 from springcheck.studies.stability.regions import Region
@@ -17,8 +16,6 @@ from springcheck.studies.stability.resonance import Resonance
 from springcheck.studies.stability.result import Stability
 
 TURN = "step times frequency, h \N{GREEK SMALL LETTER OMEGA}"
-MOST_ERROR = 30.0
-"""Errors above this say nothing."""
 
 
 def banks(study: Stability) -> list[Bank]:
@@ -49,15 +46,6 @@ def banks(study: Stability) -> list[Bank]:
         charts = [_resonance(x) for x in study.resonances]
         found.append(
             Bank(name="stability-resonances", title="Multiple time steps: where they resonate", charts=charts)
-        )
-    if study.costs:
-        found.append(
-            Bank(
-                name=f"stability-costs-{study.scene.name}",
-                title="Methods drawn",
-                heading=f"{study.scene.name}: what stiffness costs (hollow: estimates of runs too long)",
-                charts=_costs(study.costs),
-            )
         )
     return found
 
@@ -143,33 +131,3 @@ def _resonance(x: Resonance) -> Chart:
         rules=[Rule(axis="x", at=float(np.pi), name="\N{GREEK SMALL LETTER PI}")],
         short=f"{x.method} grows from {bands}",
     )
-
-
-def _costs(costs: Sequence[Cost]) -> list[Chart]:
-    ratio = RATIO_NAMES[costs[0].family]
-    what: tuple[tuple[str, str, Callable[[Cost], bool]], ...] = (
-        ("steps", "steps; those of unfinished runs are estimates", lambda x: True),
-        ("force_calls", "force calls of finished runs", lambda x: x.outcome == "complete"),
-        ("error", "error of the slow motion", lambda x: x.error < MOST_ERROR),
-    )
-    charts = []
-    for name, title, shown in what:
-        curves = []
-        for method in dict.fromkeys(x.method for x in costs):
-            mine = [x for x in costs if x.method == method and float(getattr(x, name)) > 0 and shown(x)]
-            x, y = [x.ratio for x in mine], [float(getattr(x, name)) for x in mine]
-            notes = [x.outcome for x in mine]
-            left = [x.outcome != "complete" for x in mine]
-            curves.append(
-                Curve(
-                    name=method, group=scheme_of(method), x=x, y=y, marks=True, notes=notes,
-                    open=left,
-                )
-            )  # fmt: skip
-        scales = Scale(name=ratio, log=True), Scale(name=title.partition(";")[0], log=True)
-        charts.append(
-            Chart(
-                title=f"What stiffness costs: {title}.", short=title, x=scales[0], y=scales[1], curves=curves
-            )
-        )
-    return charts

@@ -12,14 +12,13 @@ from springcheck.errors import MethodError
 from springcheck.physics.scene import Scene
 from springcheck.studies.keeper import document
 from springcheck.studies.stability import limits
-from springcheck.studies.stability.costs import Cost
 from springcheck.studies.stability.limits import Limit
 from springcheck.studies.stability.longest import fastest, longest
 from springcheck.studies.stability.multipliers import Multiplier
 from springcheck.studies.stability.regions import Region
 from springcheck.studies.stability.resonance import Resonance
 from springcheck.studies.study import Studied
-from springcheck.studies.tables import RecordForm, Rows
+from springcheck.studies.tables import RecordForm
 from springcheck.text.wording import count
 
 GROWTH = 1e-6
@@ -37,7 +36,6 @@ class Stability(Studied):
     limits: tuple[Limit, ...]
     regions: tuple[Region, ...]
     resonances: tuple[Resonance, ...]
-    costs: tuple[Cost, ...]
     multipliers: tuple[Multiplier, ...] = ()
     """Of a spring of modulated stiffness."""
 
@@ -128,7 +126,6 @@ class Stability(Studied):
                 for x in self.regions
             ],
             resonances=[_named(x, "method", "bands", "bands_predicted") for x in self.resonances],
-            costs=self.costs,
             multipliers=self.multipliers,
             left_out=self.left_out,
             failures=self.failures,
@@ -193,5 +190,4 @@ RESONANCES: RecordForm[Resonance] = RecordForm(
     auxiliary=("radius_predicted",),
 )
 MULTIPLIERS: RecordForm[Multiplier] = RecordForm(kind=Multiplier, beginning="stability/multipliers/")
-COSTS: Rows[Cost] = Rows(kind=Cost, beginning="stability/costs/", named="")
 """How each kind of measurement is kept: a table for each method."""

@@ -12,7 +12,6 @@ from springcheck.studies.stability.longest import fastest
 from springcheck.studies.stability.result import Stability
 from springcheck.studies.text import left_out, resumed
 from springcheck.text.lines import Lines, plain, table
-from springcheck.text.wording import number
 
 
 def lines(study: Stability, options: Namespace | None = None) -> Lines:
@@ -43,16 +42,6 @@ def lines(study: Stability, options: Namespace | None = None) -> Lines:
         found = [("exact motion", f"{exact[0]:.9f}", f"{exact[2]:.9f}", "")]
         found += [(x.method, f"{x.grown:.9f}", f"{x.turned:.9f}", f"{x.off:.0e}") for x in study.multipliers]
         out += [table(("method", "grows by", "turns by", "off its scheme's"), found), plain()]
-    if study.costs:
-        costs = [
-            (
-                x.method, f"{x.ratio:.0e}", str(x.steps), str(x.rejected), str(x.force_calls),
-                number(x.error, ".1e"), x.outcome.partition(":")[0],
-            )
-            for x in study.costs
-        ]  # fmt: skip
-        titles = ("method", "ratio", "steps", "rejected", "force calls", "error", "outcome")
-        out += [table(titles, costs, left=("method", "outcome")), plain()]
     out += [plain(line) for line in study.sentences]
     out += left_out(study.left_out)
     return out

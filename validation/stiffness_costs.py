@@ -4,22 +4,34 @@ Three families: the chain of a soft and a stiff spring (the shipped `two-scales`
 stiffnesses), a spring in ever more friction (`overdamped` with another damping ratio), and `van-der-pol`
 with another mu.  Every run goes as far as the slow motion needs to show; the error is that of the slow
 motion at the end.
+
+Command: python validation/stiffness_costs.py [SCENE] [METHOD ...]     (default: two-scales, by all methods)
+
+prints a line for each run and draws them into figures/stability-costs-SCENE.png and .svg.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from pathlib import Path
+from typing import Any, Literal, get_args
 
 import numpy as np
 
+from arguments import arguments
 from springcheck import driver, engines, schemes
 from springcheck.engines.contract import Label, Stopped
 from springcheck.errors import MethodError
+from springcheck.figures import render
+from springcheck.figures.charts import Bank, Chart, Curve, Scale
+from springcheck.figures.looks import scheme_of
+from springcheck.figures.style import save, style
 from springcheck.physics import exact
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.scene import Scene
+from springcheck.text.lines import TextTable, as_text, table
+from springcheck.text.wording import number
 
 Family = Literal["two-scales", "overdamped", "van-der-pol"]
 
@@ -36,6 +48,9 @@ RATIO_NAMES: dict[str, str] = {
     "van-der-pol": "mu",
 }
 """What the ratios of a family are called."""
+
+MOST_ERROR = 30.0
+"""Errors above this say nothing."""
 
 OUTPUTS = 2000
 """Steps of a method that no fast mode holds down."""
@@ -181,3 +196,71 @@ def slow_error(found: Scene, q: Any, p: Any, steps: int) -> float:
         return float(abs(y) / np.max(np.abs(modes.into(found.q, found.p)[0])))
     start = modes.into(found.q, found.p)
     return float(np.hypot(w * y, v) / np.hypot(w * start[0][j], start[1][j]))
+
+
+def study(family: Family, methods: Sequence[str] = ()) -> list[Cost]:
+    """The runs of the methods that these labels or globs name (left out: all) and that serve a family."""
+    chosen = engines.match(tuple(methods) or ("*",))
+    return [row for label in chosen if serves(label, family) for row in measure(label, family)]
+
+
+def as_table(costs: Sequence[Cost]) -> TextTable:
+    """A line for each run."""
+    rows = [
+        (
+            x.method, f"{x.ratio:.0e}", str(x.steps), str(x.rejected), str(x.force_calls),
+            number(x.error, ".1e"), x.outcome.partition(":")[0],
+        )
+        for x in costs
+    ]  # fmt: skip
+    titles = ("method", "ratio", "steps", "rejected", "force calls", "error", "outcome")
+    return table(titles, rows, left=("method", "outcome"))
+
+
+def charts(costs: Sequence[Cost]) -> list[Chart]:
+    """Steps, force calls and errors against the ratio."""
+    ratio = RATIO_NAMES[costs[0].family]
+    what: tuple[tuple[str, str, Callable[[Cost], bool]], ...] = (
+        ("steps", "steps; those of unfinished runs are estimates", lambda x: True),
+        ("force_calls", "force calls of finished runs", lambda x: x.outcome == "complete"),
+        ("error", "error of the slow motion", lambda x: x.error < MOST_ERROR),
+    )
+    found = []
+    for name, title, shown in what:
+        curves = []
+        for method in dict.fromkeys(x.method for x in costs):
+            mine = [x for x in costs if x.method == method and float(getattr(x, name)) > 0 and shown(x)]
+            x, y = [x.ratio for x in mine], [float(getattr(x, name)) for x in mine]
+            left = [x.outcome != "complete" for x in mine]
+            curves.append(Curve(name=method, group=scheme_of(method), x=x, y=y, marks=True, open=left))
+        scales = Scale(name=ratio, log=True), Scale(name=title.partition(";")[0], log=True)
+        said = f"What stiffness costs: {title}."
+        found.append(Chart(title=said, short=title, x=scales[0], y=scales[1], curves=curves))
+    return found
+
+
+def draw(costs: Sequence[Cost], folder: Path) -> list[Path]:
+    """Draw them into a folder; returns the files."""
+    family = costs[0].family
+    heading = f"{family}: what stiffness costs (hollow: estimates of runs too long)"
+    with style():
+        picture = render.picture(Bank(title="Methods drawn", heading=heading, charts=charts(costs)))
+        return save(picture, folder, f"stability-costs-{family}")
+
+
+def main() -> int:
+    """Print the costs of a family and draw them; 1 where nothing was measured."""
+    given = arguments(__doc__, scene="two-scales", methods=list[str]())
+    if given.scene not in get_args(Family):
+        raise SystemExit(f"{given.scene}: {', '.join(get_args(Family))} have costs")
+    found = study(given.scene, given.methods)
+    if not found:
+        return 1
+    print(as_text([as_table(found)]))
+    for path in draw(found, Path("figures")):
+        print(path)
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
