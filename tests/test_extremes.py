@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 import extreme
+import finer_atlas
 from springcheck import engines, store
-from springcheck.errors import SpringcheckError
 from springcheck.figures import render
 from springcheck.physics.arrays import WIDE
 from springcheck.studies.extremes import STUDY, grid, judging, page, running
@@ -160,11 +160,12 @@ def test_a_finer_atlas_has_every_decade_of_force_at_more_steps(
 ) -> None:
     # few decades, no long runs
     few = {"LENGTHS": (1,), "FAST_SECONDS": 0.0, "SIZES": (0,), "DECADES": (-20, 0, 20)}
-    for name, value in {**few, "EVERY_DECADE": range(-20, 21)}.items():
+    for name, value in few.items():
         monkeypatch.setattr(grid, name, value)
+    monkeypatch.setattr(finer_atlas, "EVERY_DECADE", range(-20, 21))
     base = extremes.measure(["own:implicit-euler"])
     method, path = ["own:implicit-euler"], tmp_path / "fine.h5"
-    fine = extremes.record(path, method, cells=800)
+    fine = finer_atlas.record(path, method, 800)
     assert 800 <= len(fine.cells) < 800 + 41
     assert set(map(repr, base.cells)) <= set(map(repr, fine.cells))
     ((plane,),) = (bank.charts for bank in page.banks(fine))
@@ -175,8 +176,6 @@ def test_a_finer_atlas_has_every_decade_of_force_at_more_steps(
     assert not fine.wrong
     assert extremes.stored(path).counts() == fine.counts()
     # few more cells complete the rows that there are
-    some = extremes.measure(method, cells=len(base.cells) + 1)
+    some = finer_atlas.record(None, method, len(base.cells) + 1)
     ((plane,),) = (bank.charts for bank in page.banks(some))
     assert (list(plane.x.values), len(plane.y.values)) == (list(range(-20, 21)), len(grid.TURNS))
-    with pytest.raises(SpringcheckError, match="not both"):
-        extremes.record(tmp_path / "no.h5", method, quick=True, cells=10)

@@ -58,17 +58,17 @@ def stability(
 
 
 def extremes(
-    methods: str | Sequence[str] = (), *, quick: bool = False, cells: int = 0,
+    methods: str | Sequence[str] = (), *, quick: bool = False,
     path: str | Path | None = None, force: bool = False, workers: int = 1,
 ) -> Atlas:  # fmt: skip
     """The atlas of extreme cases: steps, masses, amplitudes to the ends of the range, and who is right where.
 
-    `quick` takes fewer cells (20 s), `cells` about so many in a finer atlas.
+    `quick` takes fewer cells (20 s).
     """
     from springcheck.studies.extremes import measure
 
     with spoken(), labels_of(methods) as named:
-        return measure.record(path, named, quick=quick, cells=cells, **how(methods, force, workers))
+        return measure.record(path, named, quick=quick, **how(methods, force, workers))
 
 
 def faults(*, path: str | Path | None = None, force: bool = False, workers: int = 1) -> FaultReport:

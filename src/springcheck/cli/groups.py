@@ -48,7 +48,7 @@ GROUPS: Mapping[str, Sequence[str]] = {
         "--method", "--all", "--engine", "--stepper", "--command", "--scheme", "--timeout", "--fault",
     ),
     "known of the motion": ("--mass", "--stiffness"),
-    "how much is measured": ("--thorough", "--budget", "--quick", "--cells", "--workers", "--cluster"),
+    "how much is measured": ("--thorough", "--budget", "--quick", "--workers", "--cluster"),
     "figures": ("--particle", "--quantity", "--over"),
     "output": (
         "output", "--output", "--force", "--json", "--quiet", "--verdicts", "--rows", "--points", "--page",

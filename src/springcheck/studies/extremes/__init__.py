@@ -13,12 +13,5 @@ STUDY = Study(
         *team.arguments(),
         *store_arguments("extremes.h5"),
         argument("--quick", action="store_true", help="fewer cells, in about 20 seconds"),
-        argument(
-            "--cells",
-            type=int,
-            default=0,
-            metavar="N",
-            help="a finer atlas of about N cells, as 100000 (default: the usual one)",
-        ),
     ),
 )

@@ -26,9 +26,6 @@ DECADES = (
 )  # fmt: skip
 """Powers of ten of the largest force of the start, in the scene's unit: closer where engines differ."""
 
-EVERY_DECADE = range(DECADES[0], DECADES[-1] + 1)
-ROWS, GOLDEN = 8, (5**0.5 - 1) / 2
-
 SIZES = (-300, -200, -100, -30, -10, 0, 10, 30, 100, 200, 300)
 """Powers of ten of masses and stiffnesses."""
 
@@ -87,38 +84,14 @@ def specs(*, quick: bool = False) -> list[Spec]:
 def _forces() -> Iterator[Spec]:
     """The plane of h w and force."""
     for turn, decade in itertools.product(TURNS, DECADES):
-        yield _force(turn, decade)
+        yield force_cell(turn, decade)
 
 
-def _force(turn: float, decade: int) -> Spec:
+def force_cell(turn: float, decade: int) -> Spec:
     """A cell of that plane: mass and step stay, amplitude = force / k."""
     k = MASS * (turn / STEP) ** 2
     q = float(np.float64(10.0**decade) / np.float64(k))
     return Spec(block="force", m=MASS, k=k, q=q, p=0.6 * MASS * (turn / STEP) * q, h=STEP)
-
-
-def finer(count: int) -> Iterator[list[Spec]]:
-    """At least so many more cells of the plane of forces, every decade of force, in parts of `ROWS` h w.
-
-    First those of `TURNS`, then h w that lie evenly in their logarithm however many there are.
-    """
-    low, high = np.log(TURNS[0]), np.log(TURNS[-1])
-    part: list[Spec] = []
-    for j in itertools.count() if count > 0 else ():
-        done = count <= 0 and j >= len(TURNS)
-        if part and (done or j % ROWS == 0):
-            yield part
-            part = []
-        if done:
-            return
-        # fractions of the golden section fill an interval evenly (Weyl 1916)
-        new = j - len(TURNS)
-        turn = TURNS[j] if new < 0 else float(np.exp(low + (high - low) * ((new + 1) * GOLDEN % 1)))
-        with np.errstate(over="ignore", under="ignore"):
-            row = [_force(turn, x) for x in EVERY_DECADE if new >= 0 or x not in DECADES]
-        row = [x for x in row if x.finite]
-        count -= len(row)
-        part += row
 
 
 def _sizes() -> Iterator[Spec]:

@@ -24,7 +24,7 @@ from springcheck.studies.choose import sorted_out
 from springcheck.studies.extremes import grid, running
 from springcheck.studies.extremes.judging import Cell
 from springcheck.studies.extremes.result import CELLS, Atlas, Window
-from springcheck.studies.keeper import How, Keeper, Piece, each
+from springcheck.studies.keeper import How, Keeper, each
 from springcheck.studies.stability import propagators
 
 
@@ -38,13 +38,10 @@ CALM = (0.01, 1.9)
 """h w that count for a window: below, amplitudes decide and hardly any force shows; beyond, stability."""
 
 
-def measure(
-    methods: Sequence[str] = (), *, quick: bool = False, cells: int = 0, kept: Keeper | None = None
-) -> Atlas:
+def measure(methods: Sequence[str] = (), *, quick: bool = False, kept: Keeper | None = None) -> Atlas:
     """Run the atlas for these labels or globs; left out: every method, and OpenMM's platforms.
 
-    With `cells` the plane of forces is made finer until there are about so many in all.  What an earlier call
-    has finished (`kept`) is reused.
+    What an earlier call has finished (`kept`) is reused.
 
     Raises:
         MethodError: a label names nothing, or none of the methods is here.
@@ -65,7 +62,6 @@ def measure(
             usable, each(usable, "", lambda label: partial(of_method, label, quick=quick), CELLS), strict=True
         )
     ]
-    work += _finer(usable, cells)
     kept = kept or Keeper()
     found = [cell for piece in kept.results(work) for cell in piece]
     return Atlas(
@@ -75,28 +71,6 @@ def measure(
         resumed=kept.resumed,
         path=kept.path,
     )
-
-
-def _finer(labels: Sequence[Label], cells: int) -> list[Piece]:
-    """Pieces of more cells, as many for each method of fixed step, until there are so many in all."""
-    fixed = [label for label in labels if not engines.method(label).adaptive]
-    here = sum(
-        len(grid.lengths(label)) + sum(map(len, _groups(label)))
-        if label in fixed
-        else len(grid.solver_specs())
-        for label in labels
-    )
-    more = -(-(cells - here) // len(fixed)) if fixed else 0
-    return [
-        Piece(
-            key=f"{label} {j:04d}",
-            what=f"{label}, part {j} of a finer plane",
-            measure=partial(running.cells, label, specs),
-            form=CELLS,
-        )
-        for j, specs in enumerate(grid.finer(more), 1)
-        for label in fixed
-    ]
 
 
 def _cost(label: Label) -> float:
@@ -119,17 +93,13 @@ def record(
     methods: Sequence[str] = (),
     *,
     quick: bool = False,
-    cells: int = 0,
     **how: Unpack[How],
 ) -> Atlas:
     """Like `measure`, kept in a store (see `keeper.kept`): a table for each method, and the document."""
     labels = engines.match(tuple(methods) or everything())
-    if cells and quick:
-        raise SpringcheckError("--quick and --cells: fewer cells or more, not both")
-    size = "quick" if quick else f"{cells} cells" if cells else "whole"
-    command = keeper.command("extremes", labels, size)
+    command = keeper.command("extremes", labels, "quick" if quick else "whole")
     with keeper.kept(path, command, **how) as kept:
-        atlas = measure(methods, quick=quick, cells=cells, kept=kept)
+        atlas = measure(methods, quick=quick, kept=kept)
         kept.commit("extremes", {"tables": kept.names, **atlas.document(cells=False)})
     return atlas
 
@@ -140,7 +110,6 @@ def perform(options: Namespace, progress: Progress | None) -> Atlas:
         options.output or "extremes.h5",
         options.method,
         quick=options.quick,
-        cells=options.cells,
         **keeper.how(options, progress),
     )
 
@@ -161,21 +130,21 @@ def of_method(label: Label, *, quick: bool = False) -> list[Cell]:
     if engines.method(label).adaptive:
         return [running.solve(label, spec) for spec in grid.solver_specs(quick=quick)]
 
-    found = [cell for specs in _groups(label, quick=quick) for cell in running.cells(label, specs)]
+    found = [cell for specs in groups(label, quick=quick) for cell in running.cells(label, specs)]
     return found + running.last(label, grid.lengths(label, quick=quick))
 
 
-def _groups(label: Label, *, quick: bool = False) -> list[list[grid.Spec]]:
+def groups(label: Label, *, quick: bool = False) -> list[list[grid.Spec]]:
     """Cells of one method of fixed step that can run side by side."""
 
     def together(spec: grid.Spec) -> tuple[str, float]:
         return spec.block, spec.h
 
-    groups = [list(group) for _, group in groupby(sorted(grid.specs(quick=quick), key=together), together)]
+    found = [list(group) for _, group in groupby(sorted(grid.specs(quick=quick), key=together), together)]
     if label.platform not in ("", "Reference"):
         # a context costs such a platform a quarter of a second: the groups with the most cells
-        groups = sorted(groups, key=len)[-3 if quick else -24 :]
-    return groups
+        found = sorted(found, key=len)[-3 if quick else -24 :]
+    return found
 
 
 def windows(cells: Sequence[Cell]) -> list[Window]:
