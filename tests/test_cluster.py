@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import on_a_queue
 from springcheck import cli, store
 from springcheck.errors import SpringcheckError, StoreWarning
 from springcheck.studies import cluster, keeper
@@ -224,10 +225,16 @@ def test_workers_of_which_none_answers_are_named(calm: Farm, monkeypatch: pytest
 
 
 def test_no_scheduler_is_one_line(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(cluster, "WAITING", 1.0)
-    for place, words in (("tcp://127.0.0.1:9", "no scheduler answers"), ("nothing.json", "no such file")):
+    other = tmp_path / "slurm.yaml"
+    other.write_text("jobqueue: {slurm: {cores: 1, memory: 1GB}}")
+    for place, words in (
+        ("tcp://127.0.0.1:9", "no scheduler answers"),
+        ("nothing.json", "no such file"),
+        (str(other), "none that a dask scheduler writes"),
+    ):
         with pytest.raises(SpringcheckError, match=words):
             list(Cluster(place).carried_out([partial(slow, 0, 0.0)]))
 
@@ -281,11 +288,13 @@ def test_jobs_of_a_queue_measure_and_are_submitted_again_and_none_is_left(
     found = {}
     # a job may come back within 15 s unless dask is told otherwise
     monkeypatch.setitem(dask.config.config["distributed"]["deploy"], "lost-worker-timeout", "1s")
-    for i, answer in Cluster(described(queue)).carried_out([partial(slow, i, 0.02) for i in range(20)]):
-        found[i] = answer
-        if len(found) == 3:
-            # its time is up
-            os.killpg(int((queue / "jobs").read_text()), signal.SIGKILL)
+    place, parts = described(queue), [partial(slow, i, 0.02) for i in range(20)]
+    with on_a_queue.started(place, *on_a_queue.description(place), 1) as jobs_of:
+        for i, answer in Cluster(jobs_of.scheduler_address).carried_out(parts):
+            found[i] = answer
+            if len(found) == 3:
+                # its time is up
+                os.killpg(int((queue / "jobs").read_text()), signal.SIGKILL)
     assert sorted(found) == list(range(20))
     assert all(np.array_equal(found[i][1], np.sqrt(np.arange(5.0) + i)) for i in found)
     assert os.getpid() not in {pid for pid, _ in found.values()}
@@ -300,7 +309,7 @@ def test_jobs_of_a_queue_measure_and_are_submitted_again_and_none_is_left(
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("nothing: here", "neither the scheduler file of dask nor a description of one queue"),
+        ("nothing: here", "no description of one queue"),
         ("{", "cannot be read"),
         ("jobqueue: {slrum: {cores: 1, memory: 1GB}}", "no queue 'slrum'.*slurm"),
         ("jobqueue: {slurm: {cores: 1}}", "must say the memory of a job"),
@@ -312,6 +321,19 @@ def test_jobs_of_a_queue_measure_and_are_submitted_again_and_none_is_left(
 )
 def test_a_queue_that_is_described_wrongly_is_one_line(queue: Path, text: str, words: str) -> None:
     (queue / "slurm.yaml").write_text(text)
-    with pytest.raises(SpringcheckError, match=words) as raised:
-        list(Cluster(str(queue / "slurm.yaml")).carried_out([partial(slow, 0, 0.0)]))
+    place = str(queue / "slurm.yaml")
+    with (
+        pytest.raises(SpringcheckError, match=words) as raised,
+        on_a_queue.started(place, *on_a_queue.description(place), 1),
+    ):
+        pass
     assert "\n" not in str(raised.value)
+
+
+def test_a_study_on_a_queue_is_one_command(queue: Path) -> None:
+    words = [sys.executable, on_a_queue.__file__, described(queue), "1"]
+    study = ["extremes", "--quick", "--method", OWN[0], "-o", "atlas.h5"]
+    done = subprocess.run([*words, *study], cwd=queue, capture_output=True, text=True, check=False)
+    assert (done.returncode, "no cell is silently wrong" in done.stdout) == (0, True), done.stderr
+    wrong = subprocess.run([*words[:2], "no.yaml", "1", *study], capture_output=True, text=True, check=False)
+    assert (wrong.returncode, wrong.stderr.count("\n")) == (2, 1)

@@ -1,4 +1,4 @@
-"""Pieces of a study by the workers of a dask cluster: a scheduler that runs, or jobs of a queue.
+"""Pieces of a study by the workers of a dask scheduler that runs.
 
 Workers come and go: what one has not answered goes to another.  A worker whose versions are not this
 program's is refused, because its numbers might not be; a `Client.get_executor` does neither.  When the
@@ -7,6 +7,7 @@ scheduler is gone, what was finished is kept, and the same command goes on with 
 
 from __future__ import annotations
 
+import json
 import logging
 import time
 import warnings
@@ -20,7 +21,7 @@ from queue import Empty, SimpleQueue
 from typing import Any, TypeVar
 
 from springcheck.errors import SpringcheckError, StoreWarning
-from springcheck.studies import provenance, queues
+from springcheck.studies import provenance
 
 T = TypeVar("T")
 
@@ -48,17 +49,12 @@ OUT = 256
 
 @dataclass(frozen=True, slots=True)
 class Cluster:
-    """The workers of a scheduler, at ``tcp://host:port`` or described by a file: its own, or of a queue."""
+    """The workers of a scheduler, at ``tcp://host:port`` or named by the file that it writes."""
 
     place: str
-    asked: int = 1
-    """Workers that a queue is asked for."""
+    workers: int = 2
+    """How many are counted on: more than one, so that the longest pieces come first."""
     patience: float = PATIENCE
-
-    @property
-    def workers(self) -> int:
-        """More than one: the longest pieces first."""
-        return max(2, self.asked)
 
     def carried_out(self, parts: Sequence[Callable[[], T]]) -> Generator[tuple[int, T], None, None]:
         """Numbers and results of the parts, as they finish."""
@@ -66,6 +62,18 @@ class Cluster:
             return
         with self._client() as client:
             yield from _answers(client, parts, self.patience)
+
+    @property
+    def _address(self) -> str:
+        if "://" in self.place:
+            return self.place
+        try:
+            return str(json.loads(Path(self.place).read_text(encoding="utf-8"))["address"])
+        except (OSError, ValueError, KeyError, TypeError):
+            raise SpringcheckError(
+                f"--cluster {self.place}: no such file, or none that a dask scheduler writes; "
+                "tcp://HOST:PORT is the other form"
+            ) from None
 
     @contextmanager
     def _client(self) -> Iterator[Any]:
@@ -75,31 +83,16 @@ class Cluster:
             raise SpringcheckError(
                 "--cluster needs dask; install it with: python -m pip install 'springcheck[cluster]'"
             ) from None
-        how: dict[str, Any] = {"address": self.place}
         with ExitStack() as stack:
             # what is logged of connections that are lost is not for users: what is to be said is raised
             for logger in map(logging.getLogger, LOGGERS):
                 stack.callback(logger.setLevel, logger.level)
                 logger.setLevel(logging.CRITICAL)
-            cluster = None
-            if "://" not in self.place:
-                if not Path(self.place).is_file():
-                    raise SpringcheckError(
-                        f"--cluster {self.place}: no such file; tcp://HOST:PORT is the other form"
-                    )
-                queue = queues.description(self.place)
-                how = {"scheduler_file": self.place}
-                if queue is not None:
-                    cluster = stack.enter_context(queues.started(self.place, *queue, self.asked))
-                    how = {"address": cluster}
             try:
-                client = distributed.Client(**how, timeout=WAITING, set_as_default=False)
+                client = distributed.Client(self._address, timeout=WAITING, set_as_default=False)
             except (OSError, ValueError, TimeoutError) as error:
                 raise SpringcheckError(f"--cluster {self.place}: no scheduler answers: {error}") from error
             stack.callback(client.close, timeout=1)
-            if cluster is not None:
-                # first of all: an interrupted program has a second for everything
-                stack.callback(queues.cancel, cluster)
             try:
                 client.wait_for_workers(1, timeout=WAITING)
             except (TimeoutError, OSError) as error:

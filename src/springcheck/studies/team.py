@@ -82,8 +82,7 @@ def arguments(default: int = 1) -> tuple[Argument, ...]:
         ),
         argument(
             "--cluster", metavar="tcp://HOST:PORT|FILE",
-            help="the workers of a dask scheduler, by its address or its file; or N workers of a queue such "
-            "as SLURM's, by a file of dask-jobqueue",
+            help="the workers of a dask scheduler, by its address or by the file that it writes",
         ),
     )  # fmt: skip
 
@@ -94,4 +93,4 @@ def of(options: Namespace) -> Team:
         return Processes(options.workers, getattr(options, "brought", None))
     from springcheck.studies.cluster import Cluster
 
-    return Cluster(options.cluster, asked=options.workers)
+    return Cluster(options.cluster, workers=max(2, options.workers))

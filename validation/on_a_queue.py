@@ -1,6 +1,9 @@
-"""Workers of a queue: jobs of SLURM and others, as a file of dask-jobqueue describes them.
+"""A study by workers of a queue: jobs of SLURM and others, as a file of dask-jobqueue describes them.
 
-The file is the one that dask-jobqueue itself reads, YAML with the words of its documentation::
+Command: python validation/on_a_queue.py slurm.yaml 1024 extremes -o atlas.h5
+
+carries out `springcheck extremes -o atlas.h5` by so many workers.  The file is the one that dask-jobqueue
+itself reads, YAML with the words of its documentation::
 
     jobqueue:
       slurm:
@@ -18,7 +21,9 @@ from __future__ import annotations
 import contextlib
 import shlex
 import shutil
+import signal
 import subprocess
+import sys
 import time
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -26,27 +31,21 @@ from typing import Any
 
 from springcheck.errors import SpringcheckError, nearest, told
 
-MISSING = "--cluster {} needs dask-jobqueue; install it with: python -m pip install 'springcheck[cluster]'"
+MISSING = "{} needs dask-jobqueue; install it with: python -m pip install 'springcheck[cluster]'"
 
 
-def description(place: str) -> tuple[str, dict[str, Any]] | None:
-    """The queue that a file describes and what it says of its jobs; None where it is a scheduler file.
-
-    SpringcheckError where it is neither.
-    """
+def description(place: str) -> tuple[str, dict[str, Any]]:
+    """The queue that a file describes and what it says of its jobs.  SpringcheckError where it does not."""
     import yaml
 
     try:
         found = yaml.safe_load(Path(place).read_text(encoding="utf-8"))
     except (OSError, ValueError, yaml.YAMLError) as error:
-        raise SpringcheckError(f"--cluster {place}: cannot be read: {told(error)}") from error
-    if isinstance(found, dict) and "address" in found:
-        return None
+        raise SpringcheckError(f"{place}: cannot be read: {told(error)}") from error
     queues = found.get("jobqueue") if isinstance(found, dict) else None
     if not isinstance(queues, dict) or len(queues) != 1 or not isinstance(next(iter(queues.values())), dict):
         raise SpringcheckError(
-            f"--cluster {place}: neither the scheduler file of dask nor a description of one queue, "
-            "'jobqueue: slurm: cores: ..., memory: ...'"
+            f"{place}: no description of one queue, 'jobqueue: slurm: cores: ..., memory: ...'"
         )
     ((name, options),) = queues.items()
     return str(name), options
@@ -58,7 +57,7 @@ def started(place: str, queue: str, options: Mapping[str, Any], workers: int) ->
     kind, given = _checked(place, queue, dict(options))
     submit = shlex.split(kind.job_cls.submit_command or "")
     if submit and shutil.which(submit[0]) is None:
-        raise SpringcheckError(f"--cluster {place}: there is no {submit[0]} here, which submits jobs")
+        raise SpringcheckError(f"{place}: there is no {submit[0]} here, which submits jobs")
     # whole jobs
     workers = -(-workers // given["processes"]) * given["processes"]
     refused: list[str] = []
@@ -70,7 +69,7 @@ def started(place: str, queue: str, options: Mapping[str, Any], workers: int) ->
     except (ValueError, TypeError, OSError) as error:
         # or what is half made warns as it goes that it was never closed, and cannot say its name
         cluster.status = Status.closed
-        raise SpringcheckError(f"--cluster {place}: {told(error)}") from error
+        raise SpringcheckError(f"{place}: {told(error)}") from error
     try:
         # jobs end at their time limit; then they are submitted again
         cluster.adapt(minimum=workers, maximum=workers)
@@ -78,7 +77,7 @@ def started(place: str, queue: str, options: Mapping[str, Any], workers: int) ->
         while not cluster.scheduler_info["workers"]:
             jobs = list(cluster.workers.values())
             if refused and jobs and all(job.job_id is None for job in jobs):
-                raise SpringcheckError(f"--cluster {place}: the jobs were refused: {refused[-1]}")
+                raise SpringcheckError(f"{place}: the jobs were refused: {refused[-1]}")
             time.sleep(0.1)
         yield cluster
     finally:
@@ -116,17 +115,17 @@ def _checked(place: str, queue: str, options: dict[str, Any]) -> tuple[Any, dict
     kinds = {x.job_cls.config_name: x for x in found.values() if hasattr(x, "job_cls")}
     if queue not in kinds:
         raise SpringcheckError(
-            f"--cluster {place}: no queue {queue!r}{nearest(queue, kinds)}; "
+            f"{place}: no queue {queue!r}{nearest(queue, kinds)}; "
             f"dask-jobqueue has {', '.join(sorted(kinds))}"
         )
     known = {*dask.config.get(f"jobqueue.{queue}"), "processes", "cores", "memory"}
     for name in options:
         if name not in known:
             what = f"jobqueue.{queue} has no {name!r}{nearest(name, known)}"
-            raise SpringcheckError(f"--cluster {place}: {what}")
+            raise SpringcheckError(f"{place}: {what}")
     for name in ("cores", "memory"):
         if not options.get(name):
-            raise SpringcheckError(f"--cluster {place}: jobqueue.{queue} must say the {name} of a job")
+            raise SpringcheckError(f"{place}: jobqueue.{queue} must say the {name} of a job")
     # a piece takes one core, and a process measures one piece at a time
     given = {"processes": options["cores"], **options}
     given["scheduler-options"] = {
@@ -148,3 +147,27 @@ def cancel(cluster: Any) -> None:
     if jobs and command:
         with contextlib.suppress(OSError, subprocess.SubprocessError):
             subprocess.run([*command, *map(str, jobs)], capture_output=True, check=False, timeout=1)
+
+
+def main() -> int:
+    """Carry a study out by workers of a queue; its exit status."""
+    if len(sys.argv) < 4 or not sys.argv[2].isdecimal():
+        print(__doc__)
+        return 2
+    place, workers, *words = sys.argv[1:]
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        with started(place, *description(place), int(workers)) as cluster:
+            more = ["--workers", workers, "--cluster", cluster.scheduler_address]
+            command = [sys.executable, "-m", "springcheck", *words, *more]
+            return subprocess.run(command, check=False).returncode
+    except SpringcheckError as error:
+        print(error, file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        # the study has been interrupted, too, and says what it has kept
+        return 130
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
