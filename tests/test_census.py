@@ -15,9 +15,11 @@ import pytest
 
 import census as by_hand
 import claims
+import engines_table
 from springcheck import driver, engines
 from springcheck.cli import main
 from springcheck.engines.own import thermal
+from springcheck.errors import StoreError
 from springcheck.identify import identify
 from springcheck.physics.scenefile import load_scene
 from springcheck.physics.trajectory import Trajectory
@@ -133,7 +135,15 @@ def test_states_of_another_scheme_are_no_held_force() -> None:
         assert census._held(scene, census._identified(scene, driver.run(scene, label))) == ""
 
 
-def test_the_table_is_a_page_csv_and_what_changed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def written(monkeypatch: pytest.MonkeyPatch, *files: str) -> None:
+    """The page and the CSV of these documents."""
+    monkeypatch.setattr("sys.argv", ["engines_table.py", "t", *files])
+    assert engines_table.main() == 0
+
+
+def test_the_table_is_a_page_csv_and_what_changed(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     first = ["census", *(x for label in OWN[:2] for x in ("--method", label)), "-o", "a.h5", "--json"]
     assert main(first) == 0
     old = capsys.readouterr().out
@@ -146,23 +156,24 @@ def test_the_table_is_a_page_csv_and_what_changed(tmp_path: Path, capsys: pytest
     again = ["census", "--method", OWN[0], "--method", OWN[1], "-o", "b.h5"]
     assert main([*again, "--against", "old.json", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["changes"] == []
-    assert main([*again, "--force", "--against", "other.json", "--page", "t.html", "--csv", "t.csv"]) == 1
+    assert main([*again, "--force", "--against", "other.json"]) == 1
     said = " ".join(capsys.readouterr().out.split())
     assert (
         "own:euler, scheme, from the states: implicit Euler -> explicit Euler (springcheck 0.0.9 -> " in said
     )
     assert "gone:one is no longer here" in said
     assert "Changes (springcheck 0.0.9 -> springcheck " in said
+    written(monkeypatch, "old.json")
     page = Path("t.html").read_text()
     assert len(page.encode()) < 500_000
     assert "springcheck census --method own:euler" in page
-    assert main([*again, "--force", "--add", "other.json", "--page", "t.html", "--quiet"]) == 0
+    with open("t.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    written(monkeypatch, "old.json", "other.json")
     page = Path("t.html").read_text()
     assert "gone:one" in page
     assert "&lt;b&gt;&amp;" in page
     assert page.count("<tr>") == 4
-    with open("t.csv", newline="") as file:
-        rows = list(csv.DictReader(file))
     assert [row["scheme"] for row in rows] == ["explicit Euler", "semi-implicit Euler, kick-drift"]
     assert [row["limit"] for row in rows] == ["0.0000", "2.0000"]
     assert all(row["version"].startswith("springcheck ") for row in rows)
@@ -171,11 +182,8 @@ def test_the_table_is_a_page_csv_and_what_changed(tmp_path: Path, capsys: pytest
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--page", "notes.txt"], "it is there and no such table"),
-        (["--csv", "."], "it is a folder"),
-        (["--csv", "no/t.csv"], "there is no folder"),
         (["--against", "notes.txt"], "is no JSON document of springcheck census"),
-        (["--add", "nosuch.json"], "No such file"),
+        (["--against", "nosuch.json"], "No such file"),
         (["--against", ""], ""),
     ],
 )
@@ -189,6 +197,16 @@ def test_bad_input_to_the_tables_options_is_said_before_anything_runs(
     assert len(error.splitlines()) == 1
     assert not Path("c.h5").exists()
     assert Path("notes.txt").read_text() == "mine"
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [("notes.txt", "it is there and no such table"), (".", "it is a folder"), ("no/t", "there is no folder")],
+)
+def test_a_table_takes_the_place_of_no_other_file(name: str, said: str) -> None:
+    Path("notes.txt").write_text("mine")
+    with pytest.raises(StoreError, match=said):
+        engines_table.free(name, engines_table.HEAD)
 
 
 @pytest.mark.parametrize(
@@ -227,7 +245,7 @@ def test_the_kept_table_has_a_hundred_rows_with_versions_and_none_is_declared_ot
     document = table.load(folder / "engines.json")
     rows = table.rows(document)
     assert len(rows) >= 100
-    assert len({table.engine(row) for row in rows}) >= 20
+    assert len({engines_table.engine(row) for row in rows}) >= 20
     assert not any("DECLARED" in row["note"] for row in rows)
     lock = (folder / "engines.lock").read_text().splitlines()
     assert all(part.strip() in lock for row in rows for part in row["version"].split(","))

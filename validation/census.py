@@ -28,15 +28,16 @@ from typing import Any
 import numpy as np
 
 import claims
+import engines_table
 from arguments import arguments
 from springcheck import driver, engines, schemes
 from springcheck.cli import main as springcheck
 from springcheck.engines import Label, registry
 from springcheck.figures.looks import title
 from springcheck.physics.scenefile import load_scene
-from springcheck.studies.census import table as as_table
 from springcheck.studies.census.measure import agrees, measure
 from springcheck.studies.census.result import Census
+from springcheck.studies.census.table import rows as as_rows
 
 MEASURED = {
     "mujoco:joint-spring": ("semi-implicit-euler", 1.020),
@@ -182,13 +183,14 @@ def everything() -> int:
 
         document = told(stored(kept).document(), Path(folder))
     (FOLDER / "engines.json").write_text(json.dumps(document, indent=1) + "\n")
-    rows = as_table.rows(document)
-    (FOLDER / "engines.csv").write_text(as_table.as_csv(rows))
-    (FOLDER / "engines.html").write_text(as_table.html(rows, [document]))
+    rows = as_rows(document)
+    (FOLDER / "engines.csv").write_text(engines_table.as_csv(rows))
+    (FOLDER / "engines.html").write_text(engines_table.html(rows, [document]))
     lock = sorted({part.strip() for row in rows for part in row["version"].split(",")})
     (FOLDER / "engines.lock").write_text("\n".join(lock) + "\n")
     wrong = [row["method"] for row in rows if "DECLARED" in row["note"]]
-    print(f"{len(rows)} rows of {len(set(map(as_table.engine, rows)))} engines, {len(wrong)} wrong: {wrong}")
+    makers = len(set(map(engines_table.engine, rows)))
+    print(f"{len(rows)} rows of {makers} engines, {len(wrong)} wrong: {wrong}")
     return status
 
 

@@ -20,7 +20,7 @@ EXAMPLES: Mapping[str, Sequence[str]] = {
     "precision": ("spring --budget 20 --method own:rk4",),
     "stability": ("spring", "multiple-time-steps --method 'openmm:*'"),
     "extremes": ("--quick",),
-    "census": ("--method 'own:*' --page engines.html",),
+    "census": ("--method 'own:*' --against old.json",),
     "sampling": ("--method 'own:*' --method 'openmm:*'",),
     "inspect": ("spring.h5 --verdicts", "spring.h5 --trajectory own:euler --rows 5"),
     "plot": ("spring.h5 -o figures", "orbit.csv"),
@@ -40,7 +40,7 @@ EXAMPLES: Mapping[str, Sequence[str]] = {
 
 GROUPS: Mapping[str, Sequence[str]] = {
     "input": ("file", "files", "label", "word", "shell", "--trajectory", "--columns", "--from",
-              "--against", "--add"),
+              "--against"),
     "scene": ("scene", "--scene", "--step", "--steps", "--set", "--temperature", "--friction",
               "--thermostats"),
     "many runs": ("--vary", "--samples", "--seed"),
@@ -51,8 +51,7 @@ GROUPS: Mapping[str, Sequence[str]] = {
     "how much is measured": ("--thorough", "--budget", "--quick", "--workers", "--cluster"),
     "figures": ("--particle", "--quantity", "--over"),
     "output": (
-        "output", "--output", "--force", "--json", "--quiet", "--verdicts", "--rows", "--points", "--page",
-        "--csv",
+        "output", "--output", "--force", "--json", "--quiet", "--verdicts", "--rows", "--points",
     ),
     "continuous integration": tuple(f"--{name}" for name in REPORT_FORMS),
 }  # fmt: skip

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from springcheck.studies import team
-from springcheck.studies.arguments import argument, repeatable, store_arguments
+from springcheck.studies.arguments import argument, store_arguments
 from springcheck.studies.study import Study
 
 STUDY = Study(
@@ -13,9 +13,6 @@ STUDY = Study(
         *team.arguments(),
         *store_arguments("census.h5"),
         argument("--thermostats", action="store_true", help="thermostats too, on springs in a bath"),
-        argument("--page", metavar="FILE.html", help="write the table of engines as one page"),
-        argument("--csv", metavar="FILE.csv", help="write it as CSV"),
         argument("--against", metavar="OLD.json", help="what changed since an earlier census --json"),
-        repeatable("--add", "OTHER.json", "rows of another census --json, made elsewhere"),
     ),
 )

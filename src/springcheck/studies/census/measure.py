@@ -100,22 +100,12 @@ def record(
 
 def perform(options: Namespace, progress: Progress | None) -> Census:
     """What `springcheck census` does."""
-    for path, beginning in ((options.page, table.MARK), (options.csv, table.HEAD)):
-        if path is not None:
-            table.free(path, beginning)
     old = table.load(options.against) if options.against is not None else None
-    added = [table.load(path) for path in options.add]
     how = keeper.how(options, progress)
     found = record(options.output or "census.h5", options.method, thermostats=options.thermostats, **how)
-    documents = [found.document(), *added]
-    rows = table.rows(*documents)
-    if options.page:
-        table.write(options.page, table.html(rows, documents))
-    if options.csv:
-        table.write(options.csv, table.as_csv(rows))
     if old is None:
         return found
-    before = table.rows(old)
+    before, rows = table.rows(old), table.rows(found.document())
     return replace(found, changes=tuple(table.changes(before, rows)), since=table.versions(before, rows))
 
 
