@@ -13,6 +13,7 @@ import pytest
 
 import extreme
 import finer_atlas
+import long_cells
 from springcheck import engines, store
 from springcheck.figures import render
 from springcheck.physics.arrays import WIDE
@@ -50,12 +51,20 @@ def test_no_cell_is_silently_wrong(name: str, need: Need) -> None:
 def test_a_long_run_is_judged_up_to_where_its_forces_leave_fixed_point(need: Need) -> None:
     need("openmm:euler@OpenCL-double")
     label = engines.parse("openmm:euler@OpenCL-double")
-    found = running.last(label, grid.lengths(label, quick=True))
+    found = long_cells.last(label, long_cells.lengths(label, quick=True))
     cells = [cell for cell in found if "overflows beyond 2**31" in cell.reason]
     assert {cell.parameters["h_w"] for cell in cells} == {1.0, 1.9}
     # growth is (1 + (h w)**2)**(1/2) a step and the first force 2**10: 42 steps, and 28, to 2**31
     assert all("grown out of range after step 0:" in cell.reason for cell in cells)
     assert {cell.outcome for cell in cells} == {"unstable, as theory says"}
+
+
+@pytest.mark.parametrize("name", ["own:semi-implicit-euler", "own:euler", "own:implicit-euler", "own:rk4"])
+def test_no_long_run_is_silently_wrong(name: str) -> None:
+    label = engines.parse(name)
+    cells = long_cells.last(label, long_cells.lengths(label, quick=True))
+    assert len(cells) >= 16
+    assert {cell.outcome for cell in cells} <= {"right", "unstable, as theory says"}
 
 
 def test_the_whole_grid_has_two_thousand_cells_for_three_methods_alone() -> None:
@@ -158,8 +167,8 @@ def test_a_cell_that_could_not_be_measured_has_a_shade_of_its_own() -> None:
 def test_a_finer_atlas_has_every_decade_of_force_at_more_steps(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    # few decades, no long runs
-    few = {"LENGTHS": (1,), "FAST_SECONDS": 0.0, "SIZES": (0,), "DECADES": (-20, 0, 20)}
+    # few decades
+    few = {"SIZES": (0,), "DECADES": (-20, 0, 20)}
     for name, value in few.items():
         monkeypatch.setattr(grid, name, value)
     monkeypatch.setattr(finer_atlas, "EVERY_DECADE", range(-20, 21))

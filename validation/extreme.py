@@ -33,6 +33,7 @@ from typing import Any
 import mpmath
 import numpy as np
 
+import long_cells
 from arguments import arguments
 from springcheck import driver, engines, schemes
 from springcheck.errors import SpringcheckError
@@ -142,6 +143,7 @@ def main() -> int:
     folder = arguments(__doc__, folder=Path("figures")).folder
     began = time.perf_counter()
     atlas = extremes.measure()
+    atlas = replace(atlas, cells=(*atlas.cells, *long_cells.cells()))
     print(f"{len(atlas.cells)} cells in {time.perf_counter() - began:.0f} s: {dict(atlas.counts())}")
     for window in atlas.windows:
         print(window.sentence)

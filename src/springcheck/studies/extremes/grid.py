@@ -1,4 +1,4 @@
-"""The grid of extreme cases: decades of mass, stiffness, amplitude, step and length of run."""
+"""The grid of extreme cases: decades of mass, stiffness, amplitude and step."""
 
 from __future__ import annotations
 
@@ -8,14 +8,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from springcheck import engines
 from springcheck.engines.contract import Label, Need
 from springcheck.physics.builders import spring
 from springcheck.physics.scene import Scene
 from springcheck.studies.stability.propagators import MASS, STEP
 
 STEPS = 20
-"""Of the cells that are judged step by step."""
+"""Of every cell."""
 
 TURNS = (1e-8, 1e-6, 1e-4, 1e-2, 0.1, 1.0, 1.9, 1.99, 2.01, 2.5, 5.0, 10.0)
 """h w of the plane of forces."""
@@ -31,12 +30,6 @@ SIZES = (-300, -200, -100, -30, -10, 0, 10, 30, 100, 200, 300)
 
 STRETCH = (-300, -150, -100, -30, -10, -3, 0, 3, 10, 30, 100, 150, 300)
 """Powers of ten of steps."""
-
-LENGTHS = (1, 10, 1000, 100_000, 1_000_000)
-LONGEST = 100_000_000
-"""Steps of the runs that are judged by their end; LONGEST for engines of `FAST_SECONDS` a step alone."""
-
-FAST_SECONDS, SLOW_SECONDS = 1e-8, 1e-4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -125,32 +118,6 @@ def _special() -> Iterator[Spec]:
             yield Spec(block="special", m=m, k=k, q=q, p=p, h=0.11)
 
 
-def lengths(label: Label, *, quick: bool = False) -> list[Spec]:
-    """Cells that are judged by the end of a long run."""
-    seconds = engines.engine(label.engine).step_seconds
-    steps = list(LENGTHS)
-    if seconds > SLOW_SECONDS:
-        steps = [1, 10, 1000] if quick else [1, 10, 1000, 4000]
-    elif label.platform or quick:
-        steps = [1, 10, 1000, 10_000]
-    if seconds <= FAST_SECONDS and not label.platform:
-        steps.append(LONGEST // 100 if quick else LONGEST)
-    turns: tuple[float, ...] = (1e-4, 0.01, 0.1, 1.0, 1.9)
-    if label.platform and quick:
-        # every run costs a context, a quarter of a second
-        steps, turns = [1000], turns[2:]
-    found = []
-    for n in steps:
-        for turn in turns if n < LONGEST // 100 else (0.1,):
-            k = MASS * (turn / STEP) ** 2
-            # forces of 2**10 keep fixed-point sums at their best
-            q = 1024.0 / k
-            found.append(
-                Spec(block="length", m=MASS, k=k, q=q, p=0.6 * MASS * (turn / STEP) * q, h=STEP, steps=n)
-            )
-    return found
-
-
 def solver_specs(*, quick: bool = False) -> list[Spec]:
     """Cells of adaptive solvers, each a run of its own: 20 outputs."""
     found: list[Spec] = []
@@ -189,7 +156,6 @@ def scene(cells: list[Spec], label: Label, requires: frozenset[Need]) -> Scene:
         fast=Need.FAST_SPRINGS in requires,
         step=first.h,
         steps=first.steps,
-        every=max(1, first.steps // 10) if first.block == "length" else 1,
         name="extreme",
         title="extreme cases side by side",
         source="springcheck",

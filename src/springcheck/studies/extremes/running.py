@@ -1,5 +1,5 @@
 """Running cells: many of one step in one run, as far as an engine that gives up lets them; those of adaptive
-solvers and of long runs one by one, each judged by its end against the motion that it claims."""
+solvers one by one, each judged by its end against the exact motion."""
 
 from __future__ import annotations
 
@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from springcheck import checks, driver, engines
-from springcheck.checks.case import overflows
+from springcheck import checks, engines
 from springcheck.engines.contract import Label, Stopped
 from springcheck.errors import MethodError
 from springcheck.physics import exact
@@ -140,55 +139,3 @@ def _reason(scene: Scene, spec: Spec) -> str | None:
     if spec.tolerance < TIGHT:
         return f"a tolerance of {spec.tolerance:g} a step is too tight for double precision"
     return None
-
-
-def last(label: Label, specs: Sequence[Spec]) -> list[Cell]:
-    """Cells of one long run each, judged by the closed form of the scheme's motion at ten frames."""
-    found = []
-    for spec in specs:
-        scene = grid.scene([spec], label, engines.method(label).requires)
-        with np.errstate(all="ignore"):
-            run = driver.run(scene, label)
-            case, limit = _within_range(checks.Case(trajectory=run, scene=scene))
-            verdict = checks.closed_form(case)
-            if verdict.passed is None and len(case.trajectory.t) > 1:
-                verdict = checks.step_defect(case)
-            growth = judging.growth_of(case, scene)[0]
-        unstable = bool(growth * spec.steps >= np.log(judging.GROWN))
-        outcome: Outcome = "unstable, as theory says" if unstable else "right"
-        reason = limit
-        if limit and not unstable:
-            outcome = "engine's limit"
-        value, bound = verdict.value, verdict.bound
-        if run.outcome.status != "complete":
-            # the driver ends a run at the last finite frame; the next one is out of range by theory
-            high = judging.RANGES["double"][1]
-            most = (0.5 if engines.engine(label.engine).squares_lengths else 1) * np.log(high) - np.log(
-                max(abs(spec.q), abs(spec.p))
-            )
-            left = growth * (run.outcome.step + scene.every) > most
-            quantum = case.trajectory.arithmetic.overflow
-            gone = growth * run.outcome.step > np.log(quantum / spec.force) if np.isfinite(quantum) else False
-            reason = f"{run.outcome.status} after step {run.outcome.step}, grown out of range"
-            if not (unstable and (left or gone)):
-                outcome, reason = "silently wrong", f"{run.outcome.status}: {run.outcome.message}"
-        judged = outcome != "silently wrong" and len(case.trajectory.t) > 1
-        if judged and verdict.passed is None:
-            outcome, reason = "not measured", verdict.why
-        elif judged and not value <= bound:
-            outcome, reason = "silently wrong", f"{verdict.check} is {value:.3g} of {bound:.3g}"
-        found.append(judging.cell(label, spec, outcome, reason, value, bound, tolerance=spec.tolerance))
-    return found
-
-
-def _within_range(case: checks.Case) -> tuple[checks.Case, str]:
-    """The frames before a force leaves the range of a fixed-point sum, and what it then says."""
-    run = case.trajectory
-    beyond = (
-        case.strongest >= run.arithmetic.overflow if np.isfinite(run.arithmetic.overflow) else np.zeros(0)
-    )
-    if not np.any(beyond):
-        return case, ""
-    held = slice(int(np.argmax(beyond)) + 1)
-    reason = f"grown out of range after step {case.steps[held][-1]}: {overflows(run.arithmetic)}"
-    return checks.Case(trajectory=run.at(held), scene=case.scene), reason
