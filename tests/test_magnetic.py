@@ -241,3 +241,16 @@ def test_noise_that_an_unstable_step_makes_large_turns_nothing() -> None:
     assert np.max(np.abs(x)) > 1e11
     found = springcheck.identify(0.1 * np.arange(1001), x[1:], np.diff(x, axis=0) / 0.1, mass=1.0)
     assert "magnetic" not in str(found)
+
+
+@pytest.mark.parametrize("axis", [0, 2])
+def test_a_field_is_named_in_files_of_three_axes_beside_what_swings_along_it(axis: int) -> None:
+    """The spring along the field was named alone, and the turning plane beside it "too little to be judged"."""
+    scene = replace(scenes.load_scene("orbit"), step=0.083)
+    one, other = sorted({0, 1, 2} - {axis})
+    terms = (*scene.terms, Magnetic(a=[one], b=[other], strength=[2.3]))
+    run = springcheck.simulate(replace(scene, terms=terms), "own:boris")
+    found = springcheck.identify(run, mass=scene.m)
+    assert found.verdict == "none"
+    assert f"The velocity of coordinates {one} and {other} turns by" in found.statement
+    assert "strength over mass 0.621621622, stiffness over mass 0.783783784" in found.statement

@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import cmath
 import math
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
+from springcheck.identify.misplaced import MOST_COMPARED
 from springcheck.identify.record import Record
 from springcheck.identify.result import Explanation
 
@@ -26,10 +28,16 @@ BORIS_AGREES = 1e-10
 
 
 def of_plane(record: Record) -> list[Explanation]:
-    """What turns two coordinates into each other, if there are no more and that is all that couples them."""
-    if record.q.shape[1] != 2:
-        return []
-    (x, y), (u, v) = (a.astype(np.float64).T for a in (record.q, record.v * record.interval))
+    """What turns two coordinates into each other, the first two of which that is all that couples them."""
+    moving = np.flatnonzero(np.ptp(record.q, axis=0) + np.ptp(record.v, axis=0) > 0)
+    for i, j in combinations(moving[:MOST_COMPARED].tolist(), 2):
+        if found := _of_two(record, i, j):
+            return found
+    return []
+
+
+def _of_two(record: Record, i: int, j: int) -> list[Explanation]:
+    (x, y), (u, v) = (a[:, [i, j]].astype(np.float64).T for a in (record.q, record.v * record.interval))
     z = np.stack([x + 1j * y, u + 1j * v, np.ones(len(x))], axis=1)
     size = np.max(np.abs(z), axis=0)
     # of what grows or dies every frame counts by its size
@@ -48,9 +56,10 @@ def of_plane(record: Record) -> list[Explanation]:
     if abs(angle) < LEFT:
         # the velocities are other numbers than these positions', and nothing turns them
         return []
+    of = f" of coordinates {i} and {j}" if record.q.shape[1] > 2 else ""
     turned = f"{angle:.9g}" if abs(abs(det) - 1) < KEPT else f"about {angle:.2g}"
     cause = (
-        f"The velocity turns by {turned} in each frame beside what springs alike along both axes do: a "
+        f"The velocity{of} turns by {turned} in each frame beside what springs alike along both axes do: a "
         "magnetic field across the plane, or Coriolis' force in a turning frame"
     )
     half = math.tan(-angle / 2)

@@ -35,8 +35,9 @@ def judged(record: Record) -> tuple[Record, list[int], list[Map], list[str]]:
     good = [j for j, found in maps.items() if found.conditioned and _forced(found)]
     lost = [j for j in maps if j not in good]
     rough = [j for j in lost if maps[j].spans and not (maps[j].conditioned and maps[j].clean)]
-    if not good and rough:
-        # the states span the plane, and what one map leaves over is larger than rounding: that has a cause
+    if rough:
+        # the states span the plane, and what one map leaves over is larger than rounding: that has a cause,
+        # whatever moves beside it
         return record, rough[:1], [maps[rough[0]]], notes
     if not good:
         if (lost and maps[lost[0]].conditioned) or not lost:

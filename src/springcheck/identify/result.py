@@ -175,6 +175,8 @@ def _plain(x: Any, name: str = "") -> Any:
 
 
 OR_UNKNOWN = "; or a scheme that is not known here"
+ONLY_TURNS = "The velocity of coordinates "
+"""How a statement begins of what may be no scheme on springs, but a rotation."""
 
 IDENTIFIED = {
     "not told apart": "several schemes, which the data cannot tell apart",
@@ -209,8 +211,8 @@ def identification(label: str, found: Identification) -> Lines:
     if found.undecided and found.scheme:
         misfit = ", but whether it fits cannot be judged"
     said = IDENTIFIED.get(found.verdict, found.scheme)
-    if found.verdict == "not told apart" and not several:
-        # one is left, which is not enough to be named
+    if found.verdict == "not told apart" and (not several or found.statement.startswith(ONLY_TURNS)):
+        # one is left, which is not enough to be named, or none may be right
         said = found.statement
     elif found.statement.endswith(OR_UNKNOWN):
         misfit += OR_UNKNOWN

@@ -10,7 +10,7 @@ import numpy as np
 from springcheck.identify.field import of_plane
 from springcheck.identify.misplaced import MOST_COMPARED, unsorted
 from springcheck.identify.record import ROUNDING, Record
-from springcheck.identify.result import Identification
+from springcheck.identify.result import ONLY_TURNS, Identification
 from springcheck.physics.arrays import Floats, Reals
 
 ALIKE = 64
@@ -135,7 +135,7 @@ def of_rotation(record: Record, found: Identification) -> Identification:
     how = f"turns and grows by {abs(factor) - 1:+.3g} in each frame" if grows else "only turns"
     return replace(
         found, verdict="not told apart", scheme=None, aliases=(), fits=False, undecided=True,
-        statement=f"The velocity of coordinates {i} and {j} {how}: a rotation, as of a charge in a magnetic "
+        statement=f"{ONLY_TURNS}{i} and {j} {how}: a rotation, as of a charge in a magnetic "
         f"field{'' if grows else ' (Boris)'}, or a circular orbit on springs: {found.statement}",
         notes=(*found.notes, "what would tell: the stiffness, or an orbit that is no circle"),
     )  # fmt: skip
