@@ -142,3 +142,14 @@ def test_the_border_is_named_where_only_steps_across_it_are_off() -> None:
     found = {v.check: v for v in checks.judge(scene, replace(run, q=q))}
     assert found["border"].passed is False
     assert f"at step {late}" in found["border"].why
+
+
+def test_a_spring_as_long_as_half_of_the_box_is_refused_and_told() -> None:
+    """It passed for the motion without the box, where programs pull towards the nearer image."""
+    scene = boxed()
+    with pytest.raises(SceneError, match=r"at the start a spring is 1\.33 times as long as half of"):
+        replace(scene, box=(4.1, 0.45, 5.7))
+    short = replace(scene, box=(4.1, 0.9, 5.7))
+    found = {v.check: v for v in checks.judge(short, driver.run(short, "own:velocity-verlet"))}
+    assert found["border"].passed is False
+    assert "a spring is as long as half of the box, and another image" in found["border"].why

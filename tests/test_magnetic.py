@@ -245,7 +245,7 @@ def test_noise_that_an_unstable_step_makes_large_turns_nothing() -> None:
 
 @pytest.mark.parametrize("axis", [0, 2])
 def test_a_field_is_named_in_files_of_three_axes_beside_what_swings_along_it(axis: int) -> None:
-    """The spring along the field was named alone, and the turning plane beside it "too little to be judged"."""
+    """The spring along the field was named alone, and the plane beside it "too little to be judged"."""
     scene = replace(scenes.load_scene("orbit"), step=0.083)
     one, other = sorted({0, 1, 2} - {axis})
     terms = (*scene.terms, Magnetic(a=[one], b=[other], strength=[2.3]))

@@ -14,6 +14,7 @@ from springcheck.checks.check import Finding, check
 from springcheck.checks.drag import drag
 from springcheck.checks.requires import CLOSED, MAP, missing
 from springcheck.checks.stretch import Stretch, known
+from springcheck.physics import exact
 from springcheck.physics.arrays import Arithmetic, Floats, Integers, Reals
 from springcheck.physics.trajectory import Limits
 from springcheck.text.wording import count
@@ -73,6 +74,14 @@ def _step_defect(case: Case) -> Finding | str:
 def border(case: Case) -> Finding | str:
     """Steps across a border of the box, of a particle or of a bond, are as good as those within it."""
     run, box = case.trajectory, case.scene.periods
+    if exact.has_true_motion(case.scene):
+        spans = case.scene.of_half_boxes(exact.true_motion(case.scene, case.steps, run.step)[0])
+        if not (longest := float(np.max(spans))) < 1:
+            why = (
+                f"by the exact solution first after step {case.steps[int(np.argmax(~(spans < 1)))]} a spring "
+                "is as long as half of the box, and another image of its end is nearer; take a longer box"
+            )
+            return Finding(longest, float(np.nextafter(1, 0)), "of half of the box", why)
     with np.errstate(all="ignore"):
         seen = _in_roundings(case, run.q[1:], run.p[1:])
         image = np.floor(run.q / box)

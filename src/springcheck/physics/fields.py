@@ -9,7 +9,7 @@ from typing import Any, Literal, Self, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from springcheck.physics.arrays import Floats, Integers
+from springcheck.physics.arrays import Floats, Integers, Reals
 from springcheck.physics.bath import Bath
 from springcheck.physics.term import Term, refrozen
 
@@ -107,6 +107,17 @@ class SceneFields:
         if self.box is None:
             return np.zeros(self.n)
         return np.array(self.box)[self.all_places % 3]
+
+    def of_half_boxes(self, q: Reals) -> Floats:
+        """The length of the longest spring at positions q (..., n), in halves of the box: from 1 on another
+        image of its end is nearer.  0 without a box (...,)."""
+        found = np.zeros(q.shape[:-1])
+        for term in self.terms if self.box is not None else ():
+            if term.kind == "potential":
+                way = term.stretch(q) if term.bodies == 2 else term.elongation(q)
+                half = self.periods[term.particles[0]] / 2
+                found = np.maximum(found, np.max(np.abs(way) / half, axis=-1, initial=0.0))
+        return found
 
     @property
     def frames(self) -> int:

@@ -37,6 +37,11 @@ class Scene(SceneFields):
             object.__setattr__(self, field, value)
         if self.system.rods:
             self.system.rods.check(self.q, self.p)
+        if not (longest := float(self.of_half_boxes(self.q))) < 1:
+            raise SceneError(
+                f"box: at the start a spring is {longest:.3g} times as long as half of the box, and another "
+                "image of its end is nearer; give positions of images that are near, or a longer box"
+            )
 
     def __repr__(self) -> str:
         terms = ", ".join(f"{len(term)} {term.key}" for term in self.terms) or "free"
