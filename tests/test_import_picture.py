@@ -38,7 +38,7 @@ HOMES = {
     "numba": ("engines/own",),
     "jinja2": ("cli/page/writing.py",),
     "markupsafe": ("cli/page/writing.py",),
-    "rich": ("text/lines.py", "studies/run/text.py", "cli/output.py"),
+    "rich": ("text/lines.py", "cli/output.py"),
     "msgspec": ("physics/scenefile", "studies/keeper.py", "studies/tables.py", "store", "formats"),
 }
 

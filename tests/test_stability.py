@@ -13,7 +13,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rich.text import Text
 
 import stiffness_costs
 from springcheck import driver, engines, schemes
@@ -27,6 +26,7 @@ from springcheck.studies.stability import measure as stability
 from springcheck.studies.stability.longest import longest
 from springcheck.studies.stability.propagators import Springs
 from springcheck.studies.text import left_out
+from springcheck.text.lines import Text
 
 pytestmark = pytest.mark.slow
 

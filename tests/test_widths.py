@@ -25,7 +25,7 @@ from springcheck.studies.faults.table import FAULTS
 from springcheck.studies.precision import measure as precision
 from springcheck.studies.run import measure as run_study
 from springcheck.studies.run import text as run_text
-from springcheck.text.lines import GAP, Lines, TextTable, table
+from springcheck.text.lines import GAP, Lines, TextTable, drawn, table
 
 pytestmark = pytest.mark.slow
 
@@ -175,7 +175,7 @@ def rendered(made: TextTable, width: int) -> list[str]:
 
     console = Console(width=width, highlight=False)
     with console.capture() as captured:
-        console.print(made, crop=False)
+        drawn([made], console)
     return captured.get().splitlines()
 
 

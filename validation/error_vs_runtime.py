@@ -42,8 +42,6 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from rich.console import Console
-
 from arguments import arguments
 from springcheck import engines
 from springcheck.physics import scenefile as scenes
@@ -52,6 +50,7 @@ from springcheck.studies.choose import choose
 from springcheck.studies.precision import STUDY, text
 from springcheck.studies.precision import measure as precision
 from springcheck.studies.precision.result import PrecisionStudy
+from springcheck.text.lines import as_text
 
 SCENES = ("spring", "spring-uneven", "anharmonic")
 
@@ -74,19 +73,17 @@ def main() -> int:
     """Study every scene, print tables, draw figures."""
     given = arguments(__doc__, folder=Path("figures"), budget=precision.BUDGET)
     folder, budget = given.folder, given.budget
-    console = Console(width=100, highlight=False)
     wrong = []
     for name in SCENES:
         scene = scenes.load_scene(name)
         labels, _ = choose(scene, ())
         study = precision.study(scene, labels, budget=budget)
-        for line in text.lines(study):
-            console.print(line)
+        print(as_text(text.lines(study)))
         for path in STUDY.draw(study, folder / name):
-            console.print(str(path))
+            print(str(path))
         wrong += failures(study)
     for what in wrong:
-        console.print(f"DOES NOT HOLD: {what}")
+        print(f"DOES NOT HOLD: {what}")
     return 1 if wrong else 0
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
 import sys
 import textwrap
 from collections.abc import Iterator, Sequence
@@ -17,27 +16,34 @@ from springcheck import interrupts
 from springcheck.errors import SpringcheckError, StoreError, plain
 
 if TYPE_CHECKING:
-    from rich.console import RenderableType
-
     from springcheck.studies.arguments import Progress
+    from springcheck.text.lines import Lines
+
+PIPE = 1 << 16
+"""Columns of what is no terminal: long lines are for the reader's tools to fold."""
 
 SCHEMA = 1
 """Of the JSON documents: raised where a name goes or changes its meaning, and not where one is added."""
 
 
-def show(lines: Sequence[RenderableType]) -> None:
-    """Print lines, as wide as the terminal."""
-    from rich.console import Console
+def show(lines: Lines) -> None:
+    """Print lines, as wide as the terminal; in a pipe there is no width to keep to.
+
+    Styles are for a terminal, and for who asks for them: https://force-color.org.
+    """
+    from springcheck.text.lines import drawn, shown
 
     terminal = sys.stdout.isatty()
-    # in a pipe there is no width to keep to; long lines are for the reader's tools to fold
+    if not terminal and not any(map(os.environ.get, ("FORCE_COLOR", "TTY_COMPATIBLE"))):
+        print("\n".join(str(line).rstrip() for line in shown(lines, PIPE)))
+        return
+    from rich.console import Console
+
     # who wants no colours wants none, whatever else is said; Rich would still write bold
     colours: Literal["auto"] | None = None if os.environ.get("NO_COLOR") else "auto"
     # what Rich writes to a pipe that is closed ends the program with a status of Rich's
-    width, into = (None, None) if terminal else (1 << 16, StringIO())
-    console = Console(highlight=False, width=width, color_system=colours, file=into)
-    for line in lines:
-        console.print(line, crop=False)
+    width, into = (None, None) if terminal else (PIPE, StringIO())
+    drawn(lines, Console(highlight=False, width=width, color_system=colours, file=into))
     if into is not None:
         # a line that was folded ends in a blank, which a file or a diff need not keep
         print("\n".join(line.rstrip() for line in into.getvalue().splitlines()))
@@ -47,6 +53,8 @@ def folded(line: str) -> str:
     """A line broken between words where the terminal ends; as it is in a pipe."""
     if not line or not sys.stdout.isatty():
         return line
+    import shutil
+
     return textwrap.fill(line, shutil.get_terminal_size().columns, break_on_hyphens=False)
 
 

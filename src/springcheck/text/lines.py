@@ -1,4 +1,7 @@
-"""Lines and tables of text, by rich: numbers, labels and names are never cut, however narrow the terminal."""
+"""Lines and tables of text: numbers, labels and names are never cut, however narrow the terminal.
+
+Rich draws them on a terminal and breaks its lines; a pipe gets them as they are, without Rich.
+"""
 
 from __future__ import annotations
 
@@ -6,25 +9,45 @@ import textwrap
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from io import StringIO
-
-from rich.console import Console, ConsoleOptions, RenderableType
-from rich.measure import Measurement
-from rich.text import Text
+from typing import TYPE_CHECKING
 
 from springcheck import errors
 
-Lines = list[RenderableType]
-Cell = str | Text
-Row = Sequence[Cell] | Text
+if TYPE_CHECKING:
+    from rich.console import Console
 
 PROSE = 30
 """Fewest columns that a cell of prose is broken into."""
 GAP = 2
 
 
+@dataclass(frozen=True, slots=True)
+class Text:
+    """A line of text: its parts, each with its style in Rich's words; nothing in it is markup."""
+
+    parts: tuple[tuple[str, str], ...]
+    whole: bool = False
+    """No terminal breaks it between its words."""
+
+    def __str__(self) -> str:
+        return "".join(text for text, _ in self.parts)
+
+    def __len__(self) -> int:
+        return sum(len(text) for text, _ in self.parts)
+
+    @property
+    def style(self) -> str:
+        """The style of its first part."""
+        return self.parts[0][1]
+
+
 def plain(text: str = "", style: str = "") -> Text:
-    """A line of text from any file: nothing in it is markup, nothing a control character."""
-    return Text(errors.plain(text), style=style)
+    """A line of text from any file, nothing in it a control character."""
+    return Text(((errors.plain(text), style),))
+
+
+Cell = str | Text
+Row = Sequence[Cell] | Text
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +64,8 @@ class TextTable:
     left: frozenset[str]
     prose: str
 
-    def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterator[Text]:
+    def lines(self, wide: int) -> Iterator[Text]:
+        """Its lines on a terminal of so many columns."""
         head: Row = tuple(map(plain, self.titles))
         cells = [row for row in (head, *self.rows) if not isinstance(row, Text)]
         widths = [
@@ -50,8 +74,8 @@ class TextTable:
         if self.prose in self.titles:
             j = self.titles.index(self.prose)
             words = [len(word) for row in cells if j < len(row) for word in str(row[j]).split()]
-            widths[j] = min(widths[j], max(self._free(widths, j, options.max_width), *words, 1))
-        for i, block in enumerate(_blocks(widths, options.max_width)):
+            widths[j] = min(widths[j], max(self._free(widths, j, wide), *words, 1))
+        for i, block in enumerate(_blocks(widths, wide)):
             if i:
                 yield plain()
             for row in (head, *self.rows):
@@ -65,9 +89,6 @@ class TextTable:
         others = width - sum(widths) + widths[j] - GAP * (len(widths) - 1)
         return others if others >= PROSE or j == 0 else width - widths[0] - GAP
 
-    def __rich_measure__(self, console: Console, options: ConsoleOptions) -> Measurement:
-        return Measurement(1, options.max_width)
-
     def _lines(self, row: Sequence[Cell], widths: Sequence[int], block: Sequence[int]) -> Iterator[Text]:
         parts = []
         for j in block:
@@ -75,18 +96,17 @@ class TextTable:
             whole = plain(cell) if isinstance(cell, str) else cell
             pieces = [whole]
             if title == self.prose and len(whole) > width:
-                broken = textwrap.wrap(whole.plain, width, break_long_words=False, break_on_hyphens=False)
-                pieces = [plain(piece, str(whole.style)) for piece in broken]
+                broken = textwrap.wrap(str(whole), width, break_long_words=False, break_on_hyphens=False)
+                pieces = [plain(piece, whole.style) for piece in broken]
             parts.append((title in self.left or title == self.prose, width, pieces))
         for i in range(max(len(pieces) for _, _, pieces in parts)):
-            out = plain()
+            out: list[tuple[str, str]] = []
             for left, width, pieces in parts:
                 piece = pieces[i] if i < len(pieces) else plain()
-                blank = " " * (width - len(piece))
-                out.append_text(piece.copy() if left else plain(blank).append_text(piece))
-                out.append(blank + " " * GAP if left else " " * GAP)
-            out.rstrip()
-            yield _line(out)
+                blank = (" " * (width - len(piece)), "")
+                out += [*piece.parts, blank] if left else [blank, *piece.parts]
+                out.append((" " * GAP, ""))
+            yield Text(tuple(out), whole=True)
 
 
 def _blocks(widths: Sequence[int], width: int) -> list[list[int]]:
@@ -101,12 +121,6 @@ def _blocks(widths: Sequence[int], width: int) -> list[list[int]]:
     return blocks
 
 
-def _line(text: Text) -> Text:
-    text = text.copy()
-    text.no_wrap, text.overflow = True, "ignore"
-    return text
-
-
 def table(
     titles: Sequence[str], rows: Iterable[Row], *, left: Collection[str] = ("method",), prose: str = ""
 ) -> TextTable:
@@ -114,20 +128,44 @@ def table(
     return TextTable(tuple(titles), tuple(rows), frozenset(left), prose)
 
 
-def as_text(lines: Sequence[RenderableType], width: int = 100) -> str:
+Lines = list[Text | TextTable]
+
+
+def shown(lines: Sequence[Text | TextTable], wide: int) -> Iterator[Text]:
+    """Every line, those of tables too, on a terminal of so many columns."""
+    for line in lines:
+        yield from line.lines(wide) if isinstance(line, TextTable) else (line,)
+
+
+def drawn(lines: Sequence[Text | TextTable], console: Console) -> None:
+    """Print them in their styles, as wide as the console."""
+    from rich.text import Text as Styled
+
+    for line in shown(lines, console.width):
+        styled = Styled.assemble(*line.parts)
+        if line.whole:
+            styled.rstrip()
+            console.print(styled, crop=False, no_wrap=True, overflow="ignore")
+        else:
+            console.print(styled, crop=False)
+
+
+def as_text(lines: Sequence[Text | TextTable], width: int = 100) -> str:
     """Lines without colours, as `str` of a result."""
-    console = Console(file=StringIO(), width=width, highlight=False, color_system=None, record=True)
-    for line in lines:
-        console.print(line, crop=False)
-    return "\n".join(line.rstrip() for line in console.export_text().splitlines())
+    return "\n".join(line.rstrip() for line in _recorded(lines, width).export_text().splitlines())
 
 
-def as_html(lines: Sequence[RenderableType]) -> str:
+def as_html(lines: Sequence[Text | TextTable]) -> str:
     """The same with its colours, for notebooks."""
-    console = Console(file=StringIO(), width=120, highlight=False, record=True)
-    for line in lines:
-        console.print(line, crop=False)
-    return console.export_html(inline_styles=True, code_format="<pre>{code}</pre>")
+    return _recorded(lines, 120).export_html(inline_styles=True, code_format="<pre>{code}</pre>")
+
+
+def _recorded(lines: Sequence[Text | TextTable], width: int) -> Console:
+    from rich.console import Console
+
+    console = Console(file=StringIO(), width=width, highlight=False, record=True)
+    drawn(lines, console)
+    return console
 
 
 def hanging(head: str, text: str) -> Lines:

@@ -8,14 +8,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from rich.text import Text
 
 from springcheck import checks, schemes
 from springcheck.physics.trajectory import Comparison, Limits, Verdict
 from springcheck.studies.ensemble import STUDY as ENSEMBLE
 from springcheck.studies.run.result import MethodRun, Repeat, Repeats, Report, Stored
 from springcheck.studies.text import left_out, of_energy
-from springcheck.text.lines import Lines, Row, TextTable, hanging, plain, table
+from springcheck.text.lines import Lines, Row, Text, TextTable, hanging, plain, table
 from springcheck.text.wording import count, number, seconds
 
 if TYPE_CHECKING:
