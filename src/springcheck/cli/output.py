@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import sys
 import textwrap
 from collections.abc import Iterator, Sequence
@@ -53,8 +54,6 @@ def folded(line: str) -> str:
     """A line broken between words where the terminal ends; as it is in a pipe."""
     if not line or not sys.stdout.isatty():
         return line
-    import shutil
-
     return textwrap.fill(line, shutil.get_terminal_size().columns, break_on_hyphens=False)
 
 
