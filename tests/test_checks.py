@@ -41,6 +41,7 @@ def alarms(verdicts: list[Verdict]) -> list[str]:
 
 
 @pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize("name", PLAIN)
 def test_no_check_rejects_the_textbook_step_on_random_scenes(name: str) -> None:
     for seed in range(12):

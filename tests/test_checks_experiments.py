@@ -33,6 +33,7 @@ ENGINES = [
 
 
 @pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize("label", ENGINES)
 def test_every_engine_passes_every_experiment_that_applies(label: str, need: Need) -> None:
     need(label)
@@ -48,6 +49,7 @@ def plain(name: str) -> checks.Run:
 
 
 @pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize("name", ["ruth3", "forest-ruth", "yoshida4", "rk2-heun", "rk4", "implicit-midpoint"])
 def test_schemes_of_every_order_pass_every_experiment(name: str) -> None:
     verdicts = checks.judge_thoroughly(scenes.load_scene("chain"), name, plain(name))

@@ -423,6 +423,7 @@ def off(scene: Scene, name: str, x: float, row: int) -> Scene:
 
 
 @pytest.mark.slow
+@pytest.mark.campaign("which", "law")
 @pytest.mark.parametrize("which", ["driven-spring", "uneven", "mathieu-tongue"])
 @pytest.mark.parametrize("law", ["semi-implicit-euler", "velocity-verlet", "rk4"])
 def test_what_would_be_seen_of_a_drive_is_seen_at_twice_its_size(which: str, law: str) -> None:

@@ -39,6 +39,7 @@ pytestmark = [
 ]
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("name", [*METHODS, *GPU])
 def test_no_cell_is_silently_wrong(name: str, need: Need) -> None:
     need(name)

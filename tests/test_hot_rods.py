@@ -50,6 +50,7 @@ def scenes(name: str) -> Scene:
     return replace(load_scene("rigid-triangle"), steps=60, step=0.03, bath=bath, quantities=("q", "p"))
 
 
+@pytest.mark.campaign("label")
 @pytest.mark.parametrize("name", ["dumbbell", "triangle"])
 @pytest.mark.parametrize("label", LABELS)
 def test_right_engines_pass(label: str, name: str, need: Callable[[str], None]) -> None:
@@ -89,6 +90,7 @@ def right(name: str) -> tuple[Scene, Trajectory]:
     return scene, driver.run(scene, "own:baoab", seed=3)
 
 
+@pytest.mark.campaign("how")
 @pytest.mark.parametrize(
     ("how", "seen"),
     [("velocity along a rod", "rod-velocity"), ("length", "rod-length"), ("swapped", "start"),
@@ -159,6 +161,7 @@ def temperature(name: str, n: int = 20000, steps: int = 40) -> tuple[float, floa
     return float(np.mean(each)), float(np.std(each) / np.sqrt(len(each)))
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("name", ["baoab", "obabo", "aoboa", "lammps-langevin"])
 def test_free_rods_have_the_temperature_of_the_bath_where_a_law_says_so(name: str) -> None:
     assert THERMOSTATS[name].kinetic_of_rods

@@ -16,6 +16,7 @@ DRAWN = [case for case in corpus.load() if case.group == "census"]
 
 
 @pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize("case", DRAWN, ids=lambda case: case.name.split(":")[0])
 def test_what_was_wrong_once_is_right(case: corpus.Case) -> None:
     """As data: another catalogue draws other trajectories; `why` in the facts says what was wrong."""

@@ -178,6 +178,7 @@ def remembered(m: float, f: float, h: float, c: float = 0.0, count: int = 100) -
 
 
 @pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize("h", [0.07, 1.3])
 @pytest.mark.parametrize(
     ("shares", "said"),

@@ -8,6 +8,7 @@ from __future__ import annotations
 import importlib.util
 import os
 import random
+import shutil
 import signal
 import subprocess
 import sys
@@ -512,16 +513,23 @@ LIMITED = {
 }
 
 
+@pytest.fixture(scope="module")
+def uneven(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("uneven") / "input.h5"
+    session.run(scenefile.load_scene("spring-uneven"), path, methods=["own:*"])
+    return path
+
+
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="no /proc to look for processes in")
 @pytest.mark.parametrize("name", LIMITED)
-def test_an_interrupted_command_leaves_nothing(name: str, tmp_path: Path) -> None:
+def test_an_interrupted_command_leaves_nothing(name: str, tmp_path: Path, uneven: Path) -> None:
     """Everything but the two seconds, which a loaded machine may not have."""
     rng = random.Random(f"{name} 20261121")
     for again in (0.0, 0.1):
         # a signal that came too late has left a whole store, which is refused
         folder = tmp_path / f"{again}"
         folder.mkdir()
-        session.run(scenefile.load_scene("spring-uneven"), folder / "input.h5", methods=["own:*"])
+        shutil.copy(uneven, folder)
         trial = interrupting.interrupted(
             LIMITED[name], folder, rng.uniform(0.3, 2.0), number=signal.SIGINT, again=again
         )

@@ -268,6 +268,7 @@ def test_more_joined_particles_than_have_tangent_matrices_are_judged_by_tangent_
 
 
 @pytest.mark.slow
+@pytest.mark.campaign("name", "every")
 @EXTENDED
 @pytest.mark.parametrize("name", ["velocity-verlet", "rk4", "implicit-midpoint"])
 @pytest.mark.parametrize("every", [20, 700])
@@ -283,6 +284,7 @@ def test_a_step_is_judged_as_sharply_between_frames_far_apart_as_by_itself(name:
 
 
 @pytest.mark.slow
+@pytest.mark.campaign("name", "wander")
 @pytest.mark.parametrize("name", ["semi-implicit-euler", "rk4", "implicit-euler"])
 @pytest.mark.parametrize("wander", [0.3, 3e-5, 1e-6])
 def test_roundings_to_one_side_at_every_step_are_no_fault(name: str, wander: float) -> None:

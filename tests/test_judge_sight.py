@@ -58,6 +58,7 @@ SCENES: dict[str, Scene] = {
 }  # fmt: skip
 
 
+@pytest.mark.campaign("where", "name")
 @pytest.mark.parametrize("name", ["semi-implicit-euler", "velocity-verlet", "rk4", "implicit-euler"])
 @pytest.mark.parametrize("where", SCENES)
 def test_three_limits_fail_and_a_tenth_of_one_passes(where: str, name: str) -> None:
@@ -81,6 +82,7 @@ def test_a_spring_whose_effect_drowns_in_the_references_rounding_has_its_own_lim
     assert 1e-3 < sees.stiffness < 2.0**-5
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("experiment", detection.EXPERIMENTS, ids=lambda experiment: experiment.name)
 def test_the_limits_of_experiments_hold_likewise(experiment: checks.Experiment) -> None:
     cases = [("h w = 0.3", "semi-implicit-euler")]

@@ -70,6 +70,7 @@ FAULTS: dict[str, Callable[[Floats], list[float] | Floats]] = {
 
 
 @pytest.mark.slow
+@pytest.mark.campaign("name", "ratio")
 @pytest.mark.parametrize("name", forms.THETA)
 @pytest.mark.parametrize("ratio", [1e6, 1e7, 1e8, 1e9, 1e10])
 def test_the_momenta_of_a_stiff_pair_are_judged(name: str, ratio: float) -> None:
@@ -89,6 +90,7 @@ def test_the_momenta_of_a_stiff_pair_are_judged(name: str, ratio: float) -> None
 
 
 @pytest.mark.slow
+@pytest.mark.campaign("name", "form")
 @pytest.mark.parametrize("name", forms.THETA)
 @pytest.mark.parametrize("form", WRITTEN)
 def test_every_way_to_write_an_implicit_step_of_a_stiff_pair_passes(name: str, form: str) -> None:

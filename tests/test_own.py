@@ -207,6 +207,7 @@ def test_every_step_is_the_map_of_its_scheme_compiled_or_not_and_chunked_or_not(
             assert np.all(np.abs(got - true) <= count * 2.0**-53 * scale)
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_every_own_method_passes_its_verdicts_at_every_record_interval(scheme: str) -> None:
     method = next(method for method in ENGINE.methods.values() if method.scheme == scheme)

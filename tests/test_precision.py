@@ -81,6 +81,7 @@ def made_up(
 
 
 @pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize(("label", "name"), serving(FIXED, SINGLE))
 def test_every_method_has_the_order_of_its_scheme(label: str, name: str, need: Callable[[str], None]) -> None:
     need(label)
@@ -119,6 +120,7 @@ def test_a_step_that_is_slightly_too_long_loses_the_order(need: Callable[[str], 
     assert fit is None or abs(fit.order - 1) > 0.02 or fit.standard_error > 0.01
 
 
+@pytest.mark.campaign
 @pytest.mark.skipif(not WIDE, reason="rounding is told from a motion that rounds less")
 @pytest.mark.parametrize(
     "label", [label for label, _ in serving(FIXED, ["spring-uneven"]) if not label.startswith("ase")]

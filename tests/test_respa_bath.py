@@ -115,6 +115,7 @@ def test_a_long_file_of_it_is_told_with_its_substeps_and_its_share_of_fast_sprin
     assert found[0].fast == pytest.approx(41 / 43.9, abs=0.03)
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize(("substeps", "every"), [(3, 1), (4, 3), (20, 1)])
 def test_a_short_file_of_it_is_listed_with_every_count_that_it_leaves_open(substeps: int, every: int) -> None:
     q, v = stepped(by_groups(substeps), 1000 * every)

@@ -61,6 +61,7 @@ def triangle(**changes: object) -> Scene:
 
 
 @pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize("label", RIGHT)
 def test_right_engines_pass_every_check_of_a_dumbbell(label: str, need: Need) -> None:
     need(label)
@@ -77,6 +78,7 @@ def test_right_engines_pass_every_check_of_a_dumbbell(label: str, need: Need) ->
     assert {v.check for v in thorough if v.passed} >= {"mirror", "repeatability"}
 
 
+@pytest.mark.campaign("label")
 @pytest.mark.parametrize("label", RIGHT)
 def test_right_engines_pass_every_check_of_a_rigid_pendulum(label: str, need: Need) -> None:
     need(label)
@@ -472,6 +474,7 @@ def scalene() -> Scene:
     return turning([[0.1, 0.2], [0.05, 0.14], [0.18, 0.13]], (16.0, 1.1, 2.3))
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("make", [scalene, lambda: scenefile.load_scene("rigid-triangle")])
 @pytest.mark.parametrize("label", ["own:velocity-verlet", "ase:rattle", "openmm:verlet-rods"])
 def test_a_rigid_triangle_turns_about_its_axis_by_the_same_arc_sine(

@@ -1,0 +1,135 @@
+"""Claim: what tests leave to `pytest --whole` reaches no line of the package that others do not reach.
+
+    python validation/campaigns.py FILE [...]
+
+Tests marked `campaign` try many cases of one law.  Every case of those in the FILEs (`tests/test_faults.py`)
+is run here, and of each is noted which jumps from line to line of the package it makes, and what it costs.
+The dearest are left out first, as long as others of the same file make all their jumps, and every value of
+the parameters that a mark names, as `campaign("fault.caught_by")` does, still has a case.
+
+`tests/campaigns.txt` lists them: they are run by `pytest --whole` alone, as in CI.  A case that nobody has
+measured is in no list, and so in every run.
+
+It needs coverage (`pip install coverage`), and takes three times as long as the tests.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from arguments import arguments
+
+ROOT = Path(__file__).parent.parent
+LIST = ROOT / "tests" / "campaigns.txt"
+CHEAP = 0.01
+"""Seconds of a case that always stays."""
+APART = ("studies/faults/table.py", "studies/faults/steppers.py")
+"""What breaks engines on purpose: every fault has lines of its own there, and checks tell them apart."""
+
+Jumps = set[tuple[Any, ...]]
+
+
+class Cases:
+    """Every case of a campaign with its jumps and its seconds of processor."""
+
+    def __init__(self, recorder: Any) -> None:
+        self.recorder = recorder
+        self.seconds: dict[str, float] = {}
+        self.values: dict[str, Jumps] = {}
+        self.failed: list[str] = []
+
+    @pytest.hookimpl(trylast=True)
+    def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
+        items[:] = [item for item in items if item.get_closest_marker("campaign")]
+        self.values = {item.nodeid: set(values(item)) for item in items}
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_call(self, item: pytest.Item) -> Iterator[None]:
+        self.recorder.switch_context(item.nodeid)
+        began = time.process_time()
+        try:
+            return (yield)
+        finally:
+            self.seconds[item.nodeid] = time.process_time() - began
+            self.recorder.switch_context("")
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        if not report.passed:
+            self.seconds.pop(report.nodeid, None)
+        if report.failed:
+            self.failed.append(report.nodeid)
+
+
+def values(item: Any) -> Iterator[tuple[Any, ...]]:
+    """What must keep a case: each value of the parameters that the mark names."""
+    for path in item.get_closest_marker("campaign").args:
+        name, *attributes = path.split(".")
+        value = item.callspec.params[name]
+        for attribute in attributes:
+            value = getattr(value, attribute)
+        for one in value if isinstance(value, tuple) else (value,):
+            yield item.function.__name__, path, getattr(one, "__name__", repr(one))
+
+
+def jumps(recorder: Any, names: list[str]) -> dict[str, Jumps]:
+    """Jumps of each case within the package."""
+    data, found = recorder.get_data(), {}
+    files = [file for file in data.measured_files() if not file.endswith(APART)]
+    for name in names:
+        data.set_query_context(name)
+        found[name] = {(file, a, b) for file in files for a, b in data.arcs(file) or ()}
+    return found
+
+
+def left_out(seconds: dict[str, float], made: dict[str, Jumps]) -> set[str]:
+    """Cases that can go, the dearest first, so that every jump is still made by one that stays."""
+    makers = Counter(jump for name in seconds for jump in made[name])
+    out = set()
+    for name in sorted(seconds, key=lambda name: -seconds[name]):
+        if seconds[name] > CHEAP and all(makers[jump] > 1 for jump in made[name]):
+            makers.subtract(made[name])
+            out.add(name)
+    return out
+
+
+def main(files: list[str]) -> int:
+    """Measure the files, and enter what can be left out; 1 if a case fails."""
+    import coverage
+
+    recorder = coverage.Coverage(data_file=None, branch=True, source_pkgs=["springcheck"])
+    cases = Cases(recorder)
+    recorder.start()
+    pytest.main(["-q", "-p", "no:cacheprovider", "--whole", *files], plugins=[cases])
+    recorder.stop()
+    made = {name: of | cases.values[name] for name, of in jumps(recorder, list(cases.seconds)).items()}
+    enter(files, cases.seconds, made)
+    return 1 if cases.failed else 0
+
+
+def enter(files: list[str], seconds: dict[str, float], made: dict[str, Jumps]) -> None:
+    """Put what is left out of the files into the list."""
+    old = LIST.read_text(encoding="utf-8").splitlines() if LIST.exists() else []
+    out = {name for name in old if name.split("::")[0] not in files}
+    for file in files:
+        mine = {name: s for name, s in seconds.items() if name.split("::")[0] == file}
+        gone = left_out(mine, made)
+        out |= gone
+        for one in dict.fromkeys(name.split("[")[0] for name in mine):
+            every = [name for name in mine if name.split("[")[0] == one]
+            kept = [name for name in every if name not in gone]
+            print(
+                f"{one}: {len(kept)} of {len(every)} stay, "
+                f"{sum(mine[x] for x in kept):.1f} s of {sum(mine[x] for x in every):.1f}"
+            )
+    LIST.write_text("".join(f"{name}\n" for name in sorted(out)), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    sys.exit(main(arguments(__doc__, files=[]).files))
