@@ -388,8 +388,9 @@ def test_a_thermostat_is_a_row_whose_temperatures_are_measured(capsys: pytest.Ca
         "-o",
         "c.h5",
     ]
-    assert main([*found, "--csv", "t.csv", "--json"]) == 0
-    entries = {x["method"]: x for x in json.loads(capsys.readouterr().out)["entries"]}
+    assert main([*found, "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    entries = {x["method"]: x for x in document["entries"]}
     assert set(entries) == {"own:baoab", "own:baoa", OWN[0]}
     one = entries["own:baoa"]
     assert one["found"] == "baoa"
@@ -398,7 +399,7 @@ def test_a_thermostat_is_a_row_whose_temperatures_are_measured(capsys: pytest.Ca
     for x, kinetic in ((entries["own:baoab"], 1 - 0.25 / 4), (one, 1.0)):
         assert abs(x["kinetic"] - kinetic) < 5 * x["kinetic_error"] < 0.02
         assert abs(x["configurational"] - 1) < 5 * x["configurational_error"] < 0.02
-    rows = {row["method"]: row for row in csv.DictReader(Path("t.csv").read_text().splitlines())}
+    rows = {row["method"]: row for row in table.rows(document)}
     assert rows["own:baoa"]["thermostat"].startswith("BAOA")
     assert rows["own:baoa"]["amplitude"] == "-"
     assert rows[OWN[0]]["thermostat"] == "none"
