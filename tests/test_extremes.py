@@ -14,6 +14,7 @@ import pytest
 import extreme
 import finer_atlas
 import long_cells
+import solver_cells
 from springcheck import engines, store
 from springcheck.figures import render
 from springcheck.physics.arrays import WIDE
@@ -26,6 +27,7 @@ METHODS = [
     str(label)
     for label in engines.match(("*",))
     if "particles" in engines.method(label).kinds
+    and not engines.method(label).adaptive
     and "rods" not in {x.value for x in engines.method(label).requires}
 ]
 GPU = [
@@ -58,6 +60,21 @@ def test_a_long_run_is_judged_up_to_where_its_forces_leave_fixed_point(need: Nee
     # growth is (1 + (h w)**2)**(1/2) a step and the first force 2**10: 42 steps, and 28, to 2**31
     assert all("grown out of range after step 0:" in cell.reason for cell in cells)
     assert {cell.outcome for cell in cells} == {"unstable, as theory says"}
+
+
+@pytest.mark.parametrize("name", ["sundials:adams", "sundials:bdf"])
+def test_no_cell_of_a_solver_is_silently_wrong(name: str, need: Need) -> None:
+    need(name)
+    cells = solver_cells.cells([name], quick=True)
+    assert len(cells) >= 100
+    assert [cell for cell in cells if cell.outcome == "silently wrong"] == []
+    assert sum(cell.outcome == "right" for cell in cells) >= 20
+
+
+def test_a_solver_has_no_cells_in_the_atlas_and_it_is_said_why() -> None:
+    atlas = extremes.measure(["own:euler", "sundials:bdf"], quick=True)
+    assert {cell.method for cell in atlas.cells} == {"own:euler"}
+    assert "its steps are its own" in atlas.left_out[0].reason
 
 
 @pytest.mark.parametrize("name", ["own:semi-implicit-euler", "own:euler", "own:implicit-euler", "own:rk4"])

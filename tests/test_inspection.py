@@ -200,13 +200,12 @@ def test_a_store_that_lacks_a_part_of_its_study_is_refused_in_one_line(
 
 
 def test_a_study_with_nothing_to_draw_says_so(
-    tmp_path: Path, need: Need, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    need("sundials:bdf")
-    path = tmp_path / "solver.h5"
-    few = grid.solver_specs(quick=True)[:20]
-    monkeypatch.setattr(grid, "solver_specs", lambda *, quick=False: few)
-    extremes.record(path, ["sundials:bdf"], quick=True)
+    path = tmp_path / "special.h5"
+    few = [spec for spec in grid.specs(quick=True) if spec.block == "special"][:20]
+    monkeypatch.setattr(grid, "specs", lambda *, quick=False: few)
+    extremes.record(path, ["own:euler"], quick=True)
     assert main(["plot", str(path), "-o", str(tmp_path)]) == 2
     assert "can be drawn" in capsys.readouterr().err
 

@@ -34,6 +34,7 @@ import mpmath
 import numpy as np
 
 import long_cells
+import solver_cells
 from arguments import arguments
 from springcheck import driver, engines, schemes
 from springcheck.errors import SpringcheckError
@@ -143,7 +144,8 @@ def main() -> int:
     folder = arguments(__doc__, folder=Path("figures")).folder
     began = time.perf_counter()
     atlas = extremes.measure()
-    atlas = replace(atlas, cells=(*atlas.cells, *long_cells.cells()))
+    every = (*atlas.cells, *solver_cells.cells(), *long_cells.cells())
+    atlas = replace(atlas, cells=every, windows=tuple(extremes.windows(every)))
     print(f"{len(atlas.cells)} cells in {time.perf_counter() - began:.0f} s: {dict(atlas.counts())}")
     for window in atlas.windows:
         print(window.sentence)

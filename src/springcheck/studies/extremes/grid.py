@@ -67,7 +67,7 @@ class Spec:
 def specs(*, quick: bool = False) -> list[Spec]:
     """All cells of methods of fixed step that are judged step by step."""
     with np.errstate(over="ignore", under="ignore"):
-        found = [*_forces(), *_sizes(), *_steps(), *_special()]
+        found = [*_forces(), *sizes(), *steps(), *special()]
     if quick:
         # every third decade of the planes; of the steps and the special cases all
         found = [x for j, x in enumerate(found) if x.block in ("step", "special") or j % 3 == 0]
@@ -87,7 +87,7 @@ def force_cell(turn: float, decade: int) -> Spec:
     return Spec(block="force", m=MASS, k=k, q=q, p=0.6 * MASS * (turn / STEP) * q, h=STEP)
 
 
-def _sizes() -> Iterator[Spec]:
+def sizes() -> Iterator[Spec]:
     """The plane of mass and stiffness at h w = 0.3, amplitude 1."""
     for a, b in itertools.product(SIZES, SIZES):
         m, k = 3.7 * 10.0**a, 2.9 * 10.0**b
@@ -96,7 +96,7 @@ def _sizes() -> Iterator[Spec]:
         yield Spec(block="size", m=m, k=k, q=1.0, p=0.6 * np.sqrt(m) * np.sqrt(k), h=0.25 / w)
 
 
-def _steps() -> Iterator[Spec]:
+def steps() -> Iterator[Spec]:
     """Steps of every size and both signs at h w = 0.3, and free motion where no stiffness is large enough."""
     for decade, sign in itertools.product(STRETCH, (1, -1)):
         h = sign * 3.1 * 10.0**decade
@@ -104,7 +104,7 @@ def _steps() -> Iterator[Spec]:
         yield Spec(block="step", m=3.7, k=float(k) if np.isfinite(k) else 0.0, q=0.8, p=0.0, h=h)
 
 
-def _special() -> Iterator[Spec]:
+def special() -> Iterator[Spec]:
     """k = 0, k < 0, nothing at all, the smallest and the largest numbers; all with one step."""
     for k, q, p in (
         (0.0, 0.3, 0.7), (0.0, 0.0, 0.0), (0.0, 1e300, 1e300), (0.0, 1e-300, 1e-300), (2.9, 0.0, 0.0),
@@ -116,25 +116,6 @@ def _special() -> Iterator[Spec]:
     ):  # fmt: skip
         for m in (3.7, 0.37):
             yield Spec(block="special", m=m, k=k, q=q, p=p, h=0.11)
-
-
-def solver_specs(*, quick: bool = False) -> list[Spec]:
-    """Cells of adaptive solvers, each a run of its own: 20 outputs."""
-    found: list[Spec] = []
-    with np.errstate(over="ignore", under="ignore"):
-        for decade, tolerance in itertools.product(
-            (-300, -200, -150, -100, -30, -10, 0, 10, 30, 100, 150, 200, 300),
-            (1e-3, 1e-6, 1e-9, 1e-12, 1e-15),
-        ):
-            q = 10.0**decade
-            found.append(Spec(block="force", m=3.7, k=2.9, q=q, p=0.0, h=0.3, tolerance=tolerance))
-        found += [x for x in _sizes() if x.finite][:: 4 if quick else 1]
-        found += [x for x in _steps() if x.finite]
-        found += [x for x in _special() if x.finite]
-        for turn in TURNS:
-            k = MASS * (turn / STEP) ** 2
-            found.append(Spec(block="turn", m=MASS, k=k, q=0.3, p=0.7, h=STEP))
-    return [x for x in found if x.finite]
 
 
 def scene(cells: list[Spec], label: Label, requires: frozenset[Need]) -> Scene:

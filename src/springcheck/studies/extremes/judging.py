@@ -39,7 +39,7 @@ RANGES = {
 """Smallest normal and largest number of a width."""
 
 
-PARAMETERS = ("m", "k", "q", "p", "h", "steps", "h_w", "force", "tolerance")
+PARAMETERS = ("m", "k", "q", "p", "h", "steps", "h_w", "force")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,7 +52,7 @@ class Cell:
     outcome: Outcome
     reason: str
     value: float
-    """Largest distance of a step from the scheme's own, in roundings; the global error for a solver."""
+    """Largest distance of a step from the scheme's own, in roundings."""
     bound: float
 
     @property

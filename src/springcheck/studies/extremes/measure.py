@@ -83,7 +83,9 @@ def absence(label: Label) -> str | None:
     method = engines.method(label)
     if "wall-spring" not in method.terms or "particles" not in method.kinds:
         return "it moves no particles on springs"
-    return engines.absence(label.engine) or (None if method.adaptive else propagators.absence(label))
+    if method.adaptive:
+        return "its steps are its own, and no step is judged by itself"
+    return engines.absence(label.engine) or propagators.absence(label)
 
 
 def record(
@@ -125,9 +127,6 @@ def stored(kept: keeper.Kept) -> Atlas:
 
 def of_method(label: Label, *, quick: bool = False) -> list[Cell]:
     """All cells of one method."""
-    if engines.method(label).adaptive:
-        return [running.solve(label, spec) for spec in grid.solver_specs(quick=quick)]
-
     return [cell for specs in groups(label, quick=quick) for cell in running.cells(label, specs)]
 
 

@@ -33,10 +33,10 @@ def _filled(row: list[int]) -> list[int]:
 
 
 def banks(atlas: Atlas) -> list[Bank]:
-    """A map for each method of fixed step."""
+    """A map for each method."""
     methods = dict.fromkeys(cell.method for cell in atlas.cells)
     planes = {x: [c for c in atlas.cells if c.method == x and c.block == "force"] for x in methods}
-    charts = [_chart(method, cells) for method, cells in planes.items() if _is_plane(cells)]
+    charts = [_chart(method, cells) for method, cells in planes.items() if cells]
     if not charts:
         return []
     wrong = f"{count(len(atlas.wrong), 'case')} silently wrong" if atlas.wrong else "none silently wrong"
@@ -45,12 +45,6 @@ def banks(atlas: Atlas) -> list[Bank]:
     )
     heading = f"Of {len(atlas.cells)} extreme cases {wrong}: {others}"
     return [Bank(name="extremes", heading=heading, title="Methods drawn", charts=charts)]
-
-
-def _is_plane(cells: Sequence[Cell]) -> bool:
-    """Whether cells are of a method of fixed step; a solver, whose step is its own, has no plane."""
-    steps, springs = ({cell.parameters[name] for cell in cells} for name in ("h", "k"))
-    return len(steps) == 1 and len(springs) > 1
 
 
 def _chart(method: str, cells: Sequence[Cell]) -> Chart:
