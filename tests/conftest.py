@@ -19,7 +19,7 @@ from matplotlib.lines import Line2D
 from springcheck import driver, engines
 from springcheck.figures import style
 from springcheck.store import apart, trust
-from springcheck.studies.precision import measure, sweeps
+from springcheck.studies.precision import measure, sweeps, timing
 
 # hundreds of processes that tests start would compile the whole package each
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
@@ -157,13 +157,13 @@ def tried_here(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 class Clock:
-    """Seconds by what was done: 1e-7 a step, 1e-5 a frame of an adaptive solver, 1e-6 a look at the clock."""
+    """Seconds by what was done: 1e-7 a step, 1e-5 a frame of an adaptive solver, 1e-7 a look at the clock."""
 
     def __init__(self) -> None:
         self.seconds = 0.0
 
     def __call__(self) -> float:
-        self.seconds += 1e-6
+        self.seconds += 1e-7
         return self.seconds
 
 
@@ -199,6 +199,6 @@ def steady_clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
             return _Metered(self._inner.start(scene, method, label, step), clock, each)
 
     monkeypatch.setattr(engines, "load", Driver)
-    for module in (driver, measure, sweeps):
+    for module in (driver, measure, sweeps, timing):
         monkeypatch.setattr(module, "perf_counter", clock)
     return clock
