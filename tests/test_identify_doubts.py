@@ -198,6 +198,34 @@ def test_methods_with_an_acceleration_of_their_own_are_told_with_their_parameter
         assert f"a scheme with memory, of second order, {said}" in found.statement
 
 
+@pytest.mark.parametrize(
+    ("old", "slopes", "said"),
+    [
+        ([0, 1], [2, 0], "the leapfrog of two steps"),
+        ([4 / 3, -1 / 3], [2 / 3], "the two before it, and not from one: a scheme with memory, of second"),
+        ([18 / 11, -9 / 11, 2 / 11], [6 / 11], "several before it, and not from one: a scheme with memory, "
+         "of third order, BDF3"),
+    ],
+)  # fmt: skip
+def test_methods_of_several_steps_are_told_with_their_number(
+    old: list[float], slopes: list[float], said: str
+) -> None:
+    """z[n+1] is old z[n], z[n-1]... and h times the slopes there, or there is one slope, at the end."""
+    h = 0.2
+    rate = h * np.array([[0, 1], [-K / M, 0]])
+    ahead = np.linalg.inv(np.eye(2) - slopes[0] * rate) if len(slopes) == 1 else np.eye(2)
+    z = [np.array([1.3, 0.4])]
+    while len(z) < len(old):
+        z.append(z[-1] + rate @ (z[-1] + rate @ z[-1] / 2))
+    while len(z) < 101:
+        new = sum(c * z[-1 - i] for i, c in enumerate(old))
+        if len(slopes) > 1:
+            new = new + rate @ sum(c * z[-1 - i] for i, c in enumerate(slopes))
+        z.append(ahead @ new)
+    q, v = np.array(z).T
+    assert said in identify(h * np.arange(101), q, v=v, mass=M).statement
+
+
 def test_a_method_with_memory_that_is_none_of_the_known_is_none_of_them() -> None:
     """Every other step of one, another one with friction, and another of the stages' weights."""
     h = 0.2

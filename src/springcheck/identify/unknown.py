@@ -145,9 +145,23 @@ def memory(e: Evidence) -> list[Explanation]:
     # of a motion that dies down or grows each frame counts by its size
     unit = float(np.max(e.unit / size[1:]))
     off = np.max(np.abs(e.misses), axis=1) / size[1:]
-    if np.max(off[1:]) < 64 * unit or np.max(off[len(off) // 4 :]) > FORGOTTEN * np.max(off):
+    if np.max(off[1:]) < 64 * unit:
         return []
     now, old, new = z[1:-1] / size[2:, None], z[:-2] / size[2:, None], z[2:] / size[2:, None]
+    leap = new - old
+    after = float(np.max(np.abs(leap - now @ np.linalg.lstsq(now, leap, rcond=None)[0])))
+    if after < 64 * unit:
+        return [
+            Explanation(
+                cause="Each state is the last but one and a linear map of the last: the leapfrog of two "
+                "steps, z[n+1] = z[n-1] + 2 h f(z[n]), whose even and odd frames part",
+                remedy="judge it as a scheme of two steps; a first step of second order parts them less",
+                misfit=after,
+                local=True,
+            )
+        ]
+    if np.max(off[len(off) // 4 :]) > FORGOTTEN * np.max(off):
+        return []
     columns = np.concatenate([now, old], axis=1)
     left = new - columns @ np.linalg.lstsq(columns, new, rcond=None)[0]
     # the first frames alone show the other map, but for which all follow one
@@ -157,24 +171,24 @@ def memory(e: Evidence) -> list[Explanation]:
     if before < FALLS * after or before < 64 * unit:
         return []
     whose = _remembering(e)
-    kind = "of two steps or with an acceleration of its own (Adams-Bashforth, BDF2, generalised alpha)"
+    kind = "two steps or with an acceleration of its own (Adams-Bashforth, BDF2, generalised alpha)"
+    several = "the two" if after < 64 * unit else "several"
     return [
         Explanation(
-            cause=f"Each state follows from the two before it, and not from one: a scheme with memory, "
-            f"{f'of second order, {whose},' if whose else f'{kind},'} whose start differs from one map by "
-            f"{before:.1e} of the state's size",
-            remedy="leave the first frames out, and judge it as a scheme of two steps",
+            cause=f"Each state follows from {several} before it, and not from one: a scheme with memory, "
+            f"of {whose or kind}, whose start differs from one map by {before:.1e} of the state's size",
+            remedy="leave the first frames out, and judge it as a scheme of as many steps",
             misfit=after / before,
             local=after < 64 * unit,
         )
     ]
 
 
-def _two_steps(old: Floats, slopes: Floats, x: Floats) -> Floats:
-    """What a method of two steps makes of (q, v h) once its start is forgotten: y'' - y' + old (y' - y) is
-    h L times the slopes' weights of y'', y' and y; x is (h w)**2."""
+def _many_steps(rho: list[float], sigma: list[float], x: Floats) -> Floats:
+    """What a linear multistep method, rho(E) y = h L sigma(E) y, makes of (q, v h) once its start is
+    forgotten, by the root of rho - z sigma that comes nearest to exp(z); x is (h w)**2."""
     z = 1j * math.sqrt(max(x[0], 1e-300))
-    roots = np.roots([1 - slopes[0] * z, old[0] - 1 - slopes[1] * z, -old[0] - slopes[2] * z])
+    roots = np.roots(np.array(rho) - z * np.array(sigma))
     r = roots[np.argmin(np.abs(roots - np.exp(z)))]
     return np.array([r.real, r.imag / z.imag, -z.imag * r.imag, r.real])
 
@@ -196,13 +210,14 @@ def _generalised(shares: Callable[[float], tuple[float, float]], x: Floats) -> F
 
 
 WITH_MEMORY: dict[str, Callable[[Floats], Floats]] = {
-    "Adams-Bashforth (AB2)": partial(_two_steps, np.zeros(1), np.array([0, 1.5, -0.5])),
-    "BDF2": partial(_two_steps, np.array([-1 / 3]), np.array([2 / 3, 0, 0])),
-    "HHT with alpha = -{:.6g}": partial(_generalised, lambda x: (0.0, x)),
-    "generalised alpha with rho_infinity = {:.6g}": partial(
+    "second order, Adams-Bashforth (AB2)": partial(_many_steps, [1, -1, 0], [0, 1.5, -0.5]),
+    "second order, BDF2": partial(_many_steps, [1, -4 / 3, 1 / 3], [2 / 3, 0, 0]),
+    "third order, BDF3": partial(_many_steps, [1, -18 / 11, 9 / 11, -2 / 11], [6 / 11, 0, 0, 0]),
+    "second order, HHT with alpha = -{:.6g}": partial(_generalised, lambda x: (0.0, x)),
+    "second order, generalised alpha with rho_infinity = {:.6g}": partial(
         _generalised, lambda x: ((2 * x - 1) / (x + 1), x / (x + 1))
     ),
-    "WBZ with alpha_m = -{:.6g}": partial(_generalised, lambda x: (-x, 0.0)),
+    "second order, WBZ with alpha_m = -{:.6g}": partial(_generalised, lambda x: (-x, 0.0)),
 }
 """Schemes that remember more than a state, by what they are once the start is forgotten, and the name."""
 
