@@ -226,6 +226,19 @@ def test_methods_of_several_steps_are_told_with_their_number(
     assert said in identify(h * np.arange(101), q, v=v, mass=M).statement
 
 
+def test_steps_that_alternate_are_told_with_what_they_alternate_by_and_are_no_drive() -> None:
+    q, v, h, states = 1.3, 0.4, 0.13, []
+    for i in range(101):
+        states.append((q, v))
+        step = h * (1 + 0.01 * (-1) ** i)
+        v -= step / 2 * K * q / M
+        q += step * v
+        v -= step / 2 * K * q / M
+    qs, vs = np.array(states).T
+    found = identify(h * np.arange(101), qs, v=vs, mass=M)
+    assert "alternate: steps alternate by 0.02 of their length" in found.statement
+
+
 def test_a_method_with_memory_that_is_none_of_the_known_is_none_of_them() -> None:
     """Every other step of one, another one with friction, and another of the stages' weights."""
     h = 0.2

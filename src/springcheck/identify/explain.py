@@ -203,8 +203,8 @@ def _shape(e: Evidence) -> list[Explanation]:
     best = min(left[name] * math.sqrt(len(groups[name])) for name in fitting)
     room = {name: max(3 * best / math.sqrt(len(groups[name])), 0.02) for name in fitting}
     good = [name for name in groups if name in fitting and left[name] <= room[name]]
-    if "parity" in good:  # which is a beat without its slope
-        good = [name for name in good if name != "beat"]
+    if "parity" in good:  # which is a beat without its slope, and a drive that alternates with the motion
+        good = [name for name in good if name not in ("beat", "drive")]
     untried = counted < FEWEST_MISSES or (good[0] in tuned and "anharmonic" not in left)
     if untried and FALLS * left[good[0]] > 1 and good[0] != "constant":
         # what explains a part, a frequency that was looked for above all, may stand for what so few pairs
@@ -291,7 +291,7 @@ def _two_maps(e: Evidence) -> tuple[str, str]:
     elif names:
         one, other = (next(m for m in ms if m.scheme == names[0]) for ms in found)
         share = abs(math.sqrt(one.a / other.a) - 1)
-        what = f"the steps of {title(names[0])} alternate by {share:.2g} of their length"
+        what = f"steps alternate by {share:.2g} of their length"
     return (
         f"Even and odd steps differ and alternate: {what}",
         "look for a buffer or a sign that is switched in every step",
@@ -383,13 +383,6 @@ def _noise(e: Evidence, size: float, counted: float) -> Explanation:
             f"from frame to frame, {size:.1e} of the state's size in each, in {where}",
             remedy="look for several errors at once, and take them out one by one; a solver that chooses its "
             "steps has no fixed scheme to find" + (NEEDS_TWO if e.record.q.shape[1] == 1 else ""),
-            misfit=size,
-        )
-    if e.record.parts is not None and e.record.q.shape[1] > 1:
-        return Explanation(
-            cause=f"The normal modes of the coordinates are parted to no more than {size:.1e} of their size "
-            "in each frame, as where one is stiff and small: no scheme is told",
-            remedy="give the coordinates of one mode, or a motion in which all have the same size",
             misfit=size,
         )
     return Explanation(

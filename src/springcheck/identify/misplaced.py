@@ -176,8 +176,6 @@ def _nearer(q: Floats, v: Floats, h: float) -> bool:
 
 
 def _where(frames: Integers, of: int) -> str:
-    if len(frames) == of:
-        return "in every frame"
     if len(frames) == of - int(frames[0]):
         return f"from frame {int(frames[0])} on"
     shown = ", ".join(str(int(i)) for i in frames[:4])

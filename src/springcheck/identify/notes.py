@@ -10,7 +10,7 @@ import numpy as np
 from springcheck.errors import IdentificationError
 from springcheck.identify.clock import FEWEST_STATES
 from springcheck.identify.compare import compare
-from springcheck.identify.families import EULER, FAMILIES, IMPLICIT, title
+from springcheck.identify.families import FAMILIES, title
 from springcheck.identify.fit import Map
 from springcheck.identify.guesses import roots_of
 from springcheck.identify.hypothesis import Joint, Terms
@@ -136,8 +136,7 @@ def _between(low: float, high: float) -> str:
 def of_unasked_friction(found: Identification) -> Identification:
     """What was found, where the friction is that of a scheme written down wrongly: h k/(n m), n whole.
 
-    Semi-implicit Euler with an implicit friction of h k/m is implicit Euler of the same stiffness, entry for
-    entry; and where a scheme without friction has the stated stiffness, nothing is unasked.
+    Where a scheme without friction has the stated stiffness, nothing is unasked.
     """
     if not found.fits or not found.friction or not found.step or not all(x.law for x in found.candidates):
         return found
@@ -151,16 +150,6 @@ def of_unasked_friction(found: Identification) -> Identification:
             if not parts:
                 continue
             n = parts[0]
-            own = n == 1 and abs(lost[0] / a - 1) < MARK
-            if own and one.scheme == EULER and one.law.startswith(IMPLICIT):
-                plain = replace(
-                    one, scheme="implicit-euler", aliases=(), friction=(0.0,) * len(one.omega), law=""
-                )
-                said = f"{title(plain.scheme)}: {found.precision} arithmetic explains every step"
-                return replace(
-                    found, verdict="named", scheme=plain.scheme, nearest=plain.scheme, candidates=(plain,),
-                    aliases=(), friction=plain.friction, statement=said, velocity_offset=0.0,
-                )  # fmt: skip
             part = "h k/m" if n == 1 else f"h k/({n} m)"
             cause = (
                 f"{one.scheme} with a friction c/m = {rate:.6g} that was not stated and loses as much area "

@@ -132,10 +132,6 @@ def read(
         raise IdentificationError(
             f"{len(times)} states are too few to read a map from; give {FEWEST_STATES} or more"
         )
-    if p is None and v is None:
-        raise IdentificationError(
-            "positions alone do not show the scheme; give momenta or velocities as well"
-        )
     positions = _states(q, "q", len(times))
     given = [_states(x, name, len(times)) for name, x in (("p", p), ("v", v)) if x is not None]
     for x in given:

@@ -100,8 +100,6 @@ def recurrence(record: Record, j: int, steps: int) -> Recurrence:
         if whole is not None:
             alpha, beta, covariance = whole
             precision = record.q_storage.name
-        elif record.q_storage.name == "single":
-            precision = "single" if explained(2.0**-23) else ""
         elif explained(2.0**-23, 2 * np.sqrt(12.0) * (stored[2:] + 2 * stored[1:-1] + stored[:-2]) / 4):
             precision = record.q_storage.name
     # a coefficient is rounded once and the same in every step, which no number of frames averages away

@@ -128,11 +128,7 @@ def _of_record(
         return found
     other = _of_coordinates(pair, None, friction, step)
     # a coordinate of a pair is no oscillator, and what is said of it alone is wrong
-    plainer = other.fits or other.defect_ulp < found.defect_ulp
-    if found.fits:
-        # in single precision a drift passes for a force that fits many schemes
-        plainer = other.fits and other.scheme is not None
-    return of_a_pair(record, other) if plainer else found
+    return of_a_pair(record, other) if other.fits or other.defect_ulp < found.defect_ulp else found
 
 
 def _of_coordinates(
