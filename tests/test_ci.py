@@ -110,6 +110,7 @@ def judged_here(
     return status, first_sentence(Path("summary.md"))
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize(("name", "scheme", "options", "cause"), BUGS)
 def test_the_first_sentence_of_the_summary_is_the_cause_of_a_real_bug(
     name: str, scheme: str, options: str, cause: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

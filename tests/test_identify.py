@@ -88,6 +88,7 @@ def schemes(found: Identification) -> set[str]:
     return {x.scheme for x in found.candidates}
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("name", STEPPING)
 def test_a_scheme_is_named_with_its_stride_stiffness_and_precision(name: str) -> None:
     rng = np.random.default_rng(len(name) + 1)
@@ -172,6 +173,7 @@ def test_what_rounding_hides_is_said_and_not_guessed() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize("form", ["single", "text"])
 @pytest.mark.parametrize("name", ["rk4", "ruth3", "forest-ruth", "yoshida4"])
 def test_a_scheme_of_high_order_in_coarse_numbers_is_named_or_listed_and_never_called_another(

@@ -304,7 +304,9 @@ def test_a_slip_is_answered_with_what_was_meant(
     assert len(error.splitlines()) == 1
 
 
-def test_every_method_runs_by_all_and_by_a_star(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_every_method_runs_by_all_and_by_a_star(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], whole: bool
+) -> None:
     path = str(tmp_path / "a.h5")
     assert main(["run", "spring", "--steps", "20", "-o", path]) == 0
     said = capsys.readouterr().out
@@ -312,14 +314,14 @@ def test_every_method_runs_by_all_and_by_a_star(tmp_path: Path, capsys: pytest.C
     assert "own:rk4" in line
     assert "own:euler" not in line
     counts = []
-    for arguments in (["--all"], ["--method", "*"]):
+    for arguments in (["--all"], ["--method", "*"])[: 2 if whole else 1]:
         short = ["--steps", "20", "-o", path, "--force", "--json"]
         assert main(["run", "spring", *arguments, *short]) in (0, 1, 2)
         document = json.loads(capsys.readouterr().out)
         counts.append(len(document["runs"]))
         assert document["others"] == []
         assert "own:rk4" in {run["method"] for run in document["runs"]}
-    assert counts[0] == counts[1] > 25
+    assert counts[0] == counts[-1] > 25
 
 
 def test_run_says_which_methods_its_step_is_too_long_for(

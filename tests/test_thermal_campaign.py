@@ -40,6 +40,7 @@ SHORT = {203931}
 """Cases whose list lacks the scheme: Andersen's collisions of one step in forty, in single precision."""
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("case", WRONG_BEFORE)
 def test_files_that_had_a_wrong_name_have_none(case: int) -> None:
     scheme, kind, (t, q, p, scene) = campaign.file_of(case, *WRONG_BEFORE[case])

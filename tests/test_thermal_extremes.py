@@ -57,6 +57,7 @@ RIGHT: tuple[tuple[str, dict[str, float]], ...] = (
 )
 
 
+@pytest.mark.campaign
 @pytest.mark.skipif(not WIDE, reason="bounds are those of 80-bit long double")
 @pytest.mark.parametrize(("label", "given"), RIGHT)
 def test_a_right_thermostat_passes_however_far_its_numbers_are(label: str, given: dict[str, float]) -> None:
@@ -110,6 +111,7 @@ LISTS: tuple[tuple[str, dict[str, Any]], ...] = (
 )
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize(("name", "given"), LISTS)
 def test_a_file_is_given_every_scheme_that_may_have_made_it(name: str, given: dict[str, Any]) -> None:
     run = driver.run(scene(steps=1000, **given), f"own:{name}", seed=3)

@@ -85,6 +85,7 @@ def test_two_draws_a_step_are_told_apart_by_likelihood(name: str) -> None:
     assert abs(best.omega - OMEGA) < 5 * best.omega_error < 0.1
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize(
     "label", ["own:semi-implicit-euler", "own:velocity-verlet", "own:position-verlet", "own:rk4"]
 )
@@ -210,6 +211,7 @@ def in_units_of_one(name: str) -> tuple[tuple[np.ndarray, np.ndarray, np.ndarray
     return made, identify_thermal(*made)
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("name", ["obabo", "baoab"])
 @pytest.mark.parametrize(("length", "time"), [(1e-10, 1e-13), (1e-80, 1.0), (1e60, 1e-6)])
 def test_a_unit_is_of_no_account(name: str, length: float, time: float) -> None:
@@ -231,6 +233,7 @@ def test_a_stop_of_all_noise_halfway_is_no_collision() -> None:
     assert between_collisions(q, v, float(t[1] - t[0])) == []
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("name", ["baoa", "gj-iii", "lammps-langevin", "obabo"])
 def test_joined_particles_are_told_by_their_modes(name: str) -> None:
     m, k, joint = np.array([0.7, 2.9]), np.array([1.3, 2.1]), 1.7

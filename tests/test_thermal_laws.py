@@ -199,6 +199,7 @@ def test_diffusion_is_that_of_the_table(name: str) -> None:
         assert found == pytest.approx(1, rel=1e-12)
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("name", ["baoab", "aboba", "gj-i", "lammps-langevin", "bbk", "andersen-after-kick"])
 def test_laws_are_what_long_runs_of_the_scheme_itself_show(name: str) -> None:
     """Ten thousand springs side by side, 200 steps after 400: each number within five standard errors."""

@@ -62,6 +62,7 @@ def test_there_are_twenty_methods_of_four_engines_at_least() -> None:
     assert len({label.partition(":")[0] for label in LABELS}) == 4
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("label", LABELS)
 def test_a_thermostat_passes_its_checks_and_says_its_seed(label: str) -> None:
     here(label)
@@ -74,6 +75,7 @@ def test_a_thermostat_passes_its_checks_and_says_its_seed(label: str) -> None:
     assert run.origin["generator"]
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("label", [label for label in LABELS if not of_chain(label)])
 def test_a_seed_is_kept_to_and_another_seed_is_another_run(label: str) -> None:
     here(label)

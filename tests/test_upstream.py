@@ -97,6 +97,7 @@ def printed(script: str) -> str:
     return out.getvalue()
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("script", SCRIPTS, ids=lambda x: x.stem)
 def test_a_finding_is_still_there(script: Path, tmp_path: Path) -> None:
     words = command(script, tmp_path)

@@ -68,6 +68,7 @@ def judged(scene: Scene) -> dict[str, Any]:
     return {v.check: v for v in checks.judge(scene, springcheck.simulate(scene, LABEL))}
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("step", [0.1, -0.07])
 @pytest.mark.parametrize("tolerance", [1e-2, 3e-4])
 @pytest.mark.parametrize("name", ["spring-uneven", "chain", "orbit", "anharmonic"])
