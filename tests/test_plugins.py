@@ -310,5 +310,4 @@ def test_every_engine_is_registered_and_of_fields_that_mean_something() -> None:
     for name in engines.names():
         found = engines.engine(name)
         assert found.name == name
-        assert found.step_seconds > 0
         assert np.all([place.partition("@")[0] in found.methods for place in found.atlas])

@@ -16,6 +16,7 @@ from dataclasses import replace
 import numpy as np
 
 from arguments import arguments
+from cvode_steps import step_seconds
 from springcheck import checks, driver, engines
 from springcheck.checks.case import overflows
 from springcheck.engines.contract import Label
@@ -33,7 +34,7 @@ FAST_SECONDS, SLOW_SECONDS = 1e-8, 1e-4
 
 def lengths(label: Label, *, quick: bool = False) -> list[Spec]:
     """Cells that are judged by the end of a long run."""
-    seconds = engines.engine(label.engine).step_seconds
+    seconds = step_seconds(label)
     steps = list(LENGTHS)
     if seconds > SLOW_SECONDS:
         steps = [1, 10, 1000] if quick else [1, 10, 1000, 4000]

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from arguments import arguments
+from cvode_steps import internal_steps
 from springcheck import checks, engines
 from springcheck.engines.contract import Label, Stopped
 from springcheck.physics import exact
@@ -59,11 +60,10 @@ MOST = 20_000
 def solve(label: Label, spec: Spec) -> Cell:
     """One cell by an adaptive solver, judged at its end."""
     scene = grid.scene([spec], label, frozenset())
-    solver = engines.internal_steps(label)
     said, value, bound, whole, unmeasured = "", np.nan, np.nan, False, ""
     with np.errstate(all="ignore"):
         try:
-            done = solver(scene, engines.method(label), most=MOST)
+            done = internal_steps(scene, engines.method(label), most=MOST)
         except Stopped as stop:
             said = f"; it says: {stop}"
         else:

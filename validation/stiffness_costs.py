@@ -20,6 +20,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from arguments import arguments
+from cvode_steps import internal_steps, step_seconds
 from springcheck import driver, engines, schemes
 from springcheck.engines.contract import Label, Stopped
 from springcheck.errors import MethodError
@@ -67,7 +68,7 @@ MOST_STEPS = 1_500_000
 
 def most_steps(label: Label) -> int:
     """Steps of this method that are worth their time."""
-    return min(MOST_STEPS, round(WORTH_SECONDS / engines.engine(label.engine).step_seconds))
+    return min(MOST_STEPS, round(WORTH_SECONDS / step_seconds(label)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -159,11 +160,10 @@ def _fixed(found: Scene, label: Label, family: Family, ratio: float) -> Cost:
 
 
 def _solver(found: Scene, label: Label, family: Family, ratio: float) -> Cost:
-    solver = engines.internal_steps(label)
     end = found.step * found.steps
     common: dict[str, Any] = {"family": family, "method": str(label), "ratio": ratio}
     try:
-        done = solver(found, engines.method(label), most=most_steps(label))
+        done = internal_steps(found, engines.method(label), most=most_steps(label))
     except Stopped as stop:
         return Cost(**common, step=np.nan, steps=stop.rows, outcome=f"stopped: {stop}")
     whole = done.t >= end

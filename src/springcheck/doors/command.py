@@ -60,7 +60,6 @@ def engine(
         start=start,
         version=lambda: {name: shlex.join(words) for name, words in commands.items()},
         convention=lambda method: "as the command writes them",
-        step_seconds=1e-3,
     )
 
 

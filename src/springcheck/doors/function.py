@@ -141,7 +141,6 @@ def engine(specs: Sequence[Spec], stated: Callable[[str], str] = lambda name: ""
         start=start,
         version=dict,
         convention=lambda method: "as the function returns them",
-        step_seconds=2e-5,
         any_axis=True,
         periodic=True,
     )

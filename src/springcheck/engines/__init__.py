@@ -52,7 +52,7 @@ from springcheck.thermal import THERMOSTATS
 __all__ = [
     "ANY_POTENTIAL", "BRAKES", "DRIVEN", "EVERY_FORCE", "EVERY_POTENTIAL", "OURS", "Arithmetic", "Engine",
     "Label", "Method", "Need", "Simulation", "Stopped", "absence", "bring", "engine", "foreign", "from_file",
-    "guarded", "installed_version", "internal_steps", "is_brought", "load", "match", "method", "module_name",
+    "guarded", "installed_version", "is_brought", "load", "match", "method", "module_name",
     "module_of", "named", "names", "origin", "parse", "refusal", "start", "unusable", "while_here",
 ]  # fmt: skip
 
@@ -94,14 +94,6 @@ def load(name: str) -> Engine:
         kind = type(said).__name__
         raise MethodError(f"engine {name!r}: its version() returned {kind}, not a dict of names and versions")
     return found
-
-
-def internal_steps(label: Label) -> Callable[..., Any]:
-    """What an adaptive solver does on its way, counted.  MethodError where its engine cannot count."""
-    counted = load(label.engine).internal_steps
-    if counted is None:
-        raise MethodError(f"{label}: its engine does not count internal steps")
-    return counted
 
 
 @cache

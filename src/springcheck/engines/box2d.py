@@ -94,5 +94,4 @@ ENGINE = Engine(
     start=_World,
     version=installed_version("box2d"),
     arithmetic=single,
-    step_seconds=5e-6,
 )

@@ -167,8 +167,6 @@ class Engine:
     """Schemes that are not in the catalogue."""
     atlas: tuple[str, ...] = ()
     """Methods on platforms, as `method@platform`, that the atlas of extremes measures beside the methods."""
-    step_seconds: float = 1e-6
-    """What a step of one particle takes, about: studies plan their longest runs by it."""
     squares_lengths: bool = False
     """Forces come from the lengths of bonds, roots of squares, and 1/m and 1/h are formed: half the range of
     exponents is left."""
@@ -176,8 +174,6 @@ class Engine:
     """Whether it moves particles along y and z as well: it then reads `Scene.where`."""
     periodic: bool = False
     """Whether it serves scenes in a periodic box, its positions counted on across the borders."""
-    internal_steps: Callable[..., Any] | None = None
-    """internal_steps(scene, method, most=): what an adaptive solver does on its way, counted."""
 
     @property
     def install(self) -> str:

@@ -100,5 +100,4 @@ ENGINE = Engine(
     ),
     start=_World,
     version=version_of("dartpy", "dart"),
-    step_seconds=3e-6,
 )

@@ -87,5 +87,4 @@ ENGINE = Engine(
     ),
     start=_Plant,
     version=installed_version("drake"),
-    step_seconds=3e-5,
 )  # fmt: skip

@@ -104,5 +104,4 @@ ENGINE = Engine(
     ),
     start=_Series,
     version=version_of("heyoka"),
-    step_seconds=1e-5,
 )  # fmt: skip

@@ -390,7 +390,6 @@ ENGINE = Engine(
         # (1 - c2)/x of a c2 that is rounded, that of method 4 by (sqrt(1 + 4x) - 1)/2x
         cancels=(1 + label.method.startswith("gjf-4")) * label.method.startswith("gjf"),
     ),
-    step_seconds=1e-5,
     any_axis=True,
     periodic=True,
     squares_lengths=True,

@@ -215,5 +215,4 @@ ENGINE = Engine(
     version=version_of("mujoco"),
     arithmetic=arithmetic,
     convention=lambda method: "velocities of the joints, synchronised",
-    step_seconds=3e-6,
 )  # fmt: skip

@@ -98,5 +98,4 @@ ENGINE = Engine(
     start=_Space,
     version=version,
     arithmetic=arithmetic,
-    step_seconds=5e-6,
 )

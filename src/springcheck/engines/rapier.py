@@ -87,5 +87,4 @@ ENGINE = Engine(
     start=_World,
     version=version_of("rapier3d"),
     arithmetic=single,
-    step_seconds=2e-5,
 )

@@ -115,5 +115,4 @@ ENGINE = Engine(
     ),
     start=_Simulation,
     version=version_of("rebound"),
-    step_seconds=8e-6,
 )  # fmt: skip

@@ -121,6 +121,5 @@ ENGINE = Engine(
     schemes=SCHEMES,
     start=_Solver,
     version=version_of("scipy"),
-    step_seconds=1e-4,
     any_axis=True,
 )

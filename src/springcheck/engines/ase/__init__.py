@@ -55,7 +55,6 @@ ENGINE = Engine(
             note="it counts three degrees of freedom for each atom, whatever is fixed of it",
         ),
     ),
-    step_seconds=3e-4,
     any_axis=True,
     **deferred(f"{__name__}.simulation", "arithmetic"),
 )  # fmt: skip

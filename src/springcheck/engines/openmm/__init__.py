@@ -157,7 +157,6 @@ ENGINE = Engine(
         ),
     ),
     atlas=tuple(f"verlet@{place}" for place in ("CPU", "OpenCL-single", "OpenCL-mixed", "OpenCL-double")),
-    step_seconds=8e-7,
     any_axis=True,
     periodic=True,
     squares_lengths=True,

@@ -88,7 +88,6 @@ ENGINE = Engine(
         ),
     ),
     # compiled
-    step_seconds=4e-9,
     any_axis=True,
     periodic=True,
     convention=lambda method: "positions and momenta belong to the same time",

@@ -31,7 +31,6 @@ ENGINE = Engine(
             SPRINGS | {"damping"}, adaptive=True, kinds=frozenset({"circuit"}),
         ),
     ),
-    step_seconds=6e-5,
     any_axis=True,
-    **deferred(f"{__name__}.simulation", "internal_steps"),
+    **deferred(f"{__name__}.simulation"),
 )  # fmt: skip

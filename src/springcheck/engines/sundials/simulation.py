@@ -8,7 +8,6 @@ that the energy of the start allows each component, because q and p may differ i
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
 
 import numpy as np
 import sksundae
@@ -52,7 +51,7 @@ def start(scene: Scene, method: Method, label: Label, step: float) -> Simulation
     if abs(step) * scene.every < np.finfo(np.float64).tiny:
         raise MethodError(f"{label}: frames {abs(step) * scene.every:.0e} apart, whose inverse is no number")
     solvers.refuse_hours(scene, label, step)
-    return _Solver(scene, KINDS[method.name], step)
+    return Solver(scene, KINDS[method.name], step)
 
 
 def absolute_tolerance(scene: Scene) -> Floats:
@@ -82,41 +81,11 @@ def _matrix(scene: Scene) -> tuple[Floats, Floats]:
     return scene.system.jacobian(zero), np.concatenate([zero, scene.system.force(zero, zero)])
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class InternalSteps:
-    """What CVODE did on its way to the end of a scene."""
-
-    accepted: int
-    attempted: int
-    """Different times at which it asked for the force: rejected steps are those it did not accept, the
-    trials of its first step among them."""
-    force_calls: int
-    t: float
-    """Where it ended: before the end of the scene only where `most` steps did not suffice."""
-    q: Floats
-    p: Floats
-
-
-def internal_steps(scene: Scene, method: Method, *, most: int = MOST_STEPS) -> InternalSteps:
-    """Run a scene by at most so many internal steps, and count.  Stopped: CVODE gave up, and said why."""
-    # SUNDIALS' logger prints on standard output, where results go
-    with quiet.caught(1) as said:
-        try:
-            solver = _Solver(scene, KINDS[method.name], scene.step)
-            return solver.count(scene.step * scene.steps, most)
-        except (RuntimeError, Stopped) as error:
-            stopped = error
-    rows = stopped.rows if isinstance(stopped, Stopped) else 0
-    raise Stopped(rows, " ".join((said[0] or str(stopped)).split()[:40])) from stopped
-
-
-class _Solver:
+class Solver:
     """CVODE, stepped from output to output.  Outputs between internal steps are interpolated by CVODE."""
 
     def __init__(self, scene: Scene, method: str, step: float) -> None:
         self.force_calls = 0
-        self.asked: set[float] | None = None
-        """Times at which the force was asked for, where somebody counts them."""
         n, m = scene.n, scene.m
         force, slopes = timed(scene)
         as_matrix = _suits_matrix(scene)
@@ -158,8 +127,6 @@ class _Solver:
 
     def _called(self, t: float) -> None:
         self.force_calls += 1
-        if self.asked is not None:
-            self.asked.add(t)
 
     def advance(self, every: int, q: Floats, p: Floats) -> None:
         n, take, step, done = self._n, self._solver.step, self._step, self._done
@@ -185,28 +152,3 @@ class _Solver:
             q[: len(rows)], p[: len(rows)] = rows[:, :n], rows[:, n : 2 * n]
         if failure:
             raise Stopped(len(states), " ".join([failure, *said]).strip())
-
-    def count(self, end: float, most: int) -> InternalSteps:
-        """Go to `end` one internal step at a time."""
-        self.asked = set()
-        accepted, t = 0, 0.0
-        y = np.empty(2 * self._n)
-        while abs(t) < abs(end) and accepted < most:
-            try:
-                result = self._solver.step(end, method="onestep", tstop=end)
-            except RuntimeError as error:
-                raise Stopped(accepted, str(error)) from error
-            if not result.success or result.t == t:
-                raise Stopped(accepted, str(result.message))
-            t, y = float(result.t), result.y
-            accepted += 1
-        # the start is asked for too, and is no step
-        attempted = len(self.asked - {0.0})
-        return InternalSteps(
-            accepted=accepted,
-            attempted=attempted,
-            force_calls=self.force_calls,
-            t=t,
-            q=y[: self._n].copy(),
-            p=y[self._n :].copy(),
-        )
