@@ -120,3 +120,14 @@ def test_explicit_schemes_in_a_field_and_stiff_modes_are_no_friction_drive_or_no
     found = springcheck.identify(run, mass=scene.m)
     assert says in found.statement
     assert not re.search("friction|drives|Noise|coupled", found.statement)
+
+
+@pytest.mark.parametrize("damped", [True, False])
+def test_a_drive_smaller_than_the_motion_is_not_taken_for_the_spring(damped: bool) -> None:
+    """The motion of the spring was said to be the drive: without friction two waves look alike."""
+    scene = replace(driven(damped=damped, amplitude=0.073, frequency=1.3, phase=-1.1), q=[1.41])
+    wave = "the force 0.073 cos(1.3 t - 1.1) by velocity Verlet"
+    assert wave in said(scene, "own:velocity-verlet", mass=3.7, stiffness=2.9)
+    open_ended = said(scene, "own:velocity-verlet", mass=3.7)
+    assert wave in open_ended
+    assert ("do not tell which; give the stiffness" in open_ended) != damped

@@ -82,6 +82,9 @@ TUNING_STEPS = 12
 STARTS_BESIDE, FEW_FRAMES = 6, 2000
 """Starts on either side, a quarter turn over the run apart, and frames up to which they are looked at."""
 
+UNDAMPED = 1e-6
+"""Of 1, by which the eigenvalues of a step without friction may miss it beside a drive."""
+
 MOST_SCHEMES = 3
 """That a sentence names: on a spring of unknown stiffness several have one map."""
 
@@ -130,18 +133,39 @@ def said(e: Evidence, forced: bool, turn: float) -> str:
     if not forced:
         deep = b[1] / rows[0, 1]
         return f": about as 1 + {_wave(deep, w, '.2g', '.4g')}, the phase at the first frame"
+    of = "" if e.record.mass is not None else " for each unit of mass"
+    drives = [(turn, rows)]
+    own = np.linalg.eigvals(rows[:2])
+    if np.all(np.abs(np.abs(own) - 1) <= UNDAMPED):
+        # without friction the spring may as well turn as the drive does, and the drive as the spring
+        drives.append(_best(z, np.ones(e.pairs), float(abs(np.angle(own[0])))))
+        if e.stiffness and e.record.mass is not None:
+            stated = abs(float(e.record.interval)) * math.sqrt(abs(e.stiffness) / float(e.record.mass[e.j]))
+            drives = [max(drives, key=lambda one: abs(abs(one[0]) - stated))]
+    more = "" if len(drives) < 2 else " (without friction the states do not tell which; give the stiffness)"
+    ways = [f"the force {x}" for x in (_forces(e, x, y, of) for y, x in drives) if x]
+    if ways:
+        more = more if len(ways) > 1 else ""
+        return f". It is a spring with {', or with '.join(ways)}{more}, the phase at the first frame"
+    unit = float(e.found.size[1]) / float(e.record.interval) ** 2
+    unit *= 1.0 if e.record.mass is None else float(e.record.mass[e.j])
+    about = [
+        f"about {_wave((x[3, 1] - 1j * x[4, 1]) * unit, y / float(e.record.interval), '.2g', '.6g')}"
+        for y, x in drives
+    ]
+    return f": {', or '.join(about)}{more}, the phase at the first frame"
+
+
+def _forces(e: Evidence, rows: Floats, turn: float, of: str) -> str:
+    """The drive of this turn in a frame by each scheme that explains the rest; "" where none does."""
     found: dict[str, str] = {}
+    b = rows[3] - 1j * rows[4]
     for match, unit in _schemes(e, rows, b, turn):
         strength = complex(np.vdot(unit, b) / np.vdot(unit, unit))
         if np.max(np.abs(b - strength * unit)) <= AGREES * np.max(np.abs(b)):
-            found.setdefault(match.scheme, _wave(strength, w, ".9g", ".9g"))
-    if found:
-        of = "" if e.record.mass is not None else " for each unit of mass"
-        ways = [f"{wave}{of} by {title(name)}" for name, wave in list(found.items())[:MOST_SCHEMES]]
-        return f". It is a spring with the force {', or '.join(ways)}, the phase at the first frame"
-    mass = 1.0 if e.record.mass is None else float(e.record.mass[e.j])
-    size = b[1] * float(e.found.size[1]) / float(e.record.interval) ** 2 * mass
-    return f": about {_wave(size, w, '.2g', '.6g')}, the phase at the first frame"
+            found.setdefault(match.scheme, _wave(strength, turn / float(e.record.interval), ".9g", ".9g"))
+    ways = [f"{wave}{of} by {title(name)}" for name, wave in list(found.items())[:MOST_SCHEMES]]
+    return ", or ".join(ways)
 
 
 def _wave(strength: complex, w: float, first: str, digits: str) -> str:
