@@ -18,7 +18,7 @@ BUDGETS = {
     ("engines",): 2656,
     ("driver", "conformance", "doors"): 1203,
     ("checks",): 5024,
-    ("identify",): 8258,
+    ("identify",): 8282,
     ("formats", "store"): 5175,
     ("studies",): 1468,
     ("studies/*",): 10352,
