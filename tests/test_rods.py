@@ -714,3 +714,15 @@ def test_a_particle_that_swings_on_a_rod_is_seen_and_neither_an_orbit_nor_anothe
         [np.cos(t), 2 * np.cos(t)],
     )
     assert [rod_of(np.stack([*one, *z], axis=1)) for one in curves] == [""] * 4
+
+
+def test_lammps_is_given_no_triangle_with_another_rod(need: Need) -> None:
+    """It holds the two rods of the middle atom and the other one, and not the third of the triangle."""
+    need("lammps:rattle")
+    alone = triangle()
+    r, v = (alone.q[:3], alone.p[:3] / alone.m[:3])
+    tied = WallRod(i=[0, 1, 2], at=r + np.cross(v, [0.1, 0.7, 0.3]), length=3 * [1.0])
+    length = float(np.linalg.norm(np.cross(v, [0.1, 0.7, 0.3])))
+    scene = replace(alone, terms=(*alone.terms, replace(tied, length=3 * [length])))
+    with pytest.raises(MethodError, match="leaves the third rod of a triangle out"):
+        driver.run(scene, "lammps:rattle")
