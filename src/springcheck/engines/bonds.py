@@ -191,6 +191,12 @@ def triangles(joined: list[Joint]) -> Iterator[tuple[tuple[int, ...], int, float
                 yield ends, top, float(np.arccos((one * one + other * other - x * x) / (2 * one * other)))
 
 
+def beside_triangle(joined: list[Joint]) -> bool:
+    """Whether a particle of a triangle has another rod."""
+    met = [i for ends, *_ in joined for i in ends]
+    return any(met.count(i) > 2 for ends, top, _ in triangles(joined) for i in (*ends, top))
+
+
 def lengths(term: Spring, origins: Floats) -> Floats:
     """Rest lengths of bonds between coordinates that are counted from these origins [L]."""
     return np.asarray(np.abs(term.rest - (origins[term.b] - origins[term.a])))

