@@ -726,3 +726,16 @@ def test_lammps_is_given_no_triangle_with_another_rod(need: Need) -> None:
     scene = replace(alone, terms=(*alone.terms, replace(tied, length=3 * [length])))
     with pytest.raises(MethodError, match="leaves out the third rod of a triangle"):
         driver.run(scene, "lammps:rattle")
+
+
+def test_a_file_of_single_precision_with_a_rod_is_judged_to_its_digits(tmp_path: Path) -> None:
+    """Its rounded start, whose length is not the rod's to double precision, was refused."""
+    scene = dumbbell()
+    run = driver.run(scene, "own:velocity-verlet")
+    path = tmp_path / "single.npz"
+    wrong = np.where(np.arange(len(run.t))[:, None] == 7, 1 + 1e-4, 1) * run.p
+    for p, status in ((run.p, 0), (wrong, 1)):
+        np.savez(path, t=run.t, q=run.q.astype(np.float32), p=p.astype(np.float32))
+        assert main(["judge", str(path), "--scene", "dumbbell", "--scheme", "velocity-verlet"]) == status
+    np.savez(path, t=run.t, q=run.q * (1 + 1e-5), p=run.p)
+    assert main(["judge", str(path), "--scene", "dumbbell", "--scheme", "velocity-verlet"]) == 2

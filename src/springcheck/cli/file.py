@@ -16,6 +16,7 @@ from springcheck.formats import States, is_hdf5, read, read_hdf5
 from springcheck.identify import files
 from springcheck.identify.files import identify_states, of_arrays
 from springcheck.physics.arrays import AS_WRITTEN, Arithmetic, Floats
+from springcheck.physics.rods import UNTRUE
 from springcheck.physics.scene import Scene
 from springcheck.physics.scenefile import load_scene
 from springcheck.physics.trajectory import Outcome, Trajectory, Verdict
@@ -291,7 +292,14 @@ def as_trajectory(
         notes.append("velocities are rebuilt from positions, as its run declared, and judged so")
     energy = None if ours is None else ours.energy
     kept = ("q", "p") if energy is None else ("q", "p", "energy")
-    judged = replace(scene, q=q[0].copy(), p=p[0].copy(), steps=steps, every=every, quantities=kept)
+    start: dict[str, Any] = {"q": q[0].copy(), "p": p[0].copy()}
+    grid: dict[str, Any] = {"steps": steps, "every": every, "quantities": kept}
+    if scene.system.rods and states.roundoff > 2.0**-53:
+        # what a few digits have of a start leaves its lengths by as much
+        scene.system.rods.check(start["q"], start["p"], UNTRUE * 2.0**53 * states.roundoff)
+        judged = replace(scene, **grid).derived(**start)
+    else:
+        judged = replace(scene, **start, **grid)
     run = Trajectory(
         label=path.name, scheme=scheme, t=t, q=np.ascontiguousarray(q), p=np.ascontiguousarray(p),
         step=scene.step, every=every, outcome=Outcome(status="complete", step=steps),

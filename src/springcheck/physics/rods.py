@@ -331,13 +331,13 @@ class Rods:
             "keeps its length; take a shorter step"
         )
 
-    def check(self, q: Floats, p: Floats) -> None:
+    def check(self, q: Floats, p: Floats, untrue: float = UNTRUE) -> None:
         """SceneError unless every rod has its length at the start, and nothing moves along it."""
         r, v = self.ways(q), self.apart(p / self.m)
         with np.errstate(all="ignore"):
             off, along = np.abs(self.strain(q)), np.abs(self.dot(r, v))
             size = self.sum_of_sizes(r, np.abs(p) / self.m)
-        wrong = ~(off <= UNTRUE * (1 + self.magnitude(q)))
+        wrong = ~(off <= untrue * (1 + self.magnitude(q)))
         if np.any(wrong):
             j = int(np.argmax(wrong))
             raise SceneError(
@@ -355,7 +355,7 @@ class Rods:
                     f"{self.named(int(np.argmax(wrong)))}: at the start the rods before it keep its length "
                     "too, or masses are too unlike to tell, and their multipliers have no one solution"
                 )
-        wrong = ~(along <= UNTRUE * size)
+        wrong = ~(along <= untrue * size)
         if np.any(wrong):
             j = int(np.argmax(wrong))
             rate = float(self.dot(r, v)[j] / self.length[j])
