@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg.lapack import dpbtrf, dpbtrs
 
 from springcheck.errors import IdentificationError
 from springcheck.physics.arrays import Floats
@@ -20,6 +19,9 @@ class Noise:
             self.scale = np.repeat(process, 2).reshape(pairs, 2)
             self.log_det = 2 * float(np.sum(np.log(self.scale)))
             return
+        # slow to import, and roundings alone need none of it
+        from scipy.linalg.lapack import dpbtrf
+
         s = sigma**2
         across = np.einsum("ij,nj,kj->nik", entries, s[:-1], entries)
         across[:, 0, 0] += s[1:, 0] + process**2
@@ -40,6 +42,8 @@ class Noise:
         """V^-1 x of columns x (f - 1, 2, k)."""
         y = x / self.scale[:, :, None]
         if not self.diagonal:
+            from scipy.linalg.lapack import dpbtrs
+
             y = dpbtrs(self.factor, y.reshape(-1, x.shape[2]), lower=1)[0].reshape(x.shape)
         return np.asarray(y / self.scale[:, :, None])
 

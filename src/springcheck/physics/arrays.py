@@ -33,6 +33,9 @@ ROUNDOFF = float(np.finfo(np.longdouble).eps) / 2
 """Unit roundoff of `Extended`, in which every reference is computed: 2**-64 on x86-64, 2**-53 where
 `long double` is no wider than double (Apple silicon, Windows), so that references round like the engines."""
 
+EPS = 2 * ROUNDOFF
+"""Spacing of the numbers above 1 in extended precision: 1.1e-19 on x86-64."""
+
 WIDE = ROUNDOFF < 2.0**-53
 """Whether a reference has digits that an engine has not."""
 

@@ -19,8 +19,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from springcheck.physics.arrays import Extended, Integers
-from springcheck.physics.exact.elliptic import EPS
+from springcheck.physics.arrays import EPS, Extended, Integers
 from springcheck.physics.exact.linear import energy_of_doubt
 from springcheck.physics.exact.normal import Modes
 

@@ -12,10 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from springcheck.physics.arrays import ROUNDOFF, Extended
-
-EPS = 2 * ROUNDOFF
-"""Spacing of the numbers above 1 in extended precision: 1.1e-19 on x86-64."""
+from springcheck.physics.arrays import EPS, Extended
 
 MOST = 40
 """Rounds of the mean: six for ordinary moduli, a dozen for m1 near the smallest number."""

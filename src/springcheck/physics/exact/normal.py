@@ -14,9 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from springcheck.physics.arrays import Extended, Integers, Reals
+from springcheck.physics.arrays import EPS, Extended, Integers, Reals
 from springcheck.physics.exact.digits import ENOUGH, Wide, digits, eigen, exactly, extended
-from springcheck.physics.exact.elliptic import EPS
 from springcheck.physics.system import System
 from springcheck.physics.terms import Damping, Spring
 

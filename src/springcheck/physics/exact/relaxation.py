@@ -13,8 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from springcheck.physics.arrays import Extended, Floats
-from springcheck.physics.exact.elliptic import EPS
+from springcheck.physics.arrays import EPS, Extended, Floats
 from springcheck.physics.exact.well import LAST, States, Well, wide
 from springcheck.physics.system import System
 from springcheck.physics.vanderpol import VanDerPol

@@ -13,9 +13,8 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from springcheck.physics.arrays import Extended
+from springcheck.physics.arrays import EPS, Extended
 from springcheck.physics.exact import linear
-from springcheck.physics.exact.elliptic import EPS
 from springcheck.physics.exact.normal import Modes, normal_modes
 from springcheck.physics.exact.well import States, Well
 from springcheck.physics.system import System

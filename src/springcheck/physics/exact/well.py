@@ -8,8 +8,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from springcheck.physics.arrays import Extended, Integers, Reals
-from springcheck.physics.exact.elliptic import EPS
+from springcheck.physics.arrays import EPS, Extended, Integers, Reals
 from springcheck.physics.system import System
 
 States: TypeAlias = tuple[Extended, Extended]
