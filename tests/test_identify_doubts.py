@@ -239,6 +239,14 @@ def test_steps_that_alternate_are_told_with_what_they_alternate_by_and_are_no_dr
     assert "alternate: steps alternate by 0.02 of their length" in found.statement
 
 
+def test_two_frames_that_have_changed_places_are_told() -> None:
+    q, v = remembered(0.0, 0.0, 0.2)
+    order = np.arange(len(q))
+    order[[40, 41]] = 41, 40
+    found = identify(0.2 * np.arange(len(q)), q[order], v=v[order], mass=M)
+    assert "but frames 40 and 41 have changed places" in found.statement
+
+
 def test_a_method_with_memory_that_is_none_of_the_known_is_none_of_them() -> None:
     """Every other step of one, another one with friction, and another of the stages' weights."""
     h = 0.2

@@ -584,7 +584,9 @@ def test_a_program_that_steps_to_i_h_is_named(recorded: str, h: float) -> None:
     assert "position-verlet" in [x.scheme for x in identify(t_all, q_all, v=v_all).candidates]
     # a step that is longer by 1e-12, every other time, is none of a clock's roundings
     wrong = v_all * (1 + 1e-12 * (-1.0) ** np.arange(401))
-    assert not identify(t_all, q_all, v=wrong, **STATED).fits
+    found = identify(t_all, q_all, v=wrong, **STATED)
+    assert not found.fits
+    assert_said(found, "Even and odd steps differ and alternate")
 
 
 @pytest.mark.parametrize("stride", [1, 5])

@@ -38,7 +38,6 @@ STOERMER = {
 """Schemes whose positions obey q'' - 2 q' + q = h**2 F/m, and whether v is the mean of the difference
 before, after, or both: identities without a force, which hold to rounding however coarse the force is."""
 
-
 KICKED = ("explicit-euler", "position-verlet")
 """Schemes of one kick a step that positions do not see at once."""
 

@@ -250,7 +250,6 @@ KIND = {
 }  # fmt: skip
 """What the force depends on in each group of columns."""
 
-
 STATE = ("quadratic", "anharmonic", "position", "velocity")
 """Groups of functions of the state that follow most functions of time where states hardly come back."""
 

@@ -33,7 +33,6 @@ CENTRED = "friction by the mean of old and new v"
 HELD_SHARES = 64
 """Largest number of substeps that a held force is looked for at; a force held over more is a held force."""
 
-
 G_ROUNDING = 1e-13
 """Error of the share of a held force that its own roundings may make, beside that of the fit."""
 
@@ -238,7 +237,6 @@ WRONG_RK4: tuple[tuple[str, tuple[Any, ...], tuple[Any, ...]], ...] = (
     ("the midpoint method whose first stage takes a full step", ((0,), (1,)), (0, 1)),
 )
 """What is written down wrongly in Runge-Kutta methods, as tableaux."""
-
 
 _FAULTS = (
     ("old force", "Velocity Verlet whose second half kick uses the old force, "

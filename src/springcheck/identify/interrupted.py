@@ -28,13 +28,11 @@ APART = 2.0
 LARGER = 10.0
 """Size of some frames, of the median, from which a force that is not linear shows in them alone."""
 
-
 HALF_STEP = 1e-3
 """Of half a step's kick, by which what is missing at a frame may differ from it."""
 
 AT_AN_END = 3
 """Pairs at an end of their order by size, for each bad one, within which these do not lie by chance."""
-
 
 FEWEST_PAIRS = 8
 """Pairs beside the bad ones from which they make one motion."""

@@ -10,10 +10,10 @@ from springcheck.errors import IdentificationError
 from springcheck.identify.candidates import candidates_of, common, held_over, said_of
 from springcheck.identify.families import FAMILIES, HELD, Family, title
 from springcheck.identify.hypothesis import FEW, Joint, Match, distinct
-from springcheck.identify.record import ROUNDING, SIZES, Record
+from springcheck.identify.record import SIZES, Record
 from springcheck.identify.recurrence import FEWEST_FRAMES, Recurrence, classes, matches, recurrence
 from springcheck.identify.result import Explanation, Identification, nothing
-from springcheck.identify.search import SINGLE_ROOM, numbers
+from springcheck.identify.search import SINGLE_ROOM, disagreements
 from springcheck.physics.arrays import Floats
 from springcheck.text.wording import either
 
@@ -129,25 +129,11 @@ def _stated(
     if stated is None:
         return []
     for room in (0.0, SINGLE_ROOM):
-        fitting = [x for x in joints if not _stiffer(record, moving, x, stated, room)]
+        fitting = [x for x in joints if not disagreements(record, moving, x, stated, room=room)]
         if fitting:
             notes += ["a stated number was rounded to single precision"] if room else []
             return fitting
     return []
-
-
-def _stiffer(
-    record: Record, moving: list[int], joint: Joint, stated: Floats, room: float
-) -> tuple[int, float, float] | None:
-    """The first oscillator whose stiffness is not the stated one, its own and the relative error; None where
-    all agree."""
-    stiffness = numbers(record, moving, joint)[1] or ()
-    for j, part, k in zip(moving, joint.parts, stiffness, strict=True):
-        error = 6 * part.a_error / abs(part.a) + 4 * record.jitter + 64 * ROUNDING + room
-        error += 0.0 if record.fine else SINGLE_ROOM
-        if not abs(k / float(stated[j]) - 1 if stated[j] else math.inf) <= error:
-            return j, k, error
-    return None
 
 
 def _members(joints: list[Joint]) -> list[Joint]:
@@ -239,11 +225,7 @@ def _unfitting(
 ) -> tuple[str, str]:
     if joints and stated is not None:
         x = joints[0]
-        off = _stiffer(record, moving, x, stated, 0.0)
-        shown = "with another friction"
-        if off:
-            k = float(stated[off[0]])
-            shown = f"{off[1]:.9g} instead of {k:.9g}" + (f", {off[1] / k - 1:+.1e} of it" if k else "")
+        shown = [*disagreements(record, moving, x, stated), "it has another friction"][0]
         return (
             f"The positions may be those of {title(FAMILIES[x.family].scheme)}, but of another "
             f"spring: {shown}",

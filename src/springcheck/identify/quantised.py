@@ -183,9 +183,6 @@ def _step(
         if kind == "drift":
             q = q + c * v
             continue
-        if kind == "kick":
-            v = v + c * pull(q)
-            continue
         before, after, decay = KINDS[kind]
         force = 0 if kind == "friction" else pull(q)
         v = ((1 - before * c * g) * v + c * force) / (1 + after * c * g) * np.exp(-decay * c * g)

@@ -12,7 +12,17 @@ from springcheck.identify.compare import compare, nearest
 from springcheck.identify.families import FAMILIES, HELD, Family
 from springcheck.identify.fit import Map
 from springcheck.identify.guesses import roots_of
-from springcheck.identify.hypothesis import FEW, MANY, STRIDES, Joint, Match, Terms, distinct, likely
+from springcheck.identify.hypothesis import (
+    EXCLUDED,
+    FEW,
+    MANY,
+    STRIDES,
+    Joint,
+    Match,
+    Terms,
+    distinct,
+    likely,
+)
 from springcheck.identify.maps import unit
 from springcheck.identify.record import ROUNDING, Record
 from springcheck.physics.arrays import Floats
@@ -141,13 +151,9 @@ def _further(
     open_ended = len(accepted) > 1 or any(x.scheme == "exact" or x.stride == STRIDES[0] for x in accepted)
     if open_ended or (coarse and not room.damped):
         out += compare(maps, terms, room.families, MANY)
-    if not room.damped and min(x.chi2 for x in accepted) > EXCLUDED_BY_FRICTION:
+    if not room.damped and min(x.chi2 for x in accepted) > EXCLUDED:
         out += compare(maps, terms, distinct(damped=True), FEW)
     return out
-
-
-EXCLUDED_BY_FRICTION = 25.0
-"""Chi-squared from which friction may explain what a scheme without it leaves over: five standard errors."""
 
 
 def _rivals(maps: list[Map], terms: list[Terms], fitting: list[Joint], *, many: bool) -> list[Joint]:
@@ -196,7 +202,7 @@ def numbers(
 
 
 def disagreements(
-    record: Record, moving: list[int], joint: Joint, stated: Floats, quantum: float = 0.0
+    record: Record, moving: list[int], joint: Joint, stated: Floats, quantum: float = 0.0, room: float = 0.0
 ) -> list[str]:
     """Where the stiffness of the states is not the stated one, beyond six standard errors and rounding.
 
@@ -207,7 +213,7 @@ def disagreements(
     path = FAMILIES[joint.family].path
     out = []
     for j, part, k in zip(moving, joint.parts, stiffness or (), strict=False):
-        error = 6 * part.a_error / abs(part.a) + 2 * record.jitter + 4 * path * ROUNDING
+        error = 6 * part.a_error / abs(part.a) + 2 * record.jitter + 4 * path * ROUNDING + room
         error += 0.0 if record.fine else SINGLE_ROOM
         # a step or a mass in single precision moves the stiffness that is worked out with the stated one
         error += 0.0 if record.momenta else 3 * abs(part.log_mass)

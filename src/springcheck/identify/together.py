@@ -67,7 +67,6 @@ WANDERS = 1e-3
 """Part of its size by which the motion of two particles in single precision may leave their line, or their
 middle its place: roundings of 1e-7 that walk for 1e8 steps."""
 
-
 BOUND = "two particles bound to each other"
 OF_A_PAIR = f"{BOUND}, which swing along their line: their distance is judged"
 

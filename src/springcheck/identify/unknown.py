@@ -150,7 +150,8 @@ def memory(e: Evidence) -> list[Explanation]:
     now, old, new = z[1:-1] / size[2:, None], z[:-2] / size[2:, None], z[2:] / size[2:, None]
     leap = new - old
     after = float(np.max(np.abs(leap - now @ np.linalg.lstsq(now, leap, rcond=None)[0])))
-    if after < 64 * unit:
+    # maps that alternate a little leave their difference times the turn of a frame
+    if after < 64 * unit < np.max(off) * float(e.found.turn.angle[0]):
         return [
             Explanation(
                 cause="Each state is the last but one and a linear map of the last: the leapfrog of two "
