@@ -236,6 +236,19 @@ def test_a_grid_of_many_cells_is_shown_by_the_medians_of_neighbours() -> None:
     assert np.all((line.low <= line.x * 1.01) & (line.high >= 1.48 * line.x))
 
 
+def test_shades_of_a_map_follow_the_signs_of_its_numbers_and_not_what_explodes() -> None:
+    kinds, bounds = page._kinds("q0", [np.array([-3.0, 0.5, np.nan]), np.array([1e6])])
+    assert [shade for _, shade in kinds] == list(page.SIGNED_SHADES)
+    np.testing.assert_allclose(bounds, -bounds[::-1])
+    assert np.max(np.abs(bounds)) < 6
+    kinds, bounds = page._kinds("steps", [np.array([10.0, 80.0])])
+    assert kinds[0] == ("10 to 20", "s0")
+    assert kinds[-1] == ("70 to 80", "s6")
+    assert len(bounds) == len(kinds) - 1
+    assert page._kinds("max_error", [np.array([0.0])])[0] == [("0", "s0")]
+    assert [name for name, _ in page._kinds("outcome", [np.array([0.0, 2.0])])[0]] == list(page.OUTCOMES)
+
+
 def test_fields_that_are_not_shown_have_the_value_in_their_middle() -> None:
     found, cells = grid_of((5, 4, 3), lambda a, b, c: a + 1000 * b + 1e6 * c)
     part = page.reduced(cells, found, page.choices(found, "max_error", "c,a")[0])

@@ -134,6 +134,27 @@ def test_a_nan_in_an_ordinary_cell_is_silently_wrong(monkeypatch: pytest.MonkeyP
     assert {cell.outcome for cell in ordinary if cell.parameters["h_w"] < 3} == {"silently wrong"}
 
 
+def test_an_engine_that_gives_up_over_some_cells_takes_no_others_with_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    right, label = running.raw, engines.parse("own:semi-implicit-euler")
+    specs = [spec for spec in grid.specs() if spec.block == "force" and 1e-3 < spec.force < 1e3][:40]
+    fine = running.cells(label, specs)
+
+    def gives_up(scene: Any, label: Any) -> Any:
+        q, p, _ = right(scene, label)
+        if not np.any(scene.q == specs[7].q):
+            return q, p, ""
+        return q[:3], p[:3], "it stops"
+
+    monkeypatch.setattr(running, "raw", gives_up)
+    found = running.cells(label, specs)
+    assert [cell.parameters for cell in found] == [cell.parameters for cell in fine]
+    stopped = [i for i, cell in enumerate(found) if "it stops" in cell.reason]
+    assert stopped == [i for i, spec in enumerate(specs) if spec.q == specs[7].q]
+    assert all(found[i] == fine[i] for i in range(40) if i not in stopped)
+
+
 def test_bad_input_is_refused_with_a_reason() -> None:
     answers = extreme.refusals()
     assert len(answers) >= 25

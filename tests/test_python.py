@@ -262,3 +262,26 @@ def test_a_scene_is_replaced_by_the_names_of_its_fields() -> None:
         scene.replace(stepp=0.05)
     with pytest.raises(SceneError, match="steps"):
         scene.replace(steps=-1)
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments", "expected"),
+    [
+        ("extremes", {"methods": "own:euler", "quick": True}, (None, ["own:euler"], True)),
+        ("faults", {"path": "f.h5"}, ("f.h5",)),
+        ("sampling", {"methods": ["own:baoab"]}, (None, ["own:baoab"])),
+    ],
+)
+def test_a_study_hands_what_it_is_told_to_its_record(
+    monkeypatch: pytest.MonkeyPatch, name: str, arguments: dict[str, Any], expected: tuple[Any, ...]
+) -> None:
+    told: dict[str, Any] = {}
+
+    def record(*given: Any, quick: bool | None = None, **how: Any) -> str:
+        told.update(how, given=given if quick is None else (*given, quick))
+        return "found"
+
+    monkeypatch.setattr(f"springcheck.studies.{name}.measure.record", record)
+    assert getattr(springcheck, name)(**arguments, force=True, workers=2) == "found"
+    assert told["given"] == expected
+    assert (told["force"], told["team"].workers) == (True, 2)

@@ -16,15 +16,35 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+
 import stiffness_costs
 from arguments import arguments
+from springcheck import engines
+from springcheck.checks.stats import line
+from springcheck.engines.contract import Label
 from springcheck.physics import scenefile as scenes
-from springcheck.studies.stability import STUDY
+from springcheck.studies.stability import STUDY, limits
 from springcheck.studies.stability import measure as stability
 from springcheck.text.lines import as_text
 
 SCENES = ("detest-b1", "multiple-time-steps", "two-scales", "overdamped")
 FAMILIES: tuple[stiffness_costs.Family, ...] = ("two-scales", "overdamped")
+
+
+def edge(label: Label, theory: float) -> float:
+    """Exponent of growth with the number of steps at the limit: 1 where the two eigenvectors are one.
+
+    NaN where there is no limit, or none in double precision.
+    """
+    if not 0 < theory < np.inf or engines.arithmetic(label).state > 2.0**-53:
+        return float("nan")
+    steps = 1000
+    _, size = limits.stepped(label, theory, steps)
+    n = np.arange(steps // 10, steps + 1)
+    if len(size) <= steps or np.any(size[n] <= 0):
+        return float("nan")
+    return line(np.log(n), np.log(size[n])).slope
 
 
 def main() -> int:
@@ -39,10 +59,11 @@ def main() -> int:
             for x in study.limits:
                 print(
                     f"{x.method:28} limit {x.limit:.10g}, theory {x.theory:g}, "
-                    f"growth {x.growth_above:.9f} of {x.growth_predicted:.9f}, at the limit n**{x.edge:.3f}"
+                    f"growth {x.growth_above:.9f} of {x.growth_predicted:.9f}, "
+                    f"at the limit n**{edge(engines.parse(x.method), x.theory):.3f}"
                 )
-        for line in study.sentences:
-            print(line)
+        for said in study.sentences:
+            print(said)
         for path in STUDY.draw(study, folder):
             print(path)
     for family in FAMILIES:

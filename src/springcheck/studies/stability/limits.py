@@ -51,8 +51,6 @@ class Limit:
     growth_below: float
     """The same just below it, or at `LARGE` where there is no limit."""
     growth_below_predicted: float
-    edge: float
-    """Exponent of the growth in the number of steps at the limit itself; NaN where there is none."""
     h_w: Floats
     """h w of the points drawn (j,)."""
     radius: Floats
@@ -72,21 +70,18 @@ def measure(label: Label) -> Limit:
     hidden = first_exit(label, propagators.theory)
     theory = scheme.limit
     off = 0.0 if np.isinf(theory) else abs(hidden - theory)
-    how = engines.arithmetic(label)
     # theory at its own rounding shows what cannot be told; the roundings of k and of the step come on top
     bound = max(AGREED, 4 * off + 4 * propagators.noise(label) * (0 if np.isinf(theory) else theory))
     turn = _points(theory)
     springs = Springs(label=label, turn=turn)
     rounding = propagators.noise(label)
-    above, below, edge = (np.nan, np.nan), (np.nan, np.nan), np.nan
+    above, below = (np.nan, np.nan), (np.nan, np.nan)
     if theory == 0:
         above = _growth(label, ROUGH)
     elif np.isinf(theory):
         below = _growth(label, LARGE)
     else:
         above, below = _growth(label, theory * (1 + NEXT)), _growth(label, theory * (1 - NEXT))
-        if how.state <= 2.0**-53:
-            edge = _edge(label, theory)
     return Limit(
         method=str(label),
         scheme=scheme.title,
@@ -97,7 +92,6 @@ def measure(label: Label) -> Limit:
         growth_predicted=above[1],
         growth_below=below[0],
         growth_below_predicted=below[1],
-        edge=edge,
         h_w=turn,
         radius=propagators.radius(propagators.measured(springs), rounding)[0],
         radius_predicted=propagators.radius(propagators.theory(springs), rounding)[0],
@@ -134,7 +128,7 @@ def _points(theory: float) -> Floats:
     return np.unique(np.concatenate([wide, near]))
 
 
-def _run(label: Label, turn: float, steps: int) -> tuple[Trajectory, Floats]:
+def stepped(label: Label, turn: float, steps: int) -> tuple[Trajectory, Floats]:
     """A run of one spring, and its amplitude sqrt(x**2 + y**2) in scaled coordinates (f,)."""
     springs = Springs(label=label, turn=np.array([turn]))
     of_q, of_p = propagators.units(springs)
@@ -158,7 +152,7 @@ def _growth(label: Label, turn: float) -> tuple[float, float]:
     steps = 400
     if predicted != 0:
         steps = int(np.clip(16 / abs(predicted), 40, 400))
-    run, size = _run(label, turn, steps)
+    run, size = stepped(label, turn, steps)
     usable = np.flatnonzero(np.isfinite(size) & (size > 0))
     first = usable[-1] * 3 // 4
     n = np.arange(first, usable[-1] + 1)
@@ -172,13 +166,3 @@ def _growth(label: Label, turn: float) -> tuple[float, float]:
     else:
         logs = np.log(size[n])
     return line(n.astype(np.float64), logs).slope, predicted
-
-
-def _edge(label: Label, theory: float) -> float:
-    """Exponent of growth with the number of steps at the limit: 1 where the two eigenvectors are one."""
-    steps = 1000
-    _, size = _run(label, theory, steps)
-    n = np.arange(steps // 10, steps + 1)
-    if len(size) <= steps or np.any(size[n] <= 0):
-        return float("nan")
-    return line(np.log(n), np.log(size[n])).slope

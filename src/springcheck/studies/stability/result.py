@@ -139,7 +139,7 @@ def _named(found: Any, *names: str) -> dict[str, Any]:
 def _limit(x: Limit) -> dict[str, Any]:
     names = (
         "method", "scheme", "limit", "theory", "bound", "agrees",
-        "growth_above", "growth_predicted", "growth_below", "edge",
+        "growth_above", "growth_predicted", "growth_below",
     )  # fmt: skip
     points = zip(x.h_w, x.radius, x.radius_predicted, strict=True)
     return {
