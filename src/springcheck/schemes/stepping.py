@@ -96,11 +96,12 @@ def step(
             # the stage stands at its share of the step
             share = sum((number(c, width) for c in row), np.zeros((), width))
             guess = qs if near is None else np.where(np.isfinite(near), q + share * (near - q), qs)
-            own = number(own, width) * h
+            own, begun = number(own, width) * h, ps
             qs, ps = _implicit_stage(qs, ps, own, m, force, stiffness, rate, guess=guess)
         if met is not None:
             met.append(qs)
-        forces.append(force(qs, ps))
+        # a brake by place may be large beside what it leaves of the momentum
+        forces.append((ps - begun) / own if own and callable(rate) else force(qs, ps))
         velocities.append(ps / m)
     weights = [number(c, width) * h for c in scheme.b]
     return weighted_sum(q, weights, velocities), weighted_sum(p, weights, forces)
@@ -187,8 +188,14 @@ def _implicit_stage(
             break
         last = off
     if callable(rate):
-        braked, _, lost = rate(guess, q)
-        slowed, p = 1 + x * braked, p - m * lost
+        braked, bent, lost = rate(guess, q)
+        slowed, moved, p = 1 + x * braked, guess - q, p - m * lost
+        # where 1 + x rate all but vanishes, in a jump, the way says more of the velocity than the forces do
+        felt = (1 + np.abs(x * braked)) * np.abs(moved) + np.abs(x * bent * guess)
+        by_way = felt > np.abs(slowed) * (np.abs(guess) + np.abs(q))
+        with np.errstate(all="ignore"):
+            by_force = (p + x * force(guess, none)) / slowed
+        return guess, np.where(by_way, moved * m / x, by_force)
     return guess, np.asarray((p + x * force(guess, none)) / slowed)
 
 
