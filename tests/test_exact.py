@@ -15,7 +15,7 @@ import springcheck
 from springcheck.physics import builders, exact, graph
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.scene import Scene
-from springcheck.physics.terms import Cosine, Damping, Morse, Quartic, Spring, Term, WallSpring
+from springcheck.physics.terms import Cosine, Damping, Morse, Quartic, Spring, Term, WallSpring, Weight
 
 ROOT = Path(__file__).parent.parent
 _spec = importlib.util.spec_from_file_location("exact_check", ROOT / "validation" / "exact_check.py")
@@ -240,7 +240,7 @@ def test_a_pendulum_that_begins_near_its_top_keeps_its_digits() -> None:
         assert abs(wide(p[0, 0]) / mpmath.mpf("-1.348575697690617284844982") - 1) < 100 * exact.EPS
 
 
-@pytest.mark.parametrize("kind", ["spring", "chain", "quartic", "pendulum", "bond", "crowd"])
+@pytest.mark.parametrize("kind", ["spring", "chain", "quartic", "pendulum", "bond", "crowd", "unlike"])
 def test_random_scenes_lie_within_the_stated_error(kind: str) -> None:
     """By Taylor series and exponentials in integers: `validation/exact_check.py` takes 10,000 of them."""
     known = 0
@@ -250,6 +250,27 @@ def test_random_scenes_lie_within_the_stated_error(kind: str) -> None:
         known += off is not None
         assert off is None or off <= 0.2, j
     assert known >= 4
+
+
+def test_frames_of_unlike_friction_that_lie_evenly_are_those_of_their_times() -> None:
+    """Evenly spaced frames come from one another, others each from the start: forwards and back."""
+    rng, n = np.random.default_rng(4), 5
+    link = Spring(
+        a=np.arange(n - 1), b=np.arange(1, n), k=rng.uniform(0.5, 3, n - 1), rest=rng.normal(size=n - 1)
+    )
+    slow = Damping(i=np.arange(n), c=np.array([0.0, 0.3, 1.1, 0.02, 2.0]))
+    scene = made(rng.uniform(0.3, 4, n), (link, slow), rng.normal(size=n), rng.normal(size=n), 0.07)
+    assert not scene.system.has_modes
+    for steps in (np.arange(101), -np.arange(3, 40), 7 * np.arange(1000, 1030)):
+        together = exact.true_motion(scene, steps, 0.07)
+        for i in (0, 1, len(steps) // 2, len(steps) - 1):
+            one = exact.true_motion(scene, steps[i : i + 1], 0.07)
+            assert scene.system.solution is not None
+            bounds = scene.system.solution.doubt(0.07 * float(steps[i]))
+            for x, y, bound in zip(together, one, bounds, strict=True):
+                assert np.all(np.abs(x[i] - y[0]) <= bound)
+    falls = replace(scene, terms=(*scene.terms, Weight(i=[0], force=[0.3], at=[0.0])))
+    assert not exact.has_true_motion(falls)
 
 
 def test_what_is_stated_of_a_free_chain_does_not_grow_as_if_something_held_it() -> None:

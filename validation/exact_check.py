@@ -21,6 +21,11 @@ largest of the stated ones relative to the start:
 More than all of the start is stated of chains with springs that push, which leave the range of numbers, and
 of pendulums at rest where they hang, whose start is one rounding of their place.
 
+With --scenes 300 --kind unlike, chains whose masses friction slows down unlike, some driven back in time out
+of the range of numbers:
+
+    unlike       300                0.0249                       2.2e-14      inf
+
 The route: integers with 288 bits after the point.  Linear scenes by the exponential of their equations
 (Taylor series, then squaring), all others by Taylor series in time, of 48 terms, in steps in which they fall
 below 2**-150.  No closed form, no eigenvector and no elliptic function is used.  A scene that may grow is
@@ -33,6 +38,7 @@ import argparse
 import json
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from operator import mul
 from pathlib import Path
 from typing import Any
@@ -314,6 +320,18 @@ def chain(rng: np.random.Generator, n: int | None = None) -> Scene:
     return made(rng, m, terms, rng.normal(size=n), rng.normal(size=n) * m, w, turns)
 
 
+def unlike(rng: np.random.Generator) -> Scene:
+    """A chain, held or free, whose masses friction slows down unlike, some of them not at all."""
+    found = chain(rng)
+    springs = [term for term in found.terms if isinstance(term, Spring | WallSpring)]
+    rate = np.array([number(rng, 2) for _ in found.m]) * rng.choice([0, 1, 1], found.n)
+    w = math.sqrt(4 * max(float(np.max(np.abs(x.k))) for x in springs) / float(np.min(found.m)))
+    terms: list[Term] = [replace(x, k=np.abs(x.k)) for x in springs]
+    terms.append(Damping(i=np.arange(found.n), c=found.m * rate * w / 9))
+    turns = float(rng.choice([25.0, number(rng, 1) * 10 ** rng.uniform(0, 5)]))
+    return made(rng, found.m, terms, found.q, found.p, w + float(np.max(rate * w)), turns)
+
+
 def large(rng: np.random.Generator) -> Scene:
     """More joined particles than modes are found for in more digits."""
     return chain(rng, int(rng.integers(33, 37)))
@@ -415,7 +433,7 @@ def crowd(rng: np.random.Generator) -> Scene:
 
 KINDS: dict[str, Callable[[np.random.Generator], Scene]] = {
     "spring": spring, "chain": chain, "quartic": quartic, "pendulum": pendulum, "bond": bond,
-    "crowd": crowd, "large": large, "uniform": uniform,
+    "crowd": crowd, "large": large, "uniform": uniform, "unlike": unlike,
 }  # fmt: skip
 SHARES = {
     "spring": 25,

@@ -1,6 +1,7 @@
 """The exact (analytic) solution of a scene, in extended precision.
 
-Linear scenes move in normal modes (`linear`).  Single particles in a quartic potential or on a pendulum,
+Linear scenes move in normal modes (`linear`), or, where friction joins these, by the matrix exponential
+(`damped`).  Single particles in a quartic potential or on a pendulum,
 and pairs on a Morse bond, have closed forms of their own (`solution`), by Jacobi's elliptic functions
 (`elliptic`).  Where the particles of a scene fall into groups that nothing joins, its motion is known if
 that of every group is.  Its error is some roundings of that width times the angle turned through: a phase

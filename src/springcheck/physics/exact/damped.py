@@ -1,0 +1,144 @@
+"""The exact solution of joined particles that friction slows down unlike, by the matrix exponential.
+
+In the modes of the springs alone, with the positions of each times its frequency w, the state z moves by
+z' = A z, A = [[0, W], [-W, -G]], G the friction between modes.  A + A^T = -2 diag(0, G) adds no length: what
+a product of exponentials has lost of its digits grows with the number of factors and no faster.  A mode that
+nothing holds has the position over the time constant of A in place of w.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from springcheck.physics.arrays import Extended
+from springcheck.physics.exact.elliptic import EPS
+from springcheck.physics.exact.linear import ROUNDINGS
+from springcheck.physics.exact.normal import Modes, normal_modes
+from springcheck.physics.exact.well import States, Well
+from springcheck.physics.system import System
+
+MOST_UNLIKE = 32
+"""Particles: so many take 0.1 s, and 40 us a frame."""
+
+TERMS = 17
+"""Of the series of exp(A t) up to |A t| = 1/2: the next one is 2**-18/18!, 6e-22."""
+
+RADIX = 16
+"""Of the number of whole steps |A t| = 1/2 in a time: each of its digits is a product."""
+
+MOST_DIGITS = 15
+"""Of it: 2**60 steps, beyond which nothing of a phase is left."""
+
+
+class _Flow(NamedTuple):
+    """The modes, what takes z to z' (2n, 2n) [1/T], the start (2n,), and 1/z of positions (n,)."""
+
+    modes: Modes
+    A: Extended
+    start: Extended
+    scale: Extended
+    rate: np.longdouble
+    """A bound of |A|, rows or columns [1/T]."""
+    free: np.longdouble
+    """The scale of modes that nothing holds, 0 where there is none [1/T]."""
+
+
+def prepare(system: System[Any]) -> _Flow | None:
+    """None where something acts beside springs, constant forces and friction, where a mode grows, or where a
+    mode that nothing holds is pulled."""
+    if not system.is_linear or system.is_driven or system.rods or system.n > MOST_UNLIKE:
+        return None
+    if any(term.kind not in ("potential", "friction") for term in system.terms):
+        return None
+    modes = normal_modes(system.without("damping"))
+    held = modes.w2 > 0
+    if np.any(modes.w2 < 0) or np.any(modes.pull[~held]):
+        return None
+    n, V = system.n, modes.vectors if modes.vectors is not None else np.eye(system.n, dtype=np.longdouble)
+    friction = V.T @ (system.friction_rates.astype(np.longdouble)[:, None] * V)
+    w = np.sqrt(np.where(held, modes.w2, 0))
+    free = np.longdouble(0) if np.all(held) else np.max(w) + np.max(system.friction_rates)
+    scale = np.where(held, w, free)
+    A = np.zeros((2 * n, 2 * n), np.longdouble)
+    A[:n, n:], A[n:, :n], A[n:, n:] = np.diag(scale), -np.diag(w), -friction
+    u, v = modes.about_centres(system.q, system.p)
+    # the larger of the two bounds |A|**2 by their product
+    rate = np.sqrt(np.max(np.sum(np.abs(A), axis=0)) * np.max(np.sum(np.abs(A), axis=1)))
+    return _Flow(modes, A, np.concatenate([scale * u, v]), scale, rate, free)
+
+
+def _series(A: Extended, z: Extended, t: Extended) -> Extended:
+    """exp(A t) z for states z (..., 2n) at times t (..., 1) with |A t| up to 1/2."""
+    out = z
+    for j in range(TERMS, 0, -1):
+        out = z + (out @ A.T) * (t / j)
+    return np.asarray(out)
+
+
+def motion(system: System[Any], found: _Flow, t: Extended) -> States:
+    """Exact q and p (f, n) at times t (f, 1) [T]."""
+    n, z = system.n, np.empty((len(t), 2 * system.n), np.longdouble)
+    for sign, mine in ((1, t[:, 0] >= 0), (-1, t[:, 0] < 0)):
+        if np.any(mine):
+            z[mine] = _from_start(sign * found.A, found.start, np.abs(t[mine]), found.rate)
+    return found.modes.from_centres(z[:, :n] / found.scale, z[:, n:])
+
+
+def _from_start(A: Extended, start: Extended, t: Extended, rate: np.longdouble) -> Extended:
+    """exp(A t) of one state (2n,) at times t (f, 1): where these lie evenly, half of them from the others."""
+    gaps = np.diff(t[:, 0])
+    if len(t) <= RADIX or not np.ptp(gaps) <= 8 * EPS * np.max(t) < gaps[0]:
+        return _flown(A, np.broadcast_to(start, (len(t), len(start))), t, rate)
+    out = np.empty((len(t), len(start)), np.longdouble)
+    out[:1] = _flown(A, start[None], t[:1], rate)
+    unit = np.eye(len(A), dtype=np.longdouble)
+    across = _flown(A, unit, np.full((len(A), 1), (t[-1, 0] - t[0, 0]) / (len(t) - 1)), rate).T
+    done = 1
+    while done < len(t):
+        more = out[: len(t) - done][:done]
+        out[done : done + len(more)] = more @ across.T
+        done, across = done + len(more), across @ across
+    return out
+
+
+def _flown(A: Extended, z: Extended, t: Extended, rate: np.longdouble) -> Extended:
+    """exp(A t) z of states (f, 2n) at times t (f, 1), none below 0."""
+    step = 1 / (2 * rate)
+    whole = np.minimum(np.floor(t / step), np.longdouble(RADIX) ** MOST_DIGITS - 1)
+    z = _series(A, z, t - whole * step)
+    unit = np.eye(len(A), dtype=np.longdouble)
+    one = _series(A, unit, np.broadcast_to(step, (len(A), 1))).T
+    while np.any(whole > 0):
+        digit, power = np.fmod(whole, RADIX)[:, 0], unit
+        for j in range(1, RADIX):
+            power = power @ one
+            z = np.where((digit == j)[:, None], z @ power.T, z)
+        one, whole = power @ one, np.floor(whole / RADIX)
+    return np.asarray(z)
+
+
+def doubt(system: System[Any], found: _Flow, t: np.longdouble) -> States:
+    """Bounds (n,) of the errors of `motion` in q [L] and p [M L/T], from the start to time t [T].
+
+    A product of matrices (k, k) of length 1 is off by k**2/2 EPS (Higham, Accuracy and Stability of Numerical
+    Algorithms, 3.13), and a power of a step by the sum of what its factors are at most: each of 2 |A| t steps
+    counts, with 4 such products for its series, A and the power.  What modes are off by is a force.  Friction
+    drives backwards in time.  The position of a mode that nothing holds acts on nothing, and adds up
+    velocities.
+    """
+    n, duration = system.n, np.abs(t)
+    size = np.sqrt(np.sum(found.start**2))
+    if t < 0:
+        size = size * np.exp(np.max(system.friction_rates) * duration)
+    last = 2 * ((2 * n) ** 2 + ROUNDINGS) * EPS * (2 + 2 * found.rate * duration)
+    known = (last + duration * np.max(found.modes.doubt / found.scale)) * size
+    far = np.where(found.modes.w2 > 0, known, known * (1 + found.free * duration)) / found.scale
+    y = found.modes.spread(far + ROUNDINGS * EPS * np.abs(found.modes.centre()))
+    v = found.modes.spread(np.full(n, known))
+    return y / found.modes.root_m, v * found.modes.root_m
+
+
+UNLIKE = Well(key="damping", terms=frozenset(), prepare=prepare, motion=motion, doubt=doubt)
+"""A whole linear scene whose friction joins modes."""
