@@ -388,7 +388,18 @@ def test_a_rod_along_others_that_keep_its_length_is_named_and_a_body_with_all_th
         m=np.repeat([1.3, 2.1, 0.7, 0.9], 3), q=corners, p=np.zeros(12), terms=(rod,), step=0.1, steps=3,
         places=np.arange(12),
     )  # fmt: skip
-    assert rods(body).freedoms(body.q) == 6
+    assert rods(body).freedoms == 6
+
+
+def test_a_particle_too_light_for_rods_on_one_line_is_named() -> None:
+    q, ends = np.array([0.0, 1.0, 2.0]), {"a": [0, 1], "b": [1, 2]}
+    line = {"q": q, "p": np.zeros(3), "terms": (Rod(**ends, length=[1.0, 1.0]),), "step": 0.1, "steps": 3}
+    with pytest.raises(
+        SceneError, match="particles 1 and 2: particle 1, of mass 1e-14 beside 3, is too light"
+    ):
+        Scene(m=[1.0, 1e-14, 3.0], **line)
+    # at an end of the line it is held by one rod, which no other resembles
+    assert len(rods(Scene(m=[1e-14, 1.0, 3.0], **line))) == 2
 
 
 def test_rounding_that_hides_a_momentum_in_space_is_said_of_a_particle_and_its_axis() -> None:

@@ -336,10 +336,10 @@ def test_run_says_which_methods_its_step_is_too_long_for(
     assert "beyond" not in capsys.readouterr().out
 
 
-def test_a_value_that_begins_with_a_minus_is_asked_for_in_one_line(
+def test_a_value_that_is_missing_is_asked_for_in_one_line_and_a_negative_one_is_refused_as_it_was_typed(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    for words in (["--temperature", "-5K"], ["--temperature"]):
+    for words in (["--temperature", "-K"], ["--temperature"]):
         with pytest.raises(SystemExit) as left:
             main(["run", "spring", *words])
         assert left.value.code == 2
@@ -347,6 +347,7 @@ def test_a_value_that_begins_with_a_minus_is_asked_for_in_one_line(
         assert said.count("\n") == 1
         assert "--temperature: a value is needed" in said
         assert "--temperature=-" in said
-    # as it asks for, it is understood, and refused for what it is
-    assert main(["run", "spring", "--temperature=-5K"]) == 2
-    assert "temperature" in capsys.readouterr().err
+    for words in (["--temperature=-5K"], ["--temperature", "-5K"], ["--temperature", "-.5K"]):
+        assert main(["run", "spring", *words]) == 2
+        typed = words[-1].removeprefix("--temperature=")
+        assert f"--temperature {typed}: a finite number >= 0 is needed" in capsys.readouterr().err

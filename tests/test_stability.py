@@ -230,9 +230,14 @@ def test_a_method_that_cannot_serve_the_scene_has_no_largest_step_there(need: Ne
 
 
 def test_what_is_left_out_is_named_once() -> None:
-    reasons = {"own:rods": "own:rods: serves rods alone", "own:a": "no step", "own:b": "no step"}
+    reasons = {
+        "own:rods": "own:rods: serves rods alone", "own:a": "no step", "own:b": "no step",
+        **dict.fromkeys(("own:c", "own:d"), "it is for scenes with rods"), "own:e": "it has no rod term",
+    }  # fmt: skip
     said = left_out([LeftOut(method=method, reason=reason) for method, reason in reasons.items()])
     assert [str(line) for line in said[1:]] == [
         "Left out own:rods: serves rods alone",
         "Left out own:a, own:b: no step",
+        "Left out own:c, own:d: each is for scenes with rods",
+        "Left out own:e: it has no rod term",
     ]

@@ -140,7 +140,8 @@ def test_a_bath_that_makes_no_sense_is_one_line(text: str) -> None:
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["--temperature", "-3"], "bath.temperature = -3.0: a number > 0"),
+        (["--temperature", "-3"], "--temperature -3: a finite number >= 0 is needed"),
+        (["--temperature", "nanK"], "--temperature nanK: a finite number >= 0 is needed"),
         (["--temperature", "warm"], "--temperature warm: a number is needed"),
         (["--temperature", "300K", "--method", "own:euler"],
          "explicit-euler has no noise, and the scene has a bath"),

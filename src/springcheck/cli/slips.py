@@ -36,6 +36,11 @@ UNREAD = (
 class Parser(argparse.ArgumentParser):
     """A parser that answers a mistake with one line, and a mistyped word with the nearest one."""
 
+    def __init__(self, *given: Any, **options: Any) -> None:
+        super().__init__(*given, **options)
+        # -5K is a value as -5 is
+        self._negative_number_matcher = re.compile(r"-\.?\d")
+
     def error(self, message: str) -> NoReturn:
         wrong = re.search(r"invalid choice: '([^']*)' \(choose from (.*)\)", message)
         if wrong:

@@ -78,7 +78,7 @@ class Rods:
     def __init__(self, m: Floats, places: Integers | None, terms: Sequence[Term]) -> None:
         self.m = m
         self._terms: list[Any] = [term for term in terms if term.kind == "constraint"]
-        places = 3 * np.arange(len(m)) if places is None else places
+        self._places = places = 3 * np.arange(len(m)) if places is None else places
         met: dict[Any, int] = {}
         rods: dict[Any, int] = {}
         number, axes = [], []
@@ -220,7 +220,7 @@ class Rods:
         m = self.m.astype(s.dtype)
         # each state by itself: one without a solution says nothing of those beside it
         for _ in range(MOST_NEWTON):
-            now = s + self.apart(self.spread(self.each(k) * r) / m)
+            now = s + self.apart(self._push(k, r) / m)
             gap = (self.dot(now, now) - length * length) / 2
             most = np.asarray(np.max(np.abs(gap) / (length * length), axis=-1, initial=0.0), np.float64)
             going &= most < last
@@ -309,9 +309,10 @@ class Rods:
         size = np.sqrt(self.dot(r, r))
         return np.asarray((size - length) / length)
 
-    def freedoms(self, q: Reals) -> int:
-        """Degrees of freedom that they leave at positions q (n,)."""
-        return len(self.m) - int(np.linalg.matrix_rank(self._matrix(r := self.ways(q), r)))
+    @property
+    def freedoms(self) -> int:
+        """Degrees of freedom that they leave: `check` refuses one that the others make needless."""
+        return len(self.m) - len(self)
 
     def rates(self, q: Reals, p: Reals) -> Reals:
         """Angular velocity of each rod, its sign left out, at states (..., n) -> (..., c) [1/T]."""
@@ -331,6 +332,32 @@ class Rods:
             "keeps its length; take a shorter step"
         )
 
+    def _needless(self, r: Reals) -> str:
+        """Why the multipliers of the rods have no one solution at these ways (s,), or ""."""
+
+        def first(matrix: Floats) -> int | None:
+            unit = np.sqrt(np.diag(matrix))
+            # of a push that those of the rods before it make together nothing is left
+            left = np.abs(np.diag(np.linalg.qr(matrix / np.outer(unit, unit), mode="r")))
+            wrong = left <= UNTRUE * len(self)
+            return int(np.argmax(wrong)) if np.any(wrong) else None
+
+        j = first(self._matrix(r, r))
+        if j is None:
+            return ""
+        alike = Rods(np.ones_like(self.m), self._places, self._terms)
+        if first(alike._matrix(r, r)) is not None:
+            return (
+                f"{self.named(j)}: at the start the rods before it keep its length too, and their "
+                "multipliers have no one solution; leave it out"
+            )
+        of = {int(place) // 3: float(m) for place, m in zip(self._places, self.m, strict=True)}
+        light = min(self.ends[j], key=lambda particle: of[particle])
+        return (
+            f"{self.named(j)}: particle {light}, of mass {of[light]:g} beside {max(of.values()):g}, is too "
+            "light for pushes along rods on one line to be told apart; give it more mass"
+        )
+
     def check(self, q: Floats, p: Floats, untrue: float = UNTRUE) -> None:
         """SceneError unless every rod has its length at the start, and nothing moves along it."""
         r, v = self.ways(q), self.apart(p / self.m)
@@ -344,17 +371,8 @@ class Rods:
                 f"{self.named(j)}: its length is {float(self.length[j])!r}, and its ends are "
                 f"{float(np.sqrt(self.dot(r, r))[j])!r} apart at the start; leave the length out to keep that"
             )
-        if self.share:
-            matrix = self._matrix(r, r)
-            unit = np.sqrt(np.diag(matrix))
-            # of a push that those of the rods before it make together nothing is left
-            left = np.abs(np.diag(np.linalg.qr(matrix / np.outer(unit, unit), mode="r")))
-            wrong = left <= UNTRUE * len(self)
-            if np.any(wrong):
-                raise SceneError(
-                    f"{self.named(int(np.argmax(wrong)))}: at the start the rods before it keep its length "
-                    "too, or masses are too unlike to tell, and their multipliers have no one solution"
-                )
+        if self.share and (needless := self._needless(r)):
+            raise SceneError(needless)
         wrong = ~(along <= untrue * size)
         if np.any(wrong):
             j = int(np.argmax(wrong))

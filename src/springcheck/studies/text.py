@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 from springcheck.physics.exact import has_true_motion
@@ -16,7 +17,10 @@ def left_out(left: Sequence[LeftOut]) -> Lines:
     reasons: dict[str, list[str]] = {}
     for one in left:
         reasons.setdefault(one.reason.removeprefix(f"{one.method}: "), []).append(one.method)
-    said = [plain(f"Left out {', '.join(names)}: {why}") for why, names in reasons.items()]
+    said = [
+        plain(f"Left out {', '.join(names)}: {re.sub('^it ', 'each ', why) if len(names) > 1 else why}")
+        for why, names in reasons.items()
+    ]
     return [plain(), *said] if said else []
 
 

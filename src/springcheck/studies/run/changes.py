@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import tomllib
 from argparse import Namespace
 from dataclasses import replace
@@ -65,6 +66,11 @@ def bathed(scene: Scene, options: Namespace) -> Scene:
             temperature = float(text.strip().removesuffix("K"))
         except ValueError:
             raise SpringcheckError(f"--temperature {text}: a number is needed, such as 300K") from None
+        if not 0 <= temperature < math.inf:
+            raise SpringcheckError(
+                f"--temperature {text}: a finite number >= 0 is needed, such as 300K; 0 is friction without "
+                "noise"
+            )
         if kelvin and scene.units == "reduced":
             temperature *= KELVIN["md"]
     else:

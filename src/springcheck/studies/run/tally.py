@@ -36,7 +36,7 @@ class Heat:
         self._scene = scene
         self._law: thermal.Law | None = None
         rods = scene.system.rods
-        self._freedoms = rods.freedoms(scene.q) if rods else scene.n
+        self._freedoms = rods.freedoms if rods else scene.n
         self._sums = np.zeros((2, scene.n))
         self._frames = 0
         self._from = 0

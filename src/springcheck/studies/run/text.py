@@ -176,7 +176,7 @@ def _temperatures(report: Report) -> Lines:
     titles = ("method", "configurational", "measured", "kinetic", "measured ")
     scene, of = report.scene, ""
     if scene.system.rods:
-        of = f", in {count(scene.system.rods.freedoms(scene.q), 'degree')} of freedom"
+        of = f", in {count(scene.system.rods.freedoms, 'degree')} of freedom"
     return [
         plain(),
         plain(f"Temperatures over that of the bath{of}, exact for each scheme, and as measured:"),
