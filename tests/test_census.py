@@ -422,6 +422,29 @@ def test_a_thermostat_under_a_wrong_name_is_found_out(monkeypatch: pytest.Monkey
     assert (found.claimed, found.found, found.agrees) == ("aboba", "baoa", False)
 
 
+@pytest.mark.parametrize("label", ["openmm:langevin-middle-rods", "lammps:rattle-langevin"])
+def test_a_thermostat_of_rods_is_read_by_the_centres_of_dumbbells(
+    label: str, need: Callable[[str], None]
+) -> None:
+    need(label)
+    row = baths.entry(engines.parse(label))
+    assert row.agrees
+    # BBK differs by how its draws are distributed, which the sum of two does not show
+    assert row.claimed in row.found.split(" or ")
+    assert (row.along, row.constraint) == ("x, y and z", "rod: length to rounding")
+    # a = (h w)**2 = 1/4, gamma h = 0.4
+    law = 0.8 / (0.8 - 0.25 / 4) if row.claimed == "lammps-langevin" else 1.0
+    assert abs(row.configurational - law) < 5 * row.configurational_error < 0.02
+
+
+def test_new_rows_of_the_table_stand_where_the_whole_table_has_them() -> None:
+    old = [{"method": name, "found": "old"} for name in "bdz"]
+    new = [{"method": name, "found": "new"} for name in "eba"]
+    kept = by_hand.beside(old, new, list("abcdef"))
+    assert [one["method"] for one in kept] == list("abdez")
+    assert [one["found"] for one in kept] == ["new", "new", "old", "new", "old"]
+
+
 @pytest.mark.parametrize("label", ["mujoco:hinge", "dart:hinge"])
 def test_a_hinge_is_named_on_springs_of_rotors(label: str, need: Callable[[str], None]) -> None:
     need(label)

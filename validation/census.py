@@ -13,6 +13,8 @@ Run:   python validation/census.py        (about a minute; with the extras `esta
                                            data/reference/engines.npz)
        python validation/census.py table  (and `validation/engines`, OpenMM by platform, in 20 minutes; writes
                                            validation/engines/engines.json, .csv, .html and .lock)
+       python validation/census.py table own:baoab-respa3 ...
+                                          (these rows alone, the others kept as they are)
 """
 
 import json
@@ -22,6 +24,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -155,8 +158,8 @@ NOTES = {
 """What the authors of programs would want to be said beside their rows."""
 
 
-def everything() -> int:
-    """Write the table of all that is here; commands run in the root of the checkout."""
+def everything(only: list[str]) -> int:
+    """Write the table of all that is here, or these of its rows; commands run in the root of the checkout."""
     sys.path.insert(0, str(FOLDER))
     os.chdir(ROOT)
     kept = str(FOLDER / "engines.h5")
@@ -164,24 +167,42 @@ def everything() -> int:
     for name in engines.names():
         found = engines.engine(name)
         for method in found.methods:
-            places = [f"@{place}" for place in PLATFORMS] if name == "openmm" else [""]
+            # one that chooses its steps does so in single precision on the others
+            here = PLATFORMS[:2] if found.methods[method].adaptive else PLATFORMS
+            places = [f"@{place}" for place in here] if name == "openmm" else [""]
             words += [word for place in places for word in ("--method", f"{name}:{method}{place}")]
         # one platform: noise is no matter of precision
         place = "@Reference" if name == "openmm" else ""
         words += [word for method in found.thermostats for word in ("--method", f"{name}:{method}{place}")]
     for file, name in LIBRARIES.items():
+        if only and not any(one.startswith(f"{name}:") for one in only):
+            # whose default methods would be measured
+            continue
         words += ["--engine", f"{HERE}/{file}"]
         known = runpy.run_path(str(FOLDER / file))["ENGINE"]
         words += [x for one in (*known.methods, *known.thermostats) for x in ("--method", f"{name}:{one}")]
     with tempfile.TemporaryDirectory() as folder:
-        for name, command in {**of_node(), **built(Path(folder))}.items():
+        programs = not only or any(name.startswith("command:") for name in only)
+        for name, command in {**of_node(), **built(Path(folder))}.items() if programs else ():
             words += ["--command", f"{name}={command} {{scene}} {{out}}", "--method", f"command:{name}"]
+        order = [word for flag, word in pairwise(words) if flag == "--method"]
+        if unknown := set(only) - set(order):
+            print(f"no row of the table: {', '.join(sorted(unknown))}", file=sys.stderr)
+            return 2
+        for name in order if only else []:
+            if name not in only:
+                at = words.index(name)
+                del words[at - 1 : at + 1]
         status = springcheck(words)
         if status not in (0, 1):
             return status
         from springcheck.studies.census.measure import stored
 
         document = told(stored(kept).document(), Path(folder))
+    if only:
+        old = json.loads((FOLDER / "engines.json").read_text())
+        new = [entry for entry in document["entries"] if entry["method"] in only]
+        document = {**old, "entries": beside(old["entries"], new, order)}
     (FOLDER / "engines.json").write_text(json.dumps(document, indent=1) + "\n")
     rows = as_rows(document)
     (FOLDER / "engines.csv").write_text(engines_table.as_csv(rows))
@@ -192,6 +213,19 @@ def everything() -> int:
     makers = len(set(map(engines_table.engine, rows)))
     print(f"{len(rows)} rows of {makers} engines, {len(wrong)} wrong: {wrong}")
     return status
+
+
+def beside(old: list[dict[str, Any]], new: list[dict[str, Any]], order: list[str]) -> list[dict[str, Any]]:
+    """Entries with new ones in their places: behind the nearest that stands before them in this order."""
+    out = list(old)
+    for entry in new:
+        names = [one["method"] for one in out]
+        if entry["method"] in names:
+            out[names.index(entry["method"])] = entry
+            continue
+        before = [name for name in order[: order.index(entry["method"])] if name in names]
+        out.insert(names.index(before[-1]) + 1 if before else 0, entry)
+    return out
 
 
 STATES = ROOT / "data" / "reference" / "engines.npz"
@@ -299,9 +333,9 @@ def claimed(entry: dict[str, Any]) -> None:
 
 def main() -> int:
     """Print the table; the exit status says whether every engine is what it is declared as."""
-    what = arguments(__doc__, what="compare").what
-    if what in ("table", "states"):
-        return everything() if what == "table" else states()
+    given = arguments(__doc__, what="compare", methods=[])
+    if given.what in ("table", "states"):
+        return everything(given.methods) if given.what == "table" else states()
     found = measure()
     for line in table(found):
         print(line)

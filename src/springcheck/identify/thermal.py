@@ -33,14 +33,17 @@ def explained(found: Identification, t: Any, q: Any, p: Any, v: Any, mass: Any) 
     return by_a_factor(of_bath(t, q, p, v, mass) or found, h, positions, u)
 
 
-def of_bath(t: Any, q: Any, p: Any, v: Any, mass: Any) -> Identification | None:
-    """What a thermostat has left in states (f, n) at times t (f,); None where nothing random shows."""
+def of_bath(t: Any, q: Any, p: Any, v: Any, mass: Any, *, mixed: bool = False) -> Identification | None:
+    """What a thermostat has left in states (f, n) at times t (f,); None where nothing random shows.
+
+    `mixed` says that several draws act on each coordinate, whose distribution then does not show.
+    """
     given = _given(t, q, p, v, mass)
     if given is None:
         return None
     times, positions, u, m = given
     found = [
-        identify_thermal(times, x, y, np.delete(positions, j, axis=1))
+        identify_thermal(times, x, y, np.delete(positions, j, axis=1), mixed=mixed)
         for j, (x, y) in enumerate(zip(positions.T, u.T, strict=True))
     ]
     h, joined = float(np.mean(np.diff(times))), None

@@ -1,18 +1,25 @@
-"""The row of a thermostat: named by a spring's states in a bath, its two temperatures measured on many."""
+"""The row of a thermostat: named by a spring's states in a bath, its two temperatures measured on many.
+
+One that is for scenes with rods moves dumbbells in space, each of whose masses has its part of the springs:
+these turn no rod, and the centre is a mass on a spring along each axis, whose states are read.
+"""
 
 from __future__ import annotations
 
 import hashlib
+from dataclasses import replace
 from math import nan
 
 import numpy as np
 
 from springcheck import checks, driver, engines, schemes
-from springcheck.engines.contract import Label
+from springcheck.engines.contract import Label, Need
 from springcheck.physics.arrays import Floats
 from springcheck.physics.bath import Bath
 from springcheck.physics.scene import Scene
-from springcheck.physics.terms import WallSpring
+from springcheck.physics.terms import Rod, WallSpring
+from springcheck.physics.trajectory import Trajectory
+from springcheck.studies.census import rigid
 from springcheck.studies.census.result import Entry
 
 MASS, STIFFNESS, KT = 3.7, 2.9, 1.7
@@ -27,6 +34,9 @@ SIDE_BY_SIDE, COUNTED, UNCOUNTED = 1000, 1000, 100
 
 NAMED_BY = 2000
 """Steps of the spring whose states are named."""
+
+ROD, NEAR = 12.0, 0.375
+"""Length of a rod [L], which kT turns by 0.07 a step, and the part of the mass at its near end."""
 
 BLOCKS_OF_STEPS = 20
 """Of steps, for the standard error of what all springs share."""
@@ -47,6 +57,35 @@ def springs(n: int, steps: int) -> Scene:
     )  # fmt: skip
 
 
+def rods(n: int, steps: int) -> Scene:
+    """So many dumbbells, whose centres are three times as many of these springs."""
+    centres, parts = springs(3 * n, steps), np.array([[NEAR], [1 - NEAR]])
+    way = np.random.default_rng(SEED_OF_ROWS).standard_normal((n, 1, 3))
+    way *= ROD / np.linalg.norm(way, axis=2, keepdims=True)
+    q = (centres.q.reshape(n, 1, 3) + way * (parts[::-1] * [[-1], [1]])).ravel()
+    m, p = (np.ravel(x.reshape(n, 1, 3) * parts) for x in (centres.m, centres.p))
+    i = np.arange(6 * n).reshape(n, 2, 3)
+    joined = Rod(a=i[:, 0].ravel(), b=i[:, 1].ravel(), length=np.full(3 * n, ROD))
+    walls = WallSpring(i=i.ravel(), k=STIFFNESS * m / MASS, at=np.zeros(6 * n))
+    return centres.derived(m=m, q=q, p=p, terms=(walls, joined), places=i.ravel())
+
+
+def scene_of(label: Label, n: int, steps: int) -> Scene:
+    """What a thermostat moves: n springs, or as many dumbbells as have at least n coordinates of a centre."""
+    return rods(-(-n // 3), steps) if Need.RODS in engines.method(label).requires else springs(n, steps)
+
+
+def read(run: Trajectory) -> tuple[Floats, Floats]:
+    """Positions and momenta (f, n) of the springs: of dumbbells those of their centres."""
+    assert run.scene is not None
+    if not run.scene.system.rods:
+        return run.q, run.p
+    (near_q, far_q), (near_p, far_p) = (
+        np.moveaxis(x.reshape(len(x), -1, 2, 3), 2, 0).reshape(2, len(x), -1) for x in (run.q, run.p)
+    )
+    return NEAR * near_q + (1 - NEAR) * far_q, near_p + far_p
+
+
 def temperatures(q: Floats, p: Floats) -> tuple[tuple[float, float], tuple[float, float]]:
     """k <q**2>/kT and <p**2>/m kT of frames (f, n) of `springs`, each with its standard error.
 
@@ -65,16 +104,18 @@ def entry(label: Label) -> Entry:
     """What one thermostat is, by its states.  Its time, measured here, is of a step of a thousand springs."""
     from springcheck.identify.thermal import of_bath
 
-    one, many = springs(1, NAMED_BY), springs(SIDE_BY_SIDE, UNCOUNTED + COUNTED)
-    method, run = engines.method(label), driver.run(one, label, seed=SEED_OF_ROWS)
-    found = of_bath(run.t, run.q, run.p, None, one.m)
-    names = tuple(x.scheme for x in found.candidates) if found is not None else ()
+    one = scene_of(label, 1, NAMED_BY)
+    many = scene_of(label, SIDE_BY_SIDE, UNCOUNTED + COUNTED)
+    method, joined = engines.method(label), one.system.rods
+    run, hot = (replace(driver.run(x, label, seed=SEED_OF_ROWS), scene=x) for x in (one, many))
+    q, p = read(run)
+    found = of_bath(run.t, q, p, None, np.full(q.shape[1], MASS), mixed=joined is not None)
+    names = tuple(dict.fromkeys(x.scheme for x in found.candidates)) if found is not None else ()
     named = found is not None and found.verdict == "named"
     # what a single spring does not tell is judged as it is declared: by what no draw can explain
     kept = all(v.passed is not False for v in checks.shared(checks.judge(one, run)))
-    hot = driver.run(many, label, seed=SEED_OF_ROWS)
     whole = hot.outcome.status == "complete"
-    both = temperatures(hot.q[UNCOUNTED:], hot.p[UNCOUNTED:]) if whole else ((nan, nan), (nan, nan))
+    both = temperatures(*(x[UNCOUNTED:] for x in read(hot))) if whole else ((nan, nan), (nan, nan))
     configurational, kinetic = both
     ends = "" if whole else f"{SIDE_BY_SIDE} springs: {hot.outcome.status} after {hot.outcome.step} steps"
     return Entry(
@@ -85,6 +126,8 @@ def entry(label: Label) -> Entry:
         substeps=1 if named else 0, velocity_offset=found.velocity_offset if found is not None else nan,
         area=nan, friction=nan, precision=run.arithmetic.name, limit=nan, bounded=False,
         thermostat=schemes.title(method.scheme), amplitude=nan,
+        along="x, y and z" if joined else "x",
+        constraint=f"rod: length {rigid.to(np.max(np.abs(joined.strain(run.q))))}" if joined else "",
         configurational=configurational[0], configurational_error=configurational[1],
         kinetic=kinetic[0], kinetic_error=kinetic[1], force_calls=run.force_calls / run.outcome.step,
         seconds=hot.timing.run / hot.outcome.step,

@@ -48,7 +48,7 @@ def measure(methods: Sequence[str] = (), *, thermostats: bool = False, kept: Kee
     scenes = load_scene(BLOG), load_scene(UNEVEN)
 
     def why(label: Label) -> str | None:
-        of = (baths.springs(1, 1),) if engines.method(label).generator else scenes
+        of = (baths.scene_of(label, 1, 1),) if engines.method(label).generator else scenes
         reasons = [rigid.refusal(scene, label) for scene in of]
         return next(filter(None, reasons), None) or _absence(label)
 

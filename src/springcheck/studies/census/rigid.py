@@ -130,7 +130,9 @@ def axes(label: Label) -> str:
         states = [np.stack([found.q[:, axis], found.p[:, axis]]) for axis in range(3)]
         maps = np.stack([z[:, 1:] @ np.linalg.pinv(z[:, :-1]) for z in states])
         coarse = found.arithmetic.state > 2.0**-53
-        said += " alike" if np.ptp(maps, axis=0).max() < (1e-4 if coarse else ALIKE) else " unlike"
+        alike = np.ptp(maps, axis=0).max() < (1e-4 if coarse else ALIKE)
+        # steps that follow the forces are no map
+        said += " alike" if alike else "" if engines.method(label).adaptive else " unlike"
     boxed = engines.refusal(load_scene("periodic-box"), label)
     return said if boxed else f"{said}; periodic box"
 
@@ -147,7 +149,7 @@ def constraint(label: Label) -> str:
         return ""
     found, rods = driver.run(scene, label), scene.system.rods
     assert rods is not None
-    return f"rod: {_turn(found, rods, scene)}, length {_to(np.max(np.abs(rods.strain(found.q))))}"
+    return f"rod: {_turn(found, rods, scene)}, length {to(np.max(np.abs(rods.strain(found.q))))}"
 
 
 def _turn(found: Trajectory, rods: Rods, scene: Scene) -> str:
@@ -164,9 +166,9 @@ def _named(each: Reals, h_w: Floats) -> str:
     name = min(off, key=lambda one: off[one])
     if not off[name] < UNLIKE:
         return f"turns by {float(np.mean(each) / h_w[0]):.4f} h w a step"
-    return f"turns by {name} a step {_to(off[name])}"
+    return f"turns by {name} a step {to(off[name])}"
 
 
-def _to(off: float) -> str:
+def to(off: float) -> str:
     """The distance, rounded up to a power of ten, so that no rounding changes a column that is compared."""
     return "to rounding" if off < ROUNDED else f"to {10.0 ** np.ceil(np.log10(off)):.0e}"
