@@ -12,8 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from springcheck.physics.arrays import Extended
-from springcheck.physics.exact.elliptic import EPS
+from springcheck.physics.arrays import EPS, Extended
 from springcheck.physics.exact.linear import ROUNDINGS
 from springcheck.physics.exact.normal import Modes, normal_modes
 from springcheck.physics.exact.well import States, Well
