@@ -335,26 +335,23 @@ class Rods:
     def _needless(self, r: Reals) -> str:
         """Why the multipliers of the rods have no one solution at these ways (s,), or ""."""
 
-        def first(matrix: Floats) -> int | None:
+        def first(matrix: Floats) -> int:
             unit = np.sqrt(np.diag(matrix))
             # of a push that those of the rods before it make together nothing is left
             left = np.abs(np.diag(np.linalg.qr(matrix / np.outer(unit, unit), mode="r")))
-            wrong = left <= UNTRUE * len(self)
-            return int(np.argmax(wrong)) if np.any(wrong) else None
+            return int(np.argmax(np.append(left <= UNTRUE * len(self), True)))
 
-        j = first(self._matrix(r, r))
-        if j is None:
+        if (j := first(self._matrix(r, r))) == len(self):
             return ""
-        alike = Rods(np.ones_like(self.m), self._places, self._terms)
-        if first(alike._matrix(r, r)) is not None:
+        if first(Rods(np.ones_like(self.m), self._places, self._terms)._matrix(r, r)) < len(self):
             return (
                 f"{self.named(j)}: at the start the rods before it keep its length too, and their "
                 "multipliers have no one solution; leave it out"
             )
-        of = {int(place) // 3: float(m) for place, m in zip(self._places, self.m, strict=True)}
-        light = min(self.ends[j], key=lambda particle: of[particle])
+        mass = dict(zip((self._places // 3).tolist(), self.m.tolist(), strict=True))
+        light = min(self.ends[j], key=mass.__getitem__)
         return (
-            f"{self.named(j)}: particle {light}, of mass {of[light]:g} beside {max(of.values()):g}, is too "
+            f"{self.named(j)}: particle {light}, of mass {mass[light]:g} beside {max(self.m):g}, is too "
             "light for pushes along rods on one line to be told apart; give it more mass"
         )
 
@@ -387,31 +384,3 @@ class Rods:
 def rods_of(m: Floats, places: Integers | None, terms: Sequence[Term]) -> Rods | None:
     """The rods among the terms of a scene, None where there are none."""
     return Rods(m, places, terms) if any(term.kind == "constraint" for term in terms) else None
-
-
-class Variation(Rods):
-    """The rods on states (1 + d, ..., n): the first is a motion, the others are changes of it.
-
-    The change of a multiplier follows from the length that stays (implicit differentiation).
-    """
-
-    def __init__(self, rods: Rods) -> None:
-        self.__dict__.update(rods.__dict__)
-
-    def drifted(self, before: Reals, q: Reals, p: Reals, x: Any) -> tuple[Reals, Reals]:
-        """As of `Rods`."""
-        m, r, dr = self.m.astype(q.dtype), self.ways(before[0]), self.apart(before[1:])
-        k = self.multiplier(r, self.ways(q[0]))
-        push, turned = self._push(k, r), self._push(k, dr)
-        s = self.ways(q[0] + push / m)
-        lacks = self.dot(s, self.apart(q[1:] + turned / m))
-        whole = np.concatenate([push[None], turned - self._push(self.solve(s, r, lacks), r)])
-        return q + whole / m, p + whole / x
-
-    def projected(self, q: Reals, p: Reals) -> Reals:
-        """As of `Rods`."""
-        m, r, dr = self.m.astype(q.dtype), self.ways(q[0]), self.apart(q[1:])
-        k = self._along(r, p[0])
-        first, change = p[0] - self._push(k, r), p[1:] - self._push(k, dr)
-        lacks = self.dot(r, self.apart(change / m)) + self.dot(dr, self.apart(first / m))
-        return np.concatenate([first[None], change - self._push(self.solve(r, r, lacks), r)])

@@ -14,7 +14,6 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 
 from springcheck.physics.arrays import Extended, Force, Reals
-from springcheck.physics.rods import Variation
 from springcheck.physics.scene import Scene
 from springcheck.physics.term import Term
 from springcheck.schemes.catalogue import Scheme
@@ -22,6 +21,7 @@ from springcheck.schemes.catalogue import Trait as OfScheme
 from springcheck.schemes.linear import matrix, noise
 from springcheck.schemes.rounding import roundings
 from springcheck.schemes.stepping import Slope, step
+from springcheck.schemes.variation import Variation
 
 Trait: TypeAlias = OfScheme | Literal["undamped", "linear", "modes"]
 """Of a scheme, or of a scene: without friction; all forces linear; each normal mode steps by itself."""

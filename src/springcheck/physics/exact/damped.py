@@ -21,13 +21,13 @@ from springcheck.physics.system import System
 MOST_UNLIKE = 32
 """Particles: so many take 0.1 s, and 40 us a frame."""
 
-TERMS = 17
+SERIES_TERMS = 17
 """Of the series of exp(A t) up to |A t| = 1/2: the next one is 2**-18/18!, 6e-22."""
 
-RADIX = 16
+RADIX_OF_STEPS = 16
 """Of the number of whole steps |A t| = 1/2 in a time: each of its digits is a product."""
 
-MOST_DIGITS = 15
+MOST_STEP_DIGITS = 15
 """Of it: 2**60 steps, beyond which nothing of a phase is left."""
 
 
@@ -71,7 +71,7 @@ def prepare(system: System[Any]) -> _Flow | None:
 def _series(A: Extended, z: Extended, t: Extended) -> Extended:
     """exp(A t) z for states z (..., 2n) at times t (..., 1) with |A t| up to 1/2."""
     out = z
-    for j in range(TERMS, 0, -1):
+    for j in range(SERIES_TERMS, 0, -1):
         out = z + (out @ A.T) * (t / j)
     return np.asarray(out)
 
@@ -88,7 +88,7 @@ def motion(system: System[Any], found: _Flow, t: Extended) -> States:
 def _from_start(A: Extended, start: Extended, t: Extended, rate: np.longdouble) -> Extended:
     """exp(A t) of one state (2n,) at times t (f, 1): where these lie evenly, half of them from the others."""
     gaps = np.diff(t[:, 0])
-    if len(t) <= RADIX or not np.ptp(gaps) <= 8 * EPS * np.max(t) < gaps[0]:
+    if len(t) <= RADIX_OF_STEPS or not np.ptp(gaps) <= 8 * EPS * np.max(t) < gaps[0]:
         return _flown(A, np.broadcast_to(start, (len(t), len(start))), t, rate)
     out = np.empty((len(t), len(start)), np.longdouble)
     out[:1] = _flown(A, start[None], t[:1], rate)
@@ -105,16 +105,16 @@ def _from_start(A: Extended, start: Extended, t: Extended, rate: np.longdouble) 
 def _flown(A: Extended, z: Extended, t: Extended, rate: np.longdouble) -> Extended:
     """exp(A t) z of states (f, 2n) at times t (f, 1), none below 0."""
     step = 1 / (2 * rate)
-    whole = np.minimum(np.floor(t / step), np.longdouble(RADIX) ** MOST_DIGITS - 1)
+    whole = np.minimum(np.floor(t / step), np.longdouble(RADIX_OF_STEPS) ** MOST_STEP_DIGITS - 1)
     z = _series(A, z, t - whole * step)
     unit = np.eye(len(A), dtype=np.longdouble)
     one = _series(A, unit, np.broadcast_to(step, (len(A), 1))).T
     while np.any(whole > 0):
-        digit, power = np.fmod(whole, RADIX)[:, 0], unit
-        for j in range(1, RADIX):
+        digit, power = np.fmod(whole, RADIX_OF_STEPS)[:, 0], unit
+        for j in range(1, RADIX_OF_STEPS):
             power = power @ one
             z = np.where((digit == j)[:, None], z @ power.T, z)
-        one, whole = power @ one, np.floor(whole / RADIX)
+        one, whole = power @ one, np.floor(whole / RADIX_OF_STEPS)
     return np.asarray(z)
 
 
@@ -139,5 +139,5 @@ def doubt(system: System[Any], found: _Flow, t: np.longdouble) -> States:
     return y / found.modes.root_m, v * found.modes.root_m
 
 
-UNLIKE = Well(key="damping", terms=frozenset(), prepare=prepare, motion=motion, doubt=doubt)
+UNLIKE_FRICTION = Well(key="damping", terms=frozenset(), prepare=prepare, motion=motion, doubt=doubt)
 """A whole linear scene whose friction joins modes."""

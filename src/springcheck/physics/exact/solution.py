@@ -100,10 +100,10 @@ def _solution(system: SolvedSystem[Any]) -> Solution | None:
                 return Solution(n=system.n, groups=(everything(found=ready, law=law),))
         return None
     if system.is_linear and system.is_damped and not system.rods:
-        from springcheck.physics.exact.damped import UNLIKE
+        from springcheck.physics.exact.damped import UNLIKE_FRICTION
 
-        ready = UNLIKE.prepare(system)
-        return ready and Solution(n=system.n, groups=(everything(found=ready, law=UNLIKE),))
+        ready = UNLIKE_FRICTION.prepare(system)
+        return ready and Solution(n=system.n, groups=(everything(found=ready, law=UNLIKE_FRICTION),))
     from springcheck.physics.exact.bond import MORSE
     from springcheck.physics.exact.pendulum import COSINE, RIGID
     from springcheck.physics.exact.quartic import QUARTIC

@@ -35,7 +35,7 @@ SIDE_BY_SIDE, COUNTED, UNCOUNTED = 1000, 1000, 100
 NAMED_BY = 2000
 """Steps of the spring whose states are named."""
 
-ROD, NEAR = 12.0, 0.375
+DUMBBELL, NEAR_PART = 12.0, 0.375
 """Length of a rod [L], which kT turns by 0.07 a step, and the part of the mass at its near end."""
 
 BLOCKS_OF_STEPS = 20
@@ -59,13 +59,13 @@ def springs(n: int, steps: int) -> Scene:
 
 def rods(n: int, steps: int) -> Scene:
     """So many dumbbells, whose centres are three times as many of these springs."""
-    centres, parts = springs(3 * n, steps), np.array([[NEAR], [1 - NEAR]])
+    centres, parts = springs(3 * n, steps), np.array([[NEAR_PART], [1 - NEAR_PART]])
     way = np.random.default_rng(SEED_OF_ROWS).standard_normal((n, 1, 3))
-    way *= ROD / np.linalg.norm(way, axis=2, keepdims=True)
+    way *= DUMBBELL / np.linalg.norm(way, axis=2, keepdims=True)
     q = (centres.q.reshape(n, 1, 3) + way * (parts[::-1] * [[-1], [1]])).ravel()
     m, p = (np.ravel(x.reshape(n, 1, 3) * parts) for x in (centres.m, centres.p))
     i = np.arange(6 * n).reshape(n, 2, 3)
-    joined = Rod(a=i[:, 0].ravel(), b=i[:, 1].ravel(), length=np.full(3 * n, ROD))
+    joined = Rod(a=i[:, 0].ravel(), b=i[:, 1].ravel(), length=np.full(3 * n, DUMBBELL))
     walls = WallSpring(i=i.ravel(), k=STIFFNESS * m / MASS, at=np.zeros(6 * n))
     return centres.derived(m=m, q=q, p=p, terms=(walls, joined), places=i.ravel())
 
@@ -83,7 +83,7 @@ def read(run: Trajectory) -> tuple[Floats, Floats]:
     (near_q, far_q), (near_p, far_p) = (
         np.moveaxis(x.reshape(len(x), -1, 2, 3), 2, 0).reshape(2, len(x), -1) for x in (run.q, run.p)
     )
-    return NEAR * near_q + (1 - NEAR) * far_q, near_p + far_p
+    return NEAR_PART * near_q + (1 - NEAR_PART) * far_q, near_p + far_p
 
 
 def temperatures(q: Floats, p: Floats) -> tuple[tuple[float, float], tuple[float, float]]:

@@ -89,21 +89,21 @@ def _fault(
     return Fault(name, about, checks, make, scheme="variable-verlet", size=size, scene="varying steps")
 
 
-BOTH = ("replay", "energy-gain")
+BOTH_CHECKS = ("replay", "energy-gain")
 
 
 VARYING = (
     _fault("rule-of-another-tolerance", "steps are chosen by too large a tolerance", varying(looser), 1e-9,
-           BOTH),
+           BOTH_CHECKS),
     _fault("rule-that-holds-no-step", "steps grow by any little, where the rule holds them", varying(grows),
-           checks=BOTH),
-    _fault("rule-that-jumps", "a step may be longer than twice the one before", varying(jumps), checks=BOTH),
+           checks=BOTH_CHECKS),
+    _fault("rule-that-jumps", "a step may be longer than twice the one before", varying(jumps), checks=BOTH_CHECKS),
     _fault("varying-steps-with-friction", "momenta lose a fraction at every frame",
-           varying(after=lambda state, x: (state[0], state[1] * (1 - x))), 1e-9, BOTH),
+           varying(after=lambda state, x: (state[0], state[1] * (1 - x))), 1e-9, BOTH_CHECKS),
     _fault("rule-of-another-tolerance-told", "the same, with the last step before each frame recorded",
            varying(looser, told=as_taken), 1e-12),
     _fault("step-twice-as-long", "one step is twice as long as the rule says",
-           varying(doubles, told=as_taken), checks=BOTH),
+           varying(doubles, told=as_taken), checks=BOTH_CHECKS),
     _fault("last-step-not-its-own", "the last step before one frame is recorded as another",
            varying(told=one_other), 1e-12),
 )  # fmt: skip
