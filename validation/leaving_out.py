@@ -6,9 +6,7 @@ than what was asked for.
 
 Command: python validation/leaving_out.py
 
-Expected, on one core of a shared machine of 2025: memory 1.44 times, time 2.7 times that of the two imports.
-Of the time, 105 ms are Python with the two imports, 60 ms springcheck's other imports (importlib.metadata
-12 ms), and 90 ms the run: 3 methods, each stored and judged, 11 flushes to the disk among them.
+Expected, on one core of a shared machine of 2025: memory 1.46 times, time 2.8 times that of the two imports.
 
 Each figure is the least of seven runs, taken in turn; compiled bytecode is there from a run before.
 """
@@ -110,7 +108,7 @@ def main() -> int:
     small = ["run", "spring", "--method", "own:*", "--quiet"]
     codes = {
         "import numpy, h5py": "import numpy, h5py",
-        "load a scene": "from springcheck import scenes; scenes.load_scene('spring')",
+        "load a scene": "import springcheck; springcheck.load_scene('spring')",
         "one run in memory": "from springcheck import *; simulate(load_scene('spring'), 'own:euler')",
         "run spring --method 'own:*' --quiet": RUN.format(arguments=small),
         "run spring --method 'own:*'": RUN.format(arguments=small[:-1]),

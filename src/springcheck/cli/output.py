@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
 import sys
@@ -59,6 +58,8 @@ def folded(line: str) -> str:
 
 def document(command: str, data: dict[str, Any]) -> None:
     """Print the one JSON document of a command, which says its schema first."""
+    import json
+
     print(json.dumps({"schema": f"springcheck/{command}/{SCHEMA}", **data}, allow_nan=False, indent=2))
 
 
