@@ -14,7 +14,7 @@ BUDGETS = {
     ("schemes",): 1799,
     ("thermal",): 2591,
     ("engines/own",): 1673,
-    ("engines/openmm", "engines/ase", "engines/sundials"): 1283,
+    ("engines/openmm", "engines/ase", "engines/sundials"): 1324,
     ("engines",): 2664,
     ("driver", "conformance", "doors"): 1203,
     ("checks",): 5024,

@@ -16,7 +16,7 @@ from springcheck import checks, schemes, store
 from springcheck.checks import replayed
 from springcheck.checks.check import Finding
 from springcheck.engines.contract import Label, Stopped
-from springcheck.engines.openmm import ENGINE
+from springcheck.engines.openmm import ENGINE, variable
 from springcheck.engines.openmm.variable import Variable
 from springcheck.errors import MethodError, SceneError
 from springcheck.physics import scenefile
@@ -215,6 +215,34 @@ def test_a_motion_that_escapes_in_finite_time_is_refused_and_one_that_stays_is_r
         terms=(WallSpring(i=[0], k=[1.3], at=[0.0]), Quartic(i=[0], b=[-1.0], at=[0.0])),
     )
     assert judged(held)["replay"].passed is True
+
+
+def test_a_soft_well_is_run_however_many_steps_it_takes_while_its_energy_is_below_the_barrier() -> None:
+    well = Scene(
+        m=[1.7], q=[0.3], p=[0.2], step=0.1, steps=200, tolerance=1e-6,
+        terms=(WallSpring(i=[0], k=[1.3], at=[0.1]), Quartic(i=[0], b=[-1.0], at=[0.1])),
+    )  # fmt: skip
+    run = springcheck.simulate(well, LABEL)
+    assert run.force_calls > 10_000
+    assert run.outcome.status == "complete"
+    # V = 1.69/4 at the top
+    assert variable._barrier(well) == pytest.approx(1.3**2 / 4)
+    for other in (
+        replace(well, terms=well.terms[1:]),
+        replace(well, q=[1.3]),
+        replace(well, terms=(WallSpring(i=[0], k=[1.3], at=[0.2]), well.terms[1])),
+        replace(well, terms=(*well.terms, well.terms[1])),
+    ):
+        assert variable._barrier(other) == 0
+    with pytest.raises(MethodError, match="escapes to infinity"):
+        springcheck.simulate(replace(well, p=[2.0]), LABEL)
+    moving = Variable(
+        well, ENGINE.methods["variable-verlet"], Label(engine="openmm", method="variable-verlet"), well.step
+    )
+    moving._most = 0.5 * float(well.system.energy(well.q, well.p))
+    with pytest.raises(Stopped, match="nears that of a barrier") as stop:
+        moving.advance(1, *np.zeros((2, 3, 1)))
+    assert stop.value.rows == 1
 
 
 def test_what_openmm_gives_up_is_a_run_that_stopped_with_the_frames_before() -> None:

@@ -12,7 +12,7 @@ from springcheck.engines.openmm.simulation import _Context
 from springcheck.errors import MethodError
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
-from springcheck.physics.terms import Quartic
+from springcheck.physics.terms import Quartic, Spring, WallSpring
 from springcheck.schemes import SCHEMES
 from springcheck.schemes.variable import allowed, taken
 
@@ -24,11 +24,45 @@ MOST_TRIED, ESCAPED = 10_000, 30
 within a negative quartic potential it reaches sqrt(2) at most."""
 
 
-def _stays(scene: Scene, label: Label, step: float) -> None:
-    """MethodError where a motion reaches infinity within the run, or may: OpenMM's steps grow shorter there
-    without end.  No other potential falls faster than a parabola."""
+REACHED = 0.9
+"""Part of the energy of a barrier at which a run ends: a period adds 2 % at a tolerance of `COARSEST`."""
+
+COARSEST = 1e-2
+
+
+def _barrier(scene: Scene) -> float:
+    """The energy below which nothing leaves a well within a negative quartic potential, all other potentials
+    being springs; 0 where none is known."""
+    if any(term.key not in ("wall-spring", "spring", "quartic") for term in scene.terms):
+        return 0.0
+    if any(np.any(term.k < 0) for term in scene.terms if isinstance(term, Spring | WallSpring)):
+        return 0.0
+    least, met = np.inf, set()
+    for term in scene.terms:
+        for i, b, at in term.rows() if isinstance(term, Quartic) else ():
+            if b >= 0:
+                continue
+            walls = (x for x in scene.terms if isinstance(x, WallSpring))
+            k = sum(float(np.sum(x.k[(x.i == i) & (x.at == at)])) for x in walls)
+            if i in met or not (scene.q[i] - at) ** 2 < k / -b:
+                return 0.0
+            met.add(i)
+            least = min(least, k * k / (4 * -b))
+    return least
+
+
+def _stays(scene: Scene, label: Label, step: float, w: float) -> float:
+    """The energy at which the run is to end, infinite where no motion escapes.
+
+    MethodError where one reaches infinity within the run, or may: OpenMM's steps grow shorter there without
+    end.  No other potential falls faster than a parabola.
+    """
     if not any(isinstance(term, Quartic) and np.any(term.b < 0) for term in scene.terms):
-        return
+        return np.inf
+    barrier, low = _barrier(scene), 2 * float(scene.system.energy(scene.q, scene.p))
+    # looked at in each frame, which is at most a period
+    if low <= barrier and scene.tolerance <= COARSEST and scene.every * abs(step) * w <= 2 * np.pi:
+        return REACHED * barrier
     farthest, start = ESCAPED * float(np.max(scene.system.amplitudes[0])), (scene.q, scene.p)
     tried = taken(
         SCHEMES["variable-verlet"], scene, start, before=0.0, times=(0.0, step * scene.steps),
@@ -41,6 +75,7 @@ def _stays(scene: Scene, label: Label, step: float) -> None:
                     f"{label}: its steps have no end where a motion escapes to infinity, as it does here or "
                     f"may after {number} steps; --set time.steps asks for a shorter run"
                 )
+    return np.inf
 
 
 class Variable(_Context):
@@ -63,7 +98,7 @@ class Variable(_Context):
                 f"{label}: its tolerance is a part of the amplitude, and the energy of the start is 0; "
                 "start it away from rest"
             )
-        _stays(scene, label, step)
+        self._most = _stays(scene, label, step, w)
         super().__init__(scene, method, label, step)
         self.last_steps = np.zeros(0)
         # the mean is over all particles, anchors among them
@@ -83,6 +118,12 @@ class Variable(_Context):
                 self.off_axis = max(self.off_axis, bonds.off_axis(self._x, self._elsewhere))
                 self._done += every
                 row += 1
+                if self._most < np.inf:
+                    now = self._context.getState(energy=True)
+                    if now.getKineticEnergy()._value + now.getPotentialEnergy()._value > self._most:
+                        raise Stopped(
+                            row, "its energy nears that of a barrier, beyond which steps have no end"
+                        )
         except mm.OpenMMException as error:
             raise Stopped(row, str(error)) from error
         finally:
