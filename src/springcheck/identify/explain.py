@@ -60,8 +60,6 @@ def explain(
 
 def _solver(e: Evidence) -> list[Explanation]:
     """The exact solution, as near as a solver with an error of its own comes to it."""
-    if _left(_alternating(e), e.misses) < 1 / FALLS:
-        return []
     residual = float(np.max(e.found.residual))
     # one step to a frame refutes most, and is found soon
     for strides in (range(1, 2), FEW):

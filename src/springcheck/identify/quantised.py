@@ -16,7 +16,6 @@ import numpy as np
 from springcheck.identify.coarse import over_single
 from springcheck.identify.families import FAMILIES, Family
 from springcheck.identify.fit import Map
-from springcheck.identify.guesses import least_squares
 from springcheck.identify.hypothesis import Match
 from springcheck.identify.maps import KINDS
 from springcheck.identify.record import Record
@@ -30,7 +29,7 @@ unlike forces more than all is left, 1.4 of it."""
 CHANCE = 1e-9
 """Chance that forces which are cut off otherwise leave so little where few numbers count in the misses."""
 
-REFINED = 30
+REFINED = 16
 """Newton's steps of stiffness and friction, which the misses bias, with forces cut off."""
 
 Force: TypeAlias = Callable[[Floats, Floats], Floats]
@@ -142,20 +141,14 @@ def reproduced(
 
     for leaps in (False, True) if family.name == "velocity-verlet" else (False,):
         values = np.repeat(start, len(forces) * n, axis=0)
-        for turn in range(REFINED):
+        for _ in range(REFINED):
             left = missed(values, cut, leaps=leaps) * scale
             share = np.sqrt(np.mean(left**2, axis=1)) / before
             if np.any(share <= most):
                 return True
             if not np.any(np.isfinite(share)):
                 break
-            if 2 * turn <= REFINED:
-                values[:, free] -= left @ inverse
-                continue
-            # few are left that are cut to the wrong side, and those are outliers
-            usual = np.median(np.abs(left), axis=1, keepdims=True)
-            weight = 1 / (1 + (left / (usual + 0.1 * before)) ** 2)
-            values[:, free] -= least_squares(columns.T[:, :, None] * weight.T, (left * weight).T)[0].T
+            values[:, free] -= left @ inverse
     return False
 
 

@@ -152,48 +152,37 @@ def _orbit(
     values = (q - q[0]).astype(np.float64)
     n = np.arange(frames, dtype=np.float64)
     unit_ = np.maximum(unit_, _around(unit_) / 64)
-    square = float(4 * alpha - (alpha + beta) ** 2)
-    starts = []
-    if square > 0 and beta < 1:
-        starts.append(
-            (0.5 * math.log1p(-float(beta)), math.atan2(math.sqrt(square), float(2 - alpha - beta)))
-        )
-    # the highest peak of the spectrum, where neighbours are too coarse
-    spectrum = np.abs(np.fft.rfft((values - np.mean(values)) * np.hanning(frames), 8 * frames))
-    starts.append((0.0, 2 * np.pi * max(int(np.argmax(spectrum)), 1) / (8 * frames)))
-    best = None
-    for growth, phase in starts:
-        x = np.array([growth, phase])
-        for _ in range(30):
-            wave = np.exp(np.clip(x[0] * n, -60, 60))
-            c, s = wave * np.cos(x[1] * n), wave * np.sin(x[1] * n)
-            basis = np.stack([c, s, np.ones(frames)], axis=1) / unit_[:, None]
-            amplitude = np.linalg.lstsq(basis, values / unit_, rcond=None)[0]
-            u, w = amplitude[0] * c + amplitude[1] * s, amplitude[1] * c - amplitude[0] * s
-            slopes = np.concatenate([np.stack([n * u, n * w], axis=1) / unit_[:, None], basis], axis=1)
-            left = values / unit_ - basis @ amplitude
-            size = np.sqrt(np.sum(slopes**2, axis=0))
-            if not np.all(np.isfinite(slopes)) or not np.all(size > 0):
-                break
-            across, triangle = np.linalg.qr(slopes / size)
-            if np.linalg.cond(triangle) > 1e9:
-                break
-            change = np.linalg.solve(triangle, across.T @ left) / size
-            x = x + np.clip(change[:2], -1 / frames, 1 / frames)
-            if np.sum((across.T @ left) ** 2) <= 1e-12 * max(float(np.sum(left**2)), 1.0):
-                inverse = np.linalg.inv(triangle)
-                covariance = (inverse @ inverse.T / size[:, None] / size)[:2, :2]
-                if best is None or float(left @ left) < best[0]:
-                    best = float(left @ left), x, covariance, float(np.max(np.abs(left)))
-                break
-    # a uniform error has a fourth moment of 9/5 of its variance squared, and ends at sqrt(3) of them
-    if (
-        best is None
-        or best[0] > frames + ERRORS * math.sqrt(0.8 * frames) + 1
-        or best[3] > math.sqrt(3) + 0.5
-    ):
+    phase = _phase(alpha, beta)
+    if not phase:
         return None
-    (growth, phase), covariance = best[1], best[2]
+    x = np.array([0.5 * math.log1p(-float(beta)), phase])
+    for _ in range(30):
+        wave = np.exp(np.clip(x[0] * n, -60, 60))
+        c, s = wave * np.cos(x[1] * n), wave * np.sin(x[1] * n)
+        basis = np.stack([c, s, np.ones(frames)], axis=1) / unit_[:, None]
+        amplitude = np.linalg.lstsq(basis, values / unit_, rcond=None)[0]
+        u, w = amplitude[0] * c + amplitude[1] * s, amplitude[1] * c - amplitude[0] * s
+        slopes = np.concatenate([np.stack([n * u, n * w], axis=1) / unit_[:, None], basis], axis=1)
+        left = values / unit_ - basis @ amplitude
+        size = np.sqrt(np.sum(slopes**2, axis=0))
+        if not np.all(np.isfinite(slopes)) or not np.all(size > 0):
+            return None
+        across, triangle = np.linalg.qr(slopes / size)
+        if np.linalg.cond(triangle) > 1e9:
+            return None
+        change = np.linalg.solve(triangle, across.T @ left) / size
+        x = x + np.clip(change[:2], -1 / frames, 1 / frames)
+        if np.sum((across.T @ left) ** 2) <= 1e-12 * max(float(np.sum(left**2)), 1.0):
+            break
+    else:
+        return None
+    # a uniform error has a fourth moment of 9/5 of its variance squared, and ends at sqrt(3) of them
+    most = frames + ERRORS * math.sqrt(0.8 * frames) + 1
+    if left @ left > most or np.max(np.abs(left)) > math.sqrt(3) + 0.5:
+        return None
+    inverse = np.linalg.inv(triangle)
+    covariance = (inverse @ inverse.T / size[:, None] / size)[:2, :2]
+    growth, phase = x.tolist()
     r = math.exp(growth)
     bent = 4 * r * math.sin(phase / 2) ** 2
     slope = np.array([[bent - 2 * (1 - r) * r, 2 * r * math.sin(phase)], [-2 * r * r, 0.0]])
