@@ -294,6 +294,31 @@ def test_a_dump_of_a_molecule_along_no_axis_is_judged_and_identified(
     assert "1.73624681844" in said
 
 
+def test_a_dump_of_wrapped_positions_without_counters_is_followed_across_the_borders(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """LAMMPS' own columns, x y z: a border was taken for a restart from numbers of one digit."""
+    scene = diatomic()
+    run = driver.run(scene, "own:velocity-verlet")
+    box = np.asarray(scene.box)
+    # within the box at the start, and out of it later
+    q = run.q + np.tile([-3.0, 1.5, -4.0], 2)
+    assert np.all(np.floor(q[0] / np.tile(box, 2)) == 0)
+    assert np.any(np.floor(q[-1] / np.tile(box, 2)) != 0)
+    path = dump(tmp_path / "a.dump", q, run.p / scene.m, scene.masses, box)
+    rows = []
+    for line in path.read_text().replace(" ix iy iz", "").splitlines():
+        cells = line.split()
+        rows.append(" ".join(cells[:5] + cells[8:]) if len(cells) == 11 else line)
+    path.write_text("\n".join(rows) + "\n")
+    assert main(["identify", str(path), "--step", "0.1"]) == 0
+    assert "a.dump: velocity-verlet" in capsys.readouterr().out
+    # in a tilted box only positions that are counted on are read
+    path.write_text(path.read_text().replace("\n0 4.1\n", "\n0 4.1 0.3\n").replace("x y z", "xu yu zu"))
+    assert main(["identify", str(path), "--step", "0.1"]) == 1
+    assert "tilted" not in capsys.readouterr().err
+
+
 def test_counters_of_a_tilted_box_are_refused_in_a_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

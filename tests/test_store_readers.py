@@ -16,6 +16,7 @@ import pytest
 from silx.io import nxdata
 from silx.io import open as silx_open
 
+import springcheck
 from springcheck import store
 from springcheck.errors import StoreError
 from springcheck.physics.trajectory import Comparison
@@ -40,6 +41,16 @@ def test_mdanalysis_opens_an_exported_trajectory_with_its_units_and_times(tmp_pa
         assert np.allclose(frame.velocities[:, 0], 10 * made.p[i] / s.m, rtol=2.0**-22, atol=0)
         assert not frame.positions[:, 1:].any()
         assert frame.dimensions is None
+
+
+def test_mdanalysis_has_the_box_of_an_exported_trajectory(tmp_path: Path) -> None:
+    """It was left out: positions beyond the borders stood in no box."""
+    springcheck.run("periodic-box", "own:velocity-verlet", path=tmp_path / "s.h5")
+    store.export(tmp_path / "s.h5", "own:velocity-verlet", tmp_path / "out.h5md")
+    universe = MDAnalysis.Universe.empty(3, trajectory=False)
+    universe.load_new(str(tmp_path / "out.h5md"))
+    for frame in universe.trajectory[::100]:
+        assert np.allclose(frame.dimensions, [41, 33, 57, 90, 90, 90], rtol=1e-6)
 
 
 def test_an_exported_file_says_where_it_comes_from_and_is_never_overwritten(tmp_path: Path) -> None:

@@ -70,6 +70,7 @@ def read_lammps(path: Path, columns: list[str], step: float | None) -> States:
     first: list[list[str]] = []
     names: list[str] = []
     n: int | None = None
+    boxes: list[list[float]] = []
     with _frames(path, "LAMMPS dump") as lines:
         for line in lines:
             # before the number of the step, as `dump_modify units yes time yes` asks for them
@@ -82,15 +83,16 @@ def read_lammps(path: Path, columns: list[str], step: float | None) -> States:
             if not item.startswith("ITEM: TIMESTEP"):
                 raise lines.wrong("ITEM: TIMESTEP is expected")
             steps.append(int(next(lines)))
-            item, announced, edges = next(lines), 0, list[float]()
+            item, announced, edges = next(lines), 0, 3 * [0.0]
+            tilted, around = False, 3 * [""]
             while not item.startswith("ITEM: ATOMS"):
                 if item.startswith("ITEM: NUMBER OF ATOMS"):
                     announced = n = _atoms(next(lines), lines, n)
                 elif item.startswith("ITEM: BOX BOUNDS"):
                     bounds = [[float(x) for x in next(lines).split()] for _ in range(3)]
+                    tilted = any(len(x) > 2 for x in bounds)
+                    around = item.split()[-3:]
                     edges = [x[1] - x[0] for x in bounds]
-                    if any(len(x) > 2 for x in bounds):
-                        raise lines.wrong("its box is tilted; dump xu yu zu in place of counters of images")
                 item = next(lines)
             if not announced:
                 raise lines.wrong("ITEM: NUMBER OF ATOMS is missing before it")
@@ -98,6 +100,12 @@ def read_lammps(path: Path, columns: list[str], step: float | None) -> States:
             if names and list(wanted) != names:
                 raise lines.wrong("its columns change")
             names = list(wanted)
+            wrapped = "x" in item.split()[2:] and "xu" not in item.split()[2:]
+            if wrapped and tilted:
+                raise lines.wrong("its box is tilted; dump xu yu zu in place of x y z")
+            # where counters of borders are written, or an axis has none, none are looked for
+            counted = "ix" in wanted or not wrapped
+            boxes.append([0.0 if counted or way != "pp" else x for x, way in zip(edges, around, strict=True)])
             for _ in range(announced):
                 cells = next(lines).split()
                 row = [cells[i] for i in wanted.values()]
@@ -114,11 +122,23 @@ def read_lammps(path: Path, columns: list[str], step: float | None) -> States:
         order = np.argsort(table[:, :, names.index("id")], axis=1, kind="stable")
         table = np.take_along_axis(table, order[:, :, None], axis=1)
     q, v = table[:, :, :3], table[:, :, 3:6]
+    if np.any(boxes):
+        q = q + _crossed(q, np.array(boxes))
     mass = table[0, :, names.index("mass")] if "mass" in names else None
     # LAMMPS writes 6 digits unless dump_modify asks for more
     known = step is None and len(clock) == len(steps)
     when = np.array(clock) if known else times(path, steps, step)
     return of_frames(path, when, q, v, mass, roundoff(first, range(6)))
+
+
+def _crossed(q: Floats, boxes: Floats) -> Floats:
+    """What was taken off positions q (f, n, 3) at borders of periodic boxes (f, 3), 0 along axes without:
+    from frame to frame an atom is where its nearest image was."""
+    edges = boxes[1:, None, :]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        crossed = np.where(edges > 0, np.round(np.diff(q, axis=0) / edges), 0)
+    counted = np.concatenate([np.zeros_like(q[:1]), -np.cumsum(crossed, axis=0)])
+    return np.asarray(counted * boxes[:, None, :])
 
 
 def _wanted(path: Path, names: list[str]) -> dict[str, int]:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from springcheck.errors import StoreError
-from springcheck.physics.arrays import Integers
+from springcheck.physics.arrays import Floats, Integers
 from springcheck.store import access, checking, files, layout, parts, reading, space
 from springcheck.store.checking import Damage
 
@@ -53,20 +53,29 @@ def export(path: str | Path, label: str, out: str | Path) -> list[Damage]:
             "step": access.array(file, f"{first}/step", wide[:1], "i"),
             "mass": access.array(file, f"particles/{label}/mass", (int(np.max(places)) // 3 + 1,)),
         }
+        place = f"particles/{label}/box"
+        edges = None
+        if "edges" in access.children(file, place):
+            edges = access.array(file, f"{place}/edges", (3,))[()]
         with files.told(out, "write"), files.unfinished(files.temporary(out)) as made:
             size = sum(2 * values.size * 8 for values in arrays.values())
             with layout.fresh(made, size + 24 * known.frames) as target:
                 layout.begin(target)
                 layout.write_attributes(target, {"format": layout.EXPORTED})
                 group = target.create_group("particles/trajectory")
-                _write(group, arrays, columns, places, layout.UNITS[known.kind, known.units])
+                _write(group, arrays, columns, places, layout.UNITS[known.kind, known.units], edges)
                 layout.write_attributes(target.create_group("parameters/trajectory"), attributes)
             files.put(made, out)
     return found
 
 
 def _write(
-    group: Any, arrays: dict[str, Any], columns: dict[str, Any], places: Integers, unit: layout.UnitsOf
+    group: Any,
+    arrays: dict[str, Any],
+    columns: dict[str, Any],
+    places: Integers,
+    unit: layout.UnitsOf,
+    edges: Floats | None,
 ) -> None:
     layout.write_box(group)
     first = next(iter(arrays))
@@ -78,6 +87,14 @@ def _write(
             # two elements share them
             element[kind] = group[f"{first}/{kind}"] if name != first else columns[kind][()]
         layout.write_unit(element["time"], unit["time"])
+    if edges is not None:
+        layout.write_attributes(group["box"], {"boundary": 3 * ["periodic"]})
+        # of each frame: MDAnalysis asks for them so
+        element = group["box"].create_group("edges")
+        element["value"] = np.broadcast_to(edges, (len(columns["time"]), 3))
+        layout.write_unit(element["value"], unit["q"])
+        for kind in ("time", "step"):
+            element[kind] = group[f"{first}/{kind}"]
     group["mass"] = columns["mass"][()]
     layout.write_unit(group["mass"], unit["mass"])
 
