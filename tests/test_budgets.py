@@ -19,7 +19,7 @@ BUDGETS = {
     ("driver", "conformance", "doors"): 1203,
     ("checks",): 5024,
     ("identify",): 8282,
-    ("formats", "store"): 5175,
+    ("formats", "store"): 5212,
     ("studies",): 1472,
     ("studies/*",): 10388,
     ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 6924,
