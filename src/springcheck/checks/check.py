@@ -10,11 +10,16 @@ import numpy as np
 
 from springcheck.checks.requires import REQUIREMENTS, missing
 from springcheck.errors import MethodError
-from springcheck.physics.arrays import WIDE
+from springcheck.physics.arrays import WIDE, Reals
 from springcheck.physics.trajectory import NOT_KNOWN, Limits, Verdict
 
 BEYOND = 2.0**511
 """Stands for every value that fails and is no number or larger: a verdict and its ratio are numbers."""
+
+
+def largest(values: Reals) -> tuple[np.intp, ...]:
+    """Where the largest of them is; what is no number is larger than all."""
+    return np.unravel_index(np.argmax(np.where(np.isfinite(values), values, np.inf)), values.shape)
 
 
 class Subject(Protocol):

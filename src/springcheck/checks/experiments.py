@@ -10,7 +10,7 @@ from springcheck import schemes
 from springcheck.checks import sight
 from springcheck.checks.bench import Bench
 from springcheck.checks.case import Case
-from springcheck.checks.check import Finding, check
+from springcheck.checks.check import Finding, check, largest
 from springcheck.checks.steps import step_defect
 from springcheck.checks.stretch import follow, known
 from springcheck.physics.arrays import Extended, Floats, Integers, Reals
@@ -127,7 +127,7 @@ def symplecticity(bench: Bench) -> Finding | str:
     with np.errstate(over="ignore"):
         # coordinates that nothing joins are allowed next to nothing
         ratio = off / np.where(limit > 0, limit, 1)
-    worst = np.unravel_index(np.argmax(np.where(np.isfinite(ratio), ratio, np.inf)), ratio.shape)
+    worst = largest(ratio)
     if ratio[worst] <= 1 and not np.any(limit[form != 0] < 1):
         return "rounding of the entries may be as large as the form"
     return Finding(

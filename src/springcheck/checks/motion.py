@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from springcheck import schemes
 from springcheck.checks import sight
 from springcheck.checks.case import Case
-from springcheck.checks.check import Finding, check
+from springcheck.checks.check import Finding, check, largest
 from springcheck.checks.requires import CLOSED, MAP
 from springcheck.checks.steps import STILL
 from springcheck.physics.arrays import WIDE, Extended, Integers, Reals
@@ -333,7 +333,7 @@ def gyration(case: Case) -> Finding | str:
         # a step longer by x turns by sin(2 atan(h W/2)) x more, where there is a field
         felt = np.sin(right) != 0
         longer = np.min(limit[:, felt] / np.abs(np.sin(right[felt])), initial=np.inf)
-    worst = np.unravel_index(np.argmax(np.where(np.isfinite(seen), seen, np.inf)), seen.shape)
+    worst = largest(seen)
     if seen[worst] <= case.roundings and not np.any(limit < 1):
         return "rounding may be as large as the velocity"
     by, right = ratio[worst], right[worst[1]]

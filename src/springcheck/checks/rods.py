@@ -6,7 +6,7 @@ import numpy as np
 
 from springcheck import schemes, thermal
 from springcheck.checks.case import Case
-from springcheck.checks.check import Finding, check
+from springcheck.checks.check import Finding, check, largest
 from springcheck.checks.requires import MAP, missing
 from springcheck.checks.thermal import reading, thermostat
 from springcheck.physics.exact.well import PI
@@ -37,7 +37,7 @@ def rod_length(case: Case) -> Finding:
     with np.errstate(all="ignore"):
         off = np.abs(rods.strain(q))
         bound = roundings * how.state * (1 + rods.magnitude(q)) + how.lengths
-        worst = np.unravel_index(np.argmax(np.where(np.isfinite(off), off / bound, np.inf)), off.shape)
+        worst = largest(off / bound)
     why = f"roundings along one step of {case.scheme.title}, of lengths and of positions"
     if how.lengths:
         why += f", and the tolerance {how.lengths:g} of the engine's solver, which is not its error"
@@ -83,7 +83,7 @@ def rod_velocity(case: Case) -> Finding | str:
         if not np.any(np.isfinite(unit)):
             return "no step has a solution whose rounding is known"
         seen = np.where((off == 0) | ~np.isfinite(unit), 0, off / unit)
-    worst = np.unravel_index(np.argmax(np.where(np.isfinite(seen), seen, np.inf)), seen.shape)
+    worst = largest(seen)
     why = f"roundings along one step of {case.scheme.title}; does not grow with the run"
     return Finding(seen[worst], roundings, "roundings", why)
 
@@ -120,7 +120,7 @@ def turn(case: Case) -> Finding | str:
         of_rate = rods.spans(of_p / m) / rods.length
         bound = case.roundings * (n[1:] * of_angle + n[1:] * (n[1:] + 1) / 2 * of_rate * steeper)
         ratio = np.where(w > 0, off / bound, 0)
-    worst = np.unravel_index(np.argmax(np.where(np.isfinite(ratio), ratio, np.inf)), ratio.shape)
+    worst = largest(ratio)
     whole = n[1:] * np.abs(each)
     if ratio[worst] <= 1 and not np.any(whole > bound):
         return "rounding may be as large as all of the turn"
