@@ -6,6 +6,7 @@ import importlib.util
 import sys
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import mpmath
 import numpy as np
@@ -271,6 +272,19 @@ def test_frames_of_unlike_friction_that_lie_evenly_are_those_of_their_times() ->
                 assert np.all(np.abs(x[i] - y[0]) <= bound)
     falls = replace(scene, terms=(*scene.terms, Weight(i=[0], force=[0.3], at=[0.0])))
     assert not exact.has_true_motion(falls)
+
+
+def test_a_solver_is_judged_where_friction_is_unlike(need: Any) -> None:
+    need("sundials:bdf")
+    link = Spring(a=np.array([0]), b=np.array([1]), k=np.array([1.7]), rest=np.ones(1))
+    wall, slow = WallSpring(i=[0], k=[2.9], at=[0.0]), Damping(i=np.arange(2), c=np.array([0.4, 0.1]))
+    scene = Scene(
+        m=[1.3, 3.7], q=[0.3, 1.4], p=[0.2, -0.5], terms=(wall, link, slow), step=0.1, steps=100,
+    )  # fmt: skip
+    run = springcheck.simulate(scene, "sundials:bdf")
+    other = replace(scene, terms=(wall, link, replace(slow, c=slow.c * (1 + 1e-5))))
+    for of, passed in ((scene, True), (other, False)):
+        assert [v.passed for v in springcheck.judge(of, run) if v.check == "tolerance"] == [passed]
 
 
 def test_what_is_stated_of_a_free_chain_does_not_grow_as_if_something_held_it() -> None:
