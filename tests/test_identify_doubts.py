@@ -239,6 +239,19 @@ def test_steps_that_alternate_are_told_with_what_they_alternate_by_and_are_no_dr
     assert "alternate: steps alternate by 0.02 of their length" in found.statement
 
 
+def test_an_odd_number_of_steps_that_alternate_is_no_adaptive_solver() -> None:
+    """RK2 with friction, nine steps to a frame: the exact flow comes near, and what it misses alternates."""
+    q, v, h, states = 1.3, 0.4, 0.1, []
+    for i in range(9 * 100 + 1):
+        states += [(q, v)] if i % 9 == 0 else []
+        s = h * (1 + 9e-4 * (-1) ** i)
+        x, u = q + s / 2 * v, v + s / 2 * (-K / M * q - 0.15 * v)
+        q, v = q + s * u, v + s * (-K / M * x - 0.15 * u)
+    qs, vs = np.array(states).T
+    found = identify(0.9 * np.arange(101), qs, v=vs, mass=M)
+    assert found.statement.startswith("Even and odd steps differ and alternate: ")
+
+
 def test_two_frames_that_have_changed_places_are_told() -> None:
     q, v = remembered(0.0, 0.0, 0.2)
     order = np.arange(len(q))

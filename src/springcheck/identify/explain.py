@@ -60,6 +60,9 @@ def explain(
 
 def _solver(e: Evidence) -> list[Explanation]:
     """The exact solution, as near as a solver with an error of its own comes to it."""
+    if _left(_alternating(e), e.misses) < 1 / FALLS:
+        # steps that alternate are no solver's
+        return []
     residual = float(np.max(e.found.residual))
     # one step to a frame refutes most, and is found soon
     for strides in (range(1, 2), FEW):
@@ -288,7 +291,8 @@ def _two_maps(e: Evidence) -> tuple[str, str]:
     elif names:
         one, other = (next(m for m in ms if m.scheme == names[0]) for ms in found)
         share = abs(math.sqrt(one.a / other.a) - 1)
-        what = f"steps alternate by {share:.2g} of their length"
+        whose = f"the steps of {title(names[0])}" if len(set(names)) == 1 else "steps"
+        what = f"{whose} alternate by {share:.2g} of their length"
     return (
         f"Even and odd steps differ and alternate: {what}",
         "look for a buffer or a sign that is switched in every step",
