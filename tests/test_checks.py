@@ -67,6 +67,7 @@ def part_of(run: Trajectory, rows: slice) -> Trajectory:
 
 
 @pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize("name", ["explicit-euler", "velocity-verlet", "implicit-euler", "rk4"])
 def test_every_piece_of_a_long_run_is_judged_like_the_whole(name: str) -> None:
     for seed in range(8):

@@ -369,6 +369,7 @@ TURNING = [
 ]  # fmt: skip
 
 
+@pytest.mark.campaign("name", "frequency")
 @pytest.mark.parametrize(("k", "c", "frequency", "step"), TURNING)
 @pytest.mark.parametrize("name", ["explicit-euler", "semi-implicit-euler", "velocity-verlet", "rk4",
                                   "implicit-midpoint", "implicit-euler", "yoshida4"])  # fmt: skip

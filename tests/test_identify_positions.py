@@ -124,6 +124,7 @@ def test_a_table_of_two_columns_is_read(
     assert "holds no momenta or velocities" in capsys.readouterr().err
 
 
+@pytest.mark.campaign
 @pytest.mark.usefixtures("tried_here")
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("ending", ["xtc", "dcd"])

@@ -138,6 +138,7 @@ BOND = Morse(
 )
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("name", FIXED)
 def test_a_bond_between_the_recorded_states_likewise(name: str) -> None:
     for seed in range(6):

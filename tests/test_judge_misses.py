@@ -81,6 +81,7 @@ def fast_and_slow(slow: float) -> Scene:
 
 
 @pytest.mark.slow
+@pytest.mark.campaign
 @pytest.mark.parametrize("every", [20, 100, 500])
 def test_a_slow_stiffness_of_multiple_time_steps_is_judged_however_far_apart_frames_are(every: int) -> None:
     scene = replace(fast_and_slow(2.9), every=every)

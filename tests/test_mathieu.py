@@ -169,6 +169,7 @@ def test_scenes_without_a_modulation_have_no_multipliers() -> None:
     assert not multipliers.serves(scenefile.load_scene("driven-spring"), engines.parse("own:euler"))
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("label", ["own:euler", "own:implicit-euler"])
 def test_a_multiplier_beyond_doubles_is_left_out_with_its_reason(label: str, tmp_path: Path) -> None:
     """4096 steps of h w = 0.77 grow, or shrink, by more than doubles can hold."""

@@ -57,6 +57,7 @@ def test_the_limit_is_that_of_the_scheme_to_1e_6(name: str, need: Need) -> None:
     np.testing.assert_allclose(found.radius, found.radius_predicted, rtol=1e-12)
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("name", SINGLE)
 def test_the_limit_in_lower_precision_keeps_its_stated_bound(name: str, need: Need) -> None:
     need(name)

@@ -119,6 +119,7 @@ def test_a_file_is_given_every_scheme_that_may_have_made_it(name: str, given: di
     assert found is None or name in [one.scheme for one in found.candidates], found.statement
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("name", ["nose-hoover", "nose-hoover-fourth", "nose-hoover-middle"])
 @pytest.mark.parametrize("frames", [220, 400])
 def test_a_chain_is_not_taken_for_draws(name: str, frames: int) -> None:

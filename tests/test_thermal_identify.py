@@ -53,6 +53,7 @@ def run(name: str, steps: int, seed: int = 3) -> tuple[np.ndarray, np.ndarray, n
         ("vanden-eijnden-ciccotti", "vanden-eijnden-ciccotti"),
     ],
 )  # fmt: skip
+@pytest.mark.campaign("name")
 @pytest.mark.parametrize("seed", [3, 4])
 def test_a_thousand_frames_name_the_scheme_or_list_it_among_those_that_share_its_states(
     name: str, expected: str, seed: int
@@ -71,6 +72,7 @@ def test_the_spring_is_known_to_rounding_at_any_temperature(name: str) -> None:
     assert found.candidates[0].omega == pytest.approx(OMEGA, rel=1e-12)
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("name", ["obabo", "oabao", "boaob"])
 def test_two_draws_a_step_are_told_apart_by_likelihood(name: str) -> None:
     few, many = (identify_thermal(*run(name, steps)) for steps in (1000, 20000))
@@ -106,6 +108,7 @@ def test_single_precision_and_text_say_less_and_nothing_wrong() -> None:
         assert found.misfit > 1e-9
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("name", ["baoab", "obabo", "gj-ii-half"])
 def test_frames_several_steps_apart_list_their_scheme_and_their_stride(name: str) -> None:
     t, q, v = run(name, 8000)
