@@ -143,7 +143,7 @@ def test_faults_of_the_command_line_print_one_document_and_are_kept(
     monkeypatch.setattr(trial, "checks_of", lambda fault: tuple(sorted(named)))
     assert cli.main(["faults", "--json", "--workers", "1"]) == 0
     document = json.loads(capsys.readouterr().out)
-    assert document.pop("schema") == "springcheck/faults/1"
+    assert document.pop("schema") == "springcheck/faults/2"
     assert [fault["name"] for fault in document["faults"]] == [fault.name for fault in few]
     assert document["limits"]["stiffness"]["step-defect"] < 1e-14
     monkeypatch.chdir(tmp_path)

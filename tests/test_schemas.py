@@ -13,7 +13,7 @@ from springcheck import cli
 
 def schema(command: str) -> dict[str, object]:
     """The schema of a command's documents."""
-    return json.loads((schemas.FOLDER / f"{command}-{schemas.SCHEMA}.json").read_text())  # type: ignore[no-any-return]
+    return json.loads((schemas.FOLDER / f"{schemas.named(command)}.json").read_text())  # type: ignore[no-any-return]
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +40,7 @@ def test_every_document_of_a_command_keeps_to_its_schema(command: str) -> None:
     for words in schemas.WAYS[command][-1:] if command == "precision" else schemas.WAYS[command]:
         again = " --force" if " -o " in words else ""
         document = schemas.printed(words + again)
-        assert document["schema"] == f"springcheck/{command}/{schemas.SCHEMA}"
+        assert document["schema"] == schema(command)["title"]
         assert schemas.problems(document, schema(command)) == []
         assert schemas.unlisted(document, schema(command)) == [], "python validation/schemas.py write"
 
@@ -49,7 +49,7 @@ def test_every_command_that_prints_a_document_has_a_schema() -> None:
     every = (*cli.STUDIES, *cli.COMMANDS)
     printing = [one.name for one in every if any("--json" in names for names, _ in one.arguments)]
     assert {path.stem for path in schemas.FOLDER.glob("*.json")} == {
-        f"{name}-{schemas.SCHEMA}" for name in (*printing, "scene")
+        schemas.named(name) for name in (*printing, "scene")
     }
     assert set(schemas.WAYS) == set(printing)
 

@@ -2,7 +2,7 @@
 
 A document names its schema and version first.  Here each command is run in several ways, and what they print
 is put together: the types that were met, and the names that were always there.  A name that goes, or another
-type, needs another version (`springcheck.cli.output.SCHEMA`); a name more does not.
+type, needs another version (`springcheck.cli.output.SCHEMAS`); a name more does not.
 
 `scene-1.json` is that of scene files, made of the structs that read them.
 
@@ -23,7 +23,7 @@ import msgspec
 
 from arguments import arguments
 from springcheck.cli import main as springcheck
-from springcheck.cli.output import SCHEMA
+from springcheck.cli.output import SCHEMAS
 from springcheck.physics.scenefile import tables
 from springcheck.studies.faults import measure
 from springcheck.studies.faults.table import FAULTS
@@ -169,11 +169,16 @@ def with_nulls(schema: Any, kept: Any) -> Any:
     return found
 
 
+def named(command: str) -> str:
+    """A command with the version of its documents, as its file is called."""
+    return f"{command}-{SCHEMAS.get(command, 1)}"
+
+
 def schema_of(command: str, documents: list[Any]) -> dict[str, Any]:
     """The schema of a command's documents, with its head."""
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "title": f"springcheck/{command}/{SCHEMA}",
+        "title": f"springcheck/{named(command).replace('-', '/')}",
         **inferred(documents),
     }
 
@@ -196,7 +201,7 @@ def main() -> int:
         Path("table.csv").write_text(table())
         for command, ways in WAYS.items():
             documents = [printed(words) for words in ways]
-            path = FOLDER / f"{command}-{SCHEMA}.json"
+            path = FOLDER / f"{named(command)}.json"
             if given.what == "write":
                 new = with_nulls(schema_of(command, documents), json.loads(path.read_text()))
                 path.write_text(json.dumps(new, indent=1) + "\n")

@@ -22,8 +22,9 @@ if TYPE_CHECKING:
 PIPE = 1 << 16
 """Columns of what is no terminal: long lines are for the reader's tools to fold."""
 
-SCHEMA = 1
-"""Of the JSON documents: raised where a name goes or changes its meaning, and not where one is added."""
+SCHEMAS = {"faults": 2, "stability": 2}
+"""Versions of JSON documents, 1 of the others: raised where a name goes or changes its meaning, and not where
+one is added."""
 
 
 def show(lines: Lines) -> None:
@@ -60,7 +61,8 @@ def document(command: str, data: dict[str, Any]) -> None:
     """Print the one JSON document of a command, which says its schema first."""
     import json
 
-    print(json.dumps({"schema": f"springcheck/{command}/{SCHEMA}", **data}, allow_nan=False, indent=2))
+    schema = f"springcheck/{command}/{SCHEMAS.get(command, 1)}"
+    print(json.dumps({"schema": schema, **data}, allow_nan=False, indent=2))
 
 
 def doubts(file: str) -> list[dict[str, str]]:
