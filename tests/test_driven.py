@@ -12,7 +12,7 @@ import pytest
 import springcheck
 from springcheck import checks, engines, schemes
 from springcheck.doors import function
-from springcheck.errors import SceneError
+from springcheck.errors import MethodError, SceneError
 from springcheck.physics import exact
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.exact.mathieu import floquet
@@ -474,3 +474,44 @@ def test_the_check_of_the_drive_holds_its_tongue_where_the_spring_is_wrong() -> 
     assert found["step-defect"].passed is False
     assert found["drive"].passed is None
     assert "not by the time of the drive" in found["drive"].why
+
+
+def test_a_drive_of_two_steps_before_is_said_to_be_earlier() -> None:
+    """It was said to be "taken -2 of a step later"."""
+    scene = driven(3.7, 2.9, 0.0, (0.43, 0.87, 0.6))
+    run = springcheck.simulate(scene, "own:semi-implicit-euler")
+    before = replace(
+        scene,
+        terms=tuple(
+            replace(x, phase=x.phase - 2.25 * scene.step * x.frequency) if isinstance(x, Drive) else x
+            for x in scene.terms
+        ),
+    )
+    early = replace(springcheck.simulate(before, "own:semi-implicit-euler"), label=run.label)
+    found = {v.check: v for v in checks.judge(scene, early)}
+    assert "the drive is taken 2.25 steps earlier than semi-implicit Euler" in found["drive"].why
+
+
+@pytest.mark.parametrize("label", ["scipy:rk45", "sundials:adams"])
+def test_a_solver_is_not_asked_to_follow_a_drive_for_ever(label: str, need: Any) -> None:
+    need(label)
+    scene = driven(3.7, 2.9, 0.0, (0.43, 0.87, 0.6))
+    fast = tuple(replace(x, frequency=[1e300]) if isinstance(x, Drive) else x for x in scene.terms)
+    with pytest.raises(MethodError, match="the drive turns through"):
+        springcheck.simulate(replace(scene, terms=fast), label)
+
+
+def test_an_axis_along_which_all_rests_is_not_exercised() -> None:
+    scene = scenes.load_scene("orbit")
+    still = replace(scene, q=[0.3, 0.0, 0.8], p=[0.7, 0.0, -0.4])
+    assert "axis y" in checks.not_exercised(still)
+    assert "ax" not in checks.not_exercised(scene)
+
+
+@pytest.mark.parametrize(
+    "table", ["[[spring]]\nends = ['wall', 0]\nstiffness = 2.9", "[[drive]]\nparticle = 0"]
+)
+def test_an_axis_that_is_none_is_answered_with_those_that_are(table: str) -> None:
+    given = f"{table}\naxis = 'w'\n[[particle]]\nmass = 1.3\nposition = [0.3, 0.1]\nmomentum = [0.1, 0.2]\n"
+    with pytest.raises(SceneError, match=r"\.axis = 'w': one of x, y, z is needed"):
+        scenes.parse(f"title = 'a'\n{given}[time]\nstep = 0.1\nsteps = 20\n", name="a")

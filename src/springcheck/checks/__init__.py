@@ -185,7 +185,14 @@ def not_exercised(scene: Scene) -> str:
     """
     if scene.kind != "particles":
         return ""
-    missing, system = [axis for axis in "xyz" if axis not in scene.axes], scene.system
+    system = scene.system
+    pulled = np.abs(scene.p) + np.abs(system.force_of(scene.terms)(scene.q, scene.p)) > 0
+    for term in scene.terms:
+        # what is at rest and not pulled at the start may be driven later
+        if term.kind == "drive":
+            pulled[np.concatenate(term.particles)] = True
+    moved = {"xyz"[axis] for axis in np.unique(scene.all_places[pulled] % 3)}
+    missing = [axis for axis in "xyz" if axis not in moved]
     facts = {
         f"ax{'e' if len(missing) > 1 else 'i'}s {' and '.join(missing)}": not missing,
         "periodic boxes": bool(scene.box),

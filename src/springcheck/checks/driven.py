@@ -49,16 +49,17 @@ def found(case: Case) -> str:
         taken = {clock.later} if clock.held else {c + clock.later for c in right}
         if taken != right and _fits(case, clock):
             held = ", held over it," if clock.held and len(right) > 1 else ""
+            of = "" if taken <= {-1.0, 2.0} else " of the step"
             return (
-                f"the drive is taken at {_words(taken)} of the step{held} where {title} takes it at "
-                f"{_words(right)}"
+                f"the drive is taken at {_words(taken)}{of}{held} where {title} takes it at {_words(right)}"
             )
     for words, scene in _other_drives(case.scene):
         if _fits(replace(case, scene=scene), _Clock()):
             return words
     later = _later(case)
     if later and _fits(case, _Clock(later=later)):
-        return f"the drive is taken {later:.6g} of a step later than {title} takes it"
+        way = f"{'of a step' if abs(later) <= 1 else 'steps'} {'later' if later > 0 else 'earlier'}"
+        return f"the drive is taken {abs(later):.6g} {way} than {title} takes it"
     return ""
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from springcheck.engines.contract import Label
@@ -38,12 +40,21 @@ def followed(scene: Scene, step: float) -> float:
     return float(np.max(turns[moves])) if np.any(moves) else 0.0
 
 
+def driven(scene: Scene, step: float) -> float:
+    """Radians that the fastest drive turns through between two outputs, which a solver follows as well."""
+    drives: list[Any] = [term for term in scene.terms if term.kind == "drive"]
+    with np.errstate(over="ignore"):
+        turns = [np.max(np.abs(term.frequency * step)) * scene.every for term in drives if len(term)]
+    return float(max(turns, default=0.0))
+
+
 def refuse_hours(scene: Scene, label: Label, step: float) -> None:
     """MethodError where a solver would not come to its first output in an hour."""
-    radians = followed(scene, step)
-    if radians > MOST_RADIANS:
+    radians, of_drive = followed(scene, step), driven(scene, step)
+    what = "motion" if radians > of_drive else "drive"
+    if (radians := max(radians, of_drive)) > MOST_RADIANS:
         raise MethodError(
-            f"{label}: the motion turns through {radians:.3g} radians between two frames, which takes "
+            f"{label}: the {what} turns through {radians:.3g} radians between two frames, which takes "
             f"{3 * radians:.0e} internal steps or more, hours and longer; {MOST_RADIANS:.0e} radians are the "
             "most, take shorter steps or record more frames"
         )

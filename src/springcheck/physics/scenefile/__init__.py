@@ -125,7 +125,9 @@ def _explain(message: str, data: Any) -> str:
             found = None
     what = (what[0].lower() + what[1:]).replace("missing required field", "lacks the field")
     what = what.replace("contains unknown field", "has the unknown field")
-    accepted = tables.CHOICES.get(re.sub(r"\[\d+\]$", "[]", field))
+    accepted = tables.CHOICES.get(re.sub(r"\[\d+\]$", "[]", field)) or tables.CHOICES.get(
+        field.rpartition(".")[2]
+    )
     if accepted:
         return f"{field} = {found!r}: one of {', '.join(accepted)} is needed"
     if "unknown field" in what or "lacks the field" in what:

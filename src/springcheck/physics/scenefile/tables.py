@@ -273,6 +273,7 @@ CHOICES: dict[str, tuple[str, ...]] = {
     "units": get_args(Units),
     "kind": get_args(Kind),
     "record.quantities[]": get_args(Quantity),
+    "axis": get_args(Axis),
 }
 """What a field of a few words accepts, for messages; of a list, what each of its entries does."""
 
