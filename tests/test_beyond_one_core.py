@@ -86,7 +86,8 @@ def test_errors_by_workers_are_those_of_one_and_times_are_measured_alone(tmp_pat
         return {(x.method, x.steps): x.accuracy for x in study.points if x.complete}
 
     both = errors(many).keys() & errors(alone).keys()
-    assert len(both) >= 6
+    # how many of each a budget of seconds pays for depends on who else is at work
+    assert {str(method) for method, _ in both} == set(OWN)
     assert all(errors(many)[place] == errors(alone)[place] for place in both)
     for method in OWN:
         points = [point for point in many.of(method) if point.complete]
