@@ -152,3 +152,16 @@ def test_files_of_positions_are_read_to_their_precision(
     schemes = {one["scheme"] for one in found["candidates"]}
     assert schemes == (STOERMER if name == "velocity-verlet" else {name})
     assert main(["identify", f"x.{ending}", "--mass", str(M), "--stiffness", str(1.1 * K)]) == 1
+
+
+def test_steps_that_follow_an_accumulated_clock_are_one_linear_scheme_of_positions_too() -> None:
+    """RK2, five steps to a frame: each step is as long as two of its times are apart."""
+    h, k, m, q, v = 0.005087067370272234, 88.64693547804737, 0.01770958188009272, 0.6247790782384479, -315.5
+    t = np.concatenate([[0.0], np.cumsum(np.full(500, h))])
+    kept = [q]
+    for i, s in enumerate(np.diff(t).tolist()):
+        x, u = q + s / 2 * v, v - s / 2 * (k * q / m)
+        q, v = q + s * u, v - s * (k * x / m)
+        kept += [q] if i % 5 == 4 else []
+    found = identify(t[::5], np.array(kept), mass=m)
+    assert (found.scheme, found.stride) == ("rk2-midpoint", 5)

@@ -75,7 +75,7 @@ def recurrence(record: Record, j: int, steps: int) -> Recurrence:
     if not record.fine:
         noise = np.sqrt(noise**2 + stored[2:] ** 2 + 4 * stored[1:-1] ** 2 + stored[:-2] ** 2)
     noise = np.maximum(noise, 1e-30 * np.max(noise))
-    alpha, beta, covariance, left = _neighbours(q, noise)
+    alpha, beta, covariance, left = _neighbours(q, noise, record.slips)
     scale = float(np.std(q.astype(np.float64)))
     residual = float(np.sqrt(np.mean(left**2))) / scale
     ulp = float(np.max(np.abs(left) / (2.0**-52 * size)))
@@ -123,8 +123,11 @@ def _around(x: Floats) -> Floats:
     return np.asarray(np.max(np.lib.stride_tricks.sliding_window_view(wide, 7), axis=1))
 
 
-def _neighbours(q: Extended, noise: Floats) -> tuple[np.longdouble, np.longdouble, Floats, Floats]:
-    """alpha, beta, their covariance (2, 2) and what is left over (f - 2,), from neighbouring frames."""
+def _neighbours(
+    q: Extended, noise: Floats, slips: Extended | None
+) -> tuple[np.longdouble, np.longdouble, Floats, Floats]:
+    """alpha, beta, their covariance (2, 2) and what is left over (f - 2,), from neighbouring frames; where
+    steps follow the clock's `slips` these move frames along their way, which the state tells."""
     weight = (1 / noise)[:, None]
     # a motion that grows is not centred by its largest frames
     share = 1 / np.square(noise / np.min(noise))
@@ -134,6 +137,14 @@ def _neighbours(q: Extended, noise: Floats) -> tuple[np.longdouble, np.longdoubl
     right = np.asarray(second[:, None] * weight, np.longdouble)
     x = least_squares(np.asarray(columns * weight, np.longdouble), right)[:, 0]
     left = (second - columns @ x).astype(np.float64)
+    if slips is not None and len(left) > 4 * FEWEST_FRAMES:
+        moved = [1e12 * s[:, None] * columns[:, :2] for s in (slips[1:], slips[:-1])]
+        wide = np.concatenate([columns, *moved], axis=1)
+        y = least_squares(np.asarray(wide * weight, np.longdouble), right)[:, 0]
+        rest = (second - wide @ y).astype(np.float64)
+        lost, kept = (float(np.sum((r / noise) ** 2)) for r in (left, rest))
+        if lost - kept > 200 * max(kept, 0.1 * len(left)) / len(left):
+            x, left, columns = y, rest, wide
     even = (columns * weight).astype(np.float64)
     scale = np.sqrt(np.sum(even**2, axis=0))
     inverse = np.linalg.pinv((even / scale).T @ (even / scale)) / scale[:, None] / scale
