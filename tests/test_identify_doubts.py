@@ -252,6 +252,18 @@ def test_an_odd_number_of_steps_that_alternate_is_no_adaptive_solver() -> None:
     assert found.statement.startswith("Even and odd steps differ and alternate: ")
 
 
+def test_damped_frames_in_reverse_order_are_no_steps_back_in_time_with_friction_that_feeds_energy_in() -> (
+    None
+):
+    q, v, h, states = 1.3, 0.4, 0.21, []
+    for _ in range(80):
+        states.append((q, v))
+        v -= h * (K * q + 0.2 * v) / M
+        q += h * v
+    qs, vs = np.array(states[::-1]).T
+    assert identify(h * np.arange(80)[::-1], qs, v=vs, mass=M).scheme == "semi-implicit-euler"
+
+
 def test_two_frames_that_have_changed_places_are_told() -> None:
     q, v = remembered(0.0, 0.0, 0.2)
     order = np.arange(len(q))

@@ -170,9 +170,12 @@ def held_over(joint: Joint) -> str:
 
 def either_way(ways: list[Identification]) -> Identification:
     """What the frames of falling times are: in their order, by steps back in time, and in that of time."""
-    fitting = [x for x in ways if x.fits]
+    fitting = [
+        x for x in ways if x.fits and not any(rate < 0 for one in x.candidates for rate in one.friction)
+    ]
     names = {x.scheme for x in fitting}
     if len(fitting) < 2 or (len(names) == 1 and None not in names):
+        # friction that feeds energy in is none
         return fitting[0] if fitting else ways[-1] if ways[0].fits else ways[0]
     back, turned = (
         either(list(dict.fromkeys(title(x.scheme) for x in one.candidates))[:4]) for one in fitting
