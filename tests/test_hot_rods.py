@@ -157,7 +157,7 @@ def temperature(name: str, n: int = 20000, steps: int = 40) -> tuple[float, floa
         draws = [*carried, *rng.standard_normal((scheme.fresh, *q.shape))]
         q, p = (np.asarray(x) for x in step(q, p, force, draws))
         carried = draws[len(draws) - scheme.carried :]
-    each = np.sum(p * p / scene.m, axis=1) / scene.thermal / rods.freedoms(scene.q)
+    each = np.sum(p * p / scene.m, axis=1) / scene.thermal / rods.freedoms
     return float(np.mean(each)), float(np.std(each) / np.sqrt(len(each)))
 
 
