@@ -264,6 +264,20 @@ def test_damped_frames_in_reverse_order_are_no_steps_back_in_time_with_friction_
     assert identify(h * np.arange(80)[::-1], qs, v=vs, mass=M).scheme == "semi-implicit-euler"
 
 
+@pytest.mark.parametrize("roundings", [0, 10])
+def test_a_velocity_that_is_off_by_more_than_a_difference_of_positions_rounds_is_no_arithmetic(
+    roundings: int,
+) -> None:
+    q, v, h, states = 1.3, 0.4, 1e-3, []
+    for _ in range(201):
+        new = q + h * (v - h * 3.1 * q / 2.3)
+        q, v = new, (new - q) / h
+        states.append((q, v))
+    qs, vs = np.array(states).T
+    vs[60] += roundings * 2.0**-52 * abs(qs[60]) / h
+    assert identify(h * np.arange(201), qs, v=vs, mass=2.3).fits == (roundings == 0)
+
+
 def test_two_frames_that_have_changed_places_are_told() -> None:
     q, v = remembered(0.0, 0.0, 0.2)
     order = np.arange(len(q))

@@ -355,6 +355,8 @@ def _is_rebuilt(match: Match, missing: Floats, size: Floats, difference: Floats)
     if np.any(missing[:, 0] > 2.0**-52 * (4 + 2 * steps**3) * size[:, 0]):
         return False
     unit = 2.0**-52 * steps * difference[:, 1]
+    if np.any(missing[:, 1] > 2.0**-52 * (4 + 2 * steps) * size[:, 1] + 4 * unit):
+        return False
     least, most = REBUILT
     share = float(np.sqrt(np.mean(missing[:, 1] ** 2) / np.mean(unit**2)))
     return least <= share <= most
