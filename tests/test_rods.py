@@ -544,6 +544,25 @@ def test_iterations_that_find_no_length_stop_a_run(need: Need) -> None:
     assert (run.outcome.status, run.outcome.message) == ("stopped", "Did not converge")
 
 
+def test_passes_that_come_near_lengths_too_slowly_are_a_stop_with_its_words_and_no_failure(
+    need: Need,
+) -> None:
+    """A light particle between heavy ones: each of ASE's passes leaves (M/(M + m))^2 of what is off, and it
+    takes 500 of them."""
+    need("ase:rattle")
+    mass, q = np.repeat([97.0, 0.6, 97.0], 2), np.array([0.0, 0.0, 1.1, 0.0, 2.3, 0.0])
+    joined = Rod(a=np.arange(4), b=np.arange(2, 6), length=np.repeat([1.1, 1.2], 2))
+    pulled = WallSpring(i=[0, 1], k=[2.9, 2.9], at=[-0.3, 0.2])  # type: ignore[arg-type]
+    fields = {"m": mass, "q": q, "p": 0 * q, "places": np.array([0, 1, 3, 4, 6, 7]), "step": 0.1, "steps": 8}
+    scene = Scene(terms=(joined, pulled), **fields)  # type: ignore[arg-type]
+    run = driver.run(scene, "ase:rattle")
+    assert (run.outcome.status, run.outcome.message) == ("stopped", "Did not converge")
+    assert not [v for v in checks.judge(scene, run) if v.passed is False]
+    for wrong in (replace(run.outcome, message=""), replace(run.outcome, status="diverged")):
+        verdicts = checks.judge(scene, replace(run, outcome=wrong))
+        assert [v.check for v in verdicts if v.passed is False] == ["grid"]
+
+
 def test_settle_in_openmm_keeps_lengths_in_single_precision_and_is_told(need: Need) -> None:
     need("openmm:verlet-rods")
     scene = water(0.0757, 0.0586)

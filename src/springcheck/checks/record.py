@@ -81,9 +81,12 @@ def beyond(how: Arithmetic) -> list[str]:
 
 
 def _gives_up(case: Case) -> bool:
-    """Whether the engine may give up by itself, and says why: a solver that cannot hold its tolerance."""
-    outcome = case.trajectory.outcome
-    return not case.law.has("one-step") and outcome.status == "stopped" and bool(outcome.message)
+    """Whether the engine may give up by itself, and says why: a solver that cannot hold its tolerance, of a
+    step or of the lengths of rods, which it finds by passes that need not converge where there are such."""
+    outcome, solves = case.trajectory.outcome, not case.law.has("one-step")
+    if case.scene.system.rods:
+        solves = solves or case.trajectory.arithmetic.lengths > 0
+    return solves and outcome.status == "stopped" and bool(outcome.message)
 
 
 HALF_RANGE = np.sqrt(np.finfo(np.float64).max)
