@@ -199,6 +199,16 @@ def test_bad_input_to_the_tables_options_is_said_before_anything_runs(
     assert Path("notes.txt").read_text() == "mine"
 
 
+def test_a_table_without_a_row_replaces_none(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Path("t.csv").write_text(f"{engines_table.HEAD}\nmine\n")
+    monkeypatch.setattr("sys.argv", ["engines_table.py", "t"])
+    assert engines_table.main() == 2
+    assert "no rows" in capsys.readouterr().out
+    assert "mine" in Path("t.csv").read_text()
+
+
 @pytest.mark.parametrize(
     ("name", "said"),
     [("notes.txt", "it is there and no such table"), (".", "it is a folder"), ("no/t", "there is no folder")],

@@ -330,6 +330,36 @@ def test_a_queue_that_is_described_wrongly_is_one_line(queue: Path, text: str, w
     assert "\n" not in str(raised.value)
 
 
+STUDY = """#!/bin/sh
+trap 'sleep 0.5; echo kept; exit 130' INT
+echo begun
+while :; do sleep 0.05; done
+"""
+"""A study that takes longer to end than `subprocess.run` waits for it."""
+
+BEGUN = """
+import contextlib, sys, types
+import on_a_queue
+on_a_queue.description = lambda place: ("slurm", {{}})
+on_a_queue.started = lambda *given: contextlib.nullcontext(types.SimpleNamespace(scheduler_address="tcp://a:1"))
+sys.argv, sys.executable = ["on_a_queue.py", "slurm.yaml", "1", "extremes"], {study!r}
+sys.exit(on_a_queue.main())
+"""
+
+
+def test_a_study_on_a_queue_that_is_told_to_end_says_what_it_has_kept(tmp_path: Path) -> None:
+    study = tmp_path / "study"
+    study.write_text(STUDY)
+    study.chmod(0o755)
+    words = [sys.executable, "-c", BEGUN.format(study=str(study))]
+    place = str(Path(on_a_queue.__file__).parent)
+    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True, cwd=place) as script:
+        assert script.stdout is not None
+        assert script.stdout.readline() == "begun\n"
+        script.send_signal(signal.SIGTERM)
+        assert (script.stdout.read(), script.wait()) == ("kept\n", 130)
+
+
 def test_a_study_on_a_queue_is_one_command(queue: Path) -> None:
     words = [sys.executable, on_a_queue.__file__, described(queue), "1"]
     study = ["extremes", "--quick", "--method", OWN[0], "-o", "atlas.h5"]

@@ -74,7 +74,16 @@ def test_no_cell_of_a_solver_is_silently_wrong(name: str, need: Need) -> None:
 def test_a_solver_has_no_cells_in_the_atlas_and_it_is_said_why() -> None:
     atlas = extremes.measure(["own:euler", "sundials:bdf"], quick=True)
     assert {cell.method for cell in atlas.cells} == {"own:euler"}
-    assert "its steps are its own" in atlas.left_out[0].reason
+    assert "it chooses its own steps" in atlas.left_out[0].reason
+
+
+def test_cells_of_a_solver_in_a_store_are_no_map(need: Need) -> None:
+    need("sundials:bdf")
+    atlas = extremes.measure(["own:euler"], quick=True)
+    solved = [solver_cells.solve(engines.parse("sundials:bdf"), spec) for spec in solver_cells.specs()[:65:5]]
+    (bank,) = page.banks(replace(atlas, cells=(*atlas.cells, *solved)))
+    assert {cell.block for cell in solved} == {"force"}
+    assert [chart.title for chart in bank.charts] == ["own:euler"]
 
 
 @pytest.mark.parametrize("name", ["own:semi-implicit-euler", "own:euler", "own:implicit-euler", "own:rk4"])

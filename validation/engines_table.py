@@ -125,11 +125,13 @@ def free(path: str | Path, beginning: str) -> None:
 
 
 def main() -> int:
-    """Write both; 2 where a file is no census, or another would be replaced."""
+    """Write both; 2 where a file is no census, there is no row, or another file would be replaced."""
     given = arguments(__doc__, name="engines", files=list[str]())
     try:
         documents = [load(path) for path in given.files]
         found = rows(*documents)
+        if not found:
+            raise SpringcheckError("no rows: name JSON documents of `springcheck census --json`")
         texts = {f"{given.name}.csv": as_csv(found), f"{given.name}.html": html(found, documents)}
         for path, beginning in zip(texts, (HEAD, MARK), strict=True):
             free(path, beginning)

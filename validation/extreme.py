@@ -149,7 +149,7 @@ def main() -> int:
     print(f"{len(atlas.cells)} cells in {time.perf_counter() - began:.0f} s: {dict(atlas.counts())}")
     for window in atlas.windows:
         print(window.sentence)
-    for left in atlas.left_out:
+    for left in (x for x in atlas.left_out if x.method not in {cell.method for cell in every}):
         print(f"left out {left.method}: {left.reason}")
     for cell in atlas.wrong:
         print(f"silently wrong: {cell}")

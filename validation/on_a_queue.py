@@ -160,12 +160,17 @@ def main() -> int:
         with started(place, *description(place), int(workers)) as cluster:
             more = ["--workers", workers, "--cluster", cluster.scheduler_address]
             command = [sys.executable, "-m", "springcheck", *words, *more]
-            return subprocess.run(command, check=False).returncode
+            study = subprocess.Popen(command)
+            try:
+                return study.wait()
+            except KeyboardInterrupt:
+                # it hears of a Ctrl-C by itself, and ignores a second signal; it says what it has kept
+                study.send_signal(signal.SIGINT)
+                return study.wait()
     except SpringcheckError as error:
         print(error, file=sys.stderr)
         return 2
     except KeyboardInterrupt:
-        # the study has been interrupted, too, and says what it has kept
         return 130
 
 

@@ -71,7 +71,7 @@ class TextTable:
         widths = [
             max((len(row[j]) for row in cells if j < len(row)), default=0) for j in range(len(self.titles))
         ]
-        if self.prose in self.titles:
+        if self.prose and self.prose in self.titles:
             j = self.titles.index(self.prose)
             words = [len(word) for row in cells if j < len(row) for word in str(row[j]).split()]
             widths[j] = min(widths[j], max(self._free(widths, j, wide), *words, 1))

@@ -55,7 +55,7 @@ def measure(methods: Sequence[str] = (), *, quick: bool = False, kept: Keeper | 
     usable, left_out = sorted_out(engines.match(tuple(methods) or everything()), absence)
     if not usable:
         reasons = "; ".join(f"{one.method}: {one.reason}" for one in left_out)
-        raise MethodError(f"none of these methods is here: {reasons}")
+        raise MethodError(f"none of these methods has extreme cases here: {reasons}")
     work = [
         replace(piece, cost=_cost(label))
         for label, piece in zip(
@@ -84,7 +84,7 @@ def absence(label: Label) -> str | None:
     if "wall-spring" not in method.terms or "particles" not in method.kinds:
         return "it moves no particles on springs"
     if method.adaptive:
-        return "its steps are its own, and no step is judged by itself"
+        return "it chooses its own steps, and cells are judged step by step"
     return engines.absence(label.engine) or propagators.absence(label)
 
 

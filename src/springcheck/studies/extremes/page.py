@@ -33,10 +33,10 @@ def _filled(row: list[int]) -> list[int]:
 
 
 def banks(atlas: Atlas) -> list[Bank]:
-    """A map for each method."""
+    """A map for each method; solvers, whose cells are of one h w, have none."""
     methods = dict.fromkeys(cell.method for cell in atlas.cells)
     planes = {x: [c for c in atlas.cells if c.method == x and c.block == "force"] for x in methods}
-    charts = [_chart(method, cells) for method, cells in planes.items() if cells]
+    charts = [_chart(method, cells) for method, cells in planes.items() if _is_plane(cells)]
     if not charts:
         return []
     wrong = f"{count(len(atlas.wrong), 'case')} silently wrong" if atlas.wrong else "none silently wrong"
@@ -45,6 +45,10 @@ def banks(atlas: Atlas) -> list[Bank]:
     )
     heading = f"Of {len(atlas.cells)} extreme cases {wrong}: {others}"
     return [Bank(name="extremes", heading=heading, title="Methods drawn", charts=charts)]
+
+
+def _is_plane(cells: Sequence[Cell]) -> bool:
+    return len({cell.parameters["h_w"] for cell in cells}) > 1
 
 
 def _chart(method: str, cells: Sequence[Cell]) -> Chart:
