@@ -357,7 +357,7 @@ def test_a_study_on_a_queue_that_is_told_to_end_says_what_it_has_kept(tmp_path: 
         assert script.stdout is not None
         assert script.stdout.readline() == "begun\n"
         script.send_signal(signal.SIGTERM)
-        assert (script.stdout.read(), script.wait()) == ("kept\n", 130)
+        assert (script.communicate(timeout=60)[0], script.returncode) == ("kept\n", 130)
 
 
 def test_a_study_on_a_queue_is_one_command(queue: Path) -> None:

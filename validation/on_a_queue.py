@@ -25,7 +25,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -149,6 +149,23 @@ def cancel(cluster: Any) -> None:
             subprocess.run([*command, *map(str, jobs)], capture_output=True, check=False, timeout=1)
 
 
+def _carried_out(command: Sequence[str]) -> int:
+    """The exit status of a study, which is told to end with this program and says what it has kept."""
+    heard: list[int] = []
+    for number in (signal.SIGINT, signal.SIGTERM):
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            # no exception, which would leave a study behind that has just begun
+            signal.signal(number, lambda number, frame: heard.append(number))
+    study = subprocess.Popen(command)
+    while (status := study.poll()) is None:
+        if heard:
+            # of a Ctrl-C it has heard by itself: it ignores a second signal
+            study.send_signal(signal.SIGINT)
+            heard.clear()
+        time.sleep(0.1)
+    return status
+
+
 def main() -> int:
     """Carry a study out by workers of a queue; its exit status."""
     if len(sys.argv) < 4 or not sys.argv[2].isdecimal():
@@ -160,13 +177,7 @@ def main() -> int:
         with started(place, *description(place), int(workers)) as cluster:
             more = ["--workers", workers, "--cluster", cluster.scheduler_address]
             command = [sys.executable, "-m", "springcheck", *words, *more]
-            study = subprocess.Popen(command)
-            try:
-                return study.wait()
-            except KeyboardInterrupt:
-                # it hears of a Ctrl-C by itself, and ignores a second signal; it says what it has kept
-                study.send_signal(signal.SIGINT)
-                return study.wait()
+            return _carried_out(command)
     except SpringcheckError as error:
         print(error, file=sys.stderr)
         return 2

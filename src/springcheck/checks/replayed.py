@@ -174,7 +174,8 @@ def _untrue(
         clock, before = clock + abs(length), longest
         of_t += state * clock
     number, amiss, excess = _roundings(case), abs(clock - abs(times[1])), abs(steps[-1].h) - longest
-    found = amiss / of_t, excess / of_h if excess > 0 else excess * 0
+    # without a force a step may be of any length
+    found = amiss / of_t, excess / of_h if excess > 0 else np.longdouble(0)
     return float(np.max(np.array(found))), float(min(amiss, number * of_t))
 
 
