@@ -660,6 +660,27 @@ def test_lammps_without_rattles_projection_is_told(need: Need, monkeypatch: pyte
     assert {v.check for v in checks.judge(scene, run) if v.passed is False} >= {"step-defect", "rod-velocity"}
 
 
+def test_a_push_for_a_step_that_there_is_not_costs_a_run_its_last_frame_and_raises_no_alarm(
+    need: Need,
+) -> None:
+    """SHAKE's momenta hold half of the push of the next step, which cannot be found where there is none."""
+    need("lammps:shake")
+    q = np.array([0.0, 0.0, 1.1, 0.1, -0.9, 0.7])
+    length = np.repeat(np.hypot([1.1, -0.9], [0.1, 0.7]), 2)
+    joined = Rod(a=np.array([0, 1, 0, 1]), b=np.arange(2, 6), length=length)
+    pulled = WallSpring(i=[2, 5], k=[2.0, 4.0], at=[-3.0, 3.0])  # type: ignore[arg-type]
+    fields = {"m": np.repeat([0.3, 7.1, 7.1], 2), "q": q, "p": 0 * q, "places": np.array([0, 1, 3, 4, 6, 7])}
+    scene = Scene(terms=(joined, pulled), **fields, step=0.11, steps=80)  # type: ignore[arg-type]
+    last = driver.run(scene, "own:velocity-verlet").outcome.step
+    for steps in (80, last):
+        asked = replace(scene, steps=steps)
+        run = driver.run(asked, "lammps:shake")
+        assert (run.outcome.status, run.outcome.step) == ("stopped", last - 1)
+        assert "no push along its rods leads to the next step" in run.outcome.message
+        assert [v.check for v in checks.judge(asked, run) if v.passed is False] == []
+    assert driver.run(replace(scene, steps=last - 1), "lammps:shake").outcome.status == "complete"
+
+
 def test_rods_that_lammps_cannot_hold_are_refused_in_its_words(need: Need) -> None:
     need("lammps:shake")
     rod = Rod(a=[0, 1, 2, 3], b=[1, 2, 3, 4], length=[0.5] * 4)  # type: ignore[arg-type]

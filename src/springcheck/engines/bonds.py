@@ -8,10 +8,11 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from springcheck.engines.contract import Label
+from springcheck.engines.contract import Label, Stopped
 from springcheck.errors import MethodError
 from springcheck.physics import graph
 from springcheck.physics.arrays import Floats, Integers
+from springcheck.physics.rods import Rods
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Cosine, RadialSpring, Spring, WallSpring
 from springcheck.schemes import scheme
@@ -82,6 +83,25 @@ def _within_half(scene: Scene, springs: list[WallSpring | Spring], energy: Float
         most = most + (np.abs(term.rest) if isinstance(term, Spring) else 0.0)
         if not np.all(most < scene.periods[first] / 2):
             raise MethodError(f"{scene.name}: a spring may become as long as half of the box, and turn over")
+
+
+LOST = 16.0
+"""Lengths of a rod by which a push moves its ends where there was no step to find: one that brings it back to
+its length moves them by h w of it, below 1, and what 16 leaves has lost 4 bits more."""
+
+
+def without_push(rods: Rods, q: Floats, p: Floats, reach: Floats, row: int) -> Floats:
+    """Momenta p (n,) without the half of the next step's push along rods that SHAKE leaves in them.
+
+    `reach` is 2h/m, by which that half moves the ends in the next step.  Raises Stopped where there is no
+    such step, and momenta have lost their digits in the push that was looked for.
+    """
+    projected = rods.projected(q, p)
+    if np.all(np.isfinite(p)) and np.any(rods.strain(q + reach * (p - projected)) > LOST):
+        raise Stopped(
+            row, "no push along its rods leads to the next step, and momenta have lost their digits"
+        )
+    return np.asarray(projected, np.float64)
 
 
 def cells(scene: Scene, origins: Floats) -> Floats:

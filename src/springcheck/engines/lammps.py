@@ -120,7 +120,7 @@ class _Run:
         x = self._build(scene, "external" if ours else method.name, rods)
         if ours:
             self._pull(scene, step)
-        self._project = scene.system.rods.projected if scene.system.rods else None
+        self._rods, self._reach = scene.system.rods, 2 * step / scene.m
         moved = _thermostat(scene, method, seed) if method.generator else ["fix move mobile nve"]
         for line in (
             *moved,
@@ -236,8 +236,8 @@ class _Run:
                 x, v = self._array("x").reshape(-1), self._array("v").reshape(-1)
                 q[row] = x[where] + self._origins + self._crossed()
                 p[row] = v[where] * self._m
-                if self._project:
-                    p[row] = self._project(q[row], p[row])
+                if self._rods:
+                    p[row] = bonds.without_push(self._rods, q[row], p[row], self._reach, row)
         if self._on_a_line:
             x = self._array("x").reshape(-1)
             self.off_axis = max(self.off_axis, bonds.off_axis(x, self._elsewhere))
