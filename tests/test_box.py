@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -111,8 +112,20 @@ def test_boxes_that_make_no_sense_are_refused(change: dict[str, object], said: s
 
 def test_a_spring_that_may_reach_half_of_the_box_is_refused_by_engines(need: Need) -> None:
     need("openmm:verlet")
-    with pytest.raises(MethodError, match="half of the box"):
-        springcheck.simulate(replace(boxed(), box=(0.8, 3.3, 5.7)), "openmm:verlet")
+    along_x = 0.8
+    for who in ("from the wall to particle 2", "of particles 0 and 1"):
+        said = (
+            f"the spring {who} may .* half of the box, {along_x / 2:.3g} along x, .* a box of (.*) along x is"
+        )
+        with pytest.raises(MethodError, match=said) as caught:
+            springcheck.simulate(replace(boxed(), box=(along_x, 3.3, 5.7)), "openmm:verlet")
+        found = re.search(said, str(caught.value))
+        assert found
+        along_x = float(found[1])
+    enough = replace(boxed(), box=(along_x, 3.3, 5.7))
+    assert springcheck.simulate(enough, "openmm:verlet").outcome.status == "complete"
+    with pytest.raises(MethodError, match="nothing bounds it with this method and step; own:"):
+        springcheck.simulate(boxed(), "openmm:euler")
 
 
 def test_engines_without_a_box_say_so(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ from springcheck.physics import graph
 from springcheck.physics.arrays import Floats, Integers
 from springcheck.physics.rods import Rods
 from springcheck.physics.scene import Scene
+from springcheck.physics.term import Term
 from springcheck.physics.terms import Cosine, RadialSpring, Spring, WallSpring
 from springcheck.schemes import scheme
 
@@ -59,10 +60,9 @@ def origins(scene: Scene, scheme_name: str) -> Floats:
         _within_half(scene, springs, energy[group])
         reach = float(scene.system.energy(scene.q, scene.p)) * (2 + hw) / (2 - hw) if bounded else np.inf
         # one bond may have all of the energy
-        bonds = [one for one in scene.terms if isinstance(one, RadialSpring)]
-        longest = [0.0, *(float(np.max(one.rest + np.sqrt(2 * reach / np.abs(one.k)))) for one in bonds)]
-        if not max(longest) < min(scene.box) / 2:
-            raise MethodError(f"{scene.name}: a bond may become as long as half of the box")
+        for one in (x for x in scene.terms if isinstance(x, RadialSpring)):
+            longest = one.rest + np.sqrt(2 * reach / np.abs(one.k))
+            _shorter(scene, one, longest, np.full(len(one), min(scene.box)))
     if not np.any(turning):
         return np.zeros(scene.n)
     rest = scene.system.rest_positions
@@ -81,8 +81,28 @@ def _within_half(scene: Scene, springs: list[WallSpring | Spring], energy: Float
         with np.errstate(divide="ignore", invalid="ignore"):
             most = np.sqrt(2.02 * energy[first] / term.k)
         most = most + (np.abs(term.rest) if isinstance(term, Spring) else 0.0)
-        if not np.all(most < scene.periods[first] / 2):
-            raise MethodError(f"{scene.name}: a spring may become as long as half of the box, and turn over")
+        _shorter(scene, term, most, scene.periods[first])
+
+
+def _shorter(scene: Scene, term: Term, most: Floats, box: Floats) -> None:
+    """MethodError where a row of a term, which may become `most` (s,) long, reaches half of the box (s,)."""
+    short = most < box / 2
+    if np.all(short):
+        return
+    worst = int(np.argmax(np.where(short, 0.0, most / box)))
+    ends = [divmod(int(scene.all_places[of[worst]]), 3) for of in term.particles]
+    a, b = ends[0][0], ends[-1][0]
+    who = (
+        f"{term.key} of particles {a} and {b}" if len(ends) == 2 else f"spring from the wall to particle {a}"
+    )
+    axis = "every axis" if term.key == "bond" else "xyz"[ends[0][1]]
+    enough = f"a box of {2.02 * most[worst]:.3g} along {axis} is enough for it"
+    raise MethodError(
+        f"{scene.name}: the {who} may become as long as half of the box, {box[worst] / 2:.3g} "
+        f"along {axis}, and turn over; "
+        + (enough if np.isfinite(most[worst]) else "nothing bounds it with this method and step")
+        + "; own:velocity-verlet takes any length"
+    )
 
 
 LOST = 16.0
