@@ -15,7 +15,7 @@ BUDGETS = {
     ("thermal",): 2591,
     ("engines/own",): 1673,
     ("engines/openmm", "engines/ase", "engines/sundials"): 1324,
-    ("engines",): 2695,
+    ("engines",): 2715,
     ("driver", "conformance", "doors"): 1203,
     ("checks",): 5041,
     ("identify",): 8282,
