@@ -23,6 +23,7 @@ from springcheck import checks, driver, engines, schemes, store
 from springcheck.checks import Case, stretch
 from springcheck.cli import main
 from springcheck.errors import MethodError, SceneError
+from springcheck.identify import files
 from springcheck.identify.files import rod_of
 from springcheck.physics import exact, scenefile
 from springcheck.physics.rods import Rods
@@ -790,3 +791,44 @@ def test_a_file_of_single_precision_with_a_rod_is_judged_to_its_digits(tmp_path:
         assert main(["judge", str(path), "--scene", "dumbbell", "--scheme", "velocity-verlet"]) == status
     np.savez(path, t=run.t, q=run.q * (1 + 1e-5), p=run.p)
     assert main(["judge", str(path), "--scene", "dumbbell", "--scheme", "velocity-verlet"]) == 2
+
+
+def test_schemes_of_springs_that_fit_a_rod_in_single_precision_are_not_all_that_is_said(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Short steps, and what a solver of constraints leaves of itself: no error of a spring's scheme shows.
+
+    About a resting middle either end goes round, as it may on springs; about one that moves neither does.
+    """
+    t, rng, path = 0.004 * np.arange(40)[:, None], np.random.default_rng(1), str(tmp_path / "single.npz")
+    across, along = np.array([0.8, 0.0, -0.6]), np.array([0.0, 1.0, 0.0])
+    way = 0.2 * (np.cos(6 * t) * across + np.sin(6 * t) * along)
+    pace = 1.2 * (np.cos(6 * t) * along - np.sin(6 * t) * across)
+    v = np.hstack([-0.7 * pace, 0.3 * pace]) + 1e-3 * rng.normal(size=(40, 6))
+
+    def said(drift: float, status: int, *stated: str) -> str:
+        middle = 2.5 + drift * t * [0.5, 0.25, -1]
+        q = np.hstack([middle - 0.7 * way, middle + 0.3 * way])
+        np.savez(path, t=t[:, 0], q=q.astype(np.float32), v=v.astype(np.float32))
+        assert main(["identify", path, *stated]) == status
+        return " ".join("".join(capsys.readouterr()).split())
+
+    kept = "particles 0 and 1 turn and keep their distance, 0.2 to "
+    resting = said(0, 0)
+    assert "velocity-verlet" in resting
+    assert kept in resting
+    assert "or circular orbits on springs" in resting
+    told = files.identify_states(files.read(Path(path))[0])
+    monkeypatch.setattr(files, "identify_states", lambda *_, **given: told)
+    moving = said(1, 2)
+    assert kept in moving
+    assert "judge it, with a --scene" in moving
+    assert "velocity-verlet" not in moving
+    assert kept not in said(1, 0, "--stiffness", "36")
+
+
+def test_springs_that_swing_little_across_their_way_are_no_rod() -> None:
+    t = np.arange(60) * 0.1
+    across = np.stack([0 * t, 0.03 * np.cos(t), 1 + 0 * t, -0.01 * np.cos(t)], axis=1)
+    assert rod_of(across).startswith("particles 0 and 1 turn")
+    assert rod_of(across, fits=True) == ""

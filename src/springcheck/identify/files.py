@@ -13,7 +13,7 @@ import numpy as np
 from springcheck import formats, schemes, store
 from springcheck.errors import IdentificationError, MethodError, SpringcheckError, StoreError
 from springcheck.formats import columns as columns_of
-from springcheck.identify.record import of_size
+from springcheck.identify.record import ROUNDING, of_size
 from springcheck.identify.report import identify_arrays
 from springcheck.identify.result import Identification
 from springcheck.physics import scenefile as scenes
@@ -34,8 +34,14 @@ RIGID, TURNED = 1e-3, 0.05
 """Part by which a distance may change that is a rod's, programs' own tolerances being 1e-4, and by which the
 way has to turn for it to show."""
 
+SEVERAL = 8
+"""Digits of their distance to which two particles that go round each by itself keep to their circles."""
+
 FEWEST_ON_ARC = 8
 """Frames, of which a circle in space takes up to four numbers."""
+
+OR_ROUND = ", or circular orbits on springs"
+"""How a sentence ends of a rod that nothing tells from springs."""
 
 LENGTHS = {"nm": 1.0, "Angstrom": 0.1, "angstrom": 0.1, "A": 0.1, "Å": 0.1, "pm": 1e-3, "m": 1e9, "um": 1e3}
 TIMES = {"ps": 1.0, "fs": 1e-3, "ns": 1e3, "s": 1e12, "us": 1e6}
@@ -184,31 +190,55 @@ def _chosen(q: Floats, p: Floats, notes: list[str]) -> tuple[Integers, tuple[str
     return np.asarray(chosen), tuple(notes)
 
 
-def rod_of(q: Floats | None) -> str:
+def rod_of(q: Floats | None, *, fits: bool = False) -> str:
     """What particles of positions q (f, N), in space or a plane, keep as a rod does: two that turn their
-    distance, or one that swings its distance from a fixed point; or ""."""
+    distance, or one that swings its distance from a fixed point; or "".
+
+    Where springs fit as well, the way of two has to bend; and if each goes round by itself it is `OR_ROUND`.
+    """
+    round_by_itself = ""
     for axes in (3, 2):
         if q is None or q.shape[1] % axes:
             continue
         x = q[:, : axes * MOST_OSCILLATORS].reshape(len(q), -1, axes)
         for a, b in combinations(range(x.shape[1]), 2):
             way = x[:, b] - x[:, a]
-            size = np.linalg.norm(way, axis=1)
-            length, off = float(np.mean(size)), float(np.ptp(size))
+            length, off = _kept(way)
             if off <= RIGID * length and np.max(np.ptp(way, axis=0)) >= TURNED * length:
-                return f"particles {a} and {b} turn and keep their distance, {length:.6g} to {off:.1g}: a rod"
+                room = TURNED * _bent(way) if fits else np.inf
+                digits = SEVERAL * max(off, ROUNDING * np.max(np.abs(x[:, [a, b]])))
+                said = f"particles {a} and {b} turn and keep their distance, {length:.6g} to {off:.1g}: a rod"
+                if off <= room and fits and max(_kept(_arm(x[:, i]))[1] for i in (a, b)) <= digits:
+                    round_by_itself = said + OR_ROUND
+                elif off <= room:
+                    return said
         for i in range(x.shape[1] if len(x) > FEWEST_ON_ARC and np.isfinite(x).all() else 0):
-            way = x[:, i] - np.mean(x[:, i], axis=0)
-            # |way - c| = l is linear in c and l**2 - c**2
-            centre = np.linalg.lstsq(np.column_stack([2 * way, np.ones(len(way))]), np.sum(way**2, axis=1))[0]
-            size = np.linalg.norm(way - centre[:-1], axis=1)
-            length, off = float(np.mean(size)), float(np.ptp(size))
+            arm, bent = _arm(x[:, i]), _bent(x[:, i])
+            length, off = _kept(arm)
             # a straight way keeps to any circle, and an orbit may keep to one without a rod: it goes round
-            bent = np.linalg.svd(way, compute_uv=False)[1] / np.sqrt(len(way))
-            if off <= RIGID * bent and bent >= TURNED**2 * length and _turns_back(way - centre[:-1]):
+            if off <= RIGID * bent and bent >= TURNED**2 * length and _turns_back(arm):
                 kept = f"keeps its distance from a fixed point, {length:.6g} to {off:.1g}: a rod"
                 return f"particle {i} swings and {kept}"
-    return ""
+    return round_by_itself
+
+
+def _kept(way: Floats) -> tuple[float, float]:
+    """The mean length of a way (f, 2 or 3), and by how much it changes."""
+    size = np.linalg.norm(way, axis=1)
+    return float(np.mean(size)), float(np.ptp(size))
+
+
+def _bent(way: Floats) -> float:
+    """How far a way leaves its straight line."""
+    return float(np.linalg.svd(way - np.mean(way, axis=0), compute_uv=False)[1] / np.sqrt(len(way)))
+
+
+def _arm(way: Floats) -> Floats:
+    """A way from the centre of the circle that is nearest to it."""
+    way = way - np.mean(way, axis=0)
+    # |way - c| = l is linear in c and l**2 - c**2
+    centre = np.linalg.lstsq(np.column_stack([2 * way, np.ones(len(way))]), np.sum(way**2, axis=1))[0]
+    return np.asarray(way - centre[:-1])
 
 
 def _turns_back(arm: Floats) -> bool:
@@ -263,9 +293,16 @@ def identify_file(
     for states in read(path, trajectory, columns, given.get("step")):
         try:
             found[states.label] = told = identify_states(states, **given)
-            if told.verdict == "none" and (seen := rod_of(states.whole)):
+            fits = told.verdict != "none"
+            # springs that are stated are there
+            with np.errstate(all="ignore"):
+                seen = "" if fits and "stiffness" in given else rod_of(states.whole, fits=fits)
+            if seen.endswith(OR_ROUND):
+                found[states.label] = replace(told, notes=(*told.notes, seen))
+            elif seen:
                 raise IdentificationError(
                     f"{seen}; schemes are told by springs: judge it, with a --scene that has the [[rod]]"
+                    f"{', or state the --stiffness of springs' if fits else ''}"
                 )
         except SpringcheckError as error:
             raise type(error)(f"{titled(path, states.label)}: {error}") from error
