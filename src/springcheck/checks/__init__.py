@@ -191,8 +191,8 @@ def not_exercised(scene: Scene) -> str:
         # what is at rest and not pulled at the start may be driven later
         if term.kind == "drive":
             pulled[np.concatenate(term.particles)] = True
-    moved = {"xyz"[axis] for axis in np.unique(scene.all_places[pulled] % 3)}
-    missing = [axis for axis in "xyz" if axis not in moved]
+    moved = np.bincount(scene.all_places[pulled] % 3, minlength=3)
+    missing = [axis for axis, number in zip("xyz", moved, strict=True) if not number]
     facts = {
         f"ax{'e' if len(missing) > 1 else 'i'}s {' and '.join(missing)}": not missing,
         "periodic boxes": bool(scene.box),
