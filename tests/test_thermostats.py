@@ -62,7 +62,6 @@ def test_there_are_twenty_methods_of_four_engines_at_least() -> None:
     assert len({label.partition(":")[0] for label in LABELS}) == 4
 
 
-@pytest.mark.campaign
 @pytest.mark.parametrize("label", LABELS)
 def test_a_thermostat_passes_its_checks_and_says_its_seed(label: str) -> None:
     here(label)

@@ -7,6 +7,8 @@ is run here, and of each is noted which jumps from line to line of the package i
 The dearest are left out first, as long as others of the same file make all their jumps, and every value of
 the parameters that a mark names, as `campaign("fault.caught_by")` does, still has a case.
 
+Lines do not tell rows of a table apart: a test whose cases are a row each, as of thermostats, is no campaign.
+
 `tests/campaigns.txt` lists them: they are run by `pytest --whole` alone, as in CI.  A case that nobody has
 measured is in no list, and so in every run.
 
