@@ -78,6 +78,64 @@ def test_without_the_stiffness_all_that_keep_areas_are_left() -> None:
     assert "unknown number of steps" in found.statement
 
 
+def verlet(springs: list[float], every: int) -> tuple[Floats, Floats]:
+    """Times and positions of oscillators of unlike stiffness, 150 frames by velocity Verlet."""
+    k, q, v = np.array(springs), np.linspace(1.1, 0.7, len(springs)), np.linspace(0.4, -0.3, len(springs))
+    kept = [q]
+    for i in range(150 * every):
+        v = v - H / 2 * k / M * q
+        q = q + H * v
+        v = v - H / 2 * k / M * q
+        kept += [q] if i % every == every - 1 else []
+    return H * every * np.arange(151), np.array(kept)
+
+
+@pytest.mark.parametrize("springs", [[19.0], [2.9, 19.0], [19.0, 15.0]], ids=str)
+def test_springs_that_turn_more_than_frames_show_keep_their_stated_stiffness(springs: list[float]) -> None:
+    """A turn to the left and one to the right share their number of turns: one of them was lost, and explicit
+    Euler with a friction of h k, which has the positions of velocity Verlet, was left."""
+    for every in (3, 4, 5, 6, 7, 8):
+        found = identify(*verlet(springs, every), mass=M, stiffness=np.array(springs))
+        assert {(x.scheme, x.stride) for x in found.candidates} == {(x, every) for x in STOERMER}, every
+        assert found.stiffness == pytest.approx(springs, rel=1e-9)
+
+
+def test_a_held_force_is_no_explicit_euler_with_friction_where_frames_hide_turns() -> None:
+    """Over 2 substeps it has the positions of explicit Euler with a friction of 3/4 h k."""
+    k, q, v, kept = 7.4, 1.1, 0.4, []
+    for i in range(600):
+        kept += [q] if i % 6 == 0 else []
+        held = -k / M * q
+        for _ in range(2):
+            v += H / 2 * held
+            q += H / 2 * v
+    found = identify(6 * H * np.arange(100), np.array(kept), mass=M, stiffness=k)
+    assert (found.scheme, found.stride) == ("held-force", 6)
+
+
+@pytest.mark.parametrize("every", range(1, 9))
+def test_a_second_spring_of_the_same_phase_does_not_hide_the_stated_one(every: int) -> None:
+    found = identify(*positions("implicit-midpoint", every=every), mass=M, stiffness=K)
+    assert (found.scheme, found.stride) == ("implicit-midpoint", every)
+
+
+@pytest.mark.parametrize("every", [1, 3])
+def test_a_scheme_is_named_whose_friction_may_be_of_several_laws(every: int) -> None:
+    """Of implicit midpoint, friction in the force and friction at the end of the step share positions."""
+    x, q, v = K / M * H * H, 1.1, 0.4
+    kept = [q]
+    for i in range(150 * every):
+        old = v
+        v = (v * (1 - x / 4) - H * K / M * q) / (1 + x / 4)
+        q += H * (old + v) / 2
+        v *= 0.97
+        kept += [q] if i % every == every - 1 else []
+    found = identify(H * every * np.arange(151), np.array(kept), mass=M, stiffness=K)
+    assert (found.scheme, found.stride, found.fits) == ("implicit-midpoint", every, True)
+    assert found.statement.startswith("Implicit midpoint with friction,")
+    assert len({x.law for x in found.candidates}) == 4
+
+
 def test_a_spring_of_another_stiffness_does_not_fit() -> None:
     found = identify(*positions("velocity-verlet"), mass=M, stiffness=1.01 * K)
     assert (found.verdict, found.fits) == ("none", False)

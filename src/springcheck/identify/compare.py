@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -105,7 +106,8 @@ def of_positions(
     strides: Iterable[int],
 ) -> list[Match]:
     """Families whose positions obey q[n+1] - T q[n] + D q[n-1] = c, `numbers` being 1 + D - T and 1 - D, each
-    number of steps and of unseen turns: without velocities turns to the left and to the right look alike.
+    number of steps and of unseen turns, and each spring of these: without velocities turns to the left and to
+    the right look alike.
     """
     every = table(families)
     ways = [(s, i) for s in strides for i in range(max(s, FLOW_TURNS if s == 1 else 1) + 1)]
@@ -215,16 +217,19 @@ def _matched(
     good &= (chi2 <= most(freedom)) | far
     if every.damped and not terms.growing:
         good &= (values[1] > 0) | every.held[x.which]
-    kept: dict[tuple[int, int, int], tuple[float, float, int]] = {}
+    kept: dict[tuple[Any, ...], tuple[float, float, int]] = {}
     for i in np.flatnonzero(good).tolist():
-        key = int(x.which[i]), int(s[i]), int(roots.turns[x.root[i]]) if every_turn else 0
+        key: tuple[Any, ...] = int(x.which[i]), int(s[i])
+        if every_turn:
+            # one number of turns, to the left or right and on each branch of a scheme, is several springs
+            key += tuple(f"{float(y):.6g}" for y in values[:2, i])
         # a free scale of velocities lets steps of several lengths fit: the shortest is the plainest
         close = abs(float(values[0, i])) if free[-1] == 2 and freedom <= 2 else float(chi2[i])
         turns = float(roots.turns[x.root[i]])
         rank = (0.0 if far else turns), close, i
         kept[key] = min(kept.get(key, rank), rank)
     out = []
-    for (which, stride, _), (_, _, i) in kept.items():
+    for (which, stride, *_), (_, _, i) in kept.items():
         a, g, log_mass = (float(y) for y in values[:, i])
         if terms.log_stiffness is not None:
             log_mass = terms.log_stiffness - 2 * math.log(stride) - math.log(abs(a))

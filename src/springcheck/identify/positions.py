@@ -57,16 +57,19 @@ def identify_positions(
     if any(not x.precision for x in found):
         return _none(found, notes, *_misfit(worst))
     known = stated is not None and record.mass is not None
+    wanted = [0.0 for _ in moving]
+    if stated is not None and record.mass is not None:
+        wanted = [float(stated[j] / record.mass[j] * record.interval**2) for j in moving]
     plain = tuple(x[0] for x in classes())
     every_stride = known or not _all_preserve(found)
-    joints = _joined(found, plain, strides) if every_stride else _first(found, plain, strides)
-    joints += [x for x in _joined(found, (HELD,), strides) if _may_hold(x)]
+    joints = (_joined if every_stride else _first)(found, plain, strides, wanted)
+    joints += [x for x in _joined(found, (HELD,), strides, wanted) if _may_hold(x)]
     fitting = _stated(record, moving, joints, stated, notes) if known else joints
     kept = fitting
     sure = _all_preserve(found) or _certain(found)
     if friction or (friction is None and not (fitting and sure)):
         families = distinct(damped=True)
-        damped = _joined(found, families, strides) if known else _first(found, families, strides)
+        damped = (_joined if known else _first)(found, families, strides, wanted)
         damped = _stated(record, moving, damped, stated, notes) if known else damped
         kept = damped if friction else kept + damped
     if friction:
@@ -88,8 +91,11 @@ def _certain(found: list[Recurrence]) -> bool:
     return any(abs(float(x.beta)) > CERTAIN * math.sqrt(x.covariance[1, 1]) for x in found)
 
 
-def _joined(found: list[Recurrence], families: tuple[Family, ...], strides: range) -> list[Joint]:
-    """Families and strides that every oscillator may be of, and each number of unseen turns of it."""
+def _joined(
+    found: list[Recurrence], families: tuple[Family, ...], strides: range, wanted: list[float]
+) -> list[Joint]:
+    """Families and strides that every oscillator may be of, and each spring of the first; those of the others
+    are the nearest to the `wanted` (w T)**2, or where that is 0 of the fewest unseen turns."""
     parts: list[dict[tuple[str, int], list[Match]]] = []
     for x in found:
         own: dict[tuple[str, int], list[Match]] = {}
@@ -99,19 +105,23 @@ def _joined(found: list[Recurrence], families: tuple[Family, ...], strides: rang
     out = []
     for key in parts[0]:
         if all(key in own for own in parts):
-            # every way for the first oscillator, and the plainest of the others
-            rest = tuple(min(own[key], key=lambda m: (m.turns, m.chi2)) for own in parts[1:])
+            rest = tuple(
+                min(own[key], key=lambda m: (m.turns * (not a), abs(m.a * m.stride**2 - a)))
+                for own, a in zip(parts[1:], wanted[1:], strict=True)
+            )
             out += [Joint(family=key[0], stride=key[1], parts=(m, *rest)) for m in parts[0][key]]
-    return sorted(out, key=lambda x: x.plainness)
+    return sorted(out, key=lambda x: (x.plainness, abs(x.parts[0].a)))
 
 
-def _first(found: list[Recurrence], families: tuple[Family, ...], strides: range) -> list[Joint]:
+def _first(
+    found: list[Recurrence], families: tuple[Family, ...], strides: range, wanted: list[float]
+) -> list[Joint]:
     """The same of the fewest steps of each family: where more would fit as well, they say nothing."""
-    out = _joined(found, families, strides[:1])
+    out = _joined(found, families, strides[:1], wanted)
     left = tuple(f for f in families if f.name not in {x.family for x in out})
     if left and len(strides) > 1:
         seen: dict[str, Joint] = {}
-        for x in _joined(found, left, strides[1:]):
+        for x in _joined(found, left, strides[1:], wanted):
             seen.setdefault(x.family, x)
         out += seen.values()
     return out
@@ -167,13 +177,15 @@ def _known(
     steps = common([x.stride for x in candidates])
     if not known and stride is None and _all_preserve(found):
         steps = None
-    scheme = names[0] if len(names) == 1 and steps is not None and len(candidates) == 1 else None
+    # several friction laws, or places of it, of one scheme are no other scheme
+    scheme = names[0] if len(names) == 1 and steps is not None else None
     precision = common([x.precision for x in found]) or "cannot tell"
     frames = (
         "" if steps == 1 else f", {steps} steps to a frame" if steps else ", in an unknown number of steps"
     )
     if scheme:
-        law = f" with {candidates[0].law}" if candidates[0].law else " with friction" if damped else ""
+        said = common([x.law for x in candidates])
+        law = f" with {said}" if said else " with friction" if all(x.damped for x in joints) else ""
         whose = title(scheme)
         if scheme == HELD.scheme:
             whose = held_over(joints[0])
