@@ -32,11 +32,16 @@ FOLDER = Path(__file__).parents[1] / "data" / "schemas"
 
 WAYS = {
     "run": (
-        "run spring --method own:euler --method own:rk4 -o run.h5",
+        "run spring --method own:euler --method own:rk4 --method openmm:variable-verlet "
+        "--set time.tolerance=1e-3 -o run.h5",
         "run spring-uneven --method own:euler -o f.h5 --fault stiffness",
         "run --from run.h5",
     ),
-    "inspect": ("inspect run.h5", "inspect run.h5 --verdicts"),
+    "inspect": (
+        "inspect run.h5",
+        "inspect run.h5 --verdicts",
+        "inspect run.h5 --trajectory openmm:variable-verlet",
+    ),
     "identify": (
         "identify run.h5",
         "identify table.csv --stiffness 2.9 --mass 3.7 --step 0.1",
@@ -89,7 +94,8 @@ def inferred(values: list[Any], name: str = "") -> dict[str, Any]:
     if objects and name in BY_NAME:
         found["additionalProperties"] = inferred([y for x in objects for y in x.values()], name)
     elif objects:
-        keys = {key: None for x in objects for key in x}
+        # what made a trajectory are names of libraries
+        keys = {key: None for x in objects for key in x if not key.startswith("origin.")}
         found["properties"] = {key: inferred([x[key] for x in objects if key in x], key) for key in keys}
         found["required"] = [key for key in keys if all(key in x for x in objects)]
     entries = [y for x in values if isinstance(x, list | tuple) for y in x]
@@ -120,7 +126,6 @@ def unlisted(value: Any, schema: dict[str, Any], where: str = "") -> list[str]:
     """Names of a document that its schema does not list: legal, but the schema then says too little."""
     if isinstance(value, dict) and "properties" in schema:
         known = schema["properties"]
-        # what made a trajectory are names of libraries
         new = [key for key in value if key not in known and not key.startswith("origin.")]
         out = [f"{where}.{key} is not in the schema" for key in new]
         return out + [
