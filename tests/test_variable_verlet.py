@@ -131,6 +131,43 @@ def test_a_first_step_where_no_force_acts_is_as_long_as_its_rule_has_it_and_no_f
     assert next(v for v in springcheck.judge(scene, late) if v.check == "tolerance").passed is False
 
 
+def test_velocities_rebuilt_at_very_many_steps_round_further_than_the_tolerance_has_it() -> None:
+    """A heavy particle's velocity hardly changes in a step, and is rounded to the same side by each."""
+    text = """title = "heavy and light"
+    [[particle]]
+    mass = 45.67245110514776
+    position = [-1.1303773996961162, 0.5255374733661]
+    momentum = [13.103447623840557, 9.459179213833016]
+    [[particle]]
+    mass = 0.05382595543948841
+    position = [-0.21981994167518804, 0.8958036768845374]
+    momentum = [-0.3526089696035107, -0.193831047117073]
+    [[spring]]
+    ends = ["wall", 1]
+    stiffness = 0.16475925197928978
+    axis = "x"
+    [[spring]]
+    ends = ["wall", 1]
+    stiffness = 1.8271435129666904
+    axis = "y"
+    [[spring]]
+    ends = [0, 1]
+    stiffness = 0.942448738513908
+    [time]
+    step = 0.0037520571195441086
+    steps = 4
+    tolerance = 1e-12"""
+    scene = scenefile.parse(text, name="heavy", where="here")
+    run = springcheck.simulate(scene, LABEL)
+    found = checks.tolerance(checks.Case(trajectory=run, scene=scene))
+    assert found.passed is True, found.why
+    assert found.value > 2 * scene.tolerance * run.force_calls
+    assert "rounding of velocities rebuilt from positions" in found.why
+    assert found.bound < 1e-4
+    late = replace(run, p=run.p * np.where(np.arange(len(run.t)) == 3, 1 + 1e-4, 1)[:, None])
+    assert checks.tolerance(checks.Case(trajectory=late, scene=scene)).passed is False
+
+
 def test_steps_by_a_rule_meet_the_times_of_frames_and_follow_the_rule_between() -> None:
     scene = replace(scenefile.load_scene("spring-uneven"), tolerance=1e-4)
     scheme = schemes.SCHEMES["variable-verlet"]

@@ -23,8 +23,9 @@ def tolerance(case: Case) -> Finding | str:
     # sizes of the exact solution: those of one that explodes would excuse it
     true = replace(run, q=np.asarray(q, np.float64), p=np.asarray(p, np.float64))
     known = exact.uncertainty(case.scene, float(case.steps[-1]) * run.step)
-    begun = _first_step(case)
-    bound = tolerance_bound(Case(trajectory=true, scene=case.scene)) + known + begun * flow_growth(case)
+    begun, rebuilt = _first_step(case), _rebuilt(case, true.q, true.p)
+    bound = tolerance_bound(Case(trajectory=true, scene=case.scene)) + known
+    bound += (begun + rebuilt) * flow_growth(case)
     if not np.isfinite(bound) or not np.isfinite([q, p]).all():
         return "the exact flow leaves the range of numbers"
     moved = np.max(case.system.norm(q - case.scene.q, p - case.scene.p))
@@ -37,6 +38,7 @@ def tolerance(case: Case) -> Finding | str:
         f"{run.tolerance:g} a step of every component, at most {most_steps(case):.0f} internal steps, "
         f"each error enlarged by the exact flow at most {flow_growth(case):.3g} times"
         + (f", and {begun:.2g} of the first step, as its rule has it" if begun else "")
+        + (f"; {rebuilt:.2g} rounding of velocities rebuilt from positions" if rebuilt else "")
         + _not_believed(case),
         sight.of_exact(case, lambda change: case.system.norm(*change) / bound),
     )
@@ -106,6 +108,33 @@ def _first_step(case: Case) -> float:
         return 0.0
     q, p = exact.true_motion(case.scene, np.array([1]), first.h)
     return float(case.system.norm(first.end[0] - q, first.end[1] - p)[0])
+
+
+def _rebuilt(case: Case, q: Floats, p: Floats) -> float:
+    """What velocities rebuilt from positions at every step may add up to, in initial energy norms.
+
+    A step of h leaves m eps |q|/h, which steps of nearly one length round to the same side.  The shortest is
+    what the rule allows where the motion (f, n) is pushed most, held up to a fifth below that; after one cut
+    short at a frame each is twice as long as the one before, which all together add 2/h.
+    """
+    run, scene, rule = case.trajectory, case.judged, case.scheme.rule
+    if rule is None or not run.rebuilds_velocity:
+        return 0.0
+    # nobody else needs it
+    from springcheck.schemes.variable import allowed, push_of
+
+    with np.errstate(all="ignore"):
+        force = scene.system.force(q, p)
+        most = force[np.argmax(np.sum((force / scene.m) ** 2, axis=1))]
+        shortest = rule(float(push_of(scene, most)), 0.0, allowed(case.scene)) / HELD
+        cut = 0.0 if run.last_step is None else float(np.sum(2 / run.last_step[run.last_step > 0]))
+        reach = 2 * np.max(np.abs(q), axis=0) + case.origins + 2 * case.scene.periods
+        each = run.arithmetic.state * scene.m * reach * (most_steps(case) / shortest + cut)
+        return float(case.system.norm(0 * reach, each))
+
+
+HELD = 1.2
+"""How much longer a step would be that a rule leaves as long as the one before."""
 
 
 def _believed(case: Case) -> float:
