@@ -126,14 +126,14 @@ def _rebuilt(case: Case, q: Floats, p: Floats) -> float:
     with np.errstate(all="ignore"):
         force = scene.system.force(q, p)
         most = force[np.argmax(np.sum((force / scene.m) ** 2, axis=1))]
-        shortest = rule(float(push_of(scene, most)), 0.0, allowed(case.scene)) / HELD
+        shortest = rule(float(push_of(scene, most)), 0.0, allowed(case.scene)) / HELD_BY_A_RULE
         cut = 0.0 if run.last_step is None else float(np.sum(2 / run.last_step[run.last_step > 0]))
         reach = 2 * np.max(np.abs(q), axis=0) + case.origins + 2 * case.scene.periods
         each = run.arithmetic.state * scene.m * reach * (most_steps(case) / shortest + cut)
         return float(case.system.norm(0 * reach, each))
 
 
-HELD = 1.2
+HELD_BY_A_RULE = 1.2
 """How much longer a step would be that a rule leaves as long as the one before."""
 
 
