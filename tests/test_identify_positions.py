@@ -134,6 +134,7 @@ def test_a_scheme_is_named_whose_friction_may_be_of_several_laws(every: int) -> 
     assert (found.scheme, found.stride, found.fits) == ("implicit-midpoint", every, True)
     assert found.statement.startswith("Implicit midpoint with friction,")
     assert len({x.law for x in found.candidates}) == 4
+    assert any("the law is an assumption" in note for note in found.notes)
 
 
 def test_a_spring_of_another_stiffness_does_not_fit() -> None:

@@ -231,6 +231,13 @@ def candidates_of(
     return out
 
 
+def law_assumed(candidates: Sequence[Candidate]) -> list[str]:
+    """The friction by each law that it may be of, if there is any."""
+    laws = [x for x in candidates if x.law]
+    each = "; ".join(f"{', '.join(f'{y:.6g}' for y in x.friction[:3])} by {x.law}" for x in laws[:6])
+    return [f"the motion is damped, and the law is an assumption: the friction c/m is {each}"] if laws else []
+
+
 def all_remarks(
     record: Record,
     moving: list[int],
@@ -244,11 +251,9 @@ def all_remarks(
     scheme = common([x.scheme for x in candidates])
     if scheme in LEAPFROG:
         out.append(f"the same map is {LEAPFROG[scheme]}: states alone do not tell the two apart")
-    damped = [x for x in candidates if x.law]
-    if damped:
-        each = "; ".join(f"{', '.join(f'{y:.6g}' for y in x.friction[:3])} by {x.law}" for x in damped[:6])
-        out.append(f"the motion is damped, and the law is an assumption: the friction c/m is {each}")
-    elif not record.fine:
+    damped = law_assumed(candidates)
+    out += damped
+    if not (damped or record.fine):
         most = max(hidden_friction(record, found) for found in maps)
         with_it = {
             name: frictionless(name)

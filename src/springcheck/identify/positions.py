@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from springcheck.errors import IdentificationError
-from springcheck.identify.candidates import candidates_of, common, held_over, said_of
+from springcheck.identify.candidates import candidates_of, common, held_over, law_assumed, said_of
 from springcheck.identify.families import FAMILIES, HELD, Family, title
 from springcheck.identify.hypothesis import FEW, Joint, Match, distinct
 from springcheck.identify.record import SIZES, Record
@@ -186,6 +186,7 @@ def _known(
     if scheme:
         said = common([x.law for x in candidates])
         law = f" with {said}" if said else " with friction" if all(x.damped for x in joints) else ""
+        notes = [*notes, *(law_assumed(candidates) if all(x.damped for x in joints) else [])]
         whose = title(scheme)
         if scheme == HELD.scheme:
             whose = held_over(joints[0])
