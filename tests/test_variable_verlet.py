@@ -440,3 +440,23 @@ def test_what_a_step_before_may_be_off_is_tried_both_ways(monkeypatch: pytest.Mo
     assert len(others) == 3 * 3
     for right, more, less in zip(*(others[i::3] for i in range(3)), strict=True):
         assert less < right < more
+
+
+@pytest.mark.parametrize(("tolerance", "steps"), [(1e-3, 12), (1e-6, 3)])
+def test_a_replay_says_how_far_a_momentum_may_be_off_and_sees_it_from_there_on(
+    tolerance: float, steps: int
+) -> None:
+    """Its roundings grow with the number of steps, and with the inverse of their length."""
+    scene = replace(scenefile.load_scene("spring-uneven"), steps=steps, tolerance=tolerance)
+    run = springcheck.simulate(scene, LABEL)
+
+    def off(by: float, frame: int) -> Any:
+        p = run.p.copy()
+        p[frame] += by * np.max(np.abs(p))
+        return checks.replay(checks.Case(trajectory=replace(run, p=p), scene=scene))
+
+    why = off(0, 1).why
+    assert "rebuilt from positions at every step" in why
+    least = float(why.split("a momentum off by ")[1].split()[0])
+    assert {off(sign * 1.1 * least, i).passed for i in range(1, steps + 1) for sign in (1, -1)} == {False}
+    assert off(least / 100, steps // 2).passed is True

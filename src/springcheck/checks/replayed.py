@@ -209,6 +209,22 @@ def _told(case: Case, found: _Replayed) -> str:
     )
 
 
+def _hidden(case: Case, found: _Replayed) -> str:
+    """The part of the largest momentum by which that of one frame may be off and pass: twice the bound, which
+    one of which the roundings may make up for."""
+    number, p = _roundings(case), np.abs(case.trajectory.p[: len(found.counts) + 1])
+    room = number * found.bounds[1] + found.late[1]
+    part = float(2 * np.max(room) / np.max(p))
+    if not part < 1:
+        return ""
+    rebuilt = (
+        ", a velocity being rebuilt from positions at every step" if case.trajectory.rebuilds_velocity else ""
+    )
+    return (
+        f"; a momentum off by {part:.1e} of the largest shows at each of these frames, less may not{rebuilt}"
+    )
+
+
 def steps(case: Case) -> Finding | str:
     """How far the frames are from where the steps of the rule lead, in roundings."""
     with np.errstate(all="ignore"):
@@ -233,7 +249,7 @@ def steps(case: Case) -> Finding | str:
         f"roundings of {count(int(found.counts[worst]), 'step')} from the frame before, each carried on, and "
         f"of the time{_told(case, found)}; {int(np.sum(found.counts))} steps by the rule, "
         f"{np.min(lengths):.3g} to {np.max(lengths):.3g} long in the mean between two frames"
-        f"{_until(case, found)}",
+        f"{_hidden(case, found)}{_until(case, found)}",
     )
 
 
