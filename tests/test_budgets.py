@@ -17,7 +17,7 @@ BUDGETS = {
     ("engines/openmm", "engines/ase", "engines/sundials"): 1324,
     ("engines",): 2715,
     ("driver", "conformance", "doors"): 1203,
-    ("checks",): 5070,
+    ("checks",): 5086,
     ("identify",): 8282,
     ("formats", "store"): 5212,
     ("studies",): 1472,
