@@ -5,6 +5,8 @@ Claim: no run is silently wrong.  Each is judged by the closed form of its schem
 Command: python validation/long_cells.py [METHOD ...]       (default: every method that `extremes` takes)
 
 `validation/extreme.py` counts these cells among its own.
+
+Printed: 292 long runs: 264 right, 23 unstable, as theory says, 5 not measured; 2 minutes.
 """
 
 from __future__ import annotations

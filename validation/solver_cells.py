@@ -6,6 +6,8 @@ one that is off needs a reason: a state, a weight, a rate beyond CVODE's numbers
 Command: python validation/solver_cells.py [METHOD ...]       (default: every default method that is adaptive)
 
 `validation/extreme.py` counts these cells among its own.
+
+Printed: 560 cells: 474 right, 86 at an engine's limit; right for forces from 1e-200 to 1e300 by both methods.
 """
 
 from __future__ import annotations
