@@ -832,3 +832,13 @@ def test_springs_that_swing_little_across_their_way_are_no_rod() -> None:
     across = np.stack([0 * t, 0.03 * np.cos(t), 1 + 0 * t, -0.01 * np.cos(t)], axis=1)
     assert rod_of(across).startswith("particles 0 and 1 turn")
     assert rod_of(across, fits=True) == ""
+
+
+@pytest.mark.parametrize("fits", [True, False])
+@pytest.mark.parametrize("size", [1e200, np.inf])
+def test_what_has_grown_beyond_the_squares_that_numbers_hold_is_no_rod(size: float, fits: bool) -> None:
+    t = np.linspace(0, 6, 40)
+    grown = np.stack([0 * t, 0 * t, np.exp(t) * np.cos(t), np.exp(t) * np.sin(t)], axis=1)
+    grown[-1, 2:] = size
+    with np.errstate(all="ignore"):
+        assert rod_of(grown, fits=fits) == ""

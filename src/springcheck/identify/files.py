@@ -204,7 +204,7 @@ def rod_of(q: Floats | None, *, fits: bool = False) -> str:
         for a, b in combinations(range(x.shape[1]), 2):
             way = x[:, b] - x[:, a]
             length, off = _kept(way)
-            if off <= RIGID * length and np.max(np.ptp(way, axis=0)) >= TURNED * length:
+            if off <= RIGID * length < np.inf and np.max(np.ptp(way, axis=0)) >= TURNED * length:
                 room = TURNED * _bent(way) if fits else np.inf
                 digits = SEVERAL * max(off, ROUNDING * np.max(np.abs(x[:, [a, b]])))
                 said = f"particles {a} and {b} turn and keep their distance, {length:.6g} to {off:.1g}: a rod"
@@ -236,9 +236,12 @@ def _bent(way: Floats) -> float:
 def _arm(way: Floats) -> Floats:
     """A way from the centre of the circle that is nearest to it."""
     way = way - np.mean(way, axis=0)
+    # whose squares stay in range
+    size = float(np.max(np.abs(way))) or 1.0
+    way = way / size
     # |way - c| = l is linear in c and l**2 - c**2
     centre = np.linalg.lstsq(np.column_stack([2 * way, np.ones(len(way))]), np.sum(way**2, axis=1))[0]
-    return np.asarray(way - centre[:-1])
+    return np.asarray((way - centre[:-1]) * size)
 
 
 def _turns_back(arm: Floats) -> bool:
