@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from springcheck.identify import Identification, identify
-from springcheck.identify.families import EXPLICIT
+from springcheck.identify.families import EXPLICIT, substeps
 from springcheck.identify.storage import storage
 from springcheck.physics.arrays import Floats
 
@@ -516,3 +516,8 @@ def test_a_velocity_that_is_a_multiple_of_the_position_is_told() -> None:
     x, u = np.array(rows).T
     found = identify(h * np.arange(81), x, v=u, mass=M)
     assert "The velocity follows the position: from frame 1 on it is 0.8 times" in found.statement
+
+
+def test_noise_that_leaves_no_fit_is_no_number_of_substeps() -> None:
+    assert list(substeps(0.75, 1e-9)[0]) == [2]
+    assert list(substeps(np.nan, 1e-9)[0]) == list(substeps(0.75, np.nan)[0]) == []
