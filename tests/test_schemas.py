@@ -67,6 +67,12 @@ def test_a_document_that_does_not_keep_to_its_schema_is_seen(command: str) -> No
     assert schemas.unlisted({**document, "more": 3}, schema(command)) == [".more is not in the schema"]
 
 
+def test_a_library_may_be_missing_where_the_doctor_looks() -> None:
+    document = schemas.printed("doctor")
+    document["libraries"]["pandas"] = None
+    assert schemas.problems(document, schema("doctor")) == []
+
+
 def test_the_schema_of_scene_files_is_what_reads_them() -> None:
     kept = schemas.FOLDER / "scene-1.json"
     assert kept.read_text() == schemas.of_scenes(), "python validation/schemas.py write"
