@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from time import perf_counter
-from typing import Literal, Protocol
+from typing import Any, Literal, Protocol
 
 import numpy as np
 
@@ -227,7 +227,7 @@ class Gather:
         self._frames = 0
         self._t = np.empty(scene.frames)
         self._q, self._p = np.empty((scene.frames, scene.n)), np.empty((scene.frames, scene.n))
-        self._more: dict[str, Floats] = {}
+        self._more: dict[str, Any] = {}
 
     def __call__(
         self, t: Floats, q: Floats, p: Floats, energy: Floats | None, last_step: Floats | None
@@ -243,8 +243,7 @@ class Gather:
 
     def onto(self, run: Trajectory) -> Trajectory:
         """The run with these frames."""
-        whole = replace(run, t=self._t, q=self._q, p=self._p, energy=self._more.get("energy"))
-        return replace(whole, last_step=self._more.get("last_step")).at(slice(self._frames))
+        return replace(run, t=self._t, q=self._q, p=self._p, **self._more).at(slice(self._frames))
 
 
 def run(

@@ -32,7 +32,7 @@ def closed_form(case: Case) -> Finding | str:
     allowed = np.where(late, bound * unit, 1)
     with np.errstate(over="ignore"):
         ratio = np.where(late, distance / allowed, 0)
-    worst = int(np.argmax(np.where(np.isfinite(ratio), ratio, np.inf)))
+    (worst,) = largest(ratio)
     if ratio[worst] <= 1 and np.any(moved > 0) and not np.any(late & (moved > allowed)):
         return f"{STILL} the motion"
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from springcheck import schemes
 from springcheck.checks.case import Case
-from springcheck.checks.check import Finding
+from springcheck.checks.check import Finding, largest
 from springcheck.physics.arrays import ROUNDOFF, Extended
 from springcheck.schemes.variable import Taken, allowed, push_of, taken
 from springcheck.text.wording import count
@@ -238,7 +238,7 @@ def steps(case: Case) -> Finding | str:
             ratios.append(np.max(np.abs(at[1 : len(end) + 1] - end) / unit, axis=1))
             still.append(np.max(np.abs(at[: len(end)] - end) / unit, axis=1))
         seen = np.max([*ratios, found.untrue], axis=0)
-        worst = int(np.argmax(np.where(np.isfinite(seen), seen, np.inf)))
+        (worst,) = largest(seen)
         if seen[worst] <= number and not np.any(np.max(still, axis=0) > number):
             return "rounding may be as large as the way from frame to frame"
     lengths = np.abs(np.diff(run.t[: len(seen) + 1])) / found.counts
@@ -278,7 +278,7 @@ def gain(case: Case) -> Finding | str:
         law = np.cumsum(found.gains)
         off, bound = np.abs(energy[1:] - energy[0] - law), np.cumsum(each)
         ratio = off / bound
-        worst = int(np.argmax(np.where(np.isfinite(ratio), ratio, np.inf)))
+        (worst,) = largest(ratio)
         drowned = ~(np.abs(law) > bound)
         if ratio[worst] <= 1 and np.all(drowned):
             return "rounding may be as large as all that the steps add"

@@ -87,7 +87,6 @@ ENGINE = Engine(
             default=False,
         ),
     ),
-    # compiled
     any_axis=True,
     periodic=True,
     convention=lambda method: "positions and momenta belong to the same time",
