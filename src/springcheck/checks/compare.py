@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Literal
@@ -81,12 +81,46 @@ def allowed(scene: Scene, trajectory: Trajectory) -> float:
     return float(rounding * min(case.roundings * steps * (1 + steps * turn / 2), walk))
 
 
-def _telling(scene: Scene, trajectory: Trajectory) -> float:
-    """`allowed`, or NaN where it is no small part of the motion: then nothing can be said of it."""
-    limit = allowed(scene, trajectory)
+@dataclass(frozen=True, slots=True)
+class _Motion:
+    """A trajectory, and how far it may be from the motion that it stands for."""
+
+    case: Case
+    limit: float
+
+    @property
+    def is_exact(self) -> bool:
+        return self.case.trajectory.label == EXACT
+
+    @property
+    def is_adaptive(self) -> bool:
+        return not self.is_exact and not self.case.scheme.has("one-step")
+
+    def could_be(self, other: _Motion) -> bool:
+        """Whether its steps are those of another's scheme, to rounding."""
+        run, scheme = self.case.trajectory, other.case.trajectory.scheme
+        # the exact solution has no steps of its own; the other way round says it all
+        if other.is_exact or run.scheme == scheme or self.is_adaptive or other.is_adaptive:
+            return True
+        return step_defect(replace(self.case, trajectory=replace(run, scheme=scheme))).passed is True
+
+
+def _motion(scene: Scene, run: Trajectory) -> _Motion:
+    """Its limit is NaN where that is no small part of the motion: then nothing can be said of it."""
+    limit = allowed(scene, run)
     with np.errstate(over="ignore", invalid="ignore"):
-        size = np.max(scene.system.norm(trajectory.q - scene.q, trajectory.p - scene.p))
-    return limit if np.isfinite(limit) and limit <= 1e-3 * max(float(size), 1.0) else np.nan
+        size = np.max(scene.system.norm(run.q - scene.q, run.p - scene.p))
+    small = np.isfinite(limit) and limit <= 1e-3 * max(float(size), 1.0)
+    return _Motion(Case(trajectory=run, scene=scene), limit if small else np.nan)
+
+
+def _exact(scene: Scene, like: Trajectory, ends: Collection[float]) -> _Motion:
+    """The exact solution at the frames of another trajectory, with its largest error up to these times."""
+    q, p = exact.true_motion(scene, Case(trajectory=like, scene=scene).steps, like.step)
+    states = {"q": np.asarray(q, np.float64), "p": np.asarray(p, np.float64)}
+    plain = {"arithmetic": Arithmetic(), "rebuilds_velocity": False, "energy": None}
+    run = replace(like, label=EXACT, scheme=EXACT, **states, **plain)  # type: ignore[arg-type]
+    return _Motion(Case(trajectory=run, scene=scene), max(exact.uncertainty(scene, t) for t in ends))
 
 
 def same_motions(scene: Scene, trajectories: Mapping[str, Trajectory], comparison: Comparison) -> list[Same]:
@@ -97,85 +131,36 @@ def same_motions(scene: Scene, trajectories: Mapping[str, Trajectory], compariso
     the difference is no larger than its tolerance allows.
     """
     runs = {label: run for label, run in trajectories.items() if len(run.t) > 1}
-    limits = {label: _telling(scene, run) for label, run in runs.items()}
+    motions = {label: _motion(scene, run) for label, run in runs.items()}
     if EXACT in comparison.labels and runs:
-        known = max(exact.uncertainty(scene, float(run.t[-1])) for run in runs.values())
-        runs[EXACT], limits[EXACT] = _exact(scene, next(iter(runs.values()))), known
-    loose = {label for label, run in runs.items() if _is_adaptive(scene, run)}
+        ends = {float(run.t[-1]) for run in runs.values()}
+        motions[EXACT] = _exact(scene, next(iter(runs.values())), ends)
+    pairs = {
+        frozenset({a, b}): (float(comparison.max_difference[i, j]), motions[a].limit + motions[b].limit)
+        for (i, a), (j, b) in combinations(enumerate(comparison.labels), 2)
+        if a in motions and b in motions
+    }
+
+    def is_one(a: str, b: str) -> bool:
+        difference, limit = pairs[frozenset({a, b})]
+        one, other = motions[a], motions[b]
+        return difference <= limit and one.could_be(other) and other.could_be(one)
+
     found: list[Same] = []
     for within in ("rounding", "tolerance"):
         groups: list[list[str]] = []
         for label in comparison.labels:
-            if label not in runs or (within == "rounding" and label in loose):
+            if label not in motions or (within == "rounding" and motions[label].is_adaptive):
                 continue
-            joined = [
-                group
-                for group in groups
-                if all(_is_near(scene, runs, limits, comparison, (label, other)) for other in group)
-            ]
-            if joined:
-                joined[0].append(label)
-            else:
+            joined = next((group for group in groups if all(is_one(label, other) for other in group)), None)
+            if joined is None:
                 groups.append([label])
-        chosen = [
-            group for group in groups if len(group) > 1 and (within == "rounding" or loose & set(group))
-        ]
-        found += [_same(group, within, limits, comparison) for group in chosen]
+            else:
+                joined.append(label)
+        for group in groups:
+            adaptive = any(motions[label].is_adaptive for label in group)
+            if len(group) > 1 and (within == "rounding" or adaptive):
+                both = [pairs[frozenset(pair)] for pair in combinations(group, 2)]
+                difference, limit = (max(numbers) for numbers in zip(*both, strict=True))
+                found.append(Same(labels=tuple(group), difference=difference, allowed=limit, within=within))
     return sorted(found, key=lambda same: (same.within, -len(same.labels)))
-
-
-def _is_adaptive(scene: Scene, run: Trajectory) -> bool:
-    return run.label != EXACT and not Case(trajectory=run, scene=scene).scheme.has("one-step")
-
-
-def _exact(scene: Scene, like: Trajectory) -> Trajectory:
-    """The exact solution at the frames of another trajectory."""
-    q, p = exact.true_motion(scene, Case(trajectory=like, scene=scene).steps, like.step)
-    states = {"q": np.asarray(q, np.float64), "p": np.asarray(p, np.float64)}
-    plain = {"arithmetic": Arithmetic(), "rebuilds_velocity": False, "energy": None}
-    return replace(like, label=EXACT, scheme=EXACT, **states, **plain)  # type: ignore[arg-type]
-
-
-def _is_near(
-    scene: Scene,
-    runs: Mapping[str, Trajectory],
-    limits: Mapping[str, float],
-    comparison: Comparison,
-    pair: tuple[str, str],
-) -> bool:
-    """Whether two trajectories are one motion."""
-    if not _difference(comparison, pair) <= limits[pair[0]] + limits[pair[1]]:
-        return False
-    one, other = (runs[label] for label in pair)
-    if one.scheme == other.scheme or any(_is_adaptive(scene, run) for run in (one, other)):
-        return True
-    return _takes_steps_of(scene, one, other) and _takes_steps_of(scene, other, one)
-
-
-def _takes_steps_of(scene: Scene, run: Trajectory, other: Trajectory) -> bool:
-    """Whether a trajectory could be one of another's scheme."""
-    if other.label == EXACT:
-        # the exact solution has no steps of its own; the other way round says it all
-        return True
-    told = step_defect(Case(trajectory=replace(run, scheme=other.scheme), scene=scene))
-    return told.passed is True
-
-
-def _difference(comparison: Comparison, pair: tuple[str, str]) -> float:
-    i, j = (comparison.labels.index(label) for label in pair)
-    return float(comparison.max_difference[i, j])
-
-
-def _same(
-    group: Sequence[str],
-    within: Literal["rounding", "tolerance"],
-    limits: Mapping[str, float],
-    comparison: Comparison,
-) -> Same:
-    pairs = list(combinations(group, 2))
-    return Same(
-        labels=tuple(group),
-        difference=max(_difference(comparison, pair) for pair in pairs),
-        allowed=max(limits[a] + limits[b] for a, b in pairs),
-        within=within,
-    )
