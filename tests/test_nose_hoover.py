@@ -63,7 +63,9 @@ def test_the_energy_of_motion_and_chain_is_conserved_to_second_order(name: str) 
 def test_every_chain_is_judged_to_rounding(label: str, n: int, need: Callable[[str], None]) -> None:
     need(label)
     scene = springs(n, 60)
-    verdicts = checks.judge(scene, driver.run(scene, label, seed=3)) + checks.judge_seeds(scene, label, 3)
+    verdicts = checks.judge(scene, driver.run(scene, label, seed=3)) + checks.judge_seeds(
+        scene, label, 3, driver.run
+    )
     assert not [v for v in verdicts if v.passed is False]
     assert {"noise-direction", "noise-size"} <= {v.check for v in verdicts if v.passed}
     said = {v.check: v.why for v in verdicts if v.passed is None}

@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 import springcheck
 from springcheck import checks, driver, engines
-from springcheck.checks.seeds import SEEDED, by_engine, noise_map
+from springcheck.checks.seeds import Seeded, noise_map
 from springcheck.identify.thermal import of_bath
 from springcheck.physics.arrays import Floats
 from springcheck.physics.bath import Bath
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Quartic, Spring, WallSpring
+from springcheck.physics.trajectory import Trajectory
 from springcheck.studies.run.tally import heated_of
-from springcheck.thermal import THERMOSTATS, Stepper, Thermostat
+from springcheck.thermal import Stepper, Thermostat
 from springcheck.thermal.catalogue import by_groups
 from springcheck.thermal.likelihood import FULL_RANK, SUBSTEPS_TRIED, likely
 
@@ -50,7 +52,7 @@ def test_groups_of_springs_are_kicked_by_their_own_steps(label: str, joined: boo
     here(label)
     scene = two_scales(joined=joined)
     verdicts = springcheck.judge(scene, driver.run(scene, label, seed=5))
-    verdicts += [check(by_engine(scene, label, 5)) for check in SEEDED]
+    verdicts += checks.judge_seeds(scene, label, 5, driver.run)
     assert [f"{v.check}: {v.why}" for v in verdicts if v.passed is False] == []
     passed = {v.check for v in verdicts if v.passed}
     assert {"noise-map", "draws-variance", "draws-mean", "draws-neighbours", "seed-kept"} <= passed
@@ -60,10 +62,13 @@ def test_groups_of_springs_are_kicked_by_their_own_steps(label: str, joined: boo
 @pytest.mark.parametrize("label", ["own:baoab", "openmm:mts-langevin"])
 def test_springs_that_are_not_taken_apart_are_another_map(label: str) -> None:
     here(label)
-    claimed = replace(by_engine(two_scales(), label, 5), scheme=THERMOSTATS["baoab-respa2"])
-    assert noise_map(claimed).passed is False
-    wrong = replace(by_engine(two_scales(), LABELS[0], 5), scheme=THERMOSTATS["baoab"])
-    assert noise_map(wrong).passed is False
+    for made, claimed in ((label, "baoab-respa2"), (LABELS[0], "baoab")):
+
+        def play(scene: Scene, label: str, seed: Any, claimed: str = claimed) -> Trajectory:
+            return replace(driver.run(scene, label, seed=seed), scheme=claimed)
+
+        wrong = Seeded(scene=two_scales(), label=made, seed=5, play=play)
+        assert noise_map(wrong).passed is False
 
 
 @pytest.mark.parametrize("joined", [False, True], ids=["apart", "joined"])

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from springcheck import checks, driver, engines
-from springcheck.checks.seeds import by_engine, noise_size, seed_kept
+from springcheck.checks.seeds import Seeded, noise_size, seed_kept
 from springcheck.errors import MethodError
 from springcheck.identify.thermal import of_bath
 from springcheck.physics.arrays import WIDE
@@ -64,7 +64,9 @@ def test_a_right_thermostat_passes_however_far_its_numbers_are(label: str, given
     if engines.absence(label.partition(":")[0]):
         pytest.skip("not installed")
     where = scene(**given)
-    verdicts = checks.judge(where, driver.run(where, label, seed=5)) + checks.judge_seeds(where, label, 5)
+    verdicts = checks.judge(where, driver.run(where, label, seed=5)) + checks.judge_seeds(
+        where, label, 5, driver.run
+    )
     assert [
         f"{v.check}: {v.value} of {v.bound}, {v.why}" for v in checks.shared(verdicts) if v.passed is False
     ] == []
@@ -76,16 +78,20 @@ def test_an_engine_that_takes_its_forces_again_is_not_judged_by_its_draws_and_sa
     assert any("forces are kept while no position moves" in v.why for v in verdicts)
 
 
+def seeded(where: Scene, label: str, seed: int) -> Seeded:
+    return Seeded(scene=where, label=label, seed=seed, play=driver.run)
+
+
 def test_draws_whose_sum_is_next_to_nothing_are_held_against_their_own_roundings() -> None:
     for seed in range(40):
-        found = noise_size(by_engine(scene(x=0.2459, turn=0.05), "own:gj-vi-half", seed + 1))
+        found = noise_size(seeded(scene(x=0.2459, turn=0.05), "own:gj-vi-half", seed + 1))
         assert found.passed, found
 
 
 def test_seeds_of_a_run_that_diverges_before_its_first_collision_are_not_said_to_be_ignored() -> None:
     quartic = Quartic(i=np.arange(2), b=np.full(2, 900.0), at=np.zeros(2))
     where = scene(x=0.05)
-    found = seed_kept(by_engine(replace(where, terms=(*where.terms, quartic)), "own:andersen", 1))
+    found = seed_kept(seeded(replace(where, terms=(*where.terms, quartic)), "own:andersen", 1))
     assert found.passed is None
     assert "diverges" in found.why
 

@@ -323,7 +323,9 @@ def test_splittings_of_openmmtools_are_those_of_their_letters() -> None:
     scene = pair(steps=100)
     for name in found.thermostats:
         run = driver.run(scene, f"openmmtools:{name}", seed=3)
-        verdicts = springcheck.judge(scene, run) + checks.judge_seeds(scene, f"openmmtools:{name}", 3)
+        verdicts = springcheck.judge(scene, run) + checks.judge_seeds(
+            scene, f"openmmtools:{name}", 3, driver.run
+        )
         assert [f"{name} {v.check}: {v.why}" for v in verdicts if v.passed is False] == []
         assert sum(v.passed is True for v in verdicts) >= 9
 

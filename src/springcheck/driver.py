@@ -20,6 +20,7 @@ from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Outcome, Timing, Trajectory
 from springcheck.thermal import THERMOSTATS
+from springcheck.thermal.catalogue import NO_NORMAL_NUMBERS
 
 CHUNK = 1 << 16
 """Numbers per array and chunk: 512 KiB, which stays in the cache."""
@@ -79,13 +80,13 @@ def play(
     *,
     progress: Progress | None = None,
     planned: int = 0,
-    seed: int | None = None,
+    seed: Any = None,
 ) -> Trajectory:
     """Run a scene and hand every recorded frame, the start first, to `sink`; returns the run without frames.
 
     Memory does not grow with the length of the run.  Ctrl-C is no outcome: KeyboardInterrupt passes
     through.  For `planned` see `bare`.  A random method takes the seed that is given, or one that is drawn;
-    the run keeps it.
+    the run keeps it.  In its place stands a generator where the method takes one.
 
     Raises:
         MethodError: the method cannot serve the scene, or its engine or platform is not here.
@@ -97,7 +98,10 @@ def play(
     ahead = scene if method.adaptive else scene.derived(steps=max(scene.steps, planned))
     origin = {}
     if method.generator:
-        seed = checked_seed(seed)
+        scripted = hasattr(seed, "standard_normal")
+        if scripted and not method.scripted:
+            raise MethodError(NO_NORMAL_NUMBERS)
+        seed = seed if scripted else checked_seed(seed)
         draws = f"{THERMOSTATS[method.scheme].fresh} a step and particle"
         origin = {"seed": str(seed), "generator": method.generator, "threads": "1", "draws": draws}
     elif seed is not None:
@@ -105,6 +109,7 @@ def play(
     began = perf_counter()
     simulation = engines.start(ahead, label, seed)
     start_seconds = perf_counter() - began
+    how, origin = engines.arithmetic(label), {**engines.origin_of(label), **origin}
 
     rows = max(1, min(CHUNK // scene.n, scene.frames))
     piece = scene.every if method.adaptive else min(scene.every, PIECE, WORK // scene.n or 1)
@@ -146,10 +151,10 @@ def play(
         outcome=outcome,
         timing=Timing(start=start_seconds, run=run_seconds),
         force_calls=simulation.force_calls,
-        arithmetic=engines.arithmetic(label),
+        arithmetic=how,
         rebuilds_velocity=method.rebuilds_velocity,
         off_axis=getattr(simulation, "off_axis", None),
-        origin={**engines.origin_of(label), **origin},
+        origin=origin,
     )
 
 
@@ -247,7 +252,7 @@ class Gather:
 
 
 def run(
-    scene: Scene, method: str | Label, *, progress: Progress | None = None, seed: int | None = None
+    scene: Scene, method: str | Label, *, progress: Progress | None = None, seed: Any = None
 ) -> Trajectory:
     """Run a scene by one method and return its trajectory, row 0 the start.
 

@@ -157,11 +157,14 @@ def judge_thoroughly(
     return shared(verdicts)
 
 
-def judge_seeds(scene: Scene, label: str, seed: int) -> list[Verdict]:
-    """Every experiment with the seeds of a random method; one that it cannot serve does not apply."""
-    from springcheck.checks.seeds import SEEDED, by_engine
+def judge_seeds(scene: Scene, label: str, seed: int, run: Callable[..., Trajectory]) -> list[Verdict]:
+    """Every experiment with the seeds of a random method, which `run(scene, label, seed=)` carries out.
 
-    subject = by_engine(scene, label, seed)
+    One that it cannot serve does not apply.
+    """
+    from springcheck.checks.seeds import SEEDED, Seeded
+
+    subject = Seeded(scene=scene, label=label, seed=seed, play=run)
     return shared([one(subject) for one in SEEDED])
 
 

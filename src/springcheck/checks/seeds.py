@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from springcheck import driver, engines
 from springcheck.checks.case import Case, small_move
 from springcheck.checks.check import Chance, Finding, check
 from springcheck.checks.thermal import HIDDEN, NO_DRAWS, reading
@@ -16,8 +16,9 @@ from springcheck.errors import MethodError
 from springcheck.physics.arrays import Extended, Floats
 from springcheck.physics.bath import Bath
 from springcheck.physics.scene import Scene
-from springcheck.physics.trajectory import Trajectory, of_scene
+from springcheck.physics.trajectory import Trajectory
 from springcheck.thermal import THERMOSTATS, Stepper, Thermostat, chance
+from springcheck.thermal.catalogue import NO_NORMAL_NUMBERS
 from springcheck.thermal.draws import LARGEST_DRAW, law_of, one_rounding, read, roundings_of
 from springcheck.thermal.stepper import Met, forces
 
@@ -38,16 +39,19 @@ class Seeded:
     scene: Scene
     label: str
     seed: int
-    scheme: Thermostat
-    """What it claims to run."""
-    scripted: bool
-    """Whether it takes a generator in the place of a seed."""
-    play: Callable[[Scene, Any], Trajectory]
-    """A run of a scene, by a seed or a generator.  May raise MethodError."""
+    play: Callable[..., Trajectory]
+    """(scene, label, seed=) -> trajectory, by a seed or a generator.  May raise MethodError."""
+
+    @cached_property
+    def scheme(self) -> Thermostat:
+        """What it claims to run."""
+        return THERMOSTATS[
+            self.play(replace(self.scene, steps=1, every=1), self.label, seed=self.seed).scheme
+        ]
 
     def run(self, scene: Scene, steps: int, seed: Any = None) -> Trajectory:
         """A run of so many steps, each recorded.  MethodError where it diverges, or takes forces again."""
-        run = self.play(replace(scene, steps=steps, every=1), seed or self.seed)
+        run = self.play(replace(scene, steps=steps, every=1), self.label, seed=seed or self.seed)
         if limit := small_move(run):
             raise MethodError(limit)
         if len(run.t) <= steps:
@@ -80,26 +84,6 @@ class Seeded:
             of_p = of_p + np.sqrt(self.scene.m * np.sum(of_p**2 / self.scene.m))
         many = roundings_of(self.scheme, self.scene)
         return many * of_q, many * of_p
-
-
-def by_engine(scene: Scene, label: str, seed: int) -> Seeded:
-    """A method of an engine."""
-    parsed = engines.parse(label)
-    method = engines.method(parsed)
-
-    def play(scene: Scene, seed: Any) -> Trajectory:
-        if isinstance(seed, int):
-            return driver.run(scene, parsed, seed=seed)
-        q, p = np.empty((2, scene.steps + 1, scene.n))
-        q[0], p[0] = scene.q, scene.p
-        engines.start(scene, parsed, seed).advance(1, q[1:], p[1:])
-        return of_scene(
-            scene, q, p, label=label, scheme=method.scheme, arithmetic=engines.arithmetic(parsed),
-            rebuilds_velocity=method.rebuilds_velocity,
-        )  # fmt: skip
-
-    scheme = THERMOSTATS[method.scheme]
-    return Seeded(scene=scene, label=label, seed=seed, scheme=scheme, scripted=method.scripted, play=play)
 
 
 def _off(found: tuple[Any, Any], expected: tuple[Any, Any], allowed: tuple[Any, Any]) -> float:
@@ -225,14 +209,14 @@ class Script:
 def noise_matrix(subject: Seeded) -> Finding | str:
     """A scripted generator reads the noise itself: what each unit draw does in a step, to rounding."""
     scheme, scene = subject.scheme, subject.scene
-    if not subject.scripted or not scheme.draws or scheme.uniform or scheme.collides:
-        return "it takes no generator of normal numbers"
+    if not scheme.draws or scheme.uniform or scheme.collides:
+        return NO_NORMAL_NUMBERS
+    runs = [subject.run(scene, 1, Script(unit)) for unit in np.eye(scheme.draws)]
     worst, pull = 0.0, forces(scheme, scene.system)
     assert scene.bath is not None
     start = scene.q.astype(np.longdouble), scene.p.astype(np.longdouble)
     none = subject.stepper(scene)(*start, pull, [np.zeros(scene.n, np.longdouble)] * scheme.draws)
-    for unit in np.eye(scheme.draws):
-        run = subject.run(scene, 1, Script(unit))
+    for unit, run in zip(np.eye(scheme.draws), runs, strict=True):
         draws = [np.full(scene.n, np.longdouble(x)) for x in unit]
         ideal = subject.stepper(scene)(*start, pull, draws)
         factor: Any = True

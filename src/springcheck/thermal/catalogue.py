@@ -360,6 +360,9 @@ _CHAINS = (
     ),
 )  # fmt: skip
 
+NO_NORMAL_NUMBERS = "it takes no generator of normal numbers"
+"""Why a method is not asked what each draw does."""
+
 THERMOSTATS: dict[str, Thermostat] = {
     one.name: one
     for one in (*map(_by_letters, _SAID), *map(_gj, GJ), *map(_gj_half, GJ), *_OTHERS, *_RESCALED, *_CHAINS)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -47,8 +48,8 @@ def springs(n: int, *, name: str = "bath", steps: int = 1200) -> Scene:
 def subject(fault: Fault, size: float | None, scene: Scene | None = None, seed: int = 20261122) -> Seeded:
     """A fault as what experiments with seeds look at, on three springs or another scene."""
     return Seeded(
-        scene=scene or springs(3), label=fault.name, seed=seed, scheme=THERMOSTATS[fault.scheme],
-        scripted=True, play=lambda where, seed: fault.run(where, size=size, seed=seed),
+        scene=scene or springs(3), label=fault.name, seed=seed,
+        play=partial(fault.run, size=size),
     )  # fmt: skip
 
 

@@ -171,7 +171,7 @@ def run(
         report = replace(report, faults={one.label: one.about for one in wrong}, others=rest)
         if thorough and scene.bath:
             for label in labels:
-                more = checks.judge_seeds(scene, str(label), seeds["seed"])
+                more = checks.judge_seeds(scene, str(label), seeds["seed"], driver.run)
                 report = replace(report, verdicts=(*report.verdicts, *more))
         elif thorough:
             report = replace(report, verdicts=(*report.verdicts, *_experiments(scene, labels, bar)))
