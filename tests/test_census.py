@@ -16,6 +16,7 @@ import pytest
 import census as by_hand
 import claims
 import engines_table
+from arguments import script
 from springcheck import driver, engines
 from springcheck.cli import main
 from springcheck.engines.own import thermal
@@ -204,8 +205,10 @@ def test_a_table_without_a_row_replaces_none(
 ) -> None:
     Path("t.csv").write_text(f"{engines_table.HEAD}\nmine\n")
     monkeypatch.setattr("sys.argv", ["engines_table.py", "t"])
-    assert engines_table.main() == 2
-    assert "no rows" in capsys.readouterr().out
+    with pytest.raises(SystemExit) as ended:
+        script(engines_table.main)
+    assert ended.value.code == 2
+    assert "no rows" in capsys.readouterr().err
     assert "mine" in Path("t.csv").read_text()
 
 

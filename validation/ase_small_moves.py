@@ -34,6 +34,8 @@ from ase import Atoms
 from ase.calculators.calculator import Calculator, all_changes
 from ase.md.verlet import VelocityVerlet
 
+from arguments import arguments, script
+
 STEP, STEPS, LIMIT = 0.1, 200, 1e-15
 AMPLITUDES = (1.0, 1e-11, 1e-12, 1e-13, 1e-14, 1e-15, 1e-16)
 
@@ -85,6 +87,7 @@ def by_hand(x: float, limit: float) -> tuple[list[float], int]:
 
 def main() -> int:
     """Print the table; the exit status is 1 where ASE does otherwise."""
+    arguments(__doc__)
     status = 0
     print(f"ase {ase.__version__}; m = k = 1, h = {STEP}, {STEPS} steps")
     print("amplitude   kept   by the rule   largest error, of A   beside a neighbour of amplitude 1")
@@ -102,4 +105,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    raise SystemExit(main())
+    script(main)

@@ -27,14 +27,13 @@ Exit status 0 while the claim holds, 1 otherwise.
 
 from __future__ import annotations
 
-import argparse
-import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import gromacs
+from arguments import arguments, script
 from documents import told
 from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
@@ -143,9 +142,7 @@ def judged(name: str, scheme: str) -> dict[str, Any]:
 
 def main() -> int:
     """Read what is stored; returns the exit status."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("--write", action="store_true", help="run the programs anew")
-    options = parser.parse_args()
+    options = arguments(__doc__, write=False)
     right = True
     for name, scheme in CASES.items():
         if options.write:
@@ -160,4 +157,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    script(main)

@@ -49,7 +49,7 @@ from typing import Any
 
 import broken
 import hostile
-from arguments import arguments
+from arguments import arguments, script
 from forked import Result, Warm
 from springcheck.store import seal
 
@@ -408,11 +408,11 @@ def main() -> int:
     """Run cases; the exit status says whether one of them did what must not happen."""
     # a shell starts a command in the background with SIGINT ignored, and every child would inherit that
     signal.signal(signal.SIGINT, signal.default_int_handler)
-    given = arguments(__doc__, file=Path, cases=0, part="")
+    given = arguments(__doc__, file=Path, cases=0, part=("", *PARTS))
     bad = campaign(given.file, given.cases, given.part)
     print(summary(given.file))
     return int(bad > 0)
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    script(main)

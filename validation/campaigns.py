@@ -18,7 +18,6 @@ It needs coverage (`pip install coverage`), and takes three times as long as the
 from __future__ import annotations
 
 import os
-import sys
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
@@ -26,7 +25,7 @@ from typing import Any
 
 import pytest
 
-from arguments import arguments
+from arguments import arguments, script
 
 ROOT = Path(__file__).parent.parent
 LIST = ROOT / "tests" / "campaigns.txt"
@@ -102,8 +101,9 @@ def left_out(seconds: dict[str, float], made: dict[str, Jumps]) -> set[str]:
     return out
 
 
-def main(files: list[str]) -> int:
+def main() -> int:
     """Measure the files, and enter what can be left out; 1 if a case fails."""
+    files = arguments(__doc__, files=list[str]()).files
     import coverage
 
     recorder = coverage.Coverage(data_file=None, branch=True, source_pkgs=["springcheck"])
@@ -135,4 +135,4 @@ def enter(files: list[str], seconds: dict[str, float], made: dict[str, Jumps]) -
 
 
 if __name__ == "__main__":
-    sys.exit(main(arguments(__doc__, files=[]).files))
+    script(main)

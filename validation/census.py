@@ -32,7 +32,7 @@ import numpy as np
 
 import claims
 import engines_table
-from arguments import arguments
+from arguments import arguments, script
 from springcheck import driver, engines, schemes
 from springcheck.cli import main as springcheck
 from springcheck.engines import Label, registry
@@ -333,7 +333,7 @@ def claimed(entry: dict[str, Any]) -> None:
 
 def main() -> int:
     """Print the table; the exit status says whether every engine is what it is declared as."""
-    given = arguments(__doc__, what="compare", methods=[])
+    given = arguments(__doc__, what=("compare", "table", "states"), methods=[])
     if given.what in ("table", "states"):
         return everything(given.methods) if given.what == "table" else states()
     found = measure()
@@ -348,4 +348,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    script(main)

@@ -24,6 +24,7 @@ from time import perf_counter
 import numpy as np
 from matplotlib.figure import Figure
 
+from arguments import script
 from springcheck import engines
 from springcheck.figures import looks
 from springcheck.figures.style import save, style
@@ -131,4 +132,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    raise SystemExit(main())
+    script(main)

@@ -51,7 +51,7 @@ import distributed.cli.dask_scheduler
 import distributed.cli.dask_worker
 import numpy as np
 
-from arguments import arguments
+from arguments import arguments, script
 from springcheck import cli, store
 from springcheck.store.parts import parts_folder
 from springcheck.studies import cluster, keeper, provenance
@@ -357,13 +357,13 @@ def rate(folder: Path, count: int = 2000) -> None:
 
 def main() -> int:
     """Run the campaign; 1 where anything was lost or wrong."""
+    given = arguments(__doc__, kills=100, scheduler_kills=5, seed=17, rate=False)
     vary.CHUNK = CELLS_EACH
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        if "--rate" in sys.argv:
+        if given.rate:
             rate(folder)
             return 0
-        given = arguments(__doc__, kills=100, scheduler_kills=5, seed=17)
         campaign = Campaign(folder, given.seed)
         with_hanging(campaign, folder / "hanging.h5")
         with_another_version(campaign, folder / "version.h5")
@@ -386,4 +386,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    script(main)

@@ -27,15 +27,14 @@ Exit status 0 while the claim holds, 1 otherwise.
 
 from __future__ import annotations
 
-import argparse
 import csv
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from arguments import arguments, script
 from springcheck import checks, driver, engines
 from springcheck.engines import lammps
 from springcheck.engines.openmm import rounding
@@ -155,9 +154,7 @@ def holds(row: dict[str, Any]) -> bool:
 
 def main() -> int:
     """Print the table; returns the exit status."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("--write", action="store_true", help="keep the table in data/reference")
-    options = parser.parse_args()
+    options = arguments(__doc__, write=False)
     table = rows()
     for one in table:
         print("  ".join(f"{one[name]:>12}" for name in COLUMNS), "" if holds(one) else "  not as claimed")
@@ -170,4 +167,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    script(main)

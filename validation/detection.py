@@ -14,7 +14,6 @@ Measured with 400 steps and 100 random scenes: 815 limits, 99 of experiments and
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from functools import partial
@@ -23,7 +22,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 import clean
-from arguments import arguments
+from arguments import arguments, script
 from judge_campaign import FIXED, random_scene
 from springcheck import checks, schemes
 from springcheck.checks import experiments, laws
@@ -210,7 +209,8 @@ def least(scene: Scene, name: str) -> Limits:
     return Limits.least(v.sees for v in checks.judge(scene, run) if v.passed)
 
 
-if __name__ == "__main__":
+def main() -> int:
+    """Print the limits, and what is wrong with them; 1 where one is."""
     asked = arguments(__doc__, steps=400, scenes=100)
     for name in ("stiffness", "step"):
         print(f"| {name}, h w = | {' | '.join(f'{hw:g}' for hw in TURNS)} |")
@@ -249,4 +249,8 @@ if __name__ == "__main__":
     print(f"{tried} limits of {asked.scenes} random scenes likewise: {len(failed)} wrong in all")
     for line in failed:
         print(" ", line)
-    sys.exit(bool(failed))
+    return int(bool(failed))
+
+
+if __name__ == "__main__":
+    script(main)

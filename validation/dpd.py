@@ -19,12 +19,13 @@ Printed with OpenMM 8.6.1, Reference:
     its variance over the law's, 20000 seeds                                 off by 6e-03 of 5e-02
 """
 
-import sys
 from itertools import combinations, permutations
 from typing import Any
 
 import numpy as np
 import openmm as mm
+
+from arguments import arguments, script
 
 H, GAMMA, CUTOFF, K, REST, PAIR = 0.05, 1.3, 2.0, 2.9, 0.8, [(0, 1)]
 KT = 300 * 1.380649e-23 * 6.02214076e23 / 1000
@@ -63,8 +64,9 @@ def law(m: Any, x: Any, v: Any, pairs: Any, given: Any = None) -> tuple[Any, Any
     return x + H / 2 * v, v, e, c
 
 
-def main(draws: int = DRAWS) -> int:
+def main() -> int:
     """One line a claim; 1 where one does not hold."""
+    draws = arguments(__doc__, draws=DRAWS).draws
     rng, rows, m, three, xi = (
         np.random.default_rng(20261123),
         [],
@@ -97,4 +99,4 @@ def main(draws: int = DRAWS) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    script(main)

@@ -16,7 +16,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from arguments import arguments
+from arguments import arguments, script
 from springcheck.errors import SpringcheckError, StoreError, plain
 from springcheck.studies.census.table import COLUMNS, load, rows
 
@@ -127,22 +127,18 @@ def free(path: str | Path, beginning: str) -> None:
 def main() -> int:
     """Write both; 2 where a file is no census, there is no row, or another file would be replaced."""
     given = arguments(__doc__, name="engines", files=list[str]())
-    try:
-        documents = [load(path) for path in given.files]
-        found = rows(*documents)
-        if not found:
-            raise SpringcheckError("no rows: name JSON documents of `springcheck census --json`")
-        texts = {f"{given.name}.csv": as_csv(found), f"{given.name}.html": html(found, documents)}
-        for path, beginning in zip(texts, (HEAD, MARK), strict=True):
-            free(path, beginning)
-        for path, text in texts.items():
-            Path(path).write_text(text, encoding="utf-8")
-            print(path)
-    except SpringcheckError as error:
-        print(error)
-        return 2
+    documents = [load(path) for path in given.files]
+    found = rows(*documents)
+    if not found:
+        raise SpringcheckError("no rows: name JSON documents of `springcheck census --json`")
+    texts = {f"{given.name}.csv": as_csv(found), f"{given.name}.html": html(found, documents)}
+    for path, beginning in zip(texts, (HEAD, MARK), strict=True):
+        free(path, beginning)
+    for path, text in texts.items():
+        Path(path).write_text(text, encoding="utf-8")
+        print(path)
     return 0
 
 
 if __name__ == "__main__":
-    raise SystemExit(main())
+    script(main)

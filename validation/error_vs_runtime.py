@@ -39,10 +39,9 @@ Exit status 0 when the claims hold, 1 otherwise.
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
-from arguments import arguments
+from arguments import arguments, script
 from springcheck import engines
 from springcheck.physics import scenefile as scenes
 from springcheck.schemes import SCHEMES
@@ -88,4 +87,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    script(main)

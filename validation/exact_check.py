@@ -46,6 +46,7 @@ from typing import Any
 import mpmath
 import numpy as np
 
+from arguments import script
 from springcheck.physics import exact
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Cosine, Damping, Morse, Quartic, Spring, Term, WallSpring
@@ -515,4 +516,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    raise SystemExit(main())
+    script(main)

@@ -35,7 +35,7 @@ import numpy as np
 
 import long_cells
 import solver_cells
-from arguments import arguments
+from arguments import arguments, script
 from springcheck import driver, engines, schemes
 from springcheck.errors import SpringcheckError
 from springcheck.physics.scenefile import parse
@@ -163,4 +163,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    raise SystemExit(main())
+    script(main)

@@ -15,10 +15,8 @@ Expected (smallest relative size that any check sees on one spring, h w = 0.09, 
     false alarms                   0
 """
 
-import sys
-
 import clean
-from arguments import arguments
+from arguments import arguments, script
 from springcheck.studies.faults.measure import study
 from springcheck.studies.faults.result import FaultReport
 from springcheck.studies.keeper import Keeper
@@ -58,4 +56,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    script(main)

@@ -20,7 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
-from arguments import arguments
+from arguments import arguments, script
 from springcheck import engines
 from springcheck.engines.contract import Label
 from springcheck.studies import keeper
@@ -97,4 +97,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    raise SystemExit(main())
+    script(main)

@@ -27,12 +27,11 @@ Exit status 0 while the claim holds, 1 otherwise.
 
 from __future__ import annotations
 
-import argparse
 import subprocess
-import sys
 import tempfile
 from pathlib import Path
 
+from arguments import arguments, script
 from documents import told
 from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
@@ -145,9 +144,7 @@ def judged(name: str) -> dict[str, dict[str, float]]:
 
 def main() -> int:
     """Judge what is stored; returns the exit status."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("--write", action="store_true", help="run GROMACS anew")
-    options = parser.parse_args()
+    options = arguments(__doc__, write=False)
     right = True
     for name, rejected in CASES.items():
         if options.write:
@@ -162,4 +159,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    script(main)

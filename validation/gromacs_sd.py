@@ -10,14 +10,13 @@ Run:   python validation/gromacs_sd.py         (what the stored frames say)
 
 import csv
 import subprocess
-import sys
 import tempfile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from arguments import arguments
+from arguments import arguments, script
 from springcheck import identify
 
 HERE = Path(__file__).parents[1] / "data" / "reference" / "thermostats" / "gromacs-sd.csv"
@@ -88,7 +87,7 @@ def frames() -> np.ndarray:
 
 def main() -> int:
     """Write, or name what is stored."""
-    if arguments(__doc__, what="name").what == "write":
+    if arguments(__doc__, what=("name", "write")).what == "write":
         with HERE.open("w", newline="") as file:
             rows = csv.writer(file, lineterminator="\n")
             rows.writerow(("t", "q", "v"))
@@ -103,4 +102,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    script(main)

@@ -36,7 +36,8 @@ from selenium.webdriver import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.ui import WebDriverWait
 
-from arguments import arguments
+from arguments import arguments, script
+from springcheck.errors import SpringcheckError
 
 STORES = {
     "spring": ("run", "spring"),
@@ -166,7 +167,7 @@ def main() -> int:
     address = f"http://127.0.0.1:{port}"
     programs = [shutil.which(name) or "" for name in ("chromium", "chromedriver")]
     if not all(programs):
-        raise SystemExit("this needs chromium and chromedriver")
+        raise SpringcheckError("this needs chromium and chromedriver")
     options = webdriver.ChromeOptions()
     options.binary_location = programs[0]
     with tempfile.TemporaryDirectory() as kept, tempfile.TemporaryDirectory() as home:
@@ -205,8 +206,8 @@ def _await(address: str) -> None:
             return
         except OSError:
             time.sleep(0.2)
-    raise SystemExit(f"no answer from {address}")
+    raise SpringcheckError(f"no answer from {address}")
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    script(main)

@@ -18,15 +18,14 @@ Exit status 0 while the claim holds, 1 otherwise.
 
 from __future__ import annotations
 
-import argparse
 import csv
-import sys
 import tempfile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from arguments import arguments, script
 from documents import told
 
 FOLDER = Path(__file__).parents[1] / "data" / "reference" / "hinges"
@@ -110,10 +109,8 @@ def defect(name: str, scheme: str, own: float = OWN) -> dict[str, Any]:
 
 def main() -> int:
     """Read what is stored; returns the exit status."""
-    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("--write", action="store_true", help="run the programs anew")
     right = True
-    again = parser.parse_args().write
+    again = arguments(__doc__, write=False).write
     for name, program in PROGRAMS.items():
         if again:
             with (FOLDER / f"{name}.csv").open("w", newline="") as file:
@@ -132,4 +129,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    script(main)

@@ -29,7 +29,7 @@ from collections import Counter
 from functools import cache
 from pathlib import Path
 
-from arguments import arguments
+from arguments import arguments, script
 
 HOME = Path(__file__).parents[1] / "src" / "springcheck"
 LIBRARIES = "numpy, h5py, openmm, ase.md.verlet, sksundae.cvode"
@@ -190,4 +190,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    script(main)

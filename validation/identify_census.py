@@ -70,7 +70,7 @@ from typing import Any
 
 import numpy as np
 
-from arguments import arguments
+from arguments import arguments, script
 from springcheck.errors import IdentificationError
 from springcheck.identify import Identification, identify
 from springcheck.identify.families import DAMPED, UNDAMPED, Family
@@ -420,4 +420,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    script(main)

@@ -35,8 +35,8 @@ from typing import Any
 
 import numpy as np
 
-from arguments import arguments
-from springcheck.errors import IdentificationError
+from arguments import arguments, script
+from springcheck.errors import IdentificationError, SpringcheckError
 from springcheck.identify import Identification, identify
 from springcheck.physics.arrays import Floats
 
@@ -186,6 +186,8 @@ def _same(candidate: Any, case: Case) -> bool:
 def chosen(share: float, group: str = "") -> list[Case]:
     """The cases of a group, or of all, of which a share is drawn by their names' digests."""
     cases = [x for x in load() if group in ("", x.group)]
+    if not cases:
+        raise SpringcheckError(f"no group {group!r}; there are {', '.join({x.group: 0 for x in load()})}")
     return [x for x in cases if int(hashlib.sha256(x.name.encode()).hexdigest()[:8], 16) < share * 2**32]
 
 
@@ -211,4 +213,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    script(main)

@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
-from arguments import arguments
+from arguments import arguments, script
 from identify_corpus import FOLDER, _case, judged, said
 from identify_kept import ROWS, STATES, add, digits, even, stored
 from identify_loops import KNOWN, MEMORY, MISSING, RK4, UNKNOWN, W2, K, M, State, march
@@ -482,4 +482,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    script(main)

@@ -25,7 +25,7 @@ from typing import Any
 
 import numpy as np
 
-from arguments import arguments
+from arguments import arguments, script
 from identify_corpus import FOLDER, _case, judged, said
 from identify_kept import ROWS, STATES, add, even
 from springcheck.identify.hypothesis import aliases
@@ -110,4 +110,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    script(main)

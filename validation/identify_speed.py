@@ -28,7 +28,7 @@ from pathlib import Path
 
 import numpy as np
 
-from arguments import arguments
+from arguments import arguments, script
 from identify_census import Draw, written
 from springcheck.errors import IdentificationError
 from springcheck.identify import identify
@@ -130,4 +130,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    script(main)

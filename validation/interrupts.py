@@ -46,9 +46,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from arguments import arguments
+from arguments import arguments, script
 from forked import Warm
 from springcheck import interrupts
+from springcheck.errors import SpringcheckError
 
 WITHIN = 2.0
 """Seconds from the signal to the end."""
@@ -377,7 +378,9 @@ def main() -> int:
     signal.signal(signal.SIGINT, signal.default_int_handler)
     rng = random.Random(given.seed)
     wrong: list[str] = []
-    chosen = [name for name in COMMANDS if not given.only or name in given.only.split(",")]
+    chosen = given.only.split(",") if given.only else list(COMMANDS)
+    for name in set(chosen) - set(COMMANDS):
+        raise SpringcheckError(f"no command {name!r}; there are {', '.join(COMMANDS)}")
     with tempfile.TemporaryDirectory() as home, tempfile.TemporaryDirectory() as farm:
         warm, folder = Warm(), Path(home) / "given"
         folder.mkdir()
@@ -394,4 +397,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    script(main)

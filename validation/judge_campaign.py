@@ -37,7 +37,6 @@ from __future__ import annotations
 
 import json
 import re
-import sys
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
@@ -48,7 +47,7 @@ import numpy as np
 import clean
 import explicit_forms
 import implicit_forms
-from arguments import arguments
+from arguments import arguments, script
 from springcheck import checks, driver, engines, schemes
 from springcheck.checks import steps
 from springcheck.physics.arrays import Floats
@@ -868,8 +867,9 @@ def kept(file: Path) -> dict[int, Counts]:
     return {found.pop("first"): Counts(**found) for found in map(json.loads, lines)}
 
 
-if __name__ == "__main__":
-    asked = arguments(__doc__, first=0, count=500, file="-", part="")
+def main() -> int:
+    """Count the cases in blocks, and print what is wrong; 1 where anything is."""
+    asked = arguments(__doc__, first=0, count=500, file="-", part=("", "thorough"))
     total = Counts()
     keeps = asked.file != "-"
     blocks = kept(Path(asked.file)) if keeps else {}
@@ -889,4 +889,8 @@ if __name__ == "__main__":
         print(total)
     for line in (*total.alarms, *total.missed, *total.numbers):
         print(" ", line)
-    sys.exit(bool(total.alarms or total.missed or total.numbers))
+    return int(bool(total.alarms or total.missed or total.numbers))
+
+
+if __name__ == "__main__":
+    script(main)

@@ -43,7 +43,7 @@ from typing import Any
 
 import numpy as np
 
-from arguments import arguments
+from arguments import arguments, script
 from springcheck.engines.own import simulation, solver, tiles
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
@@ -369,4 +369,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    script(main)

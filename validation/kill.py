@@ -35,7 +35,7 @@ from pathlib import Path
 
 import numpy as np
 
-from arguments import arguments
+from arguments import arguments, script
 from springcheck import cli, store
 from springcheck.errors import StoreError
 from springcheck.physics.scene import Scene
@@ -437,4 +437,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    script(main)

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from arguments import arguments, script
 from springcheck.engines.lammps import _library
 from springcheck.physics.arrays import Floats
 
@@ -74,6 +75,7 @@ def off() -> float:
 
 def main() -> int:
     """Print both; exit status 1 where they are not one."""
+    arguments(__doc__)
     found = by_lammps()
     speed = np.sqrt(np.sum(found[:, 1] ** 2, axis=-1))
     grown = (speed[-1] / speed[1]) ** (1 / (STEPS - 1)) - 1
@@ -84,4 +86,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    raise SystemExit(main())
+    script(main)

@@ -17,7 +17,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from arguments import arguments
+from arguments import arguments, script
 from cvode_steps import step_seconds
 from springcheck import checks, driver, engines
 from springcheck.checks.case import overflows
@@ -131,4 +131,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    raise SystemExit(main())
+    script(main)

@@ -46,6 +46,7 @@ from time import process_time as clock
 import numpy as np
 from scipy import fft
 
+from arguments import script
 from springcheck.api import judge, simulate
 from springcheck.physics import exact
 from springcheck.physics.builders import chain
@@ -116,4 +117,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    script(main)

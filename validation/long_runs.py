@@ -37,7 +37,7 @@ from statistics import median
 import h5py
 import numpy as np
 
-from arguments import arguments
+from arguments import arguments, script
 from springcheck import driver, engines, store
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.arrays import Floats
@@ -264,4 +264,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    script(main)

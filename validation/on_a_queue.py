@@ -29,6 +29,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from arguments import arguments, script
 from springcheck.errors import SpringcheckError, nearest, told
 
 MISSING = "{} needs dask-jobqueue; install it with: python -m pip install 'springcheck[cluster]'"
@@ -169,21 +170,15 @@ def _carried_out(command: Sequence[str]) -> int:
 def main() -> int:
     """Carry a study out by workers of a queue; its exit status."""
     if len(sys.argv) < 4 or not sys.argv[2].isdecimal():
-        print(__doc__)
-        return 2
+        arguments(__doc__)
+        raise SpringcheckError("say place, number of workers and command: see --help")
     place, workers, *words = sys.argv[1:]
     signal.signal(signal.SIGTERM, signal.default_int_handler)
-    try:
-        with started(place, *description(place), int(workers)) as cluster:
-            more = ["--workers", workers, "--cluster", cluster.scheduler_address]
-            command = [sys.executable, "-m", "springcheck", *words, *more]
-            return _carried_out(command)
-    except SpringcheckError as error:
-        print(error, file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        return 130
+    with started(place, *description(place), int(workers)) as cluster:
+        more = ["--workers", workers, "--cluster", cluster.scheduler_address]
+        command = [sys.executable, "-m", "springcheck", *words, *more]
+        return _carried_out(command)
 
 
 if __name__ == "__main__":
-    raise SystemExit(main())
+    script(main)

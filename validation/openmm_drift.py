@@ -13,14 +13,13 @@ Expected:
     own:semi-implicit-euler, both                                        0 within 5 standard errors
 """
 
-import sys
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from arguments import arguments
+from arguments import arguments, script
 from springcheck.checks import laws
 from springcheck.driver import run
 from springcheck.figures import looks, style
@@ -95,4 +94,4 @@ def _draw(axes: object, steps: Floats, change: Floats, i: int, label: str) -> No
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    script(main)

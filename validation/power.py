@@ -22,7 +22,6 @@ from __future__ import annotations
 
 import os
 import random
-import sys
 import tempfile
 import warnings
 from collections.abc import Callable
@@ -32,7 +31,7 @@ from pathlib import Path
 from typing import Any
 from unittest import mock
 
-from arguments import arguments
+from arguments import arguments, script
 from kill import Ledger, lost, write
 from springcheck.errors import StoreError, StoreWarning
 from springcheck.store import adopt
@@ -230,4 +229,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    script(main)

@@ -26,7 +26,7 @@ from ase import Atoms
 from ase.md.verlet import VelocityVerlet
 from sksundae.cvode import CVODE
 
-from arguments import arguments
+from arguments import arguments, script
 from springcheck import engines, load_scene
 from springcheck.engines.ase.simulation import Springs
 from springcheck.engines.sundials.simulation import MOST_STEPS, absolute_tolerance
@@ -185,4 +185,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    script(main)

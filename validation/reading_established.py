@@ -6,7 +6,6 @@ Run:   python validation/reading_established.py [REPEATS]      (default 9; a few
 The minimum of the repeats of each side is quoted; the two take turns.
 """
 
-import sys
 from collections.abc import Callable
 from dataclasses import replace
 from time import perf_counter
@@ -14,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from arguments import arguments
+from arguments import arguments, script
 from springcheck import engines, load_scene
 
 FRAMES = 20_000
@@ -82,4 +81,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    script(main)

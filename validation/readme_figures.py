@@ -7,11 +7,10 @@ Run:   python validation/readme_figures.py [FOLDER]     (a minute; extras `estab
 
 from __future__ import annotations
 
-import sys
 import tempfile
 from pathlib import Path
 
-from arguments import arguments
+from arguments import arguments, script
 from springcheck import load_scene
 from springcheck.studies.census import STUDY as CENSUS
 from springcheck.studies.census.measure import measure
@@ -39,4 +38,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    script(main)

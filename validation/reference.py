@@ -8,12 +8,11 @@ Run:   python validation/reference.py          (compares: 0 of 4 pages differ)
 """
 
 import inspect
-import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import springcheck
-from arguments import arguments
+from arguments import arguments, script
 from springcheck import checks, schemes
 from springcheck.cli import explain
 from springcheck.physics import scenefile
@@ -79,7 +78,7 @@ def page(name: str) -> str:
 
 def main() -> int:
     """Compare, or write."""
-    given = arguments(__doc__, what="compare")
+    given = arguments(__doc__, what=("compare", "write"))
     differ = []
     for name in PAGES:
         if given.what == "write":
@@ -92,4 +91,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    script(main)

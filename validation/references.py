@@ -28,6 +28,8 @@ from typing import Any
 import mpmath as mp
 import numpy as np
 
+from arguments import script
+
 ROOT = Path(__file__).parents[1]
 FOLDER = ROOT / "data" / "reference" / "motion"
 ELSEWHERE = ("detest-b1", "stiff-spring", "two-scales", "multiple-time-steps", "overdamped", "van-der-pol")
@@ -435,4 +437,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    raise SystemExit(main())
+    script(main)

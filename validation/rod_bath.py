@@ -27,11 +27,11 @@ Exit status 0 while departures are within their bounds and means within 5 standa
 
 from __future__ import annotations
 
-import sys
 from typing import Any
 
 import numpy as np
 
+from arguments import arguments, script
 from springcheck.physics.rods import Rods
 from springcheck.physics.terms import Rod
 
@@ -189,5 +189,11 @@ def shown(found: Any) -> bool:
     return wrong
 
 
+def main() -> int:
+    """Print what is measured beside its law; 1 where one is off."""
+    arguments(__doc__)
+    return int(shown(rows()))
+
+
 if __name__ == "__main__":
-    sys.exit(shown(rows()))
+    script(main)

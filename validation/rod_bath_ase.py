@@ -18,11 +18,11 @@ Exit status 0 while departures are within their bounds and means within 5 standa
 
 from __future__ import annotations
 
-import sys
 from typing import Any
 
 import numpy as np
 
+from arguments import arguments, script
 from rod_bath import PULL, ROD, STEP, THERMAL, TOLERANCE, M, departure, mean, shown, started
 
 
@@ -124,5 +124,11 @@ def rows(rods: int = 40000) -> Any:
         yield "what turning adds, over a", value, law, most
 
 
+def main() -> int:
+    """Print what is measured beside its law; 1 where one is off."""
+    arguments(__doc__)
+    return int(shown(rows()))
+
+
 if __name__ == "__main__":
-    sys.exit(shown(rows()))
+    script(main)

@@ -22,11 +22,11 @@ Exit status 0 while departures are within their bounds and means within 5 standa
 
 from __future__ import annotations
 
-import sys
 from typing import Any
 
 import numpy as np
 
+from arguments import arguments, script
 from rod_bath import (
     LENGTH,
     PULL,
@@ -114,5 +114,11 @@ def rows(rods: int = 100, steps: int = 3000) -> Any:
                 yield title, value, 1.0, most
 
 
+def main() -> int:
+    """Print what is measured beside its law; 1 where one is off."""
+    arguments(__doc__)
+    return int(shown(rows()))
+
+
 if __name__ == "__main__":
-    sys.exit(shown(rows()))
+    script(main)

@@ -17,12 +17,11 @@ Of 1,998 runs of 20,480 steps 3 would raise an alarm (drifts up to 5.9e-18 a ste
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 
 import numpy as np
 
-from arguments import arguments
+from arguments import arguments, script
 from springcheck import schemes
 from springcheck.physics.arrays import Floats, Reals
 
@@ -100,4 +99,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    script(main)

@@ -13,7 +13,6 @@ Run:   python validation/schemas.py            (50 s: 0 documents of 21 are off)
 import contextlib
 import io
 import json
-import sys
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -21,7 +20,7 @@ from unittest import mock
 
 import msgspec
 
-from arguments import arguments
+from arguments import arguments, script
 from springcheck.cli import main as springcheck
 from springcheck.cli.output import SCHEMAS
 from springcheck.physics.scenefile import tables
@@ -196,7 +195,7 @@ def of_scenes() -> str:
 
 def main() -> int:
     """Compare, or write; the exit status says whether every document keeps to its schema."""
-    given = arguments(__doc__, what="compare")
+    given = arguments(__doc__, what=("compare", "write"))
     wrong, scenes = 0, FOLDER / "scene-1.json"
     if given.what == "write":
         scenes.write_text(of_scenes())
@@ -220,4 +219,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    script(main)

@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from arguments import arguments
+from arguments import arguments, script
 from cvode_steps import internal_steps
 from springcheck import checks, engines
 from springcheck.engines.contract import Label, Stopped
@@ -149,4 +149,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    raise SystemExit(main())
+    script(main)

@@ -18,12 +18,11 @@ Expected:
     every verdict passed
 """
 
-import sys
 from pathlib import Path
 
 import numpy as np
 
-from arguments import arguments
+from arguments import arguments, script
 from springcheck import load_scene
 from springcheck.checks import compare, judge
 from springcheck.driver import run
@@ -81,4 +80,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    script(main)

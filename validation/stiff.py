@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 import stiffness_costs
-from arguments import arguments
+from arguments import arguments, script
 from springcheck import engines
 from springcheck.checks.stats import line
 from springcheck.engines.contract import Label
@@ -75,4 +75,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    raise SystemExit(main())
+    script(main)

@@ -42,7 +42,6 @@ Exit status 0 where the orders are 1 and 2 to 0.15 and BDF agrees with the refer
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from time import process_time
@@ -50,6 +49,7 @@ from time import process_time
 import numpy as np
 from matplotlib.figure import Figure
 
+from arguments import script
 from springcheck import engines
 from springcheck.engines.own import simulation
 from springcheck.figures import looks
@@ -184,4 +184,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    script(main)

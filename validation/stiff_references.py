@@ -15,7 +15,6 @@ digits, so that the ratio of the scales (1e12, and 1e6 in the damping) costs non
 
 from __future__ import annotations
 
-import argparse
 import json
 import tomllib
 from collections.abc import Callable
@@ -23,6 +22,8 @@ from pathlib import Path
 from typing import Any
 
 import mpmath as mp
+
+from arguments import arguments, script
 
 ROOT = Path(__file__).parents[1]
 FOLDER = ROOT / "data" / "reference" / "stiff"
@@ -222,9 +223,7 @@ def references() -> dict[str, dict[str, Any]]:
 
 def main() -> int:
     """Write or compare; exit status 1 where something differs."""
-    parser = argparse.ArgumentParser(description=str(__doc__).partition("\n")[0])
-    parser.add_argument("--write", action="store_true", help="write the files anew")
-    write = parser.parse_args().write
+    write = arguments(__doc__, write=False).write
     origin = f"validation/stiff_references.py, mpmath with {mp.mp.dps} digits, {DIGITS} of them kept"
     differ = 0
     for name, found in references().items():
@@ -242,4 +241,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    raise SystemExit(main())
+    script(main)

@@ -19,11 +19,11 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from arguments import arguments
+from arguments import arguments, script
 from cvode_steps import internal_steps, step_seconds
 from springcheck import driver, engines, schemes
 from springcheck.engines.contract import Label, Stopped
-from springcheck.errors import MethodError
+from springcheck.errors import MethodError, SpringcheckError
 from springcheck.figures import render
 from springcheck.figures.charts import Bank, Chart, Curve, Scale
 from springcheck.figures.looks import scheme_of
@@ -252,7 +252,7 @@ def main() -> int:
     """Print the costs of a family and draw them; 1 where nothing was measured."""
     given = arguments(__doc__, scene="two-scales", methods=list[str]())
     if given.scene not in get_args(Family):
-        raise SystemExit(f"{given.scene}: {', '.join(get_args(Family))} have costs")
+        raise SpringcheckError(f"{given.scene}: {', '.join(get_args(Family))} have costs")
     found = study(given.scene, given.methods)
     if not found:
         return 1
@@ -263,4 +263,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    raise SystemExit(main())
+    script(main)

@@ -28,6 +28,7 @@ from typing import Any
 import numpy as np
 
 import springcheck
+from arguments import arguments, script
 from clean import clean_bath
 from springcheck import checks, driver, engines
 from springcheck.engines.contract import Label
@@ -164,9 +165,8 @@ def add(part: str, count: int, first: int | None = None) -> dict[str, Any]:
             known["cases"] = case + 1
             if (case + 1) % EVERY == 0:
                 _write(path, known, found)
-    except KeyboardInterrupt:
-        print("interrupted", file=sys.stderr)
-    _write(path, known, found)
+    finally:
+        _write(path, known, found)
     return known
 
 
@@ -201,12 +201,13 @@ def _write(path: Path, known: dict[str, Any], found: Counter[str]) -> None:
 
 def main() -> int:
     """Add cases and print what all of them come to."""
-    part, *numbers = sys.argv[1:]
+    given = arguments(__doc__, part=(*PARTS, "merge"), count=1000, first=int)
+    part = given.part
     if part == "merge":
         return merge()
     warnings.simplefilter("ignore")
-    known = add(part, *map(int, numbers or ["1000"]))
-    done = known["cases"] - int(numbers[1]) if len(numbers) > 1 else known["cases"]
+    known = add(part, given.count, given.first)
+    done = known["cases"] - (given.first or 0)
     print(f"{part}: {done} cases")
     wrong = 0
     for word, number in known["found"].items():
@@ -216,4 +217,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    script(main)

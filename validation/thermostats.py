@@ -1,7 +1,7 @@
 """Thermostats held against their laws: draws of four engines, false alarms over many seeds, files that name
 themselves, and a figure of the two temperatures against the step.
 
-Command: python validation/thermostats.py [figure]        (some minutes; `figure` draws it alone)
+Command: python validation/thermostats.py [SEEDS]    (some minutes; `--figure` draws it alone)
 
 * draws: n springs side by side, every step's draw of each from its positions; mean, variance and fourth
   moment of all, with their standard errors, and the seconds that engine and statistics take;
@@ -31,13 +31,13 @@ Printed by `thermostats.py 40` on two cores that many others used as well, hence
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from time import perf_counter, process_time
 
 import numpy as np
 
 import springcheck
+from arguments import arguments, script
 from springcheck import checks, driver, engines
 from springcheck.engines.contract import Label
 from springcheck.physics.bath import Bath
@@ -169,7 +169,8 @@ def figure() -> None:
 
 def main() -> None:
     """All of it, or the figure alone."""
-    if sys.argv[1:] != ["figure"]:
+    given = arguments(__doc__, seeds=60, figure=False)
+    if not given.figure:
         print("draws")
         for label, n in (
             ("own:baoab", 30000), ("openmm:langevin-middle-bath", 30000), ("openmm:brownian", 30000),
@@ -178,12 +179,12 @@ def main() -> None:
             if not engines.absence(label.partition(":")[0]):
                 draws(label, n, MANY_DRAWS // n)
         print("false alarms")
-        false_alarms(int(sys.argv[1]) if len(sys.argv) > 1 else 60)
+        false_alarms(given.seeds)
         print("files")
-        files(10 * (int(sys.argv[1]) if len(sys.argv) > 1 else 60))
+        files(10 * given.seeds)
     print("figure")
     figure()
 
 
 if __name__ == "__main__":
-    main()
+    script(main)

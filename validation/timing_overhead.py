@@ -24,7 +24,6 @@ Exit status 0 when every ratio is within 5 % of 1, 1 otherwise.
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from dataclasses import replace
 from time import perf_counter
@@ -37,7 +36,7 @@ from ase import Atoms
 from ase.calculators.calculator import Calculator, all_changes
 from ase.md.verlet import VelocityVerlet
 
-from arguments import arguments
+from arguments import arguments, script
 from springcheck import driver, engines
 from springcheck.physics import scenefile as scenes
 
@@ -137,9 +136,9 @@ BARE: dict[str, tuple[Run, int]] = {
 }
 
 
-def main(repeats: int = 300) -> int:
+def main() -> int:
     """Measure in turn, print a line for each method, compare."""
-    arguments(__doc__)
+    repeats = arguments(__doc__, repeats=300).repeats
     scene = scenes.load_scene("spring-uneven")
     best: dict[str, list[float]] = {name: [np.inf, np.inf] for name in BARE}
     for _ in range(repeats):
@@ -158,4 +157,4 @@ def main(repeats: int = 300) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    script(main)

@@ -22,7 +22,6 @@ At mu = 1000 in slow time, from (2, 0) to t = 2, the first makes 1.7061677321704
 
 from __future__ import annotations
 
-import argparse
 import json
 import tomllib
 from dataclasses import replace
@@ -31,6 +30,8 @@ from typing import Any
 
 import mpmath as mp
 import numpy as np
+
+from arguments import arguments, script
 
 ROOT = Path(__file__).parents[1]
 TARGET = ROOT / "data" / "reference" / "stiff" / "van-der-pol.json"
@@ -199,15 +200,16 @@ def compare(found: list[dict[str, Any]]) -> None:
         print(f"mu = {mu:g}: {worst:.2g} of what is stated")
 
 
-if __name__ == "__main__":
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--write", action="store_true")
-    if parser.parse_args().write:
+def main() -> None:
+    """Write the references, or compare springcheck's own with those that are stored."""
+    if arguments(__doc__, write=False).write:
         text = {
             "origin": "validation/van_der_pol.py, mpmath with 60 digits, 25 of them kept",
             "states": rows(),
         }
         TARGET.write_text(json.dumps(text, indent=1) + "\n", encoding="utf-8")
     compare(json.loads(TARGET.read_text(encoding="utf-8"))["states"])
+
+
+if __name__ == "__main__":
+    script(main)

@@ -39,11 +39,11 @@ law 4e-15 of the energy; and this table (OpenMM 8.6.1, Reference), the gain of a
 
 from __future__ import annotations
 
-import argparse
-import sys
 from typing import Any
 
 import numpy as np
+
+from arguments import arguments, script
 
 
 def recorded(m: Any, k: Any, x: Any, v: Any, tolerance: float, steps: int) -> tuple[Any, ...]:
@@ -139,9 +139,7 @@ SPRINGS = {
 
 def main() -> int:
     """Print what the docstring repeats."""
-    argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    ).parse_args()
+    arguments(__doc__)
     wrong = 0
     for name, (m, k, x, v, tolerance) in SPRINGS.items():
         worst, energy = judged(m, k, x, v, tolerance, 5000)
@@ -156,4 +154,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    script(main)

@@ -1,0 +1,95 @@
+"""Scripts under validation/ begin by `arguments`, end by `script`: one line for what their user can mend."""
+
+import re
+import runpy
+import signal
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from arguments import arguments, script
+from springcheck.errors import SpringcheckError
+
+FOLDER = Path(__file__).parents[1] / "validation"
+SCRIPTS = sorted(path for path in FOLDER.glob("*.py") if "__main__" in path.read_text(encoding="utf-8"))
+STARTED_BY_OTHERS = {"forked.py"}
+"""No person gives it a command: it reads jobs from a pipe, and what it forks returns as the program does."""
+
+
+def test_every_script_is_ended_by_the_one_function_and_looks_at_its_command_line() -> None:
+    assert len(SCRIPTS) > 50
+    for path in SCRIPTS:
+        if path.name not in STARTED_BY_OTHERS:
+            text = path.read_text(encoding="utf-8")
+            assert text.endswith('\n\nif __name__ == "__main__":\n    script(main)\n'), path.name
+            assert re.search(r"arguments\(__doc__|parse_args\(", text), path.name
+
+
+@pytest.mark.parametrize(
+    ("name", "word"),
+    [("reference.py", "wrte"), ("stiffness_costs.py", "spring"), ("beyond_one_core.py", "--pices")],
+)
+def test_a_word_that_names_nothing_is_one_line_with_status_2(
+    name: str, word: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("sys.argv", [name, word])
+    with pytest.raises(SystemExit) as ended:
+        runpy.run_path(str(FOLDER / name), run_name="__main__")
+    assert ended.value.code == 2
+    said = capsys.readouterr().err.splitlines()
+    assert said[-1].startswith(f"{name}: ")
+    assert word in said[-1]
+
+
+def _interrupted() -> int:
+    signal.raise_signal(signal.SIGINT)
+    return 0
+
+
+def _mistaken() -> None:
+    raise SpringcheckError("no such method")
+
+
+def _unreadable() -> None:
+    Path("missing.csv").open(encoding="utf-8").close()
+
+
+@pytest.mark.parametrize(
+    ("main", "status", "said"),
+    [
+        (_interrupted, 130, "mine.py: interrupted\n"),
+        (_mistaken, 2, "mine.py: no such method\n"),
+        (_unreadable, 2, "mine.py: [Errno 2] No such file or directory: 'missing.csv'\n"),
+        (lambda: 1, 1, ""),
+    ],
+)
+def test_a_script_ends_with_one_line_and_its_status(
+    main: Callable[[], int | None],
+    status: int,
+    said: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setattr("sys.argv", ["somewhere/mine.py"])
+    with pytest.raises(SystemExit) as ended:
+        script(main)
+    assert ended.value.code == status
+    assert capsys.readouterr().err == said
+
+
+def test_a_defect_of_a_script_keeps_its_traceback() -> None:
+    with pytest.raises(ZeroDivisionError):
+        script(lambda: 1 // 0)
+
+
+def test_words_of_a_script_follow_from_its_defaults(monkeypatch: pytest.MonkeyPatch) -> None:
+    defaults = {"what": ("compare", "write"), "count": 7, "first": int, "fast": False, "files": list[str]()}
+    monkeypatch.setattr("sys.argv", ["mine.py"])
+    assert vars(arguments(None, **defaults)) == {
+        "what": "compare", "count": 7, "first": None, "fast": False, "files": [],
+    }  # fmt: skip
+    monkeypatch.setattr("sys.argv", ["mine.py", "write", "8", "9", "a", "b", "--fast"])
+    assert vars(arguments(None, **defaults)) == {
+        "what": "write", "count": 8, "first": 9, "fast": True, "files": ["a", "b"],
+    }  # fmt: skip
