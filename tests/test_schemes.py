@@ -147,3 +147,25 @@ def test_the_closed_form_of_an_overdamped_motion_goes_on_for_ever() -> None:
     ) / (fast - slow)
     assert y[:, 0].astype(float) == pytest.approx(expected, rel=1e-10, abs=0)
     assert np.all(np.isfinite(v))
+
+
+@pytest.mark.parametrize(
+    ("k", "c", "h"),
+    [(1.3, 3e4, 1.0), (2.9, 2e3, 0.31), (3.0, 500.0, 10.0), (-3.0, 0.7, 2.0), (2.9, 0.7, -0.3)],
+)
+def test_the_exact_flow_is_right_to_its_last_digits_however_strong_the_friction(
+    k: float, c: float, h: float
+) -> None:
+    m = 1.7
+    with mpmath.workdps(60):
+        b = mpmath.mpf(c) / m / 2
+        s = mpmath.sqrt(mpmath.mpc(b * b - mpmath.mpf(k) / m))
+        up, down = mpmath.exp((s - b) * mpmath.mpf(h)), mpmath.exp((-s - b) * mpmath.mpf(h))
+        even, odd = ((up + down) / 2).real, ((up - down) / (2 * s)).real
+        expected = even + b * odd, odd / m, -k * odd, even - b * odd
+        found = schemes.matrix(SCHEMES["exact"], h=h, m=np.array([m]), k=np.array([k]), c=c)[0]
+        off = [
+            float(abs((mpmath.mpf(np.format_float_scientific(x, 30)) - y) / y))
+            for x, y in zip(found.flat, expected, strict=True)
+        ]
+    assert max(off) < 32 * np.finfo(np.longdouble).eps

@@ -16,7 +16,6 @@ from springcheck.schemes.linear import (
     condition,
     invariant,
     matrix,
-    noise,
     propagate,
     rotation,
 )
@@ -27,5 +26,5 @@ from springcheck.schemes.stepping import step
 __all__ = [
     "ATTACHED", "KINDS", "Law", "Scheme", "Trait", "SCHEMES", "bring", "known", "scheme",
     "solver", "title", "number", "step", "magnitude_step", "roundings", "amplification", "condition",
-    "invariant", "matrix", "noise", "propagate", "rotation",
+    "invariant", "matrix", "propagate", "rotation",
 ]  # fmt: skip

@@ -76,11 +76,6 @@ class Scheme:
         """The kind of each stage."""
         return tuple(KINDS[name] for name, _ in self.stages)
 
-    @property
-    def draws(self) -> int:
-        """Standard normal draws a step, for each degree of freedom."""
-        return sum(kind.random for kind in self.kinds)
-
     @cached_property
     def traits(self) -> frozenset[Trait]:
         """What the scheme is, as far as anything depends on it."""
@@ -99,7 +94,7 @@ class Scheme:
             "mixes": any(kind.evaluates in ("slow", "fast") for kind in self.kinds),
             "friction": any(kind.friction for kind in self.kinds),
             "plain": bool(self.kinds) and all(k.drifts or k.evaluates == "all" for k in self.kinds),
-            "random": self.draws > 0 or self.thermostat,
+            "random": self.thermostat,
         }
         return frozenset(name for name, is_so in facts.items() if is_so)
 

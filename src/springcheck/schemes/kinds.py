@@ -3,7 +3,8 @@
 A row says what a stage does for the time x, its part of the step: to a state of any width, and to the sizes
 of what is rounded (Higham, Accuracy and Stability of Numerical Algorithms, 3.3: a running error bound is the
 same calculation with every difference taken as a sum).  All else asks the row: `stepping` and `rounding`
-carry it out, `linear` makes matrices of it by unit states and unit draws, `explain` prints its word.
+carry it out, `linear` makes matrices of it by unit states, `explain` prints its word.  Stages that draw
+random numbers are those of `springcheck.thermal`.
 """
 
 from __future__ import annotations
@@ -24,14 +25,11 @@ or the fast springs, or of magnetic fields alone."""
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Setting:
     """What a stage finds beside the state (..., n): masses and rates of friction (n,), the latter None where
-    nothing is damped, the force evaluated last (..., n), its own standard normal draws (..., n), None without
-    noise, and kT [M L2/T2]."""
+    nothing is damped, and the force evaluated last (..., n)."""
 
     m: Reals
     rate: Reals | None
     force: Reals
-    draws: Reals | None = None
-    kT: Any = 0
     turns: Reals | None = None
     """Angular frequencies (n,) at which magnetic fields turn the velocities; None where there is no field."""
 
@@ -62,8 +60,6 @@ class StageKind:
     """Whether it does nothing without friction."""
     decay: Callable[[Any, Reals], Reals] | None = None
     """What p is multiplied by for a time x at rates (n,), where that is all that it does."""
-    random: bool = False
-    """Whether it takes a standard normal draw for each degree of freedom."""
 
 
 def _kick(q: Reals, p: Reals, x: Any, at: Setting) -> tuple[Reals, Reals]:
@@ -111,23 +107,6 @@ def _implicit_friction_sizes(q: Reals, p: Reals, x: Any, at: Setting) -> tuple[R
     return q, p * (1 + np.abs(y)) / np.abs(1 + y)
 
 
-def _noise(x: Any, at: Setting) -> Reals:
-    """What a draw of 1 adds to p: the root of (1 - exp(-2 x rate)) m kT, by which the momenta of kT stay as
-    they are.  NaN backwards in time, where there is none."""
-    assert at.rate is not None
-    return np.asarray(np.sqrt(-np.expm1(-2 * x * at.rate) * at.m * at.kT))
-
-
-def _thermal(q: Reals, p: Reals, x: Any, at: Setting) -> tuple[Reals, Reals]:
-    q, p = _friction(q, p, x, at)
-    return q, p if at.rate is None or at.draws is None else p + _noise(x, at) * at.draws
-
-
-def _thermal_sizes(q: Reals, p: Reals, x: Any, at: Setting) -> tuple[Reals, Reals]:
-    q, p = _friction_sizes(q, p, x, at)
-    return q, p if at.rate is None or at.draws is None else p + np.abs(_noise(x, at) * at.draws)
-
-
 def _gyrate(q: Reals, p: Reals, x: Any, at: Setting) -> tuple[Reals, Reals]:
     """P - p = x F((P + p)/2), a rotation by 2 atan(x W/2): with T p = x F(p)/2 and T**2 = -(x W/2)**2."""
     if at.turns is None:
@@ -164,9 +143,6 @@ _ALL = (
     # of the force 4, the square 4, its product, the difference, the sum 1 + square, the quotient and the sum
     StageKind(name="gyrate", word="p turned by 2 atan({c}B/2m) about the magnetic field", act=_gyrate,
               sizes=_gyrate_sizes, roundings=13, evaluates="magnetic"),
-    # those of friction; of the noise exponent, 1 - exp, two products, root; product with the draw; the sum
-    StageKind(name="thermal", word="p = p exp(-{c}c/m) + sqrt((1 - exp(-2 {c}c/m)) m kT) N(0, 1)",
-              act=_thermal, sizes=_thermal_sizes, roundings=10, friction=True, random=True),
 )  # fmt: skip
 
 KINDS: dict[str, StageKind] = {kind.name: kind for kind in _ALL}

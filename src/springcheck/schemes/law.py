@@ -1,12 +1,12 @@
 """What follows from a scheme on a scene: one object to ask, whatever kind of scheme it is.
 
-A step at any width, the propagator A and the noise G of the normal modes, z' = A z + G xi, and the traits of
-scheme and scene together: code asks for a trait, never for the name of a scheme or the way it is written.
+A step at any width, the propagator A of the normal modes, z' = A z, and the traits of scheme and scene
+together: code asks for a trait, never for the name of a scheme or the way it is written.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal, TypeAlias
@@ -18,7 +18,7 @@ from springcheck.physics.scene import Scene
 from springcheck.physics.term import Term
 from springcheck.schemes.catalogue import Scheme
 from springcheck.schemes.catalogue import Trait as OfScheme
-from springcheck.schemes.linear import matrix, noise
+from springcheck.schemes.linear import matrix
 from springcheck.schemes.rounding import roundings
 from springcheck.schemes.stepping import Slope, step
 from springcheck.schemes.variation import Variation
@@ -111,8 +111,6 @@ class Law:
         forces: Callable[[Iterable[Term]], Force] | None = None,
         met: list[Reals] | None = None,
         slope: Slope | None = None,
-        draws: Sequence[Reals] | None = None,
-        kT: float = 0.0,
         varied: bool = False,
     ) -> tuple[Reals, Reals]:
         """One step from states (..., n), in the width of q; `forces` makes the forces of terms.
@@ -134,8 +132,6 @@ class Law:
             rate=self.rates(varied=varied),
             met=met,
             near=near,
-            draws=draws,
-            kT=kT,
             hold=Variation(system.rods) if system.rods and varied else system.rods,
         )
 
@@ -144,8 +140,3 @@ class Law:
         """One-step matrices A (n, 2, 2) of the modes, on (y, v).  For scenes that have the trait "modes"."""
         one, modes = np.ones(1, dtype=np.longdouble), self.scene.system.modes
         return matrix(self.scheme, h=self.h, m=one, k=modes.w2, c=modes.rate)
-
-    def noise(self, kT: float) -> Extended:
-        """What the draws of a step do to the modes, G (n, 2, draws) on (y, v)."""
-        one, modes = np.ones(1, dtype=np.longdouble), self.scene.system.modes
-        return noise(self.scheme, h=self.h, m=one, k=modes.w2, c=modes.rate, kT=kT)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from springcheck.physics.arrays import Extended, Floats, Integers, Reals
+from springcheck.physics.exact.linear import flow
 from springcheck.schemes.catalogue import Scheme
 from springcheck.schemes.stepping import step
 
@@ -16,32 +16,14 @@ def matrix(scheme: Scheme, *, h: float, m: Reals, k: Reals, c: Reals | float = 0
     """One-step matrices on (q, p) of springs m, k (n,), each with friction c -> (n, 2, 2), extended.
 
     Found by stepping the two unit vectors, so the scheme is written down once.  A scheme that parts slow
-    from fast takes each spring for a fast one; the exact flow is the exponential.
+    from fast takes each spring for a fast one; that of the exact flow is its closed form.
     """
+    wide: list[Extended] = [np.atleast_1d(np.asarray(x, np.longdouble)) for x in (m, k, c)]
+    m, k, c = np.broadcast_arrays(*wide)
     if scheme.flow:
-        return _exponential(*_springs(m, k, c), h)
-    return _stepped(scheme, h, *_springs(m, k, c), np.eye(2, dtype=np.longdouble))
-
-
-def noise(scheme: Scheme, *, h: float, m: Reals, k: Reals, c: Reals | float = 0.0, kT: float) -> Extended:
-    """What the draws of a step do to (q, p) of springs m, k (n,) with friction c -> (n, 2, draws), extended.
-
-    Found by stepping unit draws from rest: with the matrix A of a step, z' = A z + G xi.
-    """
-    rest = np.zeros((scheme.draws, 2), dtype=np.longdouble)
-    unit = np.eye(scheme.draws, dtype=np.longdouble)[..., None]
-    return _stepped(scheme, h, *_springs(m, k, c), rest, draws=tuple(unit), kT=kT)
-
-
-def _springs(m: Reals, k: Reals, c: Reals | float) -> tuple[Extended, Extended, Extended]:
-    m, k, c = np.broadcast_arrays(*(np.atleast_1d(np.asarray(x, np.longdouble)) for x in (m, k, c)))
-    return m, k, c
-
-
-def _stepped(
-    scheme: Scheme, h: float, m: Extended, k: Extended, c: Extended, states: Extended, **noise: Any
-) -> Extended:
-    """Where one step takes states (s, 2) of each spring: columns of (n, 2, s)."""
+        root = np.stack([np.ones_like(m), m], axis=-1)
+        w2, rate = (np.asarray(x / m, np.longdouble) for x in (k, c))
+        return np.asarray(flow(w2, rate, np.longdouble(h)) * root[:, :, None] / root[:, None, :])
 
     def force(q: Reals, p: Reals) -> Reals:
         return np.asarray(-k * q - c * (p / m))
@@ -51,34 +33,15 @@ def _stepped(
 
     q, p = step(
         scheme,
-        *(np.broadcast_to(x[:, None], (len(states), len(m))) for x in states.T),
+        *(np.broadcast_to(x[:, None], (2, len(m))) for x in np.eye(2, dtype=np.longdouble)),
         h=h,
         m=m,
         force=force,
         stiffness=k,
         rate=c / m if np.any(c) else None,
         parts=(none, force),
-        **noise,
     )
     return np.asarray(np.stack([q.T, p.T], axis=1), np.longdouble)
-
-
-def _exponential(m: Extended, k: Extended, c: Extended, h: float) -> Extended:
-    """The exact flow (n, 2, 2), of any damping: of exp(h L) with L = N - g I, N**2 is a multiple of I."""
-    eye = np.eye(2, dtype=np.longdouble)
-    t = np.longdouble(h)
-    generator = np.zeros((len(m), 2, 2), dtype=np.longdouble)
-    generator[:, 0, 1], generator[:, 1, 0], generator[:, 1, 1] = 1 / m, -k, -c / m
-    g = -(generator[:, 0, 0] + generator[:, 1, 1]) / 2
-    traceless = generator + g[:, None, None] * eye
-    w2 = traceless[:, 0, 0] * traceless[:, 1, 1] - traceless[:, 0, 1] * traceless[:, 1, 0]
-    w = np.sqrt(np.abs(w2))
-    safe = np.where(w == 0, 1, w)
-    even = np.where(w2 >= 0, np.cos(w * t), np.cosh(np.where(w2 < 0, w, 0) * t))
-    odd = np.where(w2 >= 0, np.sin(w * t), np.sinh(np.where(w2 < 0, w, 0) * t)) / safe
-    odd = np.where(w == 0, t, odd)
-    decay = np.exp(-g * t)
-    return np.asarray((decay * even)[:, None, None] * eye + (decay * odd)[:, None, None] * traceless)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -50,8 +50,6 @@ def magnitude_step(
     met: Iterable[Met],
     rate: Reals | None = None,
     turns: Reals | None = None,
-    draws: Sequence[Reals] | None = None,
-    kT: Any = 0,
     hold: Rods | None = None,
     loose: float = 0.0,
 ) -> tuple[Reals, Reals]:
@@ -66,14 +64,13 @@ def magnitude_step(
     q, p, wide = np.abs(q), np.abs(p), np.longdouble(h)
     each = iter(met)
     if scheme.stages:
-        last, drawn = np.zeros_like(p), iter(() if draws is None else draws)
+        last = np.zeros_like(p)
         for kind, (_, c) in zip(scheme.kinds, scheme.stages, strict=True):
             if kind.evaluates:
                 here = next(each)
                 last = here.magnitude(q, np.zeros_like(p) if kind.evaluates == "potential" else p)
                 pull = here.pull
-            mine = next(drawn) if kind.random and draws is not None else None
-            setting = Setting(m=m, rate=rate, force=last, draws=mine, kT=kT, turns=turns)
+            setting = Setting(m=m, rate=rate, force=last, turns=turns)
             part = number(c, np.float64) * wide
             q, p = kind.sizes(q, p, part, setting)
             if hold is not None:

@@ -42,8 +42,6 @@ def step(
     turns: Reals | None = None,
     met: list[Reals] | None = None,
     near: Reals | None = None,
-    draws: Sequence[Reals] | None = None,
-    kT: Any = 0,
     hold: Rods | None = None,
 ) -> tuple[Reals, Reals]:
     """One step from (q, p), each (..., n), in the width of q.
@@ -52,20 +50,18 @@ def step(
     particle is joined to another; or a function of the position, where that bends.  Double precision is
     enough, because it only steers an iteration whose residual has the full width.  `rate` is
     `System.friction_rates`, left out where nothing is damped, or for stages without an exponential of it a
-    function of the position; `parts` are the forces of the slow and the fast
-    springs, for the schemes that part them, and of magnetic fields, which turn velocities at the rates
-    `turns` (n,).  `met` takes the position (..., n) of each evaluation of the
-    force, in their order.  `near` (..., n) is where the step ends, as far as that is known: of several
-    solutions of an implicit stage the one there is found; a force after the last drift is taken there, at the
-    position that an engine has rounded.  `draws` are the standard normal numbers of each random stage in
-    turn, `Scheme.draws` of (..., n), and kT [M L2/T2] is what they are drawn at; without them nothing random
-    happens.  `hold` are the rods of a scene, which hold after every stage of a splitting.
+    function of the position; `parts` are the forces of the slow and the fast springs, for the schemes that
+    part them, and of magnetic fields, which turn velocities at the rates `turns` (n,).  `met` takes the
+    position (..., n) of each evaluation of the force, in their order.  `near` (..., n) is where the step
+    ends, as far as that is known: of several solutions of an implicit stage the one there is found; a force
+    after the last drift is taken there, at the position that an engine has rounded.  `hold` are the rods of a
+    scene, which hold after every stage of a splitting.
     """
     width = q.dtype.type
     h, m = width(h), m.astype(width)
     if scheme.stages:
         rate = None if rate is None or callable(rate) else rate.astype(width)
-        last, each = np.zeros_like(p), iter(() if draws is None else draws)
+        last = np.zeros_like(p)
         drifts = [kind.drifts for kind in scheme.kinds]
         for i, (kind, (_, c)) in enumerate(zip(scheme.kinds, scheme.stages, strict=True)):
             if kind.evaluates:
@@ -74,8 +70,7 @@ def step(
                 if met is not None:
                     met.append(at)
                 last = acting(kind.evaluates, force, parts)(at, p)
-            mine = next(each) if kind.random and draws is not None else None
-            setting = Setting(m=m, rate=rate, force=last, draws=mine, kT=kT, turns=turns)
+            setting = Setting(m=m, rate=rate, force=last, turns=turns)
             before, part = q, number(c, width) * h
             q, p = kind.act(q, p, part, setting)
             if hold is not None:

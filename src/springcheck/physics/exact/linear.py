@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from springcheck.physics.arrays import EPS, Extended
-from springcheck.physics.exact.normal import Modes, normal_modes
+from springcheck.physics.exact.normal import Modes, normal_modes, split
 from springcheck.physics.exact.well import Well
 from springcheck.physics.system import System
 
@@ -20,22 +20,34 @@ ROUNDINGS = 32
 
 def motion(system: System[Any], found: Modes, t: Extended) -> tuple[Extended, Extended]:
     """Exact q and p (f, n) of a linear scene at times t (f, 1) [T]."""
-    start, centre = found.start, found.centre()
-    u0 = start.u
-    y = np.empty((len(t), len(u0)), dtype=np.longdouble)
-    v = np.empty_like(y)
-    w2, rate = found.w2, found.rate
+    start = found.start
+    y, v = _moved(start.u, start.v, t, _Law(found.w2, found.rate, found.pull, start.slow, start.fast))
+    return found.out_of(y + found.centre(), v)
+
+
+def flow(w2: Extended, rate: Extended, t: np.longdouble) -> Extended:
+    """What takes (u, u') of u'' = -w2 u - rate u' over a time t [T]: (n, 2, 2), for w2 and rate (n,)."""
+    w2, rate = (np.repeat(x, 2) for x in (w2, rate))
+    u, v = np.tile(np.eye(2, dtype=np.longdouble), len(w2) // 2)
+    slow, fast, _ = split(u, v, w2, rate)
+    y, z = _moved(u, v, np.full((1, 1), t), _Law(w2, rate, np.zeros_like(w2), slow, fast))
+    return np.stack([y.reshape(-1, 2), z.reshape(-1, 2)], axis=1)
+
+
+def _moved(u: Extended, v: Extended, t: Extended, law: _Law) -> tuple[Extended, Extended]:
+    """u and u' (f, n) at times t (f, 1), from u and v (n,)."""
+    y, z = np.empty((2, len(t), len(u)), dtype=np.longdouble)
+    turns, slows = law.w2 != 0, law.rate != 0
     with np.errstate(over="ignore", invalid="ignore", under="ignore"):
-        for kind, law in (
-            ((w2 != 0) & (rate == 0), _undamped),
-            ((w2 != 0) & (rate != 0), _damped),
-            ((w2 == 0) & (rate == 0), _free),
-            ((w2 == 0) & (rate != 0), _dragged),
+        for kind, one in (
+            (turns & ~slows, _undamped),
+            (turns & slows, _damped),
+            (~turns & ~slows, _free),
+            (~turns & slows, _dragged),
         ):
             if np.any(kind):
-                parts = (w2, rate, found.pull, start.slow, start.fast)
-                y[:, kind], v[:, kind] = law(u0[kind], start.v[kind], t, _Law(*(x[kind] for x in parts)))
-    return found.out_of(y + centre, v)
+                y[:, kind], z[:, kind] = one(u[kind], v[kind], t, _Law(*(x[kind] for x in law)))
+    return y, z
 
 
 class _Law(NamedTuple):

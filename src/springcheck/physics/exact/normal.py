@@ -23,7 +23,7 @@ from springcheck.physics.terms import Damping, Spring
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Start:
     """The start of each mode, (n,) each: u from its centre [M1/2 L], v [M1/2 L/T]; and, where it does not
-    turn, the shares of exp(slow t) and exp(fast t) in its motion (see `_split`).
+    turn, the shares of exp(slow t) and exp(fast t) in its motion (see `split`).
 
     `sizes` are those whose last digits these four are known to; of waves beside those of their transform.
     """
@@ -96,7 +96,7 @@ class Modes:
         return np.asarray(np.where(held, self.pull / np.where(held, self.w2, 1), 0))
 
 
-def _split(u: Any, v: Any, w2: Any, rate: Any) -> tuple[Any, Any, Any]:
+def split(u: Any, v: Any, w2: Any, rate: Any) -> tuple[Any, Any, Any]:
     """u'' = -w2 u - rate u' beyond critical damping, of any width: shares of exp(slow t) and exp(fast t) in
     u, and a bound of their summands.  slow = -w2/(b + s), fast = -(b + s), s**2 = b**2 - w2, b = rate/2.
     """
@@ -170,13 +170,13 @@ def _start(system: System[Any], modes: Modes) -> Start:
     y, v = modes.into(system.q, system.p)
     centre = modes.centre()
     u = y - centre
-    slow, fast, size = _split(u, v, modes.w2, modes.rate)
+    slow, fast, size = split(u, v, modes.w2, modes.rate)
     if modes.vectors is not None:
         whole = (np.sqrt(np.sum(x * x)) + np.zeros_like(x) for x in (y, v))
         size_u, size_v = next(whole) + np.abs(centre), next(whole)
     else:
         size_u, size_v = np.abs(y) + np.abs(centre), np.abs(v)
-    _, _, size = _split(size_u, size_v, modes.w2, modes.rate)
+    _, _, size = split(size_u, size_v, modes.w2, modes.rate)
     sizes = [size_u, size_v, size, size.copy()]
     lost = (modes.w2 < 0) & (np.minimum(np.abs(slow), np.abs(fast)) * 16 < size)
     if system.is_separate and np.any(lost):
@@ -187,7 +187,7 @@ def _start(system: System[Any], modes: Modes) -> Start:
             m, q, p = (exactly(x) for x in (part.m, part.q, part.p))
             root = np.sqrt(m)
             for out, like, x in zip(
-                (slow, fast), sizes[2:], _split(root * (q - pull / k), p / root, k / m, rate), strict=False
+                (slow, fast), sizes[2:], split(root * (q - pull / k), p / root, k / m, rate), strict=False
             ):
                 out[chosen] = extended(x)
                 like[chosen] = np.abs(out[chosen])
@@ -231,7 +231,7 @@ def _precise(system: System[Any]) -> Modes:
         pull = np.where(np.abs(pull) <= np.sum(np.abs(force / root)) * left, 0 * pull, pull)
         y, v = vectors.T @ (root * q), vectors.T @ (p / root)
         u = y - np.where(is_zero, 0 * pull, pull / np.where(is_zero, 1, w2))
-        slow, fast, _ = _split(u, v, w2, np.max(rates))
+        slow, fast, _ = split(u, v, w2, np.max(rates))
         parts = tuple(extended(x) for x in (u, v, slow, fast))
         found = {"w2": extended(w2), "pull": extended(pull), "vectors": extended(vectors)}
     u, v, slow, fast = parts
