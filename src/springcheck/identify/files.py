@@ -40,9 +40,6 @@ SEVERAL = 8
 FEWEST_ON_ARC = 8
 """Frames, of which a circle in space takes up to four numbers."""
 
-OR_ROUND = ", or circular orbits on springs"
-"""How a sentence ends of a rod that nothing tells from springs."""
-
 LENGTHS = {"nm": 1.0, "Angstrom": 0.1, "angstrom": 0.1, "A": 0.1, "Å": 0.1, "pm": 1e-3, "m": 1e9, "um": 1e3}
 TIMES = {"ps": 1.0, "fs": 1e-3, "ns": 1e3, "s": 1e12, "us": 1e6}
 """Lengths in nm and times in ps, by the names that H5MD files use."""
@@ -190,13 +187,23 @@ def _chosen(q: Floats, p: Floats, notes: list[str]) -> tuple[Integers, tuple[str
     return np.asarray(chosen), tuple(notes)
 
 
-def rod_of(q: Floats | None, *, fits: bool = False) -> str:
-    """What particles of positions q (f, N), in space or a plane, keep as a rod does: two that turn their
-    distance, or one that swings its distance from a fixed point; or "".
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RodSeen:
+    """A distance that particles keep as a rod keeps it, in a sentence."""
 
-    Where springs fit as well, the way of two has to bend; and if each goes round by itself it is `OR_ROUND`.
+    statement: str
+    or_springs: bool = False
+    """Whether circular orbits on springs keep it as well."""
+
+
+def rod_of(q: Floats | None, *, fits: bool = False) -> RodSeen | None:
+    """The rod in positions q (f, N), in space or a plane: two particles that turn and keep their distance, or
+    one that swings and keeps its distance from a fixed point; None where there is none.
+
+    Where springs fit as well (`fits`), the distance vector of two has to turn by more than their distance
+    changes; if each keeps to a circle of its own, springs may hold it (`or_springs`).
     """
-    round_by_itself = ""
+    on_circles = None
     for axes in (3, 2):
         if q is None or q.shape[1] % axes:
             continue
@@ -209,17 +216,17 @@ def rod_of(q: Floats | None, *, fits: bool = False) -> str:
                 digits = SEVERAL * max(off, ROUNDING * np.max(np.abs(x[:, [a, b]])))
                 said = f"particles {a} and {b} turn and keep their distance, {length:.6g} to {off:.1g}: a rod"
                 if off <= room and fits and max(_kept(_arm(x[:, i]))[1] for i in (a, b)) <= digits:
-                    round_by_itself = said + OR_ROUND
+                    on_circles = RodSeen(statement=f"{said}, or circular orbits on springs", or_springs=True)
                 elif off <= room:
-                    return said
+                    return RodSeen(statement=said)
         for i in range(x.shape[1] if len(x) > FEWEST_ON_ARC and np.isfinite(x).all() else 0):
             arm, bent = _arm(x[:, i]), _bent(x[:, i])
             length, off = _kept(arm)
             # a straight way keeps to any circle, and an orbit may keep to one without a rod: it goes round
             if off <= RIGID * bent and bent >= TURNED**2 * length and _turns_back(arm):
                 kept = f"keeps its distance from a fixed point, {length:.6g} to {off:.1g}: a rod"
-                return f"particle {i} swings and {kept}"
-    return round_by_itself
+                return RodSeen(statement=f"particle {i} swings and {kept}")
+    return on_circles
 
 
 def _kept(way: Floats) -> tuple[float, float]:
@@ -299,13 +306,13 @@ def identify_file(
             fits = told.verdict != "none"
             # springs that are stated are there
             with np.errstate(all="ignore"):
-                seen = "" if fits and "stiffness" in given else rod_of(states.whole, fits=fits)
-            if seen.endswith(OR_ROUND):
-                found[states.label] = replace(told, notes=(*told.notes, seen))
-            elif seen:
+                rod = None if fits and "stiffness" in given else rod_of(states.whole, fits=fits)
+            if rod and rod.or_springs:
+                found[states.label] = replace(told, notes=(*told.notes, rod.statement))
+            elif rod:
                 raise IdentificationError(
-                    f"{seen}; schemes are told by springs: judge it, with a --scene that has the [[rod]]"
-                    f"{', or state the --stiffness of springs' if fits else ''}"
+                    f"{rod.statement}; schemes are told by springs: judge it, with a --scene that has the "
+                    f"[[rod]]{', or state the --stiffness of springs' if fits else ''}"
                 )
         except SpringcheckError as error:
             raise type(error)(f"{titled(path, states.label)}: {error}") from error
