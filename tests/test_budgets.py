@@ -18,7 +18,7 @@ BUDGETS = {
     ("engines",): 2715,
     ("driver", "conformance", "doors"): 1207,
     ("checks",): 5086,
-    ("identify",): 8261,
+    ("identify",): 8268,
     ("formats", "store"): 5212,
     ("studies",): 1472,
     ("studies/*",): 10394,
