@@ -75,7 +75,7 @@ def main() -> int:
     wrong = []
     for name in SCENES:
         scene = scenes.load_scene(name)
-        labels, _ = choose(scene, ())
+        labels, _, _ = choose(scene, ())
         study = precision.study(scene, labels, budget=budget)
         print(as_text(text.lines(study)))
         for path in STUDY.draw(study, folder / name):

@@ -42,7 +42,7 @@ from springcheck import engines, driver
 from springcheck.physics.scenefile import load_scene
 from springcheck.studies.choose import choose
 scene = load_scene("spring")
-labels, _ = choose(scene, ())
+labels, _, _ = choose(scene, ())
 for label in labels:
     engines.load(label.engine)
 began = time.process_time()

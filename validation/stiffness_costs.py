@@ -130,7 +130,7 @@ def step_for(found: Scene, label: Label) -> float:
 
 def serves(label: Label, family: Family) -> bool:
     """Whether a method has a row in a family; a platform in another precision answers another question."""
-    known = engines.refusal(scene(family, RATIOS[family][0]), label) or engines.absence(label.engine)
+    known = engines.obstacle(scene(family, RATIOS[family][0]), label)
     return known is None and not label.platform
 
 

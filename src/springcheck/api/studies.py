@@ -40,7 +40,7 @@ def precision(
             raise SpringcheckError(f"budget={budget}: a number of seconds above 0 is needed")
         from springcheck.studies.choose import choose
 
-        labels, left = choose(found, named)
+        labels, left, _ = choose(found, named)
         done = measure.record(found, labels, path, budget=budget, **how(methods, force, workers))
     return replace(done, left_out=tuple(left))
 

@@ -52,8 +52,8 @@ from springcheck.thermal import THERMOSTATS
 __all__ = [
     "ANY_POTENTIAL", "BRAKES", "DRIVEN", "EVERY_FORCE", "EVERY_POTENTIAL", "OURS", "Arithmetic", "Engine",
     "Label", "Method", "Need", "Simulation", "Stopped", "absence", "bring", "engine", "foreign", "from_file",
-    "guarded", "installed_version", "is_brought", "load", "match", "method", "module_name",
-    "module_of", "named", "names", "origin", "parse", "refusal", "start", "unusable", "while_here",
+    "guarded", "installed_version", "is_brought", "load", "match", "method", "module_name", "module_of",
+    "named", "names", "obstacle", "origin", "parse", "refusal", "start", "unusable", "while_here",
 ]  # fmt: skip
 
 T = TypeVar("T")
@@ -233,6 +233,11 @@ def match(patterns: tuple[str, ...], *, bath: bool | None = False) -> tuple[Labe
 
 
 PLURAL = {"particles": "particles", "circuit": "circuits", "rotor": "rotors"}
+
+
+def obstacle(scene: Scene, label: Label) -> str | None:
+    """Why a method cannot run a scene here: it cannot serve it, or its library is not installed."""
+    return refusal(scene, label) or absence(label.engine)
 
 
 def refusal(scene: Scene, label: Label) -> str | None:

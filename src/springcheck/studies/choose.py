@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 from springcheck import engines
 from springcheck.engines.contract import Label
@@ -32,15 +33,10 @@ ALL = "*:?*"
 """What names every method, and not the default ones alone."""
 
 
-def others(scene: Scene, chosen: Sequence[Label]) -> tuple[str, ...]:
-    """Methods beside those chosen that are here and could serve a scene."""
-    every = engines.match((ALL,), bath=scene.bath is not None)
-    able = (x for x in every if not engines.refusal(scene, x) and not engines.absence(x.engine))
-    return tuple(str(label) for label in able if label not in chosen)
-
-
-def choose(scene: Scene, patterns: Sequence[str]) -> tuple[list[Label], list[LeftOut]]:
+def choose(scene: Scene, patterns: Sequence[str]) -> tuple[list[Label], list[LeftOut], tuple[str, ...]]:
     """Methods that can serve a scene, of those that the patterns (or the scene) name, and those left out.
+
+    With them, where the scene names them, the labels of others that are here and could serve it.
 
     Raises MethodError when a method that is named in full cannot run: it was asked for.
     """
@@ -52,12 +48,12 @@ def choose(scene: Scene, patterns: Sequence[str]) -> tuple[list[Label], list[Lef
         if patterns:
             raise
         raise MethodError(f"methods.include of scene {scene.name}: {error}") from error
-    chosen, left = sorted_out(
-        matched, lambda label: engines.refusal(scene, label) or engines.absence(label.engine)
-    )
+    chosen, left = sorted_out(matched, partial(engines.obstacle, scene))
     for one in left:
         if one.method in patterns:
             raise MethodError(f"{one.method} cannot run scene {scene.name}: {one.reason}")
     if not chosen:
         raise MethodError(f"no method can serve scene {scene.name}: {left[0].reason}")
-    return chosen, left
+    rest = () if patterns else engines.match((ALL,), bath=scene.bath is not None)
+    others = (x for x in rest if x not in matched and not engines.obstacle(scene, x))
+    return chosen, left, tuple(map(str, others))

@@ -51,7 +51,7 @@ def record(
 
     Raises SpringcheckError, before anything is run, where a field cannot be varied or no method can serve.
     """
-    labels, left = choose(scene, methods)
+    labels, left, _ = choose(scene, methods)
     fields = tuple(axis.field for axis in cells.axes)
     Varied(scene, cells).substitutions(cells.values(0))
     command = keeper.command("ensemble", labels, scene.digest, repr(cells))

@@ -199,7 +199,7 @@ def perform(options: Namespace, progress: Progress | None) -> PrecisionStudy:
     if not (isfinite(budget) and budget > 0):
         raise SpringcheckError(f"--budget {budget}: a number of seconds above 0 is needed")
     scene = scenefile.load_scene(options.scene)
-    labels, left = choose(scene, options.method)
+    labels, left, _ = choose(scene, options.method)
     path = options.output or f"{scene.name}-precision.h5"
     found = record(scene, labels, path, budget=budget, **keeper.how(options, progress))
     return replace(found, left_out=tuple(left))

@@ -84,7 +84,7 @@ def begin(scene: Scene, label: Label, known: Truth) -> Sweep:
         arithmetic=Arithmetic(),
         condition=None,
     )
-    reason = engines.refusal(scene, label) or engines.absence(label.engine)
+    reason = engines.obstacle(scene, label)
     if reason is None:
         try:
             sweep.arithmetic = engines.arithmetic(label)

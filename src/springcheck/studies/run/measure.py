@@ -22,7 +22,7 @@ from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import NOT_KNOWN, Comparison, Trajectory, Verdict
 from springcheck.studies import keeper
 from springcheck.studies.arguments import Progress
-from springcheck.studies.choose import LeftOut, choose, others
+from springcheck.studies.choose import LeftOut, choose
 from springcheck.studies.run.result import FAULT, Repeat, Repeats, Report, Stored
 from springcheck.studies.run.tally import Tally, line
 
@@ -119,7 +119,7 @@ def run(
     """
     path = Path(path)
     seeds = {"seed": driver.checked_seed(seed)} if scene.bath else {}
-    labels, left = choose(scene, methods)
+    labels, left, others = choose(scene, methods)
     wrong: list[Broken] = []
     if faults:
         from springcheck.studies.run.faulty import broken
@@ -166,9 +166,7 @@ def run(
         names = (*(str(label) for label in labels), *(one.label for one in wrong))
         sources = journal.sources()
         report = judge(scene, path, {name: sources[name] for name in names}, left, resumed=resumed)
-        known = {one.method for one in left}
-        rest = () if methods else tuple(x for x in others(scene, labels) if x not in known)
-        report = replace(report, faults={one.label: one.about for one in wrong}, others=rest)
+        report = replace(report, faults={one.label: one.about for one in wrong}, others=others)
         if thorough and scene.bath:
             for label in labels:
                 more = checks.judge_seeds(scene, str(label), seeds["seed"], driver.run)

@@ -174,7 +174,7 @@ def measure(labels: Sequence[Label], *, kept: Keeper | None = None, left: Sequen
 
 def record(path: str | Path | None, methods: Sequence[str] = (), **how: Unpack[How]) -> Sampling:
     """Like `measure`, of these labels or globs, kept in a store; the default thermostats where left out."""
-    labels, left = choose(replace(springs(1, 1), include=("*",)), methods)
+    labels, left, _ = choose(replace(springs(1, 1), include=("*",)), methods)
     with keeper.kept(path, keeper.command("sampling", labels), **how) as kept:
         found = measure(labels, kept=kept, left=left)
         kept.commit("sampling", found.document())
