@@ -16,11 +16,10 @@ import pytest
 import census as by_hand
 import claims
 import engines_table
-from arguments import script
 from springcheck import driver, engines
 from springcheck.cli import main
 from springcheck.engines.own import thermal
-from springcheck.errors import StoreError
+from springcheck.errors import SpringcheckError, StoreError
 from springcheck.identify import identify
 from springcheck.physics.scenefile import load_scene
 from springcheck.physics.trajectory import Trajectory
@@ -200,15 +199,11 @@ def test_bad_input_to_the_tables_options_is_said_before_anything_runs(
     assert Path("notes.txt").read_text() == "mine"
 
 
-def test_a_table_without_a_row_replaces_none(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_table_without_a_row_replaces_none(monkeypatch: pytest.MonkeyPatch) -> None:
     Path("t.csv").write_text(f"{engines_table.HEAD}\nmine\n")
     monkeypatch.setattr("sys.argv", ["engines_table.py", "t"])
-    with pytest.raises(SystemExit) as ended:
-        script(engines_table.main)
-    assert ended.value.code == 2
-    assert "no rows" in capsys.readouterr().err
+    with pytest.raises(SpringcheckError, match="no rows"):
+        engines_table.main()
     assert "mine" in Path("t.csv").read_text()
 
 

@@ -1,5 +1,6 @@
 """Scripts under validation/ begin by `arguments`, end by `script`: one line for what their user can mend."""
 
+import importlib
 import re
 import runpy
 import signal
@@ -9,12 +10,18 @@ from pathlib import Path
 import pytest
 
 from arguments import arguments, script
+from springcheck import interrupts
 from springcheck.errors import SpringcheckError
 
 FOLDER = Path(__file__).parents[1] / "validation"
 SCRIPTS = sorted(path for path in FOLDER.glob("*.py") if "__main__" in path.read_text(encoding="utf-8"))
 STARTED_BY_OTHERS = {"forked.py"}
 """No person gives it a command: it reads jobs from a pipe, and what it forks returns as the program does."""
+
+
+@pytest.fixture(autouse=True)
+def _signals_stay_with_pytest(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(interrupts, "install", lambda: None)
 
 
 def test_every_script_is_ended_by_the_one_function_and_looks_at_its_command_line() -> None:
@@ -55,12 +62,25 @@ def _unreadable() -> None:
     Path("missing.csv").open(encoding="utf-8").close()
 
 
+def _left_behind() -> None:
+    try:
+        raise KeyboardInterrupt
+    finally:
+        Path("missing").rmdir()
+
+
+def _without_a_library() -> None:
+    importlib.import_module("no_such_library")
+
+
 @pytest.mark.parametrize(
     ("main", "status", "said"),
     [
-        (_interrupted, 130, "mine.py: interrupted\n"),
+        (_interrupted, 130, "springcheck: interrupted\n"),
         (_mistaken, 2, "mine.py: no such method\n"),
         (_unreadable, 2, "mine.py: [Errno 2] No such file or directory: 'missing.csv'\n"),
+        (_without_a_library, 2, "mine.py: No module named 'no_such_library'\n"),
+        (_left_behind, 130, "springcheck: interrupted\n"),
         (lambda: 1, 1, ""),
     ],
 )
@@ -76,6 +96,17 @@ def test_a_script_ends_with_one_line_and_its_status(
         script(main)
     assert ended.value.code == status
     assert capsys.readouterr().err == said
+
+
+def test_an_error_that_an_interrupt_became_is_an_interrupt(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Files that cannot be removed, a document that was not printed to its end."""
+    monkeypatch.setattr(interrupts, "seen", lambda: True)
+    with pytest.raises(SystemExit) as ended:
+        script(lambda: 1 // 0)
+    assert ended.value.code == 130
+    assert capsys.readouterr().err == "springcheck: interrupted\n"
 
 
 def test_a_defect_of_a_script_keeps_its_traceback() -> None:

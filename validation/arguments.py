@@ -8,8 +8,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NoReturn
 
+from springcheck import interrupts
 from springcheck.errors import SpringcheckError
-from springcheck.interrupts import STATUS
 
 
 def arguments(description: str | None, **defaults: Any) -> argparse.Namespace:
@@ -36,18 +36,31 @@ def arguments(description: str | None, **defaults: Any) -> argparse.Namespace:
     return parser.parse_args()
 
 
+def _by_interrupt(error: BaseException) -> bool:
+    """Whether an exception was raised while an interrupt was on its way out."""
+    before = error.__context__
+    return before is not None and (isinstance(before, KeyboardInterrupt) or _by_interrupt(before))
+
+
 def script(main: Callable[[], int | None]) -> NoReturn:
     """End the process with main's exit status, 0 for None.
 
-    Ctrl-C (status 130) and a word that names nothing or a file that cannot be opened (status 2) are answered
-    by one line on standard error.  Any other exception is a defect of the script and keeps its traceback.
+    Ctrl-C (status 130) and a word that names nothing, a file that cannot be opened or a library that is not
+    installed (status 2) are answered by one line on standard error.  Any other exception is a defect of the
+    script and keeps its traceback.
     """
-    why: object
+    interrupts.install()
+    interrupts.announce("interrupted")
     try:
-        sys.exit(main())
-    except KeyboardInterrupt:
-        why, status = "interrupted", STATUS
-    except (SpringcheckError, OSError) as error:
-        why, status = error, 2
-    print(f"{Path(sys.argv[0]).name}: {why}", file=sys.stderr)
+        status = main()
+    except BaseException as error:
+        # a library, or what ends files and processes, may call an interrupt an error of its own
+        if interrupts.seen() or isinstance(error, KeyboardInterrupt) or _by_interrupt(error):
+            interrupts.say()
+            sys.exit(interrupts.STATUS)
+        missing = isinstance(error, ModuleNotFoundError) and not str(error.name).startswith("springcheck")
+        if missing or isinstance(error, SpringcheckError | OSError):
+            print(f"{Path(sys.argv[0]).name}: {error}", file=sys.stderr)
+            sys.exit(2)
+        raise
     sys.exit(status)

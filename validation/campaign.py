@@ -51,6 +51,7 @@ import broken
 import hostile
 from arguments import arguments, script
 from forked import Result, Warm
+from springcheck.errors import SpringcheckError
 from springcheck.store import seal
 
 MEMORY, SECONDS, MESSAGE = 1 << 30, 20.0, 500
@@ -409,6 +410,10 @@ def main() -> int:
     # a shell starts a command in the background with SIGINT ignored, and every child would inherit that
     signal.signal(signal.SIGINT, signal.default_int_handler)
     given = arguments(__doc__, file=Path, cases=0, part=("", *PARTS))
+    if given.file is None:
+        raise SpringcheckError(
+            "name the file that keeps the cases, a new one or that of a campaign to go on with"
+        )
     bad = campaign(given.file, given.cases, given.part)
     print(summary(given.file))
     return int(bad > 0)

@@ -467,6 +467,8 @@ def main() -> None:
         states = {name: file[name] for name in file.files}
     for row in kept:
         for name, old in row["arrays"].items():
+            if "at" not in old:
+                continue
             first, *shape = old["at"]
             flat = states[old["width"]][first : first + math.prod(shape)]
             row["arrays"][name] = stored(flat.reshape(shape).astype(np.float64))

@@ -173,6 +173,8 @@ def main() -> int:
         arguments(__doc__)
         raise SpringcheckError("say place, number of workers and command: see --help")
     place, workers, *words = sys.argv[1:]
+    # the queue's jobs end before this process, however long that takes
+    signal.set_wakeup_fd(-1)
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     with started(place, *description(place), int(workers)) as cluster:
         more = ["--workers", workers, "--cluster", cluster.scheduler_address]
