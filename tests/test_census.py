@@ -273,6 +273,15 @@ def test_the_kept_table_has_a_hundred_rows_with_versions_and_none_is_declared_ot
         assert list(csv.DictReader(file)) == rows
 
 
+def test_every_scheme_that_a_row_lists_has_its_title() -> None:
+    """Counts of substeps between those that are tried are listed, and no engine runs them."""
+    document = table.load(Path(by_hand.__file__).parent / "engines" / "engines.json")
+    entry = next(x for x in document["entries"] if "baoab-respa11" in x["found"])
+    (row,) = table.rows({"entries": [entry]})
+    assert "BAOAB-RESPA: fast springs 11 times a step" in row["scheme"]
+    assert "baoab-respa" not in row["scheme"]
+
+
 def test_a_program_s_row_is_held_against_the_scheme_that_its_documentation_claims() -> None:
     document = table.load(Path(by_hand.__file__).parent / "engines" / "engines.json")
     rows = {row["method"].removeprefix("command:"): row for row in document["entries"]}

@@ -11,6 +11,7 @@ from springcheck import engines, schemes
 from springcheck.errors import StoreError
 from springcheck.schemes.elsewhere import ELSEWHERE
 from springcheck.text.wording import number
+from springcheck.thermal.catalogue import family_of, random_scheme
 
 Row = Mapping[str, Any]
 
@@ -83,8 +84,14 @@ def _row(x: Row) -> dict[str, str]:
 
 
 def _titles(names: str) -> str:
-    found = (getattr(ELSEWHERE.get(name), "title", schemes.title(name)) for name in names.split(" or "))
-    return " or ".join(found)
+    return " or ".join(map(_title, names.split(" or ")))
+
+
+def _title(name: str) -> str:
+    """The title of a scheme, whether an engine here runs it or not."""
+    if family_of(name)[1]:
+        return random_scheme(name).title
+    return getattr(ELSEWHERE.get(name), "title", schemes.title(name))
 
 
 def _number(x: float | None, least: float) -> str:
