@@ -153,6 +153,54 @@ def test_no_attribute_changes_unseen_when_the_seal_is_gone(
     assert ["no seal" in finding.what for finding in store.check("s.h5")] == [True]
 
 
+def _as_before(file: Any) -> None:
+    """The list of digests as stores had it before arrays and groups were in it."""
+    listed = json.loads(file.attrs["digests"])
+    kept = {x: y for x, y in listed.items() if x.split("/")[1] not in ("h5md", "observables", "particles")}
+    assert len(kept) < len(listed)
+    file.attrs["digests"] = json.dumps(kept)
+
+
+@pytest.mark.parametrize(
+    ("change", "place"),
+    [
+        (lambda file: None, None),
+        (_attribute(f"/parameters/{LABEL}", "run_seconds", 1e-9), f"/parameters/{LABEL}"),
+        (_verdict, "/verdicts"),
+        (lambda file: file[Q].write_direct(np.zeros(file[Q].shape)), Q),
+        (_attribute(f"/observables/{LABEL}/p/value", "sha256", "0"), f"/observables/{LABEL}/p/value"),
+        (lambda file: file.pop(Q), f"/observables/{LABEL}"),
+        (_without_a_run, f"/parameters/{OTHER}"),
+    ],
+)
+def test_of_a_store_of_before_it_is_told_what_has_changed(
+    whole: Path, change: Callable[[Any], None], place: str | None
+) -> None:
+    edited(whole, _as_before)
+    with h5py.File("s.h5", "r+") as file:
+        change(file)
+    first, *found = store.check("s.h5")
+    assert "no seal" in first.what
+    assert [finding.place for finding in found] == ([] if place is None else [place])
+
+
+@pytest.mark.parametrize(
+    ("change", "place"),
+    [
+        (lambda file: file.pop(f"/particles/{LABEL}/position/value"), f"/particles/{LABEL}/position/value"),
+        (lambda file: file.pop(f"/observables/{LABEL}/q/step"), f"/observables/{LABEL}/q/step"),
+        (lambda file: file["h5md"].create_group("more"), "/h5md/more"),
+        (_attribute(f"/observables/{LABEL}/q", "signal", "time"), f"/observables/{LABEL}/q"),
+    ],
+)
+def test_of_what_is_laid_out_for_others_the_place_is_told(
+    whole: Path, change: Callable[[Any], None], place: str
+) -> None:
+    edited(whole, change)
+    found = [finding.place for finding in store.check("s.h5")]
+    assert found[1:] == [place]
+
+
 def test_every_flipped_bit_of_an_array_is_found(whole: Path) -> None:
     known = seal.find(whole)
     assert known is not None

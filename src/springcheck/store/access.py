@@ -7,7 +7,7 @@ are refused, and so are filters that would load a library.  Sizes, counts, depth
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -119,6 +119,35 @@ def _has_one_name(node: Any) -> Any:
     return node
 
 
+def walk(
+    group: Any, most: int, deepest: int, into: Callable[[str, Any], bool] = lambda place, node: True
+) -> Iterator[tuple[str, int, Any]]:
+    """Places below a group, addresses and objects: groups once, datasets under each of their names, opened at
+    the first (then None).
+
+    What a group holds follows it where `into` says so.  StoreError where there are more than `most`.
+    """
+    seen, count = {address(group)}, 0
+
+    def below(node: Any, before: str, depth: int) -> Iterator[tuple[str, int, Any]]:
+        nonlocal count
+        for name in members(node):
+            place, at = before + name, node.id.links.get_info(name.encode()).u
+            child = None if at in seen else node[name]
+            is_group = isinstance(child, h5py.Group)
+            if child is None and h5py.h5o.get_info(node.id, name.encode()).type == h5py.h5o.TYPE_GROUP:
+                continue
+            seen.add(at)
+            count += 1
+            if count > most:
+                raise refuse(node, "is one of more groups and datasets than can be looked at")
+            yield place, at, child
+            if is_group and depth < deepest and into(place, child):
+                yield from below(child, f"{place}/", depth + 1)
+
+    yield from below(group, "", 0)
+
+
 def group_at(file: Any, path: str) -> Any:
     """The group at a path, or None; StoreError where something else stands there."""
     node = find(file, path)
@@ -144,7 +173,7 @@ def dataset_at(file: Any, path: str, *, packed: bool = False) -> Any:
         raise StoreError(f"cannot read {file.file.filename}: {path} is missing")
     if not isinstance(node, h5py.Dataset):
         raise refuse(node, "is no dataset")
-    how = _Storage.of(node)
+    how = Storage.of(node)
     size = node.file.id.get_filesize()
     claimed = int(np.prod(node.shape, dtype=object)) * node.dtype.itemsize
     if node.ndim > MOST_DIMENSIONS:
@@ -171,7 +200,7 @@ def dataset_at(file: Any, path: str, *, packed: bool = False) -> Any:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class _Storage:
+class Storage:
     """How a dataset is stored, as plain data.
 
     libhdf5 2.0 crashes at the program's end where the creation properties of a virtual dataset are still
@@ -186,7 +215,7 @@ class _Storage:
     """Files and datasets that a virtual dataset shows; no more than a few."""
 
     @classmethod
-    def of(cls, node: Any) -> _Storage:
+    def of(cls, node: Any) -> Storage:
         how = node.id.get_create_plist()
         layout = how.get_layout()
         return cls(
@@ -203,11 +232,6 @@ class _Storage:
         )
 
 
-def views(node: Any) -> tuple[tuple[str, str], ...]:
-    """The files and datasets that a virtual dataset shows ("." is its own file); none of any other."""
-    return _Storage.of(node).views
-
-
 def _look_at_views(node: Any, shown: tuple[tuple[str, str], ...]) -> None:
     """StoreError unless a virtual dataset shows plain datasets of its own file alone, as ours do."""
     if len(shown) == MOST_VIEWS:
@@ -216,7 +240,7 @@ def _look_at_views(node: Any, shown: tuple[tuple[str, str], ...]) -> None:
         if file != ".":
             raise refuse(node, f"shows another file, {file}: what other files hold is not read")
         source = find(node.file, name)
-        if isinstance(source, h5py.Dataset) and views(source):
+        if isinstance(source, h5py.Dataset) and Storage.of(source).views:
             raise refuse(node, "shows a view of a view: only plain arrays are read")
         dataset_at(node.file, name, packed=True)
 

@@ -9,11 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import h5py
-import numpy as np
 
 from springcheck.errors import StoreError
-from springcheck.store import access, digests, files, layout, records, seal, space, tables, trust
-from springcheck.store.layout import Column
+from springcheck.store import access, digests, files, layout, reading, seal, trust
 from springcheck.store.parts import Parts
 
 NO_STORE = "no store of springcheck"
@@ -117,116 +115,36 @@ def _structure(file: Any, *, arrays: bool) -> Iterator[Damage]:
         }.get(str(root.get("format")), f"is not marked as {layout.FORMAT!r}")
         yield Damage("/", f"{what}, {NO_STORE}")
         return
-    head = access.group_at(file, "h5md")
-    if head is None or access.attributes(head).get("version") != [1, 1]:
-        yield Damage("/h5md", "missing, or not version 1.1")
-    for name in ("author", "creator"):
-        group = access.group_at(file, f"h5md/{name}")
-        if group is None or "name" not in access.attributes(group):
-            yield Damage(f"/h5md/{name}", "missing")
-    trees = ("parameters", "observables", "particles")
-    for label in sorted({label for tree in trees for label in access.children(file, tree)}):
-        try:
-            yield from _trajectory(file, label, arrays=arrays)
-        except files.BROKEN as error:
-            yield Damage(f"/observables/{label}", f"cannot be read: {files.cause(error)}")
-        except StoreError as error:
-            yield Damage(f"/observables/{label}", str(error))
-    if "part" in root:
-        return
-    yield from _contents(file, root)
+    now, extents = digests.contents(file)
+    if arrays:
+        with open(file.filename, "rb") as raw:
+            for name in seal.changed(raw, extents):
+                yield Damage(name, "does not match its sha256")
+    if "part" not in root:
+        yield from _differences(file, root, now)
 
 
-def _contents(file: Any, root: dict[str, Any]) -> Iterator[Damage]:
+def _differences(file: Any, root: dict[str, Any], now: dict[str, str]) -> Iterator[Damage]:
     """What is missing, added or another than its digest."""
     try:
         kept = access.json(str(root.get(digests.KEY)), dict[str, str])
     except ValueError:
         yield Damage("/", "the list of its digests is missing")
         return
-    now = digests.contents(file, tables.all_names(file))
+    if "/h5md" not in kept:
+        # stores of before list no arrays
+        now = {place: one for place, one in now.items() if place.split("/")[1] not in digests.LAID_OUT}
+        for label in access.children(file, "parameters"):
+            try:
+                reading.arrays_of(file, label, reading.known_of(file, label)[0])
+            except StoreError as error:
+                yield Damage(f"/observables/{label}", str(error))
     for place in sorted(kept.keys() | now.keys()):
         if place not in now:
             yield Damage(place, "missing")
         elif place not in kept:
             yield Damage(place, "was added after it was written")
         elif kept[place] != now[place]:
-            whole = "attributes" if place == "/" or place.startswith("/parameters/") else "content"
+            bare = place == "/" or place.split("/")[1] in (*digests.LAID_OUT, "parameters")
+            whole = "attributes" if bare else "content"
             yield Damage(place, f"its {whole} changed since it was written (sha256)")
-
-
-def _trajectory(file: Any, label: str, *, arrays: bool) -> Iterator[Damage]:
-    place = f"/parameters/{label}"
-    group = access.group_at(file, place)
-    if group is None:
-        yield Damage(place, "missing")
-        return
-    try:
-        known = records.record(place, access.attributes(group))
-    except StoreError as error:
-        yield Damage(place, str(error))
-        return
-    found: dict[str, str] = {}
-    whole = True
-    columns: dict[str, Column] = {}
-    for name in known.kept:
-        shape = layout.shape(name, known.frames, known.particles)
-        for kind, expected in (("value", shape), ("time", shape[:1]), ("step", shape[:1])):
-            at = f"/observables/{label}/{name}/{kind}"
-            try:
-                dataset = access.array(file, at, expected, "i" if kind == "step" else "f")
-            except StoreError as error:
-                whole = False
-                yield Damage(at, str(error))
-                continue
-            key = name if kind == "value" else kind
-            if not arrays or key in found or kind == "step":
-                continue
-            found[key] = digests.of_array(dataset)
-            columns[key] = Column(path=at, shape=expected)
-            if access.attributes(dataset).get("sha256") != found[key]:
-                whole = False
-                yield Damage(at, "does not match its sha256")
-    # reduced numbers had those of H5MD in earlier files
-    every = layout.recorded(known.kind, known.units), layout.UNITS[known.kind, known.units]
-    for name in (*known.kept, "time"):
-        at = f"/observables/{label}/" + (f"{name}/value" if name in known.kept else f"{known.kept[0]}/time")
-        node = access.find(file, at)
-        said = {} if node is None else access.attributes(node)
-        if not any(said.get("unit") == said.get("units") == units[name] for units in every):
-            yield Damage(at, f"its unit is not {every[0][name]}")
-    if arrays and whole and digests.combined(found, columns) != known.sha256:
-        yield Damage(place, "its sha256 is not that of the numbers")
-    if known.kind == "particles":
-        yield from _particles(file, label, known)
-
-
-def _particles(file: Any, label: str, known: records.RunRecord) -> Iterator[Damage]:
-    base = f"/particles/{label}"
-    try:
-        shape = (known.frames, int(np.max(space.places_of(known.axes, known.particles))) // 3 + 1, 3)
-    except StoreError as error:
-        yield Damage(f"/parameters/{label}", f"its {error}")
-        return
-    for name, source in (("position", "q"), ("velocity", "p")):
-        if source not in known.kept:
-            continue
-        at = f"{base}/{name}/value"
-        view = access.find(file, at)
-        whose = name if name in access.children(file, f"observables/{label}") else source
-        inside = {(".", f"/observables/{label}/{whose}/value")}
-        if not isinstance(view, h5py.Dataset):
-            yield Damage(at, "missing")
-        elif set(access.views(view) or ()) != inside:
-            yield Damage(at, f"is no view of the recorded {whose}")
-        elif view.shape != shape:
-            yield Damage(at, f"has shape {view.shape}, not {shape}")
-        elif "unit" not in access.attributes(view):
-            yield Damage(at, "attribute unit is missing")
-        for kind in ("time", "step"):
-            if access.find(file, f"{base}/{name}/{kind}") is None:
-                yield Damage(f"{base}/{name}/{kind}", "missing")
-    if {"q", "p"} & set(known.kept):
-        box = access.group_at(file, f"{base}/box")
-        if box is None or not {"dimension", "boundary"} <= access.attributes(box).keys():
-            yield Damage(f"{base}/box", "missing, or without dimension and boundary")

@@ -1,26 +1,37 @@
-"""What a collection holds, under sha256: numbers, attributes, tables, documents, and that none is missing.
+"""What a collection holds, under sha256: every array, group, table and document, and that none is missing.
 
 The seal (see `seal`) ends with the first edit by another program.  These digests stay, and tell what was
 changed and what was not.  Nobody needs a key to write them: they find accidents and careless edits, not
 a forger.
+
+A recorded array carries the sha256 of its numbers as an attribute, which `Draft` has found as it wrote them
+and the seal repeats; its digest here is of its attributes, shape, type and storage, and so of that one too.
 """
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
+import h5py
 import numpy as np
 
-from springcheck.store import access
+from springcheck.store import access, tables
 from springcheck.store.layout import QUANTITIES, Column
+from springcheck.store.seal import Extent
 
 PIECE = 1 << 20
 """Numbers that are read at a time."""
 
 KEY = "digests"
 """The attribute of the root that keeps them."""
+
+LAID_OUT = ("h5md", "observables", "particles")
+"""Groups of the root whose members have a digest each; stores of before list none of them."""
+MOST_OBJECTS = 64 * access.MOST_MEMBERS
+DEEPEST = 4
+"""Members of these groups, and groups in groups, of as many trajectories as a store may have."""
 
 
 def combined(digests: Mapping[str, str], columns: Mapping[str, Column]) -> str:
@@ -76,19 +87,48 @@ def of_run(file: Any, label: str) -> str:
     return total.hexdigest()
 
 
-def contents(file: Any, tables: Iterable[str]) -> dict[str, str]:
-    """Everything in a collection by its place -> sha256."""
+def contents(file: Any) -> tuple[dict[str, str], list[Extent]]:
+    """Everything in a collection by its place -> sha256; and its recorded arrays, as a seal lists them."""
     found = {"/": hashlib.sha256(_attributes(file, KEY)).hexdigest()}
+    extents: list[Extent] = []
+    known: dict[int, str] = {}
+    for below, at, node in access.walk(file, MOST_OBJECTS, DEEPEST, lambda place, node: _is_laid_out(place)):
+        if _is_laid_out(below):
+            # times and steps are one array under many names
+            if at not in known:
+                known[at] = _of_object(below, file[below] if node is None else node, extents)
+            found[f"/{below}"] = known[at]
     for label in access.children(file, "parameters"):
         found[f"/parameters/{label}"] = of_run(file, label)
-    for name in tables:
+    for name in tables.all_names(file):
         found[f"/{name}"] = of_table(access.group_at(file, name))
     for name in access.children(file, "documents"):
         text = access.text(file, f"documents/{name}")
         found[f"/documents/{name}"] = hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()
-    return found
+    return found, extents
+
+
+def _is_laid_out(place: str) -> bool:
+    return place.partition("/")[0] in LAID_OUT
+
+
+def _of_object(place: str, node: Any, extents: list[Extent]) -> str:
+    """The digest of a group or dataset; a recorded array is added to those of a seal."""
+    attributes = access.attributes(node)
+    total = hashlib.sha256(_listed(attributes))
+    if isinstance(node, h5py.Dataset):
+        how, said = access.Storage.of(node), attributes.get("sha256")
+        text = f"{node.shape} {node.dtype.str} {how.layout} {how.chunk} {how.views}"
+        total.update(text.encode("utf-8", "surrogatepass"))
+        if how.layout == h5py.h5d.CONTIGUOUS and isinstance(said, str):
+            size = node.size * node.dtype.itemsize
+            extents.append(Extent(name=f"/{place}", offset=node.id.get_offset() or 0, size=size, sha256=said))
+    return total.hexdigest()
 
 
 def _attributes(node: Any, *left_out: str) -> bytes:
-    kept = sorted((key, value) for key, value in access.attributes(node).items() if key not in left_out)
-    return repr(kept).encode("utf-8", "surrogatepass")
+    return _listed({key: value for key, value in access.attributes(node).items() if key not in left_out})
+
+
+def _listed(attributes: Mapping[str, Any]) -> bytes:
+    return repr(sorted(attributes.items())).encode("utf-8", "surrogatepass")

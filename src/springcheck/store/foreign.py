@@ -115,8 +115,8 @@ def arrays(path: Path, wanted: Callable[[str], bool]) -> Iterator[tuple[str, Any
     left = MOST_NUMBERS
     refused: StoreError | None = None
     with access.for_reading(path) as file:
-        for place in _places(file, "", set()):
-            if wanted(place):
+        for place, _, node in access.walk(file, access.MOST_MEMBERS, DEEPEST):
+            if isinstance(node, h5py.Dataset) and wanted(place):
                 try:
                     dataset = _numbers(path, file, place)
                     if dataset.size > left:
@@ -129,22 +129,6 @@ def arrays(path: Path, wanted: Callable[[str], bool]) -> Iterator[tuple[str, Any
                     refused = refused or error
         if refused and left == MOST_NUMBERS:
             raise refused
-
-
-def _places(group: Any, before: str, seen: set[int], depth: int = 0) -> Iterator[str]:
-    """Paths of the datasets below a group, each object once, no deeper than anyone nests runs."""
-    for name in access.members(group):
-        node = access.find(group, name)
-        address = access.address(node)
-        if address in seen:
-            continue
-        seen.add(address)
-        if len(seen) > access.MOST_MEMBERS:
-            raise access.refuse(group, "is one of more groups and datasets than can be looked at")
-        if isinstance(node, h5py.Dataset):
-            yield f"{before}{name}"
-        elif isinstance(node, h5py.Group) and depth < DEEPEST:
-            yield from _places(node, f"{before}{name}/", seen, depth + 1)
 
 
 def _groups(path: Path, file: Any, names: list[str], most: int | None) -> Iterator[tuple[str, Foreign]]:

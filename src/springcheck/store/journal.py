@@ -259,7 +259,7 @@ class Journal:
         found = Parts.of(self.path, self.run)
         temporary = self.folder / COLLECTION
         # an adopted part is all that there is of it
-        copied = adopt.choice(found.parts) is None
+        copied = adopt.choice(found.runs) is None
         with files.told(self.path, "write"), files.unfinished(temporary) if copied else nullcontext():
             try:
                 temporary.unlink(missing_ok=True)
@@ -274,7 +274,7 @@ class Journal:
             with interrupts.held():
                 files.move(temporary, self.path)
                 adopt.settled(self.folder)
-                for part in (*found.parts, *found.rows):
+                for part in found.everything:
                     part.unlink(missing_ok=True)
                 self._end()
                 # the same command would not go on, but refuse to write it again

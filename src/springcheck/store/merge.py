@@ -13,7 +13,7 @@ import numpy as np
 from springcheck.errors import StoreError
 from springcheck.store import access, adopt, digests, files, layout, pieces, seal, tables
 from springcheck.store.access import Scalar
-from springcheck.store.parts import Parts, name_of
+from springcheck.store.parts import Parts
 from springcheck.store.tables import Table
 
 _TREES = ("particles", "observables", "parameters")
@@ -27,9 +27,9 @@ def collection(
 
     The largest part, if it is large, is renamed to `path` instead of copied (see `adopt`).
     """
-    base = adopt.choice(found.parts)
-    sources = [part for part in found.parts if part != base]
-    total = sum(source.stat().st_size for source in (*sources, *found.rows))
+    base = adopt.choice(found.runs)
+    sources = [part for part in found.runs if part != base]
+    total = sum(source.stat().st_size for source in (*sources, *found.tables))
     text = sum(len(document.encode()) for document in documents.values())
     margin = (1 << 20) + text + 1024 * len(sources) + 8 * sum(_bytes(table) for table in extra)
     if base is None:
@@ -44,12 +44,13 @@ def collection(
             layout.begin(file)
         file.attrs.pop("part", None)
         layout.write_attributes(file, root)
-        provenance = pieces.Provenance()
         for source in sources:
             with access.opened(source) as part:
                 _take(file, part)
-                provenance.note(name_of(source), pieces.by_of(part))
-        pieces.join(file, found.rows, provenance)
+        provenance = pieces.Provenance()
+        for table in pieces.joined(found.tables, provenance):
+            tables.write(file, table)
+            _compare(file[table.name], table)
         for table in (*extra, *provenance.tables()):
             tables.write(file, table)
         for name, document in documents.items():
@@ -57,8 +58,8 @@ def collection(
                 name, data=document, dtype=h5py.string_dtype("utf-8")
             )
         _plots(file)
-        extents = _extents(file)
-        layout.write_attributes(file, {digests.KEY: json.dumps(_digests(file, path), separators=(",", ":"))})
+        listed, extents = digests.contents(file)
+        layout.write_attributes(file, {digests.KEY: json.dumps(listed, separators=(",", ":"))})
     there = {(extent.offset, extent.sha256) for extent in kept}
     with path.open("rb") as raw:
         for extent in extents:
@@ -76,7 +77,6 @@ def image(root: Mapping[str, Scalar], content: Iterable[Table]) -> bytes:
         layout.write_attributes(file, {"format": layout.FORMAT, **root})
         for table in content:
             tables.write(file, table)
-            layout.write_attributes(file[table.name], {"sha256": digests.of_table(file[table.name])})
         file.flush()
         body: bytes = file.id.get_file_image()
     return seal.sealed(body, str(root["run"]))
@@ -86,52 +86,30 @@ def _bytes(table: Table) -> int:
     return sum(np.asarray(column).size * 64 for column in table.columns.values())
 
 
+def _compare(group: Any, table: Table) -> None:
+    """StoreError where a table that was read from a part is not what stands here now."""
+    for name, dataset in group.items():
+        back, values = access.column(dataset), np.asarray(table.columns[name])
+        same = back.tolist() == values.tolist() if back.dtype == object else _raw(back) == _raw(values)
+        if not same:
+            raise StoreError(f"{table.name}/{name} was damaged on its way: check disk and memory")
+
+
+def _raw(values: np.ndarray) -> memoryview:
+    return np.ascontiguousarray(values).data.cast("B")
+
+
 def _take(file: Any, part: Any) -> None:
-    """Copy the trajectory or the tables of a part.
+    """Copy the trajectory of a part.
 
     One H5Ocopy of the whole part keeps the hard links of time and step; moving links costs nothing.
     """
     h5py.h5o.copy(part.id, b".", file.id, _INCOMING.encode())
-    incoming = file[_INCOMING]
     for tree in _TREES:
-        for label in incoming.get(tree, ()):
+        for label in file[_INCOMING].get(tree, ()):
             file.require_group(tree)
             file.move(f"{_INCOMING}/{tree}/{label}", f"{tree}/{label}")
-    for name in list(tables.names(incoming)):
-        if "/" in name:
-            file.require_group(name.rsplit("/", 1)[0])
-        file.move(f"{_INCOMING}/{name}", name)
     del file[_INCOMING]
-
-
-def _extents(file: Any) -> list[seal.Extent]:
-    """Every recorded array, from its place in the file and the digest it carries."""
-    found: dict[int, seal.Extent] = {}
-    for label, elements in file.get("observables", {}).items():
-        for name, element in elements.items():
-            for kind in ("value", "time", "step"):
-                array = element[kind]
-                offset = array.id.get_offset()
-                found[offset] = found.get(offset) or seal.Extent(
-                    name=f"/observables/{label}/{name}/{kind}",
-                    offset=offset,
-                    size=array.size * array.dtype.itemsize,
-                    sha256=array.attrs["sha256"],
-                )
-    return list(found.values())
-
-
-def _digests(file: Any, path: Path) -> dict[str, str]:
-    """Name and sha256 of all that the file holds; copied tables keep their digests, the others get one."""
-    names = tables.all_names(file)
-    found = digests.contents(file, names)
-    for name in names:
-        known, digest = file[name].attrs, found[f"/{name}"]
-        if known.get("sha256", digest) != digest:
-            raise StoreError(f"table {name} was damaged on its way into {path}: check disk and memory")
-        if "sha256" not in known:
-            layout.write_attributes(file[name], {"sha256": digest})
-    return found
 
 
 def _plots(file: Any) -> None:

@@ -23,8 +23,8 @@ def name_of(part: Path) -> str:
 
 
 def table_of(part: Path) -> str:
-    """The table of the collection that rows go into: its pieces are named <table>/<piece>."""
-    return name_of(part).rpartition("/")[0]
+    """The table of the collection that a part goes into: pieces of one are named <table>/<piece>."""
+    return name_of(part).rpartition("/")[0] if part.name.startswith(ROWS) else name_of(part)
 
 
 def parts_folder(path: Path) -> Path:
@@ -63,24 +63,24 @@ def claim(parts: Path) -> dict[str, str] | None:
 class Parts:
     """The files that make up a store: the collection, or the parts of a run that are not yet in one.
 
-    `rows` are the parts that hold rows of a table.
+    Of these each holds a trajectory (`runs`), or a table or rows of one (`tables`).
     """
 
     collection: Path | None
-    parts: list[Path]
-    rows: list[Path]
+    runs: list[Path]
+    tables: list[Path]
 
     @property
     def everything(self) -> list[Path]:
         """All files that there are."""
-        return [*self.parts, *self.rows] if self.collection is None else [self.collection]
+        return [*self.runs, *self.tables] if self.collection is None else [self.collection]
 
     @classmethod
     def of(cls, path: Path, run: str | None) -> Parts:
         """`run` is the writer's, whose parts they are; None for a reader, who takes the collection if there
         is one."""
         if run is None and path.is_file():
-            return cls(collection=path, parts=[], rows=[])
+            return cls(collection=path, runs=[], tables=[])
         folder, known = parts_folder(path), run
         if known is None:
             with contextlib.suppress(StoreError):
@@ -89,11 +89,8 @@ class Parts:
         there = folder.glob("*-*.h5") if known is not None else ()
         parts = sorted(part for part in there if part.is_file() and not part.is_symlink())
         parts = [part for part in parts if (found := seal.find(part)) is None or found.run == known]
-        return cls(
-            collection=None,
-            parts=[part for part in parts if not part.name.startswith(ROWS)],
-            rows=[part for part in parts if part.name.startswith(ROWS)],
-        )
+        runs = [part for part in parts if part.name.startswith("run-")]
+        return cls(collection=None, runs=runs, tables=[part for part in parts if part not in runs])
 
 
 def run_of(path: Path) -> str:

@@ -8,9 +8,10 @@ and one for each piece.
 
 from __future__ import annotations
 
-import hashlib
 import json
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from springcheck.errors import StoreError
-from springcheck.store import access, digests, seal, tables
+from springcheck.store import access, seal, tables
 from springcheck.store.parts import name_of, table_of
 from springcheck.store.tables import Table
 
@@ -95,55 +96,37 @@ def measured(found: Mapping[str, Table]) -> Iterator[tuple[str, dict[str, str]]]
         raise StoreError(f"the tables of who measured what do not fit together: {error}") from error
 
 
-def join(file: Any, parts: Sequence[Path], provenance: Provenance) -> None:
-    """Write the tables whose rows these parts hold, a part at a time."""
-    for name, group in groupby(sorted(parts, key=name_of), key=table_of):
-        _join(file, name, list(group), provenance)
+def joined(parts: Sequence[Path], provenance: Provenance) -> Iterator[Table]:
+    """The tables that these parts hold, or rows of, one after the other."""
+    for name, group in groupby(sorted(parts, key=lambda part: (table_of(part), name_of(part))), key=table_of):
+        yield _joined(name, list(group), provenance)
 
 
-def _join(file: Any, name: str, parts: Sequence[Path], provenance: Provenance) -> None:
-    lengths = np.zeros(len(parts) + 1, np.int64)
-    for j, part in enumerate(parts):
-        with access.opened(part) as source:
-            lengths[j + 1] = lengths[j] + _length(source[name_of(part)])
-    with access.opened(parts[0]) as source:
-        first = tables.read(source[name_of(parts[0])], name)
-    group = tables.begin(file, first)
-    whole = {
-        column: tables.column(group, first, column, (int(lengths[-1]), *np.shape(values)[1:]))
-        for column, values in first.columns.items()
-    }
-    sums = {column: hashlib.sha256() for column in whole}
-    for j, part in enumerate(parts):
+def _joined(name: str, parts: Sequence[Path], provenance: Provenance) -> Table:
+    lengths: Counter[str] = Counter()
+    for part in reversed(parts):
         known = seal.find(part)
         if known is None or not seal.is_whole(part, known):
             raise StoreError(f"{part.name} is damaged: give the same command again, and it is measured again")
         with access.opened(part) as source:
-            provenance.note(name_of(part), by_of(source))
             rows = source[name_of(part)]
-            found = {column: access.column(rows[column]) for column in access.members(rows)}
-            like = {column: (x.dtype.kind, x.shape[1:]) for column, x in found.items()}
-            if like != {
-                column: (np.asarray(x).dtype.kind, np.shape(x)[1:]) for column, x in first.columns.items()
-            }:
-                raise StoreError(f"{part.name} has other columns than the rows of {name} before it")
-            for column, values in found.items():
-                whole[column][lengths[j] : lengths[j + 1]] = values
-                sums[column].update(_bytes(values))
-    for column, dataset in whole.items():
-        back = hashlib.sha256()
-        for values in digests.blocks(dataset):
-            back.update(_bytes(values))
-        if back.digest() != sums[column].digest():
-            raise StoreError(f"{name}/{column} was damaged on its way: check disk and memory")
-
-
-def _length(group: Any) -> int:
-    name = next(iter(group))
-    return len(group[name])
-
-
-def _bytes(values: np.ndarray) -> bytes:
-    if values.dtype.kind == "O":
-        return "".join(f"{text}\0" for text in values.ravel()).encode("utf-8", "surrogatepass")
-    return np.ascontiguousarray(values).tobytes()
+            lengths.update({column: len(rows[column]) for column in rows})
+            provenance.note(name_of(part), by_of(source))
+            if part == parts[0]:
+                first = tables.read(rows, name)
+    if len(parts) == 1:
+        return first
+    like = {column: np.asarray(x) for column, x in first.columns.items()}
+    whole = {column: np.empty((lengths[column], *x.shape[1:]), x.dtype) for column, x in like.items()}
+    at: Counter[str] = Counter()
+    for part in parts:
+        with access.opened(part) as source:
+            found = {column: access.column(x) for column, x in source[name_of(part)].items()}
+        if {column: (x.dtype, x.shape[1:]) for column, x in found.items()} != {
+            column: (x.dtype, x.shape[1:]) for column, x in like.items()
+        }:
+            raise StoreError(f"{part.name} has other columns than the rows of {name} before it")
+        for column, x in found.items():
+            whole[column][at[column] : at[column] + len(x)] = x
+            at[column] += len(x)
+    return replace(first, columns=whole)

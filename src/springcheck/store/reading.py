@@ -37,11 +37,10 @@ def sources(path: Path, run: str | None = None) -> dict[str, Path]:
         with opened(found.collection) as file:
             labels = access.children(file, "parameters")
             listed += [(_sequence(file, label), label, found.collection) for label in labels]
-    for part in found.parts:
-        if part.name.startswith("run-"):
-            label = parts.name_of(part)
-            with opened(part) as file:
-                listed.append((_sequence(file, label), label, part))
+    for part in found.runs:
+        label = parts.name_of(part)
+        with opened(part) as file:
+            listed.append((_sequence(file, label), label, part))
     return {label: source for _, label, source in sorted(listed)}
 
 
@@ -61,7 +60,7 @@ def known_of(file: Any, label: str) -> tuple[RunRecord, dict[str, Any]]:
     return records.record(f"cannot read {file.filename}, {label}", known), known
 
 
-def _datasets(file: Any, label: str, known: RunRecord) -> dict[str, Any]:
+def arrays_of(file: Any, label: str, known: RunRecord) -> dict[str, Any]:
     """The arrays of a trajectory, looked at: time, and of the quantities those that are recorded."""
     base = f"observables/{label}"
     found = {"time": access.array(file, f"{base}/{known.kept[0]}/time", (known.frames,))}
@@ -73,10 +72,10 @@ def _datasets(file: Any, label: str, known: RunRecord) -> dict[str, Any]:
 
 @contextlib.contextmanager
 def _held(path: str | Path, label: str) -> Iterator[tuple[RunRecord, dict[str, Any], dict[str, Any]]]:
-    """What is known of a trajectory of a store (see `known_of`), and its arrays (see `_datasets`)."""
+    """What is known of a trajectory of a store (see `known_of`), and its arrays (see `arrays_of`)."""
     with opened(source_of(Path(path), label)) as file:
         known, rest = known_of(file, label)
-        yield known, rest, _datasets(file, label, known)
+        yield known, rest, arrays_of(file, label, known)
 
 
 def _whole(path: Path, dataset: Any) -> Floats:
@@ -105,7 +104,7 @@ def read_one(path: str | Path, label: str) -> Trajectory:
     path = Path(path)
     with opened(path) as file:
         known, rest = known_of(file, label)
-        datasets = _datasets(file, label, known)
+        datasets = arrays_of(file, label, known)
         return records.trajectory(label, known, rest, {x: _whole(path, y) for x, y in datasets.items()})
 
 
@@ -195,7 +194,7 @@ def summary(path: str | Path) -> Summary:
     for label, source in sources(path).items():
         with opened(source) as file:
             known, rest = known_of(file, label)
-            _datasets(file, label, known)
+            arrays_of(file, label, known)
             runs.append(
                 Run(
                     label=label,
@@ -212,7 +211,7 @@ def summary(path: str | Path) -> Summary:
             root = access.attributes(file)
             documents = tuple(access.children(file, "documents"))
     found = Parts.of(path, None)
-    names = [*_tables(path), *map(parts.table_of, found.rows)]
+    names = _tables(path) if found.collection else map(parts.table_of, found.tables)
     return Summary(
         path=path,
         size=sum(part.stat().st_size for part in found.everything),
@@ -233,13 +232,14 @@ def _is_claimed(path: Path, run: object) -> bool:
         return False
 
 
-def _tables(path: Path, run: str | None = None) -> dict[str, Path]:
-    """The tables of a collection, and the parts that hold one."""
+def _tables(path: Path, run: str | None = None, *, rows: bool = False) -> dict[str, Path]:
+    """The tables of a collection, and the parts that hold one, or rows of one as well."""
     found = Parts.of(path, run)
     if found.collection is not None:
         with opened(found.collection) as file:
             return dict.fromkeys(tables.names(file), found.collection)
-    return {parts.name_of(part): part for part in found.parts if part.name.startswith("table-")}
+    whole = [part for part in found.tables if rows or not part.name.startswith(parts.ROWS)]
+    return {parts.name_of(part): part for part in whole}
 
 
 def _table(path: str | Path, name: str) -> Table | None:
@@ -271,10 +271,7 @@ def tables_of(path: str | Path, run: str | None = None, *, rows: bool = False) -
 
     With `rows` also the pieces of tables that an unfinished store holds.
     """
-    found = _tables(Path(path), run)
-    if rows:
-        found |= {parts.name_of(part): part for part in Parts.of(Path(path), run).rows}
-    return _Tables(found)
+    return _Tables(_tables(Path(path), run, rows=rows))
 
 
 def measured_by(path: str | Path) -> list[tuple[str, dict[str, str]]]:

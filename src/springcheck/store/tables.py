@@ -45,14 +45,7 @@ class Table:
 
 
 def write(file: Any, table: Table) -> None:
-    """Write a table into an open file, still without its digest."""
-    group = begin(file, table)
-    for name, values in table.columns.items():
-        column(group, table, name, np.shape(values))[...] = _written(values)
-
-
-def begin(file: Any, table: Table) -> Any:
-    """The group of a table with its attributes, still without columns."""
+    """Write a table into an open file."""
     parts = table.name.split("/")
     if not all(parts) or {".", ".."} & set(parts):
         raise ValueError(f"{table.name!r} cannot name a table")
@@ -74,21 +67,14 @@ def begin(file: Any, table: Table) -> Any:
                 "signal_scale_type": scale[table.signal],
             }
             write_attributes(group, {_STYLE: json.dumps(style)})
-    return group
-
-
-def column(group: Any, table: Table, name: str, shape: tuple[int, ...]) -> Any:
-    """A dataset of this shape for a column of a table, with its unit."""
-    kind = _written(table.columns[name]).dtype
-    dataset = group.create_dataset(name, shape, h5py.string_dtype("utf-8") if kind.kind == "O" else kind)
-    if name in table.units:
-        write_unit(dataset, table.units[name])
-    return dataset
-
-
-def _written(values: Any) -> np.ndarray:
-    found = np.asarray(values)
-    return found.astype(object) if found.dtype.kind in "UO" else found
+    for name, given in table.columns.items():
+        values = np.asarray(given)
+        is_text = values.dtype.kind in "UO"
+        kind = h5py.string_dtype("utf-8") if is_text else values.dtype
+        dataset = group.create_dataset(name, values.shape, kind)
+        dataset[...] = values.astype(object) if is_text else values
+        if name in table.units:
+            write_unit(dataset, table.units[name])
 
 
 def read(group: Any, name: str) -> Table:
@@ -122,30 +108,22 @@ def _listed(value: Any) -> list[Any]:
 
 def names(file: Any) -> Iterator[str]:
     """Names of the tables of an open file, but for those that every store has."""
-    seen: set[int] = set()
-    for top in access.members(file):
-        if top not in RESERVED:
-            yield from _within(file[top], top, seen)
+
+    def into(place: str, node: Any) -> bool:
+        return place not in RESERVED and not _is_table(node)
+
+    for place, _, node in access.walk(file, access.MOST_MEMBERS, DEEPEST, into):
+        if place not in RESERVED and _is_table(node):
+            yield place
+
+
+def _is_table(node: Any) -> bool:
+    return isinstance(node, h5py.Group) and access.attribute(node, "kind") == "table"
 
 
 def all_names(file: Any) -> list[str]:
     """Names of all tables of an open file."""
     return [*names(file), *(name for name in ("comparison", "verdicts") if name in access.members(file))]
-
-
-def _within(node: Any, name: str, seen: set[int], depth: int = 0) -> Iterator[str]:
-    """Tables at and below a node, each once however often it is linked."""
-    address = access.address(node)
-    if not isinstance(node, h5py.Group) or address in seen or depth > DEEPEST:
-        return
-    seen.add(address)
-    if len(seen) > access.MOST_MEMBERS:
-        raise access.refuse(node, "is one of more tables than any of our stores has")
-    if access.attributes(node).get("kind") == "table":
-        yield name
-    else:
-        for child in access.members(node):
-            yield from _within(node[child], f"{name}/{child}", seen, depth + 1)
 
 
 def of_verdicts(verdicts: Sequence[Verdict]) -> Table:
