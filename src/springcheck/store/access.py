@@ -173,7 +173,7 @@ def dataset_at(file: Any, path: str, *, packed: bool = False) -> Any:
         raise StoreError(f"cannot read {file.file.filename}: {path} is missing")
     if not isinstance(node, h5py.Dataset):
         raise refuse(node, "is no dataset")
-    how = Storage.of(node)
+    how = StoredAs.of(node)
     size = node.file.id.get_filesize()
     claimed = int(np.prod(node.shape, dtype=object)) * node.dtype.itemsize
     if node.ndim > MOST_DIMENSIONS:
@@ -200,7 +200,7 @@ def dataset_at(file: Any, path: str, *, packed: bool = False) -> Any:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Storage:
+class StoredAs:
     """How a dataset is stored, as plain data.
 
     libhdf5 2.0 crashes at the program's end where the creation properties of a virtual dataset are still
@@ -215,7 +215,7 @@ class Storage:
     """Files and datasets that a virtual dataset shows; no more than a few."""
 
     @classmethod
-    def of(cls, node: Any) -> Storage:
+    def of(cls, node: Any) -> StoredAs:
         how = node.id.get_create_plist()
         layout = how.get_layout()
         return cls(
@@ -240,7 +240,7 @@ def _look_at_views(node: Any, shown: tuple[tuple[str, str], ...]) -> None:
         if file != ".":
             raise refuse(node, f"shows another file, {file}: what other files hold is not read")
         source = find(node.file, name)
-        if isinstance(source, h5py.Dataset) and Storage.of(source).views:
+        if isinstance(source, h5py.Dataset) and StoredAs.of(source).views:
             raise refuse(node, "shows a view of a view: only plain arrays are read")
         dataset_at(node.file, name, packed=True)
 

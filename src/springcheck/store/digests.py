@@ -117,7 +117,7 @@ def _of_object(place: str, node: Any, extents: list[Extent]) -> str:
     attributes = access.attributes(node)
     total = hashlib.sha256(_listed(attributes))
     if isinstance(node, h5py.Dataset):
-        how, said = access.Storage.of(node), attributes.get("sha256")
+        how, said = access.StoredAs.of(node), attributes.get("sha256")
         text = f"{node.shape} {node.dtype.str} {how.layout} {how.chunk} {how.views}"
         total.update(text.encode("utf-8", "surrogatepass"))
         if how.layout == h5py.h5d.CONTIGUOUS and isinstance(said, str):
