@@ -50,7 +50,7 @@ def test_the_sign_shows_with_one_degree_of_freedom_and_an_engine_without_it_is_r
 def test_ranks_of_kinetic_energies_are_the_draws_of_one_degree_of_freedom() -> None:
     scene = baths.springs(1, steps=300)
     rng, expected = np.random.default_rng(9), np.random.default_rng(9).standard_normal(300)
-    fault = Fault("right", "", (), baths.broken(), scheme="bussi", scene="bath")
+    fault = Fault("right", "", (), baths.played, scheme="bussi", scene="bath")
     run = fault.run(scene, seed=rng)
     assert read(THERMOSTATS["bussi"], scene, run.q, run.p).draws[:, 0] == pytest.approx(expected, abs=1e-9)
 

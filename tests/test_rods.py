@@ -31,7 +31,7 @@ from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Cosine, Rod, Spring, WallRod, WallSpring
 from springcheck.studies.faults import measure
 from springcheck.studies.faults.rigid import Rattle
-from springcheck.studies.faults.steppers import record
+from springcheck.studies.faults.seeded import Fault
 from springcheck.studies.precision import accuracy, sweeps
 
 Need = Callable[[str], None]
@@ -182,8 +182,7 @@ def test_the_tolerance_of_lengths_is_stored_and_read(tmp_path: Path, need: Need)
 
 def test_a_rattle_written_out_by_itself_is_judged_right() -> None:
     scene = measure.scene("dumbbell")
-    scheme = schemes.SCHEMES["velocity-verlet"]
-    run = record(scene, scheme, Rattle().step(scene, scheme, 0.0))
+    run = Fault("right", "", step=Rattle().step).run(scene)
     verdicts = checks.judge(scene, run)
     assert [v.check for v in verdicts if v.passed is False] == []
     assert sum(v.passed is True for v in verdicts) >= 10

@@ -25,7 +25,7 @@ def test_there_are_forty_faults_of_thermostats_at_least() -> None:
 
 @pytest.mark.parametrize("name", ["baoab", "obabo", "bbk", "gj-i-half", "lammps-langevin", "andersen"])
 def test_what_is_right_passes_here(name: str) -> None:
-    right = Fault(name, "", (), baths.broken(), scheme=name, scene="bath")
+    right = Fault(name, "", (), baths.played, scheme=name, scene="bath")
     passed = probe(right)
     found = {check: passed(check, None) for check in baths.OF_THERMOSTATS}
     assert [check for check, one in found.items() if one is False] == []
@@ -43,7 +43,7 @@ def test_right_thermostats_raise_no_alarm_in_random_baths() -> None:
 
 def test_noise_below_rounding_hides_the_draws_and_not_the_map() -> None:
     far = scene("bath").derived(q=np.full(40, 1e12))
-    right = Fault("right", "", (), baths.broken(), scheme="baoab", scene="bath")
+    right = Fault("right", "", (), baths.played, scheme="baoab", scene="bath")
     said = {v.check: v for v in checks.judge(far, right.run(far))}
     assert said["noise-direction"].passed is True
     assert said["draws-variance"].passed is None

@@ -159,7 +159,7 @@ def clean_bath(seed: int) -> Clean:
     linear, others = ([x for x, one in THERMOSTATS.items() if one.rescales == kind] for kind in (False, True))
     scheme = str(rng.choice(linear))
     right = Fault(
-        "thermostat", "", (), baths.broken(),
+        "thermostat", "", (), baths.played,
         scheme=str(rng.choice(others)) if rng.random() < RESCALING and np.any(where.p) else scheme,
     )  # fmt: skip
     subject = baths.subject(right, None, where, seed + 1)

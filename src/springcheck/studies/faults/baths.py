@@ -1,4 +1,4 @@
-"""What is wrong with thermostats: their draws, their seeds, their numbers, their stages."""
+"""Thermostats that are right but for their draws, their seeds, their numbers or their stages."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from springcheck import checks, schemes
+from springcheck import checks
 from springcheck.checks.seeds import SEEDED, Seeded
 from springcheck.errors import MethodError
 from springcheck.physics.arrays import Floats, Force
@@ -19,20 +19,17 @@ from springcheck.physics.scene import Scene
 from springcheck.physics.term import Term
 from springcheck.physics.terms import WallSpring
 from springcheck.physics.trajectory import Trajectory
-from springcheck.studies.faults.seeded import Fault, Make
+from springcheck.studies.faults.seeded import Case, Fault
 from springcheck.studies.faults.steppers import trajectory
 from springcheck.thermal import THERMOSTATS, Stepper
-from springcheck.thermal.catalogue import HALF, ONE, Act
+from springcheck.thermal.catalogue import Act
 from springcheck.thermal.stepper import forces
 
-Draws: TypeAlias = Callable[[Sequence[Floats], Scene, float], Any]
-"""(right draws so far, each (n,) and the last one due; scene, size) -> what is used in place of the last."""
+Draws: TypeAlias = Callable[[Sequence[Floats]], Any]
+"""Right draws so far, each (n,) and the last one due -> what is used in place of the last."""
 
 OF_THERMOSTATS: tuple[str, ...] = (*(one.name for one in checks.RANDOM), *(one.name for one in SEEDED))
 """What judges thermostats."""
-
-A, B = Act("drift", HALF), Act("kick", HALF)
-O = THERMOSTATS["baoab"].acts[2]  # noqa: E741 - the letter of the literature
 
 
 def springs(n: int, *, name: str = "bath", steps: int = 1200) -> Scene:
@@ -53,78 +50,68 @@ def subject(fault: Fault, size: float | None, scene: Scene | None = None, seed: 
     )  # fmt: skip
 
 
-def broken(
-    draws: Draws = lambda right, scene, x: right[-1],
-    *,
-    runs: str | Sequence[Act] = "",
-    seed: Callable[[Any], Any] = lambda seed: seed,
-    hold: Callable[[Scene, float], Rods | None] = lambda scene, x: scene.system.rods,
-    **numbers: Callable[[Scene, float], Any],
-) -> Make:
+def played(
+    c: Case, draws: Draws = lambda right: right[-1], *, runs: str | Sequence[Act] = "",
+    seed: Callable[[Any], Any] = lambda seed: seed, hold: Rods | None = None, h: float = 1.0,
+    m: Floats | float = 1.0, k: float = 1.0, rate: float = 1.0, thermal: float = 1.0, collision: float = 1.0,
+) -> Trajectory:  # fmt: skip
     """A thermostat with other draws, under another scheme (by name, or by its stages), from another seed,
-    with other rods, or with other numbers: (scene, size) -> the factor of h, m, rate, thermal, k or
-    collision."""
+    with other rods, or with other numbers: factors of the step, masses, forces, friction, kT and the chance
+    of a collision."""
+    scene, claims = c.scene, THERMOSTATS[c.scheme.name]
+    assert scene.bath is not None
+    of = THERMOSTATS[runs or claims.name] if isinstance(runs, str) else replace(
+        claims, acts=tuple(act for act in runs if act.kind not in ("shake", "project")), held=tuple(runs)
+    )  # fmt: skip
+    if scene.system.rods and not of.held:
+        raise MethodError(f"no stages of {of.title} with rods are known")
+    stepper = Stepper(
+        replace(of, uniform=claims.uniform), h=scene.step * h, m=scene.m * m, rate=scene.bath.friction * rate,
+        thermal=scene.thermal * thermal, width=np.float64,
+        freedoms=claims.freedoms(scene.n, scene.particles),
+        hold=hold or scene.system.rods,
+    )  # fmt: skip
+    # a script of draws stands for every generator
+    source = c.seed if hasattr(c.seed, "standard_normal") else seed(c.seed)
+    rng = source if hasattr(source, "standard_normal") else np.random.default_rng(source)
+    right: list[Floats] = []
 
-    def make(scene: Scene, scheme: schemes.Scheme, size: float, start: Any = 1) -> Trajectory:
-        assert scene.bath is not None
-        claims = THERMOSTATS[scheme.name]
-        of = THERMOSTATS[runs or claims.name] if isinstance(runs, str) else None
-        free = tuple(act for act in runs if isinstance(act, Act) and act.kind not in ("shake", "project"))
-        of = of or replace(claims, acts=free, held=tuple(runs))  # type: ignore[arg-type]
-        if scene.system.rods and not of.held:
-            raise MethodError(f"no stages of {of.title} with rods are known")
-        f = {name: factor(scene, size) for name, factor in numbers.items()}
-        stepper = Stepper(
-            replace(of, uniform=claims.uniform), h=scene.step * f.get("h", 1.0), m=scene.m * f.get("m", 1.0),
-            rate=scene.bath.friction * f.get("rate", 1.0), thermal=scene.thermal * f.get("thermal", 1.0),
-            width=np.float64, freedoms=claims.freedoms(scene.n, scene.particles),
-            hold=hold(scene, size) if scene.system.rods else None,
-        )  # fmt: skip
-        # a script of draws stands for every generator
-        source = start if hasattr(start, "standard_normal") else seed(start)
-        rng = source if hasattr(source, "standard_normal") else np.random.default_rng(source)
-        right: list[Floats] = []
+    def some(number: int) -> list[Any]:
+        found = []
+        for _ in range(number):
+            uniform = np.sqrt(12) * (rng.random(scene.n) - 0.5) if claims.uniform else None
+            right.append(rng.standard_normal(scene.n) if uniform is None else uniform)
+            found.append(draws(right))
+        return found
 
-        def some(number: int) -> list[Any]:
-            found = []
-            for _ in range(number):
-                uniform = np.sqrt(12) * (rng.random(scene.n) - 0.5) if claims.uniform else None
-                right.append(rng.standard_normal(scene.n) if uniform is None else uniform)
-                found.append(draws(right, scene, size))
-            return found
+    def stiffer(terms: Sequence[Term]) -> Force:
+        right = scene.system.force_of(terms)
+        return lambda q, p: np.asarray(right(q, p) * k)
 
-        def stiffer(terms: Sequence[Term]) -> Force:
-            right = scene.system.force_of(terms)
-            return lambda q, p: np.asarray(right(q, p) * f.get("k", 1.0))
-
-        force = forces(of, scene.system, stiffer)
-        q, p = np.empty((2, scene.frames, scene.n))
-        a, b = q[0], p[0] = scene.q, scene.p
-        carried = some(of.carried)
-        with np.errstate(all="ignore"):
-            for i in range(1, scene.steps + 1):
-                taken = [*carried, *some(of.fresh)]
-                hit = None
-                if of.collides:
-                    hit = rng.random(scene.n) < f.get("collision", 1.0) * stepper.collision
-                a, b = stepper(a, b, force, taken, hit)  # type: ignore[assignment]
-                carried = taken[len(taken) - of.carried :]
-                if i % scene.every == 0:
-                    q[i // scene.every], p[i // scene.every] = a, b
-        return trajectory(scene, scheme, q, p)
-
-    return make
+    force = forces(of, scene.system, stiffer)
+    q, p = np.empty((2, scene.frames, scene.n))
+    a, b = q[0], p[0] = scene.q, scene.p
+    carried = some(of.carried)
+    with np.errstate(all="ignore"):
+        for i in range(1, scene.steps + 1):
+            taken = [*carried, *some(of.fresh)]
+            hit = rng.random(scene.n) < collision * stepper.collision if of.collides else None
+            a, b = stepper(a, b, force, taken, hit)  # type: ignore[assignment]
+            carried = taken[len(taken) - of.carried :]
+            if i % scene.every == 0:
+                q[i // scene.every], p[i // scene.every] = a, b
+    return trajectory(scene, c.scheme, q, p)
 
 
-def by(factor: Callable[[Scene, float], Any]) -> Draws:
+def by(factor: Any) -> Draws:
     """Draws that are too large by a factor."""
-    return lambda right, scene, x: right[-1] * factor(scene, x)
+    return lambda right: right[-1] * factor
 
 
 def of_rank(change: Callable[[Floats], Any]) -> Draws:
     """Draws of another distribution: of a number in (0, 1) that is uniform."""
 
-    def draws(right: Sequence[Floats], scene: Scene, x: float) -> Any:
+    def draws(right: Sequence[Floats]) -> Any:
         from scipy.special import ndtr
 
         return change(ndtr(right[-1]))
@@ -143,16 +130,6 @@ def forgetting(scene: Scene) -> float:
     """gamma h of a scene in a bath."""
     assert scene.bath is not None
     return scene.step * scene.bath.friction
-
-
-def again(period: int) -> Draws:
-    """The generator begins anew after so many draws."""
-    return lambda right, scene, x: right[(len(right) - 1) % period]
-
-
-def neighbour(right: Sequence[Floats], scene: Scene, x: float) -> Any:
-    """A part of each draw is that of the step before."""
-    return (right[-1] + x * right[-2]) / np.sqrt(1 + x * x) if len(right) > 1 else right[-1]
 
 
 class Row:
@@ -180,17 +157,3 @@ class Each:
         """One number of each."""
         self._rngs = self._rngs or [np.random.default_rng(self._seed + i) for i in range(n)]
         return np.array([rng.standard_normal() for rng in self._rngs])
-
-
-BROKEN_STAGES = {
-    "half kick lost": (B, A, O, A),
-    "old force": (B, A, O, A, Act("held", HALF)),
-    "whole drifts": (B, Act("drift", ONE), O, Act("drift", ONE), B),
-}
-"""Splittings without one of their stages, or with a wrong coefficient."""
-
-
-def jumping(scene: Scene, scheme: schemes.Scheme, size: float, seed: Any = 1) -> Trajectory:
-    """BAOAB with noise in positions too."""
-    acts = (B, A, O, A, B, Act("jump", lambda x: size * x))
-    return broken(runs=acts)(scene, scheme, size, seed)

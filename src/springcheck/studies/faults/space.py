@@ -1,4 +1,5 @@
-"""What is wrong with engines along y and z and in a periodic box, where a scene along x sees nothing."""
+"""Faults along y and z and in a periodic box, where a scene along x sees nothing; of drives, taken at another
+time or others; and of magnetic fields, Boris' rotation written out."""
 
 from __future__ import annotations
 
@@ -6,176 +7,215 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from springcheck import schemes
-from springcheck.physics.arrays import Floats, Integers, Reals
+from springcheck.physics.arrays import Floats, Reals
+from springcheck.physics.magnetic import Magnetic
 from springcheck.physics.scene import Scene
-from springcheck.physics.terms import Spring
+from springcheck.physics.terms import Drive, Spring
 from springcheck.physics.trajectory import Trajectory
-from springcheck.studies.faults.seeded import half_step
+from springcheck.studies.faults.seeded import Case, Fault, each, half_step, single
 from springcheck.studies.faults.steppers import State, Step, textbook
 
-
-def _on(scene: Scene, axis: str) -> NDArray[np.bool_]:
-    """Which coordinates of a scene lie along an axis (n,)."""
-    return np.asarray(scene.all_places % 3 == "xyz".index(axis))
+FRAMES = ("step-defect", "closed-form")
 
 
-def stiffer(axis: str) -> Callable[[Scene, float], Scene]:
+def stiffer(c: Case, axis: str) -> Scene:
     """Springs too stiff by a fraction along one axis."""
-
-    def change(scene: Scene, size: float) -> Scene:
-        factor = np.where(_on(scene, axis), 1 + size, 1.0)
-        return scene.derived(terms=tuple(term.scaled(factor[term.particles[0]]) for term in scene.terms))
-
-    return change
+    factor = np.where(c.on(axis), 1 + c.x, 1.0)
+    return c.scene.derived(terms=tuple(term.scaled(factor[term.particles[0]]) for term in c.scene.terms))
 
 
-def heavier(axis: str) -> Callable[[Scene, float], Scene]:
-    """Masses too large by a fraction along one axis."""
-    return lambda scene, size: scene.derived(m=scene.m * (1 + size * _on(scene, axis)))
+def swapped(c: Case, x: Reals, one: int, other: int) -> Floats:
+    """Numbers of coordinates (..., n) with two axes exchanged."""
+    order = np.arange(c.scene.n)
+    order[c.axes[one]], order[c.axes[other]] = c.axes[other], c.axes[one]
+    return np.asarray(x[..., order], np.float64)
 
 
-def along(axis: str, change: Callable[[Reals], Reals]) -> Callable[[Scene, schemes.Scheme, float], Step]:
-    """Another force along one axis."""
-
-    def broken(scene: Scene, scheme: schemes.Scheme, size: float) -> Step:
-        right, on = scene.system.force, _on(scene, axis)
-
-        def force(q: Reals, p: Reals) -> Reals:
-            f = right(q, p)
-            return np.where(on, change(f), f)
-
-        return textbook(scene, scheme, force=force)
-
-    return broken
+def turned(c: Case, x: Reals, to: Reals, part: float) -> Floats:
+    """Vectors (..., n) and so much of others at right angles to them, in the plane of x and y."""
+    out, (i, j, _) = x.astype(np.float64), c.axes
+    out[..., i] -= part * to[..., j]
+    out[..., j] += part * to[..., i]
+    return out
 
 
-def _by_axis(scene: Scene) -> Integers:
-    """The coordinates along x, y and z of particles that move in space (3, particles), or of none."""
-    found = [np.flatnonzero(_on(scene, axis)) for axis in "xyz"]
-    return np.array(found) if len({len(one) for one in found}) == 1 else np.empty((3, 0), np.int64)
-
-
-def swapped_axes(scene: Scene, scheme: schemes.Scheme, size: float) -> Step:
-    """The force along y acts along z, and the other way round."""
-    right, (_, y, z) = scene.system.force, _by_axis(scene)
-    order = np.arange(scene.n)
-    order[y], order[z] = z, y
-    return textbook(scene, scheme, force=lambda q, p: right(q, p)[..., order])
-
-
-def momenta_swapped(scene: Scene, size: float, run: Trajectory) -> Trajectory:
-    """Momenta in another order of the axes."""
-    x, y, _ = _by_axis(scene)
-    p = run.p.copy()
-    p[:, x], p[:, y] = run.p[:, y], run.p[:, x]
-    return replace(run, p=p)
-
-
-def torque(scene: Scene, scheme: schemes.Scheme, size: float) -> Step:
-    """A force z x q beside that of the springs, in units of the first stiffness."""
-    right, (x, y, _) = scene.system.force, _by_axis(scene)
-    k = float(scene.system.hessian_diagonal(scene.q)[0])
-
-    def force(q: Reals, p: Reals) -> Reals:
-        f = right(q, p).copy()
-        f[..., x] -= size * k * q[..., y]
-        f[..., y] += size * k * q[..., x]
-        return f
-
-    return textbook(scene, scheme, force=force)
-
-
-def rotated(scene: Scene, size: float, i: int, state: State) -> State:
-    """Momenta turned in the plane of x and y."""
-    (q, p), (x, y, _) = state, _by_axis(scene)
-    turned = p.copy()
-    turned[x], turned[y] = p[x] - size * p[y], p[y] + size * p[x]
-    return q, turned
-
-
-def wrapped(scene: Scene, size: float, run: Trajectory) -> Trajectory:
+def wrapped(c: Case, r: Trajectory) -> Trajectory:
     """Positions along y in a box of half of their span."""
-    box = max(float(np.ptp(run.q)) / 2, 1e-300)
-    return replace(run, q=np.where(_on(scene, "y"), run.q - box * np.round(run.q / box), run.q))
+    box = max(float(np.ptp(r.q)) / 2, 1e-300)
+    return replace(r, q=np.where(c.on("y"), r.q - box * np.round(r.q / box), r.q))
 
 
-def nearest_image(scene: Scene, scheme: schemes.Scheme, size: float) -> Step:
+def nearest_image(c: Case, f: Reals, q: Reals, p: Reals) -> Reals:
     """The force of the nearest image of the wall, in a box of the amplitude."""
-    right, box = scene.system.force, 1.5 * float(np.max(scene.system.amplitudes[0]))
-    return textbook(scene, scheme, force=lambda q, p: right(q - box * np.round(q / box), p))
+    box = 1.5 * float(np.max(c.scene.system.amplitudes[0]))
+    return c.force(q - box * np.round(q / box), p)
 
 
-def late_z(scene: Scene, size: float, run: Trajectory) -> Trajectory:
-    """Momenta along z half a step early."""
-    return replace(run, p=np.where(_on(scene, "z"), half_step(scene, -1, run).p, run.p))
+AXES = each(
+    Fault("stiff-y", "forces along y are too large", moves=lambda c: stiffer(c, "y"), size=1e-11),
+    Fault("stiff-z-alone",
+          "forces along z are too large, along which nothing moves until the scene is turned",
+          ("orientation",), moves=lambda c: stiffer(c, "z"), size=1e-12),
+    Fault("heavy-y", "the mass along y is too large, as in a mass matrix that is not isotropic",
+          moves=lambda c: c.scene.derived(m=c.scene.m * (1 + c.x * c.on("y"))), size=1e-11),
+    Fault("flat", "forces along z are left out",
+          force=lambda c, f, q, p: np.where(c.on("z"), 0 * f, f)),
+    Fault("flat-turned", "forces along y are left out, along which nothing moves until the scene is turned",
+          ("orientation",), force=lambda c, f, q, p: np.where(c.on("y"), 0 * f, f)),
+    Fault("mirrored-y", "the force along y has the wrong sign",
+          force=lambda c, f, q, p: np.where(c.on("y"), -f, f)),
+    Fault("single-z", "forces along z in single precision", FRAMES,
+          force=lambda c, f, q, p: np.where(c.on("z"), single(f), f)),
+    Fault("swapped-axes", "the force along y acts along z, and that along z along y",
+          force=lambda c, f, q, p: swapped(c, f, 1, 2)),
+    Fault("velocity-order", "the momenta are written in the order y, x, z",
+          ("start", "step-defect", "angular-momentum"),
+          reports=lambda c, r: replace(r, p=swapped(c, r.p, 0, 1))),
+    Fault("torque", "a force at right angles to the position turns the orbit",
+          ("step-defect", "angular-momentum"), size=1e-11, force=lambda c, f, q, p: turned(
+              c, f, q, c.x * float(c.scene.system.hessian_diagonal(c.scene.q)[0]))),
+    Fault("coriolis", "momenta turn a little at every step, as in a rotating frame", FRAMES,
+          after=lambda c, i, q, p: (q, turned(c, p, p, c.x)), size=1e-12),
+    Fault("wrapped", "positions along y are wrapped into a box", FRAMES, reports=wrapped),
+    Fault("nearest-image", "the force is that of the nearest image in a box that the orbit leaves", FRAMES,
+          force=nearest_image),
+    Fault("late-z", "the momentum along z is that of half a step before", FRAMES,
+          reports=lambda c, r: replace(r, p=np.where(c.on("z"), half_step(c, -1, r).p, r.p))),
+    Fault("still-z", "the position along z is written as it was at the start",
+          reports=lambda c, r: replace(r, q=np.where(c.on("z"), r.q[0], r.q))),
+    Fault("planar-friction", "momenta along x and y lose a fraction at every step, along z they do not",
+          ("step-defect", "angular-momentum"), size=1e-12,
+          after=lambda c, i, q, p: (q, np.where(c.on("z"), p, p * (1 - c.x)))),
+    caught_by=(*FRAMES, "angular-momentum"),
+)  # fmt: skip
+AXES = tuple(one if "orientation" in one.caught_by else replace(one, scene="orbit") for one in AXES)
+"""What a turn shows stands on a line."""
 
 
-def still_z(scene: Scene, size: float, run: Trajectory) -> Trajectory:
-    """Positions along z as at the start."""
-    return replace(run, q=np.where(_on(scene, "z"), run.q[0], run.q))
-
-
-def planar_friction(scene: Scene, size: float, i: int, state: State) -> State:
-    """Friction along x and y alone."""
-    q, p = state
-    return q, np.where(_on(scene, "z"), p, p * (1 - size))
-
-
-def pair_in_a_box(name: str) -> Scene:
-    """Two particles in the plane, their bond across two borders of a box at the start, which drift."""
-    return Scene(
-        m=np.array([3.7, 3.7, 1.3, 1.3]),
-        q=np.array([4.0, 0.2, 4.3, -0.1]),
-        p=np.array([2.9, -0.7, 0.4, -1.1]),
-        places=np.array([0, 1, 3, 4]),
-        terms=(Spring(a=np.array([0, 1]), b=np.array([2, 3]), k=np.array([2.9, 2.9]), rest=np.zeros(2)),),
-        box=(4.1, 3.3, 5.7),
-        step=0.1,
-        steps=200,
-        name=name,
-    )
-
-
-def _crossed(scene: Scene, q: Reals) -> Reals:
+def crossed(scene: Scene, q: Reals) -> Reals:
     """Borders of the box that positions (..., n) have crossed, counted from the box; none without one."""
     return np.zeros_like(q) if scene.box is None else np.floor(q / scene.periods)
 
 
-def imaged(nearest: Callable[[Reals, Floats], Reals]) -> Callable[[Scene, schemes.Scheme, float], Step]:
-    """Bonds between positions that are put back into the box: nearest(difference, box) instead of the one
-    that is."""
-
-    def broken(scene: Scene, scheme: schemes.Scheme, size: float) -> Step:
-        right, box = scene.system.force, scene.periods
-        bonds = [term for term in scene.terms if isinstance(term, Spring) and scene.box]
-
-        def force(q: Reals, p: Reals) -> Reals:
-            x, y = q - box * _crossed(scene, q), q.copy()
-            for term in bonds:
-                y[..., term.b] = q[..., term.a] + nearest(x[..., term.b] - x[..., term.a], box[term.a])
-            return right(y, p)
-
-        return textbook(scene, scheme, force=force)
-
-    return broken
+def imaged(c: Case, q: Reals, p: Reals, nearest: Callable[[Reals, Floats], Reals]) -> Reals:
+    """The force on bonds between positions that are put back into the box: nearest(difference, box) instead
+    of the one that is."""
+    box, y = c.scene.periods, q.copy()
+    x = q - box * crossed(c.scene, q)
+    for term in c.scene.terms:
+        if isinstance(term, Spring) and c.scene.box:
+            y[..., term.b] = q[..., term.a] + nearest(x[..., term.b] - x[..., term.a], box[term.a])
+    return c.force(y, p)
 
 
-def swapped_images(scene: Scene, size: float, run: Trajectory) -> Trajectory:
+def swapped_images(c: Case, r: Trajectory) -> Trajectory:
     """Positions of particles in a plane, unwrapped along each axis by the image counts of the other."""
-    if scene.box is None:
-        return run
-    crossed = _crossed(scene, run.q)
-    crossed -= crossed[:1]
-    other = crossed.reshape(len(crossed), -1, 2)[..., ::-1].reshape(crossed.shape)
-    return replace(run, q=run.q + (other - crossed) * scene.periods)
+    if c.scene.box is None:
+        return r
+    count = crossed(c.scene, r.q)
+    count -= count[:1]
+    other = count.reshape(len(count), -1, 2)[..., ::-1].reshape(count.shape)
+    return replace(r, q=r.q + (other - count) * c.scene.periods)
 
 
-def late_images(scene: Scene, size: float, run: Trajectory) -> Trajectory:
+def late_images(c: Case, r: Trajectory) -> Trajectory:
     """Positions unwrapped by the image counts of the frame before."""
-    crossed = _crossed(scene, run.q)
-    crossed[1:] -= crossed[:-1].copy()
-    crossed[0] = 0
-    return replace(run, q=run.q - crossed * scene.periods)
+    count = crossed(c.scene, r.q)
+    return replace(r, q=r.q - np.diff(count, axis=0, prepend=count[:1]) * c.scene.periods)
+
+
+BOX = each(
+    Fault("far-image", "a bond across the border of a periodic box pulls the long way round",
+          force=lambda c, f, q, p: imaged(c, q, p, lambda d, box: d)),
+    Fault("image-to-the-right", "the image of a bond's end is the next one to the right, not the nearest",
+          force=lambda c, f, q, p: imaged(c, q, p, lambda d, box: d - box * np.floor(d / box))),
+    Fault("cubic-box", "images along y are as far apart as those along x",
+          force=lambda c, f, q, p: imaged(c, q, p, lambda d, box: d - box[0] * np.round(d / box[0]))),
+    Fault("swapped-images", "borders crossed along x are counted along y, and those along y along x",
+          reports=swapped_images),
+    Fault("late-image", "a border that is crossed is counted a frame later", reports=late_images),
+    caught_by=(*FRAMES, "border"), scene="box",
+)  # fmt: skip
+
+
+def late(c: Case, part: float) -> Step:
+    """The drive is taken later by this part of the step."""
+    return textbook(c.scene, c.scheme, clock=lambda i: ((i + part) * c.scene.step, 1.0))
+
+
+def held(c: Case) -> Step:
+    """The drive of the step's start is held over all of its stages."""
+    return textbook(c.scene, c.scheme, clock=lambda i: (i * c.scene.step, 0.0))
+
+
+def other(scene: Scene, change: Callable[[Drive], Drive]) -> Scene:
+    """With every drive changed."""
+    return replace(scene, terms=tuple(change(x) if isinstance(x, Drive) else x for x in scene.terms))
+
+
+DRIVES = each(
+    Fault("late-drive", "the drive is taken later by a part of the step",
+          textbook=lambda c: late(c, c.x), size=1e-9),
+    Fault("held-drive", "the drive of the step's start is held over its stages", textbook=held),
+    Fault("drive-of-the-step-before", "the drive is that of the step before, as of a callback that is late",
+          textbook=lambda c: late(c, -1.0)),
+    Fault("drive-phase", "the phase of the drive has the wrong sign",
+          moves=lambda c: other(c.scene, lambda d: replace(d, phase=-d.phase))),
+    Fault("drive-over-mass", "the amplitude of the drive is divided by the mass",
+          moves=lambda c: other(
+              c.scene, lambda d: replace(d, amplitude=d.amplitude * (1 / c.scene.m)))),
+    Fault("drive-in-degrees", "the phase of the drive is taken for degrees",
+          moves=lambda c: other(c.scene, lambda d: replace(d, phase=d.phase * (np.pi / 180)))),
+    Fault("drive-in-cycles", "the angular frequency of the drive is taken for cycles in a unit of time",
+          moves=lambda c: other(c.scene, lambda d: replace(d, frequency=d.frequency * (2 * np.pi)))),
+    caught_by=(*FRAMES, "drive"), scene="driven",
+)  # fmt: skip
+
+
+def cayley(t: float, v: complex) -> complex:
+    """Boris' rotation by -2 atan(t), in a form without functions."""
+    return v * (1 - 1j * t) / (1 + 1j * t)
+
+
+def turning(
+    c: Case, q: Floats, p: Floats, turn: Callable[[float, complex], complex] = cayley, *, first: float = 0.5,
+    mass: bool = True,
+) -> State:  # fmt: skip
+    """Boris' scheme with another turn, of the tangent of half the angle and v_x + i v_y; with another part of
+    the kick before it; or with a field not over the mass."""
+    m, h = float(c.scene.m[0]), c.scene.step
+    term = next((term for term in c.scene.terms if isinstance(term, Magnetic)), None)
+    if term is None:
+        return c.right(0, q, p)
+    q = q + h / 2 * p / m
+    kick = h * c.scene.system.potential_force(q, p)
+    x, y = (p + first * kick) / m
+    v = turn(float(term.strength[0]) * h / 2 / (m if mass else 1), complex(x, y))
+    p = m * np.array([v.real, v.imag]) + (1 - first) * kick
+    return q + h / 2 * p / m, p
+
+
+FIELDS = each(
+    Fault("field-sign", "the field turns velocities the other way",
+          step=lambda c, i, q, p: turning(c, q, p, lambda t, v: cayley(-t, v))),
+    Fault("field-half-angle", "the field turns velocities by half of the angle",
+          step=lambda c, i, q, p: turning(c, q, p, lambda t, v: v * (1 - 1j * t) / abs(1 + 1j * t))),
+    Fault("field-exact-angle", "the field turns velocities by Omega h, not by 2 atan(Omega h/2)",
+          step=lambda c, i, q, p: turning(c, q, p, lambda t, v: v * np.exp(-2j * t))),
+    Fault("field-gains-speed", "the field is a force at the start of the step: the speed grows",
+          step=lambda c, i, q, p: turning(c, q, p, lambda t, v: v * (1 - 2j * t))),
+    Fault("field-loses-speed", "the second half of the rotation is left out, and its denominator is not",
+          step=lambda c, i, q, p: turning(c, q, p, lambda t, v: v / (1 + 1j * t))),
+    Fault("field-speed", "the rotation loses a part of the speed",
+          step=lambda c, i, q, p: turning(c, q, p, lambda t, v: cayley(t, v) * (1 - c.x)), size=1e-12),
+    Fault("field-strength", "the field is too strong",
+          step=lambda c, i, q, p: turning(c, q, p, lambda t, v: cayley(t * (1 + c.x), v)), size=1e-12),
+    Fault("field-over-mass", "the field is not divided by the mass",
+          step=lambda c, i, q, p: turning(c, q, p, mass=False)),
+    Fault("field-after-kick", "the whole kick comes before the rotation",
+          step=lambda c, i, q, p: turning(c, q, p, first=1.0)),
+    Fault("field-before-kick", "the whole kick comes after the rotation",
+          step=lambda c, i, q, p: turning(c, q, p, first=0.0)),
+    caught_by=("step-defect", "gyration"), scheme="boris", scene="field",
+)  # fmt: skip

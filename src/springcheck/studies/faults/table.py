@@ -1,7 +1,6 @@
-"""The faults: data over `seeded`.  Most are bugs that integrators have shipped with.
+"""The faults, a row each.  Most are bugs that integrators have shipped with.
 
 The sized ones are relative errors; the smallest size that a check still sees is its detection limit.
-`caught_by` names checks that must reject a fault at the size given here: a test holds them to it.
 """
 
 from __future__ import annotations
@@ -10,311 +9,281 @@ from dataclasses import replace
 
 import numpy as np
 
-from springcheck.physics.rods import Rods
-from springcheck.studies.faults import fields, rigid, seeded, space
-from springcheck.studies.faults.fields import FIELDS
+from springcheck import schemes
+from springcheck.physics import exact
+from springcheck.physics.arrays import Arithmetic, Floats, Reals
+from springcheck.physics.trajectory import Outcome, Trajectory
 from springcheck.studies.faults.heat import OF_NOISE, RODS_IN_BATHS, THERMAL_STEPS
-from springcheck.studies.faults.rigid import Rattle
-from springcheck.studies.faults.seeded import Fault, Make
+from springcheck.studies.faults.rigid import RIGID
+from springcheck.studies.faults.seeded import Case, Fault, braked, each, half_step, shifted, single
+from springcheck.studies.faults.space import AXES, BOX, DRIVES, FIELDS
+from springcheck.studies.faults.steppers import State, Step, energies, record, textbook, trajectory
 from springcheck.studies.faults.varying import VARYING
 
 STEP = ("step-defect", "propagator")
 MOTION = ("step-defect", "closed-form", "frequency", "propagator")
+FRAMES = ("step-defect", "closed-form")
+KEPT = ("step-defect", "shadow-energy", "determinant", "symplecticity")
 
 PARAMETERS = (
-    Fault("stiffness", "every spring is too stiff",
-          MOTION, seeded.moving(lambda s, x: s.system.scaled(1 + x)), size=1e-12),
-    Fault("mass", "every mass is too large",
-          MOTION, seeded.moving(lambda s, x: replace(s, m=s.m * (1 + x))), size=1e-12),
-    Fault("step", "every step is too long",
-          MOTION, seeded.moving(lambda s, x: replace(s, step=s.step * (1 + x))), size=1e-12),
-    Fault("rest", "rest points are moved, relative to the amplitude",
-          STEP, seeded.moving(seeded.shifted), size=1e-12),
-    Fault("start-momentum", "the initial momenta are too large",
-          ("start", "closed-form", "shadow-energy"),
-          seeded.moving(lambda s, x: replace(s, p=s.p * (1 + x))), size=1e-12),
-    Fault("start-position",
-          "the initial positions are too large, and row 0 is reported as it was asked for",
-          ("step-defect", "closed-form"),
-          seeded.reported_start(lambda s, x: replace(s, q=s.q * (1 + x))), size=1e-12),
-    Fault("kcal", "kJ per kcal written 4.814 for 4.184",
-          (*MOTION, "order"), seeded.moving(lambda s, x: s.system.scaled(4.814 / 4.184))),
-    Fault("time-unit", "time unit 48.89 for 48.88821 (fs in units of A, u and kcal/mol)",
-          MOTION, seeded.moving(lambda s, x: replace(s, step=s.step * 48.89 / 48.88821))),
-    Fault("stiffness-in-single", "stiffness kept in single precision: 2.9 becomes 2.9000000954",
-          STEP, seeded.moving(lambda s, x: s.system.in_single)),
-    Fault("unsigned-step", "the size of the step is taken: backward runs go forward",
-          ("mirror",), seeded.moving(lambda s, x: replace(s, step=abs(s.step)))),
+    *each(
+        Fault("stiffness", "every spring is too stiff", moves=lambda c: c.scene.system.scaled(1 + c.x)),
+        Fault("mass", "every mass is too large", moves=lambda c: replace(c.scene, m=c.scene.m * (1 + c.x))),
+        Fault("step", "every step is too long",
+              moves=lambda c: replace(c.scene, step=c.scene.step * (1 + c.x))),
+        Fault("rest", "rest points are moved, relative to the amplitude", STEP,
+              moves=lambda c: shifted(c.scene, c.x)),
+        Fault("start-momentum", "the initial momenta are too large",
+              ("start", "closed-form", "shadow-energy"),
+              moves=lambda c: replace(c.scene, p=c.scene.p * (1 + c.x))),
+        Fault("start-position",
+              "the initial positions are too large, and row 0 is reported as it was asked for", FRAMES,
+              moves=lambda c: replace(c.scene, q=c.scene.q * (1 + c.x)),
+              reports=lambda c, r: replace(r, q=np.vstack([c.scene.q, r.q[1:]]))),
+        caught_by=MOTION, size=1e-12,
+    ),
+    Fault("kcal", "kJ per kcal written 4.814 for 4.184", (*MOTION, "order"),
+          moves=lambda c: c.scene.system.scaled(4.814 / 4.184)),
+    Fault("time-unit", "time unit 48.89 for 48.88821 (fs in units of A, u and kcal/mol)", MOTION,
+          moves=lambda c: replace(c.scene, step=c.scene.step * 48.89 / 48.88821)),
+    Fault("stiffness-in-single", "stiffness kept in single precision: 2.9 becomes 2.9000000954", STEP,
+          moves=lambda c: c.scene.system.in_single),
+    Fault("unsigned-step", "the size of the step is taken: backward runs go forward", ("mirror",),
+          moves=lambda c: replace(c.scene, step=abs(c.scene.step))),
 )  # fmt: skip
 
-FORCES = (
-    Fault("friction", "momenta lose a fraction at every step",
-          ("step-defect", "shadow-energy", "determinant", "symplecticity", "rounding-bias"),
-          seeded.following(seeded.braked), size=1e-12),
-    Fault("heating", "positions gain a fraction at every step",
-          ("step-defect", "shadow-energy", "determinant", "symplecticity", "rounding-bias"),
-          seeded.following(lambda s, x, i, z: (z[0] * (1 + x), z[1])), size=1e-12),
+
+def unpaired(c: Case, f: Reals, q: Reals, p: Reals) -> Reals:
+    """What springs do to their second particle is too large."""
+    for term in c.scene.terms:
+        if term.kind == "potential":
+            np.subtract.at(f, term.particles[-1], c.x * term.pull(q))
+    return f
+
+
+def stale(c: Case, f: Reals, q: Reals, p: Reals) -> Reals:
+    """The force comes from a buffer one step old."""
+    c.kept.append(f)
+    return c.kept.pop(0) if len(c.kept) > 1 else f
+
+
+FORCES = each(
+    Fault("friction", "momenta lose a fraction at every step", (*KEPT, "rounding-bias"),
+          after=braked, size=1e-12),
+    Fault("heating", "positions gain a fraction at every step", (*KEPT, "rounding-bias"),
+          after=lambda c, i, q, p: (q * (1 + c.x), p), size=1e-12),
     Fault("constant-force", "a constant force, in units of the largest at the start",
-          STEP, seeded.pulling(lambda top, x, f: f + x * top), size=1e-12),
+          force=lambda c, f, q, p: f + c.x * c.largest, size=1e-12),
     Fault("anharmonic", "springs stiffen with the square of their stretch",
-          STEP, seeded.pulling(lambda top, x, f: f * (1 + x * (f / top) ** 2)), size=1e-12),
+          force=lambda c, f, q, p: f * (1 + c.x * (f / c.largest) ** 2), size=1e-12),
     Fault("action-not-reaction", "the force of a spring on its second particle is too large",
-          ("step-defect", "momentum"), seeded.stepping(seeded.unpaired), size=1e-12, scene="chain"),
+          ("step-defect", "momentum"), force=unpaired, size=1e-12, scene="chain"),
     Fault("fixed-point-force", "undeclared fixed-point force, a fraction of the largest at the start",
-          STEP, seeded.pulling(lambda top, x, f: np.trunc(f / (x * top)) * (x * top)), size=2.0**-32),
+          force=lambda c, f, q, p: np.trunc(f / (c.x * c.largest)) * (c.x * c.largest), size=2.0**-32),
     Fault("small-forces-dropped", "forces below a fraction of the largest are taken for none",
-          ("step-defect",),
-          seeded.pulling(lambda top, x, f: np.where(np.abs(f) < x * top, 0.0, f)), size=1e-3,
-              scene="long spring"),
-    Fault("capped-force", "forces are cut off at 0.9 of the largest at the start",
-          ("step-defect", "closed-form"),
-          seeded.pulling(lambda top, x, f: np.clip(f, -0.9 * top, 0.9 * top))),
-    Fault("single-force", "forces in single precision",
-          STEP, seeded.pulling(lambda top, x, f: seeded.single(f))),
-    Fault("stale-force", "forces come from a buffer one step old",
-          ("step-defect", "closed-form"), seeded.stepping(seeded.stale_force), scheme="semi-implicit-euler"),
+          ("step-defect",), force=lambda c, f, q, p: np.where(np.abs(f) < c.x * c.largest, 0.0, f), size=1e-3,
+          scene="long spring"),
+    Fault("capped-force", "forces are cut off at 0.9 of the largest at the start", FRAMES,
+          force=lambda c, f, q, p: np.clip(f, -0.9 * c.largest, 0.9 * c.largest)),
+    Fault("single-force", "forces in single precision", force=lambda c, f, q, p: single(f)),
+    Fault("stale-force", "forces come from a buffer one step old", FRAMES,
+          force=stale, scheme="semi-implicit-euler"),
+    caught_by=STEP,
 )  # fmt: skip
+
+
+def verlet(
+    c: Case, q: Floats, p: Floats, *, mass: float | None = None, first: float = 0.5, second: float = 0.5,
+    old: bool = False,
+) -> State:  # fmt: skip
+    """Velocity Verlet with other coefficients, another mass in its drift, or the old force in its second
+    kick."""
+    h, m, f = c.scene.step, mass or c.scene.m, c.force(q, p)
+    p = p + first * h * f
+    q = q + h * (p / m)
+    return q, np.asarray(p + second * h * (f if old else c.force(q, p)), np.float64)
+
+
+def swapped_halves(c: Case, i: int, q: Floats, p: Floats) -> State:
+    """h/2 where h*h/2 belongs, in the position form of velocity Verlet."""
+    h, m, f = c.scene.step, c.scene.m, c.force(q, p)
+    q = np.asarray(q + h * (p / m) + h / 2 * (f / m), np.float64)
+    return q, np.asarray(p + h / 2 * (f + c.force(q, p)), np.float64)
+
+
+def one_iteration(c: Case, i: int, q: Floats, p: Floats) -> State:
+    """Implicit Euler by one fixed-point iteration instead of a solution."""
+    h, m = c.scene.step, c.scene.m
+    p = np.asarray(p + h * c.force(q + h * (p / m), p), np.float64)
+    return q + h * (p / m), p
+
+
+def coefficient(c: Case, size: float) -> Step:
+    """The second coefficient of a splitting is wrong in a digit."""
+    (a, x), (b, y), *rest = c.scheme.stages
+    wrong = str(np.longdouble(schemes.number(y, np.longdouble)) * (1 + np.longdouble(size)))
+    return textbook(c.scene, replace(c.scheme, stages=((a, x), (b, wrong), *rest)))
+
+
+def last_of_1000(i: int) -> bool:
+    """Whether a step is the last of a thousand."""
+    return i % 1000 == 999
+
+
+def rescaled(c: Case, i: int, q: Floats, p: Floats) -> State:
+    """A thermostat left on: momenta scaled so that the energy stays what it was."""
+    system = c.scene.system
+    kinetic = system.kinetic_energy(p)
+    wanted = system.energy(c.scene.q, c.scene.p) - (system.energy(q, p) - kinetic)
+    return (q, p * float(np.sqrt(wanted / kinetic))) if kinetic > 0 and wanted > 0 else (q, p)
+
+
+def significant(x: Floats, size: float) -> Floats:
+    """Rounded to a relative spacing, like text of so many digits."""
+    with np.errstate(divide="ignore"):
+        unit = np.where(x == 0, 1, 10 ** np.floor(np.log10(np.abs(np.where(x == 0, 1, x))))) * size
+    return np.asarray(np.round(x / unit) * unit)
+
 
 STEPS = (
-    Fault("unequal-half-kicks", "the first half kick is too large, the second too small",
-          STEP,
-          seeded.by_hand(lambda q, p, f, h, m, x: seeded.verlet(q, p, f, h, m, 0.5 * (1 + x), 0.5 * (1 - x))),
+    Fault("unequal-half-kicks", "the first half kick is too large, the second too small", STEP,
+          step=lambda c, i, q, p: verlet(c, q, p, first=0.5 * (1 + c.x), second=0.5 * (1 - c.x)),
           size=1e-12),
-    Fault("coefficient", "the second coefficient of a fourth-order splitting is wrong",
-          ("step-defect",), seeded.stepping(seeded.coefficient), size=1e-12, scheme="forest-ruth"),
-    Fault("coefficient-digits", "the same, as if typed with eight digits: fourth order in name",
-          STEP, seeded.stepping(lambda s, c, x: seeded.coefficient(s, c, 3e-9)), scheme="yoshida4"),
+    Fault("coefficient", "the second coefficient of a fourth-order splitting is wrong", ("step-defect",),
+          textbook=lambda c: coefficient(c, c.x), size=1e-12, scheme="forest-ruth"),
+    Fault("coefficient-digits", "the same, as if typed with eight digits: fourth order in name", STEP,
+          textbook=lambda c: coefficient(c, 3e-9), scheme="yoshida4"),
     Fault("explicit-for-semi-implicit", "a symplectic Euler that is explicit",
           ("step-defect", "determinant", "symplecticity", "shadow-energy", "reversibility"),
-          seeded.other_scheme("explicit-euler"), scheme="semi-implicit-euler"),
-    Fault("drift-kick-for-kick-drift", "drift and kick in the other order",
-          ("step-defect", "propagator", "shadow-energy"),
-          seeded.other_scheme("semi-implicit-euler-drift-kick"), scheme="semi-implicit-euler"),
+          runs="explicit-euler", scheme="semi-implicit-euler"),
+    Fault("drift-kick-for-kick-drift", "drift and kick in the other order", (*STEP, "shadow-energy"),
+          runs="semi-implicit-euler-drift-kick", scheme="semi-implicit-euler"),
     Fault("first-order", "velocity Verlet in name, semi-implicit Euler in fact",
-          ("step-defect", "propagator", "order", "order-anharmonic"),
-          seeded.other_scheme("semi-implicit-euler")),
+          (*STEP, "order", "order-anharmonic"), runs="semi-implicit-euler"),
     Fault("position-for-velocity-verlet",
           "position Verlet under the name of velocity Verlet: same order, same frequency",
-          ("step-defect", "propagator", "shadow-energy"), seeded.other_scheme("position-verlet")),
-    Fault("one-iteration", "implicit Euler by one iteration instead of a solution",
-          ("step-defect", "propagator", "determinant"),
-          seeded.by_hand(seeded.one_iteration), scheme="implicit-euler"),
-    Fault("momentum-for-velocity", "dq/dt = p; a mass of 1 hides it",
-          (*MOTION, "order"), seeded.by_hand(lambda q, p, f, h, m, x: seeded.verlet(q, p, f, h, 1.0))),
-    Fault("swapped-halves", "h/2 where h*h/2 belongs",
-          ("step-defect", "determinant", "order"), seeded.by_hand(seeded.swapped_halves)),
-    Fault("lost-half", "0*5 for 0.5: the first half kick is none",
-          ("step-defect", "frequency", "order"),
-          seeded.by_hand(lambda q, p, f, h, m, x: seeded.verlet(q, p, f, h, m, first=0.0))),
+          (*STEP, "shadow-energy"), runs="position-verlet"),
+    Fault("one-iteration", "implicit Euler by one iteration instead of a solution", (*STEP, "determinant"),
+          step=one_iteration, scheme="implicit-euler"),
+    Fault("momentum-for-velocity", "dq/dt = p; a mass of 1 hides it", (*MOTION, "order"),
+          step=lambda c, i, q, p: verlet(c, q, p, mass=1.0)),
+    Fault("swapped-halves", "h/2 where h*h/2 belongs", ("step-defect", "determinant", "order"),
+          step=swapped_halves),
+    Fault("lost-half", "0*5 for 0.5: the first half kick is none", ("step-defect", "frequency", "order"),
+          step=lambda c, i, q, p: verlet(c, q, p, first=0.0)),
     Fault("old-second-kick", "the second half kick uses the force of the first",
           ("step-defect", "determinant", "shadow-energy", "order", "order-anharmonic"),
-          seeded.by_hand(seeded.old_second_kick)),
-    Fault("skipped-step", "every 1000th step is left out",
-          ("step-defect", "frequency"), seeded.repeated(1000, 0), scene="long spring"),
-    Fault("doubled-step", "every 1000th step is taken twice",
-          ("step-defect", "frequency"), seeded.repeated(1000, 2), scene="long spring"),
+          step=lambda c, i, q, p: verlet(c, q, p, old=True)),
+    Fault("skipped-step", "every 1000th step is left out", ("step-defect", "frequency"),
+          step=lambda c, i, q, p: (q, p) if last_of_1000(i) else c.right(i, q, p), scene="long spring"),
+    Fault("doubled-step", "every 1000th step is taken twice", ("step-defect", "frequency"),
+          after=lambda c, i, q, p: c.right(i, q, p) if last_of_1000(i) else (q, p), scene="long spring"),
     Fault("thermostat", "momenta are scaled at every step so that the energy stays",
-          ("step-defect", "determinant", "reversibility"), seeded.following(seeded.rescaled)),
-    Fault("centre-of-mass-removal", "the total momentum is taken away every tenth step",
-          ("step-defect", "closed-form"),
-          seeded.following(lambda s, x, i, z: (z[0], z[1] - (i % 10 == 9) * s.m / np.sum(s.m) *
-              np.sum(z[1])))),
-    Fault("restart", "one restart, half way, from text rounded to a relative spacing",
-          ("step-defect", "closed-form"), seeded.following(seeded.restarted), size=1e-7),
+          ("step-defect", "determinant", "reversibility"), after=rescaled),
+    Fault("centre-of-mass-removal", "the total momentum is taken away every tenth step", FRAMES,
+          after=lambda c, i, q, p: (
+              q, p - (i % 10 == 9) * c.scene.m / np.sum(c.scene.m) * np.sum(p))),
+    Fault("restart", "one restart, half way, from text rounded to a relative spacing", FRAMES,
+          after=lambda c, i, q, p: (
+              (q, p) if i != c.scene.steps // 2 else (significant(q, c.x), significant(p, c.x))), size=1e-7),
 )  # fmt: skip
 
+
+def towards_zero(c: Case, i: int, q: Floats, p: Floats) -> State:
+    """Every result is rounded towards zero: no step is off by more than one unit in the last place."""
+    start = q.astype(np.longdouble), p.astype(np.longdouble)
+    wide = schemes.step(c.scheme, *start, h=c.scene.step, m=c.scene.m, force=c.force)
+    near = [np.asarray(x, np.float64) for x in wide]
+    a, b = (np.where(np.abs(y) > np.abs(x), np.nextafter(y, 0), y) for x, y in zip(wide, near, strict=True))
+    return a, b
+
+
 ARITHMETIC = (
-    Fault("single-state", "positions and momenta kept in single precision",
-          STEP, seeded.following(lambda s, x, i, z: (seeded.single(z[0]), seeded.single(z[1])))),
-    Fault("decimal-state", "momenta rounded to a decimal spacing at every step",
-          STEP, seeded.following(lambda s, x, i, z: (z[0], seeded.significant(z[1], x))), size=1e-9),
+    Fault("single-state", "positions and momenta kept in single precision", STEP,
+          after=lambda c, i, q, p: (single(q), single(p))),
+    Fault("decimal-state", "momenta rounded to a decimal spacing at every step", STEP,
+          after=lambda c, i, q, p: (q, significant(p, c.x)), size=1e-9),
     Fault("cut-off", "every result is cut off instead of rounded: no step is off by more than one rounding",
-          ("rounding-bias", "rounding-growth"), seeded.stepping(seeded.towards_zero)),
-    Fault("noise", "noise in the momenta: no two runs are equal",
-          ("step-defect", "repeatability"), seeded.stepping(seeded.random), size=1e-12),
-    Fault("single-in-name", "says single precision and computes in double",
-          ("arithmetic",), seeded.claims_single),
+          ("rounding-bias", "rounding-growth"), step=towards_zero),
+    Fault("noise", "noise in the momenta: no two runs are equal", ("step-defect", "repeatability"),
+          after=lambda c, i, q, p: (
+              q, p * (1 + c.x * np.random.default_rng().standard_normal(len(p)))), size=1e-12),
+    Fault("single-in-name", "says single precision and computes in double", ("arithmetic",),
+          reports=lambda c, r: replace(
+              r, arithmetic=Arithmetic(name="single", state=2.0**-24, force=2.0**-24))),
 )  # fmt: skip
+
+
+def kept_force(c: Case, f: Reals, q: Reals, p: Reals) -> Reals:
+    """The force is kept while no position has moved by more than a part of the start's farthest."""
+    if not c.kept or np.max(np.abs(q - c.kept[0])) > c.x * float(np.max(np.abs(c.scene.q))):
+        c.kept[:] = [q, f]
+    return np.asarray(c.kept[1])
+
+
+def swapped_frames(c: Case, r: Trajectory) -> Trajectory:
+    """The two frames in the middle have changed places."""
+    order = np.arange(len(r.t))
+    middle = slice(len(order) // 2, len(order) // 2 + 2)
+    order[middle] = order[middle][::-1]
+    return replace(r, q=r.q[order], p=r.p[order])
+
+
+def given_up(c: Case, r: Trajectory) -> Trajectory:
+    """The run ends half-way."""
+    half = slice(len(r.t) // 2)
+    return replace(r.at(half), outcome=Outcome(status="stopped", step=(half.stop - 1) * r.every))
+
+
+def late_start(c: Case) -> Trajectory:
+    """The first frame is the state after the first step."""
+    return record(c.scene, c.scheme, c.right, start=c.right(0, c.scene.q, c.scene.p))
+
 
 REPORTS = (
     Fault("early-momenta", "momenta of half a step before, reported as synchronised",
-          ("step-defect", "shadow-energy"), seeded.reporting(lambda s, x, r: seeded.half_step(s, -1, r))),
+          ("step-defect", "shadow-energy"), reports=lambda c, r: half_step(c, -1, r)),
     Fault("late-momenta", "momenta of half a step after, reported as synchronised",
-          ("step-defect", "shadow-energy"), seeded.reporting(lambda s, x, r: seeded.half_step(s, 1, r))),
-    Fault("delayed-momenta", "momenta one frame behind the positions",
-          ("step-defect", "closed-form"),
-          seeded.reporting(lambda s, x, r: replace(r, p=np.concatenate([r.p[:1], r.p[:-1]])))),
-    Fault("late-start", "the first frame is the state after the first step",
-          ("start", "closed-form"), seeded.late_start),
-    Fault("swapped-frames", "two frames have changed places",
-          ("step-defect", "closed-form"), seeded.reporting(seeded.swapped_frames)),
-    Fault("length-unit", "positions are reported too large",
-          ("start", "step-defect", "closed-form"),
-          seeded.reporting(lambda s, x, r: replace(r, q=r.q * (1 + x))), size=1e-12),
-    Fault("single-file", "states are written in single precision",
-          ("step-defect",),
-          seeded.reporting(lambda s, x, r: replace(r, q=seeded.single(r.q), p=seeded.single(r.p)))),
-    Fault("text-file", "states are written with so many digits",
-          ("step-defect", "closed-form"),
-          seeded.reporting(lambda s, x, r: replace(r, q=seeded.significant(r.q, x),
-              p=seeded.significant(r.p, x))), size=1e-9),
-    Fault("accumulated-time", "times are summed up step by step",
-          ("times",), seeded.reporting(seeded.accumulated)),
-    Fault("time-stamps", "times are stamped too late",
-          ("times",), seeded.reporting(lambda s, x, r: replace(r, t=r.t * (1 + x))), size=1e-12),
-    Fault("half-step-energy", "energies are computed from momenta half a step early",
-          ("energies",), seeded.reporting(seeded.half_step_energy, again=False)),
+          ("step-defect", "shadow-energy"), reports=lambda c, r: half_step(c, 1, r)),
+    Fault("delayed-momenta", "momenta one frame behind the positions", FRAMES,
+          reports=lambda c, r: replace(r, p=np.concatenate([r.p[:1], r.p[:-1]]))),
+    Fault("late-start", "the first frame is the state after the first step", ("start", "closed-form"),
+          late_start),
+    Fault("swapped-frames", "two frames have changed places", FRAMES, reports=swapped_frames),
+    Fault("length-unit", "positions are reported too large", ("start", *FRAMES),
+          reports=lambda c, r: replace(r, q=r.q * (1 + c.x)), size=1e-12),
+    Fault("single-file", "states are written in single precision", ("step-defect",),
+          reports=lambda c, r: replace(r, q=single(r.q), p=single(r.p))),
+    Fault("text-file", "states are written with so many digits", FRAMES,
+          reports=lambda c, r: replace(r, q=significant(r.q, c.x), p=significant(r.p, c.x)), size=1e-9),
+    Fault("accumulated-time", "times are summed up step by step", ("times",), reports=lambda c, r: replace(
+        r, t=np.concatenate([[0.0], np.cumsum(np.full(len(r.t) - 1, r.step * r.every))]))),
+    Fault("time-stamps", "times are stamped too late", ("times",),
+          reports=lambda c, r: replace(r, t=r.t * (1 + c.x)), size=1e-12),
+    Fault("half-step-energy", "energies are computed from momenta half a step early", ("energies",),
+          reports=lambda c, r: replace(r, energy=energies(
+              c.scene, r.q, np.asarray(r.p - c.scene.step / 2 * c.force(r.q, r.p), np.float64)))),
     Fault("kept-force", "forces are kept while no position moves by more than a part of its start",
-          ("step-defect", "company"), seeded.stepping(seeded.kept_force), size=0.01),
-    Fault("off-axis", "particles leave their line",
-          ("line",), seeded.reporting(lambda s, x, r: replace(r, off_axis=x)), size=1e-12),
-    Fault("gives-up", "half of the frames, and no reason why the run has stopped there",
-          ("grid",), seeded.reporting(seeded.given_up, again=False)),
-)  # fmt: skip
-
-SPACE = ("step-defect", "closed-form", "angular-momentum")
-
-_MOTION_CHECKS = ("step-defect", "closed-form")
-
-AXES = (
-    Fault("stiff-y", "forces along y are too large",
-          SPACE, seeded.moving(space.stiffer("y")), size=1e-11, scene="orbit"),
-    Fault("stiff-z-alone",
-          "forces along z are too large, along which nothing moves until the scene is turned",
-          ("orientation",), seeded.moving(space.stiffer("z")), size=1e-12),
-    Fault("heavy-y", "the mass along y is too large, as in a mass matrix that is not isotropic",
-          SPACE, seeded.moving(space.heavier("y")), size=1e-11, scene="orbit"),
-    Fault("flat", "forces along z are left out",
-          SPACE, seeded.stepping(space.along("z", lambda f: 0 * f)), scene="orbit"),
-    Fault("flat-turned", "forces along y are left out, along which nothing moves until the scene is turned",
-          ("orientation",), seeded.stepping(space.along("y", lambda f: 0 * f))),
-    Fault("mirrored-y", "the force along y has the wrong sign",
-          SPACE, seeded.stepping(space.along("y", lambda f: -f)), scene="orbit"),
-    Fault("single-z", "forces along z in single precision",
-          ("step-defect", "closed-form"),
-          seeded.stepping(space.along("z", seeded.single)), scene="orbit"),
-    Fault("swapped-axes", "the force along y acts along z, and that along z along y",
-          SPACE, seeded.stepping(space.swapped_axes), scene="orbit"),
-    Fault("velocity-order", "the momenta are written in the order y, x, z",
-          ("start", "step-defect", "angular-momentum"), seeded.reporting(space.momenta_swapped),
-          scene="orbit"),
-    Fault("torque", "a force at right angles to the position turns the orbit",
-          ("step-defect", "angular-momentum"), seeded.stepping(space.torque), size=1e-11, scene="orbit"),
-    Fault("coriolis", "momenta turn a little at every step, as in a rotating frame",
-          ("step-defect", "closed-form"), seeded.following(space.rotated), size=1e-12, scene="orbit"),
-    Fault("wrapped", "positions along y are wrapped into a box",
-          ("step-defect", "closed-form"), seeded.reporting(space.wrapped), scene="orbit"),
-    Fault("nearest-image", "the force is that of the nearest image in a box that the orbit leaves",
-          ("step-defect", "closed-form"), seeded.stepping(space.nearest_image), scene="orbit"),
-    Fault("late-z", "the momentum along z is that of half a step before",
-          ("step-defect", "closed-form"), seeded.reporting(space.late_z), scene="orbit"),
-    Fault("still-z", "the position along z is written as it was at the start",
-          SPACE, seeded.reporting(space.still_z), scene="orbit"),
-    Fault("planar-friction", "momenta along x and y lose a fraction at every step, along z they do not",
-          ("step-defect", "angular-momentum"), seeded.following(space.planar_friction), size=1e-12,
-          scene="orbit"),
-)  # fmt: skip
-
-_OF_DRIVES, _AT_BORDERS = (*_MOTION_CHECKS, "drive"), (*_MOTION_CHECKS, "border")
-
-DRIVES = (
-    Fault("late-drive", "the drive is taken later by a part of the step",
-          _OF_DRIVES, seeded.stepping(fields.late), size=1e-9, scene="driven"),
-    Fault("held-drive", "the drive of the step's start is held over its stages",
-          _OF_DRIVES, seeded.stepping(fields.held), scene="driven"),
-    Fault("drive-of-the-step-before", "the drive is that of the step before, as of a callback that is late",
-          _OF_DRIVES, seeded.stepping(lambda s, k, x: fields.late(s, k, -1.0)), scene="driven"),
-    Fault("drive-phase", "the phase of the drive has the wrong sign",
-          _OF_DRIVES, seeded.moving(lambda s, x: fields.other(s, phase=-1)), scene="driven"),
-    Fault("drive-over-mass", "the amplitude of the drive is divided by the mass",
-          _OF_DRIVES, seeded.moving(lambda s, x: fields.other(s, amplitude=1 / s.m)), scene="driven"),
-    Fault("drive-in-degrees", "the phase of the drive is taken for degrees",
-          _OF_DRIVES, seeded.moving(lambda s, x: fields.other(s, phase=np.pi / 180)), scene="driven"),
-    Fault("drive-in-cycles", "the angular frequency of the drive is taken for cycles in a unit of time",
-          _OF_DRIVES, seeded.moving(lambda s, x: fields.other(s, frequency=2 * np.pi)), scene="driven"),
+          ("step-defect", "company"), force=kept_force, size=0.01),
+    Fault("off-axis", "particles leave their line", ("line",),
+          reports=lambda c, r: replace(r, off_axis=c.x), size=1e-12),
+    Fault("gives-up", "half of the frames, and no reason why the run has stopped there", ("grid",),
+          reports=given_up),
 )  # fmt: skip
 
 
-def _rod(
-    name: str, about: str, by: tuple[str, ...], make: Make, size: float | None = None,
-    scene: seeded.Where = "dumbbell",
-) -> Fault:  # fmt: skip
-    return Fault(name, about, ("step-defect", *by), make, size=size, scene=scene)
+def slow_time(c: Case, part: float) -> Trajectory:
+    """The exact solution, too slow by this part of its time."""
+    steps = np.arange(c.scene.frames) * c.scene.every
+    q, p = (np.asarray(x, np.float64) for x in exact.true_motion(c.scene, steps, c.scene.step * (1 - part)))
+    return trajectory(c.scene, c.scheme, q, p, tolerance=c.scene.tolerance, calls=2 * c.scene.steps)
 
-
-_LENGTH, _ALONG, _TURNED = ("rod-length",), ("rod-velocity",), ("angular-momentum", "turn")
-
-RIGID = (
-    _rod("rod-after-drift", "SHAKE along the rod as it lies after the drift, not before",
-         _TURNED, Rattle(way=lambda r, s, older: s).make),
-    _rod("rod-a-step-late", "SHAKE along the rod as it lay a step before",
-         _TURNED, Rattle(way=lambda r, s, older: older).make),
-    _rod("rod-in-single", "the rod's direction is kept in single precision",
-         ("angular-momentum",), Rattle(way=lambda r, s, older: seeded.single(r)).make),
-    _rod("rod-one-iteration", "one iteration of SHAKE instead of a solution",
-         _LENGTH, Rattle(solve=rigid.iterated(1)).make),
-    _rod("rod-one-too-few", "two iterations of SHAKE, one too few",
-         _LENGTH, Rattle(solve=rigid.iterated(2)).make),
-    _rod("rod-tolerance", "SHAKE ends at a tolerance that it does not declare",
-         _LENGTH, Rattle(solve=rigid.until).make, 1e-9),
-    _rod("rod-not-projected", "velocities along the rod are left as SHAKE leaves them",
-         _ALONG, Rattle(across=lambda r, s: None).make),
-    _rod("rod-projected-early", "velocities are projected along the rod as it lay before the drift",
-         _ALONG, Rattle(across=lambda r, s: r).make),
-    _rod("rod-no-impulse", "SHAKE moves the ends and leaves their velocities",
-         _TURNED, Rattle(impulse=0.0).make),
-    _rod("rod-impulse", "the impulse of SHAKE is too large", _TURNED, Rattle(impulse=None).make, 1e-10),
-    _rod("rod-reduced-mass", "the multiplier has the mean of the masses for the reduced one",
-         _LENGTH, Rattle(reduced=lambda m: float(np.mean(m))).make),
-    _rod("rod-masses-ignored", "SHAKE moves both ends by as much, whatever their masses",
-         ("momentum", "angular-momentum"),
-         Rattle(ends=lambda push, m: (-push, push), reduced=lambda m: 0.5).make),
-    _rod("rod-one-end", "the rod pulls at one end alone",
-         ("momentum",), Rattle(ends=lambda push, m: (0 * push, push), reduced=lambda m: 1.0).make),
-    _rod("rod-leak", "what the rod does to its ends is rounded to single precision, each by itself",
-         ("momentum", "rod-length"), Rattle(ends=rigid.leaking).make),
-    _rod("rod-length", "the rod is too long", ("rod-length", "turn"), Rattle(longer=True).make, 1e-6),
-    _rod("rod-as-spring", "a stiff spring for a rod",
-         ("rod-length", "rod-velocity"), seeded.stepping(rigid.stiff)),
-    _rod("rod-every-other", "the rod holds at every second step alone",
-         ("rod-length", "turn"), seeded.stepping(rigid.every_other)),
-    _rod("rod-half-steps", "momenta are those of SHAKE half a step later",
-         _ALONG, seeded.reporting(rigid.late_halves)),
-    _rod("rod-restart", "a restart in the middle takes momenta of half a step before for those of the step",
-         _ALONG, seeded.stepping(rigid.restarted_halves)),
-    _rod("triangle-one-by-one", "each rod of a triangle is solved by itself, as if it had no company",
-         ("rod-length", "rod-velocity"), rigid.solved(rigid.OneByOne), scene="triangle"),
-    _rod("triangle-one-iteration", "one iteration of Newton's for the rods of a triangle",
-         _LENGTH, rigid.solved(rigid.Once), scene="triangle"),
-    _rod("triangle-masses-alike", "the rods of a triangle take its masses for equal",
-         _ALONG, rigid.solved(Rods, lambda m: np.full_like(m, np.mean(m))), scene="triangle"),
-    _rod("triangle-friction", "momenta of a turning triangle lose a fraction at every step",
-         ("turn", "angular-momentum"), seeded.following(seeded.braked), 1e-10, scene="triangle"),
-    _rod("rod-friction", "momenta of a turning rod lose a fraction at every step",
-         ("turn", "angular-momentum"), seeded.following(seeded.braked), 1e-10),
-)  # fmt: skip
-
-BOX = (
-    Fault("far-image", "a bond across the border of a periodic box pulls the long way round",
-          _AT_BORDERS, seeded.stepping(space.imaged(lambda d, box: d)), scene="box"),
-    Fault("image-to-the-right", "the image of a bond's end is the next one to the right, not the nearest",
-          _AT_BORDERS, seeded.stepping(space.imaged(lambda d, box: d - box * np.floor(d / box))),
-          scene="box"),
-    Fault("cubic-box", "images along y are as far apart as those along x",
-          _AT_BORDERS, seeded.stepping(space.imaged(lambda d, box: d - box[0] * np.round(d / box[0]))),
-          scene="box"),
-    Fault("swapped-images", "borders crossed along x are counted along y, and those along y along x",
-          _AT_BORDERS, seeded.reporting(space.swapped_images), scene="box"),
-    Fault("late-image", "a border that is crossed is counted a frame later",
-          _AT_BORDERS, seeded.reporting(space.late_images), scene="box"),
-)  # fmt: skip
 
 ADAPTIVE = (
     Fault("deaf-to-tolerance", "an adaptive solver whose error does not follow its tolerance",
-          ("convergence", "tolerance"),
-          seeded.adaptive(lambda tolerance, size: size), size=1e-9, scheme="adams"),
+          ("convergence", "tolerance"), lambda c: slow_time(c, c.x), size=1e-9, scheme="adams"),
     Fault("loose-tolerance", "an adaptive solver that multiplies its tolerance",
-          ("tolerance",), seeded.adaptive(lambda tolerance, size: size * tolerance), size=1e6, scheme="bdf"),
+          ("tolerance",), lambda c: slow_time(c, c.x * c.scene.tolerance), size=1e6, scheme="bdf"),
 )  # fmt: skip
 
 FAULTS: tuple[Fault, ...] = (
