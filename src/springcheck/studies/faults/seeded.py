@@ -21,6 +21,8 @@ Where: TypeAlias = Literal[
     "wide bath", "hot rod", "varying steps",
 ]  # fmt: skip
 
+FRAME_CHECKS = ("step-defect", "closed-form")
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Case:

@@ -13,10 +13,8 @@ from springcheck.physics.magnetic import Magnetic
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Drive, Spring
 from springcheck.physics.trajectory import Trajectory
-from springcheck.studies.faults.seeded import Case, Fault, each, half_step, single
+from springcheck.studies.faults.seeded import FRAME_CHECKS, Case, Fault, each, half_step, single
 from springcheck.studies.faults.steppers import State, Step, textbook
-
-FRAMES = ("step-defect", "closed-form")
 
 
 def stiffer(c: Case, axis: str) -> Scene:
@@ -65,7 +63,7 @@ AXES = each(
           ("orientation",), force=lambda c, f, q, p: np.where(c.on("y"), 0 * f, f)),
     Fault("mirrored-y", "the force along y has the wrong sign",
           force=lambda c, f, q, p: np.where(c.on("y"), -f, f)),
-    Fault("single-z", "forces along z in single precision", FRAMES,
+    Fault("single-z", "forces along z in single precision", FRAME_CHECKS,
           force=lambda c, f, q, p: np.where(c.on("z"), single(f), f)),
     Fault("swapped-axes", "the force along y acts along z, and that along z along y",
           force=lambda c, f, q, p: swapped(c, f, 1, 2)),
@@ -75,19 +73,19 @@ AXES = each(
     Fault("torque", "a force at right angles to the position turns the orbit",
           ("step-defect", "angular-momentum"), size=1e-11, force=lambda c, f, q, p: turned(
               c, f, q, c.x * float(c.scene.system.hessian_diagonal(c.scene.q)[0]))),
-    Fault("coriolis", "momenta turn a little at every step, as in a rotating frame", FRAMES,
+    Fault("coriolis", "momenta turn a little at every step, as in a rotating frame", FRAME_CHECKS,
           after=lambda c, i, q, p: (q, turned(c, p, p, c.x)), size=1e-12),
-    Fault("wrapped", "positions along y are wrapped into a box", FRAMES, reports=wrapped),
-    Fault("nearest-image", "the force is that of the nearest image in a box that the orbit leaves", FRAMES,
+    Fault("wrapped", "positions along y are wrapped into a box", FRAME_CHECKS, reports=wrapped),
+    Fault("nearest-image", "the force is that of the nearest image in a box that the orbit leaves", FRAME_CHECKS,
           force=nearest_image),
-    Fault("late-z", "the momentum along z is that of half a step before", FRAMES,
+    Fault("late-z", "the momentum along z is that of half a step before", FRAME_CHECKS,
           reports=lambda c, r: replace(r, p=np.where(c.on("z"), half_step(c, -1, r).p, r.p))),
     Fault("still-z", "the position along z is written as it was at the start",
           reports=lambda c, r: replace(r, q=np.where(c.on("z"), r.q[0], r.q))),
     Fault("planar-friction", "momenta along x and y lose a fraction at every step, along z they do not",
           ("step-defect", "angular-momentum"), size=1e-12,
           after=lambda c, i, q, p: (q, np.where(c.on("z"), p, p * (1 - c.x)))),
-    caught_by=(*FRAMES, "angular-momentum"),
+    caught_by=(*FRAME_CHECKS, "angular-momentum"),
 )  # fmt: skip
 AXES = tuple(one if "orientation" in one.caught_by else replace(one, scene="orbit") for one in AXES)
 """What a turn shows stands on a line."""
@@ -135,7 +133,7 @@ BOX = each(
     Fault("swapped-images", "borders crossed along x are counted along y, and those along y along x",
           reports=swapped_images),
     Fault("late-image", "a border that is crossed is counted a frame later", reports=late_images),
-    caught_by=(*FRAMES, "border"), scene="box",
+    caught_by=(*FRAME_CHECKS, "border"), scene="box",
 )  # fmt: skip
 
 
@@ -169,7 +167,7 @@ DRIVES = each(
           moves=lambda c: other(c.scene, lambda d: replace(d, phase=d.phase * (np.pi / 180)))),
     Fault("drive-in-cycles", "the angular frequency of the drive is taken for cycles in a unit of time",
           moves=lambda c: other(c.scene, lambda d: replace(d, frequency=d.frequency * (2 * np.pi)))),
-    caught_by=(*FRAMES, "drive"), scene="driven",
+    caught_by=(*FRAME_CHECKS, "drive"), scene="driven",
 )  # fmt: skip
 
 

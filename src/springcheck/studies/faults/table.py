@@ -15,14 +15,22 @@ from springcheck.physics.arrays import Arithmetic, Floats, Reals
 from springcheck.physics.trajectory import Outcome, Trajectory
 from springcheck.studies.faults.heat import OF_NOISE, RODS_IN_BATHS, THERMAL_STEPS
 from springcheck.studies.faults.rigid import RIGID
-from springcheck.studies.faults.seeded import Case, Fault, braked, each, half_step, shifted, single
+from springcheck.studies.faults.seeded import (
+    FRAME_CHECKS,
+    Case,
+    Fault,
+    braked,
+    each,
+    half_step,
+    shifted,
+    single,
+)
 from springcheck.studies.faults.space import AXES, BOX, DRIVES, FIELDS
 from springcheck.studies.faults.steppers import State, Step, energies, record, textbook, trajectory
 from springcheck.studies.faults.varying import VARYING
 
 STEP = ("step-defect", "propagator")
 MOTION = ("step-defect", "closed-form", "frequency", "propagator")
-FRAMES = ("step-defect", "closed-form")
 KEPT = ("step-defect", "shadow-energy", "determinant", "symplecticity")
 
 PARAMETERS = (
@@ -37,7 +45,7 @@ PARAMETERS = (
               ("start", "closed-form", "shadow-energy"),
               moves=lambda c: replace(c.scene, p=c.scene.p * (1 + c.x))),
         Fault("start-position",
-              "the initial positions are too large, and row 0 is reported as it was asked for", FRAMES,
+              "the initial positions are too large, and row 0 is reported as it was asked for", FRAME_CHECKS,
               moves=lambda c: replace(c.scene, q=c.scene.q * (1 + c.x)),
               reports=lambda c, r: replace(r, q=np.vstack([c.scene.q, r.q[1:]]))),
         caught_by=MOTION, size=1e-12,
@@ -83,10 +91,10 @@ FORCES = each(
     Fault("small-forces-dropped", "forces below a fraction of the largest are taken for none",
           ("step-defect",), force=lambda c, f, q, p: np.where(np.abs(f) < c.x * c.largest, 0.0, f), size=1e-3,
           scene="long spring"),
-    Fault("capped-force", "forces are cut off at 0.9 of the largest at the start", FRAMES,
+    Fault("capped-force", "forces are cut off at 0.9 of the largest at the start", FRAME_CHECKS,
           force=lambda c, f, q, p: np.clip(f, -0.9 * c.largest, 0.9 * c.largest)),
     Fault("single-force", "forces in single precision", force=lambda c, f, q, p: single(f)),
-    Fault("stale-force", "forces come from a buffer one step old", FRAMES,
+    Fault("stale-force", "forces come from a buffer one step old", FRAME_CHECKS,
           force=stale, scheme="semi-implicit-euler"),
     caught_by=STEP,
 )  # fmt: skip
@@ -180,10 +188,10 @@ STEPS = (
           after=lambda c, i, q, p: c.right(i, q, p) if last_of_1000(i) else (q, p), scene="long spring"),
     Fault("thermostat", "momenta are scaled at every step so that the energy stays",
           ("step-defect", "determinant", "reversibility"), after=rescaled),
-    Fault("centre-of-mass-removal", "the total momentum is taken away every tenth step", FRAMES,
+    Fault("centre-of-mass-removal", "the total momentum is taken away every tenth step", FRAME_CHECKS,
           after=lambda c, i, q, p: (
               q, p - (i % 10 == 9) * c.scene.m / np.sum(c.scene.m) * np.sum(p))),
-    Fault("restart", "one restart, half way, from text rounded to a relative spacing", FRAMES,
+    Fault("restart", "one restart, half way, from text rounded to a relative spacing", FRAME_CHECKS,
           after=lambda c, i, q, p: (
               (q, p) if i != c.scene.steps // 2 else (significant(q, c.x), significant(p, c.x))), size=1e-7),
 )  # fmt: skip
@@ -245,16 +253,16 @@ REPORTS = (
           ("step-defect", "shadow-energy"), reports=lambda c, r: half_step(c, -1, r)),
     Fault("late-momenta", "momenta of half a step after, reported as synchronised",
           ("step-defect", "shadow-energy"), reports=lambda c, r: half_step(c, 1, r)),
-    Fault("delayed-momenta", "momenta one frame behind the positions", FRAMES,
+    Fault("delayed-momenta", "momenta one frame behind the positions", FRAME_CHECKS,
           reports=lambda c, r: replace(r, p=np.concatenate([r.p[:1], r.p[:-1]]))),
     Fault("late-start", "the first frame is the state after the first step", ("start", "closed-form"),
           late_start),
-    Fault("swapped-frames", "two frames have changed places", FRAMES, reports=swapped_frames),
-    Fault("length-unit", "positions are reported too large", ("start", *FRAMES),
+    Fault("swapped-frames", "two frames have changed places", FRAME_CHECKS, reports=swapped_frames),
+    Fault("length-unit", "positions are reported too large", ("start", *FRAME_CHECKS),
           reports=lambda c, r: replace(r, q=r.q * (1 + c.x)), size=1e-12),
     Fault("single-file", "states are written in single precision", ("step-defect",),
           reports=lambda c, r: replace(r, q=single(r.q), p=single(r.p))),
-    Fault("text-file", "states are written with so many digits", FRAMES,
+    Fault("text-file", "states are written with so many digits", FRAME_CHECKS,
           reports=lambda c, r: replace(r, q=significant(r.q, c.x), p=significant(r.p, c.x)), size=1e-9),
     Fault("accumulated-time", "times are summed up step by step", ("times",), reports=lambda c, r: replace(
         r, t=np.concatenate([[0.0], np.cumsum(np.full(len(r.t) - 1, r.step * r.every))]))),
