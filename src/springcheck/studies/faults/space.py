@@ -50,7 +50,7 @@ def nearest_image(c: Case, f: Reals, q: Reals, p: Reals) -> Reals:
     return c.force(q - box * np.round(q / box), p)
 
 
-AXES = each(
+_IN_SPACE = each(
     Fault("stiff-y", "forces along y are too large", moves=lambda c: stiffer(c, "y"), size=1e-11),
     Fault("stiff-z-alone",
           "forces along z are too large, along which nothing moves until the scene is turned",
@@ -87,7 +87,7 @@ AXES = each(
           after=lambda c, i, q, p: (q, np.where(c.on("z"), p, p * (1 - c.x)))),
     caught_by=(*FRAME_CHECKS, "angular-momentum"),
 )  # fmt: skip
-AXES = tuple(one if "orientation" in one.caught_by else replace(one, scene="orbit") for one in AXES)
+AXES = tuple(one if "orientation" in one.caught_by else replace(one, scene="orbit") for one in _IN_SPACE)
 """What a turn shows stands on a line."""
 
 
@@ -177,15 +177,15 @@ def cayley(t: float, v: complex) -> complex:
 
 
 def turning(
-    c: Case, q: Floats, p: Floats, turn: Callable[[float, complex], complex] = cayley, *, first: float = 0.5,
-    mass: bool = True,
+    c: Case, i: int, q: Floats, p: Floats, turn: Callable[[float, complex], complex] = cayley, *,
+    first: float = 0.5, mass: bool = True,
 ) -> State:  # fmt: skip
     """Boris' scheme with another turn, of the tangent of half the angle and v_x + i v_y; with another part of
     the kick before it; or with a field not over the mass."""
     m, h = float(c.scene.m[0]), c.scene.step
     term = next((term for term in c.scene.terms if isinstance(term, Magnetic)), None)
     if term is None:
-        return c.right(0, q, p)
+        return c.right(i, q, p)
     q = q + h / 2 * p / m
     kick = h * c.scene.system.potential_force(q, p)
     x, y = (p + first * kick) / m
@@ -196,24 +196,24 @@ def turning(
 
 FIELDS = each(
     Fault("field-sign", "the field turns velocities the other way",
-          step=lambda c, i, q, p: turning(c, q, p, lambda t, v: cayley(-t, v))),
+          step=lambda c, i, q, p: turning(c, i, q, p, lambda t, v: cayley(-t, v))),
     Fault("field-half-angle", "the field turns velocities by half of the angle",
-          step=lambda c, i, q, p: turning(c, q, p, lambda t, v: v * (1 - 1j * t) / abs(1 + 1j * t))),
+          step=lambda c, i, q, p: turning(c, i, q, p, lambda t, v: v * (1 - 1j * t) / abs(1 + 1j * t))),
     Fault("field-exact-angle", "the field turns velocities by Omega h, not by 2 atan(Omega h/2)",
-          step=lambda c, i, q, p: turning(c, q, p, lambda t, v: v * np.exp(-2j * t))),
+          step=lambda c, i, q, p: turning(c, i, q, p, lambda t, v: v * np.exp(-2j * t))),
     Fault("field-gains-speed", "the field is a force at the start of the step: the speed grows",
-          step=lambda c, i, q, p: turning(c, q, p, lambda t, v: v * (1 - 2j * t))),
+          step=lambda c, i, q, p: turning(c, i, q, p, lambda t, v: v * (1 - 2j * t))),
     Fault("field-loses-speed", "the second half of the rotation is left out, and its denominator is not",
-          step=lambda c, i, q, p: turning(c, q, p, lambda t, v: v / (1 + 1j * t))),
+          step=lambda c, i, q, p: turning(c, i, q, p, lambda t, v: v / (1 + 1j * t))),
     Fault("field-speed", "the rotation loses a part of the speed",
-          step=lambda c, i, q, p: turning(c, q, p, lambda t, v: cayley(t, v) * (1 - c.x)), size=1e-12),
+          step=lambda c, i, q, p: turning(c, i, q, p, lambda t, v: cayley(t, v) * (1 - c.x)), size=1e-12),
     Fault("field-strength", "the field is too strong",
-          step=lambda c, i, q, p: turning(c, q, p, lambda t, v: cayley(t * (1 + c.x), v)), size=1e-12),
+          step=lambda c, i, q, p: turning(c, i, q, p, lambda t, v: cayley(t * (1 + c.x), v)), size=1e-12),
     Fault("field-over-mass", "the field is not divided by the mass",
-          step=lambda c, i, q, p: turning(c, q, p, mass=False)),
+          step=lambda c, i, q, p: turning(c, i, q, p, mass=False)),
     Fault("field-after-kick", "the whole kick comes before the rotation",
-          step=lambda c, i, q, p: turning(c, q, p, first=1.0)),
+          step=lambda c, i, q, p: turning(c, i, q, p, first=1.0)),
     Fault("field-before-kick", "the whole kick comes after the rotation",
-          step=lambda c, i, q, p: turning(c, q, p, first=0.0)),
+          step=lambda c, i, q, p: turning(c, i, q, p, first=0.0)),
     caught_by=("step-defect", "gyration"), scheme="boris", scene="field",
 )  # fmt: skip
