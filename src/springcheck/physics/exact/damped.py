@@ -62,10 +62,9 @@ def prepare(system: System[Any]) -> _Flow | None:
     scale = np.where(held, w, free)
     A = np.zeros((2 * n, 2 * n), np.longdouble)
     A[:n, n:], A[n:, :n], A[n:, n:] = np.diag(scale), -np.diag(w), -friction
-    u, v = modes.about_centres(system.q, system.p)
     # the larger of the two bounds |A|**2 by their product
     rate = np.sqrt(np.max(np.sum(np.abs(A), axis=0)) * np.max(np.sum(np.abs(A), axis=1)))
-    return _Flow(modes, A, np.concatenate([scale * u, v]), scale, rate, free)
+    return _Flow(modes, A, np.concatenate([scale * modes.start.u, modes.start.v]), scale, rate, free)
 
 
 def _series(A: Extended, z: Extended, t: Extended) -> Extended:
@@ -128,11 +127,12 @@ def doubt(system: System[Any], found: _Flow, t: np.longdouble) -> States:
     velocities.
     """
     n, duration = system.n, np.abs(t)
-    size = np.sqrt(np.sum(found.start**2))
+    of_u, of_v, *_ = found.modes.start.sizes
+    size, begun = (np.sqrt(np.sum(x**2)) for x in (found.start, np.append(found.scale * of_u, of_v)))
     if t < 0:
-        size = size * np.exp(np.max(system.friction_rates) * duration)
+        size, begun = (x * np.exp(np.max(system.friction_rates) * duration) for x in (size, begun))
     last = 2 * ((2 * n) ** 2 + ROUNDINGS) * EPS * (2 + 2 * found.rate * duration)
-    known = (last + duration * np.max(found.modes.doubt / found.scale)) * size
+    known = (last + duration * np.max(found.modes.doubt / found.scale)) * size + ROUNDINGS * EPS * begun
     far = np.where(found.modes.w2 > 0, known, known * (1 + found.free * duration)) / found.scale
     y = found.modes.spread(far + ROUNDINGS * EPS * np.abs(found.modes.centre()))
     v = found.modes.spread(np.full(n, known))

@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from springcheck.physics.arrays import Extended, Integers
-from springcheck.physics.exact.normal import normal_modes
+from springcheck.physics.exact.digits import digits, exactly, extended
+from springcheck.physics.exact.normal import exact_sums, normal_modes
 from springcheck.physics.exact.response import first_difference
-from springcheck.physics.exact.well import LAST, States, Well
+from springcheck.physics.exact.well import CANCELS, LAST, States, Well
 from springcheck.physics.system import System
 
 
@@ -44,7 +45,16 @@ def prepare(system: System[Any]) -> _Planes | None:
     turn = np.zeros(system.n, np.longdouble)
     turn[a] = planes[0].parameters[0] / system.m[a].astype(np.longdouble)
     half = (modes.rate[a] + 1j * turn[a]) / 2
-    root = np.sqrt(half * half - modes.w2[a])
+    square = half * half - modes.w2[a]
+    # where a field just holds what a spring pushes away, time makes its cube of what is lost here
+    lost = CANCELS * np.abs(square) < np.abs(half * half) + np.abs(modes.w2[a])
+    if np.any(lost):
+        with digits():
+            k, _, rate = exact_sums(system.without("magnetic"), np.diagonal)
+            m, field = exactly(system.m)[a], exactly(planes[0].parameters[0])
+            real, imag = (rate[a] ** 2 - (field / m) ** 2) / 4 - k[a] / m, rate[a] * field / m / 2
+            square = np.where(lost, extended(real) + 1j * extended(imag), square)
+    root = np.sqrt(square)
     # the larger root without cancellation, the other by their product
     far = -half - np.where((half.conjugate() * root).real < 0, -root, root)
     near = np.where(far == 0, 0, modes.w2[a] / np.where(far == 0, 1, far))

@@ -183,7 +183,7 @@ def _start(system: System[Any], modes: Modes) -> Start:
         chosen = np.flatnonzero(lost)
         with digits():
             part = system.beside(system.part(chosen))
-            k, pull, rate = _sums(part, np.diagonal)
+            k, pull, rate = exact_sums(part, np.diagonal)
             m, q, p = (exactly(x) for x in (part.m, part.q, part.p))
             root = np.sqrt(m)
             for out, like, x in zip(
@@ -198,7 +198,7 @@ def _zeros(*shape: int) -> Any:
     return exactly(np.zeros(shape))
 
 
-def _sums(system: System[Any], of: Callable[[Wide], Wide]) -> tuple[Wide, Wide, Wide]:
+def exact_sums(system: System[Any], of: Callable[[Wide], Wide]) -> tuple[Wide, Wide, Wide]:
     """Stiffness, the part of its matrix `of` which is wanted; force at 0 (n,) and rates of friction (n,)."""
     zero = np.zeros(system.n, dtype=np.longdouble)
     k, force, friction = (_zeros(*shape) for shape in ((system.n, system.n), (system.n,), (system.n,)))
@@ -217,7 +217,7 @@ def _precise(system: System[Any]) -> Modes:
     """Modes in so many digits that stiff and soft ones of a small system keep all of theirs."""
     with digits():
         # sums of the terms as they stand: exact
-        k, force, rates = _sums(system, np.asarray)
+        k, force, rates = exact_sums(system, np.asarray)
     count = _digits_for(system, k)
     left = Decimal(10) ** (12 - count)
     with digits(count):

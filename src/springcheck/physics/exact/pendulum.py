@@ -129,34 +129,44 @@ class _Hung:
 
 
 def _hung(system: System[Any]) -> _Hung | None:
-    rods, weight = system.rods, np.zeros(system.n, np.longdouble)
-    for term in system.terms:
-        if isinstance(term, Weight):
-            np.add.at(weight, term.i, term.force)
+    """In more digits: near the barrier all hangs on what the energy lacks of it."""
+    rods = system.rods
     if rods is None or rods.share or any(len(ends) > 1 for ends in rods.ends) or system.n != 2 * len(rods):
         return None
-    q, shape = wide(system.q), (len(rods), 2)
-    r, v = (
-        rods.ways(q).reshape(shape),
-        rods.apart(rods.projected(q, wide(system.p)) / system.m).reshape(shape),
-    )
-    f = rods.apart(weight).reshape(shape)
-    size, length = np.hypot(*f.T), np.hypot(*r.T)
-    if np.any(size == 0):
-        return None
-    down = f / size[:, None]
-    across = np.stack([-down[:, 1], down[:, 0]], axis=1)
-    low, side, slow, fast = (np.sum(x * y, axis=1) for x in (r, v) for y in (down, across))
-    mass = 1 / wide(rods.inverse_mass)
-    w = np.sqrt(size / (mass * length))
-    half, rate = np.arctan2(side, low) / 2, (low * fast - side * slow) / (length**2 * 2 * w)
-    sine, cosine = np.sin(half), np.cos(half)
-    swing = _Swing(
-        length=wide(length), mass=wide(mass), w=wide(w), half=wide(half), sine=wide(sine),
-        cosine=wide(cosine), rate=wide(rate), m=wide(sine * sine + rate * rate),
-        m1=wide((cosine - rate) * (cosine + rate)),
+    shape = (len(rods), 2)
+    with digits():
+        at, weight = exactly(np.zeros((2, system.n)))
+        for term in system.terms:
+            if isinstance(term, Weight):
+                np.add.at(weight, term.i, exactly(term.force))
+            else:
+                at[term.particles[0]] = exactly(getattr(term, term.origin))
+        given: Any = exactly(system.q) - at, exactly(system.p), weight, exactly(system.m)
+        (x, y), (u, v), (a, b), (m, _) = (rods.apart(of).reshape(shape).T for of in given)
+        square, force = x * x + y * y, a * a + b * b
+        if np.any(force == 0):
+            return None
+        both = np.sqrt(square * force)
+        low, side, area = x * a + y * b, a * y - b * x, x * v - y * u
+        # both - |low| without its cancellation
+        sum_, less = both + np.abs(low), side * side / (both + np.abs(low))
+        down, up = (np.where(here, sum_, less) for here in (low > 0, low <= 0))
+        sine, cosine = np.sqrt(up / (2 * both)), np.sqrt(down / (2 * both))
+        rest = 2 * m * square
+        parts = {
+            "length": np.sqrt(square), "mass": m, "w": np.sqrt(both / m / square),
+            "sine": np.where(side < 0, -sine, sine), "cosine": cosine,
+            "rate": area / np.sqrt(2 * rest * both), "m1": (rest * down - area * area) / (2 * rest * both),
+        }  # fmt: skip
+        swing = {name: extended(values) for name, values in parts.items()}
+        size = np.sqrt(force)
+        start, across = extended(np.stack([x, y], axis=1)), extended(np.stack([-b / size, a / size], axis=1))
+    half, m_ = np.arctan2(swing["sine"], swing["cosine"]), swing["sine"] ** 2 + swing["rate"] ** 2
+    down = np.stack([across[:, 1], -across[:, 0]], axis=1)
+    return _Hung(
+        rods=rods, start=start.ravel(), down=down, across=across,
+        swing=_Swing(half=half, m=m_, **swing),
     )  # fmt: skip
-    return _Hung(rods=rods, start=wide(r.ravel()), down=wide(down), across=wide(across), swing=swing)
 
 
 def _hanging(system: System[Any], found: _Hung, t: Extended) -> States:

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from springcheck.physics.arrays import Extended
-from springcheck.physics.exact.well import LAST, States, Well, one_each, sums, wide
+from springcheck.physics.exact.digits import Wide, digits, exactly, extended
+from springcheck.physics.exact.well import LAST, States, Well, one_each, wide
 from springcheck.physics.rods import UNTRUE
 from springcheck.physics.system import System
 
@@ -39,36 +40,41 @@ def _swings(system: System[Any]) -> _Swing | None:
     term: Any = system.terms[0]
     if not one_each(system):
         return None
-    m, q, p = (wide(x) for x in (system.m, system.q, system.p))
-    both = np.concatenate([term.a, term.b])
-    bond = np.empty(system.n, np.int64)
-    bond[both] = np.tile(np.unique(term.number, return_inverse=True)[1], 2)
-    k, rest, d, v, one, whole = (np.zeros(system.n, np.longdouble) for _ in range(6))
-    for values, given in (
-        (k, term.k), (rest, term.rest), (d, term.stretch(q)), (v, term.stretch(p / m)),
-    ):  # fmt: skip
-        values[both] = np.tile(given, 2)
-    one[both] = np.concatenate([-m[term.b], m[term.a]])
-    whole[both] = np.tile(m[term.a] + m[term.b], 2)
+    a, b, zero = term.a, term.b, np.zeros(system.n)
+    bond = np.unique(term.number, return_inverse=True)[1]
 
-    def summed(values: Extended) -> Extended:
-        # over the axes, of which each end has all
-        return sums(bond, values) / 2
+    def summed(values: Wide) -> Wide:
+        out = exactly(zero)
+        np.add.at(out, bond, values)
+        return out[bond]
 
-    with np.errstate(all="ignore"):
-        s = np.sqrt(summed(d * d))
-        e = d / s
-        rate = summed(e * v)
-        across = np.sqrt(summed((v - rate * e) ** 2))
-        w = np.sqrt(k * whole / (m * (whole - m)))
-        most = np.hypot(s - rest, rate / w)
-        speed = np.sqrt(summed((p / m) ** 2))
-        if not np.all((k > 0) & (rest > most) & (across <= UNTRUE * speed)):
+    # ways and velocities are differences, which may be small beside what they are of
+    with digits():
+        m, q, p, k, rest = (exactly(x) for x in (system.m, system.q, system.p, term.k, term.rest))
+        whole, d, v = m[a] + m[b], q[b] - q[a], p / m
+        apart, square = v[b] - v[a], summed(d * d)
+        if np.any(square == 0) or not np.all(term.k > 0):
             return None
-    centre = q - one / whole * d
+        s = np.sqrt(square)
+        e, rate = d / s, summed(d * apart) / s
+        across, speed = summed((apart - rate * e) ** 2), summed(v[a] ** 2 + v[b] ** 2) / 2
+        rows = extended(
+            np.stack([
+                e, (m[a] * q[a] + m[b] * q[b]) / whole, (p[a] + p[b]) / whole,
+                (square - rest * rest) / (s + rest), rate, rest, np.sqrt(k * whole / m[a] / m[b]),
+                np.sqrt(across), np.sqrt(speed),
+            ])
+        )  # fmt: skip
+        share = extended(np.concatenate([-m[b], m[a]]) / np.tile(whole, 2))
+    ends = np.argsort(np.concatenate([a, b]))
+    along, centre, drift, u, rate, rest, w, across, speed = np.tile(rows, 2)[:, ends]
+    with np.errstate(all="ignore"):
+        most = np.hypot(u, rate / w)
+    if not np.all((rest > most) & (across <= UNTRUE * speed)):
+        return None
     return _Swing(
-        share=wide(one / whole), along=wide(e), centre=wide(centre), drift=wide(p / m - one / whole * v),
-        u=wide(s - rest), rate=wide(rate), rest=rest, w=wide(w), most=wide(most), across=wide(across),
+        share=share[ends], along=along, centre=centre, drift=drift, u=u, rate=rate, rest=rest, w=w,
+        most=wide(most), across=across,
     )  # fmt: skip
 
 
@@ -81,14 +87,15 @@ def _motion(system: System[Any], found: _Swing, t: Extended) -> States:
 
 def _doubt(system: System[Any], found: _Swing, t: np.longdouble) -> States:
     time, share, far = np.abs(t), np.abs(found.share), found.rest + found.most
-    # an angle at most, of what keeps its angular momentum
-    turned = found.across * time * far / (found.rest - found.most) ** 2 * far
+    near = found.rest - found.most
+    # an angle at most, of what keeps its angular momentum, and the way that its turning pushes the ends apart
+    turned = found.across * time * far / near**2 * far
+    pushed = (found.across * far / found.w) ** 2 / near**3
     phase = 2 + found.w * time
-    q = LAST * (np.abs(found.centre) + np.abs(found.drift) * time + share * far * phase) + share * turned
+    q = LAST * (np.abs(found.centre) + np.abs(found.drift) * time + share * (far + found.most * phase))
     size = np.abs(found.drift) + share * found.most * found.w * phase
-    return wide(q), wide(
-        system.m * (LAST * size + share * (found.w * turned + found.across * far / found.rest))
-    )
+    swung = found.w * (turned + pushed * phase) + found.across * far / near
+    return wide(q + share * (turned + pushed * phase)), wide(system.m * (LAST * size + share * swung))
 
 
 SWINGING = Well(key="bond", terms=frozenset({"bond"}), prepare=_swings, motion=_motion, doubt=_doubt)

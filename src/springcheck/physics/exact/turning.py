@@ -8,19 +8,18 @@ is too long, (1 - cos) x, is what pushes along its rods can balance.
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from springcheck.physics.arrays import Extended, Integers
-from springcheck.physics.exact.well import LAST, States, Well, sums, wide
+from springcheck.physics.exact.digits import Wide, digits, exactly, extended
+from springcheck.physics.exact.well import LAST, States, Well, wide
 from springcheck.physics.rods import UNTRUE, Rods
 from springcheck.physics.system import System
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Turning:
+class _Turning(NamedTuple):
     """Of each coordinate (n,): its way from the centre and velocity about it, the distance of its particle,
     the angular velocity, and the velocity of the centre."""
 
@@ -31,38 +30,45 @@ class _Turning:
     drift: Extended
 
 
-def _is_flat(places: Integers, x: Extended, v: Extended) -> bool:
-    """Whether v (n,) is w x turned by a right angle, as it is only if the axis is across all of x."""
-    z, u = np.zeros((2, int(np.max(places)) // 3 + 1, 3), np.longdouble)
-    z.reshape(-1)[places], u.reshape(-1)[places] = x, v
-    size = z @ z.T
-    return bool(np.all(np.abs(u @ u.T - size) <= UNTRUE * np.max(size)))
-
-
-def _groups(body: Integers) -> list[Integers]:
-    return [np.flatnonzero(body == one) for one in np.unique(body)]
-
-
 def _turning(system: System[Any]) -> _Turning | None:
     """None where some rods are no flat rigid body that turns about an axis across it."""
-    rods, m, places = system.rods, wide(system.m), system.scene.all_places
+    rods, places, n = system.rods, system.scene.all_places, system.scene.particles
     assert rods is not None
-    of = _bodies(rods, system.scene.particles)
+    of, at = _bodies(rods, n), np.zeros(system.n)
     if of is None:
         return None
-    body, held = of[places // 3], np.isin(places // 3, [ends[0] for ends in rods.ends if len(ends) == 1])
-    along = 3 * body + places % 3
-    p = rods.projected(wide(system.q), wide(system.p))
-    drift = np.where(held, 0, sums(along, p) / sums(along, m))
-    x = np.where(
-        held, rods.spread(rods.ways(wide(system.q))), system.q - sums(along, m * system.q) / sums(along, m)
-    )
-    v = p / m - drift
-    w = np.sqrt(sums(body, m * v * v) / sums(body, m * x * x))
-    if rods.share and not all(_is_flat(places[of], (w * x)[of], v[of]) for of in _groups(body)):
-        return None
-    reach = np.sqrt(sums(places // 3, x * x))
-    return _Turning(x=wide(x), v=wide(v), reach=reach, w=wide(w), drift=wide(drift))
+    for term in system.terms:
+        if term.origin:
+            at[term.particles[0]] = getattr(term, term.origin)
+    held = np.isin(np.arange(n), [ends[0] for ends in rods.ends if len(ends) == 1])[:, None]
+
+    def by_axes(values: Any) -> Any:
+        out = np.zeros((n, 3), values.dtype)
+        out.reshape(-1)[places] = values
+        return out
+
+    def summed(values: Wide) -> Wide:
+        out = exactly(np.zeros_like(values, np.float64))
+        np.add.at(out, of, values)
+        return out[of]
+
+    # in more digits: a body may be small beside where it is, and turn slowly beside how it moves
+    with digits():
+        q, p, m = (exactly(by_axes(x)) for x in (system.q, system.p, system.m))
+        q, m = q - exactly(by_axes(at)), np.max(m, axis=1, keepdims=True)
+        drift, centre = (np.where(held, 0 * x, summed(x) / summed(m)) for x in (p, m * q))
+        x = q - centre
+        square = np.sum(x * x, axis=1, keepdims=True)
+        turn = summed(np.cross(x, p)) / summed(m * square)
+        v, w = np.cross(turn, x), np.sqrt(np.sum(turn * turn, axis=1, keepdims=True)) + 0 * x
+        found = [extended(y).reshape(-1)[places] for y in (x, v, np.sqrt(square) + 0 * x, w, drift)]
+    if rods.share:
+        # momenta are those of such a turn
+        off = rods.projected(wide(system.q), wide(system.p)) / system.m - found[4] - found[1]
+        body, speed = of[places // 3], found[2] * found[3]
+        if any(np.max(np.abs(off[body == b])) > UNTRUE / 2 * np.max(speed[body == b]) for b in set(body)):
+            return None
+    return _Turning(*found)
 
 
 def _bodies(rods: Rods, particles: int) -> Integers | None:

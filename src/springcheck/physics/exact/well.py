@@ -8,7 +8,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from springcheck.physics.arrays import EPS, Extended, Integers, Reals
+from springcheck.physics.arrays import EPS, Extended
 from springcheck.physics.system import System
 
 States: TypeAlias = tuple[Extended, Extended]
@@ -42,13 +42,6 @@ class Well:
 def wide(x: Any) -> Extended:
     """Doubles in extended precision."""
     return np.asarray(x, np.longdouble)
-
-
-def sums(of: Integers, values: Reals) -> Extended:
-    """Sums of values (n,) over all with the same number, where each of them stands."""
-    out = np.zeros(int(np.max(of)) + 1, np.longdouble)
-    np.add.at(out, of, values)
-    return np.asarray(out[of])
 
 
 def one_each(system: System[Any]) -> bool:

@@ -1,0 +1,173 @@
+"""Exact solutions where what decides a motion is small beside what it is taken of, against mpmath.
+
+A position far from 0, a rod slow beside its drift, an energy close to a barrier's: each lost digits that its
+stated error did not count.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mpmath as mp
+import numpy as np
+import pytest
+
+from springcheck.physics.scene import Scene
+from springcheck.physics.terms import (
+    Damping,
+    Magnetic,
+    RadialSpring,
+    Rod,
+    Spring,
+    WallRod,
+    WallSpring,
+    Weight,
+)
+
+
+def exactly(x: Any) -> Any:
+    high = float(x)
+    return mp.mpf(high) + mp.mpf(float(np.longdouble(x) - np.longdouble(high)))
+
+
+def over_stated(scene: Scene, q: Any, p: Any) -> float:
+    """The largest error after one step, in units of the stated one; that is small beside the motion."""
+    solution = scene.system.solution
+    assert solution is not None
+    found = np.concatenate(solution(np.array([1]), scene.step), axis=1)[0]
+    stated = np.concatenate(solution.doubt(scene.step))
+    assert np.all(stated < 1e-6 * np.max(np.abs(found)))
+    return max(
+        float(abs(exactly(x) - y) / exactly(most)) for x, y, most in zip(found, (*q, *p), stated, strict=True)
+    )
+
+
+def pair(ma: float, mb: float, drift: np.ndarray, way: np.ndarray, speed: np.ndarray, at: np.ndarray) -> Any:
+    """A pair in a plane: the fields of its scene, and its centre and the velocity of that, exactly."""
+    q = np.concatenate([at, at + way])
+    p = np.concatenate([ma * drift, mb * (drift + speed)])
+    a, b = exactly(ma), exactly(mb)
+    centre = [(a * exactly(x) + b * exactly(y)) / (a + b) for x, y in zip(q[:2], q[2:], strict=True)]
+    moves = [(exactly(x) + exactly(y)) / (a + b) for x, y in zip(p[:2], p[2:], strict=True)]
+    fields = {"m": [ma, ma, mb, mb], "q": q, "p": p, "places": [0, 1, 3, 4], "steps": 1}
+    return fields, centre, moves, (a, b)
+
+
+def ends(centre: Any, moves: Any, masses: Any, t: Any, way: Any, speed: Any) -> tuple[list[Any], list[Any]]:
+    (a, b), q, p = masses, [], []
+    for m, share in ((a, -b / (a + b)), (b, a / (a + b))):
+        q += [centre[i] + moves[i] * t + share * way[i] for i in (0, 1)]
+        p += [m * (moves[i] + share * speed[i]) for i in (0, 1)]
+    return q, p
+
+
+@pytest.mark.parametrize("off", [0.0, 2.0**-50, -(2.0**-50), 1e-9])
+def test_a_field_that_just_holds_a_charge_on_a_hill(off: float) -> None:
+    m, k, t = 0.35, -1402.41, 85.1
+    strength = 2 * np.sqrt(-k * m) * (1 + off)
+    q, p = (np.array([1.7, -0.3]), np.array([0.2, 0.4])) if off >= 0 else (np.array([1.0, 2.0]), np.zeros(2))
+    scene = Scene(
+        m=[m, m], q=q, p=p, places=[0, 1], step=t, steps=1,
+        terms=(Magnetic(a=[0], b=[1], strength=[strength]), WallSpring(i=[0, 1], k=[k, k], at=[0.7, 0.7])),
+    )  # fmt: skip
+    with mp.workdps(120):
+        half = 1j * exactly(strength) / exactly(m) / 2
+        s, time = mp.sqrt(half * half - exactly(k) / exactly(m)), exactly(t)
+        even, odd = mp.cosh(s * time), mp.sinh(s * time) / s if s else time
+        z, v = mp.mpc(*(exactly(x) - exactly(0.7) for x in q)), mp.mpc(*map(exactly, p)) / exactly(m)
+        turn = mp.exp(-half * time)
+        where = turn * (z * (even + half * odd) + v * odd)
+        speed = turn * (v * (even - half * odd) - z * exactly(k) / exactly(m) * odd) * exactly(m)
+        at = exactly(0.7)
+        # 29 times the stated error
+        assert over_stated(scene, (where.real + at, where.imag + at), (speed.real, speed.imag)) < 0.5
+
+
+@pytest.mark.parametrize("share", [1 - 2.0**-50, 1 + 1e-10, 1 - 1e-7, 0.4])
+def test_a_rod_that_swings_close_to_the_very_top(share: float) -> None:
+    m, force, t = 1.7, (0.37, -2.9), 60.0
+    way = np.array([1.5, -2.0])
+    with mp.workdps(120):
+        size = mp.hypot(*map(exactly, force))
+        down = [exactly(x) / size for x in force]
+        x, y = map(exactly, way)
+        length, w = mp.mpf(2.5), mp.sqrt(size / (exactly(m) * mp.mpf(2.5)))
+        half = mp.atan2(down[0] * y - down[1] * x, x * down[0] + y * down[1]) / 2
+        rate = float(2 * w * mp.cos(half)) * share
+        p = m * rate * np.array([-way[1], way[0]])
+        scene = Scene(
+            m=[m, m], q=way + np.array([3.0, 4.0]), p=p, places=[0, 1], step=t, steps=1,
+            terms=(WallRod(i=[0, 1], length=[2.5, 2.5], at=[3.0, 4.0]),
+                   Weight(i=[0, 1], force=force, at=[0.0, 0.0])),
+        )  # fmt: skip
+        r = (x * exactly(p[1]) - y * exactly(p[0])) / (exactly(m) * length**2) / (2 * w)
+        energy, u = mp.sin(half) ** 2 + r * r, w * exactly(t)
+        if energy < 1:
+            root = mp.sqrt(energy)
+            u += mp.ellipf(mp.atan2(mp.sin(half) / root, r / root), energy)
+            turned, r = mp.asin(root * mp.ellipfun("sn", u, m=energy)), root * mp.ellipfun("cn", u, m=energy)
+        else:
+            root, m1 = mp.sqrt(energy), 1 / energy
+            u = u * root + mp.ellipf(half, m1)
+            turned = mp.atan2(mp.ellipfun("sn", u, m=m1), mp.ellipfun("cn", u, m=m1))
+            r = root * mp.ellipfun("dn", u, m=m1)
+        cosine, sine, speed = mp.cos(2 * turned), mp.sin(2 * turned), exactly(m) * length * 2 * w * r
+        across = [-down[1], down[0]]
+        q = [3 + i + length * (cosine * down[i] + sine * across[i]) for i in (0, 1)]
+        # of the barrier's energy they lacked a rounding in place of what they did lack
+        assert over_stated(scene, q, [speed * (cosine * across[i] - sine * down[i]) for i in (0, 1)]) < 0.5
+
+
+@pytest.mark.parametrize(("ma", "mb"), [(1.3e-4, 811.0), (811.0, 1.3e-4), (0.75, 1.25)])
+@pytest.mark.parametrize("t", [0.01, 300.0])
+def test_a_bond_that_swings_little_beside_its_length(ma: float, mb: float, t: float) -> None:
+    k, speed = 70.7, 2.0**-20
+    along = np.array([0.75, 1.0]) * speed
+    way = np.array([1.125, 1.5])
+    rest = 1.875 + 2.0**-30
+    bond = RadialSpring(a=[0, 1], b=[2, 3], k=[k] * 2, rest=[rest] * 2, number=[0, 0])
+    with mp.workdps(60):
+        fields, centre, moves, masses = pair(ma, mb, np.zeros(2), way, along, np.array([0.5, -7.0]))
+        scene = Scene(**fields, step=t, terms=(bond,))
+        a, b = masses
+        w, time = mp.sqrt(exactly(k) * (a + b) / (a * b)), exactly(t)
+        v = [exactly(x) / b - exactly(y) / a for x, y in zip(scene.p[2:], scene.p[:2], strict=True)]
+        e = [mp.mpf(3) / 5, mp.mpf(4) / 5]
+        u, rate = exactly(1.875) - exactly(rest), e[0] * v[0] + e[1] * v[1]
+        length = exactly(rest) + u * mp.cos(w * time) + rate / w * mp.sin(w * time)
+        slope = rate * mp.cos(w * time) - u * w * mp.sin(w * time)
+        q, p = ends(centre, moves, masses, time, [x * length for x in e], [x * slope for x in e])
+        assert over_stated(scene, q, p) < 1
+
+
+@pytest.mark.parametrize(("ma", "mb"), [(3072.0, 96.0), (0.1875, 256.0)])
+def test_a_rod_that_turns_slowly_beside_its_drift_far_away(ma: float, mb: float) -> None:
+    rate, t, way = 2.0**-6, 54464.6, np.array([-0.3125, 0.75])
+    drift, at = np.array([-16.0, 32.0]), np.array([-(2.0**20), 2.0**18])
+    speed = rate * np.array([-way[1], way[0]])
+    with mp.workdps(60):
+        fields, centre, moves, masses = pair(ma, mb, drift, way, speed, at)
+        scene = Scene(**fields, step=t, terms=(Rod(a=[0, 1], b=[2, 3], length=[0.8125] * 2),))
+        angle = exactly(rate) * exactly(t)
+        x, y = map(exactly, way)
+        turned = [mp.cos(angle) * x - mp.sin(angle) * y, mp.sin(angle) * x + mp.cos(angle) * y]
+        speeds = [-exactly(rate) * turned[1], exactly(rate) * turned[0]]
+        assert over_stated(scene, *ends(centre, moves, masses, exactly(t), turned, speeds)) < 0.5
+
+
+def test_friction_on_one_of_two_far_away() -> None:
+    m, k, c, t = [0.054, 0.00213], [1399.3, 286.6], 0.00047, 0.000363
+    scene = Scene(
+        m=m, q=[1e4 + 0.085, 1e4 - 0.257], p=[-0.044, -0.0003], step=t, steps=1,
+        terms=(WallSpring(i=[0], k=k[:1], at=[1e4]), Spring(a=[0], b=[1], k=k[1:], rest=[0.0]),
+               Damping(i=[1], c=[c])),
+    )  # fmt: skip
+    with mp.workdps(60):
+        (ma, mb), (ka, kb) = map(exactly, m), map(exactly, k)
+        slow = mp.matrix([
+            [0, 0, 1 / ma, 0], [0, 0, 0, 1 / mb], [-ka - kb, kb, 0, 0], [kb, -kb, 0, -exactly(c) / mb]
+        ])  # fmt: skip
+        start = mp.matrix([*(exactly(x) - 10000 for x in scene.q), *map(exactly, scene.p)])
+        end = mp.expm(slow * exactly(t), method="taylor") * start
+        # 10 times the stated error
+        assert over_stated(scene, (end[0] + 10000, end[1] + 10000), (end[2], end[3])) < 0.5
