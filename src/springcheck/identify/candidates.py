@@ -11,13 +11,13 @@ from typing import Any, TypeVar
 import numpy as np
 
 from springcheck.identify import arithmetic
+from springcheck.identify.evidence import SINGLE_ROOM, Measured
 from springcheck.identify.families import FAMILIES, title
-from springcheck.identify.fit import Map
 from springcheck.identify.hypothesis import Joint, aliases, frictionless
 from springcheck.identify.notes import LEAPFROG, hidden_friction, same_maps, untold
 from springcheck.identify.record import Record
 from springcheck.identify.result import Candidate, Explanation, Identification
-from springcheck.identify.search import SINGLE_ROOM, coincident, disagreements, numbers
+from springcheck.identify.search import coincident
 from springcheck.identify.wrong import stiffness_ratio
 from springcheck.physics.arrays import Floats
 from springcheck.schemes import SCHEMES
@@ -60,70 +60,59 @@ def _shared(rows: list[tuple[float, ...]]) -> tuple[float, ...] | None:
     return first if same else None
 
 
-def stated_stiffness(
-    record: Record, moving: list[int], plainest: Joint, stated: Floats, precision: str
-) -> tuple[bool, list[str], list[Explanation]]:
-    """Whether the stated stiffness is that of the states, notes, and what may be wrong with it."""
+def stated_stiffness(seen: Measured, plainest: Joint, precision: str, stated: Floats) -> list[Explanation]:
+    """What may be wrong with the stated stiffness, if it is not that of the states; and notes on it."""
     quantum = arithmetic.QUANTUM if precision in SINGLE_CONSTANTS else 0.0
-    against = disagreements(record, moving, plainest, stated)
-    if not against or (quantum and not disagreements(record, moving, plainest, stated, quantum)):
-        return True, [], []
+    against = seen.disagreements(plainest)
+    if not against or (quantum and not seen.disagreements(plainest, quantum=quantum)):
+        return []
     room = max(6 * part.a_error / abs(part.a) for part in plainest.parts)
-    for what, other, of_force in _single_constants(record, stated, plainest.stride):
-        if disagreements(record, moving, plainest, other, quantum if of_force else 0.0):
+    for what, other, of_force in _single_constants(seen.record, stated, plainest.stride):
+        if seen.disagreements(plainest, other, quantum if of_force else 0.0):
             continue
         # what is told from the stated one by a little only may be anything of that size
         if (quantum and of_force) or room < 0.1 * float(np.max(np.abs(other / stated - 1))):
             why = ", as GPU-type platforms keep it" if quantum else ""
-            return True, [f"the {what} is the stated one in single precision{why}"], []
-    _, stiffness, _ = numbers(record, moving, plainest)
-    j = moving[0]
+            seen.notes.append(f"the {what} is the stated one in single precision{why}")
+            return []
+    seen.notes.extend(against)
+    _, stiffness, _ = seen.numbers(plainest)
+    j, masses = seen.moving[0], seen.record.mass
     ratio = (stiffness or (math.nan,))[0] / float(stated[j])
-    mass = None if record.mass is None else float(record.mass[j])
-    meaning = stiffness_ratio(ratio, mass)
+    meaning = stiffness_ratio(ratio, None if masses is None else float(masses[j]))
     stiff = (
         f"{ratio:.9g} times as stiff as stated" if abs(ratio - 1) > 1e-6 else f"stiffer by {ratio - 1:+.1e}"
     )
     cause = f"{title(plainest.scheme)}, but of a spring {stiff}"
-    return (
-        False,
-        against,
-        [
-            Explanation(
-                cause=f"{cause}: {meaning}" if meaning else cause,
-                remedy="look at the units of the force constant, and at whether V is k/2 q**2",
-                misfit=abs(ratio - 1),
-            )
-        ],
-    )
+    remedy = "look at the units of the force constant, and at whether V is k/2 q**2"
+    cause = f"{cause}: {meaning}" if meaning else cause
+    return [Explanation(cause=cause, remedy=remedy, misfit=abs(ratio - 1))]
 
 
-def of_stated_stiffness(
-    record: Record, moving: list[int], precisions: dict[Joint, str], stated: Floats
-) -> list[Joint]:
+def of_stated_stiffness(seen: Measured, precisions: dict[Joint, str], stated: Floats) -> list[Joint]:
     """Those of several schemes, with the arithmetic that explains each, that have the stated stiffness: as it
     is, or with a constant in single precision, or the nearest; and those that have the same one as these."""
-    joints = list(precisions)
-    agreeing = [x for x in joints if not disagreements(record, moving, x, stated)] or [
-        x for x in joints if stated_stiffness(record, moving, x, stated, precisions[x])[0]
+    joints, silent = list(precisions), replace(seen, notes=[])
+    agreeing = [x for x in joints if not seen.disagreements(x)] or [
+        x for x in joints if not stated_stiffness(silent, x, precisions[x], stated)
     ]
     if not agreeing:
-        return nearest_stiffness(record, moving, joints, stated)
-    _, found, _ = numbers(record, moving, agreeing[0])
+        return nearest_stiffness(seen, joints, stated)
+    _, found, _ = seen.numbers(agreeing[0])
     if found is None:
         return agreeing
     same = stated.copy()
-    same[moving] = found
-    return agreeing + [x for x in joints if x not in agreeing and not disagreements(record, moving, x, same)]
+    same[seen.moving] = found
+    return agreeing + [x for x in joints if x not in agreeing and not seen.disagreements(x, same)]
 
 
-def nearest_stiffness(record: Record, moving: list[int], joints: list[Joint], stated: Floats) -> list[Joint]:
+def nearest_stiffness(seen: Measured, joints: list[Joint], stated: Floats) -> list[Joint]:
     """Those of several schemes whose stiffness comes nearest to the stated one, which none has: all that a
     constant in single precision or their own errors leave room for."""
     off, room = {}, {}
     for joint in joints:
-        _, stiffness, _ = numbers(record, moving, joint)
-        known = zip(moving, stiffness or (), strict=False)
+        _, stiffness, _ = seen.numbers(joint)
+        known = zip(seen.moving, stiffness or (), strict=False)
         off[joint] = max((abs(k / float(stated[j]) - 1) for j, k in known if stated[j]), default=0.0)
         room[joint] = SINGLE_ROOM + max(6 * part.a_error / abs(part.a) for part in joint.parts)
     least = min(off.values())
@@ -197,17 +186,15 @@ def common(values: Sequence[T]) -> T | None:
     return values[0] if len(set(values)) == 1 else None
 
 
-def candidates_of(
-    record: Record, moving: list[int], joint: Joint, stated: float | None = None
-) -> list[Candidate]:
+def candidates_of(seen: Measured, joint: Joint) -> list[Candidate]:
     """What a family would mean: one candidate, or one for each friction law that has its map, if it has the
     stated friction c."""
-    family = FAMILIES[joint.family]
+    family, record = FAMILIES[joint.family], seen.record
     out = []
     for law in family.laws if joint.damped else ("",):
-        omega, stiffness, friction = numbers(record, moving, joint, law)
-        if stated is not None and record.mass is not None:
-            rates = [stated / float(record.mass[j]) for j in moving]
+        omega, stiffness, friction = seen.numbers(joint, law)
+        if seen.friction is not None and record.mass is not None:
+            rates = [seen.friction / float(record.mass[j]) for j in seen.moving]
             room = [
                 8 * part.g_error * joint.stride / abs(float(record.interval))
                 + (1e-9 + 8 * record.jitter) * rate
@@ -238,14 +225,7 @@ def law_assumed(candidates: Sequence[Candidate]) -> list[str]:
     return [f"the motion is damped, and the law is an assumption: the friction c/m is {each}"] if laws else []
 
 
-def all_remarks(
-    record: Record,
-    moving: list[int],
-    maps: list[Map],
-    joints: list[Joint],
-    candidates: tuple[Candidate, ...],
-    stiffness_stated: bool,
-) -> list[str]:
+def all_remarks(seen: Measured, joints: list[Joint], candidates: tuple[Candidate, ...]) -> list[str]:
     """What is to be said beside a name: the same maps, the law of friction, turns that frames do not show."""
     out = []
     scheme = common([x.scheme for x in candidates])
@@ -253,8 +233,8 @@ def all_remarks(
         out.append(f"the same map is {LEAPFROG[scheme]}: states alone do not tell the two apart")
     damped = law_assumed(candidates)
     out += damped
-    if not (damped or record.fine):
-        most = max(hidden_friction(record, found) for found in maps)
+    if not (damped or seen.record.fine):
+        most = max(hidden_friction(seen.record, found) for found in seen.maps)
         with_it = {
             name: frictionless(name)
             for name in dict.fromkeys(x.scheme for x in candidates)
@@ -263,8 +243,8 @@ def all_remarks(
         same = [f"{name} is {', '.join(names)}" for name, names in with_it.items() if names]
         if same:
             out.append(f"a friction c/m below {most:.1e} would not show: with it {' and '.join(same)}")
-    if scheme and not damped and not stiffness_stated and scheme in SCHEMES:
-        out += same_maps(record, moving, maps, joints[0])
+    if scheme and not damped and seen.stiffness is None and scheme in SCHEMES:
+        out += same_maps(seen, joints[0])
     if any(x.turns for x in candidates):
         might = "makes" if all(x.turns for x in candidates) else "may make"
         out.append(
@@ -273,4 +253,4 @@ def all_remarks(
     if any(part.a < 0 for part in joints[0].parts):
         out.append("the spring is inverted: its stiffness is negative")
     several = len({(x.scheme, x.stride) for x in joints}) > 1
-    return out + untold(record, maps, joints, stiffness_stated=stiffness_stated) if several else out
+    return out + untold(seen, joints) if several else out

@@ -1,19 +1,103 @@
-"""What an explanation of a misfit may look at."""
+"""What hypotheses are held against, and what an explanation of a misfit may look at."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
 from springcheck.identify.compare import compare
+from springcheck.identify.families import FAMILIES, Family
 from springcheck.identify.fit import Map
-from springcheck.identify.hypothesis import FEW, Match, Terms, distinct
+from springcheck.identify.hypothesis import FEW, Joint, Match, Terms, distinct
 from springcheck.identify.record import ROUNDING, Record
 from springcheck.physics.arrays import Floats
 
 FALLS = 12.0
 """Factor by which an explanation must bring the misfit down."""
+
+
+SINGLE_ROOM = 8 * 2.0**-24
+"""Relative difference of stiffnesses that a step, a mass and a stiffness in single precision may make."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Measured:
+    """What hypotheses are held against: the oscillators of a record that can be judged, their maps, on what
+    terms these are compared, and what is stated of them."""
+
+    record: Record
+    moving: list[int]
+    maps: list[Map]
+    terms: list[Terms]
+    stiffness: Floats | None
+    """Stated, of each oscillator of the record (n,) [M/T2]."""
+    friction: float | None
+    """Stated c [M/T]."""
+    stride: int | None
+    """Steps to a frame by the stated step; -1 where it does not divide the interval."""
+    notes: list[str]
+    """Remarks, of which whoever looks at it may add some."""
+
+    def compare(self, families: tuple[Family, ...], strides: Iterable[int]) -> list[Joint]:
+        """The hypotheses that all oscillators may be of."""
+        return compare(self.maps, self.terms, families, strides)
+
+    def evidence(self, i: int) -> Evidence:
+        """What there is of one oscillator."""
+        j = self.moving[i]
+        stiffness = None if self.stiffness is None else float(self.stiffness[j])
+        return Evidence(record=self.record, j=j, found=self.maps[i], terms=self.terms[i], stiffness=stiffness)
+
+    def numbers(
+        self, chosen: Joint, law: str = ""
+    ) -> tuple[tuple[float, ...], tuple[float, ...] | None, tuple[float, ...]]:
+        """Frequency, stiffness and friction rate of each oscillator, the friction being of this law."""
+        h = float(self.record.interval) / chosen.stride
+        family = FAMILIES[chosen.family]
+        law = law or (family.laws[0] if family.laws else "")
+        omega = tuple(math.sqrt(m.a) / abs(h) if m.a > 0 else math.nan for m in chosen.parts)
+        inside = {"explicit", "implicit", "centred", "remembered"} & {kind for kind, _ in family.stages}
+        scaled = bool(family.stages) and not inside
+        friction = tuple((family.rate(law, m.friction) if scaled else m.friction) / h for m in chosen.parts)
+        stiffness: tuple[float, ...] | None = None
+        if self.record.mass is not None:
+            masses = self.record.mass[self.moving].tolist()
+            stiffness = tuple(mass * m.a / h**2 for mass, m in zip(masses, chosen.parts, strict=True))
+        elif self.record.momenta:
+            stiffness = tuple(math.exp(m.log_mass) * m.a / h**2 for m in chosen.parts)
+        return omega, stiffness, friction
+
+    def disagreements(
+        self, joint: Joint, other: Floats | None = None, quantum: float = 0.0, room: float = 0.0
+    ) -> list[str]:
+        """Where the stiffness of the states is not the stated one, or another, beyond six standard errors and
+        rounding.
+
+        Forces cut off at multiples of `quantum` bias it as well, by that share of the mean force.  A
+        coarse file does not show whether h, m, h k or h/m were rounded to single precision.
+        """
+        stated, record = self.stiffness if other is None else other, self.record
+        _, stiffness, _ = self.numbers(joint)
+        assert stated is not None
+        path = FAMILIES[joint.family].path
+        out = []
+        for j, part, k in zip(self.moving, joint.parts, stiffness or (), strict=False):
+            error = 6 * part.a_error / abs(part.a) + 2 * record.jitter + 4 * path * ROUNDING + room
+            error += 0.0 if record.fine else SINGLE_ROOM
+            # a step or a mass in single precision moves the stiffness that is worked out with the stated one
+            error += 0.0 if record.momenta else 3 * abs(part.log_mass)
+            if quantum:
+                error += 2 * quantum * (1 + 1 / (abs(k) * float(np.sqrt(np.mean(record.q[:, j] ** 2)))))
+            off = k / float(stated[j]) - 1 if stated[j] else math.inf
+            if not abs(off) <= error:
+                out.append(
+                    f"the stated stiffness {stated[j]:.9g} does not fit: the states show {k:.9g} "
+                    f"(relative difference {off:+.2e}, known to {error:.0e})"
+                )
+        return out
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

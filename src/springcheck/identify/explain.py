@@ -10,13 +10,12 @@ import numpy as np
 from springcheck.identify import driven
 from springcheck.identify.coarse import irregular
 from springcheck.identify.compare import nearest
-from springcheck.identify.evidence import FALLS, Evidence, distance, matched
+from springcheck.identify.evidence import FALLS, Evidence, Measured, distance, matched
 from springcheck.identify.families import title
 from springcheck.identify.fit import Map, fit
 from springcheck.identify.hypothesis import FEW, Terms, distinct
 from springcheck.identify.interrupted import few_bad_frames
 from springcheck.identify.misplaced import misplaced, turned
-from springcheck.identify.record import Record
 from springcheck.identify.result import Explanation
 from springcheck.identify.unknown import memory, misfit
 from springcheck.identify.wrong import wrong_map
@@ -33,23 +32,16 @@ DRIFTING = 64.0
 """Roundings that may be left over where a constant that is added to the position is the cause."""
 
 
-def explain(
-    record: Record, moving: list[int], maps: list[Map], terms: list[Terms], stated: Floats | None
-) -> tuple[Explanation, ...]:
+def explain(seen: Measured) -> tuple[Explanation, ...]:
     """Explanations of what no scheme fits, the best first."""
-    worst = max(range(len(maps)), key=lambda i: float(np.max(maps[i].residual)))
-    j = moving[worst]
-    evidence = Evidence(
-        record=record, j=j, found=maps[worst], terms=terms[worst],
-        stiffness=None if stated is None else float(stated[j]),
-    )  # fmt: skip
-    out: list[Explanation] = turned(record, moving)
+    evidence = seen.evidence(max(range(len(seen.maps)), key=lambda i: float(np.max(seen.maps[i].residual))))
+    out: list[Explanation] = turned(seen.record, seen.moving)
     off = np.max(np.abs(evidence.misses), axis=1) / evidence.unit
     rough, loud = float(np.median(off)), float(np.max(off))
     if evidence.found.drifts and not out:
         out += _drift(evidence)
     if loud > 4 and not out:
-        for look in (misplaced, memory, few_bad_frames, _solver, _neighbours(maps), _shape):
+        for look in (misplaced, memory, few_bad_frames, _solver, _neighbours(seen.maps), _shape):
             out += look(evidence)
             if out:
                 break

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from springcheck.identify.compare import compare
-from springcheck.identify.evidence import FALLS, Evidence, matched
+from springcheck.identify.evidence import FALLS, Evidence, Measured, matched
 from springcheck.identify.families import FAMILIES, OF_HALF_A_STEP_AGO, VERLET, title
 from springcheck.identify.fit import Map, fit
-from springcheck.identify.hypothesis import FEW, Joint, Terms, distinct
+from springcheck.identify.hypothesis import FEW, Joint, distinct
 from springcheck.identify.maps import powers, unit
-from springcheck.identify.record import ROUNDING, Record
+from springcheck.identify.record import ROUNDING
 from springcheck.identify.result import Explanation
 from springcheck.physics.arrays import Extended, Floats
 from springcheck.text.wording import either
@@ -44,21 +44,20 @@ START_OFF = 64.0
 """Roundings that each step may leave over of a start that is predicted."""
 
 
-def remembered(
-    record: Record, moving: list[int], maps: list[Map], terms: list[Terms]
-) -> tuple[Record, list[Map], list[Joint]]:
-    """The frames but the first, their maps, and Verlet with the friction of the velocity half a step ago,
-    where it made them: its first step has none, and the force has the friction of the first velocity."""
-    if not record.fine or len(record.q) <= FEWEST_PAIRS or any(_first_off(x) < FALLS for x in maps):
-        return record, maps, []
+def remembered(seen: Measured) -> tuple[Measured, list[Joint]]:
+    """The frames but the first, and Verlet with the friction of the velocity half a step ago, where it made
+    them: its first step has none, and the force has the friction of the first velocity."""
+    record = seen.record
+    if not record.fine or len(record.q) <= FEWEST_PAIRS or any(_first_off(x) < FALLS for x in seen.maps):
+        return seen, []
     parts = None if record.parts is None else (record.parts[0][1:], record.parts[1][1:])
     later = replace(
         record, q=record.q[1:], v=record.v[1:], q_quantum=record.q_quantum[1:], parts=parts,
         v_quantum=record.v_quantum[1:], slips=None if record.slips is None else record.slips[1:],
     )  # fmt: skip
-    found = [fit(later, j) for j in moving]
-    joints = compare(found, terms, (FAMILIES[OF_HALF_A_STEP_AGO],), FEW)
-    return later, found, [x for x in joints if _begins(record, moving, found, x)]
+    rest = replace(seen, record=later, maps=[fit(later, j) for j in seen.moving])
+    joints = rest.compare((FAMILIES[OF_HALF_A_STEP_AGO],), FEW)
+    return rest, [x for x in joints if _begins(seen, rest.maps, x)]
 
 
 def _first_off(found: Map) -> float:
@@ -67,9 +66,10 @@ def _first_off(found: Map) -> float:
     return float(off[0] / max(np.max(off[len(off) // 2 :]), 1e-300))
 
 
-def _begins(record: Record, moving: list[int], maps: list[Map], joint: Joint) -> bool:
+def _begins(seen: Measured, maps: list[Map], joint: Joint) -> bool:
     """Whether a first step with the friction of the first velocity leads to the second frame."""
-    for j, found, part in zip(moving, maps, joint.parts, strict=True):
+    record = seen.record
+    for j, found, part in zip(seen.moving, maps, joint.parts, strict=True):
         a, g = np.array([part.a], np.longdouble), np.array([part.g], np.longdouble)
         first, later = (unit(FAMILIES[name], a, g) for name in (f"{VERLET}, damped", OF_HALF_A_STEP_AGO))
         b = powers(later[0], part.stride)[-1] @ first[0]

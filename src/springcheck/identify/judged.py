@@ -5,15 +5,38 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from springcheck.errors import IdentificationError
 from springcheck.identify import coupled
+from springcheck.identify.evidence import Measured
 from springcheck.identify.fit import Map, fit
-from springcheck.identify.record import ROUNDING, SIZES, Record
-from springcheck.identify.search import COARSE
+from springcheck.identify.record import ROUNDING, SIZES, Record, of_size, stated_stride
+from springcheck.identify.search import COARSE, terms_of
 
 
-def judged(record: Record) -> tuple[Record, list[int], list[Map], list[str]]:
+def judged(
+    record: Record, stiffness: ArrayLike | None, friction: float | None, step: float | None
+) -> Measured:
+    """What can be judged of a record, and what is stated of it.  Raises IdentificationError."""
+    stated = of_size("stiffness", stiffness, record.q.shape[1], zero=True)
+    of_size("friction", friction, zero=True)
+    of, moving, maps, notes = _oscillators(record)
+    if of is not record:
+        stated = None
+    stride = stated_stride(of, step, notes)
+    if of.momenta and stated is None:
+        notes.append(
+            "neither mass nor velocities nor stiffness are known, so only three numbers of each map count: "
+            "velocity and position Verlet, implicit midpoint and the exact flow look alike; give the mass"
+        )
+    return Measured(
+        record=of, moving=moving, maps=maps, terms=[terms_of(of, j, stated) for j in moving],
+        stiffness=stated, friction=friction, stride=stride, notes=notes,
+    )  # fmt: skip
+
+
+def _oscillators(record: Record) -> tuple[Record, list[int], list[Map], list[str]]:
     """The oscillators that can be judged, in a record of their own where they are normal modes; their maps;
     and notes on those that cannot."""
     spread = np.ptp(record.q, axis=0) + np.ptp(record.v, axis=0) * abs(record.interval)

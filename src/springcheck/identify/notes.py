@@ -10,6 +10,7 @@ import numpy as np
 from springcheck.errors import IdentificationError
 from springcheck.identify.clock import FEWEST_STATES
 from springcheck.identify.compare import compare
+from springcheck.identify.evidence import Measured
 from springcheck.identify.families import FAMILIES, title
 from springcheck.identify.fit import Map
 from springcheck.identify.guesses import roots_of
@@ -17,7 +18,7 @@ from springcheck.identify.hypothesis import Joint, Terms
 from springcheck.identify.maps import unit
 from springcheck.identify.record import DEEP, Record
 from springcheck.identify.result import OR_UNKNOWN, Explanation, Identification
-from springcheck.identify.search import SAME_MAP, coincident, numbers
+from springcheck.identify.search import SAME_MAP, coincident
 from springcheck.text.wording import count, either
 
 APART = 10.0
@@ -174,16 +175,16 @@ def hidden_friction(record: Record, found: Map) -> float:
     return (loss + 5 * error) / abs(float(record.interval))
 
 
-def same_maps(record: Record, moving: list[int], maps: list[Map], joint: Joint) -> list[str]:
+def same_maps(seen: Measured, joint: Joint) -> list[str]:
     """Damped springs that have the very same map, and what tells them from the scheme without friction."""
-    names = coincident(joint.scheme)
+    names, record = coincident(joint.scheme), seen.record
     if not names or joint.stride != 1:
         return []
-    terms = [Terms(mass_unknown=record.momenta, jitter=record.jitter) for _ in maps]
-    found = compare(maps, terms, tuple(FAMILIES[x] for x in names), range(1, 2))
+    terms = [Terms(mass_unknown=record.momenta, jitter=record.jitter) for _ in seen.maps]
+    found = compare(seen.maps, terms, tuple(FAMILIES[x] for x in names), range(1, 2))
     out = []
     for x in found[:1]:
-        omega, stiffness, friction = numbers(record, moving, x)
+        omega, stiffness, friction = seen.numbers(x)
         of = f"stiffness {stiffness[0]:.9g}" if stiffness else f"angular frequency {omega[0]:.9g}"
         out.append(
             f"the same map is {x.scheme} on a damped spring of {of} and friction c/m {friction[0]:.6g}: "
@@ -192,15 +193,16 @@ def same_maps(record: Record, moving: list[int], maps: list[Map], joint: Joint) 
     return out
 
 
-def untold(record: Record, maps: list[Map], joints: list[Joint], *, stiffness_stated: bool) -> list[str]:
+def untold(seen: Measured, joints: list[Joint]) -> list[str]:
     """Why several schemes or numbers of steps are left, and what more the states would have to show."""
-    plainest = joints[0]
+    plainest, record = joints[0], seen.record
     if plainest.scheme == "exact":
         why = "no error of a step is visible: fine steps of many schemes come as near to the exact flow"
         told = ["more digits", "a larger step"]
     else:
         others = [x for x in joints[1:] if (x.scheme, x.stride) != (plainest.scheme, plainest.stride)]
-        least, nearest = min(((separation(maps, plainest, x), x) for x in others), key=lambda pair: pair[0])
+        apart = ((separation(seen.maps, plainest, x), x) for x in others)
+        least, nearest = min(apart, key=lambda pair: pair[0])
         digits = math.ceil(math.log10(APART / least)) if least > 0 else MOST_DIGITS + 1
         pair = f"the data cannot tell these apart: the maps of {plainest} and {nearest}"
         if digits > MOST_DIGITS or _identical(plainest, nearest, free_scale=record.momenta):
@@ -213,7 +215,7 @@ def untold(record: Record, maps: list[Map], joints: list[Joint], *, stiffness_st
             told += ["more frames"] if digits <= 2 else []
     if record.momenta:
         told.append("the mass")
-    elif not stiffness_stated and any(_stiffer(x, plainest) for x in joints):
+    elif seen.stiffness is None and any(_stiffer(x, plainest) for x in joints):
         told.append(f"the {'mass and the ' * (record.mass is None)}stiffness, where known: they differ in it")
     return [why, *([f"what would tell them apart: {either(told)}"] if told else [])]
 

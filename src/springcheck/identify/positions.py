@@ -8,12 +8,12 @@ import numpy as np
 
 from springcheck.errors import IdentificationError
 from springcheck.identify.candidates import candidates_of, common, held_over, law_assumed, said_of
+from springcheck.identify.evidence import SINGLE_ROOM, Measured
 from springcheck.identify.families import FAMILIES, HELD, Family, title
 from springcheck.identify.hypothesis import FEW, Joint, Match, distinct
 from springcheck.identify.record import SIZES, Record
 from springcheck.identify.recurrence import FEWEST_FRAMES, Recurrence, classes, matches, recurrence
 from springcheck.identify.result import Explanation, Identification, nothing
-from springcheck.identify.search import SINGLE_ROOM, disagreements
 from springcheck.physics.arrays import Floats
 from springcheck.text.wording import either
 
@@ -61,22 +61,26 @@ def identify_positions(
     if stated is not None and record.mass is not None:
         wanted = [float(stated[j] / record.mass[j] * record.interval**2) for j in moving]
     plain = tuple(x[0] for x in classes())
+    seen = Measured(
+        record=record, moving=moving, maps=[], terms=[], stiffness=stated, friction=friction or None,
+        stride=stride, notes=notes,
+    )  # fmt: skip
     every_stride = known or not _all_preserve(found)
     joints = (_joined if every_stride else _first)(found, plain, strides, wanted)
     joints += [x for x in _joined(found, (HELD,), strides, wanted) if _may_hold(x)]
-    fitting = _stated(record, moving, joints, stated, notes) if known else joints
+    fitting = _stated(seen, joints) if known else joints
     kept = fitting
     sure = _all_preserve(found) or _certain(found)
     if friction or (friction is None and not (fitting and sure)):
         families = distinct(damped=True)
         damped = (_joined if known else _first)(found, families, strides, wanted)
-        damped = _stated(record, moving, damped, stated, notes) if known else damped
+        damped = _stated(seen, damped) if known else damped
         kept = damped if friction else kept + damped
     if friction:
-        kept = [x for x in kept if candidates_of(record, moving, x, friction)]
+        kept = [x for x in kept if candidates_of(seen, x)]
     if not kept:
-        return _none(found, notes, *_unfitting(record, moving, found, joints, stated))
-    return _known(record, moving, found, kept, stride, known, friction or None, notes)
+        return _none(found, notes, *_unfitting(seen, found, joints))
+    return _known(seen, found, kept, known)
 
 
 def _forced(x: Recurrence) -> bool:
@@ -132,16 +136,12 @@ def _may_hold(joint: Joint) -> bool:
     return joint.endless or bool(joint.substeps[0])
 
 
-def _stated(
-    record: Record, moving: list[int], joints: list[Joint], stated: Floats | None, notes: list[str]
-) -> list[Joint]:
+def _stated(seen: Measured, joints: list[Joint]) -> list[Joint]:
     """Those of the stated stiffness, or where none is, those of it with a number in single precision."""
-    if stated is None:
-        return []
     for room in (0.0, SINGLE_ROOM):
-        fitting = [x for x in joints if not disagreements(record, moving, x, stated, room=room)]
+        fitting = [x for x in joints if not seen.disagreements(x, room=room)]
         if fitting:
-            notes += ["a stated number was rounded to single precision"] if room else []
+            seen.notes.extend(["a stated number was rounded to single precision"] if room else [])
             return fitting
     return []
 
@@ -158,24 +158,15 @@ def _members(joints: list[Joint]) -> list[Joint]:
     return list(out.values())
 
 
-def _known(
-    record: Record,
-    moving: list[int],
-    found: list[Recurrence],
-    kept: list[Joint],
-    stride: int | None,
-    known: bool,
-    friction: float | None,
-    notes: list[str],
-) -> Identification:
+def _known(seen: Measured, found: list[Recurrence], kept: list[Joint], known: bool) -> Identification:
     """One scheme or several, of which the positions are."""
-    joints = _members(kept)
-    candidates = tuple(x for joint in joints for x in candidates_of(record, moving, joint, friction))
+    record, notes, joints = seen.record, seen.notes, _members(kept)
+    candidates = tuple(x for joint in joints for x in candidates_of(seen, joint))
     names = list(dict.fromkeys(x.scheme for x in candidates))
     damped = any(joint.damped for joint in joints)
     # the number of steps does not show where areas are kept and the stiffness is not known
     steps = common([x.stride for x in candidates])
-    if not known and stride is None and _all_preserve(found):
+    if not known and seen.stride is None and _all_preserve(found):
         steps = None
     # several friction laws, or places of it, of one scheme are no other scheme
     scheme = names[0] if len(names) == 1 and steps is not None else None
@@ -199,17 +190,17 @@ def _known(
     if not known:
         told = "mass and stiffness" if record.mass is None else "the stiffness"
         notes = [*notes, f"what would tell more: {told}, where known, the friction, or velocities"]
-    if damped and friction is None:
+    if damped and seen.friction is None:
         notes = [
             *notes,
             "with friction every scheme has a spring that fits; a stated friction of 0 leaves it out",
         ]
     elif scheme and float(found[0].beta) > 0 and not known:
         notes = [*notes, "a damped spring of another stiffness may have the same positions"]
-    unknown = tuple(math.nan for _ in moving)
+    unknown = tuple(math.nan for _ in found)
     share = 1 / (steps or 1)
     return Identification(
-        **said_of(candidates, scheme, damped, len(moving)),
+        **said_of(candidates, scheme, damped, len(found)),
         statement=statement,
         step=float(record.interval) * share if steps else math.nan,
         stride=steps,
@@ -233,12 +224,10 @@ def _misfit(worst: Recurrence) -> tuple[str, str]:
     )
 
 
-def _unfitting(
-    record: Record, moving: list[int], found: list[Recurrence], joints: list[Joint], stated: Floats | None
-) -> tuple[str, str]:
-    if joints and stated is not None:
+def _unfitting(seen: Measured, found: list[Recurrence], joints: list[Joint]) -> tuple[str, str]:
+    if joints and seen.stiffness is not None:
         x = joints[0]
-        shown = [*disagreements(record, moving, x, stated), "it has another friction"][0]
+        shown = [*seen.disagreements(x), "it has another friction"][0]
         return (
             f"The positions may be those of {title(FAMILIES[x.family].scheme)}, but of another "
             f"spring: {shown}",

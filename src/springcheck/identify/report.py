@@ -22,11 +22,12 @@ from springcheck.identify.candidates import (
     said_of,
     stated_stiffness,
 )
-from springcheck.identify.compare import compare, nearest
+from springcheck.identify.compare import nearest
+from springcheck.identify.evidence import Measured
 from springcheck.identify.explain import explain
 from springcheck.identify.families import DAMPED_ELSEWHERE, FAMILIES, KNOWN_ELSEWHERE, title
-from springcheck.identify.fit import Map, fit
-from springcheck.identify.hypothesis import FEW, Joint, Terms, distinct, likely
+from springcheck.identify.fit import fit
+from springcheck.identify.hypothesis import FEW, Joint, distinct, likely
 from springcheck.identify.interrupted import remembered
 from springcheck.identify.judged import judged
 from springcheck.identify.notes import (
@@ -42,17 +43,13 @@ from springcheck.identify.result import Explanation, Identification, nothing
 from springcheck.identify.search import (
     determinants,
     difference,
-    disagreements,
     find,
-    numbers,
-    terms_of,
     visible,
 )  # fmt: skip
 from springcheck.identify.shortened import single_parameters
 from springcheck.identify.thermal import explained, of_bath
 from springcheck.identify.together import at_rest, distance, of_a_bond, of_a_pair, of_rotation
 from springcheck.identify.wrong import faults_like, faults_of
-from springcheck.physics.arrays import Floats
 from springcheck.schemes.elsewhere import ELSEWHERE
 
 VELOCITY_OFFSET = {
@@ -134,104 +131,92 @@ def _of_record(
 def _of_coordinates(
     record: Record, stiffness: ArrayLike | None, friction: float | None, step: float | None
 ) -> Identification:
-    stated = of_size("stiffness", stiffness, record.q.shape[1], zero=True)
-    of_size("friction", friction, zero=True)
-    given = record
-    record, moving, maps, notes = judged(record)
-    if record is not given:
-        stated = None
-    stride = stated_stride(record, step, notes)
-    base = [terms_of(record, j, stated) for j in moving]
-    if record.momenta and stated is None:
-        notes.append(
-            "neither mass nor velocities nor stiffness are known, so only three numbers of each map count: "
-            "velocity and position Verlet, implicit midpoint and the exact flow look alike; give the mass"
-        )
-    if any(found.drifts for found in maps):
-        return _unknown(record, moving, maps, base, stated, range(1, 2), notes)
-    joints, terms = find(record, maps, base, stride)
-    fits_entries = bool(joints)
-    explained = _explained(record, moving, maps, joints, terms)
+    seen = judged(record, stiffness, friction, step)
+    fine, stride = seen.record.fine, seen.stride
+    if any(found.drifts for found in seen.maps):
+        return _unknown(seen, range(1, 2))
+    joints, wide = find(seen)
+    strides_left = range(1, 2) if joints else FEW
+    explained = _explained(wide, joints)
 
     def agrees(x: Joint) -> bool:
         """Whether a scheme has the stated step and stiffness."""
-        of_step = stride is None or x.stride == stride
-        return of_step and (stated is None or not disagreements(record, moving, x, stated))
+        return stride in (None, x.stride) and (seen.stiffness is None or not seen.disagreements(x))
 
-    apart = maps
-    if not (record.fine or any(map(agrees, explained))):
+    apart = seen
+    if not (fine or any(map(agrees, explained))):
         # an equilibrium beside 0 that a short or coarse file does not show may still be there
-        apart = [x if np.any(x.centre) else fit(record, moving[i], constant=True) for i, x in enumerate(maps)]
-    if not explained and not record.fine:
-        joints, terms = find(record, apart, base, stride)
-        explained = _explained(record, moving, apart, joints, terms)
-        maps = apart if explained else maps
+        each = zip(seen.moving, seen.maps, strict=True)
+        maps = [x if np.any(x.centre) else fit(seen.record, j, constant=True) for j, x in each]
+        apart = replace(seen, maps=maps)
+    if not explained and not fine:
+        joints, wide = find(apart)
+        if explained := _explained(wide, joints):
+            seen = apart
     if not explained:
-        later, maps_later, joints = remembered(record, moving, maps, base)
-        if explained := _explained(later, moving, maps_later, joints, base):
-            record, maps = later, maps_later
-            notes.append("the first step has the friction of the first velocity: none is half a step old")
-    if explained and stated is not None and not (record.fine or any(map(agrees, explained))):
+        later, joints = remembered(seen)
+        if explained := _explained(later, joints):
+            seen = later
+            seen.notes.append(
+                "the first step has the friction of the first velocity: none is half a step old"
+            )
+    if explained and seen.stiffness is not None and not (fine or any(map(agrees, explained))):
         # friction, or an equilibrium beside 0, is as plain as another spring than the stated one
-        for way, damped in ((x, y) for x in (maps, apart) for y in (False, True)):
-            joints = [x for x in compare(way, base, distinct(damped=damped), FEW) if agrees(x)]
-            if more := _explained(record, moving, way, likely(joints), base):
-                maps, explained = way, more
+        for way, damped in ((x, y) for x in (seen, apart) for y in (False, True)):
+            joints = [x for x in way.compare(distinct(damped=damped), FEW) if agrees(x)]
+            if more := _explained(way, likely(joints)):
+                seen, explained = way, more
                 break
     if all(x.stride not in FEW for x in explained):
         # of many steps, which a numerous family has, nothing is plainer than few of a scheme elsewhere
-        explained = {**_elsewhere(record, moving, maps, base, FEW), **explained}
-    elif stride is not None or stated is not None:
+        explained = {**_elsewhere(seen, FEW), **explained}
+    elif stride is not None or seen.stiffness is not None:
         right = {x.scheme for x in explained if agrees(x)}
-        if (stride is not None or len(right - {"exact"}) != 1) and not (record.fine and right):
+        if (stride is not None or len(right - {"exact"}) != 1) and not (fine and right):
             # what is stated tells more than that the step is a simple one
-            strides = FEW if stride is None else range(stride, stride + 1)
-            others = _elsewhere(record, moving, maps, base, strides)
+            others = _elsewhere(seen, FEW if stride is None else range(stride, stride + 1))
             others = {x: ds for x, ds in others.items() if agrees(x)}
             explained = {**(explained if right or not others else {}), **others}
-    elif not record.fine:
+    elif not fine:
         # what coarse numbers do not tell apart they do not tell from a scheme elsewhere either
         alone = len({(x.scheme, x.stride) for x in explained}) == 1
         strides = range(1, min(x.stride for x in explained)) if alone else FEW
-        others = {**explained, **(_elsewhere(record, moving, maps, base, strides) if strides else {})}
+        others = {**explained, **(_elsewhere(seen, strides) if strides else {})}
         explained = {x: others[x] for x in likely(list(others))}
     if all(x.stride not in FEW for x in explained):
         # few steps, one of them rounded, are plainer than many
-        joints, remark = single_parameters(record, moving, maps, base, stride)
-        rounded = _explained(record, moving, maps, joints, base)
-        notes += [remark] if rounded else []
+        joints, remark = single_parameters(seen)
+        rounded = _explained(seen, joints)
+        seen.notes.extend([remark] if rounded else [])
         explained = rounded or explained
     if not explained:
-        return _unknown(record, moving, maps, base, stated, FEW if not fits_entries else range(1, 2), notes)
+        return _unknown(seen, strides_left)
     joints = list(explained)
-    if stated is not None and disagreements(record, moving, joints[0], stated):
-        stated = of_a_bond(record, moving, stated, notes)
-    if stated is not None:
-        precisions = {x: ds[0].precision for x, ds in explained.items()}
-        joints = of_stated_stiffness(record, moving, precisions, stated)
+    if (stated := seen.stiffness) is not None:
+        if seen.disagreements(joints[0]):
+            stated = of_a_bond(seen.record, seen.moving, stated, seen.notes)
+            seen = replace(seen, stiffness=stated)
+        joints = of_stated_stiffness(seen, {x: ds[0].precision for x, ds in explained.items()}, stated)
     stated_fits = stride is None
     if stride is not None and stride > 0:
         agreeing = [x for x in joints if x.stride == stride or x.scheme == "exact"]  # which has no step
         joints, stated_fits = agreeing or joints, bool(agreeing)
         if not agreeing:
-            notes.append(f"with the stated step {step:.9g}, {stride} to a frame, no known scheme fits")
-    asked = friction
+            seen.notes.append(f"with the stated step {step:.9g}, {stride} to a frame, no known scheme fits")
     if friction is not None:
-        of_rate = [x for x in joints if candidates_of(record, moving, x, friction)]
+        of_rate = [x for x in joints if candidates_of(seen, x)]
         joints, stated_fits = of_rate or joints, stated_fits and bool(of_rate)
-        friction = friction if of_rate else None
-    kept = {x: explained[x] for x in joints}
-    found = _known(record, moving, maps, kept, stated, friction, stated_fits, notes)
-    of_maps = zip(maps, base, strict=True)
-    seen = stated is not None or any(visible(x, what, damped=joints[0].damped) for x, what in of_maps)
-    found = beside_unknown(record, found, stated=stride is not None, seen=seen)
-    if asked is not None and friction is None and record.mass is not None:
-        found = of_stated_friction(found, asked, float(record.mass[moving[0]]))
-    if stated is None:
+        seen = seen if of_rate else replace(seen, friction=None)
+    found = _known(seen, {x: explained[x] for x in joints}, stated_fits)
+    of_maps = zip(seen.maps, seen.terms, strict=True)
+    plainly = seen.stiffness is not None or any(visible(*x, damped=joints[0].damped) for x in of_maps)
+    found = beside_unknown(seen.record, found, stated=stride is not None, seen=plainly)
+    if friction is not None and seen.friction is None and seen.record.mass is not None:
+        found = of_stated_friction(found, friction, float(seen.record.mass[seen.moving[0]]))
+    if seen.stiffness is None:
         return found
-    found = of_unasked_friction(found) if friction is None else found
-    of = record, moving[0], maps[0], base[0], float(stated[moving[0]]), asked
-    faults = faults_of(*of) if found.explanations and found.candidates else []
+    found = of_unasked_friction(found) if seen.friction is None else found
+    faults = faults_of(seen, friction) if found.explanations and found.candidates else []
     if faults:
         # a scheme on another spring, or a wrong one on the stated spring: the latter is the plainer
         other = [x.cause for x in found.explanations if ": " in x.cause]
@@ -255,18 +240,16 @@ def _of_positions(
     return identify_positions(record, stated, stride, friction, notes)
 
 
-def _explained(
-    record: Record, moving: list[int], maps: list[Map], accepted: list[Joint], terms: list[Terms]
-) -> dict[Joint, list[arithmetic.Defect]]:
+def _explained(seen: Measured, accepted: list[Joint]) -> dict[Joint, list[arithmetic.Defect]]:
     """The schemes of which a known arithmetic explains every step, with the defects of their steps."""
     left = [x for x in accepted if not FAMILIES[x.family].held or x.substeps[0]]
     alone = len({(x.scheme, x.stride) for x in accepted}) == 1
     defects: list[list[arithmetic.Defect]] = [[] for _ in left]
-    for i, (j, found, what) in enumerate(zip(moving, maps, terms, strict=True)):
+    for i, (j, found, what) in enumerate(zip(seen.moving, seen.maps, seen.terms, strict=True)):
         if not left:
             break
-        seen = partial(visible, found, what, damped=left[0].damped) if alone else bool
-        new = arithmetic.defects(record, j, found, [x.parts[i] for x in left], seen)
+        shows = partial(visible, found, what, damped=left[0].damped) if alone else bool
+        new = arithmetic.defects(seen.record, j, found, [x.parts[i] for x in left], shows)
         # what explains one scheme's misses does not exclude the others, which miss the states by no more
         good = [x for x in new if x.precision]
         new = [
@@ -278,43 +261,33 @@ def _explained(
     return dict(zip(left, defects, strict=True))
 
 
-def _elsewhere(
-    record: Record, moving: list[int], maps: list[Map], terms: list[Terms], strides: range
-) -> dict[Joint, list[arithmetic.Defect]]:
+def _elsewhere(seen: Measured, strides: range) -> dict[Joint, list[arithmetic.Defect]]:
     """The schemes that springcheck does not run of which a known arithmetic explains every step."""
-    joints = compare(maps, terms, KNOWN_ELSEWHERE, strides) or compare(maps, terms, DAMPED_ELSEWHERE, strides)
-    return _explained(record, moving, maps, likely(joints), terms)
+    joints = seen.compare(KNOWN_ELSEWHERE, strides) or seen.compare(DAMPED_ELSEWHERE, strides)
+    return _explained(seen, likely(joints))
 
 
 def _known(
-    record: Record,
-    moving: list[int],
-    maps: list[Map],
-    explained: dict[Joint, list[arithmetic.Defect]],
-    stated: Floats | None,
-    friction: float | None,
-    stated_fits: bool,
-    notes: list[str],
+    seen: Measured, explained: dict[Joint, list[arithmetic.Defect]], stated_fits: bool
 ) -> Identification:
-    joints = list(explained)
+    joints, maps, notes = list(explained), seen.maps, seen.notes
     plainest = joints[0]
     worst = [max(ds, key=lambda d: (d.precision != "double", d.ulp)) for ds in explained.values()]
-    notes = [*notes, *dict.fromkeys(d.note for d in explained[plainest] if d.note)]
+    notes += dict.fromkeys(d.note for d in explained[plainest] if d.note)
     explanations: list[Explanation] = []
-    if stated is not None:
-        agrees, remarks, explanations = stated_stiffness(record, moving, plainest, stated, worst[0].precision)
-        stated_fits = stated_fits and agrees
-        notes += remarks
-    candidates = tuple(x for joint in joints for x in candidates_of(record, moving, joint, friction))
+    if seen.stiffness is not None:
+        explanations = stated_stiffness(seen, plainest, worst[0].precision, seen.stiffness)
+        stated_fits = stated_fits and not explanations
+    candidates = tuple(x for joint in joints for x in candidates_of(seen, joint))
     scheme = common([x.scheme for x in candidates])
     stride = common([x.stride for x in candidates])
     determinant, symplectic = determinants(maps, stride or 1)
-    unknown = tuple(math.nan for _ in moving)
+    unknown = tuple(math.nan for _ in maps)
     offset = common([VELOCITY_OFFSET.get(x.scheme, 0.0) for x in candidates])
     damped = any(joint.damped for joint in joints)
     first = candidates[0]
     precision = common([d.precision for d in worst]) or "cannot tell"
-    notes += all_remarks(record, moving, maps, joints, candidates, stated is not None)
+    notes += all_remarks(seen, joints, candidates)
     steps = (
         "" if stride == 1 else f", {stride} steps to a frame" if stride else ", in an unknown number of steps"
     )
@@ -345,9 +318,9 @@ def _known(
     undecided = undecided or (scheme is None and len(joints) == 1)
     statement = explanations[0].cause if explanations else statement
     return Identification(
-        **said_of(candidates, scheme, damped, len(moving)),
+        **said_of(candidates, scheme, damped, len(maps)),
         statement=statement,
-        step=float(record.interval) / stride if stride else math.nan,
+        step=float(seen.record.interval) / stride if stride else math.nan,
         stride=stride,
         velocity_offset=math.nan if offset is None else offset,
         determinant=determinant if stride else unknown,
@@ -362,35 +335,29 @@ def _known(
     )
 
 
-def _unknown(
-    record: Record,
-    moving: list[int],
-    maps: list[Map],
-    terms: list[Terms],
-    stated: Floats | None,
-    strides: range,
-    notes: list[str],
-) -> Identification:
+def _unknown(seen: Measured, strides: range) -> Identification:
     """No scheme: what may be wrong, and the nearest of these strides."""
+
+    maps = seen.maps
 
     def distance(joint: Joint) -> float:
         return max(max(map(abs, difference(found, m))) for found, m in zip(maps, joint.parts, strict=True))
 
-    tried = nearest(maps, terms, distinct(damped=False), strides)
+    tried = nearest(maps, seen.terms, distinct(damped=False), strides)
     determinant, symplectic = determinants(maps, 1)
     near: dict[str, Any] = {}
     if tried:
         least = min(distance(x) for x in tried)
         # many schemes and strides come close by chance; the plainest of the close ones is the better guess
         close = min((x for x in tried if distance(x) <= 10 * least), key=lambda x: x.plainness)
-        omega, stiffness, _ = numbers(record, moving, close)
+        omega, stiffness, _ = seen.numbers(close)
         off = difference(maps[0], close.parts[0])
         near = {"nearest": str(close), "difference": off, "omega": omega, "stiffness": stiffness}
     return nothing(
-        explain(record, moving, maps, terms, stated),
+        explain(seen),
         determinant=determinant,
         symplectic_defect=symplectic,
         defect_ulp=max(float(np.max(found.residual)) for found in maps) / 2.0**-52,
-        notes=notes,
+        notes=seen.notes,
         **near,
     )

@@ -8,7 +8,8 @@ from functools import cache
 
 import numpy as np
 
-from springcheck.identify.compare import compare, nearest
+from springcheck.identify.compare import nearest
+from springcheck.identify.evidence import Measured
 from springcheck.identify.families import FAMILIES, HELD, Family
 from springcheck.identify.fit import Map
 from springcheck.identify.guesses import roots_of
@@ -33,9 +34,6 @@ last place and a deviation of 0.29; the rest of the factor is for roundings that
 
 SINGLE = 2.0**-24
 """Unit roundoff of single precision."""
-
-SINGLE_ROOM = 8 * SINGLE
-"""Relative difference of stiffnesses that a step, a mass and a stiffness in single precision may make."""
 
 COARSE = 2.0**-46
 """Residual above which it is no double-precision rounding: 64 units in the last place."""
@@ -79,35 +77,33 @@ class Room:
         return (*distinct(damped=True), HELD) if self.damped else distinct(damped=False)
 
 
-def find(
-    record: Record, maps: list[Map], base: list[Terms], stride: int | None
-) -> tuple[list[Joint], list[Terms]]:
-    """All families that the states do not exclude, the plainest first, and what was allowed for.
+def find(seen: Measured) -> tuple[list[Joint], Measured]:
+    """All families that the states do not exclude, the plainest first, and on the terms that allow for them.
 
     What is plainer comes first, and ends the search where it fits.
     """
-    residual = max(float(np.max(found.residual)) for found in maps)
-    whole = all(found.whole for found in maps)
+    fine, stride = seen.record.fine, seen.stride
     first = (range(stride, stride + 1),) if stride is not None and stride > 0 else ()
-    for rooms in _plan(record, whole=whole, residual=residual):
+    for rooms in _plan(seen):
         accepted: list[Joint] = []
         for room in rooms:
-            terms = [replace(what, rounding=room.rounding, bias=room.bias) for what in base]
+            terms = [replace(what, rounding=room.rounding, bias=room.bias) for what in seen.terms]
+            wide = replace(seen, terms=terms)
             for strides in (*first, *room.strides):
-                fitting = compare(maps, terms, room.families, strides)
+                fitting = wide.compare(room.families, strides)
                 if fitting:
                     accepted += fitting
                     if strides is FEW and (MANY in room.strides or not room.bias):
-                        accepted += _further(maps, terms, fitting, room, coarse=not record.fine)
-                    if not (record.fine or room.damped):
-                        accepted += _rivals(maps, terms, fitting, many=strides is MANY)
+                        accepted += _further(wide, fitting, room)
+                    if not (fine or room.damped):
+                        accepted += _rivals(wide, fitting, many=strides is MANY)
                     break
         if accepted:
-            return likely(accepted), terms
-    return [], base
+            return likely(accepted), wide
+    return [], seen
 
 
-def _plan(record: Record, *, whole: bool, residual: float) -> list[list[Room]]:
+def _plan(seen: Measured) -> list[list[Room]]:
     """What is allowed for, the plainest first; what stands together is equally plain.
 
     Without friction first, and with it where nothing fits.  Coefficients are rounded in double precision,
@@ -117,6 +113,8 @@ def _plan(record: Record, *, whole: bool, residual: float) -> list[list[Room]]:
     other schemes' few steps, so there many are tried before a wider room; with a bias many hide at once, so
     that none could be named.
     """
+    record, whole = seen.record, all(found.whole for found in seen.maps)
+    residual = max(float(np.max(found.residual)) for found in seen.maps)
     biased = [BIAS] if residual > COARSE and not whole else []
     if record.fine:
         rooms = [[Room(damped=d, bias=bias)] for d in (False, True) for bias in (0.0, *biased)]
@@ -138,9 +136,7 @@ def _plan(record: Record, *, whole: bool, residual: float) -> list[list[Room]]:
     ]
 
 
-def _further(
-    maps: list[Map], terms: list[Terms], accepted: list[Joint], room: Room, *, coarse: bool
-) -> list[Joint]:
+def _further(seen: Measured, accepted: list[Joint], room: Room) -> list[Joint]:
     """What the states do not exclude either, beside what was accepted of few steps to a frame.
 
     More of them may fit as well: the error of a step falls with their number, and where the exact flow
@@ -149,20 +145,20 @@ def _further(
     """
     out: list[Joint] = []
     open_ended = len(accepted) > 1 or any(x.scheme == "exact" or x.stride == STRIDES[0] for x in accepted)
-    if open_ended or (coarse and not room.damped):
-        out += compare(maps, terms, room.families, MANY)
+    if open_ended or not (seen.record.fine or room.damped):
+        out += seen.compare(room.families, MANY)
     if not room.damped and min(x.chi2 for x in accepted) > EXCLUDED:
-        out += compare(maps, terms, distinct(damped=True), FEW)
+        out += seen.compare(distinct(damped=True), FEW)
     return out
 
 
-def _rivals(maps: list[Map], terms: list[Terms], fitting: list[Joint], *, many: bool) -> list[Joint]:
+def _rivals(seen: Measured, fitting: list[Joint], *, many: bool) -> list[Joint]:
     """What coarse files do not exclude either: a force held over substeps is nearly as many steps, and
     friction may be what steps lose.  What has a fitting scheme's map at one friction must fit better."""
     losing = many or not any(x.keeps_area and x.chi2 < POOR for x in fitting)
     others = distinct(damped=True) if losing else ()
     same = {name: x.chi2 for x in fitting for name in coincident(x.family)}
-    found = compare(maps, terms, (*others, HELD), FEW)
+    found = seen.compare((*others, HELD), FEW)
     return [x for x in found if x.chi2 < same.get(x.family, math.inf) - ONE_MORE]
 
 
@@ -178,54 +174,6 @@ def visible(found: Map, terms: Terms, *, damped: bool) -> bool:
         near = nearest([found], [replace(terms, bias=1.0)], (flow,), range(1, 2))
         found.found[asked] = all(m.chi2 > PLAIN**2 for m in near)
     return bool(found.found[asked])
-
-
-def numbers(
-    record: Record, moving: list[int], chosen: Joint, law: str = ""
-) -> tuple[tuple[float, ...], tuple[float, ...] | None, tuple[float, ...]]:
-    """Frequency, stiffness and friction rate of each oscillator, the friction being of this law."""
-    h = float(record.interval) / chosen.stride
-    family = FAMILIES[chosen.family]
-    law = law or (family.laws[0] if family.laws else "")
-    omega = tuple(math.sqrt(m.a) / abs(h) if m.a > 0 else math.nan for m in chosen.parts)
-    decays = {"explicit", "implicit", "centred", "remembered"}.isdisjoint(kind for kind, _ in family.stages)
-    scaled = bool(family.stages) and decays
-    friction = tuple((family.rate(law, m.friction) if scaled else m.friction) / h for m in chosen.parts)
-    stiffness: tuple[float, ...] | None = None
-    if record.mass is not None:
-        stiffness = tuple(
-            float(record.mass[j]) * m.a / h**2 for j, m in zip(moving, chosen.parts, strict=True)
-        )
-    elif record.momenta:
-        stiffness = tuple(math.exp(m.log_mass) * m.a / h**2 for m in chosen.parts)
-    return omega, stiffness, friction
-
-
-def disagreements(
-    record: Record, moving: list[int], joint: Joint, stated: Floats, quantum: float = 0.0, room: float = 0.0
-) -> list[str]:
-    """Where the stiffness of the states is not the stated one, beyond six standard errors and rounding.
-
-    Forces cut off at multiples of `quantum` bias it as well, by that share of the mean force.  A
-    coarse file does not show whether h, m, h k or h/m were rounded to single precision.
-    """
-    _, stiffness, _ = numbers(record, moving, joint)
-    path = FAMILIES[joint.family].path
-    out = []
-    for j, part, k in zip(moving, joint.parts, stiffness or (), strict=False):
-        error = 6 * part.a_error / abs(part.a) + 2 * record.jitter + 4 * path * ROUNDING + room
-        error += 0.0 if record.fine else SINGLE_ROOM
-        # a step or a mass in single precision moves the stiffness that is worked out with the stated one
-        error += 0.0 if record.momenta else 3 * abs(part.log_mass)
-        if quantum:
-            error += 2 * quantum * (1 + 1 / (abs(k) * float(np.sqrt(np.mean(record.q[:, j] ** 2)))))
-        off = k / float(stated[j]) - 1 if stated[j] else math.inf
-        if not abs(off) <= error:
-            out.append(
-                f"the stated stiffness {stated[j]:.9g} does not fit: the states show {k:.9g} "
-                f"(relative difference {off:+.2e}, known to {error:.0e})"
-            )
-    return out
 
 
 def difference(found: Map, part: Match) -> tuple[float, ...]:

@@ -7,20 +7,17 @@ from dataclasses import replace
 import numpy as np
 
 from springcheck.identify.coarse import over_single
-from springcheck.identify.compare import compare
+from springcheck.identify.evidence import Measured
 from springcheck.identify.families import HELD
-from springcheck.identify.fit import Map
-from springcheck.identify.hypothesis import FEW, Joint, Terms, distinct
-from springcheck.identify.record import Record
+from springcheck.identify.hypothesis import FEW, Joint, distinct
 
 
-def single_parameters(
-    record: Record, moving: list[int], maps: list[Map], base: list[Terms], stride: int | None
-) -> tuple[list[Joint], str]:
+def single_parameters(seen: Measured) -> tuple[list[Joint], str]:
     """Schemes that fit if the step or the mass is the stated one in single precision, and which of them."""
+    record, stride = seen.record, seen.stride
     if record.momenta:
         return [], ""
-    masses = [1.0 if record.mass is None else float(record.mass[j]) for j in moving]
+    masses = [1.0 if record.mass is None else float(record.mass[j]) for j in seen.moving]
     heavier = [_shortened(m) for m in masses]
     strides = range(stride, stride + 1) if stride is not None and stride > 0 else FEW
     longer = [0.0, *(_shortened(record.interval / s) for s in range(1, strides.stop))]
@@ -29,10 +26,9 @@ def single_parameters(
             scales = [tuple(of_mass * m - of_step * h for h in longer) for m in heavier]
             if not any(any(row[1:]) for row in scales):
                 continue
-            loose = [replace(x, scales=row) for x, row in zip(base, scales, strict=True)]
-            if joints := compare(maps, loose, families, strides):
-                remark = f"the {what} was rounded to single precision in double arithmetic"
-                return joints, remark
+            loose = [replace(x, scales=row) for x, row in zip(seen.terms, scales, strict=True)]
+            if joints := replace(seen, terms=loose).compare(families, strides):
+                return joints, f"the {what} was rounded to single precision in double arithmetic"
     return [], ""
 
 

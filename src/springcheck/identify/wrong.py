@@ -8,11 +8,10 @@ from functools import cache
 import numpy as np
 
 from springcheck.identify.compare import compare
-from springcheck.identify.evidence import Evidence, matched
+from springcheck.identify.evidence import Evidence, Measured, matched
 from springcheck.identify.families import FAMILIES, FAULTS, G_ROUNDING, SUBTRACTED, Family, title
-from springcheck.identify.fit import Map
 from springcheck.identify.hypothesis import SURE, Joint, Terms, distinct, same_map
-from springcheck.identify.record import ROUNDING, Record
+from springcheck.identify.record import ROUNDING
 from springcheck.identify.result import Explanation
 from springcheck.identify.unknown import misfit
 from springcheck.text.wording import either
@@ -199,15 +198,13 @@ def _meaning(e: Evidence, x: Joint) -> tuple[str, str] | None:
     return None
 
 
-def faults_of(
-    record: Record, j: int, found: Map, terms: Terms, stiffness: float, friction: float | None
-) -> list[Explanation]:
+def faults_of(seen: Measured, friction: float | None) -> list[Explanation]:
     """Schemes written down wrongly of the stated stiffness and friction, where a right one has others."""
-    e = Evidence(record=record, j=j, found=found, terms=terms, stiffness=stiffness)
-    rate = None if friction is None or record.mass is None else friction / float(record.mass[j])
-    joints = compare([found], [terms], _faults(), range(1, 3))
-    for x in compare([found], [terms], SUBTRACTED, range(1, 3)):
-        is_, error = (y * x.stride / float(record.interval) for y in (x.parts[0].g, x.parts[0].g_error))
+    e = seen.evidence(0)
+    rate = None if friction is None or e.record.mass is None else friction / float(e.record.mass[e.j])
+    joints = compare([e.found], [e.terms], _faults(), range(1, 3))
+    for x in compare([e.found], [e.terms], SUBTRACTED, range(1, 3)):
+        is_, error = (y * x.stride / float(e.record.interval) for y in (x.parts[0].g, x.parts[0].g_error))
         if is_ > SURE * error and (rate is None or abs(is_ - rate) <= SURE * error + 1e-9 * rate):
             joints.append(x)
     return [
