@@ -238,7 +238,7 @@ def test_a_reader_that_crashes_or_never_ends_is_told(tmp_path: Path, monkeypatch
     path = tmp_path / "s.h5"
     path.touch()
     monkeypatch.setattr(apart, "LIMIT", 1.0)
-    monkeypatch.setattr(trust, "MODULE", "broken")
+    monkeypatch.setattr(trust, "PACKAGE", "broken")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     for body, said in (
         ("import os; os.kill(os.getpid(), 11)", "crashes"),

@@ -20,7 +20,6 @@ import traceback
 from collections.abc import Sequence
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -217,7 +216,7 @@ def _shortened() -> None:
     setattr(study.Study, "draw", lambda *_, **__: [])  # noqa: B010
     size = int(Path("/proc/self/statm").read_text().split()[0]) * os.sysconf("SC_PAGE_SIZE")
 
-    def read(module: str, kind: str, path: Path, *words: str) -> bytes:
+    def read(module: str, function: str, path: Path, *words: str) -> bytes:
         limit = apart.LIMIT + path.stat().st_size / apart.SPEED
         pipe, write = os.pipe()
         child = os.fork()
@@ -225,7 +224,7 @@ def _shortened() -> None:
             try:
                 apart._limit(int(limit) + 1, apart.MEMORY + size)
                 os.dup2(os.open(os.devnull, os.O_RDWR), 2)
-                found = import_module(f"{module}.__main__").main(kind, path, *words)
+                found = apart.answer(module, function, path, *words)
                 with open(write, "wb") as answer:
                     answer.write(found)
             finally:
@@ -240,7 +239,7 @@ def _shortened() -> None:
         signal.setitimer(signal.ITIMER_REAL, 0)
         if ended:
             raise apart.EndedError("does not end as it should")
-        return said
+        return apart.heard(said)
 
     setattr(apart, "read", read)  # noqa: B010
 

@@ -191,25 +191,13 @@ class Recorded(States):
 
 def _in_hdf5(path: Path, columns: Sequence[str]) -> dict[str, States]:
     """Trajectories of a store of ours, of an H5MD file of any program, or of datasets by their names."""
-    foreign = bool(columns) or store.is_foreign(path)
+    if columns or store.is_foreign(path):
+        return read_hdf5(path, columns)
     found: dict[str, States] = {}
-    for run in () if foreign else store.summary(path).runs:
+    for run in store.summary(path).runs:
         # one frame more than is looked at in a piece of a very long run
         piece = next(store.windows(path, run.label, run.frames + 1))
         found[run.label] = Recorded(t=piece.t, q=piece.q, p=piece.p, v=None, mass=None, run=piece)
-    if not foreign:
-        return found
-    if columns or not store.is_h5md(path):
-        return read_hdf5(path, columns)
-    for name, group in store.read_foreign(path).items():
-        found[name] = States(
-            t=group.t,
-            q=group.q.reshape(len(group.t), -1),
-            p=None,
-            v=np.reshape(np.asarray(group.v), (len(group.t), -1)),
-            mass=group.mass,
-            roundoff=max(2.0**-53, group.roundoff),
-        )
     return found
 
 

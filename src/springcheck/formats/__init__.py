@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from functools import partial
 from io import BytesIO
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -131,24 +132,33 @@ def _read(path: Path, columns: list[str], step: float | None) -> States:
 
 def _apart(found: Format, path: Path, columns: list[str], step: float | None) -> States:
     """What a library reads."""
-    given = (json.dumps(columns), "" if step is None else repr(step))
+    given = (found.name, json.dumps(columns), "" if step is None else repr(step))
     try:
-        said = apart.read(__name__, found.name, path, *given)
+        said = apart.read(__name__, "packed", path, *given)
     except apart.EndedError as error:
         raise StoreError(f"{path}: is damaged, or no {found.name} file: reading it {error}") from error
-    if said.startswith(apart.REFUSED):
-        raise StoreError(said.removeprefix(apart.REFUSED).decode("utf-8", "backslashreplace"))
     with np.load(BytesIO(said), allow_pickle=False) as arrays:
         known = {name: arrays.get(name) for name in ("p", "v", "mass")}
         return States(t=arrays["t"], q=arrays["q"], roundoff=float(arrays["roundoff"]), **known)
 
 
-def read_hdf5(path: Path, columns: Sequence[str] = (), *, alone: bool = False) -> dict[str, States]:
-    """The trajectories of an HDF5 file that is neither a store nor H5MD, by name.
+def packed(path: Path, name: str, columns: str, step: str) -> bytes:
+    """The states that a format's reader finds, as NPZ."""
+    found = BY_NAME[name].read(path, json.loads(columns), float(step) if step else None)
+    known: dict[str, Any] = {part: getattr(found, part) for part in ("t", "q", "p", "v", "mass", "roundoff")}
+    out = BytesIO()
+    np.savez(out, **{part: x for part, x in known.items() if x is not None})
+    return out.getvalue()
 
-    Every group with datasets of times, positions, and momenta or velocities (unless positions may be `alone`)
-    is one; or `columns` name the datasets, as ``t=run/clock,q=run/x,v=run/dx``.  Raises StoreError where
-    there is none.
+
+def read_hdf5(
+    path: Path, columns: Sequence[str] = (), most: int | None = None, *, alone: bool = False
+) -> dict[str, States]:
+    """The trajectories of an HDF5 file that is no store, by name; of H5MD the first `most` frames.
+
+    Every particle group of H5MD is one.  Elsewhere every group with datasets of times, positions, and momenta
+    or velocities (unless positions may be `alone`) is one; or `columns` name the datasets, as
+    ``t=run/clock,q=run/x,v=run/dx``.  Raises StoreError where there is none.
     """
     if columns:
         wanted = {text.rpartition("=")[2].strip("/") for text in columns}
@@ -158,6 +168,19 @@ def read_hdf5(path: Path, columns: Sequence[str] = (), *, alone: bool = False) -
         }
         names = [x.replace("=/", "=").removeprefix("/") for x in columns]
         return {path.name: _moving(path, states_of(path, flat, names), alone=alone)}
+    if store.is_h5md(path):
+        return {
+            name: States(
+                t=group.t,
+                q=group.q.reshape(len(group.t), -1),
+                p=None,
+                v=None if group.v is None else group.v.reshape(len(group.t), -1),
+                mass=group.mass,
+                roundoff=max(2.0**-53, group.roundoff),
+                units=group.units,
+            )
+            for name, group in store.read_foreign(path, most, alone=alone).items()
+        }
     groups = store.read_arrays(path, lambda place: kind(_name_of(place).rpartition("/")[2]) is not None)
     made: dict[str, States] = {}
     said = StoreError(

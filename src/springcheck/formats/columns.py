@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal, TypeAlias
 
@@ -47,6 +47,8 @@ class States:
     mass: Floats | None
     roundoff: float = 2.0**-53
     """Unit roundoff of what is written: 2**-24 for single precision, 5e-d for d significant digits."""
+    units: Mapping[str, str] = field(default_factory=dict)
+    """Those of q, v, t and mass that an H5MD file names."""
 
 
 Reader: TypeAlias = Callable[[Path, list[str], float | None], States]

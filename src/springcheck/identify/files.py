@@ -75,16 +75,13 @@ def read(
     foreign = bool(columns) or (path.is_file() and store.is_foreign(path))
     own = () if foreign else store.summary(path).runs
     names = [run.label for run in own]
-    if not foreign:
-        found = list(_ours(path, own, label))
-    elif columns or not store.is_h5md(path):
-        plain = formats.read_hdf5(path, columns, alone=True)
-        names = list(plain)
-        found = [of_arrays(name, states) for name, states in plain.items() if label in (None, name)]
+    if foreign:
+        known = formats.read_hdf5(path, columns, MOST_FRAMES + 1, alone=True)
+        names = list(known)
+        found = [of_arrays(name, states) for name, states in known.items() if label in (None, name)]
     else:
-        found = list(_foreign(path, label))
+        found = list(_ours(path, own, label))
     if not found:
-        names = names if names or not foreign else list(store.read_foreign(path, alone=True))
         asked = f" {label!r}; it has {', '.join(names)}" if names else " to identify"
         raise StoreError(f"{path}: holds no trajectory{asked}")
     return found
@@ -103,8 +100,10 @@ def of_arrays(name: str, found: formats.States) -> FileStates:
     kept = slice(MOST_FRAMES)
     speed = next((x for x in (found.p, found.v) if x is not None), np.zeros_like(found.q))
     notes = [f"the first {MOST_FRAMES} frames were looked at"] if len(found.t) > MOST_FRAMES else []
-    chosen, remarks = _chosen(found.q[kept], speed[kept], notes)
     p, v, mass = found.p, found.v, found.mass
+    if v is not None and found.units:
+        v = v * _velocity_factor(found.units, notes)
+    chosen, remarks = _chosen(found.q[kept], speed[kept], notes)
     if mass is not None and len(mass) != found.q.shape[1]:
         mass = np.repeat(mass, found.q.shape[1] // len(mass))
     return FileStates(
@@ -142,26 +141,6 @@ def _adaptive(run: store.Run) -> str:
         # of an engine that is not here
         return ""
     return "" if scheme.has("one-step") or scheme.has("flow") else scheme.title
-
-
-def _foreign(path: Path, wanted: str | None) -> Iterator[FileStates]:
-    for name, group in store.read_foreign(path, MOST_FRAMES + 1, alone=True).items():
-        if wanted not in (None, name):
-            continue
-        notes: list[str] = []
-        if len(group.t) > MOST_FRAMES:
-            notes.append(f"the first {len(group.t)} frames were looked at")
-        frames, n, dimensions = group.q.shape
-        mass = None if group.mass is None else np.repeat(group.mass, dimensions)
-        q = group.q.reshape(frames, n * dimensions)
-        v = None
-        if group.v is not None:
-            v = group.v.reshape(q.shape) * _velocity_factor(group.units, notes)
-        chosen, remarks = _chosen(q, np.zeros_like(q) if v is None else v, notes)
-        yield FileStates(
-            label=name, t=group.t, q=q[:, chosen], p=None, v=None if v is None else v[:, chosen],
-            mass=None if mass is None else mass[chosen], notes=remarks, whole=q,
-        )  # fmt: skip
 
 
 def _velocity_factor(units: Mapping[str, str], notes: list[str]) -> float:

@@ -1,8 +1,7 @@
 """Files of strangers, read in a process of its own with little memory and time: whatever that does, we live.
 
 Libraries that read them (libhdf5, pandas, MDAnalysis, ASE ...) crash, hang and fill the memory on files that
-are damaged, or were made to do so.  A module that is called so has a `main(kind, path, *words)` that returns
-bytes, and a `__main__` that calls `perform`.
+are damaged, or were made to do so.
 """
 
 from __future__ import annotations
@@ -11,9 +10,10 @@ import contextlib
 import os
 import subprocess
 import sys
-from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
 
+from springcheck.errors import StoreError
 from springcheck.interrupts import called
 
 LIMIT, SPEED = 8.0, 1e8
@@ -28,14 +28,17 @@ class EndedError(Exception):
     """The process has crashed, or took more than it was given: the message says which."""
 
 
-def read(module: str, kind: str, path: Path, *words: str) -> bytes:
-    """What `main(kind, path, *words)` of a module's `__main__` returns.  EndedError where it does not."""
+def read(module: str, function: str, path: Path, *words: str) -> bytes:
+    """What a function of a module returns for a file and words.  StoreError where it raises one, EndedError
+    where it does not end as it should."""
     root = str(Path(__file__).parents[2])
     paths = os.pathsep.join(filter(None, [root, os.environ.get("PYTHONPATH")]))
     # BLAS would take memory for a thread of each core
     threads = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
     limit = LIMIT + path.stat().st_size / SPEED
-    command = [sys.executable, "-P", "-m", module, str(int(limit) + 1), str(MEMORY), kind, str(path), *words]
+    begin = "from springcheck.store import apart; apart.perform()"
+    limits = (str(int(limit) + 1), str(MEMORY))
+    command = [sys.executable, "-P", "-c", begin, *limits, module, function, str(path), *words]
     try:
         # on a busy machine it waits longer than it works, and work is what is limited
         done = called(command, 6 * limit, env={**os.environ, **threads, "PYTHONPATH": paths})
@@ -45,16 +48,34 @@ def read(module: str, kind: str, path: Path, *words: str) -> bytes:
         raise EndedError(
             f"crashes its library, or asks for more than {limit:.0f} s or {MEMORY >> 30} GiB of memory"
         )
-    return done.stdout
+    return heard(done.stdout)
 
 
-def perform(main: Callable[..., bytes]) -> None:
+def answer(module: str, function: str, path: Path, *words: str) -> bytes:
+    """What such a process answers: what its function returns, or says against the file."""
+    try:
+        found: bytes = getattr(import_module(module), function)(path, *words)
+    except StoreError as error:
+        return REFUSED + str(error).encode("utf-8", "surrogatepass")
+    return found
+
+
+def heard(said: bytes) -> bytes:
+    """An answer, or the StoreError that it tells."""
+    if said.startswith(REFUSED):
+        raise StoreError(said.removeprefix(REFUSED).decode("utf-8", "backslashreplace"))
+    return said
+
+
+def perform() -> None:
     """Be such a process: take no more than its arguments say, and answer on standard output alone."""
-    answer = os.dup(1)
+    seconds, memory, module, function, path, *words = sys.argv[1:]
+    out = os.dup(1)
     os.dup2(2, 1)
-    _limit(int(sys.argv[1]), int(sys.argv[2]))
-    found = main(sys.argv[3], Path(sys.argv[4]), *sys.argv[5:])
-    with open(answer, "wb") as file:
+    import_module(module)
+    _limit(int(seconds), int(memory))
+    found = answer(module, function, Path(path), *words)
+    with open(out, "wb") as file:
         file.write(found)
     # a library that was given a bad file may crash as it is tidied up
     os._exit(0)

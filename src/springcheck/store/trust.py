@@ -14,10 +14,10 @@ import h5py
 from springcheck.errors import StoreError
 from springcheck.store import apart, files, seal
 
-OURS, FOREIGN = "ours", "foreign"
-"""What a file is read as when it is tried."""
+OURS, FOREIGN = "checking", "foreign"
+"""What a file is read as when it is tried: the modules whose `tried` does it."""
 
-MODULE = "springcheck.store"
+PACKAGE = "springcheck.store"
 
 
 def trust(path: Path, kind: str) -> None:
@@ -53,7 +53,7 @@ def _state(path: Path) -> tuple[int, ...]:
 
 
 def guarded(path: Path, kind: str) -> str:
-    """Read a file in a process of its own -> what that says (see `__main__`).
+    """Read a file in a process of its own -> what that says.
 
     Raises StoreError when it crashes, or takes so long that it will never end.
     """
@@ -67,6 +67,8 @@ def guarded(path: Path, kind: str) -> str:
 def _tried(path: Path, kind: str, state: tuple[int, ...]) -> tuple[str, bool]:
     """What the process says, and whether it lived to say it."""
     try:
-        return apart.read(MODULE, kind, path).decode("utf-8", "backslashreplace").strip(), True
+        return apart.read(f"{PACKAGE}.{kind}", "tried", path).decode(), True
+    except StoreError as error:
+        return str(error), True
     except apart.EndedError as error:
         return f"it is damaged, reading it {error}", False
