@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from time import perf_counter
-from typing import Any, Literal, Protocol
+from typing import Any, Literal, NamedTuple, Protocol
 
 import numpy as np
 
@@ -269,8 +269,7 @@ def run(
     return gather.onto(play(scene, label, gather, progress=progress, seed=seed))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Bare:
+class Bare(NamedTuple):
     """What running an engine alone took, for one run of it: seconds of wall clock and force calls."""
 
     timing: Timing

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
-from typing import Generic, Literal, Protocol, TypeAlias, TypeVar
+from typing import Generic, Literal, NamedTuple, Protocol, TypeAlias, TypeVar
 
 import numpy as np
 
@@ -38,8 +38,7 @@ Family: TypeAlias = Literal["record", "motion", "repeat", "map", "law", "noise"]
 map; laws over many runs, which do not look at the scene; the draws of a thermostat."""
 
 
-@dataclass(frozen=True, slots=True)
-class Finding:
+class Finding(NamedTuple):
     """A value, the bound that it must keep, their unit, the bound's reason, and what would have been seen."""
 
     value: float | np.number
@@ -51,8 +50,7 @@ class Finding:
     """What else must be for it to pass."""
 
 
-@dataclass(frozen=True, slots=True)
-class Chance:
+class Chance(NamedTuple):
     """A finding that only statistics can judge: the probability of a value as bad if all is right."""
 
     chance: float

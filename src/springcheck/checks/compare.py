@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -81,8 +81,7 @@ def allowed(scene: Scene, trajectory: Trajectory) -> float:
     return float(rounding * min(case.roundings * steps * (1 + steps * turn / 2), walk))
 
 
-@dataclass(frozen=True, slots=True)
-class _Motion:
+class _Motion(NamedTuple):
     """A trajectory, and how far it may be from the motion that it stands for."""
 
     case: Case

@@ -7,8 +7,7 @@ the order of this table, so each may rely on those before it that a check requir
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -25,8 +24,7 @@ Lacks: TypeAlias = Callable[[Any], str | None]
 """A subject -> why the requirement is not met, or None."""
 
 
-@dataclass(frozen=True, slots=True)
-class Requirement:
+class Requirement(NamedTuple):
     """One row: its name, how `list` and `explain` call it, and why a subject lacks it."""
 
     name: str

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from springcheck.physics.arrays import Floats
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Line:
+class Line(NamedTuple):
     """Least squares of y = intercept + slope x, and further terms."""
 
     slope: float

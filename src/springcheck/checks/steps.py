@@ -321,7 +321,7 @@ def arithmetic(case: Case) -> Finding | str:
     if not seen.value <= seen.bound:
         return seen
     why = f"{named.name} precision: more is worse arithmetic, less than 1/256 of a rounding is better"
-    return replace(seen, why=why, holds=bool(alone >= FLOOR))
+    return seen._replace(why=why, holds=bool(alone >= FLOOR))
 
 
 FLOOR = 2.0**-8

@@ -9,10 +9,9 @@ import sys
 from argparse import Namespace
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import closing, redirect_stdout
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from springcheck import interrupts
 from springcheck.cli import output
@@ -21,8 +20,7 @@ from springcheck.studies.arguments import ENGINE, JSON, QUIET, Argument, argumen
 from springcheck.studies.team import processes
 
 
-@dataclass(frozen=True, slots=True)
-class Command:
+class Command(NamedTuple):
     """A command of the command line."""
 
     name: str

@@ -7,12 +7,12 @@ import importlib.util
 import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from functools import cache, partial
 from hashlib import sha256
 from pathlib import Path
 from types import ModuleType
+from typing import NamedTuple
 
 import springcheck
 from springcheck import interrupts, schemes
@@ -32,8 +32,7 @@ MODULES = (
 """Our engines, each the ENGINE of the module beside this one."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Origin:
+class Origin(NamedTuple):
     """Where an engine comes from: a package with its version, or a file."""
 
     package: str
@@ -43,8 +42,7 @@ class Origin:
         return f"{self.package} {self.version}".strip()
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Found:
+class _Found(NamedTuple):
     """An engine that is known by name: `load` imports it from `place`; unusable where `reason` is."""
 
     origin: Origin

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, ClassVar, Literal, Self, TypeAlias, cast
+from typing import Any, ClassVar, Literal, NamedTuple, Self, TypeAlias, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,8 +23,7 @@ Where: TypeAlias = "slice | Integers"
 Origin: TypeAlias = Literal["potential", "friction", "magnetic", "drive", "constraint"]
 
 
-@dataclass(frozen=True, slots=True)
-class Column:
+class Column(NamedTuple):
     """A parameter of a term: its name in a scene file, the field that holds it, and what it may be."""
 
     name: str

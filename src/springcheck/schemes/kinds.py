@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -38,8 +38,7 @@ Effect: TypeAlias = Callable[[Reals, Reals, Any, Setting], tuple[Reals, Reals]]
 """(q, p, x, setting) -> (q, p), each (..., n); x is a time of either sign."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class StageKind:
+class StageKind(NamedTuple):
     """One kind of stage."""
 
     name: str

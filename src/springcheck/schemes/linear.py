@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -44,8 +44,7 @@ def matrix(scheme: Scheme, *, h: float, m: Reals, k: Reals, c: Reals | float = 0
     return np.asarray(np.stack([q.T, p.T], axis=1), np.longdouble)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Rotation:
+class Rotation(NamedTuple):
     """How one-step matrices turn: by `angle`, or where the motion is unbounded by a hyperbolic angle `growth`
     > 0, `sign` the sign of their eigenvalues.  `propagate` makes their powers of it.
     """

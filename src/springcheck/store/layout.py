@@ -22,10 +22,9 @@ import contextlib
 import os
 import platform
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import h5py
 import numpy as np
@@ -88,8 +87,7 @@ ABOUT_GROUPS = (
 HOME_PAGE = ""  # OWNER: the project's address, once there is one; it follows in `about`
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Column:
+class Column(NamedTuple):
     """One array of a trajectory: HDF5 path, bytes per row, dtype."""
 
     path: str

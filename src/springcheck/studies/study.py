@@ -114,6 +114,9 @@ class Study:
 
     def perform(self, options: Namespace, progress: Progress | None) -> Result:
         """Measure what the command line asks for; SpringcheckError for what a user can mend."""
+        # first, while the stack is short: beyond a chunk of it Python 3.11 maps memory for every call, and to
+        # make the terms' classes takes hundreds
+        import_module("springcheck.physics.terms")
         measure = self._part("measure")
         if not gc.isenabled():
             # the program has switched it off for its imports: what was imported stays, and is not searched

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from decimal import Decimal
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,8 +20,7 @@ from springcheck.physics.system import System
 from springcheck.physics.terms import Damping, Spring
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Start:
+class Start(NamedTuple):
     """The start of each mode, (n,) each: u from its centre [M1/2 L], v [M1/2 L/T]; and, where it does not
     turn, the shares of exp(slow t) and exp(fast t) in its motion (see `split`).
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -22,8 +22,7 @@ from springcheck.physics.exact.well import Well
 from springcheck.physics.system import Fields, System
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Group:
+class _Group(NamedTuple):
     """Particles (s,) of a system, the system of these alone, and the closed form of their motion."""
 
     particles: Integers

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -22,8 +21,7 @@ LAST = 64 * EPS
 at most a tenth of them."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Well:
+class Well(NamedTuple):
     """A closed form: for particles on which a term `key` acts, and nothing but `terms`."""
 
     key: str
