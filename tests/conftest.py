@@ -10,8 +10,12 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
+
+# before NumPy is imported: threads of BLAS wait for each other where matrices are small, and take the cores
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 

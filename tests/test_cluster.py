@@ -99,9 +99,9 @@ PIDS: Rows[Pid] = Rows(kind=Pid, beginning="pids/", named="", joined=True)
 
 
 def test_killed_and_hanging_workers_lose_nothing_and_a_scheduler_that_dies_is_said(farm: Farm) -> None:
-    parts = [partial(slow, i, 0.2) for i in range(30)]
+    parts = [partial(slow, i, 0.1) for i in range(30)]
     found = {}
-    for i, answer in Cluster(str(farm.file), patience=3.0).carried_out(parts):
+    for i, answer in Cluster(str(farm.file), patience=1.0).carried_out(parts):
         found[i] = answer
         if len(found) in (3, 9):
             farm.workers.append(farm.worker())
@@ -115,8 +115,8 @@ def test_killed_and_hanging_workers_lose_nothing_and_a_scheduler_that_dies_is_sa
     kept = []
 
     def all_of_them() -> None:
-        parts = [partial(slow, i, 0.3) for i in range(40)]
-        for i, _ in Cluster(str(farm.file), patience=3.0).carried_out(parts):
+        parts = [partial(slow, i, 0.2) for i in range(40)]
+        for i, _ in Cluster(str(farm.file), patience=1.0).carried_out(parts):
             kept.append(i)
             if len(kept) == 4:
                 farm.scheduler.kill()
@@ -286,8 +286,9 @@ def test_jobs_of_a_queue_measure_and_are_submitted_again_and_none_is_left(
     import dask
 
     found = {}
-    # a job may come back within 15 s unless dask is told otherwise
-    monkeypatch.setitem(dask.config.config["distributed"]["deploy"], "lost-worker-timeout", "1s")
+    # a job may come back within 15 s unless dask is told otherwise, which looks once a second
+    monkeypatch.setitem(dask.config.config["distributed"]["deploy"], "lost-worker-timeout", "100ms")
+    monkeypatch.setitem(dask.config.config["distributed"]["adaptive"], "interval", "100ms")
     place, parts = described(queue), [partial(slow, i, 0.02) for i in range(20)]
     with on_a_queue.started(place, *on_a_queue.description(place), 1) as jobs_of:
         for i, answer in Cluster(jobs_of.scheduler_address).carried_out(parts):
