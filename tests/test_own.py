@@ -606,6 +606,8 @@ def test_damaged_compiled_code_is_compiled_anew(
 ) -> None:
     """numba itself ends in EOFError, UnpicklingError or a killed process: each look is one of its own."""
     numba = pytest.importorskip("numba")
+    # what the compiler learns at its first function is known to every look
+    numba.njit(lambda q: q[0])(np.zeros((1, 1)))
     monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
 
     def look(into: int) -> None:
