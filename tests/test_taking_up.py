@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import os
 import signal
@@ -38,19 +37,20 @@ def killed(arguments: Sequence[str], path: Path, tables: int) -> dict[str, store
     """Start a command, kill it (SIGKILL) once so many tables are there; what it had finished."""
     environment = os.environ | {"PYTHONPATH": str(Path(springcheck.__file__).parents[1])}
     parts = path.with_name(path.name + ".parts")
+    lifeline, held = os.pipe()
     with subprocess.Popen(
         [sys.executable, "-m", "springcheck", *arguments, "-o", str(path), "--quiet"],
         env=environment,
-        start_new_session=True,
+        pass_fds=(held,),
     ) as process:
+        os.close(held)
         while process.poll() is None and len(list(parts.glob("table-*.h5"))) < tables:
             time.sleep(0.002)
         process.send_signal(signal.SIGKILL)
     assert process.returncode == -signal.SIGKILL, "it ended before it could be killed"
     # the program that it waited for ends with it, as soon as it hears of that
-    with contextlib.suppress(ProcessLookupError):
-        while os.killpg(process.pid, 0) is None:
-            time.sleep(0.01)
+    with open(lifeline, "rb") as pipe:
+        assert pipe.read() == b""
     return dict(store.tables_of(path))
 
 
