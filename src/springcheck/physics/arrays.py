@@ -110,6 +110,8 @@ def in_pieces(law: Callable[..., Reals], rows: int, *more: Reals) -> Callable[[R
     """
 
     def bounded(q: Reals, p: Reals) -> Reals:
+        if q.ndim == 1:
+            return law(q, p, *more)
         given = (q, p, *more)
         count = q.size // q.shape[-1]
         if count == 1 or count * rows <= MOST_NUMBERS or any(x.shape != q.shape for x in given):
