@@ -10,11 +10,11 @@ import springcheck
 HOME = Path(springcheck.__file__).parent
 
 BUDGETS = {
-    ("physics",): 6949,
+    ("physics",): 6952,
     ("schemes",): 1799,
     ("thermal",): 2594,
     ("engines/own",): 1673,
-    ("engines/openmm", "engines/ase", "engines/sundials"): 1324,
+    ("engines/openmm", "engines/ase", "engines/sundials"): 1326,
     ("engines",): 2720,
     ("driver", "conformance", "doors"): 1207,
     ("checks",): 5086,
