@@ -168,7 +168,7 @@ def read_hdf5(
         }
         names = [x.replace("=/", "=").removeprefix("/") for x in columns]
         return {path.name: _moving(path, states_of(path, flat, names), alone=alone)}
-    if store.is_h5md(path):
+    if particles := store.read_foreign(path, most, alone=alone):
         return {
             name: States(
                 t=group.t,
@@ -179,7 +179,7 @@ def read_hdf5(
                 roundoff=max(2.0**-53, group.roundoff),
                 units=group.units,
             )
-            for name, group in store.read_foreign(path, most, alone=alone).items()
+            for name, group in particles.items()
         }
     groups = store.read_arrays(path, lambda place: kind(_name_of(place).rpartition("/")[2]) is not None)
     made: dict[str, States] = {}

@@ -37,19 +37,19 @@ from springcheck.store.tables import Table
 if TYPE_CHECKING:
     from springcheck.store.checking import Damage, check, doubts
     from springcheck.store.exporting import export
-    from springcheck.store.foreign import is_foreign, is_h5md, read_arrays, read_foreign
+    from springcheck.store.foreign import is_foreign, read_arrays, read_foreign
 
 __all__ = [
     "Draft", "Damage", "Journal", "Run", "StoreError", "StoreWarning", "Summary", "Table", "attributes",
     "check", "comparison", "decoded", "digest", "document", "doubts", "end", "export", "machine",
-    "is_foreign", "is_h5md", "measured_by", "need_space", "open_new", "read", "read_arrays", "read_foreign",
+    "is_foreign", "measured_by", "need_space", "open_new", "read", "read_arrays", "read_foreign",
     "read_one", "scene_text", "size", "sources", "strided", "summary", "tables_of", "verdicts",
     "windows",
 ]  # fmt: skip
 
 _LATER = {
     **dict.fromkeys(("Damage", "check", "doubts"), "checking"),
-    **dict.fromkeys(("is_foreign", "is_h5md", "read_arrays", "read_foreign"), "foreign"),
+    **dict.fromkeys(("is_foreign", "read_arrays", "read_foreign"), "foreign"),
     "export": "exporting",
 }
 """What no run needs, and the module that it is imported from when it is first used."""

@@ -69,7 +69,7 @@ def check_file(path: Path, most: int | None = None) -> list[Damage]:
             if most is None or known.end <= most:
                 found += [
                     Damage(name, "its bytes have changed since it was written")
-                    for name in seal.broken(path, known)
+                    for name in seal.broken(path, known.extents)
                 ]
             else:
                 size = files.readable(known.end)
@@ -129,9 +129,8 @@ def _structure(file: Any, *, arrays: bool) -> Iterator[Damage]:
         return
     now, extents = digests.contents(file)
     if arrays:
-        with open(file.filename, "rb") as raw:
-            for name in seal.changed(raw, extents):
-                yield Damage(name, "does not match its sha256")
+        for name in seal.broken(Path(file.filename), extents):
+            yield Damage(name, "does not match its sha256")
     if "part" not in root:
         yield from _differences(file, root, now)
 

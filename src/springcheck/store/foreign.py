@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -48,8 +47,8 @@ def read_foreign(path: str | Path, most: int | None = None, *, alone: bool = Fal
 
     `most` frames are read, from the first on; None for all.
 
-    Where the two are stored at different steps, the common ones are taken.  Raises StoreError when the
-    file is no H5MD, holds no velocities, or is damaged.
+    Where the two are stored at different steps, the common ones are taken.  None are of a file without
+    /particles, which is no H5MD.  Raises StoreError when its groups hold no velocities, or are damaged.
     """
     path = Path(path)
     trust.trust(path, trust.FOREIGN)
@@ -59,9 +58,10 @@ def read_foreign(path: str | Path, most: int | None = None, *, alone: bool = Fal
 def load(path: Path, most: int | None = None, *, alone: bool = False) -> dict[str, Foreign]:
     """The same in this process, whatever the file does to libhdf5."""
     with access.for_reading(path) as file:
-        names = access.children(file, "particles")
+        is_h5md = isinstance(access.find(file, "particles"), h5py.Group)
+        names = access.children(file, "particles") if is_h5md else []
         if not names:
-            raise StoreError(f"{path} has no /particles: it is no H5MD trajectory")
+            return {}
         found = dict(_groups(path, file, names, most))
         whole = {name: group for name, group in found.items() if group.v is not None}
         if not (whole or (alone and found)):
@@ -83,21 +83,10 @@ def tried(path: Path) -> bytes:
 
 def is_foreign(path: str | Path) -> bool:
     """Whether an HDF5 file is no store of ours.  StoreError where it cannot be read."""
-    with _trusted(Path(path)) as file:
-        return access.attribute(file, "format") not in (layout.FORMAT, layout.OLDER)
-
-
-def is_h5md(path: str | Path) -> bool:
-    """Whether a file has particle groups where H5MD has them.  StoreError where it cannot be read."""
-    with _trusted(Path(path)) as file:
-        return isinstance(access.find(file, "particles"), h5py.Group)
-
-
-@contextlib.contextmanager
-def _trusted(path: Path) -> Iterator[Any]:
+    path = Path(path)
     trust.trust(path, trust.FOREIGN)
     with access.for_reading(path) as file:
-        yield file
+        return access.attribute(file, "format") not in (layout.FORMAT, layout.OLDER)
 
 
 def read_arrays(path: str | Path, wanted: Callable[[str], bool]) -> dict[str, dict[str, Any]]:

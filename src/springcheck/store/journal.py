@@ -150,7 +150,7 @@ def _look_at_parts(parts: Path, run: str) -> None:
         known = seal.find(part)
         if known is not None and known.run != run:
             said = f"{part} is a part of another run and is left out: {name} is measured again"
-        elif known is None or not seal.is_whole(part, known) or seal.broken(part, known):
+        elif known is None or not seal.is_whole(part, known) or seal.broken(part, known.extents):
             part.unlink()
             said = f"{part} was damaged and is removed: {name} is measured again"
         else:

@@ -139,12 +139,7 @@ def is_whole(path: Path, seal: Seal) -> bool:
         return digest(file, *gaps(seal.extents, seal.end)) == seal.rest
 
 
-def broken(path: Path, seal: Seal) -> list[str]:
-    """Names of the arrays whose bytes have changed since the file was sealed."""
-    with path.open("rb") as file:
-        return changed(file, seal.extents)
-
-
-def changed(file: BinaryIO, extents: Iterable[Extent]) -> list[str]:
+def broken(path: Path, extents: Iterable[Extent]) -> list[str]:
     """Names of the arrays whose bytes are not those of their sha256."""
-    return [e.name for e in extents if digest(file, (e.offset, e.size)) != e.sha256]
+    with path.open("rb") as file:
+        return [e.name for e in extents if digest(file, (e.offset, e.size)) != e.sha256]
