@@ -1,4 +1,4 @@
-"""Is a store what it was when it was written?  Every byte against the seal, then the structure."""
+"""Is a store what it was when it was written?  Every byte against the seal, then all that it lays out."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ class Damage:
 def check(path: str | Path, *, most: int | None = None) -> list[Damage]:
     """Everything wrong with a store and its journal; an empty list where all is well.
 
-    Bytes against the seal, digests, missing and misshapen datasets, H5MD structure.  Of a file of more
-    than `most` bytes the recorded arrays are left out, and that is a finding.  Raises StoreError when
-    there is nothing to check: no such file, or one that cannot be opened at all.
+    Bytes against the seal, then everything that is laid out against its digest.  Of a file of more than
+    `most` bytes the recorded arrays are left out, and that is a finding.  Raises StoreError when there is
+    nothing to check: no such file, or one that cannot be opened at all.
     """
     path = Path(path)
     everything = Parts.of(path, None).everything
@@ -91,7 +91,7 @@ def check_file(path: Path, most: int | None = None) -> list[Damage]:
 
 
 def structure(path: Path, *, arrays: bool = True) -> list[Damage]:
-    """What libhdf5 finds: H5MD, one complete set of arrays per label, digests, tables.
+    """What libhdf5 finds: all that is missing, was added, or is another than its digest.
 
     Without `arrays` the numbers themselves are left to the seal.
     """
