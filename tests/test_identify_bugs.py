@@ -16,7 +16,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from springcheck.identify import identify, identify_stepper
+from springcheck.identify import identify, identify_stepper, record
+from springcheck.identify.fit import fit
+from springcheck.identify.judged import judged
 
 Stepper = Callable[..., tuple[Any, Any]]
 M, K, H = 3.7, 2.9, 0.1
@@ -378,3 +380,18 @@ def test_positions_that_all_lie_on_one_number_are_explained_without_a_warning() 
     found = identify(H * np.arange(201), *np.array(states).T, mass=M, stiffness=K)
     assert not found.fits
     assert "velocity" in found.statement
+
+
+def test_states_that_follow_no_map_are_not_conditioned_however_well_they_span_their_plane() -> None:
+    """Else a clean oscillator beside them would be judged together with what has no map."""
+    rng, h, k, m = np.random.default_rng(7), 0.13, 2.3, 1.7
+    q, v = rng.normal(size=(2, 60, 2))
+    for i in range(59):
+        v[i + 1, 0] = v[i, 0] - h * k / m * q[i, 0]
+        q[i + 1, 0] = q[i, 0] + h * v[i + 1, 0]
+    found = record.read(h * np.arange(60), q, None, v=v, mass=[m, m])
+    clean, scattered = (fit(found, j) for j in range(2))
+    assert clean.conditioned
+    assert scattered.spans
+    assert not scattered.conditioned
+    assert judged(found, None, None, None).moving == [1]
