@@ -22,8 +22,8 @@ from springcheck.errors import IdentificationError
 from springcheck.identify.noise import Noise
 from springcheck.identify.record import ROUNDING, Record
 from springcheck.physics.arrays import Extended, Floats
+from springcheck.physics.exact.powers import Rotation
 from springcheck.schemes import rotation
-from springcheck.schemes.linear import Rotation
 
 CONSTANT_SHOWS = 50.0
 """Gain of chi-squared that shows a constant part in double precision, whose residuals are no Gaussian noise:

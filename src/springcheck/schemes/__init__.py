@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from springcheck.physics.exact.powers import propagate, rotation
 from springcheck.schemes.attached import ATTACHED
 from springcheck.schemes.catalogue import (
     SCHEMES,
@@ -16,8 +17,6 @@ from springcheck.schemes.linear import (
     condition,
     invariant,
     matrix,
-    propagate,
-    rotation,
 )
 from springcheck.schemes.lookup import bring, known, scheme, title
 from springcheck.schemes.rounding import magnitude_step, roundings

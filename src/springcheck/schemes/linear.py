@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from springcheck.physics.arrays import Extended, Floats, Integers, Reals
 from springcheck.physics.exact.linear import flow
+from springcheck.physics.exact.powers import rotation
 from springcheck.schemes.catalogue import Scheme
 from springcheck.schemes.stepping import step
 
@@ -44,44 +43,6 @@ def matrix(scheme: Scheme, *, h: float, m: Reals, k: Reals, c: Reals | float = 0
     return np.asarray(np.stack([q.T, p.T], axis=1), np.longdouble)
 
 
-class Rotation(NamedTuple):
-    """How one-step matrices turn: by `angle`, or where the motion is unbounded by a hyperbolic angle `growth`
-    > 0, `sign` the sign of their eigenvalues.  `propagate` makes their powers of it.
-    """
-
-    determinant: Extended
-    angle: Extended
-    growth: Extended
-    sign: Extended
-
-
-def rotation(matrices: Extended) -> Rotation:
-    """Phase and growth of one-step matrices (n, 2, 2), without the cancellation of acos(trace/2).
-
-    Where the determinant is not positive a step reverses orientation and has neither.
-    """
-    a, b = matrices[:, 0, 0], matrices[:, 0, 1]
-    c, d = matrices[:, 1, 0], matrices[:, 1, 1]
-    determinant = a * d - b * c
-    # -discriminant/4 = det sin(angle)**2; b*c is -(h w)**2 to leading order, so nothing cancels
-    minus = -((a - d) ** 2 / 4 + b * c)
-    half_trace = (a + d) / 2
-    root = np.sqrt(np.abs(minus))
-    turning = minus > 0
-    angle = np.where(turning, np.arctan2(root, half_trace), 0)
-    # a step that reverses orientation (determinant <= 0) has no such growth
-    hyperbolic = (minus < 0) & (determinant > 0)
-    growth = np.zeros_like(root)
-    if np.any(hyperbolic):
-        growth = np.where(hyperbolic, np.arcsinh(root / np.sqrt(np.where(hyperbolic, determinant, 1))), 0)
-    return Rotation(
-        determinant=determinant,
-        angle=angle,
-        growth=growth,
-        sign=np.where(half_trace < 0, np.longdouble(-1), np.longdouble(1)),
-    )
-
-
 def invariant(matrices: Extended, *, h: float) -> Extended:
     """Coefficients (n, 3) of the quadratic form s_qq q**2 + s_qp q p + s_pp p**2 that a step multiplies
     by the determinant of its matrix: the shadow energy, equal to H up to order h [M L2/T2].
@@ -90,52 +51,6 @@ def invariant(matrices: Extended, *, h: float) -> Extended:
     """
     out = np.stack([matrices[:, 1, 0], matrices[:, 1, 1] - matrices[:, 0, 0], -matrices[:, 0, 1]], axis=-1)
     return np.asarray(out / np.longdouble(-2 * np.longdouble(h)))
-
-
-def propagate(
-    matrices: Extended, y: Extended, v: Extended, steps: Integers, *, area_preserving: bool
-) -> tuple[Extended, Extended]:
-    """Closed form of the discrete motion: M**j (y, v) of n modes for j in steps (f,) -> (f, n), twice.
-
-    M**j = d**(j/2) (C + S (M/sqrt(d) - c)) with d the determinant, c = cos(angle), C = cos(j angle) and
-    S = sin(j angle)/sin(angle); hyperbolic where the eigenvalues are real, j at the edge between.
-    """
-    turn = rotation(matrices)
-    j = np.asarray(steps).astype(np.longdouble)[:, None]
-    d = np.ones_like(turn.determinant) if area_preserving else turn.determinant
-    if np.any(d <= 0):
-        raise ValueError("a step that reverses orientation (det <= 0) has no phase")
-    sign = np.where(np.asarray(steps)[:, None] % 2 == 1, turn.sign, 1)
-    x, g = turn.angle, turn.growth
-    one = np.ones_like(x)
-    with np.errstate(over="ignore", invalid="ignore"):
-        turning, growing = x != 0, g != 0
-        near = np.where(turning, np.cos(x), np.where(growing, turn.sign * np.cosh(g), turn.sign * one))
-        sine = np.where(turning, np.sin(np.where(turning, x, 1)), np.sinh(np.where(growing, g, 1)))
-        root = np.sqrt(d)
-        # d is 1 + (h w)**2 or the like: the logarithm of the rounded sum would be wrong by j EPS
-        less = matrices - np.eye(2, dtype=np.longdouble)
-        a, c = less[:, 0, 0], less[:, 1, 1]
-        beyond = a + c + a * c - less[:, 0, 1] * less[:, 1, 0]
-        decay = j / 2 * (np.zeros_like(d) if area_preserving else np.log1p(beyond))
-        # with the powers of the root: what grows by cosh and decays by friction is 0 times infinity apart
-        size, up = np.exp(decay), np.exp(decay + j * g)
-        even = np.where(
-            turning,
-            size * np.cos(j * x),
-            np.where(growing, sign * up * (1 + np.exp(-2 * j * g)) / 2, sign * size),
-        )
-        odd = np.where(
-            turning,
-            size * np.sin(j * x) / sine,
-            sign * turn.sign * np.where(growing, -up * np.expm1(-2 * j * g) / (2 * sine), j * size),
-        )
-        a, b = matrices[:, 0, 0] / root - near, matrices[:, 0, 1] / root
-        c, e = matrices[:, 1, 0] / root, matrices[:, 1, 1] / root - near
-        return (
-            np.asarray(even * y + odd * (a * y + b * v)),
-            np.asarray(even * v + odd * (c * y + e * v)),
-        )
 
 
 def condition(matrices: Extended, w: Extended) -> Extended:

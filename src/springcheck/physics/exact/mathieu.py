@@ -12,11 +12,15 @@ import numpy as np
 
 from springcheck.physics.arrays import Extended
 from springcheck.physics.driven import ModulatedSpring
+from springcheck.physics.exact.powers import propagate
 from springcheck.physics.exact.well import LAST, PI, States, Well, one_each
 from springcheck.physics.system import System
 
 TAYLOR_ORDER = 22
 """Of the series: the next term is (1/2)**23/23!, 5e-30 of the first."""
+
+SCALES = 5
+"""Coordinates in which the growth of errors is bounded."""
 
 MOST_NODES = 1 << 14
 """Of a period: a modulation so slow that it takes more is left out."""
@@ -91,18 +95,6 @@ def _series(mode: _Mode, t: Extended, s: Extended) -> Extended:
     return np.asarray(np.moveaxis(np.stack([y, v]), -1, 0))
 
 
-def _powers(matrix: Extended, n: np.ndarray) -> Extended:
-    """Powers n (f,), of either sign, of a matrix (2, 2) of determinant 1: (f, 2, 2)."""
-    (a, b), (c, d) = matrix
-    inverse = np.array([[d, -b], [-c, a]])
-    out = np.broadcast_to(np.eye(2, dtype=np.longdouble), (len(n), 2, 2))
-    base, left = np.where((n < 0)[:, None, None], inverse, matrix), np.abs(n)
-    while np.any(left):
-        out = np.where((left % 2 == 1)[:, None, None], out @ base, out)
-        base, left = base @ base, left // 2
-    return out
-
-
 def motion(system: System[Any], found: tuple[_Mode, ...], t: Extended) -> States:
     """Exact q and p (f, n) at times t (f, 1) [T]."""
     q, p = np.empty((2, len(t), system.n), dtype=np.longdouble)
@@ -116,29 +108,49 @@ def motion(system: System[Any], found: tuple[_Mode, ...], t: Extended) -> States
         rest = t[:, 0] - n * period
         j = np.clip((rest / mode.node).astype(np.int64), 0, len(mode.nodes) - 2)
         last = _series(mode, mode.node * j, rest - mode.node * j)
-        whole = last @ mode.nodes[j] @ _powers(mode.nodes[-1], n)
-        q[:, i], v = (whole @ mode.start).T
-        p[:, i] = v * system.m[i]
-    return q + at, p
+        # what turns by nearly half a turn a period, its negative turns by little
+        sign, begun = np.copysign(1, np.trace(mode.nodes[-1])), np.empty((2, len(t)), np.longdouble)
+        (a, b), (c, d) = sign * mode.nodes[-1]
+        for matrix, mine in ((np.array([[a, b], [c, d]]), n >= 0), (np.array([[d, -b], [-c, a]]), n < 0)):
+            u0, v0 = mode.start[:, None]
+            u, v = propagate(matrix[None], u0, v0, np.abs(n[mine]), area_preserving=True)
+            begun[:, mine] = np.stack([u[:, 0], v[:, 0]]) * np.where(n[mine] % 2 == 1, sign, 1)
+        q[:, i], p[:, i] = np.einsum("fij,jf->if", last @ mode.nodes[j], begun)
+    return q + at, p * system.m
 
 
 def doubt(system: System[Any], found: tuple[_Mode, ...], t: np.longdouble) -> States:
     """Bounds (n,) of the errors of `motion`: roundings of the angle turned through, times the largest state.
 
-    In the coordinates (rate u, v) no power of the matrix of a period is larger than the condition number of
-    its eigenvectors times that of its spectral radius.
+    Of eigenvalues x and y, and the length N of M - x, the matrix M of a period has powers of at most 1 + n N
+    or the condition of its eigenvectors, k + root(k**2 - 1) with k = N/|x - y|: close to the edge of a
+    resonance they grow, once with the state and once with what becomes of an error.  That holds in the
+    coordinates (z u, v) for any z, and the least of several is taken; errors begin with rate/z there.
     """
     u, v = np.empty((2, system.n), dtype=np.longdouble)
     for i, mode in enumerate(found):
-        scale = np.array([mode.rate, 1.0])
-        scaled = (mode.nodes * scale[:, None] / scale).astype(np.float64)
-        values, vectors = np.linalg.eig(scaled[-1])
+        M = mode.nodes[-1]
+        half = np.trace(M) / 2
+        root = np.emath.sqrt((half - 1) * (half + 1)) * np.copysign(1, half)
+        radius, gap = max(float(np.abs(np.real(half + root))), 1.0), max(2 * float(np.abs(root)), LAST)
         periods = float(np.abs(t) * np.abs(mode.turn) / (2 * PI)) + 1
-        within = np.max(np.linalg.norm(scaled, axis=(1, 2)))
-        grown = within * np.linalg.cond(vectors) * max(float(np.max(np.abs(values))), 1.0) ** periods
-        size = grown * np.hypot(*(mode.start * scale)) * LAST * (1 + mode.rate * np.abs(t))
-        u[i], v[i] = size / mode.rate, size
+        sizes = []
+        for z in mode.rate * np.geomspace(1, _balance(M) / mode.rate, SCALES):
+            scaled = mode.nodes * [[1, z], [1 / z, 1]]
+            length = float(np.linalg.norm((scaled[-1] - (half + root) * np.eye(2)).astype(complex)))
+            k = max(length / gap, 1.0)
+            power = min(k + np.sqrt(k * k - 1), 1 + periods * length)
+            within = np.max(np.linalg.norm(scaled.astype(np.float64), axis=(1, 2)))
+            grown = within * power**2 * max(mode.rate / z, z / mode.rate)
+            sizes.append(grown * np.hypot(z * mode.start[0], mode.start[1]) / np.array([z, 1]))
+        u[i], v[i] = np.min(sizes, axis=0) * radius**periods * LAST * (1 + mode.rate * np.abs(t))
     return u, v * system.m
+
+
+def _balance(M: Extended) -> float:
+    """The z with which M (2, 2) on (z u, v) has elements alike beside its diagonal."""
+    one, other = np.abs(M[0, 1]), np.abs(M[1, 0])
+    return float(np.sqrt(other / one)) if one > 0 < other else 1.0
 
 
 def floquet(system: System[Any]) -> tuple[float, float, float] | None:
