@@ -10,7 +10,7 @@ import springcheck
 HOME = Path(springcheck.__file__).parent
 
 BUDGETS = {
-    ("physics",): 6952,
+    ("physics",): 7052,
     ("schemes",): 1799,
     ("thermal",): 2594,
     ("engines/own",): 1673,
