@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from argparse import Namespace
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
@@ -21,59 +21,47 @@ from springcheck.studies import keeper
 from springcheck.studies.arguments import Progress
 from springcheck.studies.faults import baths
 from springcheck.studies.faults.result import RESULTS, SEEN, FaultReport, Result, seen
-from springcheck.studies.faults.seeded import Fault, Where
+from springcheck.studies.faults.seeded import Fault
 from springcheck.studies.faults.table import FAULTS
 from springcheck.studies.keeper import How, Keeper, Piece
 
-SHIPPED = {
-    "dumbbell": ("dumbbell", 200), "triangle": ("rigid-triangle", 40), "field": ("foucault", 200),
-    "hot rod": ("bath-dumbbell", 400),
+
+def alone(**other: Any) -> Scene:
+    """One mass on a spring."""
+    return spring(**{"m": 3.7, "k": 2.9, "q": 0.3, "p": 0.7, "title": "", **other})
+
+
+DRIVE = Drive(i=np.array([0]), amplitude=np.array([0.43]), frequency=np.array([0.87]), phase=np.array([0.6]))
+
+SCENES: Mapping[str, Callable[[], Scene]] = {
+    "spring": alone,
+    "long spring": partial(alone, steps=2100),
+    "varying steps": partial(alone, steps=60, tolerance=1e-3),
+    "orbit": partial(alone, q=[0.3, -0.5, 0.8], p=[0.7, 1.1, -0.4], places=np.arange(3)),
+    "driven": lambda: replace(one := alone(c=0.11), terms=(*one.terms, DRIVE)),
+    "chain": lambda: Scene(
+        m=np.array([1.3, 0.7, 2.1]), q=np.array([0.2, 1.0, 1.9]), p=np.array([0.4, -0.3, 0.5]), step=0.05,
+        terms=(Spring(a=np.arange(2), b=np.arange(1, 3), k=np.array([1.1, 3.7]), rest=np.array([0.9, 1.2])),),
+        steps=200),
+    # in the plane, their bond across two borders of a box at the start, which drift
+    "box": lambda: Scene(
+        m=np.array([3.7, 3.7, 1.3, 1.3]), q=np.array([4.0, 0.2, 4.3, -0.1]),
+        p=np.array([2.9, -0.7, 0.4, -1.1]), places=np.array([0, 1, 3, 4]), box=(4.1, 3.3, 5.7), step=0.1,
+        terms=(Spring(a=np.arange(2), b=np.arange(2, 4), k=np.full(2, 2.9), rest=np.zeros(2)),), steps=200),
+    "dumbbell": lambda: replace(load_scene("dumbbell"), steps=200),
+    "triangle": lambda: replace(load_scene("rigid-triangle"), steps=40),
+    "field": lambda: replace(load_scene("foucault"), steps=200),
+    "hot rod": lambda: replace(load_scene("bath-dumbbell"), steps=400),
+    "bath": lambda: baths.springs(40),
+    "wide bath": lambda: baths.springs(250),
 }  # fmt: skip
-"""Scenes of the faults that are shipped ones, of so many steps."""
+"""The scenes of the faults: no mass, stiffness, rest point or step that is 1, h w about 0.1."""
 
 
 @cache
-def scene(where: Where) -> Scene:
-    """The scenes of the faults: no mass, stiffness, rest point or step that is 1, h w about 0.1."""
-    if where == "chain":
-        springs = Spring(
-            a=np.array([0, 1]), b=np.array([1, 2]), k=np.array([1.1, 3.7]), rest=np.array([0.9, 1.2])
-        )
-        return Scene(
-            m=np.array([1.3, 0.7, 2.1]),
-            terms=(springs,),
-            q=np.array([0.2, 1.0, 1.9]),
-            p=np.array([0.4, -0.3, 0.5]),
-            step=0.05,
-            steps=200,
-            name=where,
-        )
-    if where == "orbit":
-        q, p = [0.3, -0.5, 0.8], [0.7, 1.1, -0.4]
-        return spring(m=3.7, k=2.9, q=q, p=p, places=np.arange(3), name=where, title="")
-    if where == "driven":
-        drive = Drive(
-            i=np.array([0]), amplitude=0.43 * np.ones(1), frequency=0.87 * np.ones(1), phase=0.6 * np.ones(1)
-        )
-        alone = spring(m=3.7, k=2.9, q=0.3, p=0.7, c=0.11, step=0.1, steps=200, name=where, title="")
-        return replace(alone, terms=(*alone.terms, drive))
-    if where == "box":
-        # in the plane, their bond across two borders of a box at the start, which drift
-        return Scene(
-            m=np.array([3.7, 3.7, 1.3, 1.3]), q=np.array([4.0, 0.2, 4.3, -0.1]),
-            p=np.array([2.9, -0.7, 0.4, -1.1]), places=np.array([0, 1, 3, 4]),
-            terms=(Spring(a=np.arange(2), b=np.arange(2, 4), k=np.full(2, 2.9), rest=np.zeros(2)),),
-            box=(4.1, 3.3, 5.7), step=0.1, steps=200, name=where,
-        )  # fmt: skip
-    if where in ("bath", "wide bath"):
-        return baths.springs({"bath": 40, "wide bath": 250}[where], name=where)
-    if where in SHIPPED:
-        name, steps = SHIPPED[where]
-        return replace(load_scene(name), steps=steps, name=where)
-    if where == "varying steps":
-        return replace(scene("spring"), steps=60, tolerance=1e-3, name=where)
-    steps = 2100 if where == "long spring" else 200
-    return spring(m=3.7, k=2.9, q=0.3, p=0.7, step=0.1, steps=steps, name=where, title="")
+def scene(where: str) -> Scene:
+    """One of them, by its name."""
+    return replace(SCENES[where](), name=where)
 
 
 SLOW = frozenset(check.name for check in checks.THOROUGH if check.family == "law")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import cached_property, partial
-from typing import Any, Literal, TypeAlias
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,11 +15,6 @@ from springcheck.physics.arrays import Floats, Force, Integers, Reals
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory
 from springcheck.studies.faults.steppers import State, Step, energies, record, textbook
-
-Where: TypeAlias = Literal[
-    "spring", "chain", "long spring", "orbit", "driven", "box", "dumbbell", "triangle", "field", "bath",
-    "wide bath", "hot rod", "varying steps",
-]  # fmt: skip
 
 FRAME_CHECKS = ("step-defect", "closed-form")
 
@@ -100,7 +95,8 @@ class Fault:
     """The scheme that the engine claims."""
     size: float | None = None
     """Size in the table; None where the fault has no size."""
-    scene: Where = "spring"
+    scene: str = "spring"
+    """On which it is judged: see `measure.SCENES`."""
 
     @property
     def random(self) -> bool:
