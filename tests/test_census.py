@@ -251,7 +251,7 @@ def test_a_map_whose_eigenvectors_coincide_at_its_limit_has_one() -> None:
 def test_the_kept_table_has_a_hundred_rows_with_versions_and_none_is_declared_otherwise() -> None:
     folder = Path(by_hand.__file__).parent / "engines"
     document = table.load(folder / "engines.json")
-    rows = table.rows(document)
+    rows = engines_table.rows(document)
     assert len(rows) >= 100
     assert len({engines_table.engine(row) for row in rows}) >= 20
     assert not any("DECLARED" in row["note"] for row in rows)
@@ -277,7 +277,7 @@ def test_every_scheme_that_a_row_lists_has_its_title() -> None:
     """Counts of substeps between those that are tried are listed, and no engine runs them."""
     document = table.load(Path(by_hand.__file__).parent / "engines" / "engines.json")
     entry = next(x for x in document["entries"] if "baoab-respa11" in x["found"])
-    (row,) = table.rows({"entries": [entry]})
+    (row,) = engines_table.rows({"entries": [entry]})
     assert "BAOAB-RESPA: fast springs 11 times a step" in row["scheme"]
     assert "baoab-respa" not in row["scheme"]
 
@@ -325,14 +325,16 @@ def test_a_program_of_an_engine_is_short() -> None:
 
 
 def test_the_temperatures_of_a_row_are_shown_with_their_errors() -> None:
-    (row,) = table.rows(census.Census(entries=(census.entry(engines.parse(OWN[0])),), left_out=()).document())
+    (row,) = engines_table.rows(
+        census.Census(entries=(census.entry(engines.parse(OWN[0])),), left_out=()).document()
+    )
     assert (row["thermostat"], row["constraint"], row["kinetic"]) == ("none", "none", "-")
     document = census.Census(entries=(), left_out=()).document()
     document["entries"] = [{
         **vars_of(replace(census.entry(engines.parse(OWN[0])), thermostat="Andersen", configurational=1.1088,
                           configurational_error=4e-4)), "partners": [],
     }]  # fmt: skip
-    (row,) = table.rows(document)
+    (row,) = engines_table.rows(document)
     assert (row["thermostat"], row["configurational"]) == ("Andersen", "1.1088 +- 0.0004")
 
 
@@ -416,7 +418,7 @@ def test_a_thermostat_is_a_row_whose_temperatures_are_measured(capsys: pytest.Ca
     for x, kinetic in ((entries["own:baoab"], 1 - 0.25 / 4), (one, 1.0)):
         assert abs(x["kinetic"] - kinetic) < 5 * x["kinetic_error"] < 0.02
         assert abs(x["configurational"] - 1) < 5 * x["configurational_error"] < 0.02
-    rows = {row["method"]: row for row in table.rows(document)}
+    rows = {row["method"]: row for row in engines_table.rows(document)}
     assert rows["own:baoa"]["thermostat"].startswith("BAOA")
     assert rows["own:baoa"]["amplitude"] == "-"
     assert rows[OWN[0]]["thermostat"] == "none"

@@ -40,7 +40,6 @@ from springcheck.figures.looks import title
 from springcheck.physics.scenefile import load_scene
 from springcheck.studies.census.measure import agrees, measure
 from springcheck.studies.census.result import Census
-from springcheck.studies.census.table import rows as as_rows
 
 MEASURED = {
     "mujoco:joint-spring": ("semi-implicit-euler", 1.020),
@@ -204,7 +203,7 @@ def everything(only: list[str]) -> int:
         new = [entry for entry in document["entries"] if entry["method"] in only]
         document = {**old, "entries": beside(old["entries"], new, order)}
     (FOLDER / "engines.json").write_text(json.dumps(document, indent=1) + "\n")
-    rows = as_rows(document)
+    rows = engines_table.rows(document)
     (FOLDER / "engines.csv").write_text(engines_table.as_csv(rows))
     (FOLDER / "engines.html").write_text(engines_table.html(rows, [document]))
     lock = sorted({part.strip() for row in rows for part in row["version"].split(",")})

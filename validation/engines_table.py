@@ -18,7 +18,25 @@ from typing import Any
 
 from arguments import arguments, script
 from springcheck.errors import SpringcheckError, StoreError, plain
-from springcheck.studies.census.table import COLUMNS, load, rows
+from springcheck.studies.census import table
+from springcheck.studies.census.table import load
+
+COLUMNS = {
+    "method": "engine and attachment",
+    "about": "what is called",
+    "version": "version",
+    **{name: table.WATCHED[name][0] for name in ("thermostat", "axes", "constraint", "scheme")},
+    "claimed": "declared or documented as",
+    **{
+        name: table.WATCHED[name][0]
+        for name in ("velocity", "substeps", "friction", "det", "precision", "limit", "amplitude")
+    },
+    "configurational": "configurational temperature, k<x2>/kT",
+    "kinetic": "kinetic temperature, m<v2>/kT",
+    "forces": "forces a step",
+    "note": "note",
+    "command": "command that makes the row",
+}
 
 MARK = '<meta name="generator" content="springcheck census">'
 """In the first lines of every page: no other file is replaced."""
@@ -50,6 +68,37 @@ for(const a of document.querySelectorAll('a[download]')){
 const x=JSON.parse(document.getElementById(a.download).textContent);
 a.href=URL.createObjectURL(new Blob([typeof x==='string'?x:JSON.stringify(x)]))}
 """
+
+
+def rows(*documents: Mapping[str, Any]) -> list[dict[str, str]]:
+    """One row for each entry of these documents, as text; of a method that is in several the first one's."""
+    found: dict[str, dict[str, str]] = {}
+    for document in documents:
+        watched = table.rows(document)
+        for x in document["entries"]:
+            found.setdefault(x["method"], _row(x, watched[x["method"]]))
+    return list(found.values())
+
+
+def _row(x: Mapping[str, Any], watched: Mapping[str, str]) -> dict[str, str]:
+    row = {
+        **watched,
+        "method": x["method"],
+        "about": x.get("about", ""),
+        "claimed": table.titles(x["claimed"]),
+        "configurational": _share(x, "configurational"),
+        "kinetic": _share(x, "kinetic"),
+        "forces": f"{x['force_calls']:.3g}",
+        "note": "; ".join(filter(None, (x.get("note", ""), "" if x["agrees"] else "DECLARED OTHERWISE"))),
+        "command": x.get("command", f"springcheck census --method {x['method']}"),
+    }
+    return {name: row[name] for name in COLUMNS}
+
+
+def _share(x: Mapping[str, Any], name: str) -> str:
+    """A temperature of the bath's and its standard error."""
+    value, error = x.get(name), x.get(f"{name}_error")
+    return "-" if value is None else f"{value:.4f}" if error is None else f"{value:.4f} +- {error:.1g}"
 
 
 def engine(row: Mapping[str, str]) -> str:

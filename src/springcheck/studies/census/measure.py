@@ -130,6 +130,7 @@ def entry(label: Label) -> Entry:
     found = None if method.adaptive or held else _identified(uneven, run)
     limit = np.nan if method.adaptive else first_limit(uneven, label)
     name = "adaptive" if method.adaptive else rigid.name(uneven, run) if held else _name(uneven, run, found)
+    one_step = np.full((2, 2), np.nan) if method.adaptive else rigid.fitted(run.q[:, 0], run.p[:, 0])
     steps = max(run.outcome.step, 1)
     states = np.concatenate([orbit.q[:, 0], orbit.p[:, 0]])
     return Entry(
@@ -142,8 +143,8 @@ def entry(label: Label) -> Entry:
         agrees=agrees(uneven, method.scheme, name),
         substeps=0 if found is None or found.stride is None else found.stride,
         velocity_offset=np.nan if found is None else float(found.velocity_offset),
-        area=np.nan if method.adaptive else float(np.linalg.det(_map(run))) - 1,
-        trace=np.nan if method.adaptive else float(np.trace(_map(run))),
+        area=float(np.linalg.det(one_step)) - 1,
+        trace=float(np.trace(one_step)),
         friction=float(found.friction[0]) if found is not None and found.fits and found.friction else np.nan,
         precision=found.precision if found is not None and found.fits else run.arithmetic.name,
         limit=limit,
@@ -171,12 +172,6 @@ def _identified(scene: Scene, run: Trajectory) -> Identification | None:
         return identify(run.t, run.q, run.p, mass=m, stiffness=k)
     except IdentificationError:
         return None
-
-
-def _map(run: Trajectory) -> np.ndarray:
-    """The one-step matrix (2, 2) on (q, p) that fits the states best."""
-    z = np.stack([run.q[:, 0], run.p[:, 0]])
-    return np.asarray(z[:, 1:] @ np.linalg.pinv(z[:, :-1]))
 
 
 def _name(scene: Scene, run: Trajectory, found: Identification | None) -> str:

@@ -90,6 +90,12 @@ def run(scene: Scene, label: Label) -> Trajectory:
     return replace(both, q=both.q[:, :1], p=np.sum(both.p, axis=1, keepdims=True), energy=None)
 
 
+def fitted(q: Floats, p: Floats) -> Floats:
+    """The one-step matrix (2, 2) that fits states (f,) best, by least squares."""
+    z = np.stack([q, p])
+    return np.asarray(z[:, 1:] @ np.linalg.pinv(z[:, :-1]))
+
+
 def name(scene: Scene, found: Trajectory) -> str:
     """The schemes whose map of this spring the states follow as well as any linear map.
 
@@ -98,7 +104,7 @@ def name(scene: Scene, found: Trajectory) -> str:
     z = np.stack([found.q[:, 0], found.p[:, 0]])
     z = z / np.max(np.abs(z), axis=1, keepdims=True)
     scale = np.max(np.abs(found.q)) / np.max(np.abs(found.p))
-    best = z[:, 1:] @ np.linalg.pinv(z[:, :-1])
+    best = fitted(*z)
     if found.arithmetic.parameters == "single":
         scene = scene.system.in_single
     m, k = scene.m, scene.system.hessian_diagonal(scene.q)
@@ -127,8 +133,7 @@ def axes(label: Label) -> str:
     found = driver.run(scene, label)
     said = "x, y and z"
     if not is_rigid(label):
-        states = [np.stack([found.q[:, axis], found.p[:, axis]]) for axis in range(3)]
-        maps = np.stack([z[:, 1:] @ np.linalg.pinv(z[:, :-1]) for z in states])
+        maps = np.stack([fitted(found.q[:, axis], found.p[:, axis]) for axis in range(3)])
         coarse = found.arithmetic.state > 2.0**-53
         alike = np.ptp(maps, axis=0).max() < (1e-4 if coarse else ALIKE)
         # steps that follow the forces are no map
