@@ -12,15 +12,21 @@ from springcheck.errors import StoreError
 from springcheck.schemes.elsewhere import ELSEWHERE
 from springcheck.studies.census.rigid import NO_SCHEME
 from springcheck.text.wording import number
+from springcheck.thermal.catalogue import family_of, random_scheme
 
 Cells: TypeAlias = Mapping[str, Mapping[str, str]]
 """Of each method its version, and the text of each column."""
 
 
 def titles(names: str) -> str:
-    """Schemes by their titles, several that nothing tells apart joined by "or"."""
-    found = (getattr(ELSEWHERE.get(name), "title", schemes.title(name)) for name in names.split(" or "))
-    return names if names == NO_SCHEME else " or ".join(found)
+    """Schemes by their titles, whether an engine here runs them or not; several joined by "or"."""
+    return names if names == NO_SCHEME else " or ".join(map(_title, names.split(" or ")))
+
+
+def _title(name: str) -> str:
+    if family_of(name)[1]:
+        return random_scheme(name).title
+    return getattr(ELSEWHERE.get(name), "title", schemes.title(name))
 
 
 def _velocity(offset: float | None) -> str:
