@@ -209,7 +209,6 @@ def _terms(table: Any, bodies: _Bodies) -> Iterator[Term]:
     yield from _of_rows(_capacitors(table, bodies))
     for key, (term, _) in tables.of_terms().items():
         yield from _by_columns(term, getattr(table, tables.identifier(key)), bodies)
-    yield from _by_columns(Damping, table.damping, bodies)
     for read in (_rods(table.rod, bodies), _bonds(table.bond, bodies), _magnetic(table.magnetic, bodies)):
         yield from _of_rows(read)
     yield from _of_rows(

@@ -95,14 +95,6 @@ class BondTable(SceneTable, frozen=True):
     rest: NonNegative = 0.0
 
 
-class DampingTable(SceneTable, frozen=True):
-    """Friction of one particle, along `axis` or all of its axes: force -coefficient p/mass, in M/T."""
-
-    particle: int
-    coefficient: NonNegative
-    axis: Axis | None = None
-
-
 class MagneticTable(SceneTable, frozen=True):
     """A magnetic field along `axis`, its strength charge times field [M/T]: force strength (v_y, -v_x)."""
 
@@ -200,7 +192,6 @@ class SceneBase(SceneTable, frozen=True):
     resistor: tuple[ResistorTable, ...] = ()
     chain: ChainTable | None = None
     spring: tuple[SpringTable, ...] = ()
-    damping: tuple[DampingTable, ...] = ()
     rod: tuple[RodTable, ...] = ()
     bond: tuple[BondTable, ...] = ()
     magnetic: tuple[MagneticTable, ...] = ()
@@ -228,8 +219,9 @@ def _of_term(term: Any) -> type[SceneTable]:
         fields.append((name, kind) if column.default is None else (name, kind, column.default))
     fields.append(("axis", Axis | None, None))
     table = msgspec.defstruct(
-        f"{term.__name__}SceneTable", fields, bases=(SceneTable,), frozen=True, kw_only=True, rename=names
-    )
+        f"{term.__name__}SceneTable", fields, bases=(SceneTable,), frozen=True, kw_only=True, rename=names,
+        namespace={"__doc__": term.__doc__},
+    )  # fmt: skip
     return cast(type[SceneTable], table)
 
 
@@ -238,7 +230,7 @@ def identifier(name: str) -> str:
     return name.replace("-", "_")
 
 
-OTHERWISE = ("wall-spring", "spring", "damping", "magnetic", "wall-rod", "rod", "bond")
+OTHERWISE = ("wall-spring", "spring", "magnetic", "wall-rod", "rod", "bond")
 """Terms that have tables of their own."""
 
 
@@ -282,7 +274,7 @@ def named(name: str) -> Any:
     """The table of a name, for messages that say which fields it has; None for a name that has none."""
     given = (
         ParticleTable, RotorTable, InductorTable, CapacitorTable, ResistorTable, ChainTable, SpringTable,
-        DampingTable, RodTable, BondTable, MagneticTable, BoxTable, BathTable, TimeTable, MethodsTable,
+        RodTable, BondTable, MagneticTable, BoxTable, BathTable, TimeTable, MethodsTable,
         RecordTable,
     )  # fmt: skip
     found: dict[str, Any] = {kind.__name__.removesuffix("Table").lower(): kind for kind in given}
