@@ -208,7 +208,7 @@ def not_exercised(scene: Scene) -> str:
 
 
 def worst(pieces: Sequence[Sequence[Verdict]]) -> list[Verdict]:
-    """Of the verdicts on the pieces of one trajectory, the worst of each check."""
+    """The worst verdict of each check, among those on the pieces of one trajectory."""
     out: list[Verdict] = []
     for same in zip(*pieces, strict=True):
         judged = [verdict for verdict in same if verdict.passed is not None]

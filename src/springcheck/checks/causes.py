@@ -16,7 +16,7 @@ from springcheck.thermal import THERMOSTATS
 from springcheck.thermal.catalogue import ENERGY_LEFT
 
 PUSH_ROUNDINGS = 64
-"""Of the positions that a push is the difference of: a free step, its rounding and that of the frame."""
+"""Roundings of the positions whose difference is a push: of a free step, and of the frame as recorded."""
 
 STANDARD_ERRORS = 6.0
 """Standard errors from which a size is another: a chance of 2e-9 of normal numbers."""
@@ -25,7 +25,7 @@ FEWEST_DRAWS = 50
 """Draws from which sizes are said: their standard error is a tenth."""
 
 FIT_ROUNDS = 20
-"""Of a fit whose weights are its own variances."""
+"""Iterations of a fit whose weights are its own variances."""
 
 SAME_DRAWS = 1e-6
 """Relative difference up to which two draws are taken for one number."""

@@ -93,7 +93,7 @@ def _fits(case: Case, clock: _Clock) -> bool:
 
 
 def _later(case: Case) -> float:
-    """By which part of a step the time is taken later, by least squares in units of the allowance."""
+    """Delay of the drive's time, in steps, by least squares in units of the allowance."""
     unit, later, change = np.stack(case.allowance)[..., :-1], 0.0, 1e-6
     with np.errstate(all="ignore"):
         for _ in range(NEWTON_STEPS):
@@ -107,7 +107,7 @@ def _later(case: Case) -> float:
 
 
 def time_taken(case: Case) -> Finding | str:
-    """By which part of a step all drives are taken later, by linear least squares over all steps.
+    """Delay of all drives, in steps, by linear least squares over all steps.
 
     Each residual may be off by the scheme's roundings: they are added up with their signs in the worst way.
     Where no time and no other drive explains the states, the cause is not the drive.

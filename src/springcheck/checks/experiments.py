@@ -195,7 +195,7 @@ def reversibility(bench: Bench) -> Finding | str:
 
 
 SMALL_PART = 2.0**-10
-"""Of the initial energy norm, up to which the effect of a change is taken for linear in it."""
+"""Largest change, relative to the initial energy norm, whose effect is taken to be linear in it."""
 
 
 def _sees(case: Case, steps: int, allowed: np.floating) -> Limits:

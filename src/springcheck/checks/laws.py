@@ -37,7 +37,7 @@ COARSEST = 16
 MEMBERS = 256
 LONG = 4096
 SIGMAS = 5.0
-"""Of a normal variable: passed by chance once in 1.7 million."""
+"""Standard deviations that a normal variable exceeds by chance once in 1.7 million."""
 
 DECADES = tuple(10.0**-d for d in range(4, 13))
 

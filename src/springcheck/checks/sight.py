@@ -32,7 +32,7 @@ CHANGE = 2.0**-20
 this fraction."""
 
 ROUNDING = np.longdouble(64 * ROUNDOFF)
-"""Of a motion in extended precision: a change that is not well above it is not known."""
+"""Rounding of a motion in extended precision: a change that is not well above it is not known."""
 
 LARGEST = 2.0**-5
 """Relative change up to which its effect is taken to be proportional to it."""

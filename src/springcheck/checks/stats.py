@@ -14,7 +14,7 @@ class Line(NamedTuple):
 
     slope: float
     standard_error: float
-    """Of the slope; NaN where there are as many unknowns as points."""
+    """Standard error of the slope; NaN where there are as many unknowns as points."""
     intercept: float
     leverage: Floats
     """What the slope changes by for a change of each y (n,)."""

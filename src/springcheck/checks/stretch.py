@@ -81,7 +81,7 @@ counts."""
 
 
 def known(case: Claim, ahead: Stretch, steps: int) -> NDArray[np.bool_]:
-    """Of which of these ways of so many steps the end, and what rounding does to it, are known (f,)."""
+    """Whether the end of each stretch of so many steps, and the effect of rounding on it, are known (f,)."""
     with np.errstate(all="ignore"):
         told = np.isfinite([ahead.end, ahead.allowance]).all(axis=(0, 1, 3))
         if not case.system.is_linear and steps > 1:

@@ -118,7 +118,7 @@ def judge(
 
 
 def _taken(states: States, judged: Scene, run: Trajectory, asked: Scene) -> dict[str, str]:
-    """Of each check of the record: what was taken from the file in place of the scene, and so not judged."""
+    """What was taken from the file in place of the scene, and so not judged, by check of the record."""
     out: dict[str, str] = {}
     if np.any(states.t != run.t):
         off = float(np.max(np.abs(states.t - states.t[0] - run.t)))

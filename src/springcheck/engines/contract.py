@@ -85,7 +85,7 @@ class Method:
     one_friction: bool = False
     """One friction rate serves all particles of a run."""
     generator: str = ""
-    """Of a random method: what draws its numbers, in words."""
+    """What draws the numbers of a random method, in words."""
     scripted: bool = False
     """Whether its seed may be a generator of one's own, an object with `standard_normal(size)`."""
     note: str = ""

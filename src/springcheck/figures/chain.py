@@ -39,7 +39,7 @@ chain."""
 WAVE_SHADES = (
     "#2166ac", "#4393c3", "#92c5de", "#d1e5f0", "#f7f7f7", "#fddbc7", "#f4a582", "#d6604d", "#b2182b",
 )  # fmt: skip
-"""Of displacements from the largest below rest to the largest above, by Brewer."""
+"""Colours of displacements, from the largest below rest to the largest above (Brewer)."""
 
 SHARES = (0.003, 0.01, 0.03, 0.1, 0.3, 1.0)
 """Bounds of the shades of errors, as parts of the largest displacement."""
@@ -112,7 +112,7 @@ def _modes(runs: Runs, exact: Exact) -> Bank:
 
 
 def _scale(found: Sequence[Floats], true: Floats | None) -> Frame:
-    """Of the energies of one mode."""
+    """The scale of the energies of one mode."""
     ys = overlay.frame(found, true, far=10.0)
     least = min((float(np.min(x)) for x in found if ys.leaves(x) is None), default=0.0)
     if least > 0 and ys.high > DECADES * least:

@@ -28,7 +28,7 @@ class Scale:
     name: str
     log: bool = False
     values: Sequence[float] = ()
-    """Of tiles: what stands at 0, 1, 2 ..."""
+    """Values that stand at 0, 1, 2 ... on an axis of tiles."""
     names: Sequence[str] = ()
     """The same in words, all of which are written."""
     shown: tuple[float, float] | None = None
@@ -54,7 +54,7 @@ class Curve:
     notes: Sequence[str] = ()
     """What is said of each point beside its numbers."""
     open: Sequence[bool] = ()
-    """Which points are estimates: their marks are hollow, and full of the others."""
+    """Which points are estimates: these have hollow marks, all others filled ones."""
     title: str = ""
     """The scheme in words, or what is wrong with it."""
     over: bool = False
@@ -125,15 +125,15 @@ class Bank:
     title: str
     charts: Sequence[Chart]
     name: str = ""
-    """Of its figure's file; left out: the page alone shows it."""
+    """Name of its figure's file; left out: the page alone shows it."""
     heading: str = ""
-    """Of its figure; left out: the title of its first chart."""
+    """Heading of its figure; left out: the title of its first chart."""
     on: Sequence[str] | None = None
     """What is drawn at first; left out: everything."""
     columns: int = 0
     """Charts beside each other in a figure; left out: as many as suit it."""
     size: tuple[float, float] | None = None
-    """Of a chart in a figure [in]; left out: what suits it."""
+    """Size of a chart in a figure [in]; left out: what suits it."""
 
 
 def plain(bank: Bank) -> dict[str, Any]:

@@ -25,10 +25,10 @@ DECADES = 100.0
 """Ratio of largest to smallest energy from which the scale is logarithmic."""
 
 LEAST = 1e-4
-"""Of the initial energy, what the logarithmic scale goes down to."""
+"""Lower end of the logarithmic scale, relative to the initial energy."""
 
 MOST_TURNING = 8
-"""Of which some must turn where an orbit is one."""
+"""Particles of which some must turn where an orbit is one."""
 
 CHANGED, EVENLY, FINDINGS_SAID = 0.05, 0.99, 3
 """Part of an energy, or logarithm of it over the start's, from which it has changed; part of its change that
@@ -38,7 +38,7 @@ SEEN = 0.01
 """Part of an energy from which an axis that is not logarithmic shows what it does."""
 
 FLAT = 1e-3
-"""Of half a picture, less than the width of a line in it."""
+"""Share of half a picture, less than the width of a line in it."""
 
 FLOOR, ALL_ROUNDED = 2.0**-53, 2.0**-44
 """Relative differences below this are none: they stand on the lower edge; differences that are roundings."""
@@ -136,7 +136,7 @@ def _largest(runs: Runs, found: Mapping[str, Floats]) -> dict[str, float]:
 
 
 def steady(energies: Floats, every: int) -> float:
-    """By which part of itself an energy changes in every step alike; 0 where it wavers or stays."""
+    """Relative change of an energy that is the same in every step; 0 where it wavers or stays."""
     if not (np.isfinite(energies).all() and np.min(energies) > 0 and len(energies) > 4):
         return 0.0
     y, n = np.log(energies), np.arange(len(energies))
@@ -297,7 +297,7 @@ def error(runs: Runs, exact: Exact) -> Bank:
 
 
 def means(runs: Runs, thermal: float) -> Bank:
-    """Of runs in a bath: the mean of their energy up to each time, over kT."""
+    """The mean energy up to each time, over kT, of runs in a bath."""
     found = {}
     scene = runs.scene
     for run in runs.every:

@@ -54,7 +54,7 @@ def put(drawn: list[Path], folder: Path, path: Path) -> list[Path]:
 
 
 def _known(folder: Path) -> dict[str, list[str]]:
-    """Of each figure in a folder: its store, then its digests."""
+    """The store, then the digests, of each figure in a folder."""
     try:
         with files.own(folder / FIGURES) as file:
             found = json.loads(file.read())

@@ -106,7 +106,7 @@ LOOKS = {
     "gj-i": Look(_BLUE, DASHED),
 }
 FAILED = "#DD0033"
-"""Of whatever is wrong, in figures and page."""
+"""Colour of whatever is wrong, in figures and page."""
 
 FAILED_ON_SCREEN = (FAILED, "#FF5C7A", 0)
 """The same on white and on black, and the number of its line."""
@@ -129,7 +129,7 @@ MARKS = {
     "drake": ("P", "\u271a"),
     "fault": ("H", "\u2b22"),
 }
-"""Of each engine: the mark on a line, and the character that stands for it in a legend."""
+"""Mark of each engine on a line, and the character that stands for it in a legend."""
 _OTHER_MARKS = (("8", "\u2b23"), ("d", "\u29eb"))
 
 

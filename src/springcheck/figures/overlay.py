@@ -53,7 +53,7 @@ class Group:
 
     @property
     def title(self) -> str:
-        """Of its scheme, or of the run that is wrong."""
+        """Title of its scheme, or label of the run that is wrong."""
         return self.members[0].label if self.failed else looks.title(self.scheme)
 
 
@@ -147,7 +147,7 @@ class Runs:
         return found
 
     def first(self, curves: Sequence[Curve]) -> Iterable[tuple[str, Curve]]:
-        """Of each motion its title and its first curve."""
+        """The title and the first curve of each motion."""
         titles = {run.label: group.title for group in self.groups for run in group.members}
         known = [curve for curve in curves[::-1] if curve.name in titles and not curve.over]
         found = {(titles[curve.name], curve.group): curve for curve in known}

@@ -52,7 +52,7 @@ def phase_portraits(runs: Runs, shown: Sequence[View], truth: Motion | None, sai
 
 
 def _size(charts: Sequence[Chart], wide: float, most: float) -> tuple[float, float]:
-    """Of a panel [in]: of equal scales no higher than the highest motion is."""
+    """Width and height of a panel [in]; with equal scales, no higher than the highest motion."""
     spans = [(np.ptp(one.x.shown), np.ptp(one.y.shown)) for one in charts if one.x.shown and one.y.shown]
     high = max((float(y / x) for x, y in spans), default=1.0)
     return wide, min(most, wide * high + 0.8) if all(one.equal for one in charts) else most

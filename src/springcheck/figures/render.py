@@ -36,14 +36,14 @@ TILES_SHADED = {
     "s0": "#fff7d6", "s1": "#fee08b", "s2": "#fdb863", "s3": "#f08a4b", "s4": "#cf4e4e", "s5": "#96295f",
     "s6": "#4b1250",
 }  # fmt: skip
-"""Of the kinds of tiles, as on the page's paper."""
+"""Colours of the kinds of tiles, as on the page's paper."""
 
 RULES = {"limit": ("#b00020", (0, (4, 2))), "one": ("#888888", "-"), "here": ("#333333", (0, (1, 2))),
          "floor": ("#666666", (0, (1, 3)))}  # fmt: skip
 """Colour and line of each look of a rule."""
 
 NO_KIND = ("not tried", "#ffffff")
-"""Of a tile without a kind."""
+"""Name and colour of a tile without a kind."""
 
 MOST_MARKS, FEWEST_MARKS, ALL_MARKS, MANY = 14, 4, 66, 200
 """Marks on a curve, at the most and at the least, and on all curves of a picture; a curve of more points than

@@ -26,7 +26,7 @@ LONGEST_LINE = 120
 """Characters of a line of text, and of a file's name."""
 
 DPI = 200.0
-"""Of a PNG."""
+"""Resolution of a PNG."""
 
 _RC: dict[Any, Any] = {
     "font.size": 9.0,

@@ -54,7 +54,7 @@ class View:
     """One coordinate x of a scene and its momentum y."""
 
     title: str
-    """Of its panel: "particle 1", or "" for a scene of one."""
+    """Title of its panel: "particle 1", or "" for a scene of one."""
     what: str
     """What x is, in one word."""
     x_name: str
@@ -66,7 +66,7 @@ class View:
     turn: float = 0.0
     """The length after which x begins again, 0 where it does not."""
     potential: Callable[[Floats], Floats] | None = field(default=None)
-    """Of x alone, where the motion of x depends on nothing else."""
+    """The potential of x alone, where the motion of x depends on nothing else."""
     mass: float = 1.0
 
     def wrapped(self, x: Floats, y: Floats) -> State:

@@ -110,7 +110,7 @@ def _in_a_row(n: int, springs: Spring) -> Floats:
 
 
 def alike(places: Integers | None, terms: Iterable[Term]) -> tuple[tuple[Integers, Integers], ...]:
-    """Of each two axes that nothing tells apart the coordinates along the one and the other, by particle.
+    """The coordinates, by particle, along each pair of axes on which all terms act alike.
 
     Linear terms, rods and bonds that act on both alike and rest in 0 keep the angular momentum about 0 in
     their plane.  `places` (n,) are those of `Scene`.

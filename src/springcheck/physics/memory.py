@@ -9,7 +9,7 @@ from pathlib import Path
 from springcheck.errors import SceneError
 
 LIMITS = (("memory.max", "memory.current"), ("memory/memory.limit_in_bytes", "memory/memory.usage_in_bytes"))
-"""Of a control group below its root, and what is used of them: versions 2 and 1."""
+"""Files below a control group's root with its limit and its use, in versions 2 and 1."""
 
 
 def available(root: Path = Path("/")) -> int | None:

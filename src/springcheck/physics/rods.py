@@ -23,7 +23,7 @@ from springcheck.physics.arrays import Extended, Floats, Integers, Reals
 from springcheck.physics.term import Column, OnParticles, Origin, Term, WithoutPotential
 
 MOST_NEWTON = 60
-"""Of Newton's method, which converges quadratically: far from a solution there is none."""
+"""Iterations of Newton's method, which converges quadratically: what needs more has no solution."""
 
 UNTRUE = 2.0**-46
 """How far lengths and velocities along rods may be off at the start, relative to what they are made of: 64
@@ -98,7 +98,7 @@ class Rods:
         self._starts = np.flatnonzero(np.diff(self._rod, prepend=-1))
         of_row = np.concatenate([term.length for term in self._terms])[self._order]
         self.length: Floats = of_row[self._starts]
-        """Of each rod (c,) [L]."""
+        """Length of each rod (c,) [L]."""
         wide = m.astype(np.longdouble)
         inverse = [sum(1 / wide[index] for index in term.particles) for term in self._terms]
         self.inverse_mass: Extended = np.concatenate(inverse)[self._order][self._starts]
@@ -303,7 +303,7 @@ class Rods:
     # what is said of states
 
     def strain(self, q: Reals) -> Reals:
-        """By which part each rod is too long at positions q (..., n) -> (..., c)."""
+        """Strain of each rod, its excess length over its length, at positions q (..., n) -> (..., c)."""
         r, length = self.ways(q), self.length.astype(q.dtype)
         # the difference of squares by its factors: a length has lost half of what they tell
         size = np.sqrt(self.dot(r, r))

@@ -261,4 +261,4 @@ def _check_text(given: Any, field: str) -> None:
         except (AttributeError, UnicodeEncodeError):
             right = False
         if not right or (field == "name" and not text):
-            raise SceneError(f"{field} = {text!r}: a text is needed, without halves of characters")
+            raise SceneError(f"{field} = {text!r}: a text is needed, without unpaired surrogates")

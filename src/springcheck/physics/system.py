@@ -121,7 +121,7 @@ class System(Generic[Fields]):
 
     @cached_property
     def alike(self) -> tuple[tuple[Integers, Integers], ...]:
-        """Of each two axes that nothing tells apart the coordinates along each: `graph.alike`."""
+        """The coordinates along each pair of axes on which all terms act alike: see `graph.alike`."""
         return graph.alike(self.scene.places, self.terms)
 
     @cached_property

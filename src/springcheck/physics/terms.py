@@ -220,7 +220,7 @@ class Damping(WithoutPotential):
 
     @staticmethod
     def slope(u: Reals, c: Floats) -> Reals:
-        """Of the velocity u, not of an elongation."""
+        """The force by the velocity u, not by an elongation."""
         return c * u
 
     @staticmethod

@@ -272,25 +272,25 @@ class Limits:
     """The relative change of each quantity from which on a check fails; None where it says nothing of it."""
 
     stiffness: float | None = None
-    """Of the spring, or row of another potential, that shows least of those that show at all."""
+    """Relative change of the spring, or other potential's row, that shows least among those that show."""
     step: float | None = None
     friction: float | None = None
-    """Of the friction on one particle, likewise."""
+    """Relative change of the friction on one particle."""
     area: float | None = None
-    """Of every particle's area in phase space at each step: its momentum is multiplied by 1 + x."""
+    """Relative change of every particle's phase-space area a step: its momentum is multiplied by 1 + x."""
     reaction: float | None = None
-    """Of the force on one particle beside its reactions on the others."""
+    """Relative excess of the force on one particle over its reactions on the others."""
     order: float | None = None
-    """Of an order or an exponent, absolute."""
+    """Change of an order or an exponent, absolute."""
 
     amplitude: float | None = None
-    """Of the drive, or the depth of the modulation, that shows least."""
+    """Relative change of the amplitude of the drive, or depth of the modulation, that shows least."""
     frequency: float | None = None
-    """Of that of a drive, likewise."""
+    """Relative change of the frequency of a drive."""
     phase: float | None = None
-    """Of a drive, in radians."""
+    """Change of the phase of a drive, in radians."""
     late: float | None = None
-    """By which part of a step a drive is taken late."""
+    """Delay of a drive, in steps."""
 
     def __str__(self) -> str:
         """The same in words, or nothing."""
@@ -299,7 +299,7 @@ class Limits:
 
     @classmethod
     def least(cls, several: Iterable[Limits]) -> Limits:
-        """Of several checks, or of one on several pieces of a run, that of the one that sees most."""
+        """The least limits among several checks, or among the pieces of a run that one check has seen."""
         every = list(several)
         known = {name: [x for one in every if (x := getattr(one, name)) is not None] for name in _SEEN}
         return cls(**{name: min(x, default=None) for name, x in known.items()})

@@ -62,11 +62,11 @@ class Scheme:
     b: tuple[Fraction, ...] = ()
     flow: bool = False
     convergence: Fraction | None = None
-    """Of an adaptive solver: the power of its tolerance with which its error falls, on a smooth motion."""
+    """Power of the tolerance with which an adaptive solver's error falls, on a smooth motion."""
     steps_of: str = ""
-    """Of a solver whose steps are those of a scheme, by lengths of its own: the scheme's name."""
+    """Name of the scheme whose steps a solver takes, with lengths of its own choice."""
     rule: Rule | None = None
-    """These lengths."""
+    """The rule that chooses these lengths."""
     thermostat: bool = False
     """Whether it has noise, and a step that `springcheck.thermal` carries out."""
     source: str = ""

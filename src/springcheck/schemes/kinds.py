@@ -50,7 +50,7 @@ class StageKind(NamedTuple):
     roundings: int
     """On the longest path through it: of a force 4, of a kick 2."""
     evaluates: Acting = ""
-    """Of which terms it evaluates the force."""
+    """The terms whose force it evaluates."""
     kicks: bool = False
     """Whether it moves p by a force, one that it evaluates or the one evaluated last."""
     drifts: bool = False

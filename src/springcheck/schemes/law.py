@@ -24,7 +24,7 @@ from springcheck.schemes.stepping import Slope, step
 from springcheck.schemes.variation import Variation
 
 Trait: TypeAlias = OfScheme | Literal["undamped", "linear", "modes"]
-"""Of a scheme, or of a scene: without friction; all forces linear; each normal mode steps by itself."""
+"""A trait of a scheme, or of a scene: without friction; all forces linear; normal modes that decouple."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

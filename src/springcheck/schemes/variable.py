@@ -16,7 +16,7 @@ from springcheck.schemes.lookup import scheme as named
 
 
 def allowed(scene: Scene) -> float:
-    """What the tolerance of a scene allows a step to be off [L]: so much of the largest amplitude."""
+    """Error of a step that the tolerance of a scene allows [L]: the tolerance times the largest amplitude."""
     return float(scene.tolerance * np.max(scene.system.amplitudes[0]))
 
 
@@ -31,7 +31,7 @@ class Taken(NamedTuple):
 
 
 def push_of(scene: Scene, force: Reals) -> Reals:
-    """By which a rule measures forces (n,), or their errors: their root mean square over the mass."""
+    """How a rule measures forces (n,), or their errors: their root mean square over the mass."""
     return np.asarray(np.sqrt(np.sum((force / scene.m) ** 2) / (3 * scene.particles)))
 
 

@@ -17,17 +17,17 @@ from springcheck.physics.arrays import Floats
 
 
 def of_normal(z: float) -> float:
-    """Of a standard normal number."""
+    """Chance of a standard normal number at least as far from 0."""
     return math.erfc(abs(z) / math.sqrt(2)) if math.isfinite(z) else 0.0
 
 
 def mean(x: Floats) -> float:
-    """Of the mean of draws x (...)."""
+    """Chance of the mean of draws x (...)."""
     return of_normal(float(np.sum(x)) / math.sqrt(x.size))
 
 
 def variance(x: Floats) -> float:
-    """Of the sum of squares of draws x (...): chi-squared."""
+    """Chance of the sum of squares of draws x (...), by chi-squared."""
     from scipy.special import gammainc, gammaincc
 
     half = float(np.sum(x * x)) / 2
@@ -37,7 +37,7 @@ def variance(x: Floats) -> float:
 
 
 def shape(x: Floats) -> float:
-    """Of what the fourth moment shows, the tails beside the middle, whatever the variance.
+    """Chance of the weight of the tails (the fourth moment), whatever the variance.
 
     The mean of the fourth Legendre polynomial of the rank 2 Phi(x) - 1 (Neyman's smooth test), of draws
     whose variance is made 1 first: bounded, so that no single draw decides.
@@ -84,7 +84,7 @@ def _saddlepoint(value: float, n: int) -> float:
 
 
 def repeats(x: Floats) -> float:
-    """Of the products of draws x (f, ...) with those any number of rows later: the largest of all sums.
+    """Chance of the largest autocorrelation of draws x (f, ...), over lags of any number of rows.
 
     Each is nearly normal, more so the longer the record; ten times its chance stands for the difference.
     """
@@ -98,7 +98,7 @@ def repeats(x: Floats) -> float:
 
 
 def neighbours(x: Floats) -> float:
-    """Of the products of draws x (f, ...) with those one row later.
+    """Chance of the autocorrelation of draws x (f, ...) at a lag of one row.
 
     Given every second row, the sum over the rows between is normal, with a variance that these have.
     """
@@ -126,7 +126,7 @@ def crossed(x: Floats, y: Floats) -> float:
 
 
 def count(hits: int, n: int, p: float) -> float:
-    """Of so many hits of n, each of probability p: binomial."""
+    """Chance of so many hits of n, each of probability p, by the binomial distribution."""
     from scipy.special import bdtr, bdtrc
 
     below, above = float(bdtr(hits, n, p)), float(bdtrc(hits - 1, n, p)) if hits else 1.0

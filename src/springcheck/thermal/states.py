@@ -337,7 +337,7 @@ def _as_gj(number: str, decay: float, slow: float, error: float, t: float, h: fl
 
 
 def _regressed(known: Floats, x: Floats) -> tuple[Floats, Floats, Floats]:
-    """Of x (f,) by what is `known` (f, k): entries (k,), what they leave (f,), and their standard errors."""
+    """Regression of x (f,) on `known` (f, k): coefficients (k,), residuals (f,), standard errors (k,)."""
     entries = np.linalg.lstsq(known, x, rcond=None)[0]
     left = x - known @ entries
     # columns unlike in size leave an inverse no digits

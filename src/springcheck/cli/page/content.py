@@ -115,17 +115,17 @@ class Content:
     known: Mapping[str, Any]
     """Versions and machine, by name."""
     sections: tuple[Section, ...]
-    """Of the studies."""
+    """The sections of the studies."""
     summary: Summary
     not_trusted: tuple[Damage, ...]
     methods: tuple[Passed, ...]
     explained: Mapping[str, tuple[str, tuple[str, ...]]]
-    """Of the checks among the verdicts: what each looks at, in a sentence and in lines."""
+    """What each check among the verdicts looks at, in a sentence and in lines."""
     same: tuple[Same, ...] | None
     """None where it cannot be told: a scheme that is not here, or states that were not recorded."""
     comparison: Comparison | None
     sha256: str
-    """Of the file; empty where the run has not ended."""
+    """SHA-256 of the file; empty where the run has not ended."""
     stride: int
     """Every how many stored frames one stands in the page."""
     data: Mapping[str, Any]
@@ -155,7 +155,7 @@ class Content:
 
     @property
     def name(self) -> str:
-        """Of the store, as a shell takes it."""
+        """Name of the store, as a shell takes it."""
         return shlex.quote(self.summary.path.name)
 
 
@@ -205,7 +205,7 @@ def gather(path: Path) -> Content:
 
 
 def _motion(path: Path, wrong: Collection[str], most: int) -> dict[str, Any] | None:
-    """The charts of the run in one bank: what `plot` draws, the first engine of each scheme on."""
+    """The charts that `plot` draws of a run, with the first engine of each scheme visible."""
     shown = drawable(path, most)
     found = of_runs(
         shown.scene,

@@ -27,7 +27,7 @@ from springcheck.physics.trajectory import Trajectory
 LONGEST = 2_000_000
 """Steps up to which a browser runs the loops again: about a second."""
 STAGES = {"kick", "held", "drift", "pull", "friction", "implicit-friction"}
-"""Of a splitting that a page carries out."""
+"""Stages of a splitting that a page can carry out."""
 LOOPS = {
     "own:euler": "own", "own:semi-implicit-euler": "own", "own:velocity-verlet": "own",
     "ase:velocity-verlet": "ase",
@@ -69,7 +69,7 @@ def plain_schemes() -> list[dict[str, Any]]:
 
 
 def _live() -> Bank:
-    """Of the sliders; their scripts fill in the numbers of the curves."""
+    """The charts of the sliders; their scripts fill in the numbers of the curves."""
     curves = [Curve(name=name, group=group, x=[], y=[]) for name, group in TRIED.items()]
     w = np.arange(301) / 100
     factors = [Curve(name=name, group=group, x=w, y=0 * w) for name, group in TRIED.items()]

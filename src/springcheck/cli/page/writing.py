@@ -29,7 +29,7 @@ SCRIPTS = ("loops.js", "drawing.js", "charts.js", "files.js", "page.js")
 DASHES = ("", "7 4", "2 3", "9 3 2 3", "14 4", "9 3 2 3 2 3", "2 6")
 """In the order of `looks.LINES`."""
 PLAIN_DASHES = {EXACTLY: "1 5", SEPARATRIX: "3 3", GUIDE: "", BEGIN: ""}
-"""Of what is no scheme's."""
+"""Dashes of lines that belong to no scheme."""
 SHAPES = (
     "m-3 0a3 3 0 1 0 6 0a3 3 0 1 0-6 0",
     "m-3-3h6v6h-6z",

@@ -91,7 +91,7 @@ def _files(folder: Path, kernel: Callable[..., Any]) -> list[Path]:
 
 
 def _digest(folder: Path, kernel: Callable[..., Any]) -> str:
-    """Of the saved code of a kernel, and of the sources that it was compiled from."""
+    """Digest of the saved code of a kernel and of the sources that it was compiled from."""
     sources = [Path(__file__), *(Path(inspect.getfile(module)) for module in (forces, updates, kernels))]
     sums = [(path.name, hashlib.sha256(path.read_bytes()).hexdigest()) for path in _files(folder, kernel)]
     return repr([*sums, *(hashlib.sha256(path.read_bytes()).hexdigest() for path in sources)])

@@ -48,7 +48,7 @@ class Program:
     b: Floats | None = None
     forces: tuple[str, ...] = (ALL,)
     damped: tuple[bool, ...] = (False, False)
-    """Of each force: whether it depends on the momenta."""
+    """Whether each force depends on the momenta."""
 
     @property
     def implicit_step(self) -> float:
@@ -62,7 +62,7 @@ class Program:
 
     @property
     def slots(self) -> tuple[int, ...]:
-        """Of each operation the number of its force, or of its row of decays."""
+        """For each operation, the index of its force or of its row of decays."""
         frictions = iter(range(len(self.operations)))
         return tuple(
             next(frictions) if o.code == FRICTION else self.forces.index(o.force) if o.force else 0

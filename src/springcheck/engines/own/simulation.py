@@ -54,7 +54,7 @@ class Own:
 
 
 def version() -> dict[str, str]:
-    """Of this package, the interpreter and NumPy, and of numba where it has compiled something."""
+    """Versions of this package, the interpreter and NumPy, and of numba where it has compiled something."""
     found = {
         "springcheck": springcheck.__version__,
         "python": platform.python_version(),

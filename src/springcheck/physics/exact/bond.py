@@ -48,7 +48,7 @@ class _Bond:
     start: Extended
     """Phase of the start from the inner turning point, an angle or beyond dissociation its hyperbolic kin."""
     rate: Extended
-    """Of the phase."""
+    """Rate of the phase."""
 
 
 def _relative(m: Any, q: Any, p: Any, rest: Any) -> tuple[Any, Any]:

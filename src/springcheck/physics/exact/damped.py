@@ -22,7 +22,7 @@ MOST_UNLIKE = 32
 """Particles: so many take 0.1 s, and 40 us a frame."""
 
 SERIES_TERMS = 17
-"""Of the series of exp(A t) up to |A t| = 1/2: the next one is 2**-18/18!, 6e-22."""
+"""Terms of the series of exp(A t) up to |A t| = 1/2: the next one is 2**-18/18!, 6e-22."""
 
 RADIX_OF_STEPS = 16
 """Of the number of whole steps |A t| = 1/2 in a time: each of its digits is a product."""

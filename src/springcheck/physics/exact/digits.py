@@ -23,10 +23,10 @@ Wide: TypeAlias = NDArray[np.object_]
 """An array of Decimal numbers."""
 
 DIGITS = 420
-"""Of sums of products of doubles, which may differ by 300 decades, and of pi beside the largest angle."""
+"""Digits for sums of products of doubles that differ by 300 decades, and for pi beside the largest angle."""
 
 ENOUGH = 57
-"""Of everything that stays within 17 decades of the largest number: three words of libmpdec."""
+"""Digits where all numbers lie within 17 decades of the largest: three words of libmpdec."""
 
 
 @contextmanager

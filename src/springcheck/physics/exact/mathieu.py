@@ -17,13 +17,13 @@ from springcheck.physics.exact.well import LAST, PI, States, Well, one_each
 from springcheck.physics.system import System
 
 TAYLOR_ORDER = 22
-"""Of the series: the next term is (1/2)**23/23!, 5e-30 of the first."""
+"""Order of the Taylor series: its next term is (1/2)**23/23!, 5e-30 of the first."""
 
 SCALES = 5
 """Coordinates in which the growth of errors is bounded."""
 
 MOST_NODES = 1 << 14
-"""Of a period: a modulation so slow that it takes more is left out."""
+"""Nodes of a period: a modulation so slow that it takes more is left out."""
 
 
 class _Mode(NamedTuple):

@@ -22,7 +22,7 @@ from springcheck.physics.system import System
 _Complex = NDArray[np.complexfloating[Any, Any]]
 
 SERIES_TERMS = 26
-"""Of a series within |x t| < 1: the next one is below a rounding of 113 bits."""
+"""Terms of a series within |x t| < 1: the next one is below a rounding of 113 bits."""
 
 
 _Drive: TypeAlias = tuple[np.longdouble, np.longdouble, Extended]
@@ -46,7 +46,7 @@ def prepare(system: System[Any]) -> _Found | None:
 
 
 def drives(system: System[Any], modes: Modes) -> tuple[_Drive, ...]:
-    """Of each drive of a system frequency, phase, and force on each mode without drives (n,)."""
+    """Frequency and phase of each drive of a system, and its force on each normal mode (n,)."""
     found = []
     for term in system.terms:
         for i, amplitude, frequency, phase in term.rows() if term.key == "drive" else ():

@@ -47,7 +47,7 @@ class _Bodies:
 
     @property
     def places(self) -> Integers | None:
-        """Of each coordinate, as `Scene.places`."""
+        """The place of each coordinate, as in `Scene.places`."""
         return np.array([3 * i + "xyz".index(x) for i, x in self._coordinates]) if self.axes else None
 
     @property
@@ -218,7 +218,7 @@ def _terms(table: Any, bodies: _Bodies) -> Iterator[Term]:
 
 
 _Rows: TypeAlias = Iterator[tuple[type[Term], bool, tuple[float, ...]]]
-"""Of each row its term, whether it is fast, and its ends and columns."""
+"""For each row, its term, whether it is fast, and its ends and columns."""
 
 
 def _springs(springs: Sequence[Any], bodies: _Bodies) -> _Rows:

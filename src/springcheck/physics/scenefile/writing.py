@@ -70,7 +70,7 @@ def _bodies(scene: SceneFields, names: Sequence[str]) -> Iterator[Iterable[tuple
 
 
 def _rests_at_0(scene: SceneFields) -> bool:
-    """Whether the springs of a chain have the rests that [chain] stands for."""
+    """Whether the springs of a chain have the rest lengths that [chain] stands for."""
     springs = [term for term in scene.terms if isinstance(term, WallSpring | Spring)]
     return not any(term.fast or np.any(getattr(term, term.origin)) for term in springs)
 

@@ -30,10 +30,10 @@ TITLES = {
 """Quantities that can be drawn, as axes name them."""
 
 SIZES = ("max_error", "energy_drift")
-"""Those of which the magnitude counts, over many powers of ten."""
+"""Quantities drawn by their magnitude, over many powers of ten."""
 
 MOST = 1e3
-"""Of these, relative to the start, beyond which nothing is read off a picture."""
+"""Largest value of a size relative to the start that a picture shows: beyond it nothing can be read off."""
 
 DRAWN = SIZES
 """Those that are drawn unless others are chosen."""

@@ -69,7 +69,7 @@ def specs(*, quick: bool = False) -> list[Spec]:
     with np.errstate(over="ignore", under="ignore"):
         found = [*_forces(), *sizes(), *steps(), *special()]
     if quick:
-        # every third decade of the planes; of the steps and the special cases all
+        # every third cell of the planes, and all steps and special cases
         found = [x for j, x in enumerate(found) if x.block in ("step", "special") or j % 3 == 0]
     return [x for x in found if x.finite]
 

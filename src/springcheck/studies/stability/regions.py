@@ -37,7 +37,7 @@ class Region:
     off: float
     """Largest distance of the radii, in units of what rounding of the propagator's entries can do."""
     undecided: int
-    """Points at which rounding of the entries decides: theory is within it of the border."""
+    """Points whose predicted radius differs from the border by less than the rounding of the entries."""
     wrong: int
     """Points, not among these, at which measurement and theory disagree."""
 
