@@ -95,7 +95,7 @@ ERRORS = (
 
 CAUSES = {
     "wobbling stiffness": "changes in time|on time",
-    "cubic force": "anharmonic|not linear in the position|cubic|quadratic|powers of the position",
+    "cubic force": "anharmonic|not linear in (the )?position|cubic|quadratic|powers of the position",
     "drift of the position": "constant added to the position",
     "noise": "^Noise",
     "alternating steps": "alternate|the step or a force changes in time",

@@ -56,7 +56,7 @@ CLAIMS = {
     "plane": r"span its plane|record more of the motion",
     "noise": r"^Noise|takes noise",
     "time": r"changes in time|alternat",
-    "anharmonic": r"anharmonic|not linear in the position|clipped",
+    "anharmonic": r"anharmonic|not linear in (the )?position|clipped",
     "drag": r"drag|not linear in the velocity|depends on the velocity",
     "constant": r"constant (added|beside)|has a constant",
     "coupled": r"coupled",

@@ -41,7 +41,7 @@ def explain(seen: Measured) -> tuple[Explanation, ...]:
     if evidence.found.drifts and not out:
         out += _drift(evidence)
     if loud > 4 and not out:
-        for look in (misplaced, memory, few_bad_frames, _solver, _neighbours(seen.maps), _shape):
+        for look in (misplaced, memory, few_bad_frames, _neighbours(seen.maps), _solver, _shape):
             out += look(evidence)
             if out:
                 break
@@ -52,8 +52,8 @@ def explain(seen: Measured) -> tuple[Explanation, ...]:
 
 def _solver(e: Evidence) -> list[Explanation]:
     """The exact solution, as near as a solver with an error of its own comes to it."""
-    if _left(_alternating(e), e.misses) < 1 / FALLS:
-        # steps that alternate are no solver's
+    if min(_left(columns, e.misses) for columns in (_alternating(e), _powers(e))) < 1 / FALLS:
+        # steps that alternate are no solver's, and its errors are no powers of the state
         return []
     residual = float(np.max(e.found.residual))
     # one step to a frame refutes most, and is found soon
@@ -122,9 +122,11 @@ def _neighbours(maps: list[Map]) -> Callable[[Evidence], list[Explanation]]:
     def look(e: Evidence) -> list[Explanation]:
         if len(maps) < 2 or e.pairs < 4 * len(maps) + 12:
             return []
+        # about an equilibrium that the map of one alone does not show
         others = np.concatenate([m.z[:-1].astype(np.float64) for m in maps], axis=1)
+        others = np.concatenate([others, np.ones((e.pairs, 1))], axis=1)
         share = _left(others, e.misses)
-        if share > 0.3:
+        if share > 1 / FALLS:
             return []
         fitted = others @ np.linalg.lstsq(others, e.misses, rcond=None)[0]
         return [
@@ -160,12 +162,7 @@ def _shape(e: Evidence) -> list[Explanation]:
         "quadratic": [q, v, np.ones_like(q), q * q],
         "cubic": [*linear, q**3],
         "oscillation": [*linear, *driven.waves(q, tuned["oscillation"])],
-        "anharmonic": [
-            q,
-            v,
-            np.ones_like(q),
-            *(q**i * v**k for i in range(4) for k in range(4) if 1 < i + k < 4),
-        ],
+        "anharmonic": [*_powers(e).T],
         "position": [v, *_hats(q, 16).T],
         "velocity": [q, *_hats(v, 16).T],
         "stiffness in time": [v, *own, *(q[:, None] * _hats(t, count)).T],
@@ -266,6 +263,13 @@ def _alternating(e: Evidence) -> Floats:
     return np.concatenate([z, z * (-1.0) ** np.arange(len(z))[:, None], constant], axis=1)
 
 
+def _powers(e: Evidence) -> Floats:
+    """Columns (f - 1, 10) of powers of position and velocity, and their products, up to the third."""
+    q, v = e.found.z[:-1].astype(np.float64).T
+    powers = (q**i * v**k for i in range(4) for k in range(4) if 1 < i + k < 4)
+    return np.stack([q, v, np.ones_like(q), *powers], axis=1)
+
+
 def _two_maps(e: Evidence) -> tuple[str, str]:
     """What the maps of even and odd frames differ in."""
     odd = np.arange(e.pairs) % 2 == 1
@@ -323,7 +327,7 @@ def _sentence(e: Evidence, name: str, q: Floats, v: Floats, missing: Floats, siz
     causes = {
         "constant": "A constant added to the position in every frame explains most of what a map misses: it",
         "quadratic": "The force is anharmonic: a quadratic part",
-        "anharmonic": "The motion is anharmonic: the force is not linear in the position, which",
+        "anharmonic": "The motion is anharmonic: the force is not linear in position or velocity, which",
         "position": "The force is not linear in the position, as one that is clipped or anharmonic, which",
         "velocity": "The friction is not linear in the velocity, which",
         "stiffness in time": "The stiffness changes in time, which",

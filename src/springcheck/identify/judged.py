@@ -53,7 +53,8 @@ def _oscillators(record: Record) -> tuple[Record, list[int], list[Map], list[str
             modes, _ = alone
             kept = {i: fit(modes, i) for i in range(modes.q.shape[1]) if not _straight(modes, i)}
             good = [i for i, found in kept.items() if found.conditioned and _forced(found)]
-            if good:
+            # what no springs couple, as a field that turns velocities, has modes that are not alone either
+            if good and not any(found.spans and not found.conditioned for found in kept.values()):
                 return modes, good, [kept[i] for i in good], [*notes, *notes_of]
     good = [j for j, found in maps.items() if found.conditioned and _forced(found)]
     lost = [j for j in maps if j not in good]
@@ -61,7 +62,8 @@ def _oscillators(record: Record) -> tuple[Record, list[int], list[Map], list[str
     if rough:
         # the states span the plane, and what one map leaves over is larger than rounding: that has a cause,
         # whatever moves beside it
-        return record, rough[:1], [maps[rough[0]]], notes
+        every = [*rough, *good]
+        return record, every, [maps[j] for j in every], notes
     if not good:
         if (lost and maps[lost[0]].conditioned) or not lost:
             raise IdentificationError(

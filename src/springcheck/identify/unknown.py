@@ -62,7 +62,8 @@ def misfit(e: Evidence) -> Explanation:
         off = distance(e.found, closest.parts[0])
         near = f"; the nearest, {title(closest.scheme)}, misses a frame by {off:.1e} of its size"
     kind = _class(e) or growth
-    none = f", but it is none of the known schemes' in up to {STRIDES[1]} steps to a frame"
+    few, many = STRIDES
+    none = f", but it is none of the known schemes' in up to {many} steps to a frame, or {few} with friction"
     return Explanation(
         cause=f"One linear map explains the states{'' if kind.startswith(MAP_OF) else none}: {kind}{near}",
         remedy="compare the order of its stages and their coefficients with the scheme's; state the step "
@@ -161,7 +162,9 @@ def memory(e: Evidence) -> list[Explanation]:
                 local=True,
             )
         ]
-    if np.max(off[len(off) // 4 :]) > FORGOTTEN * np.max(off):
+    # of a motion that grows what comes from outside dies in the same way, but not by itself
+    alone = np.maximum(np.max(np.abs(e.misses), axis=1) - 8 * e.unit, 0.0)
+    if any(np.max(y[len(off) // 4 :]) > FORGOTTEN * np.max(y) for y in (off, alone)):
         return []
     columns = np.concatenate([now, old], axis=1)
     left = new - columns @ np.linalg.lstsq(columns, new, rcond=None)[0]

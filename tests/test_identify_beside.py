@@ -1,0 +1,76 @@
+"""What moves beside a scheme, in other coordinates or from outside, is no scheme's, solver's or memory's."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from springcheck.identify import identify
+
+H = 0.39
+Force = Callable[[Any, Any, float], Any]
+
+
+def verlet(q: Any, v: Any, t: float, force: Force) -> tuple[Any, Any]:
+    v = v + H / 2 * force(q, v, t)
+    q = q + H * v
+    return q, v + H / 2 * force(q, v, t + H)
+
+
+def heun(q: Any, v: Any, t: float, force: Force) -> tuple[Any, Any]:
+    a = force(q, v, t)
+    b = force(q + H * v, v + H * a, t + H)
+    return q + H / 2 * (v + v + H * a), v + H / 2 * (a + b)
+
+
+def march(step: Any, q: Any, v: Any, force: Force, frames: int, every: int = 1) -> tuple[Any, Any, Any]:
+    states = [(q, v)]
+    for i in range((frames - 1) * every):
+        states.append(step(*states[-1], i * H, force))
+    q, v = (np.array(x)[::every] for x in zip(*states, strict=True))
+    return np.arange(frames) * (H * every), q, v
+
+
+def test_a_particle_beside_two_that_a_field_turns_names_no_scheme_of_all() -> None:
+    # along unlike springs, so that no rotation is left over; the modes of the two are none
+    k = np.array([0.62, 0.27, 0.49])
+
+    def force(q: Any, v: Any, t: float) -> Any:
+        return -k * q + 0.3 * np.array([v[1], -v[0], 0.0])
+
+    q, v = np.array([1.1, -0.4, 0.7]), np.array([0.3, 0.6, -0.2])
+    t, q, v = march(verlet, q, v, force, 200)
+    found = identify(t, q, v=v, mass=2.3)
+    assert (found.scheme, found.fits) == (None, False)
+    assert found.statement.startswith("The oscillators are coupled")
+
+
+def test_a_drive_beside_a_motion_that_grows_is_no_memory() -> None:
+    def force(q: Any, v: Any, t: float) -> Any:
+        return -7.9 * q + 0.02 * np.cos(1.9 * t)
+
+    t, q, v = march(heun, 1.1, 0.4, force, 101)
+    found = identify(t, q, v=v, mass=2.3)
+    assert not found.fits
+    assert "memory" not in found.statement
+
+
+def test_an_anharmonic_motion_is_no_exact_solution_of_an_adaptive_solver() -> None:
+    def force(q: Any, v: Any, t: float) -> Any:
+        return -0.43 / 0.04 * (1 - np.exp(-0.04 * q)) * np.exp(-0.04 * q)
+
+    t, q, v = march(verlet, 0.6, -0.3, force, 50, every=5)
+    found = identify(t, q, v=v)
+    assert found.statement.startswith("The motion is anharmonic")
+
+
+def test_how_many_steps_were_looked_at_with_friction_is_said() -> None:
+    def force(q: Any, v: Any, t: float) -> Any:
+        return -1.9 * q - 0.11 * v
+
+    t, q, v = march(heun, 0.6, -0.3, force, 20, every=20)
+    found = identify(t, q, v=v)
+    assert found.verdict == "none"
+    assert "in up to 100 steps to a frame, or 12 with friction" in found.statement
