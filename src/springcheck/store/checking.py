@@ -128,28 +128,36 @@ def _structure(file: Any, *, arrays: bool) -> Iterator[Damage]:
         yield Damage("/", f"{what}, {NO_STORE}")
         return
     now, extents = digests.contents(file)
-    if arrays:
-        for name in seal.broken(Path(file.filename), extents):
-            yield Damage(name, "does not match its sha256")
-    if "part" not in root:
-        yield from _differences(file, root, now)
-
-
-def _differences(file: Any, root: dict[str, Any], now: dict[str, str]) -> Iterator[Damage]:
-    """What is missing, added or another than its digest."""
     try:
         kept = access.json(str(root.get(digests.KEY)), dict[str, str])
     except ValueError:
-        yield Damage("/", "the list of its digests is missing")
-        return
-    if "/h5md" not in kept:
-        # stores of before list no arrays
-        now = {place: one for place, one in now.items() if place.split("/")[1] not in digests.LAID_OUT}
-        for label in access.children(file, "parameters"):
-            try:
-                reading.arrays_of(file, label, reading.known_of(file, label)[0])
-            except StoreError as error:
-                yield Damage(f"/observables/{label}", str(error))
+        kept = {}
+        if "part" not in root:
+            yield Damage("/", "the list of its digests is missing")
+    found = [*_differences(kept, now)] if "/h5md" in kept else [*_before(file, kept, now)]
+    yield from found
+    if arrays:
+        # what is laid out otherwise may claim to be as long as it likes
+        places = {finding.place for finding in found}
+        as_laid_out = [x for x in extents if not {x.name, x.name.rsplit("/", 2)[0]} & places]
+        for name in seal.broken(Path(file.filename), as_laid_out):
+            yield Damage(name, "does not match its sha256")
+
+
+def _before(file: Any, kept: dict[str, str], now: dict[str, str]) -> Iterator[Damage]:
+    """The same of a store of before, which lists no arrays, and of a part, which has no list."""
+    for label in access.children(file, "parameters"):
+        try:
+            reading.arrays_of(file, label, reading.known_of(file, label)[0])
+        except StoreError as error:
+            yield Damage(f"/observables/{label}", str(error))
+    if kept:
+        tops = digests.LAID_OUT
+        yield from _differences(kept, {x: y for x, y in now.items() if x.split("/")[1] not in tops})
+
+
+def _differences(kept: dict[str, str], now: dict[str, str]) -> Iterator[Damage]:
+    """What is missing, added or another than its digest."""
     for place in sorted(kept.keys() | now.keys()):
         if place not in now:
             yield Damage(place, "missing")
