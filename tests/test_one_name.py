@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections import defaultdict
+from functools import cache
 from pathlib import Path
 
 import springcheck
@@ -23,6 +24,7 @@ BY_CONTRACT = {"ENGINE", "STUDY"}
 """What every module of an engine, and every folder of a study, is asked for by name."""
 
 
+@cache
 def defined() -> tuple[dict[str, list[str]], dict[str, list[str]]]:
     """Modules that define each public class, and each public constant."""
     classes, constants = defaultdict(list), defaultdict(list)

@@ -279,7 +279,7 @@ def studies(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     folder = tmp_path_factory.mktemp("studies")
     methods = ["--method", "own:euler", "--method", "own:semi-implicit-euler"]
     calls = {
-        "precision": ["precision", "spring", "--budget", "1.5", *methods],
+        "precision": ["precision", "spring", "--budget", "0.4", *methods],
         "stability": ["stability", "rlc-circuit", *methods[2:]],
         "extremes": ["extremes", "--quick", "--method", "own:semi-implicit-euler"],
         "census": ["census", *methods],

@@ -16,6 +16,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from springcheck.engines.own import forces, kernels, updates
 
 HELP: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
@@ -49,13 +51,35 @@ def compiled(kernel: Callable[..., Any], arguments: tuple[Any, ...]) -> Callable
     Raises:
         ImportError: numba is not here.
     """
+    looks = tuple(map(_look, arguments))
     try:
-        return _jit(kernel, _types(arguments), saved=True)
+        if looks not in _TYPES:
+            _TYPES[looks] = _types(arguments)
+        return _jit(kernel, looks, saved=True)
     except ImportError:
         raise
     except Exception:
         # saved code that cannot be read, or no folder to save it in: compile for this process alone
-        return _jit(kernel, _types(arguments), saved=False)
+        return _jit(kernel, looks, saved=False)
+
+
+_TYPES: dict[tuple[Any, ...], tuple[Any, ...]] = {}
+"""Types of arguments by their looks: numba takes a millisecond to find and to compare them."""
+
+
+def _look(argument: Any) -> Any:
+    """All of an argument that numba's type of it depends on."""
+    if isinstance(argument, np.ndarray):
+        flags = argument.flags
+        return (
+            argument.dtype,
+            argument.ndim,
+            flags.c_contiguous,
+            flags.f_contiguous,
+            flags.writeable,
+            flags.aligned,
+        )
+    return (type(argument), *map(_look, argument)) if isinstance(argument, tuple) else type(argument)
 
 
 def _types(arguments: tuple[Any, ...]) -> tuple[Any, ...]:
@@ -67,9 +91,10 @@ def _types(arguments: tuple[Any, ...]) -> tuple[Any, ...]:
 
 
 @cache
-def _jit(kernel: Callable[..., Any], types: tuple[Any, ...], *, saved: bool) -> Callable[..., Any]:
+def _jit(kernel: Callable[..., Any], looks: tuple[Any, ...], *, saved: bool) -> Callable[..., Any]:
     import numba
 
+    types = _TYPES[looks]
     _registered()
     found: Any = numba.njit(cache=saved, **FLAGS)(kernel)
     if saved:
