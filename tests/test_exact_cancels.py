@@ -214,3 +214,22 @@ def test_a_modulated_spring_at_the_edge_of_a_resonance(
         u, v = end * mp.matrix([exactly(0.7), exactly(-0.4) / exactly(m)])
         # up to 12,000 stated errors
         assert over_stated(scene, [u], [v * exactly(m)], part=1.0) < 0.5
+
+
+@pytest.mark.parametrize(
+    ("m", "k", "c", "t"),
+    [
+        (7700.715921215284, 1.6567478353688883e-07, 0.07143708961943689, -21559433.5),
+        (5.951897023595648e-07, 0.0037177356438791876, 9.407993226790962e-05, -1.265285),
+    ],
+)
+def test_a_spring_of_nearly_critical_friction_back_in_time(m: float, k: float, c: float, t: float) -> None:
+    terms = (WallSpring(i=[0], k=[k], at=[0.0]), Damping(i=[0], c=[c]))
+    scene = Scene(m=[m], q=[0.8], p=[0.0], terms=terms, step=t, steps=1)
+    with mp.workdps(120):
+        b = exactly(c) / exactly(m) / 2
+        s, time, q = mp.sqrt(mp.mpc(b * b - exactly(k) / exactly(m))), exactly(t), exactly(0.8)
+        even, odd = (mp.cosh(s * time), mp.sinh(s * time) / s)
+        u = q * mp.exp(-b * time) * (even + b * odd)
+        # 14 and 10 times the stated error
+        assert over_stated(scene, [u.real], [(-q * exactly(k) * odd * mp.exp(-b * time)).real]) < 0.5

@@ -211,8 +211,15 @@ def reaches(found: Modes, t: np.longdouble) -> tuple[Extended, Extended, Extende
     speed = 3 * v + w * w * u * hold + drive * hold
     phase = (w + b) * duration
     if t < 0:
-        driven = np.exp((b + np.sqrt(np.maximum(b * b - found.w2, 0))) * duration)
-        reach, speed = reach * driven, speed * driven
+        square = b * b - found.w2
+        driven = np.exp((b + np.sqrt(np.maximum(square, 0))) * duration)
+        # near critical damping t exp(b t) grows, and what is not known of the roots with the cube of t
+        longer = np.minimum(duration, 1 / np.sqrt(np.maximum(np.abs(square), SMALLEST)))
+        hold = np.where(turns, np.maximum(hold, longer), hold)
+        wider = np.where(turns, np.maximum(1, w * longer), 1)
+        reach = (3 * u * wider + (v + drive * duration) * hold) * driven
+        speed = (3 * v * wider + w * w * u * hold + drive * hold) * driven
+        phase = phase * wider
     else:
         phase = np.where(turns & (b > 0), w * np.minimum(duration, 1 / np.where(b > 0, b, 1)), phase)
         phase = np.where((found.w2 == 0) & (b > 0), 0, phase)
