@@ -94,7 +94,7 @@ def clock_of(t: Floats) -> Clock:
 
 
 def _width(t: Floats, quantum: float) -> type[np.floating[Any]]:
-    """Of the numbers of a clock whose times have this rounding [T]."""
+    """Floating-point type of a clock whose times have this rounding [T]."""
     return np.float32 if quantum > float(np.max(np.spacing(np.abs(t)))) else np.float64
 
 

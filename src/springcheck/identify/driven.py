@@ -83,7 +83,7 @@ STARTS_BESIDE, FEW_FRAMES = 6, 2000
 """Starts on either side, a quarter turn over the run apart, and frames up to which they are looked at."""
 
 UNDAMPED = 1e-6
-"""Of 1, by which the eigenvalues of a step without friction may miss it beside a drive."""
+"""Largest distance from 1 of the moduli of a frictionless step's eigenvalues, beside a drive."""
 
 MOST_SCHEMES = 3
 """That a sentence names: on a spring of unknown stiffness several have one map."""

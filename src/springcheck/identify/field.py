@@ -21,7 +21,7 @@ LEFT = 1e-9
 """Of the states' size, what a right complex map leaves over at most, the roundings of a long motion in it."""
 
 KEPT = 1e-4
-"""Of 1, by which the determinant may miss it where its angle is that of the velocity."""
+"""Largest distance of the determinant from 1 where its angle is that of the velocity."""
 
 BORIS_AGREES = 1e-10
 """Share of the largest entry by which Boris' map may miss the measured one."""

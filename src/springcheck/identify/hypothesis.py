@@ -21,7 +21,7 @@ SOLVED = 1e-4
 """Chi-squared of unknowns that solve as many equations: Gauss-Newton's rest."""
 
 EXCLUDED = 25.0
-"""By which chi-squared exceeds that of the best where a hypothesis is excluded: five standard errors."""
+"""Excess of chi-squared over the best hypothesis' that excludes another: five standard errors."""
 
 SURE = 6.0
 """Standard errors by which a number differs from another for certain, and within which it may be off."""

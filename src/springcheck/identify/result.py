@@ -86,7 +86,7 @@ class Identification:
     velocity_offset: float
     """Time of the velocities after that of the positions, in steps."""
     determinant: tuple[float, ...]
-    """Of the measured map, for one step."""
+    """Determinant of the measured map, for one step."""
     symplectic_defect: float
     """Largest |M^T J M - J| of the measured map between frames."""
     defect_ulp: float

@@ -42,7 +42,7 @@ POOR = 8.0
 """Chi-squared of three degrees of freedom that chance exceeds once in 20."""
 
 ONE_MORE = 4.0
-"""By which one unknown more lowers chi-squared by chance once in 20."""
+"""Decrease of chi-squared by one more unknown that chance exceeds once in 20."""
 
 PLAIN = 30.0
 """Residuals by which the exact flow must miss where a scheme is named in spite of coarse numbers."""

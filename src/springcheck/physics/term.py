@@ -215,7 +215,7 @@ class Term:
         return self._changed(**{self.origin: np.zeros(len(self))}) if self.origin else self
 
     def in_single(self) -> Self:
-        """With the parameters rounded that an engine of single precision keeps so; inf beyond its range."""
+        """A copy with parameters rounded as a single-precision engine keeps them; inf beyond its range."""
         names = [column.field for column in self.columns if column.single]
         with np.errstate(over="ignore", under="ignore"):
             kept = {name: getattr(self, name).astype(np.float32).astype(np.float64) for name in names}

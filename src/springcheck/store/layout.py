@@ -274,7 +274,7 @@ def _particles(
 
 
 def write_unit(dataset: Any, unit: str, name: str = "") -> None:
-    """The unit under the names of H5MD and of NeXus, and what viewers write at an axis."""
+    """Write the unit under the names of H5MD and of NeXus, and the name that viewers write at an axis."""
     write_attributes(dataset, {"unit": unit, "units": unit, **({"long_name": name} if name else {})})
 
 

@@ -88,7 +88,7 @@ class Thermostat:
     """Whether the momentum that it stores belongs to the time of the position."""
     source: str = ""
     most: float = inf
-    """gamma h below which it is a thermostat: from there on its noise has no real size."""
+    """gamma h below which it is a thermostat: from there on the variance of its noise is negative."""
     chain: Chain | None = None
     """The bath of a scheme that takes no draws."""
     held: tuple[Act, ...] = ()
@@ -273,7 +273,7 @@ _LAMMPS = (
     ),
     (Act("damp", _of_x(0, HALF)), Act("kick", HALF), Act("noise", HALF, 1)),
 )  # fmt: skip
-"""Up to where rods have their lengths again, and the rest."""
+"""The stages up to the one that restores the rods' lengths, and those after it."""
 
 _OTHERS = (
     *map(by_groups, (2, 3, 4)),

@@ -73,7 +73,7 @@ def splitting(
     out the first `skip` particles.
     """
     n = len(m)
-    # of a simple row the loops are called from here: to hand a whole force on takes as long as 100 particles
+    # for a simple row the loops are called from here: passing a whole force on costs as much as 100 particles
     indices, _, (k_held, at_held), (k, rest, ends), (c, _) = one
     divisors, factors, _ = solver
     simple = not indices and len(c) == 0

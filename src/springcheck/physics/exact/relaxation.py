@@ -105,7 +105,7 @@ def _step(law: _Law, u: Any, v: Any, h: Any, guess: Extended) -> _Met | None:
     """A step of h from (u, v), None where Newton's iteration does not get there."""
     rule = _rule()
     found, last = guess, np.inf
-    # near u = 1 the brake is nearly 0, and feels the rounding of u: let it be the same one at all nodes
+    # near u = 1 the brake is nearly 0, and cancellation shows the rounding of u: all nodes share one value
     first = law.g * ((1 - u) * (1 + u)) - law.r
     for _ in range(MOST_RADAU_CORRECTIONS):
         moved = h * (rule.a @ found)

@@ -31,7 +31,7 @@ class Well(NamedTuple):
     motion: Callable[[System[Any], Any, Extended], States]
     """A scene, what was worked out of it, and times t (f, 1) [T] -> q and p (f, n)."""
     doubt: Callable[[System[Any], Any, np.longdouble], States]
-    """The same and one time -> bounds (n,) of the errors of q and p from the start to then."""
+    """The same with one time -> bounds (n,) of the errors of q and p up to that time."""
     growth: Callable[[System[Any], Any], float] | None = None
     """A scene and what was worked out of it -> the largest derivative of the flow between two times of it, in
     the energy norm, where the law knows it."""

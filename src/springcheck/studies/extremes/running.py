@@ -46,7 +46,7 @@ def cells(label: Label, specs: Sequence[Spec]) -> list[Cell]:
     if stale := engines.arithmetic(label).stale:
         # in company of a larger motion an engine computes forces anew that it would keep for the cell alone
         with np.errstate(invalid="ignore"):
-            # a state that has left all numbers is not slow
+            # a state that has overflowed (inf or nan) does not count as slow
             slow = np.any(np.abs(np.diff(q, axis=0)) <= 2 * stale, axis=0)
         found = [
             cells(label, [spec])[0] if alone else cell

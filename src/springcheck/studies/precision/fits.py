@@ -207,7 +207,7 @@ class Condition:
 
 
 def condition(method: Method, arithmetic: Arithmetic, angle: float) -> Condition | None:
-    """How rounding adds up in a method over a run that turns by `angle`; None for an adaptive solver.
+    """How rounding adds up over a run whose phase advances by `angle`; None for an adaptive solver.
 
     Each step rounds the state once, up or down as it falls, and the motion carries that on: a random
     walk, eps sqrt(N).  Two things are worse.  A velocity rebuilt as (x' - x)/h takes on eps x / h at each

@@ -1,8 +1,8 @@
 """The longest step at which a scheme stays bounded on a scene, from the spectral radius of its one-step map.
 
 The map is that of the scene's linearisation where its motion is stiffest, with its friction, and with slow
-and fast springs apart for a scheme that parts them.  Where nothing couples the modes, each has a matrix of
-2 x 2; elsewhere one of 2n x 2n has them all.
+and fast springs apart for a scheme that parts them.  Where nothing couples the modes, each has a 2 x 2
+matrix of its own; elsewhere all eigenvalues are those of one 2n x 2n matrix.
 """
 
 from __future__ import annotations
