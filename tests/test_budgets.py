@@ -18,7 +18,7 @@ BUDGETS = {
     ("engines",): 2720,
     ("driver", "conformance", "doors"): 1207,
     ("checks",): 5086,
-    ("identify",): 8268,
+    ("identify",): 8234,
     ("formats", "store"): 5212,
     ("studies",): 1472,
     ("studies/*",): 10021,
