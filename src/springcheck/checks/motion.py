@@ -205,7 +205,7 @@ def _on_circle(form: Extended, u: np.longdouble, v: np.longdouble) -> tuple[np.l
 
 @check("moment", family="motion", requires=MAP | {"unheld"})
 def momentum(case: Case) -> Finding | str:
-    """Nothing outside pulls, so the total momentum along every axis stays."""
+    """Without external forces the total momentum along every axis is conserved."""
     run, places = case.trajectory, case.scene.all_places % 3
     axes = np.unique(places)
     # along one axis all that there is, in its order: sums round by that

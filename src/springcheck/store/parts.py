@@ -72,7 +72,7 @@ class Parts:
 
     @property
     def everything(self) -> list[Path]:
-        """All files that there are."""
+        """Every file of the journal: the collection, or its runs and tables."""
         return [*self.runs, *self.tables] if self.collection is None else [self.collection]
 
     @classmethod

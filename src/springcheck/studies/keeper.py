@@ -154,7 +154,7 @@ class Keeper:
             for j, result, by in measured:
                 self.keep(left[j].form, left[j].key, result, by)
                 done += 1
-                # the last so many of those that were left are still to come
+                # these, the last of those that were left, are still to be measured
                 following = len(left) - (len(pieces) - done)
                 self._tell(done, pieces, left[following : following + 1])
                 yield left[j], result

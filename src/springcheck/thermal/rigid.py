@@ -22,7 +22,7 @@ from springcheck.thermal.draws import Reading, one_rounding, roundings_of
 from springcheck.thermal.stepper import Met, Stepper, forces
 
 SMALL_DRAW = 1e-4
-"""By which a draw is changed, to both sides, to see what it does: what bends leaves its square, 1e-8."""
+"""Step of the central difference in a draw, whose truncation error is its square, 1e-8."""
 
 UNSEEN_DRAW = 1e-6
 """Singular value over the largest below which a combination of draws does nothing: roundings over such a

@@ -61,7 +61,7 @@ SHIFTED = frozenset(
     {"verlet", "langevin-middle", "langevin", "langevin-middle-synchronised"}
     | {name for name in LENGTHS if name.startswith("verlet")}
 )
-"""Methods whose stored velocity is half a pull behind the position, and is synchronised here."""
+"""Methods whose stored velocity is half a kick behind the position, and is synchronised here."""
 
 
 ATTENTIVE = 500

@@ -88,7 +88,7 @@ def _floors(study: PrecisionStudy) -> list[Rule]:
 
 
 def _slopes(study: PrecisionStudy, points: Sequence[Point], cost: Callable[[Point], float]) -> list[Curve]:
-    """Short lines of the orders that were found, from one point at the left, where no curve runs."""
+    """Guides with the slopes of the orders found, from one point at the left, clear of all curves."""
     orders = sorted({round(x.order) for x in study.methods if x.order is not None})
     left, errors = min(map(cost, points)), [math.log10(x.error) for x in points]
     start = 10 ** (min(errors) + 0.35 * (min(1.5, max(errors)) - min(errors)))
