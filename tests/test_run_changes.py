@@ -63,6 +63,7 @@ def test_numbers_are_set_as_if_the_file_had_them() -> None:
         (["--fault", "stifness"], "did you mean stiffness"),
         (["--fault", "kcal=2"], "no size"),
         (["--fault", "mass=-1"], "above 0"),
+        (["--fault", "field-sign"], "nothing on scene spring shows it"),
         (["--set", "time.step=1", "--vary", "time.step=1:2:3"], "go with one SCENE"),
     ],
 )
