@@ -24,6 +24,7 @@ from springcheck.physics.terms import (
     WallSpring,
     Weight,
 )
+from springcheck.physics.vanderpol import VanDerPol
 
 
 def exactly(x: Any) -> Any:
@@ -233,3 +234,25 @@ def test_a_spring_of_nearly_critical_friction_back_in_time(m: float, k: float, c
         u = q * mp.exp(-b * time) * (even + b * odd)
         # 14 and 10 times the stated error
         assert over_stated(scene, [u.real], [(-q * exactly(k) * odd * mp.exp(-b * time)).real]) < 0.5
+
+
+@pytest.mark.parametrize(
+    ("at", "width", "k"), [(-1e5, 0.0625, -415.1), (3.3, 23.35, 1.7835), (-1e5, 11.0, 0.0)]
+)
+def test_a_brake_by_place_far_from_0(at: float, width: float, k: float) -> None:
+    m, c, t, q = 319.0, 0.69, 0.09, at + 1e-5
+    terms = (VanDerPol(i=[0], c=[c], width=[width], at=[at]), WallSpring(i=[0], k=[k], at=[at]))
+    scene = Scene(m=[m], q=[q], p=[1e-6], terms=terms[: 2 if k else 1], step=t, steps=1)
+    with mp.workdps(60):
+        g, w2 = exactly(c) / exactly(m), exactly(k) / exactly(m)
+        a = [(exactly(q) - exactly(at)) / exactly(width), exactly(1e-6) / exactly(m) / exactly(width)]
+        for j in range(40):
+            # (1 - u**2) u' is the slope of u - u**3/3
+            cube = mp.fsum(a[x] * a[y] * a[j + 1 - x - y] for x in range(j + 2) for y in range(j + 2 - x))
+            a.append((g * (j + 1) * (a[j + 1] - cube / 3) - w2 * a[j]) / ((j + 1) * (j + 2)))
+        u, v = (
+            mp.polyval(x[::-1], exactly(t)) * exactly(width)
+            for x in (a, [j * x for j, x in enumerate(a)][1:])
+        )
+        # up to 4e6 stated errors
+        assert over_stated(scene, [u + exactly(at)], [v * exactly(m)]) < 0.5

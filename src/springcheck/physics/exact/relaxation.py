@@ -14,6 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from springcheck.physics.arrays import EPS, Extended, Floats
+from springcheck.physics.exact.digits import digits, exactly, extended
+from springcheck.physics.exact.normal import exact_sums
 from springcheck.physics.exact.well import LAST, States, Well, wide
 from springcheck.physics.system import System
 from springcheck.physics.vanderpol import VanDerPol
@@ -189,16 +191,17 @@ def prepare(system: System[Any]) -> tuple[_Path, ...] | None:
     term = next(term for term in system.terms if isinstance(term, VanDerPol))
     if system.scene.step < 0 or len(term) != system.n or len(np.unique(term.i)) < system.n:
         return None
-    none = np.zeros(system.n, np.longdouble)
-    springs = system.potential_force(none, none)
-    k = system.hessian_diagonal(none)
+    with digits():
+        k, springs, _ = exact_sums(system.without(term.key), np.diagonal)
     for i, c, width, at in sorted(term.rows()):
         m, wall, wide_at = (np.longdouble(x) for x in (system.m[i], width, at))
-        w2 = k[i] / m
-        # the force at `at`, in units of the stiffness: where the springs rest
-        centre = (springs[i] / k[i] - wide_at) / wall if k[i] else np.longdouble(0)
         if not k[i] and springs[i]:
             return None
+        with digits():
+            # the force at `at`, in units of the stiffness: where the springs rest; far from 0 it cancels
+            away = (springs[i] - k[i] * exactly(at)[()]) / (k[i] or 1)
+            stiffness, rests = extended(np.array([k[i], away], object))
+        w2, centre = stiffness / m, rests / wall
         law = _Law(np.longdouble(c) / m, system.friction_rates[i], w2, centre)
         start = float(system.q[i]), float(system.p[i])
         u, v = (system.q[i] - wide_at) / wall, np.longdouble(system.p[i]) / m / wall
@@ -231,10 +234,10 @@ def motion(system: System[Any], found: tuple[_Path, ...], t: Extended) -> States
 
 
 def doubt(system: System[Any], found: tuple[_Path, ...], t: np.longdouble) -> States:
-    """Bounds (n,) of the errors of `motion`: those of its size, and a time known to `LATENESS`."""
+    """Bounds (n,) of the errors of `motion`: those of its size and place, and a time known to `LATENESS`."""
     u, v, a = (np.array([path.fastest[j] * float(path.width) for path in found]) for j in range(3))
-    late = LATENESS * np.abs(t)
-    return np.asarray(LAST * u + late * v), np.asarray((LAST * v + late * a) * system.m)
+    late, at = LATENESS * np.abs(t), np.array([np.abs(path.at) for path in found])
+    return np.asarray(LAST * (at + u) + late * v), np.asarray((LAST * v + late * a) * system.m)
 
 
 def growth(system: System[Any], found: tuple[_Path, ...]) -> float:
