@@ -14,7 +14,7 @@ import pytest
 
 from springcheck import store
 from springcheck.cli import main
-from springcheck.store import seal
+from springcheck.store import checking, seal
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("own_folder", "tried_here", "sketched")]
 
@@ -179,9 +179,35 @@ def test_of_a_store_of_before_it_is_told_what_has_changed(
     edited(whole, _as_before)
     with h5py.File("s.h5", "r+") as file:
         change(file)
-    first, *found = store.check("s.h5")
+    first, *found, last = store.check("s.h5")
     assert "no seal" in first.what
+    assert last.what.endswith("groups, units and views are not told")
     assert [finding.place for finding in found] == ([] if place is None else [place])
+
+
+@pytest.mark.parametrize("earlier", [False, True])
+def test_an_array_that_claims_more_than_was_laid_out_is_not_read(
+    whole: Path, earlier: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    edited(whole, _as_before if earlier else lambda file: None)
+    with h5py.File("s.h5", "r+") as file:
+        said = file[Q].attrs["sha256"]
+        del file[Q]
+        # 64 MiB that lie in the file as a hole
+        how = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+        how.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
+        how.set_fill_time(h5py.h5d.FILL_TIME_NEVER)
+        space, group, name = h5py.h5s.create_simple((1 << 23, 1)), file[Q.rpartition("/")[0]].id, b"value"
+        made = h5py.Dataset(h5py.h5d.create(group, name, h5py.h5t.IEEE_F64LE, space, how))
+        made.attrs["sha256"] = said
+    assert Path("s.h5").stat().st_size > 1 << 26
+    read: list[str] = []
+    monkeypatch.setattr(seal, "broken", lambda path, extents: read.extend(x.name for x in extents) or [])
+    assert any(
+        Q.startswith(finding.place) and finding.place != "/" for finding in checking.structure(Path("s.h5"))
+    )
+    assert read
+    assert Q not in read
 
 
 @pytest.mark.parametrize(

@@ -110,12 +110,12 @@ def _joined(name: str, parts: Sequence[Path], provenance: Provenance) -> Table:
             raise StoreError(f"{part.name} is damaged: give the same command again, and it is measured again")
         with access.opened(part) as source:
             rows = source[name_of(part)]
-            lengths.update({column: len(rows[column]) for column in rows})
             provenance.note(name_of(part), by_of(source))
             if part == parts[0]:
                 first = tables.read(rows, name)
-    if len(parts) == 1:
-        return first
+            if len(parts) == 1:
+                return first
+            lengths.update({column: len(rows[column]) for column in rows})
     like = {column: np.asarray(x) for column, x in first.columns.items()}
     whole = {column: np.empty((lengths[column], *x.shape[1:]), x.dtype) for column, x in like.items()}
     at: Counter[str] = Counter()
