@@ -254,5 +254,5 @@ def test_a_brake_by_place_far_from_0(at: float, width: float, k: float) -> None:
             mp.polyval(x[::-1], exactly(t)) * exactly(width)
             for x in (a, [j * x for j, x in enumerate(a)][1:])
         )
-        # up to 4e6 stated errors
+        # up to 3e7 stated errors
         assert over_stated(scene, [u + exactly(at)], [v * exactly(m)]) < 0.5
