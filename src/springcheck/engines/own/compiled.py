@@ -52,9 +52,9 @@ def compiled(kernel: Callable[..., Any], arguments: tuple[Any, ...]) -> Callable
         ImportError: numba is not here.
     """
     looks = tuple(map(_look, arguments))
+    if looks not in _TYPES:
+        _TYPES[looks] = _types(arguments)
     try:
-        if looks not in _TYPES:
-            _TYPES[looks] = _types(arguments)
         return _jit(kernel, looks, saved=True)
     except ImportError:
         raise
