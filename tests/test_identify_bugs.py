@@ -383,7 +383,7 @@ def test_positions_that_all_lie_on_one_number_are_explained_without_a_warning() 
 
 
 def test_states_that_follow_no_map_are_not_conditioned_however_well_they_span_their_plane() -> None:
-    """Else a clean oscillator beside them would be judged together with what has no map."""
+    """Else they would be one more oscillator whose map is known, and not what is wrong beside a clean one."""
     rng, h, k, m = np.random.default_rng(7), 0.13, 2.3, 1.7
     q, v = rng.normal(size=(2, 60, 2))
     for i in range(59):
@@ -394,4 +394,4 @@ def test_states_that_follow_no_map_are_not_conditioned_however_well_they_span_th
     assert clean.conditioned
     assert scattered.spans
     assert not scattered.conditioned
-    assert judged(found, None, None, None).moving == [1]
+    assert judged(found, None, None, None).moving[0] == 1

@@ -64,9 +64,9 @@ def law(m: Any, x: Any, v: Any, pairs: Any, given: Any = None) -> tuple[Any, Any
     return x + H / 2 * v, v, e, c
 
 
-def main() -> int:
+def main(draws: int | None = None) -> int:
     """One line a claim; 1 where one does not hold."""
-    draws = arguments(__doc__, draws=DRAWS).draws
+    draws = draws or arguments(__doc__, draws=DRAWS).draws
     rng, rows, m, three, xi = (
         np.random.default_rng(20261123),
         [],

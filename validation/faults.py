@@ -52,7 +52,7 @@ def main() -> int:
     small = {"stiffness", "mass", "step"}
     limits = [result.limits["step-defect"] for result in found.results if result.name in small]
     seen = found.status == 0 and max(limits) < 1e-12
-    return 0 if seen and right.runs >= 300 and not right.alarms else 1
+    return 0 if seen and right.runs >= 800 and not right.alarms else 1
 
 
 if __name__ == "__main__":
