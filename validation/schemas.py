@@ -14,6 +14,7 @@ import contextlib
 import io
 import json
 import tempfile
+from inspect import cleandoc
 from pathlib import Path
 from typing import Any
 from unittest import mock
@@ -190,7 +191,19 @@ def schema_of(command: str, documents: list[Any]) -> dict[str, Any]:
 def of_scenes() -> str:
     """The schema of scene files."""
     head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "a scene of springcheck"}
-    return json.dumps(head | msgspec.json.schema(tables.scene_table()), indent=1) + "\n"
+    return json.dumps(head | _outdented(msgspec.json.schema(tables.scene_table())), indent=1) + "\n"
+
+
+def _outdented(schema: Any) -> Any:
+    """Descriptions are docstrings, which Python takes the margin of from 3.13 on."""
+    if isinstance(schema, list):
+        return [_outdented(x) for x in schema]
+    if not isinstance(schema, dict):
+        return schema
+    return {
+        k: cleandoc(x) if k == "description" and isinstance(x, str) else _outdented(x)
+        for k, x in schema.items()
+    }
 
 
 def main() -> int:
