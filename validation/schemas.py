@@ -191,19 +191,17 @@ def schema_of(command: str, documents: list[Any]) -> dict[str, Any]:
 def of_scenes() -> str:
     """The schema of scene files."""
     head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "a scene of springcheck"}
-    return json.dumps(head | _outdented(msgspec.json.schema(tables.scene_table())), indent=1) + "\n"
+    return json.dumps(head | _settled(msgspec.json.schema(tables.scene_table())), indent=1) + "\n"
 
 
-def _outdented(schema: Any) -> Any:
-    """Descriptions are docstrings, which Python takes the margin of from 3.13 on."""
+def _settled(schema: Any, key: str = "") -> Any:
+    """Descriptions are docstrings, whose margin Python takes from 3.13 on; alternatives have no order."""
     if isinstance(schema, list):
-        return [_outdented(x) for x in schema]
-    if not isinstance(schema, dict):
-        return schema
-    return {
-        k: cleandoc(x) if k == "description" and isinstance(x, str) else _outdented(x)
-        for k, x in schema.items()
-    }
+        found = [_settled(x) for x in schema]
+        return sorted(found, key=json.dumps) if key == "anyOf" else found
+    if isinstance(schema, dict):
+        return {k: _settled(x, k) for k, x in schema.items()}
+    return cleandoc(schema) if key == "description" and isinstance(schema, str) else schema
 
 
 def main() -> int:
