@@ -62,7 +62,7 @@ def test_momenta_of_zero_are_refused_and_all_else_passes(label: str) -> None:
     scene = baths.springs(3, steps=500)
     found = [
         *checks.judge(scene, driver.run(scene, label, seed=4)),
-        *checks.judge_seeds(scene, label, 4, driver.run),
+        *checks.judge_thoroughly(scene, label, driver.run, seed=4),
     ]
     assert [v.why for v in checks.shared(found) if v.passed is False] == []
     assert {v.check for v in found if v.passed} >= {

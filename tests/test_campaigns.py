@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import ast
+import subprocess
+import sys
+from cProfile import Profile
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
 import campaigns
+from springcheck import driver, load_scene
 
 HERE = Path(__file__).parent
 
@@ -32,8 +37,24 @@ def test_every_case_that_is_left_out_is_of_a_campaign() -> None:
 
 def test_the_dearest_are_left_out_as_long_as_every_jump_is_made() -> None:
     made = {"a": {(1,), (2,)}, "b": {(2,), (3,)}, "c": {(1,), (3,)}, "d": {(4,)}, "e": {(4,)}}
-    seconds = {"a": 3.0, "b": 2.0, "c": 1.0, "d": 0.1, "e": campaigns.CHEAP / 2}
-    assert campaigns.left_out(seconds, made) == {"a", "d"}
-    assert campaigns.left_out({"a": 1.0, "b": 2.0, "c": 3.0}, made) == {"c"}
+    dear = 10 * campaigns.CHEAP
+    costs = {"a": 3 * dear, "b": 2 * dear, "c": dear, "d": campaigns.CHEAP + 1, "e": campaigns.CHEAP}
+    assert campaigns.left_out(costs, made) == {"a", "d"}
+    assert campaigns.left_out({"a": dear, "b": 2 * dear, "c": 3 * dear}, made) == {"c"}
     # of two alike one stays
-    assert campaigns.left_out({"d": 1.0, "f": 2.0}, {"d": {(4,)}, "f": {(4,)}}) == {"f"}
+    assert campaigns.left_out({"d": dear, "f": 2 * dear}, {"d": {(4,)}, "f": {(4,)}}) == {"f"}
+
+
+def test_a_cost_is_the_calls_that_are_made_and_a_process_counts_for_many() -> None:
+    scene = load_scene("spring")
+    costs = []
+    # the first run loads the engine
+    for steps in (100, 100, 100, 200):
+        with Profile() as profile:
+            driver.run(replace(scene, steps=steps), "ase:velocity-verlet")
+        costs.append(campaigns.calls(profile))
+    assert abs(costs[2] - costs[1]) < 0.01 * costs[1]
+    assert 1.1 * costs[1] < costs[3] < 100 * costs[1]
+    with Profile() as profile:
+        subprocess.run([sys.executable, "-S", "-c", ""], check=True)
+    assert campaigns.PROCESS < campaigns.calls(profile) < 2 * campaigns.PROCESS

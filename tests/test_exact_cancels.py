@@ -85,6 +85,28 @@ def test_a_field_that_just_holds_a_charge_on_a_hill(off: float) -> None:
         assert over_stated(scene, (where.real + at, where.imag + at), (speed.real, speed.imag)) < 0.5
 
 
+def test_a_charge_on_two_springs_that_turns_little_far_from_0() -> None:
+    m, k, at, strength, t = 3.3, (0.37, 0.91), (1e8, 1.001e8), -2.6, -7.9
+    a, b = exactly(k[0]), exactly(k[1])
+    with mp.workdps(60):
+        rest = (a * exactly(at[0]) + b * exactly(at[1])) / (a + b)
+        q, p = np.array([1e-3, -2e-3]) + float(rest), np.array([0.0, 1e-3])
+        scene = Scene(
+            m=[m, m], q=q, p=p, places=[0, 1], step=t, steps=1,
+            terms=(Magnetic(a=[0], b=[1], strength=[strength]),
+                   WallSpring(i=[0, 1] * 2, k=np.repeat(k, 2), at=np.repeat(at, 2))),
+        )  # fmt: skip
+        half = 1j * exactly(strength) / exactly(m) / 2
+        w2, time = (a + b) / exactly(m), exactly(t)
+        s = mp.sqrt(half * half - w2)
+        even, odd, turn = mp.cosh(s * time), mp.sinh(s * time) / s, mp.exp(-half * time)
+        z, v = mp.mpc(*(exactly(x) - rest for x in q)), mp.mpc(*map(exactly, p)) / exactly(m)
+        where = turn * (z * (even + half * odd) + v * odd)
+        speed = turn * (v * (even - half * odd) - z * w2 * odd) * exactly(m)
+        # what the centre was rounded to moved the momenta by 1e7 stated errors
+        assert over_stated(scene, (where.real + rest, where.imag + rest), (speed.real, speed.imag)) < 0.5
+
+
 @pytest.mark.parametrize("share", [1 - 2.0**-50, 1 + 1e-10, 1 - 1e-7, 0.4])
 def test_a_rod_that_swings_close_to_the_very_top(share: float) -> None:
     m, force, t = 1.7, (0.37, -2.9), 60.0
@@ -217,6 +239,18 @@ def test_a_modulated_spring_at_the_edge_of_a_resonance(
         assert over_stated(scene, [u], [v * exactly(m)], part=1.0) < 0.5
 
 
+@pytest.mark.parametrize(("at", "q", "p", "t"), [(-1e5, -1e5 - 5e-6, 0.0, 0.4), (0.0, 0.7, -12.1, -0.007)])
+def test_a_modulated_spring_far_from_0_and_back_in_time(at: float, q: float, p: float, t: float) -> None:
+    m, k, depth, turn, phase = 2.7, 3.64, 0.3, 0.0156 if t < 0 else 2.6, 1.012
+    spring = ModulatedSpring(i=[0], k=[k], depth=[depth], frequency=[turn], phase=[phase], at=[at])
+    scene = Scene(m=[m], q=[q], p=[p], terms=(spring,), step=t, steps=1)
+    with mp.workdps(40):
+        end = a_period(exactly(k) / exactly(m), *map(exactly, (depth, turn, phase, t)))
+        u, v = end * mp.matrix([exactly(q) - exactly(at), exactly(p) / exactly(m)])
+        # the rounding of a far position was not counted, nor the whole period that times before 0 go back
+        assert over_stated(scene, [u + exactly(at)], [v * exactly(m)]) < 0.5
+
+
 @pytest.mark.parametrize(
     ("m", "k", "c", "t"),
     [
@@ -234,6 +268,26 @@ def test_a_spring_of_nearly_critical_friction_back_in_time(m: float, k: float, c
         u = q * mp.exp(-b * time) * (even + b * odd)
         # 14 and 10 times the stated error
         assert over_stated(scene, [u.real], [(-q * exactly(k) * odd * mp.exp(-b * time)).real]) < 0.5
+
+
+@pytest.mark.parametrize(
+    ("at", "c", "t"), [(0.0, (1.6e-3, 4.9e-4), 0.0301), (1e8, (0.0, 0.0), 44.02), (0.0, (9.1, 2.3), -7.9)]
+)
+def test_a_spring_pulls_at_a_rod_on_its_line(at: float, c: tuple[float, float], t: float) -> None:
+    m, k, q = [0.789, 14.483], 2.4, np.array([at - 3e-7, at + 0.999999974])
+    terms = (WallSpring(i=[0], k=[k], at=[at]), Rod(a=[0], b=[1], length=[q[1] - q[0]]))
+    brakes = (Damping(i=[0, 1], c=c),) if any(c) else ()
+    scene = Scene(m=m, q=q, p=[0.0, 0.0], terms=(*terms, *brakes), step=t, steps=1)
+    with mp.workdps(60):
+        whole = exactly(m[0]) + exactly(m[1])
+        b, w2, u, time = mp.fsum(map(exactly, c)) / whole / 2, exactly(k) / whole, exactly(q[0]), exactly(t)
+        u -= exactly(at)
+        s = mp.sqrt(mp.mpc(b * b - w2))
+        even, odd, less = mp.cosh(s * time), mp.sinh(s * time) / s, mp.exp(-b * time)
+        moved, v = (u * less * (even + b * odd)).real - u, (-u * w2 * odd * less).real
+        ends = [exactly(x) + moved for x in q], [exactly(x) * v for x in m]
+        # sums of masses and positions, rounded to doubles: 4.6 stated errors
+        assert over_stated(scene, *ends) < 0.7
 
 
 @pytest.mark.parametrize(
@@ -256,3 +310,14 @@ def test_a_brake_by_place_far_from_0(at: float, width: float, k: float) -> None:
         )
         # up to 3e7 stated errors
         assert over_stated(scene, [u + exactly(at)], [v * exactly(m)]) < 0.5
+
+
+@pytest.mark.parametrize(("off", "walls"), [(3.7e9, 1), (-(2.0**40), 0), (1e8, 2)])
+def test_a_chain_at_rest_far_from_0(off: float, walls: int) -> None:
+    m, rest = np.array([0.3, 1.0, 1.7]), 0.25
+    q = off + rest * np.arange(3)
+    held = WallSpring(i=[0, 2][:walls], k=[2.2, 0.7][:walls], at=q[[0, 2][:walls]])
+    terms = (Spring(a=[0, 1], b=[1, 2], k=[1.0, 3.3], rest=[rest] * 2), *([held] if walls else []))
+    scene = Scene(m=m, q=q, p=np.zeros(3), terms=terms, step=10.0, steps=1)
+    # it was at rest to 1e-43 of the units, and said to 1e-58
+    assert over_stated(scene, list(map(exactly, q)), [mp.mpf(0)] * 3) < 0.5

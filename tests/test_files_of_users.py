@@ -236,3 +236,31 @@ def test_a_journal_whose_lock_alone_is_left_is_tidied_up() -> None:
     lock.release()
     written(Path("s.h5"), scene())
     assert [path.name for path in Path().iterdir()] == ["s.h5"]
+
+
+def test_a_lock_whose_file_goes_as_it_is_taken_is_taken_of_the_file_that_others_see(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The holder before has removed it: two would write, each with a lock of its own."""
+    path, right = Path("lock"), files._taken
+    again: list[Any] = []
+
+    def taken(file: Any) -> bool | None:
+        if not again:
+            path.unlink()
+        again.append(file)
+        return right(file)
+
+    monkeypatch.setattr(files, "_taken", taken)
+    lock = files.Lock(path)
+    assert len(again) == 2
+    assert os.path.samestat(path.stat(), os.fstat(lock._file.fileno()))
+    lock.release()
+
+
+def test_a_call_that_a_signal_interrupts_is_made_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    answers = [errno.EINTR, errno.EINTR, 0]
+    monkeypatch.setattr(files, "_function", lambda name: lambda *_: answers.pop(0))
+    with Path("x").open("wb") as file:
+        assert files._done("flock", file, 2)
+    assert answers == []

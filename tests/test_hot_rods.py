@@ -23,6 +23,7 @@ from springcheck.physics.arrays import Floats
 from springcheck.physics.bath import Bath
 from springcheck.physics.scene import Scene
 from springcheck.physics.scenefile import load_scene
+from springcheck.physics.terms import WallSpring
 from springcheck.physics.trajectory import Trajectory
 from springcheck.studies.faults import measure
 from springcheck.studies.faults.heat import RODS_IN_BATHS
@@ -102,6 +103,50 @@ def test_a_small_fault_of_a_frame_is_seen(name: str, how: str, seen: str) -> Non
     failed = {v.check for v in checks.judge(scene, spoiled(run, scene, how)) if v.passed is False}
     assert seen in failed
     assert "noise-direction" in failed
+
+
+def test_three_roundings_of_all_that_a_step_adds_up_are_seen_and_half_of_them_are_not() -> None:
+    scene, run = right("dumbbell")
+    rods, known = scene.system.rods, read(THERMOSTATS["baoab"], scene, run.q, run.p)
+    assert rods is not None
+    assert known.allowed is not None
+    along = np.sign(rods.spread(rods.ways(run.q[50])))
+    for share, passed in ((3, False), (0.5, True)):
+        q = run.q.copy()
+        q[50] += share * known.roundings * np.asarray(known.allowed[0][49], float) * along
+        (found,) = checks.judge(scene, replace(run, q=q), [checks.thermal.noise_direction])
+        assert found.passed is passed
+
+
+@pytest.mark.parametrize(
+    ("random", "label"), [("aboba", "own:position-verlet"), ("obabo", "own:velocity-verlet")]
+)
+def test_without_friction_a_splitting_is_its_scheme_of_springs_with_rods(random: str, label: str) -> None:
+    """Of one drift, and of two, whose pushes last as long as it does."""
+    scene = scenes("dumbbell")
+    scene = pulled(replace(scene, steps=1))
+    stepper = Stepper.of(THERMOSTATS[random], replace(scene, bath=Bath(temperature=1e-300, friction=1e-30)))
+    by = forces(THERMOSTATS[random], scene.system)
+    draws = [np.zeros(scene.n)] * THERMOSTATS[random].draws
+    q, p = stepper(scene.q.astype(np.longdouble), scene.p.astype(np.longdouble), by, draws)
+    run = driver.run(replace(scene, bath=None), label)
+    assert run.q[1] == pytest.approx(np.asarray(q, float), abs=1e-14)
+    assert run.p[1] == pytest.approx(np.asarray(p, float), abs=1e-14)
+
+
+def pulled(scene: Scene) -> Scene:
+    """With springs that push along the rods as well."""
+    k = np.linspace(1.3, 2.9, scene.n)
+    return replace(scene, terms=(*scene.terms, WallSpring(i=np.arange(scene.n), k=k, at=np.zeros(scene.n))))
+
+
+def test_openmm_projects_before_it_drifts(need: Callable[[str], None]) -> None:
+    """Of a bath so cold that no draw makes up for a push along the rod that is left in the momenta."""
+    need("openmm:langevin-middle-rods")
+    scene = replace(scenes("dumbbell"), steps=20, bath=Bath(temperature=1e-9, friction=1.9))
+    run = driver.run(pulled(scene), "openmm:langevin-middle-rods", seed=3)
+    found = checks.judge(pulled(scene), run, [checks.thermal.noise_direction, checks.thermal.draws_variance])
+    assert [v.passed for v in found] == [True, True]
 
 
 def test_the_draws_that_are_found_are_those_of_the_generator() -> None:

@@ -395,3 +395,25 @@ def test_states_that_follow_no_map_are_not_conditioned_however_well_they_span_th
     assert scattered.spans
     assert not scattered.conditioned
     assert judged(found, None, None, None).moving[0] == 1
+
+
+@pytest.mark.parametrize("form", ["velocities", "single precision", "momenta", "wrong kicks"])
+def test_a_stated_stiffness_of_0_is_another_spring(form: str) -> None:
+    """It was divided by."""
+    rows, q, v = [(1.0, 0.6)], 1.0, 0.6
+    for _ in range(60):
+        old = v - 0.05 * q / 3
+        q, v = q + 0.1 * old, old - 0.05 * q / 3
+        if form != "wrong kicks":
+            v = old - 0.05 * q / 3
+        rows.append((q, v))
+    q_, v_ = np.array(rows).T
+    if form == "single precision":
+        q_, v_ = (x.astype(np.float32).astype(float) for x in (q_, v_))
+    states: dict[str, Any] = {"p": v_} if form == "momenta" else {"v": v_, "mass": 3.0}
+    found = identify(0.1 * np.arange(61), q_, stiffness=0.0, **states)
+    assert not found.fits
+    if form == "wrong kicks":
+        assert "old force" not in found.statement
+    else:
+        assert found.explanations[0].cause.endswith("where 0 is stated")

@@ -6,12 +6,18 @@ The trajectories are of schemes that springcheck does not run, which many of the
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+import identify_corpus as corpus
 from springcheck.identify import Identification, identify
+from springcheck.identify.candidates import stated_stiffness
 from springcheck.identify.families import EXPLICIT, substeps
+from springcheck.identify.hypothesis import distinct
+from springcheck.identify.judged import judged
+from springcheck.identify.record import read
 from springcheck.identify.storage import storage
 from springcheck.physics.arrays import Floats
 
@@ -521,3 +527,46 @@ def test_a_velocity_that_is_a_multiple_of_the_position_is_told() -> None:
 def test_noise_that_leaves_no_fit_is_no_number_of_substeps() -> None:
     assert list(substeps(0.75, 1e-9)[0]) == [2]
     assert list(substeps(np.nan, 1e-9)[0]) == list(substeps(0.75, np.nan)[0]) == []
+
+
+WEAK = [case for case in corpus.load() if case.name.startswith("a weak ")]
+
+
+@pytest.mark.parametrize("case", WEAK, ids=lambda case: case.name)
+def test_a_friction_that_few_digits_hardly_show_may_be_another_force(case: corpus.Case) -> None:
+    """A drag like |v| v, or a bond that is no spring, was named with friction, and without a doubt."""
+    found = corpus.said(case)
+    assert isinstance(found, Identification)
+    assert found.scheme in case.schemes
+    assert found.statement.endswith(DOUBT)
+    if any(not x.law for x in found.candidates):
+        assert " with or without friction" in found.statement
+        assert any(note.startswith("the motion may be damped") for note in found.notes)
+
+
+def test_a_friction_that_digits_show_is_linear_in_the_velocity_for_certain() -> None:
+    q, v = 1.0, 0.0
+    rows = [(q, v)]
+    for _ in range(300):
+        v = v + 0.2 * (-q - 0.1 * v)
+        q = q + 0.2 * v
+        rows.append((q, v))
+    q_, v_ = (np.array([float(f"{y:.7g}") for y in x]) for x in np.array(rows).T)
+    found = identify(0.2 * np.arange(301), q_, v=v_)
+    assert found.statement.startswith("Semi-implicit Euler, kick-drift")
+    assert " with friction: " in found.statement
+    assert DOUBT not in found.statement
+
+
+def test_a_remark_on_one_reading_of_the_states_is_not_one_on_another() -> None:
+    t, x = 0.1 * np.arange(40), 0.3 * np.arange(40)
+    plain = judged(read(t, np.cos(x), None, -3 * np.sin(x), 1.0), None, None, None)
+    other = replace(plain, stride=2).noting("one more")
+    assert other.notes == (*plain.notes, "one more")
+    # what is tried of a stated stiffness leaves no remark behind
+    stated = replace(plain, stiffness=np.array([7.0]))
+    joint = plain.compare(distinct(damped=False), range(1, 2))[0]
+    wrong, remarks = stated_stiffness(stated, joint, "double", np.array([7.0]))
+    assert wrong[0].cause.startswith("Exact flow, but of a spring")
+    assert "does not fit" in remarks[0]
+    assert stated.notes == plain.notes

@@ -113,6 +113,24 @@ def test_an_adaptive_solver_s_tolerance_says_what_it_hides(need: Need) -> None:
     assert seen.passed is False
 
 
+@pytest.mark.parametrize("every", [1, 7])
+@pytest.mark.parametrize("shorter", [1, 1000])
+@pytest.mark.parametrize("name", ["driven-spring", "mathieu-stable"])
+def test_recorded_times_are_no_part_of_what_shows_a_wrong_step_of_a_driven_scene(
+    name: str, shorter: int, every: int
+) -> None:
+    scene = scenefile.load_scene(name)
+    scene = replace(scene, step=scene.step / shorter, steps=140, every=every)
+    right = springcheck.simulate(scene, "own:velocity-verlet")
+    (seen,) = checks.judge(scene, right, [checks.step_defect])
+    assert seen.sees.step is not None
+    for part, passed in ((3.0, False), (0.1, True)):
+        of = replace(scene, step=scene.step * (1 + part * seen.sees.step))
+        wrong = replace(springcheck.simulate(of, "own:velocity-verlet"), t=right.t, step=scene.step)
+        (found,) = checks.judge(scene, wrong, [checks.step_defect])
+        assert found.passed is passed
+
+
 def verdict(**limits: float | None) -> Verdict:
     return Verdict(
         method="m", check="c", value=1.0, bound=2.0, unit="", passed=True, why="", sees=Limits(**limits)

@@ -63,13 +63,25 @@ def test_the_energy_of_motion_and_chain_is_conserved_to_second_order(name: str) 
 def test_every_chain_is_judged_to_rounding(label: str, n: int, need: Callable[[str], None]) -> None:
     need(label)
     scene = springs(n, 60)
-    verdicts = checks.judge(scene, driver.run(scene, label, seed=3)) + checks.judge_seeds(
-        scene, label, 3, driver.run
+    verdicts = checks.judge(scene, driver.run(scene, label, seed=3)) + checks.judge_thoroughly(
+        scene, label, driver.run, seed=3
     )
     assert not [v for v in verdicts if v.passed is False]
     assert {"noise-direction", "noise-size"} <= {v.check for v in verdicts if v.passed}
     said = {v.check: v.why for v in verdicts if v.passed is None}
     assert said["draws-variance"] == said["seed-kept"] == "it takes no draws: its bath is a chain"
+
+
+@pytest.mark.parametrize("share", [0.7, 1.3])
+def test_a_chain_of_openmm_rests_below_the_kinetic_energy_that_its_source_says(
+    share: float, need: Callable[[str], None]
+) -> None:
+    need(label := "openmm:nose-hoover-bath")
+    # at its lowest point, where no force acts in the first step
+    scene = springs(1, 8)
+    scene = replace(scene, q=0 * scene.q, p=np.sqrt(2e-8 * share * scene.m))
+    (found,) = checks.judge(scene, driver.run(scene, label, seed=3), [checks.thermal.noise_direction])
+    assert found.passed, found.why
 
 
 SAID: dict[str, tuple[str, Callable[[Any], float]]] = {

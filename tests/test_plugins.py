@@ -119,12 +119,13 @@ def test_a_file_is_an_engine_for_one_call_and_runs_beside_the_others(
 MINIMAL = """
 from springcheck.engines import Arithmetic, Engine, Method, named
 class S:
-    force_calls = 0
-    def advance(self, every, q, p):
+    force_calls = {calls}; {more}
+    def advance(self, {advanced}):
         {advance}
-def start(scene, method, label, step):
+def start({started}):
     {start}
-ENGINE = Engine(name={name}, title="bad", methods=named(Method(name="m", scheme={scheme}, about="")),
+M = Method(name="m", scheme={scheme}, about="", terms={terms})
+ENGINE = Engine(name={name}, title="bad", methods={by_name}(M),
                 start=start, version=lambda: {version}, arithmetic={arithmetic})
 """
 
@@ -132,7 +133,9 @@ ENGINE = Engine(name={name}, title="bad", methods=named(Method(name="m", scheme=
 def bad(path: Path, **parts: str) -> Path:
     plain = {
         "advance": "pass", "start": "return S()", "name": "'bad'", "scheme": "'explicit-euler'",
-        "version": "{}", "arithmetic": "lambda label: Arithmetic()",
+        "version": "{}", "arithmetic": "lambda label: Arithmetic()", "by_name": "named",
+        "terms": "{'wall-spring'}", "started": "scene, method, label, step", "advanced": "every, q, p",
+        "calls": "0", "more": "pass",
     }  # fmt: skip
     path.write_text(MINIMAL.format(**plain | parts))
     return path
@@ -158,11 +161,32 @@ def bad(path: Path, **parts: str) -> Path:
         ({"version": "[]"}, "engine 'bad': its version() returned list, not a dict of names and versions"),
         (
             {"advance": "q[:] = p[:] = 0", "arithmetic": "lambda: Arithmetic()"},
-            "bad:m failed: TypeError: <lambda>() takes 0 positional arguments",
+            "takes 0 positional arguments but 1 was given; it is called as arithmetic(label)",
         ),
+        ({"started": "scene, step"}, "given; it is called as start(scene, method, label, step)"),
+        (
+            {"advanced": "q, p"},
+            "takes 3 positional arguments but 4 were given; it is called as advance(every",
+        ),
+        ({"start": "return S(1)"}, "TypeError: S() takes no arguments (bad.py, line 8)"),
+        (
+            {"by_name": "(lambda *all: [*all])"},
+            "its methods are a list, not by name; named(...) makes them so",
+        ),
+        ({"terms": "['wall-spring']"}, "the terms of its method 'm' are a list, not a set"),
+        ({"terms": "{'wall-sprin'}"}, "there is no term 'wall-sprin', did you mean wall-spring?"),
         ({"advance": "q[:] = p[:] = 0", "arithmetic": "str"}, "its arithmetic is of type str"),
         ({"start": "return None"}, "NoneType"),
         ({"advance": "return ("}, "SyntaxError"),
+        ({"scheme": "'euler'"}, "there are explicit-euler, semi-implicit-euler"),
+        (
+            {"advance": "q[:] = p[:] = 0", "calls": "'many'"},
+            "bad:m: its force_calls is 'many', not a whole number of calls",
+        ),
+        ({"advance": "q[:] = p[:] = 0", "calls": "1e30"}, "its force_calls is 1e+30, not a whole number"),
+        ({"advance": "q[:] = p[:] = 0", "more": "off_axis = 'far'"}, "its off_axis is 'far', not a number"),
+        ({"advance": "q[:] = p[:] = 0", "more": "last_steps = []"}, "its last_steps is [], not 200 lengths"),
+        ({"advance": "import springcheck.engines as e; raise e.Stopped(900, '')"}, "after 900 of 200 rows"),
     ],
     ids=str,
 )

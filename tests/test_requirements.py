@@ -21,8 +21,19 @@ EVERY = tuple(dict.fromkeys((*checks.ALL, *checks.RANDOM)))
 
 @pytest.mark.parametrize("one", EVERY, ids=lambda one: one.name)
 def test_a_check_requires_what_the_table_has_and_says_so(one: checks.Check) -> None:
-    assert one.requires <= set(requires.REQUIREMENTS)
     assert all(requires.REQUIREMENTS[name].word in one.needs for name in one.requires)
+
+
+def test_a_requirement_that_is_not_in_the_table_is_refused_where_the_check_is_made() -> None:
+    with pytest.raises(ValueError, match="no requirement is called unheld-by-walls; known are start, "):
+        check.check("still", family="motion", requires={"unheld-by-walls", "named"})
+
+
+def test_checks_of_conserved_quantities_and_of_the_record_tell_no_scheme_from_another() -> None:
+    silent = {one.name for one in checks.ALL if not one.telling}
+    assert silent >= {"momentum", "angular-momentum", "rod-length", "start", "times", "repeatability"}
+    assert silent.isdisjoint(checks.TELLING)
+    assert {"step-defect", "closed-form", "propagator", "order", "draws-variance"} <= checks.TELLING
 
 
 def test_every_requirement_is_one_of_some_check() -> None:

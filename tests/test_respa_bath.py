@@ -52,7 +52,7 @@ def test_groups_of_springs_are_kicked_by_their_own_steps(label: str, joined: boo
     here(label)
     scene = two_scales(joined=joined)
     verdicts = springcheck.judge(scene, driver.run(scene, label, seed=5))
-    verdicts += checks.judge_seeds(scene, label, 5, driver.run)
+    verdicts += checks.judge_thoroughly(scene, label, driver.run, seed=5)
     assert [f"{v.check}: {v.why}" for v in verdicts if v.passed is False] == []
     passed = {v.check for v in verdicts if v.passed}
     assert {"noise-map", "draws-variance", "draws-mean", "draws-neighbours", "seed-kept"} <= passed

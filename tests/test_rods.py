@@ -6,6 +6,7 @@ one rod solves a quadratic.
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import itertools
 import re
@@ -291,6 +292,50 @@ def test_rods_that_share_particles_are_solved_to_rounding() -> None:
     wide = [x[:-1].astype(np.longdouble) for x in (run.q, run.p)]
     q, _ = Case(trajectory=run, scene=scene).step(*wide)
     assert np.max(np.abs(rods(scene).strain(q))) < 1e-17 or np.finfo(np.longdouble).eps > 1e-16
+
+
+def test_momenta_are_projected_to_the_rounding_of_their_own_width() -> None:
+    scene = triangle()
+    p = np.random.default_rng(3).normal(size=(5, 9)).astype(np.longdouble)
+    q = np.tile(scene.q.astype(np.longdouble), (5, 1))
+    held, r = rods(scene).projected(q, p), rods(scene).ways(q)
+    along = rods(scene).dot(r, rods(scene).apart(held / scene.m))
+    most = rods(scene).sum_of_sizes(r, np.abs(held) / scene.m)
+    # a sum of 12 products, and pushes of as many roundings, solved for once more than they need
+    assert np.all(np.abs(along) <= 64 * np.finfo(np.longdouble).eps * most)
+
+
+def test_what_a_rounding_of_a_length_does_to_a_step_is_what_its_bound_says() -> None:
+    """By a rod that is longer by a small part: exactly, and no less of what its push leaves across it."""
+    scene, x, part = dumbbell(), np.longdouble(0.15), 1e-7
+    q, p = scene.q.astype(np.longdouble), scene.p.astype(np.longdouble)
+    (rod,) = (term for term in scene.terms if isinstance(term, Rod))
+    ends = []
+    for length in (rod.length, rod.length * (1 + part)):
+        known = Rods(scene.m, scene.places, [replace(rod, length=length)])
+        held = known.drifted(q, q + x * p / scene.m, p, x)
+        ends.append((*held, known.projected(*held)))
+    off_q, _, off_p = (np.abs(more - less) / part for less, more in zip(*ends, strict=True))
+    of_q, of_p = rods(scene).sizes(q, *ends[0][:2], x, (0 * q, 0 * p), 0.0)
+    assert np.asarray(of_q / off_q, float) == pytest.approx(1, abs=10 * part)
+    # and what is taken back along the rod, whose sizes of two axes are added up
+    assert 1 <= np.linalg.norm(of_p.astype(float)) / np.linalg.norm(off_p.astype(float)) <= 1 + 2**0.5
+
+
+@pytest.mark.parametrize(("share", "right"), [(0.5, True), (1.5, False)])
+@pytest.mark.parametrize("what", ["its length is", "its ends come apart"])
+def test_a_start_is_true_to_64_roundings(what: str, share: float, right: bool) -> None:
+    scene = dumbbell()
+    known, q, p = rods(scene), scene.q, scene.p
+    r = known.ways(q)
+    if what == "its length is":
+        more = share * 2.0**-46 * (1 + known.magnitude(q)) * r
+        q = q + np.concatenate([0 * more, more])
+    else:
+        along = share * 2.0**-46 * known.sum_of_sizes(r, np.abs(p) / scene.m)
+        p = p + known.spread(known.each(along / known.dot(r, r) / known.inverse_mass) * r).astype(float)
+    with contextlib.nullcontext() if right else pytest.raises(SceneError, match=what):
+        known.check(q, p)
 
 
 @pytest.mark.parametrize("what", ["momenta without a step", "a frame of zeros"])

@@ -109,6 +109,20 @@ def test_the_closed_form_is_what_stepping_gives(scheme: Scheme, k: float) -> Non
     assert np.max(np.max(np.abs(states - walked), axis=1) / size) <= 1e5 * np.finfo(np.longdouble).eps
 
 
+@pytest.mark.parametrize("below", [1e-6, 1e-13, 2e-16])
+def test_the_closed_form_just_below_the_limit_of_stability(below: float) -> None:
+    found = one(SCHEMES["velocity-verlet"], k=4 * M / H**2 * (1 - below))
+    z = np.array([0.3, 0.7], dtype=np.longdouble)
+    walked = [z]
+    for _ in range(50):
+        walked.append(found[0] @ walked[-1])
+    steps = np.arange(1, 51)
+    y, v = schemes.propagate(found, z[:1], z[1:], steps, area_preserving=True)
+    off = np.max(np.abs(np.stack([y[:, 0], v[:, 0]], axis=1) - walked[1:]), axis=1)
+    # what a product of so many such maps is off by; pi - angle had lost 1/(pi - angle) digits: 1e5 of these
+    assert np.all(off <= 4 * np.finfo(np.longdouble).eps * steps**2 * np.max(np.abs(walked)))
+
+
 def test_fractions_are_rounded_once() -> None:
     third = schemes.number(Fraction(1, 3), np.longdouble)
     assert third == np.longdouble(1) / np.longdouble(3)

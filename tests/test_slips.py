@@ -95,6 +95,8 @@ def test_a_name_that_is_no_file(
         ("run --from a.h5 --verdicts", ("--verdicts", "--from")),
         ("identify --stepper steppers:step --mass 3", ("--mass", "--stepper")),
         ("identify --stepper steppers:step --trajectory x", ("--trajectory", "--stepper")),
+        ("plot a.h5 -o picture.png", ("-o picture.png", "a folder is needed")),
+        ("run spring --engine .", (".: it is a folder, a Python file is needed",)),
         ("inspect a.h5 --rows 3", ("--rows", "--trajectory")),
         ("inspect a.h5 --rows " + "x" * 5000, ("--rows", "xx .. xx")),
     ],
@@ -104,6 +106,7 @@ def test_numbers_names_and_options_that_serve_nothing(
 ) -> None:
     refused(capsys, line.split(), *words)
     assert not Path("x.h5").exists()
+    assert not Path("picture.png").exists()
 
 
 @pytest.mark.usefixtures("stored")
@@ -113,6 +116,10 @@ def test_numbers_names_and_options_that_serve_nothing(
         ("runn spring", "did you mean run?"),
         ("run sprin", "did you mean spring?"),
         ("run spring --forse", "did you mean --force?"),
+        (
+            "inspect a.h5 --force",
+            "--force: unknown or too many arguments; `springcheck inspect -h` shows them",
+        ),
         ("run spring --metod=own:euler", "did you mean --method?"),
         ("run spring --method own:eular", "did you mean own:euler?"),
         ("run spring --method openmm:verlet@cpu", "did you mean openmm:verlet@CPU?"),

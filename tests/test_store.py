@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from springcheck import store
 from springcheck.errors import StoreError
 from springcheck.physics.trajectory import Comparison, Timing, Verdict
-from springcheck.store import draft, reading
+from springcheck.store import access, draft, layout, reading
 from stores import LABELS, assert_same, scene, trajectory, written
 
 
@@ -301,3 +301,22 @@ def test_importing_the_store_imports_no_engine_and_no_plots() -> None:
     )
     ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert ran.stdout.strip() == "[]"
+
+
+def test_attributes_are_written_with_the_types_that_h5py_gives_them() -> None:
+    values = {
+        "text": "ångström", "texts": ["a", "bé"], "none": "", "flag": True, "count": 3, "x": 0.1,
+        "numbers": np.array([1, 1], np.int32),
+    }  # fmt: skip
+    with h5py.File("a", "w", driver="core", backing_store=False) as file:
+        ours, theirs = file.create_group("ours"), file.create_group("theirs")
+        layout.write_attributes(ours, dict.fromkeys(values, "before"))
+        layout.write_attributes(ours, values)
+        for name, value in values.items():
+            text = h5py.string_dtype("utf-8") if isinstance(value, str | list) else None
+            theirs.attrs.create(name, value, dtype=text)
+            mine, other = ours.attrs.get_id(name), theirs.attrs.get_id(name)
+            assert (mine.get_type().encode(), mine.shape) == (other.get_type().encode(), other.shape)
+            assert mine.get_space().get_simple_extent_type() == other.get_space().get_simple_extent_type()
+        assert access.attributes(ours) == access.attributes(theirs)
+        assert list(ours.attrs["texts"]) == values["texts"]

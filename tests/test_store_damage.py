@@ -91,6 +91,30 @@ def test_a_file_whose_structure_has_changed_is_not_read(whole: Path, tmp_path: P
     assert store.check(path)
 
 
+def test_a_seal_says_of_every_byte_which_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Bytes between what it ends and itself, arrays that overlap, and more besides them than is looked at."""
+    path, body = tmp_path / "x", bytes(range(200))
+
+    def extents(*places: tuple[int, int]) -> tuple[seal.Extent, ...]:
+        return tuple(seal.Extent(name="x", offset=i, size=size, sha256="") for i, size in places)
+
+    def found(of: tuple[seal.Extent, ...], more: bytes = b"", end: int = 200) -> seal.Seal | None:
+        path.write_bytes(body + more + seal.encoded(seal.Seal(end=end, extents=of, rest="")))
+        return seal.find(path)
+
+    assert found(extents((0, 100), (100, 100))) is not None
+    assert found(extents((0, 100)), more=b"?") is None
+    assert found((), end=199) is None
+    assert found(extents((0, 100), (150, 51))) is None
+    assert found(extents((0, 100), (99, 20))) is None
+    assert found(extents((0, 100), (120, -20))) is None
+    path.write_bytes(seal.sealed(body))
+    assert (known := seal.find(path)) is not None
+    for most, right in ((200, True), (199, False)):
+        monkeypatch.setattr(seal, "LARGEST_REST", most)
+        assert seal.is_whole(path, known) is right
+
+
 def test_a_changed_number_is_named_and_not_read(whole: Path, tmp_path: Path) -> None:
     known = seal.find(whole)
     assert known is not None

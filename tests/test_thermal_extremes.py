@@ -64,8 +64,8 @@ def test_a_right_thermostat_passes_however_far_its_numbers_are(label: str, given
     if engines.absence(label.partition(":")[0]):
         pytest.skip("not installed")
     where = scene(**given)
-    verdicts = checks.judge(where, driver.run(where, label, seed=5)) + checks.judge_seeds(
-        where, label, 5, driver.run
+    verdicts = checks.judge(where, driver.run(where, label, seed=5)) + checks.judge_thoroughly(
+        where, label, driver.run, seed=5
     )
     assert [
         f"{v.check}: {v.value} of {v.bound}, {v.why}" for v in checks.shared(verdicts) if v.passed is False

@@ -96,6 +96,6 @@ def test_a_broken_thermostat_runs_among_the_others(
 def test_experiments_with_seeds_pass_for_what_is_right(label: str) -> None:
     if reason := engines.absence(label.partition(":")[0]):
         pytest.skip(reason)
-    found = checks.judge_seeds(baths.springs(3), label, 5, driver.run)
+    found = checks.judge_thoroughly(baths.springs(3), label, driver.run, seed=5)
     assert [v.why for v in found if v.passed is False] == []
     assert sum(v.passed is True for v in found) >= 2

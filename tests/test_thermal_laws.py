@@ -227,6 +227,15 @@ def test_laws_are_what_long_runs_of_the_scheme_itself_show(name: str) -> None:
     assert moved == pytest.approx(1, abs=20 * error[0])
 
 
+def test_the_error_of_a_variance_is_that_of_the_squares_of_all_pairs_of_frames() -> None:
+    """Of a Gaussian motion <x_i**2 x_j**2> is C(0)**2 + 2 C(i - j)**2."""
+    found, frames = law("baoab", *SPRINGS[0]), 30
+    C = np.array([np.diagonal(found.autocovariance(5 * j)[0]) for j in range(frames)])
+    apart = np.abs(np.subtract.outer(range(frames), range(frames)))
+    expected = np.sqrt(2 * np.mean((C / C[0])[apart] ** 2, axis=(0, 1)))
+    assert found.error_of_variances(frames, 5)[0] == pytest.approx(expected, rel=1e-12)
+
+
 def test_a_step_beyond_its_limit_has_no_stationary_state() -> None:
     found = replace(law("baoab", *SPRINGS[0]), h=2.4)
     assert np.all(np.isinf(found.covariance))

@@ -7,9 +7,12 @@ checks allow themselves.
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 
@@ -18,13 +21,18 @@ from springcheck import checks, driver, engines
 from springcheck.cli import main
 from springcheck.engines import Label
 from springcheck.engines.contract import Need
-from springcheck.errors import MethodError, SceneError
+from springcheck.engines.own import thermal as own_thermal
+from springcheck.errors import MethodError, SceneError, SpringcheckError
 from springcheck.physics import scenefile
+from springcheck.physics.arrays import Floats
 from springcheck.physics.bath import Bath
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Spring, WallSpring
+from springcheck.studies.faults import baths
+from springcheck.studies.run import measure
 from springcheck.studies.run.tally import Heat
 from springcheck.thermal import THERMOSTATS, chance
+from springcheck.thermal.stepper import forces
 
 pytestmark = pytest.mark.slow
 
@@ -115,11 +123,96 @@ def test_chances_are_those_of_their_null() -> None:
         # a saddlepoint is sought for each, which takes a millisecond
         found = np.array([of(row) for row in (x[:500] if of is chance.shape else x)])
         for level in (0.5, 0.1, 0.01):
-            assert np.mean(found <= level) < level + 5 * np.sqrt(level / len(found)), of.__name__
+            assert abs(np.mean(found <= level) - level) < 5 * np.sqrt(level / len(found)), of.__name__
+    for n, p in ((9, 0.3), (1, 0.6)):
+        each = np.array([math.comb(n, i) * p**i * (1 - p) ** (n - i) for i in range(n + 1)])
+        for i in range(n + 1):
+            sides = np.sum(each[: i + 1]), np.sum(each[i:])
+            assert chance.count(i, n, p) == pytest.approx(min(1, 2 * min(sides)), rel=1e-12)
     assert chance.shape(np.sqrt(12) * (rng.random(2000) - 0.5)) < 1e-15
     assert chance.shape(rng.standard_t(3, 2000)) < 1e-15
     assert chance.variance(1.01 * rng.standard_normal(1_000_000)) < 1e-30
     assert chance.neighbours(np.repeat(rng.standard_normal(500), 2)) < 1e-15
+    assert np.mean([chance.pairs(rng.standard_normal((300, 5))) <= 0.05 for _ in range(1000)]) < 0.085
+
+
+class _Shared:
+    """Normal numbers, one of whose columns are a part of those of another, some steps before."""
+
+    def __init__(self, source: int, to: int, steps: int, part: float) -> None:
+        self._rng, self._kept = np.random.default_rng(3), []  # type: ignore[var-annotated]
+        self._from, self._to, self._steps, self._part = source, to, steps, part
+
+    def standard_normal(self, shape: tuple[int, ...]) -> Floats:
+        x = self._rng.standard_normal(shape)
+        if x.size:
+            self._kept = [*self._kept, x[..., self._from].copy()][-self._steps - 1 :]
+            rest = np.sqrt(1 - self._part**2) * x[..., self._to]
+            if len(self._kept) > self._steps:
+                x[..., self._to] = self._part * self._kept[0] + rest
+        return x
+
+
+@pytest.mark.parametrize(
+    ("to", "steps", "part", "check"),
+    [
+        (2, 0, 1.0, "draws-particles"),
+        (8, 0, 0.3, "draws-particles"),
+        (2, 1, 1.0, "draws-repeat"),
+        (1, 3, 1.0, "draws-repeat"),
+        (8, 1, 0.6, "draws-repeat"),
+    ],
+)
+@pytest.mark.parametrize("name", ["baoab", "obabo", "brownian"])
+def test_noise_that_any_two_particles_share_is_seen_at_once_and_later(
+    name: str, to: int, steps: int, part: float, check: str
+) -> None:
+    n = 9
+    springs = WallSpring(i=np.arange(n), k=np.linspace(1.3, 3.3, n), at=np.zeros(n))
+    m = np.linspace(1.1, 3.7, n)
+    scene = Scene(
+        name="nine", m=m, q=np.zeros(n), p=np.zeros(n), terms=(springs,), step=0.35, steps=4000,
+        bath=Bath(temperature=1.7, friction=0.8),
+    )  # fmt: skip
+    right = checks.judge(scene, driver.run(scene, f"own:{name}", seed=3))
+    assert not [one.why for one in right if one.passed is False]
+    wrong = driver.run(scene, f"own:{name}", seed=_Shared(0, to, steps, part))
+    assert [one.check for one in checks.judge(scene, wrong) if one.passed is False] == [check]
+
+
+@pytest.mark.parametrize("name", [name for name, one in THERMOSTATS.items() if not one.splits])
+def test_own_thermostats_count_the_forces_that_they_ask_for(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    calls: list[int] = []
+
+    def counting(*given: Any) -> Any:
+        force = forces(*given)
+        return lambda q, p: (calls.append(1), force(q, p))[1]
+
+    monkeypatch.setattr(own_thermal, "forces", counting)
+    scene = baths.springs(2, steps=7)
+    assert driver.run(scene, f"own:{name}", seed=3).force_calls == len(calls) > 0
+
+
+def test_collisions_and_what_they_draw_are_of_unlike_numbers() -> None:
+    """Of one sequence, a number small enough for a collision would be a small draw as well."""
+    begun = own_thermal.Random(baths.springs(1), "andersen", 0.1, 3)
+    assert not {*begun._hits.random(1000)} & {*np.random.Generator(np.random.PCG64(3)).random(10_000)}
+
+
+@pytest.mark.parametrize("name", [name for name, one in THERMOSTATS.items() if one.carried])
+def test_draws_that_do_not_act_again_in_the_next_step_are_rejected(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where a draw and the next reach one number alone, by the correlation of what follows each other."""
+    scene = baths.springs(2, steps=300)
+    with monkeypatch.context() as patch:
+        patch.setitem(THERMOSTATS, name, replace(THERMOSTATS[name], carried=0))
+        wrong = driver.run(scene, f"own:{name}", seed=3)
+    seen = checks.judge(scene, wrong, [checks.thermal.noise_direction, checks.thermal.draws_neighbours])
+    first = "draws-neighbours" if name.endswith("-half") else "noise-direction"
+    assert first in {v.check for v in seen if v.passed is False}
 
 
 BAD = {
@@ -167,6 +260,44 @@ def test_a_seed_that_is_no_integer_is_refused(capsys: pytest.CaptureFixture[str]
         driver.run(pair(), "own:baoab", seed=1.5)  # type: ignore[arg-type]
     with pytest.raises(MethodError, match="takes no seed"):
         driver.run(scenefile.load_scene("spring"), "own:euler", seed=1)
+    with pytest.raises(SpringcheckError, match="seed= goes with"):
+        springcheck.run("spring", methods=["own:euler"], seed=1)
+
+
+def test_a_generator_is_no_seed_that_a_run_could_keep() -> None:
+    rng = np.random.default_rng(5)
+    with pytest.raises(MethodError, match=r"seed = Generator\(PCG64\).*: a whole number from 1"):
+        springcheck.simulate(pair(), "own:baoab", seed=rng)  # type: ignore[arg-type]
+    with pytest.raises(MethodError, match="a whole number from 1"):
+        springcheck.simulate(pair(), "own:euler", seed=rng)  # type: ignore[arg-type]
+    kept = driver.run(pair(), "own:baoab", seed=rng).origin
+    assert kept["seed"].startswith("none")
+
+
+def test_a_store_without_a_seed_is_not_run_again(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    store = str(tmp_path / "x.h5")
+    assert main(["run", "spring", "--temperature", "1", "--method", "own:baoab", "--quiet", "-o", store]) == 0
+    with h5py.File(store, "r+") as file:
+        found: list[Any] = []
+        file.visititems(lambda _, node: found.append(node) if "origin.seed" in node.attrs else None)
+        found[0].attrs["origin.seed"] = "lucky"
+    capsys.readouterr()
+    assert main(["run", "--from", store]) == 2
+    said = capsys.readouterr().err
+    assert "own:baoab" in said
+    assert "its seed is 'lucky'" in said
+    assert "Traceback" not in said
+
+
+def test_a_thorough_run_in_a_bath_reports_its_progress_to_the_end(tmp_path: Path) -> None:
+    heard: list[tuple[float, int]] = []
+    labels = ["own:baoab", "own:obabo"]
+    measure.run(
+        pair(40), tmp_path / "x.h5", methods=labels, thorough=True, seed=3,
+        progress=lambda done, parts, *what: heard.append((done, parts)),
+    )  # fmt: skip
+    assert heard[-1] == (4, 4)
+    assert [done for done, _ in heard] == sorted(done for done, _ in heard)
 
 
 def test_a_spring_at_300_kelvin_runs_and_repeats(
@@ -318,8 +449,8 @@ def test_splittings_of_openmmtools_are_those_of_their_letters() -> None:
     scene = pair(steps=100)
     for name in found.thermostats:
         run = driver.run(scene, f"openmmtools:{name}", seed=3)
-        verdicts = springcheck.judge(scene, run) + checks.judge_seeds(
-            scene, f"openmmtools:{name}", 3, driver.run
+        verdicts = springcheck.judge(scene, run) + checks.judge_thoroughly(
+            scene, f"openmmtools:{name}", driver.run, seed=3
         )
         assert [f"{name} {v.check}: {v.why}" for v in verdicts if v.passed is False] == []
         assert sum(v.passed is True for v in verdicts) >= 9

@@ -1,9 +1,12 @@
 """Scripts under validation/ begin by `arguments`, end by `script`: one line for what their user can mend."""
 
+import ast
 import importlib
 import re
 import runpy
 import signal
+import sys
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -47,6 +50,31 @@ def test_a_word_that_names_nothing_is_one_line_with_status_2(
     said = capsys.readouterr().err.splitlines()
     assert said[-1].startswith(f"{name}: ")
     assert word in said[-1]
+
+
+def _imported(part: ast.stmt) -> list[str]:
+    if isinstance(part, ast.ImportFrom):
+        return [str(part.module).split(".")[0]]
+    return [name.name.split(".")[0] for name in part.names] if isinstance(part, ast.Import) else []
+
+
+def test_a_script_begins_with_what_tests_need_and_says_in_one_line_what_else_is_missing(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    project = tomllib.loads((FOLDER.parent / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    lines = [*project["dependencies"], *project["optional-dependencies"]["test"]]
+    needed = {re.split(r"[^\w-]", line)[0] for line in lines} | {"sksundae", "springcheck"}
+    beside = {path.stem for path in FOLDER.glob("*.py")}
+    for path in SCRIPTS:
+        body = ast.parse(path.read_text(encoding="utf-8")).body
+        found = {name for part in body for name in _imported(part)}
+        assert found - needed - beside - sys.stdlib_module_names == set(), path.name
+    monkeypatch.setitem(sys.modules, "selenium", None)
+    monkeypatch.setattr("sys.argv", ["h5web.py"])
+    with pytest.raises(SystemExit) as ended:
+        runpy.run_path(str(FOLDER / "h5web.py"), run_name="__main__")
+    assert ended.value.code == 2
+    assert re.fullmatch(r"h5web\.py: .*selenium.*\n", capsys.readouterr().err)
 
 
 def _interrupted() -> int:

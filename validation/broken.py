@@ -127,7 +127,7 @@ WORDS = (
 
 METHODS = ("ase:velocity-verlet", "openmm:verlet@Reference", "sundials:adams")
 STEPS = 200
-"""Of the scenes that are changed, at most."""
+"""Most steps of a changed scene."""
 
 
 def scene_text(rng: random.Random) -> str:

@@ -3,7 +3,8 @@
     python validation/campaigns.py FILE [...]
 
 Tests marked `campaign` try many cases of one law.  Every case of those in the FILEs (`tests/test_faults.py`)
-is run here, and of each is noted which jumps from line to line of the package it makes, and what it costs.
+is run here, and of each is noted which jumps from line to line of the package it makes, and its cost in
+calls of functions: unlike seconds, these do not depend on the machine's load.
 The dearest are left out first, as long as others of the same file make all their jumps, and every value of
 the parameters that a mark names, as `campaign("fault.caught_by")` does, still has a case.
 
@@ -17,9 +18,9 @@ It needs coverage (`pip install coverage`), and takes three times as long as the
 
 from __future__ import annotations
 
-import os
 from collections import Counter
 from collections.abc import Iterator
+from cProfile import Profile
 from pathlib import Path
 from typing import Any
 
@@ -29,8 +30,10 @@ from arguments import arguments, script
 
 ROOT = Path(__file__).parent.parent
 LIST = ROOT / "tests" / "campaigns.txt"
-CHEAP = 0.01
-"""Seconds of a case that always stays."""
+CHEAP = 10_000
+"""Calls of a case that always stays: about 10 ms."""
+PROCESS = 1_000_000
+"""Calls that a process counts for: about a second."""
 APART = ("studies/faults/table.py", "studies/faults/steppers.py")
 """What breaks engines on purpose: every fault has lines of its own there, and checks tell them apart."""
 
@@ -38,11 +41,11 @@ Jumps = set[tuple[Any, ...]]
 
 
 class Cases:
-    """Every case of a campaign with its jumps and its seconds of processor."""
+    """Every case of a campaign with its jumps and its cost in calls."""
 
     def __init__(self, recorder: Any) -> None:
         self.recorder = recorder
-        self.seconds: dict[str, float] = {}
+        self.costs: dict[str, int] = {}
         self.values: dict[str, Jumps] = {}
         self.failed: list[str] = []
 
@@ -54,18 +57,25 @@ class Cases:
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_call(self, item: pytest.Item) -> Iterator[None]:
         self.recorder.switch_context(item.nodeid)
-        began = sum(os.times()[:4])
+        profile = Profile()
+        profile.enable()
         try:
             return (yield)
         finally:
-            self.seconds[item.nodeid] = sum(os.times()[:4]) - began
+            profile.disable()
+            self.costs[item.nodeid] = calls(profile)
             self.recorder.switch_context("")
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         if not report.passed:
-            self.seconds.pop(report.nodeid, None)
+            self.costs.pop(report.nodeid, None)
         if report.failed:
             self.failed.append(report.nodeid)
+
+
+def calls(profile: Any) -> int:
+    """How many calls were made, a process that was started among them as `PROCESS`."""
+    return sum(x.callcount * (PROCESS if "fork_exec" in str(x.code) else 1) for x in profile.getstats())
 
 
 def values(item: Any) -> Iterator[tuple[Any, ...]]:
@@ -90,12 +100,15 @@ def jumps(recorder: Any, names: list[str]) -> dict[str, Jumps]:
     return found
 
 
-def left_out(seconds: dict[str, float], made: dict[str, Jumps]) -> set[str]:
-    """Cases that can go, the dearest first, so that every jump is still made by one that stays."""
-    makers = Counter(jump for name in seconds for jump in made[name])
+def left_out(costs: dict[str, int], made: dict[str, Jumps]) -> set[str]:
+    """Cases that can go, the dearest first, so that every jump is still made by one that stays.
+
+    A few calls in a million differ from run to run: of cases that cost the same to two digits, names decide.
+    """
+    makers = Counter(jump for name in costs for jump in made[name])
     out = set()
-    for name in sorted(seconds, key=lambda name: -seconds[name]):
-        if seconds[name] > CHEAP and all(makers[jump] > 1 for jump in made[name]):
+    for name in sorted(costs, key=lambda name: (-float(f"{costs[name]:.2g}"), name)):
+        if costs[name] > CHEAP and all(makers[jump] > 1 for jump in made[name]):
             makers.subtract(made[name])
             out.add(name)
     return out
@@ -111,17 +124,17 @@ def main() -> int:
     recorder.start()
     pytest.main(["-q", "-p", "no:cacheprovider", "--whole", *files], plugins=[cases])
     recorder.stop()
-    made = {name: of | cases.values[name] for name, of in jumps(recorder, list(cases.seconds)).items()}
-    enter(files, cases.seconds, made)
+    made = {name: of | cases.values[name] for name, of in jumps(recorder, list(cases.costs)).items()}
+    enter(files, cases.costs, made)
     return 1 if cases.failed else 0
 
 
-def enter(files: list[str], seconds: dict[str, float], made: dict[str, Jumps]) -> None:
+def enter(files: list[str], costs: dict[str, int], made: dict[str, Jumps]) -> None:
     """Put what is left out of the files into the list."""
     old = LIST.read_text(encoding="utf-8").splitlines() if LIST.exists() else []
     out = {name for name in old if name.split("::")[0] not in files}
     for file in files:
-        mine = {name: s for name, s in seconds.items() if name.split("::")[0] == file}
+        mine = {name: cost for name, cost in costs.items() if name.split("::")[0] == file}
         gone = left_out(mine, made)
         out |= gone
         for one in dict.fromkeys(name.split("[")[0] for name in mine):
@@ -129,7 +142,7 @@ def enter(files: list[str], seconds: dict[str, float], made: dict[str, Jumps]) -
             kept = [name for name in every if name not in gone]
             print(
                 f"{one}: {len(kept)} of {len(every)} stay, "
-                f"{sum(mine[x] for x in kept):.1f} s of {sum(mine[x] for x in every):.1f}"
+                f"{sum(mine[x] for x in kept):,} calls of {sum(mine[x] for x in every):,}"
             )
     LIST.write_text("".join(f"{name}\n" for name in sorted(out)), encoding="utf-8")
 

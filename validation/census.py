@@ -65,7 +65,7 @@ MEASURED = {
 BIT_EQUAL = {"mujoco:joint-spring": "own:semi-implicit-euler", "pymunk:force": "own:euler"}
 
 HELD_GROWTH = 1.87
-"""Of `spring-uneven` in 400 steps by a force held over 5 substeps."""
+"""Growth of `spring-uneven` in 400 steps under a force that is held over 5 substeps."""
 
 
 def differences(found: Census) -> list[str]:
@@ -144,7 +144,7 @@ PROGRAMS = {
               "basicsymplectic-1 basicsymplectic-2 basicsymplectic-3 basicsymplectic-4",
               "TSStep without adaptation"),
 }  # fmt: skip
-"""Of programs in C++: flags beside `g++ -std=c++17 -O1`, the methods they know, and what they call."""
+"""By program in C++: flags beside `g++ -std=c++17 -O1`, its methods, and the functions that they call."""
 
 HALVES = "two half steps inside, by which it estimates its error"
 NOTES = {

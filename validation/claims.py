@@ -91,7 +91,7 @@ MAPS = {
 """By their maps, with what they are called."""
 
 ROUNDED = 1e-12
-"""Of trace and determinant that are read off 200 steps: some thousand roundings."""
+"""Accuracy of a trace and a determinant that are read off 200 steps: some thousand roundings."""
 
 
 def agrees(entry: dict[str, Any], matrix: Any) -> bool:

@@ -47,8 +47,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import distributed.cli.dask_scheduler
-import distributed.cli.dask_worker
 import numpy as np
 
 from arguments import arguments, script
@@ -110,10 +108,14 @@ class Farm:
     """A scheduler and its workers."""
 
     def __init__(self, folder: Path) -> None:
+        from distributed.cli import dask_scheduler, dask_worker
+
+        self.run_worker = dask_worker.main
         self.folder, self.file = folder, folder / f"scheduler-{time.monotonic_ns()}.json"
         command = ["--scheduler-file", str(self.file), "--port", "0", "--host", "127.0.0.1", "--no-dashboard"]
-        main = distributed.cli.dask_scheduler.main
-        self.scheduler = forked(partial(main, command, standalone_mode=False), folder / "scheduler.log")
+        self.scheduler = forked(
+            partial(dask_scheduler.main, command, standalone_mode=False), folder / "scheduler.log"
+        )
         while not self.file.is_file():
             time.sleep(0.02)
         self.workers = [self.worker() for _ in range(WORKERS)]
@@ -125,7 +127,7 @@ class Farm:
 
         def work() -> None:
             before()
-            distributed.cli.dask_worker.main(command, standalone_mode=False)
+            self.run_worker(command, standalone_mode=False)
 
         return forked(work, self.folder / "workers.log")
 

@@ -22,7 +22,7 @@ STEP_SECONDS = {
 
 
 def step_seconds(label: Label) -> float:
-    """That of a method's engine; a microsecond where nobody has measured it."""
+    """Seconds per step of a method's engine; a microsecond where nobody has measured it."""
     return STEP_SECONDS.get(label.engine, 1e-6)
 
 

@@ -82,7 +82,7 @@ class Warm:
         return True
 
     def seconds(self) -> float:
-        """Of the processor, so far, by the job and its workers; a busy machine is no fault of a job."""
+        """Processor time of the job and its workers so far: wall time would measure the machine's load."""
         found, pids = 0, [self.pid]
         while pids:
             pid = pids.pop()

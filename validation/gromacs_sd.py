@@ -62,7 +62,7 @@ refcoord-scaling = no
 """
 
 FRAME_BYTES, HEAD, FROM = 144, 84, 36
-"""Of a .trr frame of one particle: its length, its head, and the box before positions and velocities."""
+"""Bytes of a .trr frame of one particle, of its head, and of the box before positions and velocities."""
 
 
 def frames() -> np.ndarray:

@@ -30,11 +30,6 @@ from typing import Any
 import h5py
 import numpy as np
 from matplotlib.image import imread
-from selenium import webdriver
-from selenium.common.exceptions import WebDriverException
-from selenium.webdriver import ActionChains
-from selenium.webdriver.common.by import By
-from selenium.webdriver.support.ui import WebDriverWait
 
 from arguments import arguments, script
 from springcheck.errors import SpringcheckError
@@ -54,6 +49,8 @@ BROWSER = (
     "--window-size=2400,1200", "--no-first-run", "--disable-quic", "--disable-sync",
     "--disable-background-networking", "--disable-component-update",
 )  # fmt: skip
+CSS, XPATH = "css selector", "xpath"
+"""How WebDriver is told where an element is."""
 PATIENCE = 10.0
 """Time after which something counts as not shown [s]."""
 COLOURED = 30
@@ -64,6 +61,10 @@ class Viewer:
     """H5Web with one file open."""
 
     def __init__(self, driver: Any, address: str, name: str) -> None:
+        from selenium.common.exceptions import WebDriverException
+        from selenium.webdriver import ActionChains
+        from selenium.webdriver.support.ui import WebDriverWait
+
         again = (WebDriverException,)
         self.driver = driver
         self.wait = WebDriverWait(driver, PATIENCE, poll_frequency=0.1, ignored_exceptions=again)
@@ -71,8 +72,8 @@ class Viewer:
         entry = f"//li[contains(@class,'jp-DirListing-item')][.//span[text()='{name}.h5']]"
 
         def opened(d: Any) -> bool:
-            if not d.find_elements(By.CSS_SELECTOR, '[role=treeitem][data-path="/"]'):
-                ActionChains(d).double_click(d.find_element(By.XPATH, entry)).perform()
+            if not d.find_elements(CSS, '[role=treeitem][data-path="/"]'):
+                ActionChains(d).double_click(d.find_element(XPATH, entry)).perform()
                 return False
             return True
 
@@ -80,16 +81,14 @@ class Viewer:
 
     def title(self) -> str:
         """The title of the figure that is shown, once something is drawn in it."""
-        self.wait.until(lambda d: _coloured(d.find_element(By.CSS_SELECTOR, "figure canvas")) >= COLOURED)
+        self.wait.until(lambda d: _coloured(d.find_element(CSS, "figure canvas")) >= COLOURED)
         shown = "figure[aria-label]"
-        return str(
-            self.wait.until(lambda d: d.find_element(By.CSS_SELECTOR, shown).get_attribute("aria-label"))
-        )
+        return str(self.wait.until(lambda d: d.find_element(CSS, shown).get_attribute("aria-label")))
 
     def select(self, path: str) -> None:
         """Click through the tree to a path, from a place where nothing is shown."""
         self._click("/h5md")
-        self.wait.until(lambda d: not d.find_elements(By.CSS_SELECTOR, "figure, [role=gridcell]"))
+        self.wait.until(lambda d: not d.find_elements(CSS, "figure, [role=gridcell]"))
         steps = path.strip("/").split("/")
         for i in range(1, len(steps)):
             above = "/" + "/".join(steps[:i])
@@ -102,17 +101,15 @@ class Viewer:
         self._press("Matrix")
         self._press("Exact")
         grid = "[role=gridcell]"
-        texts = self.wait.until(lambda d: [cell.text for cell in d.find_elements(By.CSS_SELECTOR, grid)])
+        texts = self.wait.until(lambda d: [cell.text for cell in d.find_elements(CSS, grid)])
         return [str(text) for text in texts]
 
     def _press(self, text: str) -> None:
-        found = self.wait.until(lambda d: d.find_element(By.XPATH, f"//button[normalize-space()='{text}']"))
+        found = self.wait.until(lambda d: d.find_element(XPATH, f"//button[normalize-space()='{text}']"))
         self.driver.execute_script("arguments[0].click()", found)
 
     def _item(self, path: str) -> Any:
-        return self.wait.until(
-            lambda d: d.find_element(By.CSS_SELECTOR, f'[role=treeitem][data-path="{path}"]')
-        )
+        return self.wait.until(lambda d: d.find_element(CSS, f'[role=treeitem][data-path="{path}"]'))
 
     def _click(self, path: str) -> None:
         self.driver.execute_script("arguments[0].click()", self._item(path))
@@ -125,6 +122,8 @@ def _coloured(canvas: Any) -> int:
 
 def look(viewer: Viewer, path: Path, pictures: Path | None) -> tuple[int, list[str]]:
     """Look at everything in a store -> how much was looked at, and what is not shown."""
+    from selenium.common.exceptions import WebDriverException
+
     asked: list[tuple[str, Any]] = [("", None)]
     with h5py.File(path) as file:
         file.visititems(lambda name, node: asked.extend(_asked(f"/{name}", node)))
@@ -162,6 +161,8 @@ def _asked(where: str, node: Any) -> list[tuple[str, Any]]:
 def main() -> int:
     """Make the stores, serve them, look at them."""
     pictures = arguments(__doc__, folder=Path).folder
+    from selenium import webdriver
+
     with socket.create_server(("127.0.0.1", 0)) as free:
         port = free.getsockname()[1]
     address = f"http://127.0.0.1:{port}"

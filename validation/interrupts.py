@@ -127,7 +127,7 @@ class Trial:
     out: str
     err: str
     processes: int
-    """Of its session, that outlived it."""
+    """Processes of its session that outlived it."""
     files: tuple[str, ...]
     """In its folder, without what it was given."""
     temporary: tuple[str, ...]

@@ -663,9 +663,9 @@ class Counts:
     seen_below: int = 0
     untold: int = 0
     missed: list[str] = field(default_factory=list)
-    """Those above 20 times the noise that nothing tells."""
+    """Faults above 20 times the noise that no check reports."""
     decades: dict[str, int] = field(default_factory=dict)
-    """How many of them by the decade of that factor."""
+    """Number of these by the decade of that factor."""
     numbers: list[str] = field(default_factory=list)
     """Verdicts whose value or bound is no finite number."""
     kinds: dict[str, int] = field(default_factory=dict)

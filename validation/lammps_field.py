@@ -24,7 +24,7 @@ from springcheck.physics.arrays import Floats
 M, B, H, STEPS = 1.7, 2.3, 0.1, 400
 START = np.array([[0.3, -0.2], [0.7 / M, 0.4 / M]])
 LAST = 1e-13
-"""Of 400 steps that each round a state which grows with them."""
+"""Bound after 400 steps, each of which rounds a growing state."""
 
 
 def by_lammps() -> Floats:

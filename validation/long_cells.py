@@ -114,7 +114,7 @@ def _within_range(case: checks.Case) -> tuple[checks.Case, str]:
 
 
 def cells(methods: Sequence[str] = ()) -> list[Cell]:
-    """Those of every method of fixed step that these labels or globs name."""
+    """Cells of every method of fixed step that these labels or globs name."""
     labels = engines.match(tuple(methods) or measure.everything())
     here = [label for label in labels if not engines.method(label).adaptive and not measure.absence(label)]
     return [cell for label in here for cell in last(label, lengths(label))]

@@ -79,15 +79,18 @@ def page(name: str) -> str:
 def main() -> int:
     """Compare, or write."""
     given = arguments(__doc__, what=("compare", "write"))
-    differ = []
-    for name in PAGES:
-        if given.what == "write":
-            FOLDER.mkdir(exist_ok=True)
-            (FOLDER / name).write_text(page(name), encoding="utf-8")
-        if (FOLDER / name).read_text(encoding="utf-8") != page(name):
-            differ.append(name)
-    print(f"{len(differ)} of {len(PAGES)} pages differ {' '.join(differ)}".rstrip())
-    return int(bool(differ))
+    texts = {name: page(name) for name in PAGES}
+    files = {name: FOLDER / name for name in PAGES}
+    differ = [
+        name for name, file in files.items()
+        if not file.is_file() or file.read_text(encoding="utf-8") != texts[name]
+    ]  # fmt: skip
+    if given.what == "write":
+        for name in differ:
+            files[name].write_text(texts[name], encoding="utf-8")
+    done = "written anew" if given.what == "write" else "differ"
+    print(f"{len(differ)} of {len(PAGES)} pages {done} {' '.join(differ)}".rstrip())
+    return int(bool(differ) and given.what == "compare")
 
 
 if __name__ == "__main__":

@@ -94,7 +94,7 @@ def openmm(
 
 
 def departure(made: Any, found: Any) -> float:
-    """By which part of its bound a step departs: roundings of states, and what SHAKE's tolerance leaves."""
+    """Error of a step over its bound: roundings of the states, and what SHAKE's tolerance leaves."""
     size = np.max(np.abs(found[0])) + np.max(np.abs(STEP * found[1] / M))
     off = max(np.max(np.abs(made[0] - found[0])), np.max(np.abs(STEP * (made[1] - found[1]) / M)))
     return float(off / (ROUNDINGS * 2.0**-53 * size + TOLERANCE * LENGTH))
@@ -110,7 +110,7 @@ def judged(q: Any, p: Any, rate: Any, thermal: float, pull: Any) -> tuple[float,
 
 
 def mean(values: Any) -> tuple[float, float]:
-    """Of values (f, n), and SIGMAS standard errors by rods, which know nothing of each other."""
+    """Mean of values (f, n), and SIGMAS standard errors of it over the rods, which are independent."""
     each = np.mean(np.asarray(values, float), axis=0)
     return float(np.mean(each)), SIGMAS * float(np.std(each) / np.sqrt(len(each)))
 

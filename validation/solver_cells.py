@@ -125,7 +125,7 @@ def _reason(scene: Scene, spec: Spec) -> str | None:
 
 
 def cells(methods: Sequence[str] = (), *, quick: bool = False) -> list[Cell]:
-    """Those of every adaptive method that these labels or globs name."""
+    """Cells of every adaptive method that these labels or globs name."""
     labels = engines.match(tuple(methods) or ("*",))
     return [solve(label, spec) for label in labels if _serves(label) for spec in specs(quick=quick)]
 

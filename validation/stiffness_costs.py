@@ -57,7 +57,7 @@ OUTPUTS = 2000
 """Steps of a method that no fast mode holds down."""
 
 TOLERANCE = 1e-6
-"""Of adaptive solvers: relative, per step."""
+"""Relative tolerance per step of adaptive solvers."""
 
 WORTH_SECONDS = 1.2
 """What a run may take before it is not worth its time."""

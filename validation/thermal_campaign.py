@@ -92,7 +92,7 @@ def by_engine(case: int) -> dict[str, int]:
     scene = scene_of(rng, scheme, coupled=bool(rng.integers(2)), steps=300)
     try:
         verdicts = checks.judge(scene, driver.run(scene, label, seed=case + 1))
-        verdicts += checks.judge_seeds(scene, label, case + 1, driver.run)
+        verdicts += checks.judge_thoroughly(scene, label, driver.run, seed=case + 1)
     except SpringcheckError as error:
         return {f"refused: {error}"[:90]: 1}
     failed = [v for v in checks.shared(verdicts) if v.passed is False]

@@ -146,7 +146,7 @@ def uneven_scenes() -> Iterator[Scene]:
 
 
 def _served(label: Label) -> list[Scene]:
-    """Those of the uneven scenes that a method serves; else scenes of what it is for."""
+    """The uneven scenes that a method serves, or scenes made for it where it serves none."""
     found = _some(label)
     if not found:
         raise AssertionError(f"{label} serves none of the scenes: {_refusal(label)}")

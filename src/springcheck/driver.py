@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from time import perf_counter
 from typing import Any, Literal, NamedTuple, Protocol
 
@@ -30,12 +31,12 @@ FIRST, QUICK = 256, 0.1
 reports its progress, and hears Ctrl-C, several times a second."""
 
 PIECE, WORK = 1 << 16, 1 << 22
-"""Steps, and steps times particles, that an engine of fixed step takes between two looks at the keyboard,
-where frames lie further apart.  Numbers, not times: the numbers of a run must not depend on the speed of
-the machine."""
+"""Steps, and steps times particles, that an engine of fixed step takes in one call where frames lie further
+apart: between two calls a run can be interrupted.  Counts, not times: the numbers of a run must not depend on
+the speed of the machine."""
 
 UNHEARD = 0.25
-"""Seconds that an engine may be deaf for where its numbers are thrown away."""
+"""Longest call of an engine, which nothing interrupts, where its numbers are thrown away [s]."""
 
 
 class Sink(Protocol):
@@ -62,6 +63,10 @@ MOST_SEED = 900_000_000
 """Seeds go from 1 to this, which every library takes: LAMMPS has no larger one, and 0 asks OpenMM for any."""
 
 
+GIVEN_DRAWS = "none: drawn by a generator that the caller gave"
+"""What a run keeps in place of a seed that it was not given."""
+
+
 def checked_seed(seed: int | None) -> int:
     """The seed that is given, or one that is drawn.  MethodError where it is out of range."""
     if seed is None:
@@ -86,7 +91,8 @@ def play(
 
     Memory does not grow with the length of the run.  Ctrl-C is no outcome: KeyboardInterrupt passes
     through.  For `planned` see `bare`.  A random method takes the seed that is given, or one that is drawn;
-    the run keeps it.  In its place stands a generator where the method takes one.
+    the run keeps it.  A scripted method also takes a generator in its place; the run then keeps no seed,
+    because nothing could make the same draws again.
 
     Raises:
         MethodError: the method cannot serve the scene, or its engine or platform is not here.
@@ -103,7 +109,8 @@ def play(
             raise MethodError(NO_NORMAL_NUMBERS)
         seed = seed if scripted else checked_seed(seed)
         draws = f"{THERMOSTATS[method.scheme].fresh} a step and particle"
-        origin = {"seed": str(seed), "generator": method.generator, "threads": "1", "draws": draws}
+        kept = GIVEN_DRAWS if scripted else str(seed)
+        origin = {"seed": kept, "generator": method.generator, "threads": "1", "draws": draws}
     elif seed is not None:
         raise MethodError(f"{label}: it has no noise, and takes no seed")
     began = perf_counter()
@@ -116,9 +123,8 @@ def play(
     ready = min(rows, FIRST, WORK // (piece * scene.n) or 1)
     # an engine that fills nothing must not pass for one that has
     q, p = np.full((rows, scene.n), np.nan), np.full((rows, scene.n), np.nan)
-    q[0], p[0] = scene.q, scene.p
     told = hasattr(simulation, "last_steps")
-    _hand_over(scene, sink, 0, q[:1], p[:1], np.zeros(1) if told else None)
+    _hand_over(scene, sink, 0, scene.q[None], scene.p[None], np.zeros(1) if told else None)
     run_seconds = 0.0
     outcome = Outcome(status="complete", step=scene.steps)
     frame = 1
@@ -129,7 +135,9 @@ def play(
         run_seconds += seconds
         ready = min(rows, 4 * ready) if seconds < QUICK else ready
         if good:
-            last = simulation.last_steps[:good] if told else None  # type: ignore[attr-defined]
+            last = None
+            if told:
+                last = _said(label, simulation, "last_steps", f"{good} lengths", partial(_rows, good))
             _hand_over(scene, sink, frame, q[:good], p[:good], last)
         frame += good
         if progress:
@@ -150,12 +158,37 @@ def play(
         tolerance=scene.tolerance if method.adaptive else None,
         outcome=outcome,
         timing=Timing(start=start_seconds, run=run_seconds),
-        force_calls=simulation.force_calls,
+        force_calls=_said(label, simulation, "force_calls", CALLS, _count),
         arithmetic=how,
         rebuilds_velocity=method.rebuilds_velocity,
-        off_axis=getattr(simulation, "off_axis", None),
+        off_axis=_said(label, simulation, "off_axis", "a number", float)
+        if getattr(simulation, "off_axis", None) is not None
+        else None,
         origin=origin,
     )
+
+
+def _said(label: Label, simulation: Simulation, name: str, what: str, taken: Callable[[Any], Any]) -> Any:
+    """What an engine says of its run, as `taken` takes it.  MethodError where it is no such thing."""
+    said: Any = engines.guarded(label, lambda: getattr(simulation, name))
+    try:
+        return taken(said)
+    except (TypeError, ValueError, OverflowError):
+        raise MethodError(f"{label}: its {name} is {said!r:.60}, not {what}") from None
+
+
+CALLS = "a whole number of calls"
+
+
+def _rows(number: int, said: Any) -> Floats:
+    return np.asarray(said, np.float64)[:number].reshape(number)
+
+
+def _count(said: Any) -> int:
+    whole = int(said)
+    if whole != said or not 0 <= whole < 2**63:
+        raise ValueError
+    return whole
 
 
 Ending = Literal["complete", "diverged", "stopped"]
@@ -180,11 +213,13 @@ class _Part:
         began = perf_counter()
         try:
             if self.piece == self.every:
-                engines.guarded(self.label, self.simulation.advance, self.every, q, p)
+                self._advance(self.every, q, p)
             else:
                 self._in_pieces(q, p)
         except Stopped as stop:
             status, good, message = "stopped", stop.rows, str(stop)
+            if good not in range(len(q) + 1):
+                raise MethodError(f"{self.label}: Stopped after {good!r} of {len(q)} rows") from stop
         seconds = perf_counter() - began
         finite = np.isfinite(q[:good]).all(axis=1) & np.isfinite(p[:good]).all(axis=1)
         if not finite.all():
@@ -194,15 +229,17 @@ class _Part:
             status = "diverged"
         return status, good, message, seconds
 
+    def _advance(self, steps: int, q: Floats, p: Floats) -> None:
+        advance = self.simulation.advance
+        engines.guarded(self.label, advance, steps, q, p, form="advance(every, q, p)")
+
     def _in_pieces(self, q: Floats, p: Floats) -> None:
         for row in range(len(q)):
             left = self.every
             while left:
                 steps = min(left, self.piece)
                 try:
-                    engines.guarded(
-                        self.label, self.simulation.advance, steps, q[row : row + 1], p[row : row + 1]
-                    )
+                    self._advance(steps, q[row : row + 1], p[row : row + 1])
                 except Stopped as stop:
                     raise Stopped(row, str(stop)) from stop
                 left -= steps
@@ -280,9 +317,9 @@ def bare(scene: Scene, label: Label, *, copies: int = 1, read: bool = False, pla
     """Time the engine alone: all steps in one call and one row read at the end, nothing recorded.
 
     `copies` fresh runs are timed together, one after the other, where one is too short for the clock.
-    With `read` every step is read, in chunks, and thrown away.  `planned` steps lie before the caller in
-    all: an engine that compiles decides by them instead of by this one run, so that the runs of a study
-    go the same way.  A run that is not finite costs what it costs: judge it by `play`.
+    With `read` every step is read, in chunks, and thrown away.  `planned` is how many steps the caller will
+    take in all: an engine that compiles decides by them, not by this one run, so that all runs of a study
+    use the same code.  Numbers that are not finite are timed like others: judge them by `play`.
 
     Raises:
         Stopped: the engine gave up.
@@ -314,7 +351,7 @@ def bare(scene: Scene, label: Label, *, copies: int = 1, read: bool = False, pla
     run_seconds = engines.guarded(label, timed)
     return Bare(
         timing=Timing(start=start_seconds / copies, run=run_seconds / copies),
-        force_calls=simulations[0].force_calls,
+        force_calls=_said(label, simulations[0], "force_calls", CALLS, _count),
     )
 
 

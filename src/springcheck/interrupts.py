@@ -239,7 +239,7 @@ def say() -> None:
 
 
 def finish() -> None:
-    """Nothing is left that could be interrupted: ignore signals while the interpreter shuts down."""
+    """Ignore signals while the interpreter shuts down: nothing is left that could be interrupted."""
     for name in SIGNALS:
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.SIG_IGN)

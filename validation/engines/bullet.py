@@ -33,7 +33,7 @@ def start(scene: Any, method: Any, label: Any, step: float) -> Springs:
 
 
 def version() -> dict[str, str]:
-    """Of the wheel."""
+    """Version of the wheel."""
     from importlib.metadata import version as of
 
     return {"pybullet": of("pybullet")}

@@ -56,7 +56,7 @@ def start(scene: Any, method: Any, label: Any, step: float) -> Batch:
 
 @functools.cache
 def version() -> dict[str, str]:
-    """Of cp2k."""
+    """Version of cp2k."""
     return {"cp2k": called("cp2k --version", ".").partition("CP2K version")[2].split()[0]}
 
 

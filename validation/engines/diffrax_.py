@@ -58,7 +58,7 @@ def start(scene: Any, method: Any, label: Any, step: float) -> Springs:
 
 
 def version() -> dict[str, str]:
-    """Of diffrax and JAX."""
+    """Versions of diffrax and JAX."""
     from importlib.metadata import version as of
 
     return {"diffrax": of("diffrax"), "jax": of("jax")}

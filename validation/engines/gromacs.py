@@ -23,7 +23,7 @@ HELD = {"lincs": "lincs-order = 8; lincs-iter = 4; lincs-warnangle = 90", "shake
 
 
 def shift(scene: Any) -> float:
-    """By how much positions are larger in the files: gmx puts negative ones into the box from beyond."""
+    """Offset of the positions in the files: gmx wraps negative ones into the box."""
     return 8.0 if np.any(scene.q < 0) else 0.0
 
 

@@ -31,7 +31,7 @@ def start(scene: Any, method: Any, label: Any, step: float) -> Springs:
 
 
 def version() -> dict[str, str]:
-    """Of jax-md and JAX."""
+    """Versions of jax-md and JAX."""
     from importlib.metadata import version as of
 
     return {"jax-md": of("jax-md"), "jax": of("jax")}

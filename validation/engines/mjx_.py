@@ -49,7 +49,7 @@ def start(scene: Any, method: Any, label: Any, step: float) -> Springs:
 
 
 def version() -> dict[str, str]:
-    """Of MJX and JAX."""
+    """Versions of MJX and JAX."""
     from importlib.metadata import version as of
 
     return {"mujoco-mjx": of("mujoco-mjx"), "jax": of("jax")}

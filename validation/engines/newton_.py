@@ -47,7 +47,7 @@ def start(scene: Any, method: Any, label: Any, step: float) -> Springs:
 
 
 def version() -> dict[str, str]:
-    """Of Newton and Warp."""
+    """Versions of Newton and Warp."""
     from importlib.metadata import version as of
 
     return {"newton": of("newton"), "warp": of("warp-lang")}

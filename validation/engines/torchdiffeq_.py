@@ -38,7 +38,7 @@ def start(scene: Any, method: Any, label: Any, step: float) -> Springs:
 
 
 def version() -> dict[str, str]:
-    """Of torchdiffeq and PyTorch."""
+    """Versions of torchdiffeq and PyTorch."""
     from importlib.metadata import version as of
 
     return {"torchdiffeq": of("torchdiffeq"), "torch": of("torch")}

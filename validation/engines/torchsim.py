@@ -53,7 +53,7 @@ def start(scene: Any, method: Any, label: Any, step: float) -> Springs:
 
 
 def version() -> dict[str, str]:
-    """Of torch-sim and PyTorch."""
+    """Versions of torch-sim and PyTorch."""
     from importlib.metadata import version as of
 
     return {"torch-sim": of("torch-sim-atomistic"), "torch": of("torch")}

@@ -34,7 +34,7 @@ def attempt(run):
 
 
 def slope(t, y, *args):
-    """Of a spring."""
+    """Right-hand side of a spring."""
     return np.array([y[1], -W2 * y[0]])
 
 

@@ -69,11 +69,15 @@ def simulate(
 
     A function ``step(q, p, h, force, mass) -> (q, p)`` is a method too: it is given numbers of one particle,
     or arrays (n,); `scheme` is what it is to be judged as, by default what its states show.  `progress` is
-    called with the number of steps done since its last call; `seed` is that of a random method.
+    called with the number of steps done since its last call; `seed`, a whole number, is that of a
+    random method.
 
-    Raises MethodError: no such method, or it cannot serve the scene, or its engine is not installed.
+    Raises MethodError: no such method, or it cannot serve the scene, or its engine is not installed, or the
+    seed is no such number.
     """
     found = scene_of(scene)
+    if seed is not None:
+        driver.checked_seed(seed)
     with labels_of(method, scheme) as (label,):
         return replace(driver.run(found, label, progress=progress, seed=seed), scene=found)
 

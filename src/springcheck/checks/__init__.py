@@ -45,10 +45,10 @@ from springcheck.text.wording import STATES_SHOW
 
 __all__ = [
     "ALL", "BLIND", "CHECKS", "CONTRACTED", "RANDOM", "STATES_SHOW", "TELLING", "THOROUGH", "Bench", "Case",
-    "Check", "Experiment",
-    "Run", "angular_momentum", "arithmetic", "bridges", "closed_form", "energies", "first_off", "frequency",
-    "judge", "judge_seeds", "judge_thoroughly", "momentum", "not_judged", "shadow_energy", "shared", "start",
-    "status", "step_defect", "summary", "tolerance", "tolerance_bound", "worst",
+    "Check", "Experiment", "Run", "angular_momentum", "arithmetic", "bridges", "closed_form", "energies",
+    "experiments_of", "first_off", "frequency", "judge", "judge_thoroughly", "momentum", "not_judged",
+    "shadow_energy", "shared", "start", "status", "step_defect", "summary", "tolerance", "tolerance_bound",
+    "worst",
 ]  # fmt: skip
 
 Check: TypeAlias = check.Check[Case]
@@ -72,13 +72,7 @@ RANDOM: tuple[Check, ...] = (start, times, grid, energies, *thermal.DRAWN, rod_l
 """Checks of a trajectory of a thermostat, which no law of a deterministic motion holds for."""
 
 
-_TELLING = [
-    one.name
-    for one in ALL
-    if one.family in ("motion", "map", "law")
-    and one not in (momentum, angular_momentum, rod_length, rod_velocity, border, drive)
-]
-TELLING = frozenset(["identified", *_TELLING, *(one.name for one in thermal.DRAWN)])
+TELLING = frozenset(["identified", *(one.name for one in (*ALL, *thermal.DRAWN) if one.telling)])
 """Checks that tell the scheme that a method claims from another one; `identified` is of a file's states."""
 
 
@@ -136,36 +130,41 @@ def explained(
     return [replace(v, why=why) if v is first else v for v in verdicts]
 
 
+def experiments_of(scene: Scene) -> tuple[check.Check[Any], ...]:
+    """The experiments with a method of this scene: in a bath those with the seeds of a random one."""
+    if not scene.bath:
+        return THOROUGH
+    from springcheck.checks.seeds import SEEDED
+
+    return SEEDED
+
+
 def judge_thoroughly(
     scene: Scene,
     label: str,
-    run: Run,
-    experiments: Sequence[Experiment] = THOROUGH,
+    run: Callable[..., Trajectory],
+    experiments: Sequence[check.Check[Any]] | None = None,
     *,
+    seed: int = 0,
     progress: Callable[[int], None] | None = None,
 ) -> list[Verdict]:
     """Every experiment with a method, which `run(scene, label)` carries out on scenes made here.
 
-    `progress(1)` is called after each; one that the method cannot serve (MethodError) does not apply.
+    In a bath it is `run(scene, label, seed=)`, with `seed` and others.  `progress(1)` is called after each
+    experiment; one that the method cannot serve (MethodError) does not apply.
     """
-    bench = Bench(scene=scene, label=label, run=run)
+    if scene.bath:
+        from springcheck.checks.seeds import Seeded
+
+        bench: Any = Seeded(scene=scene, label=label, seed=seed, play=run)
+    else:
+        bench = Bench(scene=scene, label=label, run=run)
     verdicts = []
-    for experiment in experiments:
+    for experiment in experiments_of(scene) if experiments is None else experiments:
         verdicts.append(experiment(bench))
         if progress:
             progress(1)
     return shared(verdicts)
-
-
-def judge_seeds(scene: Scene, label: str, seed: int, run: Callable[..., Trajectory]) -> list[Verdict]:
-    """Every experiment with the seeds of a random method, which `run(scene, label, seed=)` carries out.
-
-    One that it cannot serve does not apply.
-    """
-    from springcheck.checks.seeds import SEEDED, Seeded
-
-    subject = Seeded(scene=scene, label=label, seed=seed, play=run)
-    return shared([one(subject) for one in SEEDED])
 
 
 def judge(

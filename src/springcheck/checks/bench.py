@@ -45,7 +45,7 @@ class Bench:
 
     @property
     def trajectory(self) -> Trajectory:
-        """That run, as the trajectory that a requirement is asked of."""
+        """The same run, under the name by which requirements ask for it."""
         return self.forwards
 
     @property
@@ -60,7 +60,7 @@ class Bench:
 
     @property
     def tolerance(self) -> float:
-        """That which an adaptive solver is given."""
+        """The tolerance that an adaptive solver is given."""
         return self.scene.tolerance
 
     @property

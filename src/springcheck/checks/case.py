@@ -51,7 +51,7 @@ class Case(Claim):
 
     @cached_property
     def undriven(self) -> Case:
-        """The case without driving forces, whose modes the motion has; itself where there are none."""
+        """The case without driving forces, of the same normal modes; itself where there are none."""
         alone = self.scene.system.without("drive").scene
         return replace(self, scene=alone) if len(alone.terms) < len(self.scene.terms) else self
 
@@ -66,7 +66,7 @@ class Case(Claim):
 
     @property
     def tolerance(self) -> float | None:
-        """That of an adaptive solver."""
+        """The tolerance of an adaptive solver."""
         return self.trajectory.tolerance
 
     @property
@@ -104,12 +104,12 @@ class Case(Claim):
 
     @cached_property
     def residual(self) -> tuple[Extended, Extended] | None:
-        """x/m of Q = q + x P/m, the equation of an implicit step that has no force in it (n,), or of two
-        stages q' = q + x (p + p')/m, and one rounding of what it adds up after each frame but the last
-        (f-1, n); None where there is none.
+        """The equation of an implicit step that has no force in it, Q = q + x P/m, or of two stages q' = q +
+        x (p + p')/m: its factor x/m (n,), and one rounding of what it adds up after each frame but the last
+        (f-1, n); None for a scheme without such an equation.
 
-        Whichever way an engine solves for a step, and however far A^-1 carries what its solver leaves, it
-        takes the position from the momentum by this or the momentum from the position.
+        An engine gets the position from the momentum by it, or the momentum from the position, whichever way
+        it solves for a step and however far A^-1 carries the residual of its solver.
         """
         run, stages = self.trajectory, self.scheme.a
         if not (self.ahead and run.every == 1 and self.law.has("implicit") and len(stages) <= 2):
@@ -169,8 +169,8 @@ class Case(Claim):
     def allowance_of_stretches(self) -> Extended:
         """One rounding of what a step adds up on each stretch between frames (f-1,), as `Norm.most`.
 
-        Of both ends, the far one where the scheme itself comes to, and of what lies before: a frame that is
-        wrong must not enlarge what it is judged by.
+        The larger of its two ends, the far one being the scheme's own, and no less than on any stretch
+        before: a wrong frame must not enlarge its own bound.
         """
         with np.errstate(over="ignore", invalid="ignore"):
             ends = self.allowance, self.allowance_at(*self.next_states)
@@ -195,7 +195,7 @@ class Case(Claim):
         )
         if alone is self:
             return u, v
-        # nobody else needs it
+        # imported here: scenes without a drive do without it
         from springcheck.schemes import forced
 
         y, w = forced.answer(
@@ -207,8 +207,8 @@ class Case(Claim):
     def growth(self) -> tuple[Floats, Extended]:
         """Bound on the distance from the closed form (f,), in units of one rounding, and that unit.
 
-        One rounding a step, enlarged by the map from the step where it arises, and all of one sign; of a
-        splitting what `walk` says, if that is less.  The unit is a root of an energy: see `Norm.most`.
+        The roundings of all steps have one sign, and the map enlarges each from its step on; a splitting has
+        the bound of `walk` where that is less.  The unit is a root of an energy: see `Norm.most`.
         """
         alone, n = self.undriven, self.scene.n
         total, grown = schemes.amplification(alone.matrices, alone.w, self.steps)
@@ -314,7 +314,7 @@ def least_moved(moved: Reals) -> Reals:
 
 
 def small_move(run: Trajectory) -> str:
-    """That an engine took a force again within some step, where it moved that little; or nothing."""
+    """A sentence where some step moves so little that the engine takes a kept force for it; "" elsewhere."""
     how = run.arithmetic
     if how.stale and run.every == 1 and len(run.q) > 1:
         moved = np.max(np.abs(np.diff(run.q, axis=0)), axis=1)

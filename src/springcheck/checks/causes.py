@@ -32,14 +32,15 @@ SAME_DRAWS = 1e-6
 
 
 def found(case: Case) -> str:
-    """In one sentence, or "" where nothing here is what happened."""
+    """The cause in one sentence, or "" where no cause that is known here explains the states."""
     if case.trajectory.scheme in THERMOSTATS:
         return _of_bath(case) if case.trajectory.every == 1 else ""
     return _of_rods(case)
 
 
 def _of_rods(case: Case) -> str:
-    """Along which way the ends of rods are pushed, where it is not that before the drift."""
+    """The direction in which the ends of rods are pushed, where it is not that of the rods before the
+    drift."""
     rods, run = case.system.rods, case.trajectory
     if rods is None or rods.share or missing(case, MAP) or run.every > 1 or len(run.t) < 3:
         return ""
@@ -75,7 +76,7 @@ def _of_rods(case: Case) -> str:
 
 
 def _of_bath(case: Case) -> str:
-    """Whose the draws are, and their size."""
+    """Draws that two coordinates share, or noise of another size than the bath's."""
     seen = reading(case)
     if seen.rescaled is not None:
         return _rescaled(case, seen.rescaled)

@@ -47,7 +47,7 @@ class Finding(NamedTuple):
     why: str
     sees: Limits = NOT_KNOWN
     holds: bool = True
-    """What else must be for it to pass."""
+    """A further condition of a pass, beside the value within its bound."""
 
 
 class Chance(NamedTuple):
@@ -59,7 +59,7 @@ class Chance(NamedTuple):
 
     @property
     def finding(self) -> Finding:
-        """As a value and its bound, both in decades of chance; alone it has all of the false alarms."""
+        """A value and its bound in decades of chance, as of the only random verdict of a command."""
         with np.errstate(divide="ignore"):
             value = -np.log10(np.float64(self.chance))
         return Finding(value, -np.log10(FALSE_ALARMS), DECADES, self.why, self.sees)
@@ -99,6 +99,8 @@ class Check(Generic[Subject_contra]):
     """What holds where it passes."""
     judge: Callable[[Subject_contra], Finding | Chance | str]
     """What it finds, or why what it measures says nothing."""
+    telling: bool
+    """Whether a pass tells the scheme that a method claims from another one."""
 
     @property
     def needs(self) -> str:
@@ -120,8 +122,17 @@ def check(
     *,
     family: Family,
     requires: Collection[str] = (),
+    telling: bool | None = None,
 ) -> Callable[[Callable[[Subject_contra], Finding | Chance | str]], Check[Subject_contra]]:
-    """Make a check of a function: its name and the first sentence of its docstring are the check's own."""
+    """Make a check of a function: its name and the first sentence of its docstring are the check's own.
+
+    Where `telling` is left out, every check tells one scheme from another but those of facts and repetitions.
+    ValueError for a requirement that is not in the table.
+    """
+    if unknown := sorted(set(requires) - set(REQUIREMENTS)):
+        raise ValueError(
+            f"no requirement is called {' or '.join(unknown)}; known are {', '.join(REQUIREMENTS)}"
+        )
 
     def made(judge: Callable[[Subject_contra], Finding | Chance | str]) -> Check[Subject_contra]:
         return Check(
@@ -134,6 +145,7 @@ def check(
             .rstrip(".")
             + ".",
             judge=judge,
+            telling=family not in ("record", "repeat") if telling is None else telling,
         )
 
     return made

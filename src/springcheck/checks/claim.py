@@ -80,9 +80,9 @@ class Claim:
 
     @cached_property
     def origins(self) -> Floats:
-        """How far from 0 an engine may count positions from (n,) [L]: from where springs between particles
-        have their rest lengths, or from the nearest place to which a term of its own ties a particle; from
-        the start, where it says so; and from a border of the box."""
+        """Largest distance from 0 of a point from which an engine may count positions (n,) [L]: where springs
+        between particles have their rest lengths, the nearest place to which a term ties a particle, the
+        start where the engine says so, and a border of the box."""
         rest = self.system.rest_positions
         zero, sites = np.zeros(self.scene.n), np.full(self.scene.n, np.inf)
         for term in self.judged.terms:

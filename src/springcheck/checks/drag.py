@@ -30,8 +30,8 @@ FEWEST_STEPS = 8
 
 
 def drag(case: Case, told: NDArray[np.bool_]) -> tuple[float, float, str] | None:
-    """What the steps lack along the momenta, in allowances without the rebuilding of velocities, what they
-    may lack, and that in words: of the particle that is farthest off; None where this says nothing."""
+    """Sum of what the steps lack along the momenta, in allowances without rebuilt velocities, its bound, and
+    both in words, of the particle farthest off; None where velocities are not rebuilt, or steps are few."""
     run, ahead = case.trajectory, case.ahead
     rebuilds = run.rebuilds_velocity and not run.arithmetic.keeps_displacement
     rebuilds = rebuilds and case.law.has("explicit")

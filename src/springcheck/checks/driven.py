@@ -39,7 +39,8 @@ class _Clock:
 
 
 def found(case: Case) -> str:
-    """In one sentence, or "" where nothing here is what happened or no force depends on the time."""
+    """The cause in one sentence, or "" where no cause known here explains the states, or nothing is
+    driven."""
     if not case.scene.system.is_driven or missing(case, MAP) or case.trajectory.every > 1:
         return ""
     case = case.clocked

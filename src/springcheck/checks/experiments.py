@@ -199,7 +199,7 @@ SMALL_PART = 2.0**-10
 
 
 def _sees(case: Case, steps: int, allowed: np.floating) -> Limits:
-    """By how much momenta may be off after each step so that what comes back is off by what is allowed."""
+    """Relative error of momenta, made at each step, that brings the run back at the bound."""
     change = np.longdouble(sight.change_of(2 * steps))
     q, p = (x.astype(np.longdouble) for x in (case.scene.q, case.scene.p))
     two_stage = len(case.scheme.stages) == 2

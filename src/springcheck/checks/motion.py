@@ -203,7 +203,7 @@ def _on_circle(form: Extended, u: np.longdouble, v: np.longdouble) -> tuple[np.l
     return x, np.sqrt(np.abs(form[2])) * (v + form[1] / (2 * form[2]) * u)
 
 
-@check("moment", family="motion", requires=MAP | {"unheld"})
+@check("moment", family="motion", requires=MAP | {"unheld"}, telling=False)
 def momentum(case: Case) -> Finding | str:
     """Without external forces the total momentum along every axis is conserved."""
     run, places = case.trajectory, case.scene.all_places % 3
@@ -251,7 +251,7 @@ def momentum(case: Case) -> Finding | str:
     )
 
 
-@check("angular", family="motion", requires=MAP | {"alike", "one-area"})
+@check("angular", family="motion", requires=MAP | {"alike", "one-area"}, telling=False)
 def angular_momentum(case: Case) -> Finding | str:
     """Angular momentum q_x p_y - q_y p_x is kept where a step keeps area, and changes by its determinant."""
     # a step that is one linear map A on both axes changes the area that they span, summed over particles, by
@@ -289,8 +289,8 @@ def _areas(
     noise: tuple[Extended, Extended],
     steps: Integers,
 ) -> tuple[Extended, Extended, Extended]:
-    """Of two axes, at every frame but the first: how far the angular momentum is off, what a rounding of each
-    coordinate makes of it in one step at most, and how large it should be, (f-1,) each."""
+    """Departure of the angular momentum in the plane of two axes, its largest change in one step by a
+    rounding of each coordinate, and its right size, at every frame but the first, (f-1,) each."""
     x, y = pair
     (q, p), (dq, dp) = (tuple(one.astype(np.longdouble) for one in two) for two in (states, noise))
     factor: Extended | int = 1

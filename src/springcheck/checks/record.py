@@ -95,8 +95,8 @@ length of a bond does."""
 
 
 def _explodes(case: Case) -> bool:
-    """Whether the motion itself, from the last frame to the next, comes so near the end of the engine's
-    numbers."""
+    """Whether the motion itself comes near the end of the engine's numbers between the last frame and the
+    next."""
     run, scene = case.trajectory, case.judged
     q, p = (x[-1:].astype(np.longdouble) for x in (run.q, run.p))
     limit = SINGLE_RANGE if run.arithmetic.force >= np.finfo(np.float32).eps / 2 else HALF_RANGE

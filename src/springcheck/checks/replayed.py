@@ -17,7 +17,7 @@ import numpy as np
 from springcheck import schemes
 from springcheck.checks.case import Case
 from springcheck.checks.check import Finding, largest
-from springcheck.physics.arrays import ROUNDOFF, Extended
+from springcheck.physics.arrays import ROUNDOFF, Extended, by_identity
 from springcheck.schemes.variable import Taken, allowed, push_of, taken
 from springcheck.text.wording import count
 
@@ -25,33 +25,40 @@ MOST_REPLAYED = 10_000
 """Steps: two seconds."""
 
 LOST = 0.1
-"""Part of itself to which a step is known, up to which a longer and a shorter one stand for all between.  The
-last step before a frame is what the others leave of its time: where it is not told, its rounding grows from
-frame to frame, until the rule has a step that does not depend on it, or nothing is known of it."""
+"""Relative uncertainty of the last step before a frame up to which a longer and a shorter one are replayed in
+its stead.  That step is what the others leave of the frame's time: where it is not recorded, its uncertainty
+grows from frame to frame, until the rule takes a step that does not depend on it, or nothing is known of
+it."""
 
 Times: TypeAlias = tuple[float, float]
 
 
+@by_identity
 class _Replayed(NamedTuple):
-    """Of each stretch that is replayed, the first ones: where its steps lead, one rounding of all that they
-    add up, and what the roundings of the time may do, (f-1, n) each; the energy that they add by their law,
-    and what the time may do to it, how many they are, the shortest, and by how many roundings the last one
-    that is told is not what the others leave of the time, or more than the rule allows, (f-1,) each."""
+    """The first stretches between frames, as far as they are replayed: arrays (f-1, n) and (f-1,)."""
 
     ends: tuple[Extended, Extended]
+    """Where the steps of each lead (f-1, n)."""
     bounds: tuple[Extended, Extended]
+    """One rounding of all that these steps add up (f-1, n)."""
     late: tuple[Extended, Extended]
+    """Effect of the roundings of the time on the end (f-1, n)."""
     gains: Extended
+    """Energy that the steps add by their law (f-1,)."""
     loose: Extended
+    """Effect of the roundings of the time on that."""
     counts: Extended
     shortest: Extended
+    """The shortest step."""
     untrue: Extended
+    """Roundings by which the recorded last step is not what the others leave of the time, or exceeds the
+    rule."""
     ended: str
-    """Why not all are."""
+    """Why the stretches after these are not replayed; "" where there are none."""
 
 
 def _follow(case: Case) -> _Replayed | str:
-    """Or the reason why the steps are not replayed."""
+    """Replay the steps from each frame to the next, or say why they cannot be."""
     run, system, m = case.trajectory, case.system, case.judged.m.astype(np.longdouble)
     told = None if run.last_step is None or run.last_step.shape != run.t.shape else run.last_step
     if case.steps[0] != 0 and told is None:
@@ -151,8 +158,8 @@ def _rounded(case: Case, steps: list[Taken], before: float) -> Iterator[tuple[Ex
 def _untrue(
     case: Case, steps: list[Taken], bounds: list[tuple[Extended, Extended]], before: float, times: Times
 ) -> tuple[float, float]:
-    """By how many roundings the last step, as it is told, is not what the others leave of the time, or more
-    than the rule allows; and the first of both as a time, as far as roundings explain it.
+    """Roundings by which the recorded last step is not what the others leave of the time, or exceeds the
+    rule; and the first of the two as a time, as far as roundings explain it.
 
     A step is known as the force at its start is: to what rounding has made of positions and of the time.
     """
@@ -188,7 +195,7 @@ def _too_many() -> str:
 
 
 def _until(case: Case, found: _Replayed) -> str:
-    """What of a run is not replayed, where that is so."""
+    """How many frames are replayed, and why no more, in words; "" where all are."""
     if not found.ended:
         return ""
     first, every = len(found.counts), len(case.trajectory.t) - 1
@@ -196,7 +203,7 @@ def _until(case: Case, found: _Replayed) -> str:
 
 
 def _told(case: Case, found: _Replayed) -> str:
-    """What the last steps before frames say, where the engine tells them."""
+    """Whether the recorded last steps are those of the rule, in words; "" where none are recorded."""
     told, wrong = case.trajectory.last_step, ~(found.untrue <= _roundings(case))
     if told is None:
         return ""
@@ -210,8 +217,8 @@ def _told(case: Case, found: _Replayed) -> str:
 
 
 def _hidden(case: Case, found: _Replayed) -> str:
-    """The part of the largest momentum by which that of one frame may be off and pass: twice the bound, which
-    one of which the roundings may make up for."""
+    """The part of the largest momentum by which a frame may be off and pass, in words: twice the bound,
+    because roundings may make up for one of the two."""
     number, p = _roundings(case), np.abs(case.trajectory.p[: len(found.counts) + 1])
     room = number * found.bounds[1] + found.late[1]
     part = float(2 * np.max(room) / np.max(p))

@@ -27,7 +27,7 @@ HELD_RIGID = frozenset({"named", "two-frames", "rods"})
 """What a check of rods requires."""
 
 
-@check("length", family="motion", requires=HELD_RIGID)
+@check("length", family="motion", requires=HELD_RIGID, telling=False)
 def rod_length(case: Case) -> Finding:
     """Every rod has its length at every frame, to rounding or to the tolerance that its engine declares."""
     rods, how = _rods(case), case.trajectory.arithmetic
@@ -59,7 +59,7 @@ def rod_length(case: Case) -> Finding:
     return Finding(off[worst], bound[worst], "of the length", why)
 
 
-@check("along", family="motion", requires=HELD_RIGID)
+@check("along", family="motion", requires=HELD_RIGID, telling=False)
 def rod_velocity(case: Case) -> Finding | str:
     """The ends of a rod have one velocity along it, to rounding."""
     rods, bath, heated = _rods(case), THERMOSTATS.get(case.trajectory.scheme), case.law.has("random")
@@ -91,8 +91,9 @@ def rod_velocity(case: Case) -> Finding | str:
 @check("turn", family="motion", requires=MAP | {"rods", "turning"})
 def turn(case: Case) -> Finding | str:
     """A rod that turns freely turns by asin(h w) in a drift of h, w that of the start, at every step."""
-    # along the push lies the way before the drift, of length l, and across it h v: the angle between the ways
-    # before and after has the sine h |v| / l = h w.  What is taken off the momenta leaves them w again
+    # SHAKE pushes along the rod as it lay before the drift, of length l, and the drift moves its ends apart
+    # by h v across it: the rod turns by the angle with the sine h |v| / l = h w.  The projection leaves w as
+    # it was
     rods, run, steps = _rods(case), case.trajectory, case.steps
     m = case.judged.m
     q0, p0 = case.scene.q.astype(np.longdouble), case.scene.p.astype(np.longdouble)

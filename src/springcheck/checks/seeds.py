@@ -26,10 +26,10 @@ FEW = 8
 """Number of particles up to which each is perturbed by itself."""
 
 LONGEST_WAIT, NONE_LEFT = 10_000, 1e-9
-"""Steps in which a collision is waited for at most, and the chance of none that is left."""
+"""Most steps of a run that waits for a collision, and the probability that even so none comes."""
 
 COLLIDED = 30
-"""Steps in which a collision is waited for."""
+"""Steps of the runs of `noise_size` where noise comes by collisions."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -163,7 +163,8 @@ def noise_size(subject: Seeded) -> Finding | str:
 
 
 def _redrawn(subject: Seeded, one: Trajectory) -> float:
-    """By how much the draws of a step from rest differ from those of the same seed at another friction.
+    """Difference, over its bound, of the draws of a step from rest from those of the seed at another
+    friction.
 
     An engine that takes 1 - c**2 from c loses digits at small x = gamma h: 1/2x roundings of the noise, and
     1/x times as many where c is a difference itself, as in LAMMPS' (sqrt(1 + 4x) - 1)/2x.
@@ -194,7 +195,7 @@ class Script:
         self._left = list(values)
 
     def standard_normal(self, size: Any = ()) -> Floats:
-        """Numbers in the shape (steps, draws, particles), or of one draw in any other."""
+        """The next of the list for each draw of the shape (steps, draws, particles), or one for any other."""
         out = np.zeros(size)
         for row in out[0] if out.ndim == 3 else [out]:
             row[...] = self._last = self._left.pop(0) if self._left else 0.0

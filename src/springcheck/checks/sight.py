@@ -6,8 +6,8 @@ A check sees it where x D exceeds the bound, so its limit is the least bound/D. 
 roundings of the engine, which fill a quarter of a bound at most: three limits fail for certain, and a tenth
 of one passes.
 
-Of several springs the one counts that shows least of those that show at all: all of them off at once would
-be seen long before that one is.
+Of several springs the limit is that of the least visible one among those that show at all: an error of all of
+them at once would be seen long before.
 """
 
 from __future__ import annotations
@@ -38,13 +38,14 @@ LARGEST = 2.0**-5
 """Relative change up to which its effect is taken to be proportional to it."""
 
 COARSER = LARGEST / CHANGE
-"""Times a change whose effect drowns in the reference's rounding, one of which it may show."""
+"""Factor to the larger change that is tried where the effect of the first drowns in the reference's
+rounding."""
 
 LOOKED_AT = 64
 """Frames at which a limit is worked out, at equal distances: it is that of all frames or a little more."""
 
 NUMBERS = 1 << 16
-"""Positions of which it is worked out at most, of very many particles at fewer frames."""
+"""Most positions at which a limit is worked out: very many particles take fewer frames."""
 
 States: TypeAlias = tuple[Extended, Extended]
 Part: TypeAlias = Callable[[States], Reals | np.floating]
@@ -105,7 +106,8 @@ def change_of(steps: int) -> float:
 
 
 def rows(case: Case, total: int, told: NDArray[np.bool_] | None = None) -> Integers:
-    """Some of so many rows, or of those that are told, at equal distances, the last among them."""
+    """Numbers of some rows of so many, or of those that are `told`, evenly spaced, the last one among
+    them."""
     chosen = np.arange(total) if told is None else np.flatnonzero(told)
     most = max(2, min(LOOKED_AT, NUMBERS // case.scene.n))
     if len(chosen) > most:
@@ -114,7 +116,7 @@ def rows(case: Case, total: int, told: NDArray[np.bool_] | None = None) -> Integ
 
 
 MOST_ROWS = 8
-"""Springs of which it is worked out by itself what they would do; of more, those that seem to do least."""
+"""Springs whose effects are worked out one by one; of more springs, those with the least effect."""
 
 
 def changed(case: Case, name: str, change: float, rows: Rows | None = None) -> Case:
@@ -161,7 +163,7 @@ def every_row(case: Case, name: str, copies: int = 1) -> list[Rows]:
 
 
 def _weakest(case: Case, every: list[Rows], at: Integers) -> list[Rows]:
-    """Those few rows whose force in one step is least beside what rounding may do to its particles."""
+    """The few rows with the least force in one step, relative to the bound of their particles' rounding."""
     if len(every) <= MOST_ROWS:
         return every
     q, p = (x[at].astype(np.longdouble) for x in (case.trajectory.q, case.trajectory.p))

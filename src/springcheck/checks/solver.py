@@ -47,7 +47,7 @@ def tolerance(case: Case) -> Finding | str:
 @check("replay", family="motion", requires={"rule", "two-frames"})
 def replay(case: Case) -> Finding | str:
     """Each step between two frames is that of a fixed-step scheme, as long as the solver's rule says."""
-    # nobody else needs it
+    # imported here: solvers without a rule do without it
     from springcheck.checks import replayed
 
     return replayed.steps(case)
@@ -97,7 +97,7 @@ def _first_step(case: Case) -> float:
     force acts at the start, nothing makes it short."""
     if case.scheme.rule is None or case.steps[0] != 0:
         return 0.0
-    # nobody else needs it
+    # imported here: solvers without a rule do without it
     from springcheck.schemes.variable import allowed, taken
 
     run, scene = case.trajectory, case.judged
@@ -120,7 +120,7 @@ def _rebuilt(case: Case, q: Floats, p: Floats) -> float:
     run, scene, rule = case.trajectory, case.judged, case.scheme.rule
     if rule is None or not run.rebuilds_velocity:
         return 0.0
-    # nobody else needs it
+    # imported here: solvers without a rule do without it
     from springcheck.schemes.variable import allowed, push_of
 
     with np.errstate(all="ignore"):
@@ -134,7 +134,7 @@ def _rebuilt(case: Case, q: Floats, p: Floats) -> float:
 
 
 HELD_BY_A_RULE = 1.2
-"""How much longer a step would be that a rule leaves as long as the one before."""
+"""Growth of a step below which a rule keeps the length of the step before."""
 
 
 def _believed(case: Case) -> float:
@@ -146,7 +146,7 @@ def _believed(case: Case) -> float:
 
 
 def _not_believed(case: Case) -> str:
-    """That a method says it has called the force more often than is believed, or nothing."""
+    """A sentence where a method declares more force calls than are believed; "" elsewhere."""
     calls = case.trajectory.force_calls
     if calls <= _believed(case):
         return ""
@@ -167,8 +167,8 @@ TIMES = 128
 """Times along the motion between which the exact flow's growth is looked at."""
 
 CHANGE = np.longdouble(2.0**-24)
-"""Of a start, of which the exact solution is taken again: its second order is 2**-24 of the first, and its
-rounding in extended precision 2**-40."""
+"""Relative change of the start for which the exact solution is worked out again: its second order is 2**-24
+of the first, and its rounding in extended precision 2**-40."""
 
 
 def flow_growth(case: Case) -> float:

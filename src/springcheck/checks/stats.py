@@ -6,9 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from springcheck.physics.arrays import Floats
+from springcheck.physics.arrays import Floats, by_identity
 
 
+@by_identity
 class Line(NamedTuple):
     """Least squares of y = intercept + slope x, and further terms."""
 

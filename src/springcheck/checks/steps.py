@@ -70,7 +70,7 @@ def _step_defect(case: Case) -> Finding | str:
     return Finding(value, most, "roundings", why + hidden, sees)
 
 
-@check("border", family="motion", requires=MAP | {"box", "resolved"})
+@check("border", family="motion", requires=MAP | {"box", "resolved"}, telling=False)
 def border(case: Case) -> Finding | str:
     """Steps across a border of the box, of a particle or of a bond, are as good as those within it."""
     run, box = case.trajectory, case.scene.periods
@@ -106,7 +106,7 @@ def border(case: Case) -> Finding | str:
     return Finding(seen[worst], bound[worst], "roundings", why + _where(case, off & across))
 
 
-@check("drive", family="motion", requires=MAP | {"driven", "resolved"})
+@check("drive", family="motion", requires=MAP | {"driven", "resolved"}, telling=False)
 def drive(case: Case) -> Finding | str:
     """The time of a drive is that at which the scheme takes it within its step."""
     if case.trajectory.every > 1:
@@ -118,9 +118,9 @@ def drive(case: Case) -> Finding | str:
 
 
 def _allowed(case: Case) -> tuple[Floats, NDArray[np.bool_]]:
-    """By how many roundings each frame but the first may be off, and whether that is known (f-1,).
+    """Bound in roundings of each frame but the first, and whether it is known there (f-1,).
 
-    In the energy norm over all particles for very many steps.
+    Frames very many steps apart are judged in the energy norm over all particles.
     """
     if case.ahead is not None:
         told = known(case, case.ahead, case.trajectory.every)
@@ -137,11 +137,11 @@ NO_BETTER = "cannot be judged to better than that here: rounding is as large"
 
 
 def _blind(case: Case, told: NDArray[np.bool_], *, passed: bool) -> str:
-    """Which positions and momenta move by no more in any step than rounding may, and of which others it is
-    much more than that of their own digits, or no small part of how far they move.
+    """Name the positions and momenta that move by no more in any step than rounding may, and the others whose
+    bound exceeds `OF_DIGITS` roundings of their own digits or `OF_WAY` of how far they move.
 
-    Of steps that pass, also which are off by much more than recording them rounds: a right engine's may be,
-    and so may those of a wrong force.
+    Where the steps pass, also those that are off by more than `OF_RECORDING` times what recording them
+    rounds: those of a right engine may be, and those of a wrong force.
     """
     ahead, run = case.ahead, case.trajectory
     if ahead is None:
@@ -163,11 +163,11 @@ def _blind(case: Case, told: NDArray[np.bool_], *, passed: bool) -> str:
 
 
 OF_DIGITS, OF_WAY = 512.0, 1e-9
-"""Roundings of a number, and part of its way, above which what rounding hides of it is said."""
+"""Roundings of a number, and part of its way, above which the verdict says what rounding hides of it."""
 
 OF_RECORDING = 20.0
-"""Times what rounding a recorded number may change it by, half a unit in its last place, above which it is
-said to be known no better than to what rounding allows."""
+"""Departure of a number from the scheme's own, in roundings of recording it (half a unit in the last place),
+above which a verdict that passes says that the number is known no better than to its bound."""
 
 
 def _list(case: Case, which: NDArray[np.bool_], said: str, size: Reals | None = None) -> str:
@@ -186,16 +186,22 @@ MOST_NAMED = 4
 
 
 def _sees(case: Case, bound: Floats, told: NDArray[np.bool_]) -> tuple[Limits, str]:
-    """What the roundings allowed, in each degree of freedom where that is known, would not have hidden."""
+    """The limits of detection that the bound leaves, by each degree of freedom where it has its own."""
+    # a clock stands at the times that were recorded, whatever step the engine takes
+    particles = np.arange(case.scene.n) < case.scene.n - case.scene.system.is_driven
     ahead = case.ahead
     if ahead is None:
         unit = case.allowance_of_stretches * bound
-        return sight.of_steps(case, told, lambda at, change: case.system.norm.size(*change) / unit[at])
+
+        def whole(at: Integers, change: sight.States) -> Reals:
+            return case.system.norm.size(*(x * particles for x in change)) / unit[at]
+
+        return sight.of_steps(case, told, whole)
     most = case.roundings * ahead.allowance
 
     def part(at: Integers, change: sight.States) -> Reals:
         left = _left(case, *change, at) / case.roundings
-        return np.stack([change[0] / most[0, at], change[1] / most[1, at], left])
+        return np.stack([change[0] / most[0, at], change[1] / most[1, at], left]) * particles
 
     return sight.of_steps(case, told, part)
 
@@ -237,8 +243,8 @@ def _in_roundings(case: Case, to_q: Floats, to_p: Floats) -> Reals:
 
 
 def _left(case: Case, off_q: Reals, off_p: Reals, at: Integers | slice = slice(None)) -> Reals:
-    """What states that are off by so much (r, n) leave of the equation of positions of an implicit step after
-    these frames, in roundings of that; 0 where there is none."""
+    """Residual of the equation of positions of an implicit step (`Case.residual`) where states are off by so
+    much (r, n) after these frames, in its roundings; 0 for a scheme without such an equation."""
     if case.residual is None:
         return np.zeros_like(off_q)
     way, added = case.residual
@@ -247,7 +253,7 @@ def _left(case: Case, off_q: Reals, off_p: Reals, at: Integers | slice = slice(N
 
 
 def _off(ahead: Stretch, to_q: Floats, to_p: Floats) -> Reals:
-    """The same in allowances of each degree of freedom, the largest (f-1,)."""
+    """Distance of states from the ends of stretches, in allowances of the degree of freedom farthest off."""
     with np.errstate(all="ignore"):
         off = np.abs(ahead.end - np.stack([to_q, to_p]))
         # where nothing rounds nothing may be off: 0 of 0 is 0
@@ -291,7 +297,7 @@ def rates_met(case: Case, *states: Reals) -> Floats:
 
 
 def fastest(case: Case) -> float:
-    """The same, of the whole trajectory."""
+    """The largest of `rates_met` on the whole trajectory [1/T]."""
     return float(rates_met(case, case.trajectory.q)[-1])
 
 

@@ -42,7 +42,7 @@ JOINED = 32
 """Joined particles up to which tangent maps are carried as matrices (2n, 2n)."""
 
 SAMPLES = 16
-"""Tangent vectors of more than these, whose every rounding has a random sign."""
+"""Tangent vectors with a random sign of every rounding, which stand for the matrices of more particles."""
 
 DEVIATIONS = 5.0
 """Standard deviations of roundings as good as random that are allowed: more once in 1.7 million; one more, as
@@ -51,10 +51,11 @@ rounding by each stage that moves a coordinate, two on its way in and two out: n
 random raise no alarm."""
 
 T_SIXTEEN = 7.98
-"""The same where `SAMPLES` tell the standard deviation, by Student's t."""
+"""The same multiple where the standard deviation is estimated from `SAMPLES`: Student's t."""
 
 WIDENED = 3.32
-"""Times what `SAMPLES` show, a standard deviation is larger than that once in a million: chi-squared."""
+"""Factor by which an estimate from `SAMPLES` is below the standard deviation once in a million:
+chi-squared."""
 
 NUMBERS = 1 << 20
 """Numbers of states and tangent maps that are kept at a time: 16 MB, and a few times that on the way."""
@@ -76,8 +77,7 @@ class Stretch:
 
 
 BENT = 0.125
-"""Part of a motion up to which what rounding does to it goes by the tangent: beyond, the next order
-counts."""
+"""Part of a motion up to which the effect of rounding on it is linear: beyond, the second order counts."""
 
 
 def known(case: Claim, ahead: Stretch, steps: int) -> NDArray[np.bool_]:
@@ -258,8 +258,7 @@ def _turn(case: Claim, q: Extended) -> Extended:
 
 
 def _apply(matrix: Extended, x: Extended) -> Extended:
-    """matrix (f, [n,] d, d) times x (f, [n,] d); what is not there is not enlarged, not even without
-    bound."""
+    """matrix (f, [n,] d, d) times x (f, [n,] d); one matrix may serve all f."""
     if matrix.ndim == 3 and len(matrix) == 1:
         return np.asarray(x @ matrix[0].T)
     found = (matrix @ x[..., None])[..., 0]

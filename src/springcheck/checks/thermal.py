@@ -153,15 +153,15 @@ def draws_repeat(case: Case) -> Chance | str:
 
 @check("apart", family="noise", requires={"company", "every-step"})
 def draws_particles(case: Case) -> Chance | str:
-    """The draws of one particle say nothing of those of the next."""
+    """The draws of one particle say nothing of those of another."""
     if THERMOSTATS[case.trajectory.scheme].collides:
         return "there are no draws of two particles side by side"
     if THERMOSTATS[case.trajectory.scheme].rescales:
         return "one number acts on all particles"
     return _of(
         case,
-        lambda x: thermal.chance.neighbours(x.T),
-        lambda x: f"correlation {np.mean(x[:, 1:] * x[:, :-1]):+.2e}",
+        thermal.chance.pairs,
+        lambda x: f"largest correlation {np.max(np.abs(thermal.chance.products(x))) / np.sqrt(len(x)):.2e}",
     )
 
 

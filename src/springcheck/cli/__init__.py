@@ -116,7 +116,7 @@ def _mistake(error: SpringcheckError | OSError) -> int:
 
 
 def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
-    """The command that these words begin with, or all of them: to set up each with its options takes long."""
+    """A parser for the command that these words begin with, or for all: each takes long to set up."""
     parser = slips.Parser(
         prog="springcheck",
         description="Simulation engines judged to rounding by a mass on a spring.",

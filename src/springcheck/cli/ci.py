@@ -20,14 +20,14 @@ from springcheck.text.wording import STATES_SHOW, count
 
 HEAD = b"<?xml version='1.0' encoding='utf-8'?>\n<testsuites name=\"springcheck\""
 OURS = {"junit": HEAD, "badge": b'{"schemaVersion":'}
-"""How the files that are written anew begin: one that begins otherwise is somebody's, and is left alone."""
+"""First bytes of the files that are written anew: a file with others is somebody else's, and stays."""
 
 COLOURS = {0: "brightgreen", 1: "red", 2: "lightgrey"}
 
 WORDS = {0: "passed", 1: "failed", 2: "nothing judged"}
 
 MOST_CASES = 20
-"""Cases in a summary; the report has all."""
+"""Most cases in a summary; the report has all of them."""
 
 _NOT_IN_XML = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 

@@ -57,6 +57,8 @@ def _plot(options: Namespace) -> int:
     drawing.need_matplotlib()
     path = Path(options.file)
     into = Path(options.output or folder.folder_of(path))
+    if into.suffix in (".png", ".svg", ".pdf") and not into.is_dir():
+        raise SpringcheckError(f"-o {into}: a folder is needed, figures have names of their own in it")
     doubts: list[dict[str, str]] = []
     if path.is_file() and (options.columns or not formats.is_hdf5(path) or store.is_foreign(path)):
         if options.quantity or options.over:
@@ -187,7 +189,7 @@ def _unlike(found: Any, asked: str) -> str:
 
 
 def _in_order(parts: Sequence[Callable[[], Any]], workers: int) -> Iterator[Any]:
-    """What the parts return, in their order."""
+    """The results of the parts, in their order."""
     from springcheck.studies.team import Processes
 
     known: dict[int, Any] = {}

@@ -19,7 +19,7 @@ from springcheck.studies import STUDIES
 from springcheck.text.wording import count
 
 MOST_COORDINATES = 8
-"""Coordinates of a file of other programs that are drawn."""
+"""Most coordinates that are drawn of a file by another program."""
 
 FRAMES, SAME = 12, 0.02
 """Frames of a period below which lines between them are chords; relative change of a reach that is none."""

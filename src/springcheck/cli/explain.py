@@ -40,7 +40,7 @@ WORDS = {
     "energy norm": "the size of a difference of states: the root of its energy, over that of the start",
     "ensemble": "many runs of a scene with numbers varied: `springcheck run SCENE --vary FIELD=A:B:N`",
 }
-"""Each with its meaning."""
+"""Words of the field and of springcheck, each with its meaning."""
 
 
 def word(name: str) -> tuple[str, str] | None:

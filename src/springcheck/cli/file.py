@@ -317,8 +317,8 @@ def _in_plane(path: Path, q: Floats, other: Floats, scene: Scene, off: float) ->
 
 
 def _beside_start(q: Floats, scene: Scene, off: float) -> float:
-    """How far along their line several particles (f, n) stand from where the scene has them at the start; 0
-    where they are as far apart otherwise, or stand there."""
+    """Shift along their line of several particles (f, n) from where the scene has them at the start; 0 where
+    they stand there, or are not as far from each other as in the scene."""
     apart = q[0] - scene.q
     moved, size = float(np.mean(apart)), float(np.ptp(scene.q))
     alike = scene.n > 1 and np.ptp(apart) <= off * size < abs(moved)

@@ -35,7 +35,7 @@ EXAMPLES: Mapping[str, Sequence[str]] = {
     "doctor": ("",),
     "completion": ("bash",),
 }
-"""By command, without its name."""
+"""Examples of each command, without its name: the help shows them, and a test parses them."""
 
 
 GROUPS: Mapping[str, Sequence[str]] = {
@@ -67,7 +67,7 @@ ELSEWHERE: Mapping[str, Mapping[str, str]] = {
 
 
 class Formatter(argparse.RawDescriptionHelpFormatter):
-    """Folds what is one line, and leaves examples as they stand."""
+    """Wraps descriptions, and leaves the lines of examples as they are."""
 
     def _fill_text(self, text: str, width: int, indent: str) -> str:
         if "\n" in text:

@@ -87,7 +87,7 @@ def _runs(summary: store.Summary) -> TextTable:
 
 
 def _frames(run: Trajectory, stride: int, last: Trajectory) -> Lines:
-    """Some frames, and the last one where it is none of them."""
+    """Some frames, and the last one as well."""
     n = run.q.shape[1]
     shown = min(n, 3)
     title = f"{run.label}" + (f", every {ordinal(stride)} frame and the last" if stride > 1 else "")

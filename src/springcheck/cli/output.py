@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from springcheck.text.lines import Lines
 
 PIPE = 1 << 16
-"""Columns of what is no terminal: long lines are for the reader's tools to fold."""
+"""Width of output that no terminal shows: its reader's tools wrap long lines."""
 
 SCHEMAS = {"faults": 2, "stability": 2}
 """Versions of JSON documents, 1 of the others: raised where a name goes or changes its meaning, and not where

@@ -54,16 +54,17 @@ class Parser(argparse.ArgumentParser):
         raise SystemExit(2)
 
     def _print_message(self, message: str, file: Any = None) -> None:
-        """As argparse has it, but that it says of a full disk or a closed pipe."""
+        """As argparse has it, but raising what a full disk or a closed pipe raises."""
         print(message, end="", file=file, flush=True)
 
     def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
         found, extra = self.parse_known_args(args, namespace)
         if extra:
             words = [word.partition("=")[0] for word in extra]
-            known = [option for one in self._of(found) for option in one._option_string_actions]
-            near = nearest(words[0], known)
-            self.error(f"{' '.join(extra)}: unknown or too many arguments{near}; `springcheck -h` shows them")
+            parsers = list(self._of(found))
+            near = nearest(words[0], [option for one in parsers for option in one._option_string_actions])
+            shows = f"`{parsers[-1].prog} -h` shows them"
+            self.error(f"{' '.join(extra)}: unknown or too many arguments{near}; {shows}")
         return found
 
     def _of(self, found: argparse.Namespace) -> Iterable[argparse.ArgumentParser]:
@@ -139,7 +140,7 @@ def open_streams() -> None:
 
 
 def one_line(error: BaseException) -> str:
-    """What is said of a mistake of ours: no user can mend it, and all of them are to report it."""
+    """One line on a mistake of ours, which no user can mend: what it is, and how to see where."""
     said = " ".join(str(error).split())[:200]
     where = "SPRINGCHECK_TRACEBACK=1 shows where"
     return f"{type(error).__name__}: {said}; this is a mistake in springcheck: {where}"

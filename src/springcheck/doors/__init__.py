@@ -17,7 +17,7 @@ from springcheck.physics import terms
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Brought:
-    """What a call brings, as it names it, so that another process can bring it too."""
+    """Engines, functions and programs as a call spells them, so that another process can bring them too."""
 
     engines: tuple[str, ...] = ()
     steppers: tuple[str, ...] = ()
@@ -64,15 +64,15 @@ class Brought:
 
 @cache
 def bring_once(what: Brought) -> None:
-    """Bring it where this process has not: a worker carries out many parts."""
+    """Bring them once in this process: a worker carries out many parts."""
     what.bring()
 
 
 def bring(options: Namespace) -> None:
     """Make the engines that the options name known, and have their methods run beside the others.
 
-    `options.brought` tells the processes that a study starts.  Raises MethodError, in one line, where one of
-    them cannot be used.
+    `options.brought` hands them on to the processes that a study starts.  Raises MethodError, in one line,
+    where one of them cannot be used.
     """
     seconds = getattr(options, "timeout", None)
     if seconds is not None and not (math.isfinite(seconds) and seconds > 0):

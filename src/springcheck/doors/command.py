@@ -1,7 +1,7 @@
 """A program in any language as an engine: the scene goes in as JSON, a table of states comes out.
 
 ``name=./engine {scene} {out}``: the program is called once, without a shell, with the paths of the scene and
-of the file that it is to write.  Its time is that of the whole command, reading and writing among it.
+of the file that it is to write.  Its time is that of the whole command, reading and writing included.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 
 SECONDS = 600.0
-"""What a command may take unless it is told."""
+"""Seconds that a command may take where `--timeout` does not say."""
 
 
 def engine(

@@ -37,7 +37,7 @@ UNKNOWN = Scheme(
 
 
 Spec = str | Callable[..., Any]
-"""A function, or where one is."""
+"""A function, or the text that says where one is."""
 
 
 def load(spec: Spec) -> Callable[..., Any]:
@@ -120,7 +120,7 @@ def file_of(spec: str) -> str:
 
 
 def engine(specs: Sequence[Spec], stated: Callable[[str], str] = lambda name: "") -> Engine:
-    """An engine of the functions; without a stated scheme each is what it is found to be, if anything."""
+    """An engine of the functions; without a stated scheme each has the one that `identify` finds, if any."""
     functions = dict(zip(_names([_called(spec) for spec in specs]), map(load, specs), strict=True))
 
     def start(scene: Scene, method: Method, label: Label, step: float) -> Simulation:

@@ -102,14 +102,20 @@ def _imported(version: Callable[[], object]) -> object:
     return version()
 
 
-def guarded(label: Label, call: Callable[..., T], *arguments: object) -> T:
+def guarded(label: Label, call: Callable[..., T], *arguments: object, form: str = "") -> T:
     """Call into an engine.  Whatever it raises comes out as MethodError, with its file and line.
 
-    So does what it did before, where it ended the program and this is the next one (`interrupts.supervised`).
+    So does how the engine has ended an earlier process of this command (see `foreign`).  `form` is the call
+    as the contract writes it, for the message where a function takes other arguments.
     """
     with foreign(str(label), f"{label} failed", origin(label.engine).package):
         try:
             return call(*arguments)
+        except TypeError as error:
+            # raised by the call itself: no line of the engine was reached
+            if form and error.__traceback__ and error.__traceback__.tb_next is None:
+                raise MethodError(f"{label} failed: {error}; it is called as {form}") from error
+            raise
         finally:
             _reopened()
 
@@ -131,7 +137,8 @@ def start(scene: Scene, label: Label, seed: Any = None) -> Simulation:
     """
     driver, run_by = load(label.engine), method(label)
     made = partial(driver.start, seed=seed) if run_by.generator else driver.start
-    found: Simulation = guarded(label, made, scene, run_by, label, scene.step)
+    form = f"start(scene, method, label, step{', seed=seed' if run_by.generator else ''})"
+    found: Simulation = guarded(label, made, scene, run_by, label, scene.step, form=form)
     if not callable(getattr(found, "advance", None)):
         raise MethodError(f"{label} failed: its start returned {type(found).__name__}, which has no advance")
     return found
@@ -139,7 +146,7 @@ def start(scene: Scene, label: Label, seed: Any = None) -> Simulation:
 
 def arithmetic(label: Label) -> Arithmetic:
     """How the engine of a label says that it rounds.  MethodError where its own code fails."""
-    found: object = guarded(label, load(label.engine).arithmetic, label)
+    found: object = guarded(label, load(label.engine).arithmetic, label, form="arithmetic(label)")
     if not isinstance(found, Arithmetic):
         raise MethodError(f"{label} failed: its arithmetic is of type {type(found).__name__}")
     return found
@@ -156,7 +163,7 @@ def origin_of(label: Label) -> dict[str, str]:
         **versions,
         "engine": driver.title,
         "method": run_by.about,
-        "velocity": str(guarded(label, driver.convention, run_by)),
+        "velocity": str(guarded(label, driver.convention, run_by, form="convention(method)")),
     }
 
 

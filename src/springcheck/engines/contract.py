@@ -40,7 +40,7 @@ EVERY_POTENTIAL = frozenset({ANY_POTENTIAL, "wall-spring", "spring", "quartic", 
 """The terms of a method that takes the force as a function: the potentials that are known, and all others."""
 
 EVERY_FORCE = EVERY_POTENTIAL | {"damping"}
-"""The same where the force may also depend on the velocity."""
+"""The terms of a method whose force may also depend on the velocity."""
 
 RODS = frozenset({"wall-rod", "rod"})
 
@@ -89,7 +89,7 @@ class Method:
     scripted: bool = False
     """Whether its seed may be a generator of one's own, an object with `standard_normal(size)`."""
     note: str = ""
-    """What the library's authors would want to be said beside a finding, and the thread that asked."""
+    """A remark of the library's authors that belongs beside a finding, and the thread where they made it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -195,7 +195,7 @@ def by_default(
 
 
 def by_name(name: str, scheme: str, about: str, terms: frozenset[str], *needs: Need, **more: Any) -> Method:
-    """The same for a method that is run by its name alone, never by default."""
+    """A method of these terms and needs that is run by its name alone, never by default."""
     return by_default(name, scheme, about, terms, *needs, default=False, **more)
 
 

@@ -68,7 +68,7 @@ neigh_modify delay 0 every {every} check no
 comm_modify cutoff {cutoff!r}
 region all block {edges} units box
 """
-"""No order but that of creation."""
+"""Atoms stay in the order of their creation."""
 
 IMAGES = np.array([0, 10, 20])
 """First bits of the three counters in LAMMPS' image flags, of 10 bits each, in which 512 stands for 0."""
@@ -266,8 +266,9 @@ def _drives(scene: Scene, h: float) -> Iterator[str]:
 
 
 def _borders(box: tuple[float, ...] | None) -> dict[str, Any]:
-    """Without a box no periodic image, and no list that is built again; in one what leaves it is put back at
-    every step, and a bond finds its nearest image up to half of it away."""
+    """How LAMMPS treats borders.  Without a box there are no images, and neighbour lists are built once; in a
+    box atoms are put back at every step, and a bond finds the nearest image of its end up to half a box
+    away."""
     if box is None:
         return {"border": "s s s", "every": 2000000000, "cutoff": 1.0, "edges": "-1 1 -1 1 -1 1"}
     edges = " ".join(f"0 {length!r}" for length in box)

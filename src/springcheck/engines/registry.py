@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Set
 from contextlib import contextmanager
 from fnmatch import fnmatchcase
 from functools import cache, partial
@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import springcheck
 from springcheck import interrupts, schemes
-from springcheck.engines.contract import Engine, Method, Stopped
+from springcheck.engines.contract import ANY_POTENTIAL, Engine, Method, Stopped
 from springcheck.errors import MethodError, SpringcheckError, nearest, told
 from springcheck.physics import terms
 from springcheck.thermal import THERMOSTATS
@@ -107,9 +107,10 @@ def _loaded(name: str, place: str, load: Callable[[], object]) -> Engine | str:
 
 @contextmanager
 def foreign(name: str, what: str, file: str = "") -> Iterator[None]:
-    """Code of others, known by this name, runs in here: whatever it raises is a MethodError "`what`: why".
+    """Run the code of others, known by this name: whatever it raises becomes a MethodError "`what`: why".
 
-    So is what it did before, where it ended the program and this is the next one (`interrupts.supervised`).
+    Code that has ended an earlier process of this command (`interrupts.supervised`) is not run again: the
+    MethodError says how it ended that one.
     """
     before = interrupts.ended_by(name)
     if before:
@@ -130,7 +131,10 @@ def foreign(name: str, what: str, file: str = "") -> Iterator[None]:
 
 
 def _checked(found: object, name: str = "") -> Engine:
-    """What claims to be an engine, if it keeps the contract.  Its schemes are then known."""
+    """The object, if it is an engine that keeps the contract; its schemes are known from then on.
+
+    MethodError, with what the contract asks, where it does not.
+    """
     if not isinstance(found, Engine):
         raise MethodError(f"it is of type {type(found).__name__}, not a springcheck.engines.Engine")
     if not isinstance(found.name, str) or not found.name.replace("-", "").replace("_", "").isalnum():
@@ -140,13 +144,24 @@ def _checked(found: object, name: str = "") -> Engine:
     for what in ("start", "version", "arithmetic", "convention"):
         if not callable(getattr(found, what)):
             raise MethodError(f"its {what} is of type {type(getattr(found, what)).__name__}, not a function")
+    for what in ("methods", "thermostats"):
+        if not isinstance(by_name := getattr(found, what), Mapping):
+            raise MethodError(
+                f"its {what} are a {type(by_name).__name__}, not by name; named(...) makes them so"
+            )
     if not found.methods:
         raise MethodError("it has no methods")
+    known = (*terms.known(), ANY_POTENTIAL)
     for scheme in found.schemes:
         schemes.bring(scheme)
     for key, one in (*found.methods.items(), *found.thermostats.items()):
         if not isinstance(one, Method) or one.name != key:
             raise MethodError(f"its method {key!r} must be a springcheck.engines.Method of this name")
+        if not isinstance(one.terms, Set):
+            raise MethodError(f"the terms of its method {key!r} are a {type(one.terms).__name__}, not a set")
+        for term in one.terms:
+            if term not in known:
+                raise MethodError(f"its method {key!r}: there is no term {term!r}{nearest(str(term), known)}")
         if one.generator:
             if one.scheme not in THERMOSTATS:
                 raise MethodError(f"the scheme {one.scheme!r} of its thermostat {key!r} is not known")
@@ -165,7 +180,7 @@ def names(like: str = "*") -> tuple[str, ...]:
 
 
 def unusable() -> dict[str, str]:
-    """Why each engine that is registered but cannot be used cannot, by name."""
+    """Engines that are registered and cannot be used, by name, each with the reason."""
     found = {name: (_find(name), one.origin) for name, one in _known().items()}
     return {
         name: f"engine {name} of {where} cannot be used: {what}"
@@ -258,7 +273,8 @@ def from_file(path: Path) -> Engine | None:
 def module_of(path: Path) -> ModuleType:
     """A Python file as a module.  MethodError, with the line, where it cannot be run."""
     if not path.is_file():
-        raise MethodError(f"{path}: there is no such file")
+        why = "it is a folder, a Python file is needed" if path.is_dir() else "there is no such file"
+        raise MethodError(f"{path}: {why}")
     spec = importlib.util.spec_from_file_location(f"springcheck_{path.stem}", path)
     if spec is None or spec.loader is None:
         raise MethodError(f"{path} is not a Python file: its name must end in .py")

@@ -33,8 +33,8 @@ DECADES = 20.0
 """Ratio of energies from which their scale is logarithmic."""
 
 BLOCKS, IMAGE_ROWS = 100, 120
-"""Of neighbours, over which errors are averaged, and of frames: no picture resolves the short waves of a long
-chain."""
+"""Blocks of neighbours over which errors are averaged, and most frames in the image of a wave: no picture
+resolves the short waves of a long chain."""
 
 WAVE_SHADES = (
     "#2166ac", "#4393c3", "#92c5de", "#d1e5f0", "#f7f7f7", "#fddbc7", "#f4a582", "#d6604d", "#b2182b",

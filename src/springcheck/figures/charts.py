@@ -30,14 +30,14 @@ class Scale:
     values: Sequence[float] = ()
     """Values that stand at 0, 1, 2 ... on an axis of tiles."""
     names: Sequence[str] = ()
-    """The same in words, all of which are written."""
+    """Names of the values 0, 1, 2 ...; every one is written at the axis."""
     shown: tuple[float, float] | None = None
-    """From and to at first; left out: what the curves fill."""
+    """Range shown at first; left out: that of the curves."""
     factor: float = 1.0
     """What numbers are multiplied by in the unit of the name."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Curve:
     """Points of one name; curves of one name are switched on and off together.
 

@@ -187,7 +187,7 @@ def orbits(runs: Runs, exact: Exact) -> str:
 
 
 def _scale(found: Sequence[Floats], true: Floats | None) -> Frame:
-    """Limits of an axis of energies, set by all that stay within some times the right one."""
+    """Limits of an axis of energies, set by the exact energy and all runs within `LARGE` times its size."""
     largest = max(1.0, 0.0 if true is None else float(np.max(np.abs(true))))
     near = [x for x in found if np.max(np.abs(x)) <= LARGE * largest] or list(found)
     right = [] if true is None else [true]

@@ -11,7 +11,7 @@ from springcheck.errors import StoreError
 from springcheck.store import files
 
 FIGURES = "springcheck-figures.json"
-"""In a folder of figures: of each file the store that it shows, and the sha256 by which it is known."""
+"""Index of a folder of figures: for each file the store that it shows, and the file's sha256."""
 
 
 def folder_of(path: Path) -> Path:

@@ -93,7 +93,7 @@ class Runs:
 
     @property
     def times(self) -> Frame:
-        """From the first of their times to the last."""
+        """The range of their times."""
         ends = [float(run.t[i]) for run in self.every for i in (0, -1)]
         return Frame(min(ends), max(ends))
 
@@ -191,12 +191,12 @@ class Frame:
 
     @property
     def half(self) -> float:
-        """From its middle to its edge."""
+        """Half-width."""
         return self.high / 2 - self.low / 2
 
     @property
     def ends(self) -> tuple[float, float]:
-        """From and to."""
+        """Lower and upper end."""
         return self.low, self.high
 
     def axis(self, name: str, unit: str) -> Scale:

@@ -25,17 +25,18 @@ CHORD = 0.015
 """Part of a picture by which lines between frames may miss the exact solution: beyond, frames are dots."""
 
 JUMP, MANY_POINTS, TO_AND_FRO = 0.3, 1000, 0.25
-"""Of half a picture, the way from a point to the next that is a jump in a curve of many points; part of all
-frames that jump to and fro."""
+"""Distance of two points, in half pictures, that is a jump in a curve of many points; and the part of all
+frames from which a run is said to jump to and fro."""
 
 STEEP, START_SHOWN = 30.0, 8.0
-"""How many times its median a motion that runs away reaches; of its start, what is shown of it."""
+"""Reach, in medians, from which a motion runs away; and what is shown of it, in reaches of its start."""
 
 STANDS, SOON = 0.02, 0.1
-"""Part of its way that a motion has left where it has settled, and of the time by when that is soon."""
+"""Part of its way that is left where a motion has settled; and the part of the run within which that is
+soon."""
 
 MOST_CLOUDS = 12
-"""Schemes in a bath that have a panel of their own."""
+"""Most schemes in a bath that have a panel of their own."""
 
 
 def phase_portraits(runs: Runs, shown: Sequence[View], truth: Motion | None, said: str = "") -> Bank:
@@ -199,7 +200,7 @@ def _steep(picked: Mapping[str, State], true: State | None) -> tuple[Frame, Fram
 
 
 def _beginning(x: Floats) -> Frame:
-    """From a little behind 0 to the last value."""
+    """The frame from a little left of 0 to the last value."""
     edges = float(x[-1]), -0.25 * float(x[-1])
     return Frame(min(edges), max(edges), True)
 

@@ -46,11 +46,12 @@ NO_KIND = ("not tried", "#ffffff")
 """Name and colour of a tile without a kind."""
 
 MOST_MARKS, FEWEST_MARKS, ALL_MARKS, MANY = 14, 4, 66, 200
-"""Marks on a curve, at the most and at the least, and on all curves of a picture; a curve of more points than
-are many, and no line, shows them all, small."""
+"""Most and fewest marks on a curve, and most on all curves of a picture; the points of a curve without a line
+that has more than many are all shown, as small marks."""
 
 GOLDEN_PART = 0.618
-"""Multiples of it, modulo 1, stand far from one another, however many: there curves have their marks."""
+"""Curves begin their marks at its multiples, modulo 1, which lie far from one another however many there
+are."""
 
 DRAWN_UP_TO = 1e6
 """How many times as far as its picture reaches a line is drawn: farther, drawing it overflows."""
@@ -59,10 +60,11 @@ LEGEND_LINE = 0.17
 """Height of a line of the legend, with its part of the space between entries [in]."""
 
 LETTERS, WIDEST = 11.3, 38
-"""Letters of a title on an inch; those of a line of the legend."""
+"""Letters of a title per inch; most letters of a line of the legend."""
 
 MOST_TICKS, MOST_TICKS_UP, EVEN = 8, 12, 40
-"""Values of tiles that are written, and upwards; more than so many in even ratios: powers of ten."""
+"""Most values of tiles along x and along y that are written; of more than `EVEN` in even ratios, powers of
+ten."""
 
 SMALL_MAPS = 6
 """Maps from which on they are small, three beside each other, and write what they have in common once."""

@@ -48,7 +48,7 @@ class States:
     roundoff: float = 2.0**-53
     """Unit roundoff of what is written: 2**-24 for single precision, 5e-d for d significant digits."""
     units: Mapping[str, str] = field(default_factory=dict)
-    """Those of q, v, t and mass that an H5MD file names."""
+    """Units of q, v, t and mass that an H5MD file names."""
 
 
 Reader: TypeAlias = Callable[[Path, list[str], float | None], States]

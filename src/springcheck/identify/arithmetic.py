@@ -34,13 +34,13 @@ EITHER = "single, or double stored in single"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Defect:
-    """How far one step falls short, and what explains it.  `precision` is "" where nothing does."""
+    """Largest residual of a step and the arithmetic that explains it.  `precision` is "" where none does."""
 
     ulp: float
     precision: str
     note: str = ""
     miss: float = 0.0
-    """How far it falls short, as a share of the state."""
+    """Largest residual, as a share of the state."""
     certain: bool = True
     """Whether the arithmetic itself shows, and not only an error of its size."""
 
@@ -51,8 +51,8 @@ def _predicted(matches: list[Match]) -> Extended:
 
 
 def _misses(matches: list[Match], found: Map, slips: Extended | None) -> Extended:
-    """What each frame differs by from the step of the one before, (c, f - 1, 2), in the frame of `found`,
-    where steps follow the clock's `slips`."""
+    """Difference (c, f - 1, 2) between each frame and the predicted step from the frame before, in the
+    units of `found`; steps follow the clock's `slips`."""
     b = _predicted(matches)
     out = found.z[1:] - found.z[:-1] @ np.swapaxes(b, 1, 2)
     if slips is not None:
@@ -63,13 +63,13 @@ def _misses(matches: list[Match], found: Map, slips: Extended | None) -> Extende
 
 
 FREE = 1e6
-"""Times what is missing by which an equilibrium may be elsewhere, as far as this says."""
+"""Multiple of the residuals by which the equilibrium may be elsewhere: the prior that leaves it free."""
 
 
 def _refitted(
     record: Record, found: Map, matches: list[Match], signed: Floats, unit: Floats, *, numbers: bool = False
 ) -> Floats:
-    """What is missing (c, f - 1, 2), counted in `unit`, but for what is uncertain: the interval, by the
+    """Residuals (c, f - 1, 2), of errors `unit`, less what uncertain parameters explain: the interval, by the
     rounding of the times; the equilibrium, of which each scheme has its own; and with `numbers` h w and the
     friction of each match.
 
@@ -160,7 +160,8 @@ def _substeps(match: Match) -> int:
 
 
 def _unlike(record: Record, found: Map, matches: list[Match]) -> Floats:
-    """Most that unlike steps within a frame, of which the clock shows the sum alone, do to it (c, f - 1, 2).
+    """Bound (c, f - 1, 2) of the effect on a frame of steps of unlike length, of which the clock shows the
+    sum.
 
     A step that is longer by the share d does d M**(s - 1 - i) M' M**i to the map of s steps; what the steps'
     sum does is known, so the departures of these from their mean are left, times the rounding of a step.
@@ -189,8 +190,7 @@ to i h halves the last step, or adds one of a rounding, and its clock rounds eac
 
 
 def _stepped_to(record: Record, found: Map, matches: list[Match], signed: Floats, unit: Floats) -> Floats:
-    """What is missing (c, f - 1, 2), counted in `unit`, but for what the clock's rounding of each step does
-    to it."""
+    """Residuals (c, f - 1, 2), of errors `unit`, less what the clock's rounding of each step explains."""
     d = 1e-6
     change = _slipped(matches, found, d) - _slipped(matches, found, -d)
     way = found.z[:-1].astype(np.float64) @ np.swapaxes(change.astype(np.float64) / (2 * d), 1, 2)
@@ -323,7 +323,7 @@ def _defects(
             precision = _stored(record, found)
         elif coarse_file[i]:
             texts = [s.name for s in (record.q_storage, record.v_storage) if s.name.startswith("text")]
-            # one orbit, rounded once, leaves no room for more than that
+            # an orbit that was rounded once has no larger errors: single-precision steps are excluded
             precision = texts[0] if texts else "" if found.once else "single"
         miss = float(share[i])
         out.append(Defect(ulp=float(ulp[i]), precision=precision, note=note, miss=miss, certain=certain))

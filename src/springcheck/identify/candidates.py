@@ -60,12 +60,14 @@ def _shared(rows: list[tuple[float, ...]]) -> tuple[float, ...] | None:
     return first if same else None
 
 
-def stated_stiffness(seen: Measured, plainest: Joint, precision: str, stated: Floats) -> list[Explanation]:
-    """What may be wrong with the stated stiffness, if it is not that of the states; and notes on it."""
+def stated_stiffness(
+    seen: Measured, plainest: Joint, precision: str, stated: Floats
+) -> tuple[list[Explanation], list[str]]:
+    """Explanations of a stated stiffness that is not that of the states, and notes on it."""
     quantum = arithmetic.QUANTUM if precision in SINGLE_CONSTANTS else 0.0
     against = seen.disagreements(plainest)
     if not against or (quantum and not seen.disagreements(plainest, quantum=quantum)):
-        return []
+        return [], []
     room = max(6 * part.a_error / abs(part.a) for part in plainest.parts)
     for what, other, of_force in _single_constants(seen.record, stated, plainest.stride):
         if seen.disagreements(plainest, other, quantum if of_force else 0.0):
@@ -73,28 +75,28 @@ def stated_stiffness(seen: Measured, plainest: Joint, precision: str, stated: Fl
         # what is told from the stated one by a little only may be anything of that size
         if (quantum and of_force) or room < 0.1 * float(np.max(np.abs(other / stated - 1))):
             why = ", as GPU-type platforms keep it" if quantum else ""
-            seen.notes.append(f"the {what} is the stated one in single precision{why}")
-            return []
-    seen.notes.extend(against)
+            return [], [f"the {what} is the stated one in single precision{why}"]
     _, stiffness, _ = seen.numbers(plainest)
     j, masses = seen.moving[0], seen.record.mass
-    ratio = (stiffness or (math.nan,))[0] / float(stated[j])
+    found = (stiffness or (math.nan,))[0]
+    ratio = found / float(stated[j]) if stated[j] else math.inf
     meaning = stiffness_ratio(ratio, None if masses is None else float(masses[j]))
     stiff = (
         f"{ratio:.9g} times as stiff as stated" if abs(ratio - 1) > 1e-6 else f"stiffer by {ratio - 1:+.1e}"
     )
+    stiff = stiff if stated[j] else f"of stiffness {found:.9g} where 0 is stated"
     cause = f"{title(plainest.scheme)}, but of a spring {stiff}"
     remedy = "look at the units of the force constant, and at whether V is k/2 q**2"
     cause = f"{cause}: {meaning}" if meaning else cause
-    return [Explanation(cause=cause, remedy=remedy, misfit=abs(ratio - 1))]
+    return [Explanation(cause=cause, remedy=remedy, misfit=abs(ratio - 1))], against
 
 
 def of_stated_stiffness(seen: Measured, precisions: dict[Joint, str], stated: Floats) -> list[Joint]:
-    """Those of several schemes, with the arithmetic that explains each, that have the stated stiffness: as it
-    is, or with a constant in single precision, or the nearest; and those that have the same one as these."""
-    joints, silent = list(precisions), replace(seen, notes=[])
+    """Select hypotheses, given with the arithmetic that explains each, of the stated stiffness: as it is,
+    with a constant in single precision, or the nearest; and those that have the same one as these."""
+    joints = list(precisions)
     agreeing = [x for x in joints if not seen.disagreements(x)] or [
-        x for x in joints if not stated_stiffness(silent, x, precisions[x], stated)
+        x for x in joints if not stated_stiffness(seen, x, precisions[x], stated)[0]
     ]
     if not agreeing:
         return nearest_stiffness(seen, joints, stated)
@@ -107,8 +109,8 @@ def of_stated_stiffness(seen: Measured, precisions: dict[Joint, str], stated: Fl
 
 
 def nearest_stiffness(seen: Measured, joints: list[Joint], stated: Floats) -> list[Joint]:
-    """Those of several schemes whose stiffness comes nearest to the stated one, which none has: all that a
-    constant in single precision or their own errors leave room for."""
+    """Select the hypotheses whose stiffness is nearest to the stated one, which none has, to within single
+    precision of a constant and their own errors."""
     off, room = {}, {}
     for joint in joints:
         _, stiffness, _ = seen.numbers(joint)
@@ -158,7 +160,7 @@ def held_over(joint: Joint) -> str:
 
 
 def either_way(ways: list[Identification]) -> Identification:
-    """What the frames of falling times are: in their order, by steps back in time, and in that of time."""
+    """Identify frames whose times fall: in their order, by steps back in time, and in that of time."""
     fitting = [
         x for x in ways if x.fits and not any(rate < 0 for one in x.candidates for rate in one.friction)
     ]
@@ -187,8 +189,7 @@ def common(values: Sequence[T]) -> T | None:
 
 
 def candidates_of(seen: Measured, joint: Joint) -> list[Candidate]:
-    """What a family would mean: one candidate, or one for each friction law that has its map, if it has the
-    stated friction c."""
+    """Candidates of a hypothesis, one for each friction law of its map, if it has the stated friction c."""
     family, record = FAMILIES[joint.family], seen.record
     out = []
     for law in family.laws if joint.damped else ("",):
@@ -222,11 +223,14 @@ def law_assumed(candidates: Sequence[Candidate]) -> list[str]:
     """The friction by each law that it may be of, if there is any."""
     laws = [x for x in candidates if x.law]
     each = "; ".join(f"{', '.join(f'{y:.6g}' for y in x.friction[:3])} by {x.law}" for x in laws[:6])
-    return [f"the motion is damped, and the law is an assumption: the friction c/m is {each}"] if laws else []
+    is_ = "is" if len(laws) == len(candidates) else "may be"
+    return (
+        [f"the motion {is_} damped, and the law is an assumption: the friction c/m is {each}"] if laws else []
+    )
 
 
 def all_remarks(seen: Measured, joints: list[Joint], candidates: tuple[Candidate, ...]) -> list[str]:
-    """What is to be said beside a name: the same maps, the law of friction, turns that frames do not show."""
+    """Notes beside a name: the same maps, the law of friction, turns that frames do not show."""
     out = []
     scheme = common([x.scheme for x in candidates])
     if scheme in LEAPFROG:

@@ -7,6 +7,7 @@ tells it from anything else is where it enters (in kicks, never in drifts) and i
 
 from __future__ import annotations
 
+import math
 from itertools import repeat
 
 import numpy as np
@@ -22,10 +23,13 @@ from springcheck.schemes import SCHEMES, magnitude_step
 from springcheck.schemes.rounding import Met
 
 QUANTUM = 2.0**-32
-"""Of forces that GPU-type platforms of OpenMM sum in 64-bit fixed point [kJ/mol/nm]."""
+"""Quantum of the forces that GPU-type platforms of OpenMM sum in 64-bit fixed point [kJ/mol/nm]."""
 
 EXCESS = 2.0**-32
-"""By which OpenMM's CustomIntegrator takes fixed-point forces too large: it divides by 2**32 - 1."""
+"""Relative excess of the fixed-point forces of OpenMM's CustomIntegrator, which divides by 2**32 - 1."""
+
+CHANCE = 1e-9
+"""Chance that errors which are not those of cut-off forces leave as little as these do."""
 
 LEAST = 1 / 100
 """Share of its bound that an error must reach in the mean square for the bound to be what explains it."""
@@ -114,7 +118,8 @@ def kinematic(record: Record, j: int, found: Map, match: Match) -> tuple[str, st
     """Precision and note where positions and velocities of every step fit together to rounding, so that
     only the force can be coarse; its own numbers then show how, and are none where they show nothing.
 
-    None where forces cannot be read so finely that their quanta would show.
+    None where forces cannot be read so finely that their quanta would show, or so few of them lie near
+    multiples that others might.
     """
     forces = _forces(record, j, found, match)
     if forces is None:
@@ -123,6 +128,7 @@ def kinematic(record: Record, j: int, found: Map, match: Match) -> tuple[str, st
     single = np.spacing(np.abs(values).astype(np.float32)).astype(np.float64)
     fixed = np.full(len(values), QUANTUM)
     mass = 1.0 if record.mass is None else float(record.mass[j])
+    readable = noise < 0.05 * float(np.median(single))
     for name, quantum, factor, note in (
         ("mixed", single, 1.0, "single-precision numbers"),
         ("mixed", single, float(over_single(mass)), "single-precision numbers, and so is the mass"),
@@ -139,9 +145,14 @@ def kinematic(record: Record, j: int, found: Map, match: Match) -> tuple[str, st
         whole = np.rint(off)
         # forces far below a quantum are near 0 of them, and cannot be sums of quanta
         clear = noise < 0.05 * float(np.median(quantum)) and np.any(whole)
-        if clear and float(np.mean(np.abs(off - whole))) < 0.1:
-            return name, f"states are double, and forces are {note}"
-    return ("", "") if noise < 0.05 * float(np.median(single)) else None
+        left = np.abs(off - whole)
+        if clear and float(np.mean(left)) < 0.1:
+            # the sum of n numbers, each uniform up to 1, is at most s with a chance of s**n/n! or less
+            n, total = len(left), float(np.sum(2 * left)) or math.ulp(1.0)
+            if n * math.log(total) - math.lgamma(n + 1) < math.log(CHANCE):
+                return name, f"states are double, and forces are {note}"
+            readable = False
+    return ("", "") if readable else None
 
 
 OUTLIER = 6.0
@@ -187,7 +198,7 @@ def white(found: Map, match: Match, signed: Floats) -> bool:
 
 
 def cut_off(found: Map, match: Match) -> Floats:
-    """What forces that are cut off towards zero, in each of a frame's steps, do to a frame: (f - 1, 2)."""
+    """Displacement (f - 1, 2) of each frame by forces truncated towards zero in each of its steps."""
     one = np.ones(1)
     step = unit(FAMILIES[match.family], match.a * one, match.g * one)[0]
     up = np.array([1.0, match.stride * float(found.size[0] / found.size[1])])

@@ -265,7 +265,7 @@ def compare(
 
 
 def _joints(parts: list[dict[tuple[str, int], Match]]) -> list[Joint]:
-    """What all oscillators have a match of."""
+    """Hypotheses of which every oscillator has a match."""
     shared = (key for key in parts[0] if all(key in x for x in parts))
     return [Joint(family=key[0], stride=key[1], parts=tuple(x[key] for x in parts)) for key in shared]
 

@@ -33,8 +33,8 @@ Complexes: TypeAlias = NDArray[np.complex128]
 
 
 def frequency(linear: list[Floats], missing: Floats, weight: Floats, carrier: Floats) -> float:
-    """Of the sine and cosine in frames by which a carrier explains most of what is missing (f, 2) beside what
-    goes with `linear` columns."""
+    """Angular frequency, per frame, of the sine and cosine times a carrier that explain most of the
+    residuals (f, 2) beside the `linear` columns."""
     n, frames, pull = np.arange(len(carrier)), len(carrier), weight * carrier
     across = np.linalg.qr(np.stack(linear, axis=1) * weight[:, None])[0]
     wanted = missing * weight[:, None]
@@ -86,7 +86,7 @@ UNDAMPED = 1e-6
 """Largest distance from 1 of the moduli of a frictionless step's eigenvalues, beside a drive."""
 
 MOST_SCHEMES = 3
-"""That a sentence names: on a spring of unknown stiffness several have one map."""
+"""Schemes that a sentence names at most: on a spring of unknown stiffness several have one map."""
 
 AGREES = 1e-6
 """Share of b by which that of a scheme may miss it: what rounding leaves of b is less by decades."""
@@ -125,7 +125,7 @@ def _tuned(z: Floats, carrier: Floats, turn: float) -> tuple[float, Floats, floa
 
 
 def said(e: Evidence, forced: bool, turn: float) -> str:
-    """What more there is to say of a drive, or of a stiffness that changes, in words."""
+    """Formula of a drive, or of a stiffness that oscillates, with its amplitude, frequency and phase."""
     z = e.found.z.astype(np.float64)
     turn, rows = _best(z, np.ones(e.pairs) if forced else z[:-1, 0], turn)
     w = turn / float(e.record.interval)
@@ -139,8 +139,8 @@ def said(e: Evidence, forced: bool, turn: float) -> str:
     if np.all(np.abs(np.abs(own) - 1) <= UNDAMPED):
         # without friction the spring may as well turn as the drive does, and the drive as the spring
         drives.append(_best(z, np.ones(e.pairs), float(abs(np.angle(own[0])))))
-        if e.stiffness and e.record.mass is not None:
-            stated = abs(float(e.record.interval)) * math.sqrt(abs(e.stiffness) / float(e.record.mass[e.j]))
+        if e.stated:
+            stated = math.sqrt(abs(e.stated))
             drives = [max(drives, key=lambda one: abs(abs(one[0]) - stated))]
     more = "" if len(drives) < 2 else " (without friction the states do not tell which; give the stiffness)"
     ways = [f"the force {x}" for x in (_forces(e, x, y, of) for y, x in drives) if x]
@@ -202,16 +202,10 @@ def _schemes(
     for joint in sorted(joints, key=lambda x: x.plainness):
         match = joint.parts[0]
         unit = _response(e, match, turn)
-        if unit is not None and match.turns == 0 and _has_stated(e, match):
+        # other schemes have its map with other springs than the stated one
+        off = 0.0 if e.stated is None else abs(match.a * match.stride**2 - e.stated)
+        if unit is not None and match.turns == 0 and off <= AGREES * abs(e.stated or 0.0):
             yield match, unit
-
-
-def _has_stated(e: Evidence, match: Match) -> bool:
-    """Whether it has the stiffness that is stated, where one is: other schemes have its map with others."""
-    if e.stiffness is None or e.record.mass is None:
-        return True
-    stated = e.stiffness / float(e.record.mass[e.j]) * (float(e.record.interval) / match.stride) ** 2
-    return abs(match.a - stated) <= AGREES * stated
 
 
 def _response(e: Evidence, match: Match, turn: float) -> NDArray[np.complex128] | None:

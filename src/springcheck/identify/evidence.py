@@ -1,10 +1,10 @@
-"""What hypotheses are held against, and what an explanation of a misfit may look at."""
+"""Evidence for hypotheses, and for explanations of what none explains."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -25,8 +25,8 @@ SINGLE_ROOM = 8 * 2.0**-24
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Measured:
-    """What hypotheses are held against: the oscillators of a record that can be judged, their maps, on what
-    terms these are compared, and what is stated of them."""
+    """The data that hypotheses are tested on: the oscillators of a record that can be judged, their maps,
+    on what terms these are compared, and what is stated of them."""
 
     record: Record
     moving: list[int]
@@ -38,8 +38,12 @@ class Measured:
     """Stated c [M/T]."""
     stride: int | None
     """Steps to a frame by the stated step; -1 where it does not divide the interval."""
-    notes: list[str]
-    """Remarks, of which whoever looks at it may add some."""
+    notes: tuple[str, ...]
+    """Remarks for the report."""
+
+    def noting(self, *more: str) -> Measured:
+        """Copy with more remarks."""
+        return replace(self, notes=(*self.notes, *more))
 
     def compare(self, families: tuple[Family, ...], strides: Iterable[int]) -> list[Joint]:
         """The hypotheses that all oscillators may be of."""
@@ -102,13 +106,20 @@ class Measured:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Evidence:
-    """What an explanation may look at: the worst oscillator's map, and what was stated of it."""
+    """The data of an explanation: the worst oscillator's map, and what was stated of it."""
 
     record: Record
     j: int
     found: Map
     terms: Terms
     stiffness: float | None
+
+    @property
+    def stated(self) -> float | None:
+        """(w T)**2 of the stated stiffness, T between two frames; None where it or the mass is not known."""
+        if not self.stiffness or self.record.mass is None:
+            return 0.0 if self.stiffness == 0 else None
+        return self.stiffness / float(self.record.mass[self.j]) * float(self.record.interval) ** 2
 
     @property
     def pairs(self) -> int:

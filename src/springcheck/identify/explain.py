@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from springcheck.identify import driven
-from springcheck.identify.coarse import irregular
+from springcheck.identify.coarse import CHANCE, irregular
 from springcheck.identify.compare import nearest
 from springcheck.identify.evidence import FALLS, Evidence, Measured, distance, matched
 from springcheck.identify.families import title
@@ -23,10 +23,10 @@ from springcheck.physics.arrays import Floats
 from springcheck.schemes import rotation
 
 FEWEST_MISSES = 24.0
-"""Pairs that count in what is left over from which its pattern shows."""
+"""Fewest pairs that count among the residuals for their pattern to show."""
 
 FIXED = 2.0**-46
-"""What a map leaves over, of a state's size, that is still rounding: 64 units in the last place."""
+"""Residual of a map, relative to the state, that is still rounding: 64 units in the last place."""
 
 DRIFTING = 64.0
 """Roundings that may be left over where a constant that is added to the position is the cause."""
@@ -101,7 +101,7 @@ def _drift(e: Evidence) -> list[Explanation]:
 
 
 def _left(columns: Floats, missing: Floats) -> float:
-    """Share of the residual that these columns leave over, in the root mean square."""
+    """Root mean square of the residual of a regression on these columns, as a share of the total."""
     scale = np.sqrt(np.mean(columns**2, axis=0))
     columns = columns[:, scale > 0] / scale[scale > 0]
     fitted = columns @ np.linalg.lstsq(columns, missing, rcond=None)[0]
@@ -142,7 +142,7 @@ def _neighbours(maps: list[Map]) -> Callable[[Evidence], list[Explanation]]:
 
 
 def _shape(e: Evidence) -> list[Explanation]:
-    """What the residual depends on: position, velocity, or time; or nothing, and it is noise."""
+    """Regress the residuals on functions of position, velocity and time; irregular ones are noise."""
     z, missing = e.found.z[:-1].astype(np.float64), e.misses
     q, v = z.T
     # a motion that grows or decays is not judged by its largest states alone
@@ -180,6 +180,12 @@ def _shape(e: Evidence) -> list[Explanation]:
         for name, columns in groups.items()
         if counted > 3 * numbers.get(name, len(columns) - len(own))
     }
+    # powers of the state are many numbers: of fewer pairs they show where they leave less than by chance
+    spare = counted - len(groups["anharmonic"]) + len(own)
+    powers = 1.0
+    if "anharmonic" not in left and spare > 0:
+        powers = _left(weight * _powers(e), weight * missing)
+        left |= {"anharmonic": powers} if powers**spare < CHANCE else {}
     if left.get("constant", 1.0) < 0.35:
         # what a constant explains shows nothing of what has one beside it
         left = {
@@ -214,8 +220,10 @@ def _shape(e: Evidence) -> list[Explanation]:
     if few and (good[0] in (*STATE, *TIME) or len({KIND[name] for name in good}) > 1):
         # where states hardly come back, any function of time is one of many powers of the state
         good = [*good, "anharmonic" if good[0] in TIME else "stiffness in time"]
-    if away.get(good[0], math.inf) < math.pi and "anharmonic" not in left:
-        # powers of the position, not tried, have frequencies that are the motion's own, several times
+    as_little = good[0] in TIME and powers * math.sqrt(len(groups["anharmonic"])) <= 3 * best
+    if "anharmonic" not in left and (as_little or away.get(good[0], math.inf) < math.pi):
+        # powers of the position, which so few pairs do not show, have frequencies that are the motion's own,
+        # several times, and are as likely as a law of time where they leave as little
         good = [*good, "anharmonic"]
     kinds = list(dict.fromkeys(KIND[name] for name in good))
     if len(kinds) > 1:
@@ -238,7 +246,7 @@ KIND = {
     "stiffness in time": "changes in time", "friction in time": "changes in time",
     "map in time": "changes in time", "beat": "changes in time", "drive": "is driven",
 }  # fmt: skip
-"""What the force depends on in each group of columns."""
+"""Dependence of the force that each group of columns stands for."""
 
 STATE = ("quadratic", "anharmonic", "position", "velocity")
 """Groups of functions of the state that follow most functions of time where states hardly come back."""
@@ -271,7 +279,7 @@ def _powers(e: Evidence) -> Floats:
 
 
 def _two_maps(e: Evidence) -> tuple[str, str]:
-    """What the maps of even and odd frames differ in."""
+    """Difference between the maps of even and odd frames, and what to do."""
     odd = np.arange(e.pairs) % 2 == 1
     halves = [fit(e.record, e.j, kept=mask) for mask in (~odd, odd)]
     left = max(float(np.max(x.residual)) for x in halves)
@@ -368,7 +376,7 @@ def _too_few(size: float, counted: float) -> Explanation:
 
 
 def _noise(e: Evidence, size: float, counted: float) -> Explanation:
-    """What is left over is irregular, or goes with nothing that is known, or stands in too few frames."""
+    """Explanation of residuals that are irregular, or follow no known law, or stand in too few frames."""
     if counted < FEWEST_MISSES:
         return _too_few(size, counted)
     rows = e.found.residual

@@ -48,7 +48,7 @@ def one_factor(h: float, q: Floats, v: Floats) -> tuple[str, float, Floats] | No
 
 
 def by_a_factor(found: Identification, h: float, q: Floats, v: Floats) -> Identification:
-    """What was found, or that all momenta have one factor a step, where that explains these states."""
+    """Identify one factor a step for all momenta, where that explains these states; else what was found."""
     if q.shape[1] < 2 or found.verdict == "named":
         return found
     with np.errstate(all="ignore"):

@@ -18,7 +18,7 @@ from springcheck.identify.record import Record
 from springcheck.identify.result import Explanation
 
 LEFT = 1e-9
-"""Of the states' size, what a right complex map leaves over at most, the roundings of a long motion in it."""
+"""Largest residual of a right complex map, relative to the states: the roundings of a long motion."""
 
 KEPT = 1e-4
 """Largest distance of the determinant from 1 where its angle is that of the velocity."""
@@ -28,7 +28,7 @@ BORIS_AGREES = 1e-10
 
 
 def of_plane(record: Record) -> list[Explanation]:
-    """What turns two coordinates into each other, the first two of which that is all that couples them."""
+    """Explain by a rotation of two coordinates into each other, of the first pair that it alone couples."""
     moving = np.flatnonzero(np.ptp(record.q, axis=0) + np.ptp(record.v, axis=0) > 0)
     for i, j in combinations(moving[:MOST_COMPARED].tolist(), 2):
         if found := _of_two(record, i, j):

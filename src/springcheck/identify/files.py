@@ -144,7 +144,7 @@ def _adaptive(run: store.Run) -> str:
 
 
 def _velocity_factor(units: Mapping[str, str], notes: list[str]) -> float:
-    """What makes velocities lengths of q over times of t, where the file names units that differ."""
+    """Conversion factor of velocities to units of q over t, where the file names units that differ."""
     q, t, v = units.get("q", ""), units.get("t", ""), units.get("v", "")
     length, _, time = v.partition(" ")
     time = time.removesuffix("-1").removesuffix("^-1")
@@ -201,7 +201,7 @@ def rod_of(q: Floats | None, *, fits: bool = False) -> RodSeen | None:
         for i in range(x.shape[1] if len(x) > FEWEST_ON_ARC and np.isfinite(x).all() else 0):
             arm, bent = _arm(x[:, i]), _bent(x[:, i])
             length, off = _kept(arm)
-            # a straight way keeps to any circle, and an orbit may keep to one without a rod: it goes round
+            # a straight path lies on a circle as well, and an orbit may without a rod, but does not turn back
             if off <= RIGID * bent and bent >= TURNED**2 * length and _turns_back(arm):
                 kept = f"keeps its distance from a fixed point, {length:.6g} to {off:.1g}: a rod"
                 return RodSeen(statement=f"particle {i} swings and {kept}")
@@ -215,7 +215,7 @@ def _kept(way: Floats) -> tuple[float, float]:
 
 
 def _bent(way: Floats) -> float:
-    """How far a way leaves its straight line."""
+    """Root mean square distance of a path from its straight line."""
     return float(np.linalg.svd(way - np.mean(way, axis=0), compute_uv=False)[1] / np.sqrt(len(way)))
 
 
@@ -240,8 +240,8 @@ def _turns_back(arm: Floats) -> bool:
 
 
 def sentence(run: Trajectory, mass: Floats, stiffness: Floats | None = None, *, about: int = 0) -> str:
-    """What the states of a trajectory around a frame really are, in one sentence, for a verdict that failed;
-    "" where they show nothing.  `stiffness` (n,) where each particle has a spring of its own."""
+    """Identification of a trajectory around a frame, in one sentence, for a verdict that failed; "" where
+    the states show nothing.  `stiffness` (n,) where each particle has a spring of its own."""
     chosen, _ = _chosen(run.q, run.p, [])
     first = max(0, min(about - MOST_FAILED // 2, len(run.t) - MOST_FAILED))
     frames = slice(first, first + MOST_FAILED)
@@ -255,7 +255,7 @@ def sentence(run: Trajectory, mass: Floats, stiffness: Floats | None = None, *, 
 
 
 def shown(scene: Scene, run: Trajectory, about: int) -> str:
-    """What the states of a trajectory around a frame really are; "" where its scene is not of springs."""
+    """Identification of a run around a frame, in one sentence; "" where the scene is not of springs."""
     if not scene.system.is_linear:
         return ""
     springs = scene.system.hessian(scene.q).astype(np.float64) if scene.n <= MOST_OSCILLATORS else None
@@ -271,7 +271,8 @@ def titled(file: Path | str, label: str) -> str:
 def identify_file(
     path: Path, trajectory: str | None, columns: Sequence[str], stated: Mapping[str, float | None]
 ) -> dict[str, Identification]:
-    """What a file holds, by label, `stated` mass, stiffness, friction and step of the command line.
+    """Identify the trajectories of a file, by label; `stated`: mass, stiffness, friction, step of the
+    command.
 
     Raises SpringcheckError, which names the trajectory.
     """

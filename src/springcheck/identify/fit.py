@@ -30,15 +30,15 @@ CONSTANT_SHOWS = 50.0
 5 standard errors leave one in 700 files with an equilibrium that is none."""
 
 CONSTANT_LIKELY = 10.0
-"""The same in a coarse file, where a constant that is left out is wrong and one too many costs little."""
+"""Gain that shows a constant part in a coarse file: one left out is wrong, one too many costs little."""
 
 FLOOR = 1 / 8
 """A number near zero is written finer than its neighbours by any power of ten; it counts as no finer than
 this share of the other component's quantum."""
 
 LEAST_LEFT = 1 / 16
-"""Of the rounding of a state, what one step leaves over at least in the mean square: numbers that happen to
-be exact leave less, and say no more."""
+"""Least mean square residual of a step, in squares of a state's rounding: numbers that happen to be exact
+leave less, and prove no more."""
 
 ENOUGH = 8
 """Residuals to spare from which what they leave over shows how large it is; fewer may be small by chance, and
@@ -54,13 +54,13 @@ FEWEST_SLIPPING = 20
 """Numbers up to which what a clock's slips do to each step is not fitted."""
 
 CLEAN = 100.0
-"""What may be left over in the mean square, of what is expected, where it may be rounding."""
+"""Largest mean square residual, relative to the expected one, that may still be rounding."""
 
 KURTOSIS = 0.8
 """Variance of the square of an even error in units of its own squared: chi-squared of n has 0.8 n."""
 
 CHANCE = 1e-6
-"""Of a constant that is none."""
+"""Probability of accepting a constant where there is none."""
 
 ERRORS = 5.0
 """Standard errors that chance does not exceed: 6e-7."""
@@ -93,7 +93,7 @@ class Map:
     """Root mean square (2,) of what the map leaves over of each component, weighted."""
     noise: Noise
     chi2: float
-    """What is left over, in squares of what the observation model expects."""
+    """Chi-squared: residuals in squares of what the observation model expects."""
     freedom: int
     conditioned: bool
     """Whether the states span the plane beyond what the map leaves over."""
@@ -103,7 +103,7 @@ class Map:
     """Whether the states were rounded once, as they were written, and never in the motion; None where that
     does not show, or where they have all digits."""
     drifts: bool = False
-    """Whether the constant part is no equilibrium: the position gets a constant in every step."""
+    """Whether the constant part is no equilibrium but a constant added to the position in every step."""
     slips: Extended | None = None
     """Relative excess (f - 1,) of each step over the mean, where the steps follow the clock's."""
     found: dict[Any, Any] = field(default_factory=dict, init=False)
@@ -154,7 +154,7 @@ def _sizes(z: Extended) -> Extended:
     return np.asarray(size * np.sqrt((square @ size**-2).mean() / 2))
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, eq=False)
 class _Solution:
     """A minimum: unknowns, their covariance, what is left over of it, and its noise."""
 
@@ -207,7 +207,7 @@ def _minimum(
 
 
 class _Unknowns:
-    """What is fitted: entries, a constant part, and what the clock's slips do."""
+    """Unknowns of the fit: entries, a constant part, and the response to the clock's slips."""
 
     def __init__(self, z: Extended, process: Floats, centred: int, slips: Extended | None) -> None:
         self.z, self.process, self.pairs, self.centred = z, process, len(process), centred
@@ -324,7 +324,7 @@ def fit(record: Record, j: int, *, kept: NDArray[np.bool_] | None = None, consta
 
 
 def _least(freedom: int) -> float:
-    """What so many residuals to spare leave over at least in the mean square, in squares of a rounding."""
+    """Least mean square of so many residuals to spare, in squares of a rounding."""
     return max(LEAST_LEFT, min(1.0, ENOUGH / max(freedom, 1)))
 
 
@@ -396,5 +396,5 @@ def _fed_back(
 
 
 def repeats(z: Extended) -> float:
-    """How often each state comes back: roundings that repeat with the motion do not average away."""
+    """Mean number of times that a state recurs: roundings that repeat with the motion do not average out."""
     return len(z) / len(np.unique(z.astype(np.float64) @ [1, 1j]))

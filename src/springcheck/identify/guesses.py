@@ -28,15 +28,15 @@ NEAR = 1e-11, 30.0
 comparison: what Gauss-Newton in double precision leaves of the right one."""
 
 FAR = 3.0
-"""The same where the nearest is wanted, whether or not it may be accepted."""
+"""Bound on the entries' distance where the nearest is wanted, whether or not it may be accepted."""
 
 LOST = 3.0
-"""The same of a first guess, and as long as steps are long."""
+"""Bound on the entries' distance of a first guess, and as long as Newton steps are long."""
 
 CURVED, QUOTIENT, FARTHEST = 30.0, 1e-5, 0.3
-"""What a step of relative length 1 may leave over beside what further steps take away, in units of its
-square: 8.4 at most in the right families of 11,600 maps of up to 0.9 of the critical damping; the same in
-units of the step, because slopes are difference quotients; and the length from which a step says nothing."""
+"""Residual that a Gauss-Newton step may leave beside what further steps remove: in units of its square (8.4
+at most was seen in the right families of 11,600 maps, damped up to 0.9 of the critical) and of its length
+(slopes are difference quotients); and the length of a step from which this says nothing."""
 
 FLOW_TURNS = 8
 """Turns between two frames that the exact flow, which has no step, is looked for at."""
@@ -49,7 +49,7 @@ GLANCE = 3e-6
 the table bends, within which a guess is followed."""
 
 DAMPING = 2.0
-"""The same in units of g, where there is friction.  Measured on 2,900 maps of up to 0.9 of the critical
+"""Distance in units of g, where there is friction.  Measured on 2,900 maps of up to 0.9 of the critical
 damping: 1.7."""
 
 SWAY = 8.0
@@ -123,7 +123,7 @@ def _curve(name: str) -> _Curves:
     return _Curves(np.zeros(len(out), np.int64), low, high, np.array(out))
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, eq=False)
 class Roots:
     """Steps (r,) that a map may be the power of: the matrix on (q, v h), its phase and log of determinant."""
 
@@ -181,7 +181,7 @@ def roots_of_map(found: Map, strides: Iterable[int]) -> Roots:
     return Roots(s, turns, phase, log_det, step, error, {})
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, eq=False)
 class Guesses:
     """Candidates (c,): family, root, and the unknowns a and g."""
 
@@ -304,8 +304,9 @@ def _on_curves(
 
 
 def polished(every: MapTable, roots: Roots, x: Guesses, *, free_scale: bool, far: bool = False) -> Guesses:
-    """Those of the guesses that come near a root, by Gauss-Newton on a step's entries; with `far` all."""
-    rounds = 6 if every.damped else 3
+    """Refine guesses by Gauss-Newton on a step's entries, and keep those near a root; with `far` all."""
+    # three of a table's guesses, and one more beside the largest phase, where it says little
+    rounds = 6 if every.damped else 4
     bound = NEAR[0] + NEAR[1] * roots.error
     length = np.full(len(x.a), np.inf)
 
@@ -337,8 +338,8 @@ def polished(every: MapTable, roots: Roots, x: Guesses, *, free_scale: bool, far
 
 
 def _entry_sizes(wanted: Floats, roots: Roots, x: Guesses) -> Floats:
-    """What entries are compared by: diagonal ones by the root of the determinant, the others by their own
-    size, but for what a half turn takes away of it."""
+    """Scales of the entries: of diagonal ones the root of the determinant, of the others their own size,
+    but for what a half turn takes away of it."""
     whole = np.exp(np.maximum(roots.log_det[x.root] / 2, -600))
     bend = np.nan_to_num(np.abs(np.sinc(roots.phase[x.root] / np.pi)), nan=1.0)
     out = np.abs(wanted)
@@ -351,8 +352,8 @@ def _entry_sizes(wanted: Floats, roots: Roots, x: Guesses) -> Floats:
 
 
 def _compared(m: Floats, *, free_scale: bool) -> Floats:
-    """What is compared of matrices (c, 2, 2): entries, or where velocities have any scale the three numbers
-    that no scale changes."""
+    """Numbers compared of matrices (c, 2, 2): the entries, or where velocities have any scale the three
+    numbers that no scale changes."""
     if free_scale:
         return np.stack([m[:, 0, 0], m[:, 0, 1] * m[:, 1, 0], m[:, 1, 1]])
     return np.stack([m[:, 0, 0], m[:, 0, 1], m[:, 1, 0], m[:, 1, 1]])
@@ -371,8 +372,8 @@ def least_squares(slopes: Floats, right: Floats) -> tuple[Floats, Floats]:
 def roots_of(
     families: tuple[Family, ...], steps: Floats, room: float, *, free_scale: bool = False
 ) -> tuple[Integers, Integers, Floats, Floats]:
-    """Which families have these one-step matrices (r, 2, 2) on (q, v h) to within `room`: family, matrix, a
-    and g of each."""
+    """Families whose one-step matrix is one of these (r, 2, 2) on (q, v h) to within `room`: family,
+    matrix, a and g of each."""
     every = table(families)
     with np.errstate(all="ignore"):
         found = rotation(steps.astype(np.longdouble))

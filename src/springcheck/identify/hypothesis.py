@@ -26,6 +26,9 @@ EXCLUDED = 25.0
 SURE = 6.0
 """Standard errors by which a number differs from another for certain, and within which it may be off."""
 
+LAW_SHOWS = 50.0
+"""Standard errors of a friction from which its law shows: by another a tenth of it is unlike."""
+
 STRIDES = 12, 100
 """Steps to a frame looked at: up to so many, and where nothing fits, or a choice is left, up to those."""
 
@@ -34,7 +37,8 @@ FEW, MANY = range(1, STRIDES[0] + 1), range(STRIDES[0] + 1, STRIDES[1] + 1)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Terms:
-    """What is known of a map beside its entries, and how finely the arithmetic resolves coefficients."""
+    """Conditions of a comparison: what is known of a map beside its entries, and how finely the arithmetic
+    resolves coefficients."""
 
     mass_unknown: bool = False
     jitter: float = 0.0
@@ -43,7 +47,7 @@ class Terms:
     """log(k T**2) where the stiffness is known and the mass is not: the mass follows from a then."""
     rounding: float = ROUNDING
     bias: float = 0.0
-    """How far entries may be off in units of what the map leaves over, whatever the number of pairs: coarse
+    """Bias allowed of the entries, in units of the residual and whatever the number of pairs: coarse
     forces that cut off are biased, and repeat from turn to turn."""
     scales: tuple[float, ...] = ()
     """Log of the scale of velocities at each stride from 0 on, where it is known beforehand."""
@@ -105,6 +109,11 @@ class Joint:
         return FAMILIES[self.family].damped and not FAMILIES[self.family].held
 
     @property
+    def shows_law(self) -> bool:
+        """Whether a drag that is not linear in the velocity would not fit as well as its friction, if any."""
+        return not self.damped or all(x.g > LAW_SHOWS * x.g_error for x in self.parts)
+
+    @property
     def keeps_area(self) -> bool:
         """Whether all maps predicted have a determinant of 1."""
         entries = np.array([part.predicted for part in self.parts])
@@ -112,7 +121,7 @@ class Joint:
 
     @property
     def plainness(self) -> tuple[int, int, int]:
-        """What parsimony sorts by: no unseen turns, the exact flow or the smallest stride, then the list."""
+        """Sort key of parsimony: no unseen turns, the exact flow or the smallest stride, then the list."""
         turns = max(part.turns for part in self.parts)
         return turns, self.stride, -1 if self.scheme == "exact" else list(FAMILIES).index(self.family)
 
@@ -188,7 +197,7 @@ def frictionless(name: str) -> tuple[str, ...]:
 
 
 def likely(joints: list[Joint]) -> list[Joint]:
-    """Those of which the best is not five standard errors better, each once, the plainest first."""
+    """Hypotheses within five standard errors of the best, each once, the plainest first."""
     if not joints:
         return []
     best = min(x.chi2 for x in joints)

@@ -29,7 +29,7 @@ LARGER = 10.0
 """Size of some frames, of the median, from which a force that is not linear shows in them alone."""
 
 HALF_STEP = 1e-3
-"""Of half a step's kick, by which what is missing at a frame may differ from it."""
+"""Relative difference between a residual and half a step's kick up to which it is one."""
 
 AT_AN_END = 3
 """Pairs at an end of their order by size, for each bad one, within which these do not lie by chance."""
@@ -150,7 +150,7 @@ def _damped(found: Map, e: Evidence) -> str:
 
 
 def _interruption(e: Evidence, found: Map, run: NDArray[np.intp], whose: str) -> tuple[str, str]:
-    """What happened at a run of bad pairs, the rest of the motion being `found`'s."""
+    """Diagnose a run of bad pairs by the map of the other frames: cause and remedy."""
     z, b = found.z, found.entries
     first, last = int(run[0]), int(run[-1])
 
@@ -204,7 +204,7 @@ def _interruption(e: Evidence, found: Map, run: NDArray[np.intp], whose: str) ->
 
 
 def _kicked(e: Evidence, found: Map, kick: float, q: float, at: int, whose: str) -> tuple[str, str]:
-    """What one kick of the velocity in the state of a frame is, which stands there at `q` of its size."""
+    """Cause and remedy of one kick of the velocity at a frame whose position is `q` of the motion's size."""
     for match in matched(found, e.terms):
         # half a step of the force there, T h F/m = -a s q of s steps: what a leapfrog is early by
         half = match.a * match.stride * q * float(found.size[0] / found.size[1]) / 2

@@ -18,7 +18,7 @@ from springcheck.identify.search import COARSE, terms_of
 def judged(
     record: Record, stiffness: ArrayLike | None, friction: float | None, step: float | None
 ) -> Measured:
-    """What can be judged of a record, and what is stated of it.  Raises IdentificationError."""
+    """Select the oscillators that can be judged, and check what is stated.  Raises IdentificationError."""
     stated = of_size("stiffness", stiffness, record.q.shape[1], zero=True)
     of_size("friction", friction, zero=True)
     of, moving, maps, notes = _oscillators(record)
@@ -32,7 +32,7 @@ def judged(
         )
     return Measured(
         record=of, moving=moving, maps=maps, terms=[terms_of(of, j, stated) for j in moving],
-        stiffness=stated, friction=friction, stride=stride, notes=notes,
+        stiffness=stated, friction=friction, stride=stride, notes=tuple(notes),
     )  # fmt: skip
 
 
@@ -89,8 +89,8 @@ ALIKE = 1e-9
 
 
 def _proportional(record: Record, j: int) -> str:
-    """What is the matter where the velocities follow from the positions alone, in more frames than an arc of
-    few roundings shows; "" where they do not."""
+    """Message for velocities that follow from the positions alone, in more frames than an arc of few
+    roundings shows; "" where they do not."""
     q, v = (x[:, j].astype(np.float64) for x in (record.q, record.v))
     q, v = q - np.mean(q), v - np.mean(v)
     size = float(np.max(np.abs(q)))

@@ -64,10 +64,10 @@ def _pairs(stages: tuple[Stage, ...]) -> list[Extended]:
     return out
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Plan:
-    """What is to be done for some of a table's families: the number of `one`, where it is one alone; kinds of
-    map other than stages, and whose they are, None where they are all; numbers of slots that are not 0."""
+    """Evaluation plan for some of a table's families: the number of `one`, where it is one alone; kinds of
+    map other than stages, and whose they are, None where they are all; slots that are not 0."""
 
     one: int | None
     kinds: tuple[tuple[str, NDArray[np.bool_] | None], ...]
@@ -82,7 +82,7 @@ class MapTable:
     slots: tuple[Columns, ...]
     """Kicks with the drift after each, as in `_slots`."""
     flags: NDArray[np.bool_]
-    """Which numbers (slots, 5, F) of them are none."""
+    """Mask (slots, 5, F) of the coefficients that are not 0."""
     rational: Columns
     """Numerator and denominator (degree, F) of stability functions; whether friction is inside (F,)."""
     kinds: tuple[tuple[str, Any], ...]
@@ -91,7 +91,7 @@ class MapTable:
     held: NDArray[np.bool_]
     damped: bool
     plans: dict[bytes, Plan] = field(default_factory=dict)
-    """What is to be done for some of the families, by which they are."""
+    """Evaluation plans, by the set of families."""
 
     def unit(self, which: Integers, a: Reals, g: Reals) -> Reals:
         """One-step matrices (c, 2, 2), a and g (c,), in their width."""
@@ -352,7 +352,7 @@ FORMULAS: dict[str, Callable[[Reals], Reals]] = {
 
 
 def _formula(name: str) -> Callable[[Reals], Reals]:
-    """That of a fault, or of a scheme that is stepped."""
+    """Formula of the map of a fault, or of a scheme that is stepped."""
     return FORMULAS.get(name) or partial(_stepped, SCHEMES[name])
 
 

@@ -25,7 +25,7 @@ AGAINST = 0.3
 """Share of the way between frames by which it may differ from that of the velocities, turned over."""
 
 PLACED = 2.0**-46
-"""What one map may leave over of numbers in their place, of their size: 64 units in the last place."""
+"""Largest residual of numbers in their place, relative to them: 64 units in the last place."""
 
 MOST_COMPARED = 12
 """Coordinates of which every two are compared."""
@@ -48,7 +48,7 @@ def misplaced(e: Evidence) -> list[Explanation]:
 
 
 def _left(record: Record, j: int) -> float:
-    """What one map leaves over of a coordinate's frames, in the mean square of its size."""
+    """Root mean square residual of one map of a coordinate's frames, relative to its size."""
     z = np.stack([record.q[:, j], record.v[:, j] * record.interval], axis=1).astype(np.float64)
     z = z - np.mean(z, axis=0)
     if not np.all(np.std(z, axis=0) > 0):
@@ -103,7 +103,7 @@ def unsorted(record: Record) -> list[Explanation]:
     where = ", ".join(f"of coordinate {each[i]} in column {of[i]}" for i in others)
     cause = f"The velocities stand in other columns than the positions, in every frame: those {where}"
     remedy = "sort the particles by their number before they are written, positions and velocities alike"
-    return [Explanation(cause=cause, remedy=remedy, misfit=0.0, local=True)]
+    return [Explanation(cause=cause, remedy=remedy, local=True)]
 
 
 def turned(record: Record, moving: list[int]) -> list[Explanation]:
@@ -122,7 +122,7 @@ def turned(record: Record, moving: list[int]) -> list[Explanation]:
     if against == moving and record.interval < 0:
         cause = "The motion runs forwards while its times fall: each step is |h|, not h"
         remedy = "look for abs(dt); if the step is right, all velocities have the wrong sign"
-    return [Explanation(cause=cause, remedy=remedy, misfit=0.0, local=True)]
+    return [Explanation(cause=cause, remedy=remedy, local=True)]
 
 
 def _exchanged(record: Record, j: int) -> Iterator[Repair]:
@@ -165,7 +165,7 @@ def _exchanged(record: Record, j: int) -> Iterator[Repair]:
 
 
 def _off(q: Floats, v: Floats, x: Floats, u: Floats, h: float) -> float:
-    """How far a frame lies from the one before, moved on by the mean of the velocities."""
+    """Squared distance of a frame from the one before, moved on by the mean of the velocities."""
     return float(np.sum((x - q - h * (u + v) / 2) ** 2) + np.sum((h * (u - v)) ** 2))
 
 

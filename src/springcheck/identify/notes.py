@@ -37,7 +37,7 @@ CERTAIN_STEPS = 12
 """Steps to a frame above which coarse numbers name no scheme: their errors are small, and many lie near."""
 
 MOST_PARTS, MARK = 4, 1e-9
-"""Largest n, and how near a friction must come to h k/(n m) to be that."""
+"""Largest n, and the relative distance within which a friction is h k/(n m)."""
 
 LEAPFROG = {
     "semi-implicit-euler": "leapfrog with velocities half a step early",
@@ -46,7 +46,7 @@ LEAPFROG = {
 
 
 def separation(maps: list[Map], one: Joint, other: Joint) -> float:
-    """How far apart two schemes' maps are, each at its best, in standard errors of the measured ones."""
+    """Mahalanobis distance of two schemes' maps, each at its best, by the covariance of the measured ones."""
     total = 0.0
     for found, a, b in zip(maps, one.parts, other.parts, strict=True):
         if "inverse" not in found.found:
@@ -59,7 +59,7 @@ def separation(maps: list[Map], one: Joint, other: Joint) -> float:
 
 
 def of_few(record: Record, found: Identification) -> Identification:
-    """What was found, where few frames of text or single precision exclude no other scheme.
+    """Withhold the name where few frames of text or single precision exclude no other scheme.
 
     Raises IdentificationError where no scheme fits so few.
     """
@@ -88,10 +88,11 @@ def of_few(record: Record, found: Identification) -> Identification:
 
 
 def beside_unknown(record: Record, found: Identification, *, stated: bool, seen: bool) -> Identification:
-    """What was found in coarse numbers, or at coarse times, at a number of steps that nobody stated: what
-    lies between two schemes fits as well, and above `CERTAIN_STEPS` names none; of deep ones a list of many
-    steps says so.  What the exact flow fits anything fits whose own error does not show, and where the error
-    of the scheme's step is not plainly `seen` one of about that size fits as well."""
+    """Add "or a scheme that is not known here" where coarse numbers or times leave room for one.  At a
+    number of steps that nobody stated what lies between two schemes fits as well, and above
+    `CERTAIN_STEPS` none is named; of deep ones a list of many steps says so.  Where the exact flow fits,
+    any scheme fits whose own error does not show; and where the error of the scheme's step, or the law of
+    its friction, is not plainly `seen`, another fits as well."""
     few = found.scheme or any(x.stride <= CERTAIN_STEPS for x in found.candidates)
     clear = record.jitter < DEEP
     # what lies between two schemes that coarse numbers do not tell apart they do not exclude either
@@ -109,7 +110,7 @@ def beside_unknown(record: Record, found: Identification, *, stated: bool, seen:
 
 
 def of_stated_friction(found: Identification, stated: float, mass: float) -> Identification:
-    """What was found, where the stated friction c [M/T] is that of no law: one of another size, or none."""
+    """Say that the stated friction c [M/T] is that of no law: there is one of another size, or none."""
     rates = sorted(mass * x.friction[0] for x in found.candidates)
     whose = either(list(dict.fromkeys(title(x.scheme) for x in found.candidates))[:4])
     low, high = rates[0], rates[-1]
@@ -121,7 +122,7 @@ def of_stated_friction(found: Identification, stated: float, mass: float) -> Ide
         share = _between(*sorted((low / stated, high / stated)))
         cause = f"{whose}, but with a friction {share} times the stated"
     remedy = "look at the unit of the friction, c or c/m, and at how often a step applies it"
-    wrong = Explanation(cause=cause, remedy=remedy, misfit=0.0)
+    wrong = Explanation(cause=cause, remedy=remedy)
     notes = (*found.notes, "the stated friction does not fit by any of the laws that are known")
     statement = found.statement if found.explanations else cause
     return replace(found, statement=statement, explanations=(*found.explanations, wrong), notes=notes)
@@ -135,7 +136,7 @@ def _between(low: float, high: float) -> str:
 
 
 def of_unasked_friction(found: Identification) -> Identification:
-    """What was found, where the friction is that of a scheme written down wrongly: h k/(n m), n whole.
+    """Reject friction that is the mark of a scheme written down wrongly: h k/(n m), n whole.
 
     Where a scheme without friction has the stated stiffness, nothing is unasked.
     """
@@ -157,9 +158,7 @@ def of_unasked_friction(found: Identification) -> Identification:
                 f"as {part}: the mark of a scheme that is written down wrongly, or of an implicit one; state "
                 "the friction if not"
             )
-            wrong = Explanation(
-                cause=cause, remedy="compare the factors 1/2 of the step with the scheme's", misfit=0.0
-            )
+            wrong = Explanation(cause=cause, remedy="compare the factors 1/2 of the step with the scheme's")
             return replace(
                 found, verdict="none", scheme=None, aliases=(), candidates=(), statement=cause, fits=False,
                 explanations=(wrong,),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -63,23 +64,23 @@ def identify_positions(
     plain = tuple(x[0] for x in classes())
     seen = Measured(
         record=record, moving=moving, maps=[], terms=[], stiffness=stated, friction=friction or None,
-        stride=stride, notes=notes,
+        stride=stride, notes=tuple(notes),
     )  # fmt: skip
     every_stride = known or not _all_preserve(found)
     joints = (_joined if every_stride else _first)(found, plain, strides, wanted)
     joints += [x for x in _joined(found, (HELD,), strides, wanted) if _may_hold(x)]
-    fitting = _stated(seen, joints) if known else joints
+    seen, fitting = _stated(seen, joints) if known else (seen, joints)
     kept = fitting
     sure = _all_preserve(found) or _certain(found)
     if friction or (friction is None and not (fitting and sure)):
         families = distinct(damped=True)
         damped = (_joined if known else _first)(found, families, strides, wanted)
-        damped = _stated(seen, damped) if known else damped
+        seen, damped = _stated(seen, damped) if known else (seen, damped)
         kept = damped if friction else kept + damped
     if friction:
         kept = [x for x in kept if candidates_of(seen, x)]
     if not kept:
-        return _none(found, notes, *_unfitting(seen, found, joints))
+        return _none(found, seen.notes, *_unfitting(seen, found, joints))
     return _known(seen, found, kept, known)
 
 
@@ -120,7 +121,7 @@ def _joined(
 def _first(
     found: list[Recurrence], families: tuple[Family, ...], strides: range, wanted: list[float]
 ) -> list[Joint]:
-    """The same of the fewest steps of each family: where more would fit as well, they say nothing."""
+    """Join hypotheses of the fewest steps of each family: where more fit as well, they prove nothing."""
     out = _joined(found, families, strides[:1], wanted)
     left = tuple(f for f in families if f.name not in {x.family for x in out})
     if left and len(strides) > 1:
@@ -136,14 +137,15 @@ def _may_hold(joint: Joint) -> bool:
     return joint.endless or bool(joint.substeps[0])
 
 
-def _stated(seen: Measured, joints: list[Joint]) -> list[Joint]:
-    """Those of the stated stiffness, or where none is, those of it with a number in single precision."""
+def _stated(seen: Measured, joints: list[Joint]) -> tuple[Measured, list[Joint]]:
+    """Hypotheses of the stated stiffness, or where none is, of it with a number in single precision, which
+    is noted."""
     for room in (0.0, SINGLE_ROOM):
         fitting = [x for x in joints if not seen.disagreements(x, room=room)]
         if fitting:
-            seen.notes.extend(["a stated number was rounded to single precision"] if room else [])
-            return fitting
-    return []
+            remarks = ["a stated number was rounded to single precision"] if room else []
+            return seen.noting(*remarks), fitting
+    return seen, []
 
 
 def _members(joints: list[Joint]) -> list[Joint]:
@@ -159,8 +161,8 @@ def _members(joints: list[Joint]) -> list[Joint]:
 
 
 def _known(seen: Measured, found: list[Recurrence], kept: list[Joint], known: bool) -> Identification:
-    """One scheme or several, of which the positions are."""
-    record, notes, joints = seen.record, seen.notes, _members(kept)
+    """Identification of positions that one scheme or several explain."""
+    record, notes, joints = seen.record, list(seen.notes), _members(kept)
     candidates = tuple(x for joint in joints for x in candidates_of(seen, joint))
     names = list(dict.fromkeys(x.scheme for x in candidates))
     damped = any(joint.damped for joint in joints)
@@ -177,7 +179,7 @@ def _known(seen: Measured, found: list[Recurrence], kept: list[Joint], known: bo
     if scheme:
         said = common([x.law for x in candidates])
         law = f" with {said}" if said else " with friction" if all(x.damped for x in joints) else ""
-        notes = [*notes, *(law_assumed(candidates) if all(x.damped for x in joints) else [])]
+        notes += law_assumed(candidates) if all(x.damped for x in joints) else []
         whose = title(scheme)
         if scheme == HELD.scheme:
             whose = held_over(joints[0])
@@ -189,14 +191,13 @@ def _known(seen: Measured, found: list[Recurrence], kept: list[Joint], known: bo
         statement = f"Positions alone: {what}, and they are those of {either(listed)}{frames}"
     if not known:
         told = "mass and stiffness" if record.mass is None else "the stiffness"
-        notes = [*notes, f"what would tell more: {told}, where known, the friction, or velocities"]
+        notes.append(f"what would tell more: {told}, where known, the friction, or velocities")
     if damped and seen.friction is None:
-        notes = [
-            *notes,
-            "with friction every scheme has a spring that fits; a stated friction of 0 leaves it out",
-        ]
+        notes.append(
+            "with friction every scheme has a spring that fits; a stated friction of 0 leaves it out"
+        )
     elif scheme and float(found[0].beta) > 0 and not known:
-        notes = [*notes, "a damped spring of another stiffness may have the same positions"]
+        notes.append("a damped spring of another stiffness may have the same positions")
     unknown = tuple(math.nan for _ in found)
     share = 1 / (steps or 1)
     return Identification(
@@ -204,14 +205,11 @@ def _known(seen: Measured, found: list[Recurrence], kept: list[Joint], known: bo
         statement=statement,
         step=float(record.interval) * share if steps else math.nan,
         stride=steps,
-        velocity_offset=math.nan,
         determinant=tuple(math.exp(x.log_det * share) for x in found) if steps else unknown,
         symplectic_defect=max(abs(float(x.beta)) for x in found),
         defect_ulp=max(x.ulp for x in found),
         precision=precision,
         fits=True,
-        undecided=False,
-        difference=(math.nan,) * 4,
         notes=tuple(dict.fromkeys(notes)),
     )
 
@@ -241,7 +239,7 @@ def _unfitting(seen: Measured, found: list[Recurrence], joints: list[Joint]) -> 
     )
 
 
-def _none(found: list[Recurrence], notes: list[str], cause: str, remedy: str) -> Identification:
+def _none(found: list[Recurrence], notes: Sequence[str], cause: str, remedy: str) -> Identification:
     """No scheme, and why."""
     worst = max(found, key=lambda x: x.residual)
     return nothing(

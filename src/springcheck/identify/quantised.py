@@ -13,7 +13,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from springcheck.identify.coarse import over_single
+from springcheck.identify.coarse import CHANCE, over_single
 from springcheck.identify.families import FAMILIES, Family
 from springcheck.identify.fit import Map
 from springcheck.identify.hypothesis import Match
@@ -25,9 +25,6 @@ from springcheck.schemes import SCHEMES, number
 EXPLAINED = 0.3
 """Share of the misses in the root mean square that is left at most where forces are cut off: of the noise of
 unlike forces more than all is left, 1.4 of it."""
-
-CHANCE = 1e-9
-"""Chance that forces which are cut off otherwise leave so little where few numbers count in the misses."""
 
 REFINED = 16
 """Newton's steps of stiffness and friction, which the misses bias, with forces cut off."""

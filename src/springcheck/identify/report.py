@@ -48,7 +48,7 @@ from springcheck.identify.search import (
 )  # fmt: skip
 from springcheck.identify.shortened import single_parameters
 from springcheck.identify.thermal import explained, of_bath
-from springcheck.identify.together import at_rest, distance, of_a_bond, of_a_pair, of_rotation
+from springcheck.identify.together import OF_A_BOND, at_rest, distance, of_a_bond, of_a_pair, of_rotation
 from springcheck.identify.wrong import faults_like, faults_of
 from springcheck.schemes.elsewhere import ELSEWHERE
 
@@ -109,7 +109,7 @@ def _of_states(t: Any, q: Any, p: Any, v: Any, *, mass: ArrayLike | None, **stat
         if in_a_bath := of_bath(t, q, p, v, mass):
             return in_a_bath
         raise
-    # what a scheme or the record explains takes no noise
+    # noise is not looked for where a scheme, or a mistake in the record, explains the states
     local = any(x.local for x in found.explanations)
     return found if found.candidates or local else explained(found, t, q, p, v, mass)
 
@@ -156,8 +156,7 @@ def _of_coordinates(
     if not explained:
         later, joints = remembered(seen)
         if explained := _explained(later, joints):
-            seen = later
-            seen.notes.append(
+            seen = later.noting(
                 "the first step has the friction of the first velocity: none is half a step old"
             )
     if explained and seen.stiffness is not None and not (fine or any(map(agrees, explained))):
@@ -187,22 +186,21 @@ def _of_coordinates(
         # few steps, one of them rounded, are plainer than many
         joints, remark = single_parameters(seen)
         rounded = _explained(seen, joints)
-        seen.notes.extend([remark] if rounded else [])
-        explained = rounded or explained
+        seen, explained = (seen.noting(remark), rounded) if rounded else (seen, explained)
     if not explained:
         return _unknown(seen, strides_left)
     joints = list(explained)
     if (stated := seen.stiffness) is not None:
-        if seen.disagreements(joints[0]):
-            stated = of_a_bond(seen.record, seen.moving, stated, seen.notes)
-            seen = replace(seen, stiffness=stated)
+        bond = of_a_bond(seen.record, seen.moving, stated) if seen.disagreements(joints[0]) else None
+        if bond is not None:
+            seen, stated = replace(seen.noting(OF_A_BOND), stiffness=bond), bond
         joints = of_stated_stiffness(seen, {x: ds[0].precision for x, ds in explained.items()}, stated)
     stated_fits = stride is None
     if stride is not None and stride > 0:
         agreeing = [x for x in joints if x.stride == stride or x.scheme == "exact"]  # which has no step
         joints, stated_fits = agreeing or joints, bool(agreeing)
         if not agreeing:
-            seen.notes.append(f"with the stated step {step:.9g}, {stride} to a frame, no known scheme fits")
+            seen = seen.noting(f"with the stated step {step:.9g}, {stride} to a frame, no known scheme fits")
     if friction is not None:
         of_rate = [x for x in joints if candidates_of(seen, x)]
         joints, stated_fits = of_rate or joints, stated_fits and bool(of_rate)
@@ -210,6 +208,8 @@ def _of_coordinates(
     found = _known(seen, {x: explained[x] for x in joints}, stated_fits)
     of_maps = zip(seen.maps, seen.terms, strict=True)
     plainly = seen.stiffness is not None or any(visible(*x, damped=joints[0].damped) for x in of_maps)
+    known = friction is not None or seen.record.deep
+    plainly = plainly and (known or all(x.shows_law for x in joints))
     found = beside_unknown(seen.record, found, stated=stride is not None, seen=plainly)
     if friction is not None and seen.friction is None and seen.record.mass is not None:
         found = of_stated_friction(found, friction, float(seen.record.mass[seen.moving[0]]))
@@ -270,13 +270,14 @@ def _elsewhere(seen: Measured, strides: range) -> dict[Joint, list[arithmetic.De
 def _known(
     seen: Measured, explained: dict[Joint, list[arithmetic.Defect]], stated_fits: bool
 ) -> Identification:
-    joints, maps, notes = list(explained), seen.maps, seen.notes
+    joints, maps, notes = list(explained), seen.maps, list(seen.notes)
     plainest = joints[0]
     worst = [max(ds, key=lambda d: (d.precision != "double", d.ulp)) for ds in explained.values()]
     notes += dict.fromkeys(d.note for d in explained[plainest] if d.note)
     explanations: list[Explanation] = []
     if seen.stiffness is not None:
-        explanations = stated_stiffness(seen, plainest, worst[0].precision, seen.stiffness)
+        explanations, remarks = stated_stiffness(seen, plainest, worst[0].precision, seen.stiffness)
+        notes += remarks
         stated_fits = stated_fits and not explanations
     candidates = tuple(x for joint in joints for x in candidates_of(seen, joint))
     scheme = common([x.scheme for x in candidates])
@@ -285,13 +286,15 @@ def _known(
     unknown = tuple(math.nan for _ in maps)
     offset = common([VELOCITY_OFFSET.get(x.scheme, 0.0) for x in candidates])
     damped = any(joint.damped for joint in joints)
+    doubt = "" if all(joint.damped for joint in joints) else " or without"
     first = candidates[0]
     precision = common([d.precision for d in worst]) or "cannot tell"
     notes += all_remarks(seen, joints, candidates)
     steps = (
         "" if stride == 1 else f", {stride} steps to a frame" if stride else ", in an unknown number of steps"
     )
-    law = f" with {first.law}" if first.law and len(candidates) == 1 else " with friction" if damped else ""
+    law = f" with{doubt} friction" if damped else ""
+    law = f" with {first.law}" if first.law and len(candidates) == 1 else law
     if scheme == "held-force":
         kicks = plainest.substeps[1]
         order = "kick, then drift" if kicks else "drift, then kick"

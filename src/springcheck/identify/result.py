@@ -43,21 +43,21 @@ class Candidate:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Explanation:
-    """What may be wrong: a sentence of cause, what to do, and how much it leaves unexplained.
+    """Possible cause: a sentence, what to do, and how much it leaves unexplained.
 
     `misfit` is a share of what is missing, or standard errors of a map; the smaller the better.
     """
 
     cause: str
     remedy: str
-    misfit: float
+    misfit: float = 0.0
     local: bool = False
     """Whether it leaves no noise to explain: numbers in the wrong place, or a motion known to rounding."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Identification:
-    """What the states say.  Rows of numbers hold one for each oscillator that moves.
+    """Result of an identification.  Rows of numbers hold one for each oscillator that moves.
 
     A scheme is named only where the states exclude every other.  Where several explain them equally well
     the verdict is "not told apart", `scheme` is None, `candidates` are all of them, and a number is given
@@ -68,40 +68,40 @@ class Identification:
     verdict: Verdict
     statement: str
     """One sentence: the scheme and the arithmetic, or what is wrong."""
-    scheme: str | None
-    aliases: tuple[str, ...]
+    scheme: str | None = None
+    aliases: tuple[str, ...] = ()
     """Other names of the same map: on a spring nothing can tell them apart."""
-    candidates: tuple[Candidate, ...]
-    """What the states do not exclude, the plainest first; one where stride and scheme are certain."""
-    step: float
+    candidates: tuple[Candidate, ...] = ()
+    """Schemes that the states do not exclude, the plainest first; one where stride and scheme are certain."""
+    step: float = math.nan
     """[T]; negative where time runs backwards, NaN where candidates differ."""
-    stride: int | None
+    stride: int | None = None
     """Steps from frame to frame; None where candidates differ."""
     omega: tuple[float, ...]
     """True angular frequency sqrt(k/m), not that of the discrete motion; NaN for an inverted spring [1/T]."""
-    stiffness: tuple[float, ...] | None
+    stiffness: tuple[float, ...] | None = None
     """[M/T2]; None where no mass is known."""
     friction: tuple[float, ...]
     """Rate c/m [1/T]."""
-    velocity_offset: float
+    velocity_offset: float = math.nan
     """Time of the velocities after that of the positions, in steps."""
     determinant: tuple[float, ...]
     """Determinant of the measured map, for one step."""
-    symplectic_defect: float
+    symplectic_defect: float = math.nan
     """Largest |M^T J M - J| of the measured map between frames."""
-    defect_ulp: float
+    defect_ulp: float = math.nan
     """Largest departure of one recorded step from the scheme's, in units of 2**-52 of the terms' sizes; of
     several schemes, the closest's."""
-    precision: str
-    fits: bool
+    precision: str = "unknown"
+    fits: bool = False
     """Whether a known scheme explains every step to the rounding of a known arithmetic, and what was stated
     (mass, stiffness, step) agrees with it."""
-    undecided: bool
+    undecided: bool = False
     """Whether the scheme is known, but errors of its force have the size of a known arithmetic and nothing
     shows that they are not noise or a systematic error.  `fits` is False then."""
-    nearest: str | None
+    nearest: str | None = None
     """The scheme itself, or where none fits the one whose entries are closest; None where several fit."""
-    difference: tuple[float, ...]
+    difference: tuple[float, ...] = (math.nan,) * 4
     """Measured less predicted entries M11, M12, M21, M22 on (q, v T) between frames; first oscillator."""
     notes: tuple[str, ...]
     explanations: tuple[Explanation, ...] = ()
@@ -139,18 +139,16 @@ def nothing(
     determinant: tuple[float, ...],
     symplectic_defect: float,
     defect_ulp: float,
-    notes: list[str],
+    notes: Sequence[str],
     **near: Any,
 ) -> Identification:
     """No scheme, and why; of `determinant` there is one for each oscillator that moves, and `near` says of
     the nearest scheme what is known."""
     unknown = (math.nan,) * len(determinant)
-    near = {"omega": unknown, "stiffness": None, "nearest": None, "difference": (math.nan,) * 4} | near
     return Identification(
-        verdict="none", statement=explanations[0].cause, scheme=None, aliases=(), candidates=(),
-        step=math.nan, stride=None, friction=unknown, velocity_offset=math.nan, determinant=determinant,
-        symplectic_defect=symplectic_defect, defect_ulp=defect_ulp, precision="unknown", fits=False,
-        undecided=False, notes=tuple(dict.fromkeys(notes)), explanations=explanations, **near,
+        verdict="none", statement=explanations[0].cause, friction=unknown, determinant=determinant,
+        symplectic_defect=symplectic_defect, defect_ulp=defect_ulp, notes=tuple(dict.fromkeys(notes)),
+        explanations=explanations, **{"omega": unknown, **near},
     )  # fmt: skip
 
 
@@ -182,11 +180,11 @@ IDENTIFIED = {
     "not told apart": "several schemes, which the data cannot tell apart",
     "adaptive": "adaptive solver, no fixed scheme to find",
 }
-"""What is said where no scheme is named."""
+"""Phrases of the report for verdicts that name no scheme."""
 
 
 def identification(label: str, found: Identification) -> Lines:
-    """What a trajectory says of the scheme that made it, as text."""
+    """Format an identification as text."""
     from springcheck.text.lines import hanging, plain
 
     style = "bold" if found.fits or found.verdict == "adaptive" else "bold red"

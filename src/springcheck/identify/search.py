@@ -1,4 +1,4 @@
-"""The search: which hypotheses are looked at in turn, and what those that are left would mean."""
+"""The search: which hypotheses are tried in turn, and which of them the states do not exclude."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def coincident(name: str) -> tuple[str, ...]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Room:
-    """What is allowed for beside the numbers' own uncertainty, and the strides looked at, in turn."""
+    """Tolerance beside the numbers' own uncertainty, and the strides looked at, in turn."""
 
     damped: bool = False
     rounding: float = ROUNDING
@@ -104,7 +104,7 @@ def find(seen: Measured) -> tuple[list[Joint], Measured]:
 
 
 def _plan(seen: Measured) -> list[list[Room]]:
-    """What is allowed for, the plainest first; what stands together is equally plain.
+    """Order of the search: tolerances, the plainest first; what stands together is equally plain.
 
     Without friction first, and with it where nothing fits.  Coefficients are rounded in double precision,
     unless the states show that the arithmetic was coarser, or are too few to show that it was not; text
@@ -137,7 +137,7 @@ def _plan(seen: Measured) -> list[list[Room]]:
 
 
 def _further(seen: Measured, accepted: list[Joint], room: Room) -> list[Joint]:
-    """What the states do not exclude either, beside what was accepted of few steps to a frame.
+    """Further hypotheses that the states do not exclude, beside those accepted of few steps to a frame.
 
     More of them may fit as well: the error of a step falls with their number, and where the exact flow
     fits, so does any scheme from some number on.  In double precision that is looked at only where few
@@ -153,8 +153,8 @@ def _further(seen: Measured, accepted: list[Joint], room: Room) -> list[Joint]:
 
 
 def _rivals(seen: Measured, fitting: list[Joint], *, many: bool) -> list[Joint]:
-    """What coarse files do not exclude either: a force held over substeps is nearly as many steps, and
-    friction may be what steps lose.  What has a fitting scheme's map at one friction must fit better."""
+    """Rival hypotheses in coarse files: a force held over substeps is nearly as many steps, and friction
+    may be what steps lose.  What has a fitting scheme's map at one friction must fit better."""
     losing = many or not any(x.keeps_area and x.chi2 < POOR for x in fitting)
     others = distinct(damped=True) if losing else ()
     same = {name: x.chi2 for x in fitting for name in coincident(x.family)}
@@ -194,7 +194,7 @@ def terms_of(record: Record, j: int, stated: Floats | None) -> Terms:
 
 
 def determinants(maps: list[Map], stride: int) -> tuple[tuple[float, ...], float]:
-    """Those of a step of each map, of so many steps, and how far one of a map is from 1 at most."""
+    """Determinants of one step of each map, and the largest |det - 1| of a map between frames."""
     between = [float(x.entries[0, 0] * x.entries[1, 1] - x.entries[0, 1] * x.entries[1, 0]) for x in maps]
     each = tuple(math.copysign(abs(d) ** (1 / stride), d) for d in between)
     return each, max(abs(d - 1) for d in between)

@@ -122,9 +122,9 @@ def identify_stepper(step: Stepper) -> Identification:
             for x, (m, k, h) in zip(results, SPRINGS, strict=False)
         )
         wrong.append(
-            _wrong(
-                f"The stepper looks like different schemes on different springs: {named}",
-                "look for numbers that are written into it",
+            Explanation(
+                cause=f"The stepper looks like different schemes on different springs: {named}",
+                remedy="look for numbers that are written into it",
             )
         )
     elif found.fits and any(not x.fits for x in results):
@@ -132,16 +132,17 @@ def identify_stepper(step: Stepper) -> Identification:
     if any(x.law for x in found.candidates):
         rates = ", ".join(f"{x.friction[0]:.4g} by {x.law}" for x in found.candidates[:3])
         wrong.append(
-            _wrong(
-                f"{title(found.candidates[0].scheme)} with a friction that the force has not: c/m is {rates}",
-                "set the damping to 0, which many engines do not by default",
+            Explanation(
+                cause=f"{title(found.candidates[0].scheme)} with a friction that the force has not: c/m is "
+                f"{rates}",
+                remedy="set the damping to 0, which many engines do not by default",
             )
         )
     if found.scheme and not wrong:
         wrong += _backwards(step, found)
     if found.scheme in ELSEWHERE and _calls(step) > len(ELSEWHERE[found.scheme].over) - 1 > 0:
         # more stages than the scheme needs: a fault of the same map has them
-        wrong += [_wrong(one.cause, one.remedy) for one in faults_like(found.scheme)]
+        wrong += [Explanation(cause=one.cause, remedy=one.remedy) for one in faults_like(found.scheme)]
     slope, deviation = _order(step)
     if math.isnan(slope):
         notes.append("its error on a quartic well does not fall as a power of the step: no order is seen")
@@ -151,10 +152,10 @@ def identify_stepper(step: Stepper) -> Identification:
         order = known.order if known else 0
         if order and slope < order - max(5 * deviation, 0.25):
             wrong.append(
-                _wrong(
-                    f"On a spring it is {found.scheme}, of order {order}, but not on forces that are not "
-                    "linear",
-                    "look for a force that is evaluated at the wrong place",
+                Explanation(
+                    cause=f"On a spring it is {found.scheme}, of order {order}, but not on forces that are "
+                    "not linear",
+                    remedy="look for a force that is evaluated at the wrong place",
                 )
             )
     fits = found.fits and not wrong
@@ -182,12 +183,8 @@ def _calls(step: Stepper) -> int:
     return calls[0]
 
 
-def _wrong(cause: str, remedy: str) -> Explanation:
-    return Explanation(cause=cause, remedy=remedy, misfit=0.0)
-
-
 def _backwards(step: Stepper, found: Identification) -> list[Explanation]:
-    """What a negative step does wrong, if it does not go backwards by the same scheme."""
+    """Test a negative step: explanations where it does not go backwards by the same scheme."""
     m, k, h = SPRINGS[0]
     t, q, p = _run(step, _spring(k), m, -h, (1.3, 0.7 * m), FRAMES)
     back = identify_arrays(t, q, p, mass=m, stiffness=k, step=-h)
@@ -196,9 +193,9 @@ def _backwards(step: Stepper, found: Identification) -> list[Explanation]:
     forward = identify_arrays(-t, q, p, mass=m, stiffness=k, step=h)
     if forward.scheme == found.scheme:
         cause = f"{title(str(found.scheme))}, but a negative step goes forwards: the sign of the step is lost"
-        return [_wrong(cause, "take the step with its sign")]
+        return [Explanation(cause=cause, remedy="take the step with its sign")]
     cause = f"A negative step is not {found.scheme} backwards but {back.scheme}"
-    return [_wrong(cause, "look for what depends on the direction of time")]
+    return [Explanation(cause=cause, remedy="look for what depends on the direction of time")]
 
 
 def _order(step: Stepper) -> tuple[float, float]:

@@ -25,7 +25,7 @@ MOST_DIGITS = 16
 """Significant decimal digits of text that is coarser than double precision."""
 
 DIGITS_OF_SINGLE = 7
-"""More of them say nothing of numbers of single precision."""
+"""Digits above which text says nothing of numbers of single precision."""
 
 BY_CHANCE = 1e-6
 """Probability of numbers that lie as near to those of single precision by chance, from which they do not."""
@@ -33,7 +33,7 @@ BY_CHANCE = 1e-6
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Storage:
-    """How numbers were written down: `name` ("double", "single", "text, 6 digits"), and how finely."""
+    """Format of recorded numbers: `name` ("double", "single", "text, 6 digits"), and its resolution."""
 
     name: str = "double"
     digits: int = 0
@@ -82,7 +82,7 @@ def single_of(x: Floats, digits: int = 0) -> bool:
 
 
 def storage(x: Floats) -> Storage:
-    """How x was written down, from the numbers themselves."""
+    """Detect the format of x from the numbers themselves."""
     values = np.ravel(x)
     values = values[values != 0]
     if len(np.unique(np.abs(values))) < FEWEST_VALUES:

@@ -24,7 +24,8 @@ REMEDY = "record every step, each oscillator by itself, with the velocities that
 
 
 def explained(found: Identification, t: Any, q: Any, p: Any, v: Any, mass: Any) -> Identification:
-    """What a bath explains of states (f, n) at times t (f,), or what was found before."""
+    """Identify a bath in states (f, n) at times t (f,) that no scheme explains; else what was found
+    before."""
     given = _given(t, q, p, v, mass)
     if given is None:
         return found
@@ -34,7 +35,7 @@ def explained(found: Identification, t: Any, q: Any, p: Any, v: Any, mass: Any) 
 
 
 def of_bath(t: Any, q: Any, p: Any, v: Any, mass: Any, *, mixed: bool = False) -> Identification | None:
-    """What a thermostat has left in states (f, n) at times t (f,); None where nothing random shows.
+    """Identification of the thermostat of states (f, n) at times t (f,); None where nothing random shows.
 
     `mixed` says that several draws act on each coordinate, whose distribution then does not show.
     """
@@ -144,15 +145,12 @@ def _said(found: list[Thermal], h: float, m: Any, *, with_mass: bool, joined: bo
         )
     only = candidates[0] if named else None
     return Identification(
-        verdict=verdict, statement=statement, scheme=best if named else None, aliases=(),
-        candidates=candidates,
+        verdict=verdict, statement=statement, scheme=best if named else None, candidates=candidates,
         step=h, stride=1 if named else None, omega=only.omega if only else unknown,
         stiffness=only.stiffness if only else None, friction=only.friction if only else unknown,
         velocity_offset=math.nan if not only else 0.0 if THERMOSTATS[only.scheme].synchronised else -0.5,
-        determinant=unknown, symplectic_defect=math.nan, defect_ulp=math.nan, precision="unknown",
-        fits=best is not None and first.known,
-        undecided=not first.known, nearest=best if named else None, difference=(math.nan,) * 4,
-        notes=tuple(notes),
+        determinant=unknown, fits=best is not None and first.known, undecided=not first.known,
+        nearest=best if named else None, notes=tuple(notes),
         explanations=() if best else (Explanation(cause=statement, remedy=REMEDY, misfit=math.nan),),
     )  # fmt: skip
 

@@ -17,15 +17,21 @@ ALIKE = 64
 """Roundings of a number by which coordinates of one motion may differ."""
 
 
-def of_a_bond(record: Record, moving: list[int], stated: Floats, notes: list[str]) -> Floats:
+OF_A_BOND = (
+    "the two halves of the coordinates are two particles bound to each other, at rest as a whole: the "
+    "stated stiffness is taken for that of the bond"
+)
+
+
+def of_a_bond(record: Record, moving: list[int], stated: Floats) -> Floats | None:
     """The stiffness of each coordinate (n,) where the stated one is that of a bond between two particles at
-    rest as a whole: k m_j/mu, mu the reduced mass, and a note; the stated one where the states are no pair's.
+    rest as a whole: k m_j/mu, mu the reduced mass; None where the states are no pair's.
 
     Of two halves of the coordinates the momenta are opposite in every frame, in whatever direction.
     """
     half = len(moving) // 2
     if record.mass is None or len(moving) % 2 or not half:
-        return stated
+        return None
     one, other = moving[:half], moving[half:]
     p = (record.v * record.mass).astype(np.float64)
     unit = (record.v_quantum * record.mass)[:, one] + (record.v_quantum * record.mass)[:, other]
@@ -33,20 +39,16 @@ def of_a_bond(record: Record, moving: list[int], stated: Floats, notes: list[str
     # either particle's velocity adds its roundings up by itself
     room = unit + ALIKE * ROUNDING * np.sqrt(len(p)) * size
     if np.any(np.abs(p[:, one] + p[:, other]) > room):
-        return stated
+        return None
     masses = [np.unique(record.mass[x]) for x in (one, other)]
     if len(masses[0]) > 1 or len(masses[1]) > 1:
-        return stated
-    notes.append(
-        "the two halves of the coordinates are two particles bound to each other, at rest as a whole: the "
-        "stated stiffness is taken for that of the bond"
-    )
+        return None
     return np.asarray(stated * record.mass * (1 / masses[0][0] + 1 / masses[1][0]))
 
 
 def at_rest(record: Record, found: Identification) -> Identification:
-    """What was found of points in space that are two particles bound to each other, at rest as a whole, with
-    the stiffness of their bond: that of each coordinate is k m/mu, mu the reduced mass."""
+    """Note the stiffness of the bond of two particles in space, at rest as a whole: that of each
+    coordinate is k m/mu, mu the reduced mass."""
     n = record.q.shape[1]
     moving = np.flatnonzero(np.ptp(record.q, axis=0) + np.ptp(record.v, axis=0) > 0)
     one, other = moving[: len(moving) // 2], moving[len(moving) // 2 :]
@@ -55,8 +57,8 @@ def at_rest(record: Record, found: Identification) -> Identification:
         return found
     if np.any(one % 3 != other % 3) or np.any(one // 3 != one[0] // 3) or np.any(other // 3 == one[0] // 3):
         return found
-    each = of_a_bond(record, moving.tolist(), np.ones(n), [])
-    if np.all(each == 1):
+    each = of_a_bond(record, moving.tolist(), np.ones(n))
+    if each is None:
         return found
     stiffness = float(np.median(np.array(found.stiffness) / each[moving]))
     bond = f"{BOUND}, at rest as a whole: their bond has the stiffness {stiffness:.9g}"
@@ -72,8 +74,8 @@ OF_A_PAIR = f"{BOUND}, which swing along their line: their distance is judged"
 
 
 def of_a_pair(record: Record, found: Identification) -> Identification:
-    """What was found of the distance of two particles, with what was judged, and the stiffness of their bond
-    where their masses are known."""
+    """Note that the distance of two particles was judged, and the stiffness of their bond where their
+    masses are known."""
     note = OF_A_PAIR
     if record.mass is not None and found.scheme and found.omega:
         moving = np.flatnonzero(np.ptp(record.q, axis=0) > 0)
@@ -124,7 +126,7 @@ def distance(record: Record) -> Record | None:
 
 
 def of_rotation(record: Record, found: Identification) -> Identification:
-    """What was found, where the states may as well be a rotation, or are one and no scheme fits."""
+    """Check for a rotation, which springs may explain as well, or which is there where no scheme fits."""
     if found.explanations and (cause := (not found.fits and unsorted(record)) or of_plane(record)):
         return replace(found, statement=cause[0].cause, explanations=tuple(cause))
     if not found.fits or (pair := _turning(record)) is None:

@@ -25,7 +25,7 @@ ORDERS = range(1, 9)
 """Powers of h L of which the first wrong coefficient is looked for."""
 
 FORGOTTEN = 0.1
-"""Share of what a map misses at first that is left in the last three quarters of the frames, of a memory that
+"""Share of the initial residual that is left in the last three quarters of the frames, of a memory that
 dies."""
 
 READ, CHOSEN = 1e-6, 1200
@@ -73,7 +73,7 @@ def misfit(e: Evidence) -> Explanation:
 
 
 def _class(e: Evidence) -> str:
-    """What is known of a one-step method by its map of a spring; "" where it is none's.
+    """Class of a one-step method, read from its map of a spring; "" where it is none's.
 
     A Runge-Kutta method takes (q, v) by R(h L), which is x + y L with L**2 = -w**2, so that M11 = M22 and
     M12, M21 show (h w)**2; R(i h w) less exp(i h w) is c (i h w)**n with a real c, and order n - 1.
@@ -90,7 +90,7 @@ def _class(e: Evidence) -> str:
         return ""
     size = float(e.found.size[1] / e.found.size[0])
     symmetric = abs(x - u) <= SURE * math.hypot(error[0], error[3]) + 1e-14
-    stated = _stated(e)
+    stated = e.stated
     room = 4 * (SURE * float(np.max(error)) * max(size, 1 / size) + 1e-14)
     with np.errstate(divide="ignore", invalid="ignore"):
         a = 2 * (1 - x) / y
@@ -125,13 +125,6 @@ def _class(e: Evidence) -> str:
         f"if every step was recorded, a one-step method of order {n - 1}, whose stability function has "
         f"{should + found[n].real:.3g} z**{n} in place of {should:.3g} z**{n}"
     )
-
-
-def _stated(e: Evidence) -> float | None:
-    """(h w)**2 of the stated stiffness."""
-    if e.stiffness is None or e.record.mass is None:
-        return None
-    return e.stiffness / float(e.record.mass[e.j]) * float(e.record.interval) ** 2
 
 
 def memory(e: Evidence) -> list[Explanation]:
@@ -189,7 +182,7 @@ def memory(e: Evidence) -> list[Explanation]:
 
 
 def _many_steps(rho: list[float], sigma: list[float], x: Floats) -> Floats:
-    """What a linear multistep method, rho(E) y = h L sigma(E) y, makes of (q, v h) once its start is
+    """Map of (q, v h) of a linear multistep method, rho(E) y = h L sigma(E) y, once its start is
     forgotten, by the root of rho - z sigma that comes nearest to exp(z); x is (h w)**2."""
     z = 1j * math.sqrt(max(x[0], 1e-300))
     roots = np.roots(np.array(rho) - z * np.array(sigma))
@@ -198,8 +191,8 @@ def _many_steps(rho: list[float], sigma: list[float], x: Floats) -> Floats:
 
 
 def _generalised(shares: Callable[[float], tuple[float, float]], x: Floats) -> Floats:
-    """The same of the generalised alpha method (Chung & Hulbert, J. Appl. Mech. 60 (1993) 371), of second
-    order and least damping, by the shares alpha_m and alpha_f of the parameter x[1]; x[0] is (h w)**2."""
+    """Map of the generalised alpha method (Chung & Hulbert, J. Appl. Mech. 60 (1993) 371), of second order
+    and least damping, by the shares alpha_m and alpha_f of the parameter x[1]; x[0] is (h w)**2."""
     a, (m, f) = x[0], shares(x[1])
     gamma, beta = 0.5 - m + f, (1 - m + f) ** 2 / 4
     whole = 1 - m + (1 - f) * a * beta
@@ -242,7 +235,7 @@ def _remembering(e: Evidence) -> str:
     entries, error = found.unscaled.astype(np.float64).ravel(), np.sqrt(np.diag(found.covariance))
     ratio = float(found.size[1] / found.size[0])
     error = SURE * error * [1, 1 / ratio, ratio, 1] + 1e-14
-    turn, stated, out = -entries[2] / entries[1] if entries[1] else -1.0, _stated(e), []
+    turn, stated, out = -entries[2] / entries[1] if entries[1] else -1.0, e.stated, []
     for name, entries_of in WITH_MEMORY.items():
         starts = [[1.0, y] for y in PARAMETERS] if "{" in name else [[1.0]]
 
@@ -255,7 +248,7 @@ def _remembering(e: Evidence) -> str:
             if not np.all(np.isfinite(left(np.array(start)))):
                 continue
             best = least_squares(left, start, x_scale="jac", xtol=1e-15, ftol=1e-15, gtol=1e-15)
-            other = stated is not None and abs(best.x[0] * turn / stated - 1) > READ
+            other = stated is not None and abs(best.x[0] * turn - stated) > READ * abs(stated)
             if np.max(np.abs(best.fun)) > 1 or other:
                 continue
             known = [round(float(y), DIGITS) + 0.0 for y in best.x[1:]]

@@ -65,12 +65,11 @@ def _departing(e: Evidence, scheme: str) -> Explanation:
 
 def _rank(e: Evidence, joint: Joint) -> int:
     """0 for a fault that is nothing else and of the stated stiffness, 3 where the stiffness is another."""
-    if e.stiffness is None or e.record.mass is None:
+    if (stated := e.stated) is None:
         return 0 if joint.stride == 1 else 2
     part = joint.parts[0]
-    k = float(e.record.mass[e.j]) * part.a * (joint.stride / float(e.record.interval)) ** 2
-    agrees = abs(k / e.stiffness - 1) <= 1e-7 + 6 * part.a_error / abs(part.a)
-    return 0 if agrees else 3
+    room = 1e-7 + 6 * part.a_error / abs(part.a)
+    return 0 if abs(part.a * joint.stride**2 - stated) <= room * abs(stated) else 3
 
 
 def _found(cause: str, remedy: str, joint: Joint) -> Explanation:
@@ -126,9 +125,7 @@ def _scales(e: Evidence) -> tuple[list[Explanation], bool]:
     free = Terms(mass_unknown=True, rounding=e.terms.rounding, jitter=e.terms.jitter)
     fitting = compare([e.found], [free], distinct(damped=False), range(1, 4))
     fitting = [x for x in fitting if abs(x.parts[0].log_mass) > 6 * x.parts[0].mass_error + 4 * ROUNDING]
-    of_stated = [
-        x for x in fitting if e.stiffness is not None and e.record.mass is not None and _rank(e, x) == 0
-    ]
+    of_stated = [x for x in fitting if e.stated is not None and _rank(e, x) == 0]
     fitting = of_stated or fitting
     meant = [(x, meaning) for x in fitting if (meaning := _meaning(e, x))]
     if meant:
@@ -155,7 +152,7 @@ def _scales(e: Evidence) -> tuple[list[Explanation], bool]:
 
 
 def _meaning(e: Evidence, x: Joint) -> tuple[str, str] | None:
-    """What a scale of the velocities means, by the mass, the stated stiffness and well-known factors."""
+    """Meaning of a scale of the velocities, by the mass, the stated stiffness and well-known factors."""
     part = x.parts[0]
     scale = math.exp(-part.log_mass)
     known = 6 * (part.mass_error + part.a_error / abs(part.a)) + e.record.jitter + 32 * ROUNDING
@@ -165,8 +162,7 @@ def _meaning(e: Evidence, x: Joint) -> tuple[str, str] | None:
 
     h = float(e.record.interval) / x.stride
     mass = None if e.record.mass is None else float(e.record.mass[e.j])
-    k = None if mass is None else mass * part.a / h**2
-    stiffer = None if k is None or not e.stiffness else k / e.stiffness
+    stiffer = part.a * x.stride**2 / e.stated if e.stated else None
     if stiffer is not None and is_(stiffer, scale**2, 0.0):
         if is_(scale, 1 / h**2):
             return "the step taken is 1/h: it divides by the step", "multiply by the step"
@@ -213,7 +209,7 @@ def faults_of(seen: Measured, friction: float | None) -> list[Explanation]:
 
 
 def stiffness_ratio(ratio: float, mass: float | None) -> str:
-    """What a stiffness that is `ratio` times the stated one means."""
+    """Meaning of a stiffness that is `ratio` times the stated one; "" where there is none."""
     known = [
         (1 / 4.184, "kcal taken for kJ"), (4.184, "kJ taken for kcal"),
         (4.814 / 4.184, "4.814 kJ to a kcal instead of 4.184"),

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +42,18 @@ WIDE = ROUNDOFF < 2.0**-53
 Integers: TypeAlias = NDArray[np.int64]
 Force: TypeAlias = Callable[[Reals, Reals], Reals]
 """(q, p), each (..., n) -> force on every particle (..., n) [M L/T2]."""
+
+Class = TypeVar("Class")
+
+
+def by_identity(kind: type[Class]) -> type[Class]:
+    """Class decorator: an object is equal to itself alone.
+
+    A NamedTuple compares its fields one by one, and two arrays have no one answer.
+    """
+    for name in ("__eq__", "__ne__", "__hash__"):
+        setattr(kind, name, getattr(object, name))
+    return kind
 
 
 AS_WRITTEN = "as written"

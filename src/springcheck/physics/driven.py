@@ -24,7 +24,7 @@ nothing beside that of any motion."""
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Driven(Term):
-    """What both have: frequency and phase, and where the time is read."""
+    """Base of periodically driven terms: frequency and phase, and the clock that gives their time."""
 
     kind: ClassVar[Origin] = "drive"
     ends: ClassVar[tuple[str, ...]] = ("i",)
@@ -101,7 +101,7 @@ class ModulatedSpring(LinearLaw, _Driven):
 
     @staticmethod
     def second(u: Reals, k: Floats, depth: Floats, *_: Floats) -> Reals:  # type: ignore[override]
-        """At most: `curvature` is what it is at a time."""
+        """Largest absolute curvature over all times: `curvature` has that at one time."""
         return np.asarray(np.abs(k) * (1 + np.abs(depth)))
 
     def pull(self, q: Reals) -> Reals:

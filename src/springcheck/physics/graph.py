@@ -58,7 +58,7 @@ def lowest_joined(n: int, terms: Sequence[Term]) -> Integers:
             low = np.minimum(lowest[a], lowest[b])
             for end in (a, b):
                 np.minimum.at(lowest, lowest[end], low)
-        # what a particle points to points further: every round halves the way
+        # pointer jumping: each points to where its target points, which halves all paths in a round
         while np.any(lowest[lowest] != lowest):
             lowest = lowest[lowest]
         if np.array_equal(lowest, before):
@@ -100,7 +100,7 @@ def rest_positions(n: int, terms: Sequence[Term]) -> Floats | None:
 
 
 def _in_a_row(n: int, springs: Spring) -> Floats:
-    """Where each particle is joined to the next or not: sums of rest lengths from the last break on."""
+    """Rest positions where springs join neighbours alone: sums of rest lengths from the last break on."""
     found = np.zeros(n)
     # a sum begins anew after every break, so that each is rounded as if it stood alone
     starts = np.flatnonzero(np.append(True, np.diff(springs.a) > 1))

@@ -78,7 +78,7 @@ class RadialSpring(LinearLaw, Term):
         self.add_pull(self.k * (moved - self.rest / s * (moved - along)), out)
 
     def curvature(self, q: Reals) -> Reals:
-        """At most, summed over the axes of the other rows: what Gershgorin's bound asks for."""
+        """Upper bound of each row's absolute curvatures, summed over the axes, for Gershgorin's bound."""
         _, s = self._ways(q)
         bent = self.rest / s
         return np.asarray(np.abs(self.k) * (np.abs(1 - bent) + np.sqrt(3.0) * bent))

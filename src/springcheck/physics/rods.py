@@ -133,11 +133,11 @@ class Rods:
         return np.take(rows, self._order, axis=-1)
 
     def ways(self, q: Reals) -> Reals:
-        """From one end of each rod to the other, by axes, at positions q (..., n) -> (..., s) [L]."""
+        """Vectors from one end of each rod to the other, by axes, at positions q (..., n) -> (..., s) [L]."""
         return self._rows("elongation", q)
 
     def apart(self, change: Reals) -> Reals:
-        """By how much a change of positions, or of velocities, changes them (..., s)."""
+        """Change of these vectors by a change of positions, or of velocities (..., s)."""
         return self._rows("stretch", change)
 
     def dot(self, one: Reals, other: Reals) -> Reals:
@@ -149,8 +149,8 @@ class Rods:
         return np.take(values, self._rod, axis=-1)
 
     def spread(self, values: Reals, *, size: bool = False) -> Reals:
-        """What pushes the ends of each rod apart by values (..., s) does to coordinates (..., n); the sum of
-        both sizes, if `size`."""
+        """Effect on coordinates (..., n) of pushing the ends of each rod apart by values (..., s); the sum of
+        the sizes of these effects, if `size`."""
         back = np.empty_like(values)
         back[..., self._order] = values
         out = np.zeros((*values.shape[:-1], len(self.m)), dtype=values.dtype)
@@ -166,7 +166,7 @@ class Rods:
 
     @cached_property
     def _joined(self) -> Floats:
-        """How a push along each row moves the ways of all rows (s, s) [1/M]."""
+        """Change of the vectors of all rows by a unit push along each (s, s) [1/M]."""
         unit = np.eye(len(self._rod))
         return np.asarray(self.apart(self.spread(unit) / self.m).T, np.float64)
 
@@ -275,25 +275,25 @@ class Rods:
         return of_q, of_p + self.spread(held, size=True)
 
     def sum_of_sizes(self, r: Reals, size: Reals) -> Reals:
-        """What bounds the change of products of the ways r (..., s) with changes of these sizes (..., n)."""
+        """Bound of products of the vectors r (..., s) with changes of positions of these sizes (..., n)."""
         return self.dot(np.abs(r), self._rows("most_stretch", size))
 
     def spans(self, size: Reals) -> Reals:
-        """What bounds the length of changes of the ways by these sizes of changes (..., n) -> (..., c)."""
+        """Bound of the length by which changes of these sizes (..., n) move the vectors (..., c)."""
         most = self._rows("most_stretch", size)
         return np.asarray(np.sqrt(self.dot(most, most)))
 
     def magnitude(self, q: Reals) -> Reals:
-        """What a rounding of positions q (..., n) makes of each length, relative to it (..., c)."""
+        """Effect of one rounding of positions q (..., n) on each length, relative to it (..., c)."""
         return np.asarray(self.dot(np.abs(self.ways(q)), self._most(np.abs(q))) / self.length**2)
 
     def _most(self, size: Reals) -> Reals:
-        """What bounds the ways between positions of these sizes."""
+        """Bound of the vectors between positions of these sizes."""
         at = np.concatenate([np.abs(one) for one in self._at])[self._order]
         return np.asarray(self._rows("most_stretch", size) + at)
 
     def _enlarged(self, left: Reals, right: Reals, size: Reals) -> Reals:
-        """The largest |k| of `solve` for what is wanted of these sizes."""
+        """Bound of |k| in `solve`, where what is wanted has these sizes."""
         if not self.share:
             return np.abs(self.solve(left, right, size))
         inverse = np.abs(_where_regular(np.linalg.inv, self._matrix(left, right)))

@@ -55,8 +55,8 @@ class Trajectory:
     energy: Floats | None = None
     """Total energy of each frame, (f,) [M L2/T2]; None where the scene asks for none."""
     last_step: Floats | None = None
-    """Of a solver that chooses its steps: the length of that which ended at each frame, (f,) [T], of either
-    direction of time, 0 at the start; None where it tells none."""
+    """Length of the adaptive step that ended at each frame (f,) [T], in either direction of time, 0 at the
+    start; None for fixed steps, or where the solver reports none."""
     arithmetic: Arithmetic = field(default_factory=Arithmetic)
     rebuilds_velocity: bool = False
     off_axis: float | None = None

@@ -194,8 +194,8 @@ def solver(name: str, title: str, source: str, convergence: Fraction | None = No
 
 
 def _of_an_euler_step(push: float, before: float, tolerance: float) -> float:
-    """As long as Verlet's step and explicit Euler's differ by the tolerance, at most twice the step before,
-    and the step before where it would grow by less than a fifth."""
+    """Step [T] over which Verlet's and explicit Euler's differ by the tolerance, at most twice the last step,
+    and that one where it would grow by less than a fifth."""
     with np.errstate(all="ignore"):
         new = float(np.sqrt(np.float64(tolerance) / push))
     if before == 0:

@@ -18,8 +18,8 @@ import numpy as np
 from springcheck.physics.arrays import Reals
 
 Acting: TypeAlias = Literal["", "all", "potential", "slow", "fast", "magnetic"]
-"""By which terms of a scene the force is: none is evaluated, all of them, those of the potential, or the slow
-or the fast springs, or of magnetic fields alone."""
+"""The terms whose force a stage evaluates: none, all, those of the potential, the slow or the fast springs,
+or magnetic fields alone."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -46,9 +46,9 @@ class StageKind(NamedTuple):
     """What it does with {c}, its part of the step h, for readers; F is the force at the present q and p."""
     act: Effect
     sizes: Effect
-    """What bounds its rounding: the same of sizes q, p, force and draws."""
+    """Running error bound: the same stage on absolute values of q, p, force and draws."""
     roundings: int
-    """On the longest path through it: of a force 4, of a kick 2."""
+    """Roundings on the longest path through it: 4 of a force, 2 of a kick."""
     evaluates: Acting = ""
     """The terms whose force it evaluates."""
     kicks: bool = False

@@ -37,7 +37,7 @@ class Law:
 
     @cached_property
     def traits(self) -> frozenset[Trait]:
-        """Those of the scheme, and of the scene."""
+        """The traits of the scheme, and those that the scene adds."""
         system = self.scene.system
         mixes = self.scheme.has("mixes") and any(term.kind == "potential" for term in system.slow)
         facts: dict[Trait, bool] = {

@@ -19,9 +19,9 @@ def scheme(name: str) -> Scheme:
     """The scheme of this name, of the catalogue or brought by an engine.  MethodError where there is none."""
     found = SCHEMES.get(name) or _brought.get(name)
     if found is None:
+        close = nearest(name, (*SCHEMES, *_brought)) or f"; there are {', '.join(SCHEMES)}"
         raise MethodError(
-            f"scheme {name!r} is neither in the catalogue nor brought by an engine that is here"
-            f"{nearest(name, (*SCHEMES, *_brought))}"
+            f"scheme {name!r} is neither in the catalogue nor brought by an engine that is here{close}"
         )
     return found
 

@@ -53,10 +53,10 @@ def magnitude_step(
     hold: Rods | None = None,
     loose: float = 0.0,
 ) -> tuple[Reals, Reals]:
-    """What bounds the rounding of `step` from (q, p): the same step with every difference taken as a sum.
+    """Running error bound of `step` from (q, p): the same step with every difference taken as a sum.
 
-    `met` has one entry for each evaluation of the force, in their order.  Rods `hold` after every stage, at
-    the way itself, to the tolerance `loose` of their lengths, in roundings.
+    `met` has one entry for each evaluation of the force, in their order.  Rods `hold` after every stage of
+    the step itself, to the tolerance `loose` of their lengths, in roundings.
     """
     start = way = q, p
     pull: Reals | None = None
@@ -89,8 +89,8 @@ def _tableau(
 ) -> tuple[Reals, Reals]:
     """The same for a Butcher tableau.
 
-    Beside what bounds the roundings it carries the states of the stages themselves, signs and all: a bound
-    of a stiff force is no size of the state that the force leads to.
+    Beside the bounds it carries the states of the stages themselves, signs and all: the bound of a stiff
+    force says nothing of the size of the state that the force leads to.
     """
     (q, p), size = (np.abs(x) for x in start), np.abs(h)
     slowing = np.zeros_like(m) if rate is None else rate
@@ -135,7 +135,7 @@ def _implicit_stage(
     m: Reals,
     slowed: Reals,
 ) -> Reals:
-    """What bounds the rounding of the force behind the solution of Q = q + x P/m, slowed P = p + x F(Q).
+    """Bound of the rounding of the force behind the solution of Q = q + x P/m, slowed P = p + x F(Q).
 
     q and p bound what the stage starts from; `way` is |P|, and what positions and momenta the step goes
     through on its way there, where that is known.  With A = 1 + x**2 K/(m slowed):

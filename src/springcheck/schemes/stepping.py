@@ -95,7 +95,7 @@ def step(
             qs, ps = _implicit_stage(qs, ps, own, m, force, stiffness, rate, guess=guess)
         if met is not None:
             met.append(qs)
-        # a brake by place may be large beside what it leaves of the momentum
+        # a friction that depends on the position may be far larger than the momentum that it leaves
         forces.append((ps - begun) / own if own and callable(rate) else force(qs, ps))
         velocities.append(ps / m)
     weights = [number(c, width) * h for c in scheme.b]

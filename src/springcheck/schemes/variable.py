@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from springcheck.physics.arrays import Reals
+from springcheck.physics.arrays import Reals, by_identity
 from springcheck.physics.scene import Scene
 from springcheck.schemes.catalogue import Scheme
 from springcheck.schemes.law import Law
@@ -20,6 +20,7 @@ def allowed(scene: Scene) -> float:
     return float(scene.tolerance * np.max(scene.system.amplitudes[0]))
 
 
+@by_identity
 class Taken(NamedTuple):
     """A step: its length, of either sign, the states (n,) at its start and end, and how long its rule lets it
     be."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -353,19 +354,32 @@ def attribute(node: Any, name: str) -> Any:
 
 
 def _value(node: Any, known: Any, name: str) -> Any:
-    shape, kind = known.shape, known.dtype
+    shape = known.shape
+    kind, memory = _types(known.get_type().encode())
     if shape is None:
         return "<nothing>"
-    if kind.kind not in "fiubSO" or (kind.kind == "O" and h5py.check_string_dtype(kind) is None):
+    if memory is None:
         return f"<{kind}>"
     items = int(np.prod(shape, dtype=object)) if shape else 1
     if items > MOST_ITEMS or known.get_storage_size() > LONGEST_TEXT:
         raise refuse(node, f"has an attribute {name} of {items} items")
     values = np.empty(shape, kind)
-    known.read(values)
+    known.read(values, memory)
     if kind.kind == "O" and sum(len(x or "") for x in values.ravel()) > LONGEST_TEXT:
         raise refuse(node, f"has an attribute {name} of more than {LONGEST_TEXT >> 20} MiB of text")
     return [scalar(value) for value in values.ravel()] if shape else scalar(values[()])
+
+
+@lru_cache(maxsize=64)
+def _types(encoded: bytes) -> tuple[np.dtype, Any]:
+    """A type of HDF5 as numpy's and as one of the memory, which is None where we never write such values.
+
+    A file has thousands of attributes of a handful of types, and h5py makes each anew.
+    """
+    kind = h5py.h5t.decode(encoded).dtype
+    if kind.kind not in "fiubSO" or (kind.kind == "O" and h5py.check_string_dtype(kind) is None):
+        return kind, None
+    return kind, h5py.h5t.py_create(kind)
 
 
 def scalar(value: Any) -> Scalar:

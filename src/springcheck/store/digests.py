@@ -25,7 +25,7 @@ PIECE = 1 << 20
 """Numbers that are read at a time."""
 
 KEY = "digests"
-"""The attribute of the root that keeps them."""
+"""The attribute of the root that keeps the digests."""
 
 LAID_OUT = ("h5md", "observables", "particles")
 """Groups of the root whose members have a digest each; stores of before list none of them."""

@@ -115,7 +115,7 @@ def units(scene: Scene) -> UnitsOf:
 
 
 def shape(name: str, frames: int, n: int) -> tuple[int, ...]:
-    """That of one of the quantities."""
+    """The shape of one of the quantities."""
     return (frames, n) if name in ("q", "p") else (frames,)
 
 
@@ -143,14 +143,29 @@ def size(scene: Scene) -> int:
 
 
 def write_attributes(node: Any, values: Mapping[str, Any]) -> None:
-    """Attributes: strings as variable-length UTF-8, sequences of strings as arrays of them."""
+    """Attributes: strings as variable-length UTF-8, sequences of strings as arrays of them.
+
+    As h5py's own `attrs` writes them, in half the time: types are made once, not for each attribute.
+    """
     for name, value in values.items():
-        if isinstance(value, str):
-            node.attrs.create(name, value.replace("\0", ""), dtype=_STRING)
-        elif isinstance(value, list | tuple) and value and isinstance(value[0], str):
-            node.attrs.create(name, list(value), dtype=_STRING)
+        first = value[0] if isinstance(value, list | tuple) and value else value
+        if isinstance(first, str):
+            text = value.replace("\0", "") if isinstance(value, str) else list(value)
+            data, (kind, memory) = np.array(text, dtype=object), _types(_STRING)
         else:
-            node.attrs[name] = value
+            data = np.asarray(value)
+            kind, memory = _types(data.dtype)
+        key = name.encode()
+        if h5py.h5a.exists(node.id, key):
+            h5py.h5a.delete(node.id, key)
+        space = h5py.h5s.create_simple(data.shape) if data.shape else h5py.h5s.create(h5py.h5s.SCALAR)
+        h5py.h5a.create(node.id, key, kind, space).write(data, memory)
+
+
+@cache
+def _types(kind: np.dtype) -> tuple[Any, Any]:
+    """The types of HDF5, in the file and in memory, for one of numpy's; attributes have a handful of them."""
+    return h5py.h5t.py_create(kind, logical=True), h5py.h5t.py_create(kind)
 
 
 def begin(file: Any) -> None:
@@ -308,7 +323,8 @@ def machine() -> dict[str, Scalar]:
 
 
 def _system() -> str:
-    """As `platform.platform` says it, which on Linux starts a program to ask for the processor."""
+    """The system as `platform.platform` names it, which on Linux starts a program to ask for the
+    processor."""
     if platform.system() != "Linux":
         return platform.platform()
     libc = "".join(platform.libc_ver())

@@ -38,7 +38,7 @@ def by_text(by: Sequence[Worker]) -> dict[str, str]:
 
 
 def by_of(file: Any) -> list[dict[str, str]]:
-    """By whom an open part was measured."""
+    """The workers that measured an open part."""
     try:
         found: list[dict[str, str]] = access.json(
             str(access.attribute(file, BY) or "[]"), list[dict[str, str]]

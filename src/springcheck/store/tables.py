@@ -21,7 +21,7 @@ _STYLE = "SILX_style"
 DEEPEST = 8
 """Groups that a table lies in."""
 MOST_VERDICTS = 1 << 17
-"""As many as the trajectories that a store may hold have checks."""
+"""Most verdicts: as many as there are checks of all trajectories that a store may hold."""
 _PASSED = {None: -1, False: 0, True: 1}
 
 

@@ -1,4 +1,4 @@
-"""Studies: many runs put together.  A study is a folder here and a line in `STUDIES`; nothing else names it.
+"""Studies: many runs put together.  A study is a folder here, a line in `STUDIES`, and examples for its help.
 
 They measure how good a scheme is.  A study's own control may fail it; a large error never does.
 """

@@ -34,7 +34,7 @@ SCENE = argument("scene", metavar="SCENE", help="a shipped scene's name, or the 
 
 
 def store_arguments(default: str = "SCENE.h5") -> tuple[Argument, ...]:
-    """Those of every study that is kept in a store: where, which methods, what runs beside them."""
+    """Arguments of every study that is kept in a store: where, which methods, what runs beside them."""
     return (
         argument("-o", "--output", metavar="FILE", help=f"the store (default: {default})"),
         repeatable("--method", "LABEL", "engine:method[@platform[-precision]] or a glob such as 'own:*'"),

@@ -23,7 +23,7 @@ class LeftOut:
 def sorted_out(
     labels: Iterable[Label], reason: Callable[[Label], str | None]
 ) -> tuple[list[Label], list[LeftOut]]:
-    """The methods against which there is no reason, and the others with theirs."""
+    """Methods for which `reason` is None, and the others with their reasons."""
     reasons = {label: reason(label) for label in labels}
     left = [LeftOut(method=str(label), reason=why) for label, why in reasons.items() if why]
     return [label for label, why in reasons.items() if not why], left

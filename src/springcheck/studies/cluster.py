@@ -44,7 +44,7 @@ LOGGERS = "distributed", "distributed.client", "distributed.core", "tornado", "t
 """Loggers of the library, of which some have levels of their own; those of others are left as they are."""
 
 OUT = 256
-"""Pieces that are given out at a time, at least."""
+"""Fewest pieces that are given out at a time."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,7 +136,7 @@ def _hanging(client: Any, named: set[str]) -> tuple[list[str], list[str]]:
 
 
 def _checked(part: Callable[[], Any], wanted: dict[str, str]) -> Any:
-    """What a worker does: whenever it has joined, its versions are looked at first."""
+    """Measure a piece on a worker, after a look at its versions, whenever it has joined."""
     from distributed import get_worker
 
     worker = get_worker()

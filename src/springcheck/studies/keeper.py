@@ -41,7 +41,7 @@ open_new, need_space, size = store.open_new, store.need_space, store.size
 windows, strided, end, summary = store.windows, store.strided, store.end, store.summary
 digest, attributes = store.digest, store.attributes
 tables, verdicts, comparison = store.tables_of, store.verdicts, store.comparison
-"""Trajectories of a store, written as they go and read in pieces, and what was found of them."""
+"""Functions of `store` on trajectories, which are written as they go and read in pieces, and on results."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,11 +55,11 @@ class Piece:
     measure: Callable[[], Any]
     form: Form[Any]
     cost: float = 0.0
-    """About how long it takes, beside the others."""
+    """Estimate of the time that it takes, relative to the others."""
 
     @property
     def name(self) -> str:
-        """Of its table."""
+        """Name of its table."""
         return self.form.beginning + self.key
 
 
@@ -86,7 +86,7 @@ class Keeper:
     ) -> None:
         self._journal, self.team = journal, team
         self.path = path
-        """Of the store, as it was given."""
+        """Path of the store as the caller gave it."""
         self._finished = journal.tables() if journal else {}
         self.progress = progress
         self._by: dict[str, list[dict[str, str]]] = {}
@@ -136,7 +136,7 @@ class Keeper:
         return [found[piece.name] for piece in pieces]
 
     def stream(self, pieces: Sequence[Piece]) -> Iterator[tuple[Piece, Any]]:
-        """The same as they come, and none of them held: those that are finished first."""
+        """Pieces and results as they come, none of them held in memory: those of earlier calls first."""
         self.names += [piece.name for piece in pieces]
         left = []
         for piece in pieces:

@@ -20,7 +20,7 @@ PACKAGES = ("springcheck", "numpy", "numba", "scipy")
 """Packages on which numbers depend, beside those of the engines."""
 
 MOST_HOSTS = 4
-"""Of one kind of processor, that are named."""
+"""Hosts that are named for each kind of processor."""
 
 BITS = ("elementary functions", "sums", "linear algebra")
 """What is computed for comparison: the results differ where the processors' libraries round differently."""

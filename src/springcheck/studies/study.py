@@ -64,7 +64,7 @@ class Shown:
         return found
 
     def to_dataframe(self) -> Any:
-        """The same as a pandas DataFrame; what stands within another thing is named as ``outer.inner``."""
+        """The rows as a pandas DataFrame; the columns of nested values are called ``outer.inner``."""
         from springcheck.physics.trajectory import library
 
         return library("pandas").json_normalize(self.rows())
@@ -99,10 +99,10 @@ class Study:
     """A study as the command line, `inspect` and `plot` know it."""
 
     name: str
-    """Of its command, of its folder, and of its document in a store."""
+    """The name of its command, of its folder, and of its document in a store."""
     about: str
     arguments: tuple[Argument, ...]
-    """Of its command."""
+    """The arguments of its command."""
     trajectories: bool = False
     """Kept in a store as trajectories, not as a document."""
     chooses: tuple[str, ...] = ()
@@ -166,7 +166,7 @@ class Study:
             return [path for name, picture in pictures.items() for path in save(picture, folder, name)]
 
     def pictures(self, found: Result, **chosen: Any) -> dict[str, Any]:
-        """The same as matplotlib's figures, by name."""
+        """Its figures as matplotlib's, by name."""
         if self._has("figure"):
             drawn: dict[str, Any] = self._part("figure").pictures(found, **chosen)
             return drawn

@@ -74,7 +74,7 @@ def processes(text: str) -> int:
 
 
 def arguments(default: int = 1) -> tuple[Argument, ...]:
-    """Those of a study that can be measured by many."""
+    """Arguments of a study whose pieces several workers can measure."""
     return (
         argument(
             "--workers", type=processes, default=default, metavar="N",

@@ -79,9 +79,9 @@ class Thermostat:
     draws: int = 1
     """Draws that act in a step."""
     substeps: int = 1
-    """How often fast terms act in a step, by slow and by fast ones apart where that is more than once."""
+    """How often the fast terms act in a step; above 1 the slow and the fast ones act separately."""
     carried: int = 0
-    """How many of them, its first, were the last of the step before."""
+    """How many of the draws, the first ones, are the last ones of the step before."""
     uniform: bool = False
     """Whether draws are uniform in place of normal."""
     synchronised: bool = True

@@ -21,7 +21,7 @@ FOURTH = (THIRD, 1 - 2 * THIRD, THIRD)
 
 _OUTER = (0.784513610477560, 0.235573213359357, -1.17767998417887)
 SIXTH = (*_OUTER, 1.31518632068391, *_OUTER[::-1])
-"""Those of Yoshida's sixth order, solution A, to the digits that OpenMM has."""
+"""Weights of Yoshida's sixth order, solution A, to the digits that OpenMM has."""
 
 PER_SUBSTEP = 12
 """Roundings of one variable in a substep: two exponentials, four products and two sums, and its own push."""
@@ -78,7 +78,7 @@ class Chain:
         return after, factor
 
     def energy(self, state: Any, *, freedoms: int, thermal: Any, Q: Any) -> Any:
-        """That of the chain [M L2/T2]: with that of the motion it is conserved."""
+        """Energy of the chain [M L2/T2]; its sum with the energy of the motion is conserved."""
         s, y = state[: self.length], state[self.length :]
         return np.sum(s * s / (2 * Q), axis=0) + thermal * (freedoms * y[0] + np.sum(y[1:], axis=0))
 

@@ -84,17 +84,38 @@ def _saddlepoint(value: float, n: int) -> float:
 
 
 def repeats(x: Floats) -> float:
-    """Chance of the largest autocorrelation of draws x (f, ...), over lags of any number of rows.
+    """Chance of the largest autocorrelation of draws x (f, n), taken one after the other, row by row: of each
+    number and any that comes more than n later.
 
     Each is nearly normal, more so the longer the record; ten times its chance stands for the difference.
     """
-    f = len(x)
-    padded = np.fft.rfft(x.reshape(f, -1), 2 * f, axis=0)
-    sums = np.sum(np.fft.irfft(np.abs(padded) ** 2, axis=0), axis=1)[2 : f // 2]
+    f, n = len(x), x.size // len(x)
+    padded = np.fft.rfft(x.ravel(), 2 * x.size)
+    sums = np.fft.irfft(np.abs(padded) ** 2)[n + 1 : n * (f // 2)]
     if f < 1000 or not np.all(np.isfinite(sums)):
         return 1.0
-    sizes = np.sqrt((f - np.arange(2, f // 2)) * (x.size / f))
+    sizes = np.sqrt(x.size - np.arange(n + 1, n * (f // 2)))
     return min(1.0, 10 * len(sums) * of_normal(float(np.max(np.abs(sums) / sizes))))
+
+
+MOST_PAIRED = 512
+"""Columns of which every two are compared."""
+
+
+def products(x: Floats) -> Floats:
+    """Sums of products of each pair of the first `MOST_PAIRED` columns of draws x (f, n), in standard
+    deviations given the first of the two: normal numbers (n, n), 0 on and below the diagonal."""
+    some = x[:, :MOST_PAIRED]
+    sums = some.T @ some
+    return np.asarray(np.triu(sums, 1) / np.sqrt(np.diag(sums))[:, None])
+
+
+def pairs(x: Floats) -> float:
+    """Chance of the largest of the sums of products of two columns of draws x (f, n), and of all neighbours
+    together."""
+    one, z = neighbours(x.T), products(x)
+    n = len(z)
+    return one if n < 3 else min(1.0, 2 * one, n * (n - 1) * of_normal(float(np.max(np.abs(z)))))
 
 
 def neighbours(x: Floats) -> float:
@@ -113,8 +134,8 @@ def neighbours(x: Floats) -> float:
 
 
 def crossed(x: Floats, y: Floats) -> float:
-    """Of the products of draws x (n,) with other draws y (n,) up to half of them later or earlier: the
-    largest of all sums, each of which is normal given x."""
+    """Chance of the largest cross-correlation of draws x (n,) with draws y (n,), at lags up to n/2 either
+    way; the sum at each lag is normal given x."""
     n = len(x)
     turned = np.fft.rfft(y, 2 * n) * np.conj(np.fft.rfft(x, 2 * n))
     sums, squares = np.fft.irfft(turned, 2 * n), np.concatenate([[0.0], np.cumsum(x * x)])

@@ -14,16 +14,16 @@ from springcheck.thermal.laws import Law
 from springcheck.thermal.likelihood import Candidate
 
 TRIPLES = 30000
-"""Threes of frames by which a map is tried, of which 24 are of one that holds for every tenth frame."""
+"""Triples of frames from which a map is tried: of a map that holds for every tenth frame 24 are expected."""
 
 NO_COLLISION = 1e-7
-"""Digits over the motion, to which a map holds between collisions."""
+"""Misfit, relative to the motion, up to which a map holds between two frames without a collision."""
 
 FEWEST_OF_EACH = 10
-"""Frames with and without a collision, of which there must be so many: three of them make the map."""
+"""Fewest frames with, and fewest without a collision: three of the latter make the map."""
 
 TIMES_LEFT_OVER = 10.0
-"""Times what a map leaves over, on the average, that is allowed for its entries."""
+"""Error allowed for the entries of a map, in units of its mean residual."""
 
 TOGETHER_BY_CHANCE = 1e-9
 """Chance below which frames with a collision stand together, as a part that moves otherwise does."""

@@ -30,7 +30,7 @@ HOTTEST = 1e4
 _NONE: Extended = np.empty((0, 0), np.longdouble)
 
 LARGEST_DRAW = 8.0
-"""No draw of a run of a few steps is larger: its chance is 1e-15."""
+"""Size that no draw of a run of a few steps exceeds: the chance is 1e-15 for each."""
 
 SMALLEST = np.longdouble(np.finfo(np.float64).smallest_normal)
 """What an operation may lose to underflow: at rest in 0 nothing is rounded."""
@@ -46,9 +46,9 @@ class Reading:
     Of two fresh draws a step those of the first and of the second are rows one after the other.
     """
     across: Floats | None
-    """By how many roundings states contradict each other; None where some draws reach every state."""
+    """Contradiction between the numbers of a state, in roundings; None where some draws reach every state."""
     roundings: int
-    """What `across` may be."""
+    """Largest `across` that rounding explains."""
     error: Floats
     """What rounding may leave of each draw, (f-1, n), or of two a step (2, f-1, n)."""
     hits: NDArray[np.bool_] | None = None
@@ -56,7 +56,7 @@ class Reading:
     rescaled: Floats | None = None
     """Twice the kinetic energy over kT before and after one factor for all momenta, (2, f-1)."""
     allowed: tuple[Extended, Extended] | None = None
-    """Beside rods: one rounding of everything that a step adds up, of q and of p (f-1, n)."""
+    """Running error bounds of a step of a scene with rods, of q and of p (f-1, n)."""
 
     @property
     def known(self) -> bool:
@@ -266,8 +266,8 @@ class _Reader:
     def _summed(
         self, start: tuple[Extended, Extended], end: tuple[Extended, Extended]
     ) -> tuple[Extended, Extended]:
-        """Of more draws a step than a state has numbers: that many independent sums of them (2, f-1, n), and
-        one rounding of each."""
+        """Independent sums (2, f-1, n) of more draws a step than a state has numbers, and one rounding of
+        each."""
         (f, n), r = start[0].shape, self.scheme.draws
         if n > MOST_JOINTLY or not self.scene.system.is_linear:
             # what a draw makes then depends on others
@@ -343,8 +343,8 @@ def _unit(u: int, j: int, like: Extended) -> Extended:
 
 
 def _directions(scheme: Thermostat, scene: Scene) -> tuple[Extended, bool]:
-    """How the draws of a step (draws, u) come from those u that a state tells apart, and whether a single one
-    shows in the position."""
+    """Matrix (draws, u) from the u combinations that a state determines to the draws of a step, and whether
+    only one of them reaches the position."""
     found = law_of(scheme, scene)
     # the stiffest particle has all that the others have
     j = int(np.argmax(np.abs(found.k) / found.m))

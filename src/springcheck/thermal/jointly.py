@@ -46,7 +46,7 @@ def jointly(
 def independent_sums(
     made: Extended, left: Extended, allowed: Callable[[Extended], Extended]
 ) -> tuple[Extended, Extended]:
-    """As many independent sums of draws as a state has numbers (2, f, n), and a rounding of each, where r n
+    """Independent sums (2, f, n) of draws, as many as a state has numbers, and a rounding of each, where r n
     draws make `made` (2, r n, n) and have made what is `left` (2, f, n), with roundings as `allowed` by draws
     (r, f, n): by the Cholesky factor of the covariance.  Infinite where draws do not reach each number."""
     u, f, n = left.shape

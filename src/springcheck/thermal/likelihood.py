@@ -52,7 +52,7 @@ STEPS_DOWNHILL = 40
 """Steps of Newton's method at most."""
 
 STARTS_HALVED = 3
-"""Times that the friction of a start is halved at most."""
+"""Most times that the friction of a start is halved."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,7 +71,7 @@ class Candidate:
     fast: float = 0.0
     """Share of fast terms in omega**2."""
     nats: float = 0.0
-    """By how much its likelihood falls short of the best one's."""
+    """Log-likelihood of the best candidate less its own."""
     strides: tuple[int, ...] = (1,)
     """Steps from frame to frame that the frames leave open, the likeliest first, of which the numbers are."""
 
@@ -140,9 +140,9 @@ def _compared(found: list[Candidate], q: Floats, v: Floats, *, fits: bool = Fals
 
 
 def _of_more_substeps(found: list[Candidate], q: Floats, v: Floats, h: float) -> list[Candidate]:
-    """Those found of two substeps with more of them: each count begins where the one before ends, and is the
-    last where it is less likely, and by more than `ODDS` than the best.  Counts between two are as likely as
-    the likelier one, so that none of them is named unseen."""
+    """The candidates of two substeps, continued to more: each count starts from the fit of the one before,
+    and is the last where it is less likely, and by more than `ODDS` than the best.  Counts between two are
+    as likely as the likelier one, so that none of them is named unseen."""
     best, out = min((y.nats for y in found), default=inf), []
     far = best + UNLIKE_A_FRAME * len(q)
     last = {y.strides[0]: y for y in found if y.scheme == by_groups(2).name and y.nats < far}
@@ -166,7 +166,7 @@ def _of_scheme(
     scheme: Thermostat, q: Floats, v: Floats, h: float, strides: tuple[int, ...], turn: float | None = None,
     starts: Floats | None = None,
 ) -> list[Candidate]:  # fmt: skip
-    """The best of a scheme at each stride, or from a start at each; nats are those of its likelihood."""
+    """Best candidate of a scheme at each stride, or from each start, with its log likelihood in nats."""
     moments, n = _moments(q, v * h)
     begins, every = _starts(_free(moments), strides, n)
     if starts is not None:

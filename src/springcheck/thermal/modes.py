@@ -14,9 +14,9 @@ def modes(q: Floats, v: Floats, m: Floats) -> tuple[Floats, bool] | None:
     """Combinations (n, n) of the positions q (f, n) of masses m (n,) that move each by itself, a row each,
     and whether they are known to rounding.
 
-    Where n combinations of (q', v', q, v) are free of noise, and their matrices are no multiples of 1, these
-    have them to rounding; else the best map of a frame, symmetric in sqrt(m) q, has them by statistics.  None
-    where nothing moves.
+    Where n combinations of (q', v', q, v) are free of noise, and their matrices are no multiples of 1, the
+    modes are eigenvectors of these, to rounding; else of the best map of a frame, symmetric in sqrt(m) q, to
+    its statistical error.  None where nothing moves.
     """
     n, root = q.shape[1], np.sqrt(m)
     x, u = (q - np.mean(q, axis=0)) * root, (v - np.mean(v, axis=0)) * root

@@ -29,17 +29,17 @@ UNSEEN_DRAW = 1e-6
 change, also where the reference is no wider than double, make 1e-8."""
 
 MOST_GAUSS_NEWTON = 10
-"""Of which each leaves about the square of what was off, once that is small: 4 to 9 are needed."""
+"""Gauss-Newton iterations, each of which about squares a small residual: 4 to 9 are needed."""
 
 MOST_HALVINGS = 8
-"""Of a change after which no push along a rod would keep its length: 3 are needed."""
+"""Halvings of a change of draws after which no push along a rod would keep its length: 3 are needed."""
 
 
 def read(
     scheme: Thermostat, scene: Scene, q: Floats, p: Floats, *, how: Arithmetic | None = None,
     rebuilt: bool = False,
 ) -> Reading:  # fmt: skip
-    """As `draws.read`, for a scene with rods: draws (f-1, r) are combinations of those of all coordinates."""
+    """`draws.read` for a scene with rods: draws (f-1, r) are combinations of those of all coordinates."""
     return _Reader(scheme, scene, how or Arithmetic(), rebuilt).read(q, p)
 
 
@@ -50,7 +50,7 @@ class _Reader:
         self._force = forces(scheme, scene.system)
 
     def _at(self, x: Extended, met: list[Met] | None = None) -> Extended:
-        """Where draws x (f, u n) lead to, (f, 2 n)."""
+        """State at the end of the step with draws x (f, u n) -> (f, 2 n)."""
         split = np.split(x, self._scheme.draws, axis=-1)
         end = None if met is not None else self._end
         return np.concatenate(self._stepper(*self._start, self._force, split, None, end, met), axis=-1)

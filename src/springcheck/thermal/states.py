@@ -25,8 +25,8 @@ FEWEST = 200
 """Frames from which on states are asked for their draws."""
 
 NOISE = 1e-3
-"""Size of the noise of a step over that of the motion, from which on it is noise and not rounding of a file:
-gamma h of 5e-7."""
+"""Smallest noise of a step, relative to the motion, that is taken for noise and not for rounding of a file:
+that of gamma h = 5e-7."""
 
 WHITE = 1e-9
 """Chance below which draws are no draws: deterministic motion that does not close in one frame."""
@@ -53,7 +53,7 @@ class Thermal:
     free: tuple[float, ...]
     """The combination of (x', v', x, v) that noise does not reach, 1 on x'; () where there is none."""
     misfit: float
-    """How far it is from 0, over the size of the noise."""
+    """Root mean square of that combination over that of the noise."""
     uniform: bool
     """Whether the draws are uniform rather than normal."""
     known: bool = True
@@ -203,7 +203,7 @@ def _is_uniform(x: Floats) -> bool:
 def _of_one(
     q: Floats, v: Floats, h: float, free: Floats, misfit: float, left: Floats, even: bool, mixed: bool
 ) -> Thermal | None:
-    """Of a single draw a step: the schemes of whose null vector this is one."""
+    """Schemes of one draw a step whose null vector this is."""
     _, b, c, d = free
     close = max(1e-9, 100 * misfit)
 
@@ -305,8 +305,8 @@ def _rate(of: Callable[[Floats], Floats], wanted: float) -> float | None:
 
 
 def _decay(q: Floats, v: Floats) -> tuple[float, float, float]:
-    """Of the best linear map the determinant, that of the decay of momenta, (h w)**2 as its trace has it, and
-    what either is off by at most: five standard errors, and 20/n, as far as a root near 1 is underestimated
+    """Determinant of the fitted linear map, which is the decay of momenta, (h w)**2 by its trace, and a bound
+    of the error of both: five standard errors, and 20/n for the bias of a root near 1
     (Dickey & Fuller, J. Am. Stat. Assoc. 74 (1979) 427)."""
     # neither is small beside the other
     z = np.stack([(x - np.mean(x)) / np.std(x) for x in (q, v)])
@@ -347,8 +347,8 @@ def _regressed(known: Floats, x: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def _of_no_memory(q: Floats, v: Floats, close: float) -> tuple[str, ...]:
-    """Of positions that follow their velocities, v = (x' - x)/h: those that a bath draws anew at every step,
-    or at some, between which leapfrog leaves v'' - 2 v' + v = -h w**2 (x' - x)."""
+    """Schemes in which positions follow their velocities, v = (x' - x)/h, and a bath draws these anew at
+    every step, or at some: between those leapfrog leaves v'' - 2 v' + v = -h w**2 (x' - x)."""
     with np.errstate(all="ignore"):
         slopes = np.sort((v[2:] - 2 * v[1:-1] + v[:-2]) / (q[1:-1] - q[:-2]))
         together = slopes[4:] - slopes[:-4]
@@ -364,7 +364,7 @@ def _of_no_memory(q: Floats, v: Floats, close: float) -> tuple[str, ...]:
 
 
 def _of_two_halves(q: Floats, h: float, misfit: float, beside: Floats | None, mixed: bool) -> Thermal | None:
-    """Of a draw that acts in two half kicks: velocities of the half steps have a draw of their own each."""
+    """Schemes whose draw acts in two half kicks: each velocity of a half step has a draw of its own."""
     half = np.diff(q) / h
     known = np.stack([half[:-1], q[1:-1], np.ones(len(half) - 1)], axis=1)
     entries, left, (of_c, of_kick, _) = _regressed(known, half[1:])

@@ -25,7 +25,7 @@ HERE = Path(__file__).parent
 MARK = '<meta name="generator" content="springcheck report">'
 """In the first lines of every report: no other file is replaced."""
 SCRIPTS = ("loops.js", "drawing.js", "charts.js", "files.js", "page.js")
-"""In the order in which they need one another."""
+"""Scripts of the page, each after those that it needs."""
 DASHES = ("", "7 4", "2 3", "9 3 2 3", "14 4", "9 3 2 3 2 3", "2 6")
 """In the order of `looks.LINES`."""
 PLAIN_DASHES = {EXACTLY: "1 5", SEPARATRIX: "3 3", GUIDE: "", BEGIN: ""}
@@ -40,7 +40,7 @@ SHAPES = (
 """Marks, drawn from where they stand."""
 JSON_WORDS = ("Infinity", "-Infinity", "NaN")
 FEWEST_POOLED = 8
-"""Numbers that are written where they stand."""
+"""Most numbers of a row that is written in place; a longer one is written once and referred to."""
 HEAD = 1024
 """Bytes in which the mark stands."""
 
@@ -185,7 +185,7 @@ def _json(data: Any) -> Markup:
 
 
 def _digest(text: str) -> str:
-    """As a Content-Security-Policy names what may run."""
+    """The digest by which a Content-Security-Policy allows a text to run."""
     return "sha256-" + base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
 
 

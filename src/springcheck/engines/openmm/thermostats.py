@@ -17,7 +17,7 @@ BOLTZMANN = 1.380649e-23 * 6.02214076e23 / 1000
 
 
 LOOSE = 1e300
-"""A tolerance of which every step is allowed."""
+"""A tolerance so large that it allows every step."""
 
 
 def thermostat(scene: Scene, name: str, step: float, seed: int, system: mm.System) -> mm.Integrator:

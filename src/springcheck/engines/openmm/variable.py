@@ -17,11 +17,11 @@ from springcheck.schemes import SCHEMES
 from springcheck.schemes.variable import allowed, taken
 
 MOST_STEPS = 1e8
-"""A minute of one particle."""
+"""Most steps of a run: a minute for one particle."""
 
 MOST_TRIED, ESCAPED = 10_000, 30
-"""Steps that are tried where a motion may escape, two seconds; amplitudes beyond which it has: of a well
-within a negative quartic potential it reaches sqrt(2) at most."""
+"""Most steps of the trial of a motion that may escape, two seconds; and how many amplitudes of its energy
+away it has escaped: in a well within a negative quartic potential it reaches sqrt(2) at most."""
 
 
 REACHED = 0.9

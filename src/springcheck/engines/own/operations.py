@@ -39,7 +39,7 @@ class Operation(NamedTuple):
     force: str = ""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Program:
     """A step as operations, or as an explicit tableau (`a`, `b`, times the step) by all terms."""
 

@@ -12,25 +12,26 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from springcheck.physics.arrays import EPS, Extended
+from springcheck.physics.arrays import EPS, Extended, by_identity
 from springcheck.physics.exact.linear import ROUNDINGS
 from springcheck.physics.exact.normal import Modes, normal_modes
 from springcheck.physics.exact.well import States, Well
 from springcheck.physics.system import System
 
 MOST_UNLIKE = 32
-"""Particles: so many take 0.1 s, and 40 us a frame."""
+"""Most particles, for which the solution takes 0.1 s, and 40 us a frame."""
 
 SERIES_TERMS = 17
 """Terms of the series of exp(A t) up to |A t| = 1/2: the next one is 2**-18/18!, 6e-22."""
 
 RADIX_OF_STEPS = 16
-"""Of the number of whole steps |A t| = 1/2 in a time: each of its digits is a product."""
+"""Radix in which the number of steps |A t| = 1/2 is written: each of its digits is one product."""
 
 MOST_STEP_DIGITS = 15
-"""Of it: 2**60 steps, beyond which nothing of a phase is left."""
+"""Digits of that number: up to 2**60 steps, beyond which no digit of a phase is left."""
 
 
+@by_identity
 class _Flow(NamedTuple):
     """The modes, what takes z to z' (2n, 2n) [1/T], the start (2n,), and 1/z of positions (n,)."""
 

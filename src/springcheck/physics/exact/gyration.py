@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from springcheck.physics.arrays import Extended, Integers
+from springcheck.physics.arrays import Extended, Integers, by_identity
 from springcheck.physics.exact.digits import digits, exactly, extended
 from springcheck.physics.exact.normal import exact_sums, normal_modes
 from springcheck.physics.exact.response import first_difference
@@ -19,6 +19,7 @@ from springcheck.physics.exact.well import CANCELS, LAST, States, Well
 from springcheck.physics.system import System
 
 
+@by_identity
 class _Planes(NamedTuple):
     """Particles (s,) in planes of coordinates a and b: their roots, start and centres."""
 
@@ -48,9 +49,12 @@ def prepare(system: System[Any]) -> _Planes | None:
     square = half * half - modes.w2[a]
     # where a field just holds what a spring pushes away, time makes its cube of what is lost here
     lost = CANCELS * np.abs(square) < np.abs(half * half) + np.abs(modes.w2[a])
-    if np.any(lost):
-        with digits():
-            k, _, rate = exact_sums(system.without("magnetic"), np.diagonal)
+    # and an orbit may be small beside how far from 0 its centre is
+    with digits():
+        k, pull, rate = exact_sums(system.without("magnetic"), np.diagonal)
+        centre = np.where(k == 0, 0 * k, pull / np.where(k == 0, 1, k))
+        q = extended(exactly(system.q) - centre)
+        if np.any(lost):
             m, field = exactly(system.m)[a], exactly(planes[0].parameters[0])
             real, imag = (rate[a] ** 2 - (field / m) ** 2) / 4 - k[a] / m, rate[a] * field / m / 2
             square = np.where(lost, extended(real) + 1j * extended(imag), square)
@@ -58,9 +62,8 @@ def prepare(system: System[Any]) -> _Planes | None:
     # the larger root without cancellation, the other by their product
     far = -half - np.where((half.conjugate() * root).real < 0, -root, root)
     near = np.where(far == 0, 0, modes.w2[a] / np.where(far == 0, 1, far))
-    rest = np.asarray(modes.rest, np.longdouble)
-    q, v = system.q - rest, system.p / system.m.astype(np.longdouble)
-    return _Planes(a, b, near, far, q[a] + 1j * q[b], v[a] + 1j * v[b], rest)
+    v = system.p / system.m.astype(np.longdouble)
+    return _Planes(a, b, near, far, q[a] + 1j * q[b], v[a] + 1j * v[b], extended(centre))
 
 
 def motion(system: System[Any], found: _Planes, t: Extended) -> States:

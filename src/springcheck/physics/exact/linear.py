@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from springcheck.physics.arrays import EPS, Extended
+from springcheck.physics.arrays import EPS, Extended, by_identity
 from springcheck.physics.exact.normal import Modes, normal_modes, split
 from springcheck.physics.exact.well import Well
 from springcheck.physics.system import System
@@ -50,6 +50,7 @@ def _moved(u: Extended, v: Extended, t: Extended, law: _Law) -> tuple[Extended, 
     return y, z
 
 
+@by_identity
 class _Law(NamedTuple):
     """u'' = -w2 u - rate u' + pull, the pull only where w2 = 0 (elsewhere u counts from the centre)."""
 
@@ -172,7 +173,7 @@ def energy_of_doubt(system: System[Any], found: Modes, t: np.longdouble) -> np.l
 def _of_waves(
     system: System[Any], found: Modes, t: np.longdouble
 ) -> tuple[Extended, Extended, Extended, Extended]:
-    """Of a uniform chain bounds (n,) of each wave's position and velocity, and what the transform adds.
+    """Error bounds (n,) of each wave's position and velocity in a uniform chain, and those of the transform.
 
     A wave is known like any mode.  The transform, an orthogonal one, errs by some log2(n) roundings of the
     length of what it turns (Higham, Accuracy and Stability of Numerical Algorithms, 24.1), three times that

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from springcheck.physics.arrays import Extended
+from springcheck.physics.arrays import Extended, by_identity
 from springcheck.physics.driven import ModulatedSpring
 from springcheck.physics.exact.powers import propagate
 from springcheck.physics.exact.well import LAST, PI, States, Well, one_each
@@ -26,14 +26,16 @@ MOST_NODES = 1 << 14
 """Nodes of a period: a modulation so slow that it takes more is left out."""
 
 
+@by_identity
 class _Mode(NamedTuple):
-    """One particle: u'' = -w2 (1 + depth cos(W t + phase)) u, its start (u, v), and its matrices."""
+    """One particle: u'' = -w2 (1 + depth cos(W t + phase)) u, u = q - at, its start (u, v), its matrices."""
 
     w2: np.longdouble
     depth: np.longdouble
     turn: np.longdouble
     phase: np.longdouble
     start: Extended
+    at: float
     node: np.longdouble
     """Distance of the nodes [T]."""
     nodes: Extended
@@ -56,7 +58,7 @@ def prepare(system: System[Any]) -> tuple[_Mode, ...] | None:
         start = np.array([q - np.longdouble(at), p / m])
         deep, turn, angle = (np.longdouble(x) for x in (depth, frequency, phase))
         none = np.empty(0, np.longdouble)
-        blank = _Mode(np.longdouble(k) / m, deep, turn, angle, start, np.longdouble(0), none)
+        blank = _Mode(np.longdouble(k) / m, deep, turn, angle, start, at, np.longdouble(0), none)
         if frequency == 0 or not 2 * blank.rate * 2 * np.pi / abs(frequency) < MOST_NODES:
             return None
         found.append((i, _with_nodes(blank)))
@@ -98,10 +100,6 @@ def _series(mode: _Mode, t: Extended, s: Extended) -> Extended:
 def motion(system: System[Any], found: tuple[_Mode, ...], t: Extended) -> States:
     """Exact q and p (f, n) at times t (f, 1) [T]."""
     q, p = np.empty((2, len(t), system.n), dtype=np.longdouble)
-    term = system.terms[0]
-    assert isinstance(term, ModulatedSpring)
-    at = np.zeros(system.n)
-    at[term.i] = term.at
     for i, mode in enumerate(found):
         period = 2 * PI / np.abs(mode.turn)
         n = np.floor(t[:, 0] / period).astype(np.int64)
@@ -116,7 +114,7 @@ def motion(system: System[Any], found: tuple[_Mode, ...], t: Extended) -> States
             u, v = propagate(matrix[None], u0, v0, np.abs(n[mine]), area_preserving=True)
             begun[:, mine] = np.stack([u[:, 0], v[:, 0]]) * np.where(n[mine] % 2 == 1, sign, 1)
         q[:, i], p[:, i] = np.einsum("fij,jf->if", last @ mode.nodes[j], begun)
-    return q + at, p * system.m
+    return q + np.array([mode.at for mode in found]), p * system.m
 
 
 def doubt(system: System[Any], found: tuple[_Mode, ...], t: np.longdouble) -> States:
@@ -133,7 +131,9 @@ def doubt(system: System[Any], found: tuple[_Mode, ...], t: np.longdouble) -> St
         half = np.trace(M) / 2
         root = np.emath.sqrt((half - 1) * (half + 1)) * np.copysign(1, half)
         radius, gap = max(float(np.abs(np.real(half + root))), 1.0), max(2 * float(np.abs(root)), LAST)
-        periods = float(np.abs(t) * np.abs(mode.turn) / (2 * PI)) + 1
+        period = 2 * PI / np.abs(mode.turn)
+        # before the start a whole period goes back, and some of it on
+        turned, periods = mode.rate * (t if t >= 0 else period - t), float(np.abs(t) / period) + 1
         sizes = []
         for z in mode.rate * np.geomspace(1, _balance(M) / mode.rate, SCALES):
             scaled = mode.nodes * [[1, z], [1 / z, 1]]
@@ -143,7 +143,8 @@ def doubt(system: System[Any], found: tuple[_Mode, ...], t: np.longdouble) -> St
             within = np.max(np.linalg.norm(scaled.astype(np.float64), axis=(1, 2)))
             grown = within * power**2 * max(mode.rate / z, z / mode.rate)
             sizes.append(grown * np.hypot(z * mode.start[0], mode.start[1]) / np.array([z, 1]))
-        u[i], v[i] = np.min(sizes, axis=0) * radius**periods * LAST * (1 + mode.rate * np.abs(t))
+        u[i], v[i] = np.min(sizes, axis=0) * radius**periods * LAST * (1 + turned)
+        u[i] += LAST * np.abs(mode.at)
     return u, v * system.m
 
 

@@ -14,12 +14,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from springcheck.physics.arrays import EPS, Extended, Integers, Reals
+from springcheck.physics.arrays import EPS, Extended, Integers, Reals, by_identity
 from springcheck.physics.exact.digits import ENOUGH, Wide, digits, eigen, exactly, extended
 from springcheck.physics.system import System
 from springcheck.physics.terms import Damping, Spring
 
 
+@by_identity
 class Start(NamedTuple):
     """The start of each mode, (n,) each: u from its centre [M1/2 L], v [M1/2 L/T]; and, where it does not
     turn, the shares of exp(slow t) and exp(fast t) in its motion (see `split`).
@@ -231,11 +232,17 @@ def _precise(system: System[Any]) -> Modes:
         y, v = vectors.T @ (root * q), vectors.T @ (p / root)
         u = y - np.where(is_zero, 0 * pull, pull / np.where(is_zero, 1, w2))
         slow, fast, _ = split(u, v, w2, np.max(rates))
+        # where a sum cancels, as at rest far from 0, it is known to the digits of what is added up
+        vast = left * np.max(np.abs(w2)) / np.where(is_zero, np.max(np.abs(w2)) or 1, np.abs(w2))
+        of_u = (np.abs(vectors.T) @ np.abs(root * q) + np.abs(y - u)) * vast
+        of_v = np.abs(vectors.T) @ np.abs(p / root) * left
+        of_both = split(of_u, of_v, w2, np.max(rates))[2]
+        lost = (extended(x) / EPS for x in (of_u, of_v, of_both, of_both))
         parts = tuple(extended(x) for x in (u, v, slow, fast))
         found = {"w2": extended(w2), "pull": extended(pull), "vectors": extended(vectors)}
     u, v, slow, fast = parts
-    sizes = (np.abs(u), np.abs(v), np.abs(slow), np.abs(fast))
-    start = Start(u=u, v=v, slow=slow, fast=fast, sizes=sizes)
+    most = [np.maximum(np.abs(x), least) for x, least in zip(parts, lost, strict=True)]
+    start = Start(u=u, v=v, slow=slow, fast=fast, sizes=(most[0], most[1], most[2], most[3]))
     found |= {"root_m": extended(root), "rate": system.friction_rates, "doubt": np.zeros_like(u)}
     return _modes(system, start=start, **found)
 

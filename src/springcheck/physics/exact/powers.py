@@ -6,18 +6,21 @@ from typing import NamedTuple
 
 import numpy as np
 
-from springcheck.physics.arrays import Extended, Integers
+from springcheck.physics.arrays import Extended, Integers, by_identity
 
 
+@by_identity
 class Rotation(NamedTuple):
     """How one-step matrices turn: by `angle`, or where the motion is unbounded by a hyperbolic angle `growth`
-    > 0, `sign` the sign of their eigenvalues.  `propagate` makes their powers of it.
+    > 0, `sign` the sign of their eigenvalues' real parts.  `propagate` makes their powers of it.
     """
 
     determinant: Extended
     angle: Extended
     growth: Extended
     sign: Extended
+    near: Extended
+    """The angle of sign * M, at most pi/2: near a half turn `angle` has lost the digits of pi - angle."""
 
 
 def rotation(matrices: Extended) -> Rotation:
@@ -33,7 +36,7 @@ def rotation(matrices: Extended) -> Rotation:
     half_trace = (a + d) / 2
     root = np.sqrt(np.abs(minus))
     turning = minus > 0
-    angle = np.where(turning, np.arctan2(root, half_trace), 0)
+    angle, near = (np.where(turning, np.arctan2(root, x), 0) for x in (half_trace, np.abs(half_trace)))
     # a step that reverses orientation (determinant <= 0) has no such growth
     hyperbolic = (minus < 0) & (determinant > 0)
     growth = np.zeros_like(root)
@@ -44,6 +47,7 @@ def rotation(matrices: Extended) -> Rotation:
         angle=angle,
         growth=growth,
         sign=np.where(half_trace < 0, np.longdouble(-1), np.longdouble(1)),
+        near=near,
     )
 
 
@@ -52,8 +56,9 @@ def propagate(
 ) -> tuple[Extended, Extended]:
     """Closed form of the discrete motion: M**j (y, v) of n modes for j in steps (f,) -> (f, n), twice.
 
-    M**j = d**(j/2) (C + S (M/sqrt(d) - c)) with d the determinant, c = cos(angle), C = cos(j angle) and
-    S = sin(j angle)/sin(angle); hyperbolic where the eigenvalues are real, j at the edge between.
+    M**j = sign**j d**(j/2) (C + S (sign M/sqrt(d) - c)) with d the determinant, c = cos(x), C = cos(j x) and
+    S = sin(j x)/sin(x), x the angle of sign M; hyperbolic where the eigenvalues are real, j at the edge
+    between.
     """
     turn = rotation(matrices)
     j = np.asarray(steps).astype(np.longdouble)[:, None]
@@ -61,32 +66,31 @@ def propagate(
     if np.any(d <= 0):
         raise ValueError("a step that reverses orientation (det <= 0) has no phase")
     sign = np.where(np.asarray(steps)[:, None] % 2 == 1, turn.sign, 1)
-    x, g = turn.angle, turn.growth
-    one = np.ones_like(x)
+    x, g = turn.near, turn.growth
     with np.errstate(over="ignore", invalid="ignore"):
         turning, growing = x != 0, g != 0
-        near = np.where(turning, np.cos(x), np.where(growing, turn.sign * np.cosh(g), turn.sign * one))
+        cosine = np.where(turning, np.cos(x), np.cosh(g))
         sine = np.where(turning, np.sin(np.where(turning, x, 1)), np.sinh(np.where(growing, g, 1)))
-        root = np.sqrt(d)
+        root = turn.sign * np.sqrt(d)
         # d is 1 + (h w)**2 or the like: the logarithm of the rounded sum would be wrong by j EPS
         less = matrices - np.eye(2, dtype=np.longdouble)
         a, c = less[:, 0, 0], less[:, 1, 1]
         beyond = a + c + a * c - less[:, 0, 1] * less[:, 1, 0]
         decay = j / 2 * (np.zeros_like(d) if area_preserving else np.log1p(beyond))
         # with the powers of the root: what grows by cosh and decays by friction is 0 times infinity apart
-        size, up = np.exp(decay), np.exp(decay + j * g)
+        size, up = sign * np.exp(decay), sign * np.exp(decay + j * g)
         even = np.where(
             turning,
             size * np.cos(j * x),
-            np.where(growing, sign * up * (1 + np.exp(-2 * j * g)) / 2, sign * size),
+            np.where(growing, up * (1 + np.exp(-2 * j * g)) / 2, size),
         )
         odd = np.where(
             turning,
             size * np.sin(j * x) / sine,
-            sign * turn.sign * np.where(growing, -up * np.expm1(-2 * j * g) / (2 * sine), j * size),
+            np.where(growing, -up * np.expm1(-2 * j * g) / (2 * sine), j * size),
         )
-        a, b = matrices[:, 0, 0] / root - near, matrices[:, 0, 1] / root
-        c, e = matrices[:, 1, 0] / root, matrices[:, 1, 1] / root - near
+        a, b = matrices[:, 0, 0] / root - cosine, matrices[:, 0, 1] / root
+        c, e = matrices[:, 1, 0] / root, matrices[:, 1, 1] / root - cosine
         return (
             np.asarray(even * y + odd * (a * y + b * v)),
             np.asarray(even * v + odd * (c * y + e * v)),

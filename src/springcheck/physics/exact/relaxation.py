@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from springcheck.physics.arrays import EPS, Extended, Floats
+from springcheck.physics.arrays import EPS, Extended, Floats, by_identity
 from springcheck.physics.exact.digits import digits, exactly, extended
 from springcheck.physics.exact.normal import exact_sums
 from springcheck.physics.exact.well import LAST, States, Well, wide
@@ -29,6 +29,7 @@ MOST_RADAU_STEPS = 20_000
 MOST_RADAU_CORRECTIONS = 40
 
 
+@by_identity
 class _Rule(NamedTuple):
     """Nodes c (s,) on [0, 1], A (s, s), and what makes coefficients of values (s, s)."""
 
@@ -46,6 +47,7 @@ class _Law(NamedTuple):
     centre: np.longdouble
 
 
+@by_identity
 class _Path(NamedTuple):
     """One particle: the ends of its steps t (j + 1,), u at their starts (j,), and the series of u' (j, s)."""
 
@@ -61,6 +63,7 @@ class _Path(NamedTuple):
     """The largest |D phi| between any two ends of steps, in the energy norm."""
 
 
+@by_identity
 class _Met(NamedTuple):
     """u, u' and u'' at the nodes of a step (s,), and the derivative of its end by its start (2, 2)."""
 

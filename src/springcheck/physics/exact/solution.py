@@ -15,13 +15,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from springcheck.physics.arrays import Extended, Integers
+from springcheck.physics.arrays import Extended, Integers, by_identity
 from springcheck.physics.exact import linear
 from springcheck.physics.exact.normal import Modes, normal_modes
 from springcheck.physics.exact.well import Well
 from springcheck.physics.system import Fields, System
 
 
+@by_identity
 class _Group(NamedTuple):
     """Particles (s,) of a system, the system of these alone, and the closed form of their motion."""
 

@@ -20,7 +20,7 @@ from springcheck.physics.system import System
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Swing:
-    """Of each coordinate (n,): its share of the length, signed, the direction; the centre and its velocity;
+    """Arrays by coordinate (n,): signed share of the length, and direction; the centre and its velocity;
     length less rest and its rate at the start, rest, frequency, amplitude, and the speed across."""
 
     share: Extended

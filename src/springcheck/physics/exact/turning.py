@@ -12,15 +12,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from springcheck.physics.arrays import Extended, Integers
+from springcheck.physics.arrays import Extended, Integers, by_identity
 from springcheck.physics.exact.digits import Wide, digits, exactly, extended
 from springcheck.physics.exact.well import LAST, States, Well, wide
 from springcheck.physics.rods import UNTRUE, Rods
 from springcheck.physics.system import System
 
 
+@by_identity
 class _Turning(NamedTuple):
-    """Of each coordinate (n,): its way from the centre and velocity about it, the distance of its particle,
+    """Arrays by coordinate (n,): position and velocity from the centre, the distance of its particle,
     the angular velocity, and the velocity of the centre."""
 
     x: Extended

@@ -226,7 +226,7 @@ def _of_term(term: Any) -> type[SceneTable]:
 
 
 def identifier(name: str) -> str:
-    """The attribute under which a struct holds what a scene file calls so: words with dashes are none."""
+    """The attribute of a struct for a name in a scene file: dashes become underscores."""
     return name.replace("-", "_")
 
 

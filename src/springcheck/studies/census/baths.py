@@ -39,10 +39,10 @@ DUMBBELL, NEAR_PART = 12.0, 0.375
 """Length of a rod [L], which kT turns by 0.07 a step, and the part of the mass at its near end."""
 
 BLOCKS_OF_STEPS = 20
-"""Of steps, for the standard error of what all springs share."""
+"""Blocks of steps from which the standard error of what all springs share is taken."""
 
 SEED_OF_ROWS = 26
-"""Of every row: none is chosen."""
+"""The seed of every row: none is chosen."""
 
 
 def springs(n: int, steps: int) -> Scene:

@@ -17,19 +17,21 @@ LEAST, MOST, APART = 0.05, 4.0, 0.05
 """h omega that are tried, the first of them and the last; of no engine is a limit below 0.05 looked for."""
 
 STEPS = 8
-"""Of each run: more pairs of states than a map of four entries needs, too few to leave a spring's range."""
+"""Steps of each run: more pairs of states than a map of four entries needs, too few to leave a spring's
+range."""
 
 LEAST_STEPS = 3
 """Steps from which a map of four entries follows, with two numbers over."""
 
 HALVINGS = 12
-"""Of the bracket, to 0.05 / 4096."""
+"""Halvings of the bracket, to 0.05 / 4096."""
 
 SMALL = 0.1
-"""Of the scene's start: near the limit a motion grows, and engines have a largest speed."""
+"""Part of the scene's start from which runs begin: near the limit a motion grows, and engines have a largest
+speed."""
 
 SPREAD = 10
-"""Times the error of the growth that its standard error is taken for: of eight steps it is poorly known."""
+"""Factor from the standard error of the growth to the error allowed: of eight steps it is poorly known."""
 
 LOST = 0.1
 """Error of the growth from which states follow no map, as beyond the range of an engine's spring."""

@@ -37,7 +37,7 @@ BLOG, UNEVEN = "spring", "spring-uneven"
 REPEATS = 2
 
 MOST_SUBSTEPS = 64
-"""A force held over more substeps is a force held for good."""
+"""Most substeps over which a force is said to be held; over more it is held for good."""
 
 
 def measure(methods: Sequence[str] = (), *, thermostats: bool = False, kept: Keeper | None = None) -> Census:

@@ -59,13 +59,13 @@ class Entry:
     """m <v**2>/kT where a thermostat is on."""
     kinetic_error: float = nan
     amplitude: float
-    """Of the blog's spring after its 200 steps; 1 is exact."""
+    """Amplitude of the blog's spring after its 200 steps; 1 is exact."""
     force_calls: float
     """A step, counted by us."""
     seconds: float
     """A step, on `spring-uneven`, every state read; with nothing of ours beside it."""
     digest: str
-    """Of the states of the blog's spring: equal for engines that agree bit for bit."""
+    """Digest of the states of the blog's spring: equal for engines that agree bit for bit."""
     q: Floats
     """The orbit of the blog's spring (f,)."""
     p: Floats

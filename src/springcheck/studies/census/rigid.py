@@ -22,7 +22,7 @@ from springcheck.physics.terms import Rod
 from springcheck.physics.trajectory import Trajectory
 
 LENGTH, PART = 0.75, 0.375
-"""Of the rod [L], and of the mass at its near end: unlike, and sums of few powers of 2."""
+"""Length of the rod [L], and part of the mass at its near end: unlike, and sums of few powers of 2."""
 
 TURNS: Mapping[str, Callable[[Floats], Floats]] = {
     "asin(h w)": np.arcsin,
@@ -31,11 +31,11 @@ TURNS: Mapping[str, Callable[[Floats], Floats]] = {
     "2 atan(h w/2)": lambda x: 2 * np.arctan(x / 2),
     "h w": lambda x: x,
 }
-"""By what a free rod turns in a step: of SHAKE and RATTLE; the same in two drifts of half a step; a length
-that is put right along the way after the drift; Cayley's rotation; a rotation by the angle itself."""
+"""Angle by which a free rod turns in a step: by SHAKE and RATTLE; by these in two drifts of half a step;
+where its length is put right along the rod after the drift; by Cayley's rotation; by the angle itself."""
 
 WORSE = 4
-"""Times what the best linear map leaves over of the states that the map of their scheme may leave."""
+"""Residual that the map of a scheme may leave, in residuals of the best linear map."""
 
 NO_SCHEME = "none that is known"
 

@@ -15,7 +15,7 @@ from springcheck.text.wording import number
 from springcheck.thermal.catalogue import family_of, random_scheme
 
 Cells: TypeAlias = Mapping[str, Mapping[str, str]]
-"""Of each method its version, and the text of each column."""
+"""Version, and text of each column, of each method."""
 
 
 def titles(names: str) -> str:

@@ -36,13 +36,13 @@ MOST = 1e3
 """Largest value of a size relative to the start that a picture shows: beyond it nothing can be read off."""
 
 DRAWN = SIZES
-"""Those that are drawn unless others are chosen."""
+"""Quantities that are drawn by default."""
 
 MOST_POINTS, MOST_TILES = 400, 64
 FEW = 100
-"""Points that are shown as they are in any case."""
+"""Points of a curve up to which all are shown as they are."""
 TOGETHER = 9
-"""Random samples of a point or tile, on average at least."""
+"""Fewest random samples that a point or tile puts together, on average."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -181,10 +181,10 @@ def _tiles(x: Floats, most: int, *, grid: bool) -> tuple[Floats, np.ndarray]:
 
 
 SHADES = 7
-"""Of a map, from small to large numbers."""
+"""Number of shades of a map, from small to large numbers."""
 
 SIGNED_SHADES = ("#2166ac", "#67a9cf", "#d1e5f0", "#f7f7f7", "#fddbc7", "#ef8a62", "#b2182b")
-"""Of a map of numbers of both signs, by Brewer."""
+"""Shades of a map of numbers of both signs, by Brewer."""
 
 LIMIT_NAME = "limit h \N{GREEK SMALL LETTER OMEGA} = 2"
 
@@ -251,7 +251,7 @@ def named(field: str, scene: Scene) -> str:
 
 
 def _limits(scene: Scene) -> dict[str, float]:
-    """Of one spring, where h omega = 2 by the fields that move it."""
+    """The value of each field at which h omega = 2 on a single spring, where the field changes it."""
     walls = [term for term in scene.terms if isinstance(term, WallSpring)]
     if scene.n > 1 or len(scene.terms) != 1 or not walls or len(walls[0]) != 1 or not walls[0].k[0] > 0:
         return {}
@@ -291,7 +291,7 @@ def _lines(scene: Scene, choice: Choice, shown: Mapping[str, Line]) -> Chart:
 
 
 def _axis(quantity: str, scene: Scene, values: Floats) -> Scale:
-    """Of a quantity, up to where nothing is read off it."""
+    """The axis of a quantity, cut off where larger values tell nothing."""
     name, good = _title(quantity, scene).partition(",")[0], values[np.isfinite(values)]
     if quantity == "outcome":
         return Scale(name=name, names=OUTCOMES)

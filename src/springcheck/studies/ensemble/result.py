@@ -53,10 +53,10 @@ class Tally:
     complete: int = 0
     smallest: Mapping[str, float]
     largest: Mapping[str, float]
-    """Of each of the `QUANTITIES` over the cells that are complete."""
+    """Extremes of each of the `QUANTITIES` over the complete cells."""
 
     def plus(self, found: Columns) -> Tally:
-        """With the cells of a chunk."""
+        """The tally with the cells of another chunk added."""
         good = found["outcome"] == 0
         low, high = dict(self.smallest), dict(self.largest)
         for name in QUANTITIES:

@@ -55,7 +55,7 @@ class Axis:
         return len(self.values) or self.count
 
     def at(self, index: np.ndarray) -> Floats:
-        """These values of a grid."""
+        """The grid values at these indices."""
         spaced = np.geomspace if self.log else np.linspace
         found: Floats = np.array(self.values or spaced(self.low, self.high, self.count), np.float64)[index]
         return found

@@ -14,7 +14,7 @@ from springcheck.physics.scene import Scene
 from springcheck.studies.stability.propagators import MASS, STEP
 
 STEPS = 20
-"""Of every cell."""
+"""Steps of every cell."""
 
 TURNS = (1e-8, 1e-6, 1e-4, 1e-2, 0.1, 1.0, 1.9, 1.99, 2.01, 2.5, 5.0, 10.0)
 """h w of the plane of forces."""

@@ -69,7 +69,7 @@ SLOW = frozenset(check.name for check in checks.THOROUGH if check.family == "law
 SMALLEST, LARGEST = 1e-20, 0.3
 """Sizes between which a detection limit is looked for."""
 HALVINGS = 4
-"""Of a decade: limits are known to a factor 10**(1/16) = 1.15."""
+"""Halvings of a decade: limits are known to a factor 10**(1/16) = 1.15."""
 
 
 Passed = Callable[[str, float | None], bool | None]
@@ -77,7 +77,7 @@ Passed = Callable[[str, float | None], bool | None]
 
 
 def checks_of(fault: Fault) -> tuple[str, ...]:
-    """By name: those of thermostats, or those of everything else."""
+    """Names of the checks that judge a fault: those of thermostats, or those of deterministic methods."""
     return baths.OF_THERMOSTATS if fault.random else tuple(one.name for one in checks.ALL)
 
 

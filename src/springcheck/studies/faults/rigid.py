@@ -48,16 +48,16 @@ class Rattle:
 
     solve: Solver = quadratic
     way: Callable[[Reals, Reals, Reals], Reals] = lambda r, s, older: r
-    """Along which way the ends are pushed: of those before and after the drift, and a step before."""
+    """Direction in which the ends are pushed, from the rod before and after the drift, and a step before."""
     ends: Callable[[Reals, Floats], tuple[Reals, Reals]] = lambda push, m: (-push / m[0], push / m[1])
-    """By how much a push moves both ends."""
+    """Displacements of both ends by a push."""
     impulse: float = 1.0
-    """Part of the push that momenta get."""
+    """Factor of the push where it is applied to the momenta."""
     across: Callable[[Reals, Reals], Reals | None] = lambda r, s: s
-    """Along which way velocities are projected, of those before and after the drift."""
+    """Direction along which velocities are projected, from the rod before and after the drift."""
     reduced: Callable[[Floats], float] = lambda m: float(m[0] * m[1] / (m[0] + m[1]))
     longer: float = 0.0
-    """By which part the length is too large."""
+    """Relative excess of the length."""
 
     def step(self, c: Case, i: int, q: Floats, p: Floats) -> State:
         """The step of a scene of one rod between two particles in the plane."""

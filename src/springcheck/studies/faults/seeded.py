@@ -29,7 +29,7 @@ class Case:
     x: float
     """The size of the fault."""
     seed: Any = 1
-    """Of a thermostat: a number, or a script of draws."""
+    """Seed of a thermostat: a number, or a script of draws."""
     kept: list[Any] = field(default_factory=list)
     """What a hook remembers from one call to the next."""
 
@@ -88,7 +88,7 @@ class Fault:
     step: Callable[[Case, int, Floats, Floats], State] | None = None
     """Its step by hand: the number of the step from 0, q, p -> the next (q, p)."""
     after: Callable[[Case, int, Floats, Floats], State] | None = None
-    """The same of a state (q, p) that a right step has reached."""
+    """Changes the state after each right step: the number of the step, q, p -> the next (q, p)."""
     reports: Callable[[Case, Trajectory], Trajectory] | None = None
     """What it records of its motion; energies are computed anew unless they are changed here."""
     scheme: str = "velocity-verlet"

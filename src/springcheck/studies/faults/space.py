@@ -148,7 +148,7 @@ def held(c: Case) -> Step:
 
 
 def other(scene: Scene, change: Callable[[Drive], Drive]) -> Scene:
-    """With every drive changed."""
+    """The scene with every drive changed."""
     return replace(scene, terms=tuple(change(x) if isinstance(x, Drive) else x for x in scene.terms))
 
 

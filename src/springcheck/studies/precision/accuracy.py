@@ -62,7 +62,7 @@ class Truth:
 
     @property
     def duration(self) -> float:
-        """From the start to the end [T]."""
+        """Time from the first frame to the last [T]."""
         return self.scene.step * self.scene.steps
 
     @property

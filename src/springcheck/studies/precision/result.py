@@ -35,7 +35,7 @@ class MethodSummary:
     seconds_per_step: float | None
     seconds_per_force_call: float | None
     read_seconds_per_step: float | None
-    """The same with every step read."""
+    """Seconds per step when every step is read."""
     start_seconds: float | None
     first_start_seconds: float | None
     """The first start in this process and its first short run, with import and compilation [s]."""

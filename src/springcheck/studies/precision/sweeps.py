@@ -35,7 +35,7 @@ class Sweep:
 
     label: Label
     scenes: Iterator[Scene]
-    """Those that are still to come."""
+    """Scenes of the finer steps that are still to be run."""
     scene: Scene | None = None
     """The next one, None at the end."""
     points: list[Point]
@@ -147,7 +147,7 @@ def by_tolerance(scene: Scene) -> Iterator[Scene]:
 
 
 def affordable(sweeps: list[Sweep], known: Truth, left: float) -> list[Sweep]:
-    """Those whose turn it is with so many seconds left; the cheapest that fits at all where none's is.
+    """The sweeps whose turn it is with so many seconds left; where there is none, the cheapest that fits.
 
     What the methods need that can reach their floor is set aside for them; the others share the rest
     equally.  A method that waits loses nothing: when others have finished, it goes on.

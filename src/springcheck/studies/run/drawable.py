@@ -14,16 +14,16 @@ from springcheck.studies import keeper
 from springcheck.text.wording import ordinal
 
 MOST_FRAMES = 4001
-"""Frames of one trajectory that are drawn; a longer one is drawn every so many frames, and it is said."""
+"""Most frames of one trajectory that are drawn; of a longer one every so many, which a note says."""
 
 FEWEST_FRAMES, MOST_NUMBERS = 16, 1 << 22
-"""Frames of very many particles, and positions of all of them."""
+"""Frames that are drawn however many particles there are, and positions above which frames are left out."""
 
 FIGURE_BYTES, RUN_BYTES = 160, 64
 """Memory for a frame of one particle: of the exact solution, and of each run."""
 
 END_FRAMES = 500
-"""Frames at the end of a run whose motion is too fast for that."""
+"""Frames that are drawn of the end of a run whose motion is too fast for all of it."""
 
 RESOLVED = 0.25
 """Largest way between two drawn frames, as a part of the whole, that still shows the motion: half a radian

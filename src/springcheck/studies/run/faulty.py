@@ -17,7 +17,7 @@ from springcheck.studies.keeper import Draft, attributes
 from springcheck.studies.run.result import FAULT
 
 MOST_NUMBERS = 10**7
-"""Of one trajectory: a fault is recorded in memory, by loops in Python."""
+"""Steps times particles that a run with a fault may have: loops in Python record it in memory."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +29,7 @@ class Broken:
 
     @property
     def label(self) -> str:
-        """Of its trajectory."""
+        """Label of its trajectory."""
         return f"{FAULT}:{self.fault.name}"
 
     @property

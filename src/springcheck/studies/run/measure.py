@@ -75,8 +75,6 @@ def perform(options: Namespace, progress: Progress | None) -> Report | Repeats |
         scene = changed(options)
     else:
         scene = scenefile.load_scene(options.scene)
-    if options.seed is not None and not scene.bath:
-        raise SpringcheckError("--seed goes with --vary, or with a scene that has a bath: --temperature")
     return run(
         scene,
         Path(options.output or f"{scene.name}.h5"),
@@ -118,6 +116,8 @@ def run(
     others: their report has it under `broke`.
     """
     path = Path(path)
+    if seed is not None and not scene.bath:
+        raise SpringcheckError("--seed goes with --vary, or with a scene that has a bath: --temperature")
     seeds = {"seed": driver.checked_seed(seed)} if scene.bath else {}
     labels, left, others = choose(scene, methods)
     wrong: list[Broken] = []
@@ -167,12 +167,12 @@ def run(
         sources = journal.sources()
         report = judge(scene, path, {name: sources[name] for name in names}, left, resumed=resumed)
         report = replace(report, faults={one.label: one.about for one in wrong}, others=others)
-        if thorough and scene.bath:
+        if thorough:
+            tried = checks.experiments_of(scene)
             for label in labels:
-                more = checks.judge_seeds(scene, str(label), seeds["seed"], driver.run)
+                told = bar.of(label, len(tried))
+                more = checks.judge_thoroughly(scene, str(label), driver.run, tried, progress=told, **seeds)
                 report = replace(report, verdicts=(*report.verdicts, *more))
-        elif thorough:
-            report = replace(report, verdicts=(*report.verdicts, *_experiments(scene, labels, bar)))
         report = replace(report, verdicts=tuple(checks.shared(report.verdicts)))
         if broke:
             journal.fail()
@@ -201,15 +201,6 @@ class _Bar:
             told(before + done / size, self._parts, str(label))
 
         return step
-
-
-def _experiments(scene: Scene, labels: Sequence[Label], bar: _Bar) -> list[Verdict]:
-    """The verdicts of the experiments with every method."""
-    found: list[Verdict] = []
-    for label in labels:
-        progress = bar.of(label, len(checks.THOROUGH))
-        found += checks.judge_thoroughly(scene, str(label), driver.run, progress=progress)
-    return found
 
 
 def judge(
@@ -273,7 +264,7 @@ def judge(
 
 
 def _pieces(scene: Scene, sources: Mapping[str, Path]) -> tuple[int, int]:
-    """Frames of a piece of the stored runs, and of how many pieces one is judged."""
+    """Frames of a piece of the stored runs, and the stride: of so many pieces one is judged."""
     rows = max(2, PIECE // scene.n)
     if scene.frames - 1 <= MOST_PIECES * rows:
         return rows, 1
@@ -354,7 +345,7 @@ def repeat(path: Path, *, methods: Sequence[str] = (), progress: Progress | None
                     # what an older version did not keep is no difference
                     kept = 5 if "last_step" in known[name].quantities else 4
                     sink = lambda *frames, add=draft.append, kept=kept: add(*frames[:kept])  # noqa: E731
-                    seed = int(str(before["origin.seed"])) if scene.bath else None
+                    seed = _seed(path, name, before.get("origin.seed")) if scene.bath else None
                     record = driver.play(mine, label, sink, progress=told, seed=seed)
                     digest = draft.finish(keeper.attributes(record))
                 source = journal.sources()[name]
@@ -372,6 +363,15 @@ def repeat(path: Path, *, methods: Sequence[str] = (), progress: Progress | None
                     )
                 )
     return found
+
+
+def _seed(path: Path, name: str, kept: object) -> int:
+    """The seed that a store keeps of a random run.  StoreError where it keeps none."""
+    try:
+        return driver.checked_seed(int(str(kept)))
+    except (ValueError, MethodError):
+        why = f"{path}: {name} cannot be run again: its seed is {kept!r}, and should be a whole number"
+        raise StoreError(why) from None
 
 
 def _difference(scene: Scene, one: Path, other: Path, label: str) -> float:

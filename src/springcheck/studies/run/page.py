@@ -36,7 +36,7 @@ def banks(found: Stored | Report, *, particle: int | None = None) -> list[Bank]:
 
 
 def temperatures(scene: Scene, path: Path) -> tuple[Heated, ...]:
-    """Of every stored run in a bath, by all its frames; none without a bath."""
+    """Temperatures of every stored run in a bath, over all its frames; none without a bath."""
     if scene.bath is None:
         return ()
     return tuple(heated_of(scene, keeper.windows(path, run.label)) for run in keeper.summary(path).runs)

@@ -77,7 +77,7 @@ class Report(Shown):
     judged_frames: int
     """Frames of each run that were judged: all of them, unless the run is very long."""
     temperatures: tuple[Heated, ...] = ()
-    """Of every run in a bath: its temperatures, and those of its scheme."""
+    """Measured temperatures of every run in a bath, beside those of its scheme."""
     resumed: tuple[str, ...] = ()
     others: tuple[str, ...] = ()
     """Methods that could have served the scene and were not among those that run by default."""
@@ -119,7 +119,7 @@ class Report(Shown):
 
     @property
     def not_judged(self) -> tuple[str, ...]:
-        """Methods of whose scheme nothing that applied could tell: passing would prove nothing."""
+        """Methods whose scheme no check that applied could tell from another: a pass proves nothing."""
         return checks.not_judged(self.verdicts)
 
     def document(self) -> dict[str, Any]:

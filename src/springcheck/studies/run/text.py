@@ -238,7 +238,7 @@ def _cell(verdict: Verdict | None) -> Text:
 
 
 def sights(verdicts: Sequence[Verdict]) -> Lines:
-    """What would have been seen of every method, by the check that sees most of it."""
+    """The smallest error of a stiffness that would have been seen, in the best and the worst method."""
     methods = dict.fromkeys(v.method for v in verdicts if v.passed)
     best = {name: Limits.least(v.sees for v in verdicts if v.passed and v.method == name) for name in methods}
     known = {name: sees.stiffness for name, sees in best.items() if sees.stiffness is not None}
@@ -272,8 +272,8 @@ def _faults(report: Report) -> Lines:
 
 
 def unjudged(verdicts: Sequence[Verdict]) -> Lines:
-    """Every method of whose scheme no check could tell, and why the checks could not; and of the others what
-    could not be judged in them."""
+    """Methods whose scheme no check that applied could tell from another, with the reasons; and the parts of
+    other methods that no check could judge."""
     out: Lines = []
     for v in verdicts:
         said = [part for part in v.why.split("; ") if part.endswith(checks.BLIND)] if v.passed else []

@@ -50,7 +50,7 @@ HOTTEST_LAW = 100.0
 """Over the bath's: above it, and at a limit, motion is not bounded within these steps."""
 
 SEED_OF_ALL = 27
-"""None is chosen."""
+"""One seed for all methods; none was selected."""
 
 
 def bathed(scene: Scene, turn: float, friction: float) -> Scene:
@@ -59,7 +59,7 @@ def bathed(scene: Scene, turn: float, friction: float) -> Scene:
 
 
 def law_at(scheme: str, turn: float, friction: float) -> Law:
-    """Of one of these springs."""
+    """The law of a scheme on one of these springs, by h omega and gamma/omega."""
     return Law(
         scheme=THERMOSTATS[scheme], h=turn / OMEGA, m=np.array([MASS]), k=np.array([STIFFNESS]),
         rate=friction * OMEGA, thermal=KT,
@@ -123,7 +123,7 @@ def _radius(scheme: str, friction: float, turn: float) -> float:
 
 
 def _radius_of_engine(label: Label, friction: float, turn: float) -> float:
-    """The same of an engine's own map, which one seed and three starts leave without any noise."""
+    """Spectral radius of an engine's own map; one seed and three starts cancel the noise."""
     one = bathed(springs(1, 1), turn, friction)
     rest = np.zeros(1)
     runs = [

@@ -166,7 +166,7 @@ def _oscillators(w2: Floats, modes: Floats, rate: Floats) -> Linear:
     values, vectors = np.linalg.eig(np.block([[np.zeros_like(w), w], [-w, -c]]))
     size, v = np.abs(vectors) ** 2, vectors[len(w) :]
     decay = np.real(np.sum(v.conj() * (c @ v), axis=0)) / size.sum(axis=0)
-    # a vector is known to some roundings, and the decay of what no friction acts on to their square
+    # a vector is off by some roundings: so the decay of one on which no friction acts is off by their square
     decay = np.where(decay > LEAST_DECAY * np.max(rate), decay, 0.0)
     turns, alone = values.imag > 0, np.sort(decay[values.imag == 0])
     one, other = alone[::2], alone[1::2]

@@ -18,7 +18,7 @@ from springcheck.physics.exact.mathieu import floquet
 from springcheck.physics.scene import Scene
 
 MOST_STEPS = 4096
-"""In a period: of a scene whose step is shorter the multipliers of that many are measured."""
+"""Largest number of steps in a period: where the step is shorter, multipliers are measured with this many."""
 
 INVERTIBLE = 2.0**500
 """Size of a matrix up to which, and down to its inverse, all products of two elements are doubles."""
@@ -33,13 +33,13 @@ class Multiplier:
 
     method: str
     steps: int
-    """In a period of the modulation."""
+    """Steps in a period of the modulation."""
     grown: float
     """Factor of a period, measured: two starts, a period each."""
     turned: float
     """Angle of a period [rad], from 0 to pi, measured by the same; NaN, as all, where nothing was."""
     grown_predicted: float
-    """By the scheme's own steps."""
+    """Growth that the scheme's own steps have."""
     turned_predicted: float
     off: float
     """Distance of both in the complex plane."""
@@ -113,7 +113,7 @@ def _spring(scene: Scene) -> ModulatedSpring:
 
 
 def _largest(values: np.ndarray) -> complex:
-    """Of two that are conjugate, that of the upper half plane; the size of a real one is its own."""
+    """The largest eigenvalue; of a conjugate pair the one in the upper half plane."""
     return complex(max(values, key=lambda one: (round(abs(one), 12), one.imag)))
 
 

@@ -24,10 +24,10 @@ FORCE = 1024.0
 """Largest force on a scanned spring, in the scene's unit of force."""
 
 MASS = 3.75
-"""Of every scanned spring: not 1, and exact in single precision."""
+"""Mass of every scanned spring: not 1, and exact in single precision."""
 
 STEP = 0.125
-"""Of every scan: a power of 2, so that h w is known to a rounding of sqrt(k/m)."""
+"""Step of every scan: a power of 2, so that h w is known to a rounding of sqrt(k/m)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -37,7 +37,7 @@ class Stability(Studied):
     regions: tuple[Region, ...]
     resonances: tuple[Resonance, ...]
     multipliers: tuple[Multiplier, ...] = ()
-    """Of a spring of modulated stiffness."""
+    """Floquet multipliers, where the stiffness of a spring is modulated."""
 
     def __repr__(self) -> str:
         said = f"{len(self.failures)} not where theory puts them" if self.failures else "as theory has them"
