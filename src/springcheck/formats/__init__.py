@@ -9,6 +9,8 @@ from __future__ import annotations
 import gzip
 import json
 import re
+import zlib
+from codecs import BOM_UTF8
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -120,11 +122,14 @@ def _read(path: Path, columns: list[str], step: float | None) -> States:
         if zipped:
             with gzip.open(path) as file:
                 head = file.read(BEGINNING)
+        head = head.removeprefix(BOM_UTF8)
         found = next(one for one in FORMATS if one.recognise(head, path) and (one.by == LINES or not zipped))
         if found.by != LIBRARY:
             return found.read(path, columns, step)
         return _apart(found, path, columns, step)
-    except (UnicodeDecodeError, gzip.BadGzipFile, EOFError) as error:
+    except (gzip.BadGzipFile, EOFError, zlib.error) as error:
+        raise StoreError(f"{path}: what gzip has packed is damaged or cut off ({error})") from error
+    except UnicodeDecodeError as error:
         raise StoreError(
             f"{path}: is of no format that is known here, and no text in UTF-8; {KNOWN}"
         ) from error
@@ -183,17 +188,19 @@ def read_hdf5(
         }
     groups = store.read_arrays(path, lambda place: kind(_name_of(place).rpartition("/")[2]) is not None)
     made: dict[str, States] = {}
-    said = StoreError(
-        f"{path} has no /particles as H5MD has, and no datasets of times, positions and velocities by their "
-        "names; give these, as --columns t=clock,q=run/x,v=run/dx"
-    )
+    refused = []
     for name, arrays in _by_trajectory(groups).items():
         try:
-            made[name or path.name] = _moving(path, states_of(path, arrays), alone=alone)
+            if {"t", "q"} <= {kind(one) for one in arrays}:
+                made[name or path.name] = _moving(path, states_of(path, arrays), alone=alone)
         except StoreError as error:
-            said = error if ALONE in str(error) else said
+            refused.append(error)
     if not made:
-        raise said
+        said = (
+            f"{path} has no /particles as H5MD has, and no datasets of times, positions and velocities by "
+            "their names; give these, as --columns t=clock,q=run/x,v=run/dx"
+        )
+        raise next(iter(refused), StoreError(said))
     return made
 
 
@@ -215,4 +222,6 @@ def _by_trajectory(groups: dict[str, dict[str, object]]) -> dict[str, dict[str, 
 def _moving(path: Path, found: States, *, alone: bool) -> States:
     if found.p is None and found.v is None and not alone:
         raise StoreError(f"{path}: holds no momenta or velocities; {ALONE}")
+    if found.mass is not None and (not len(found.mass) or found.q.shape[1] % len(found.mass)):
+        raise StoreError(f"{path}: {len(found.mass)} masses and {found.q.shape[1]} columns of q")
     return found

@@ -21,9 +21,9 @@ Kind: TypeAlias = Literal["t", "q", "p", "v", "m"]
 
 NAMES: dict[Kind, str] = {
     "t": r"t|time|times",
-    "q": r"q|x|y|z|pos|position|positions|r|coordinate|coordinates",
-    "p": r"p|px|py|pz|mom|momentum|momenta",
-    "v": r"v|vx|vy|vz|vel|velocity|velocities",
+    "q": r"q|r|(pos|position|positions|coordinate|coordinates)([_ ][xyz])?|[xyz]",
+    "p": r"p[xyz]?|(mom|momentum|momenta)([_ ][xyz])?",
+    "v": r"v[xyz]?|(vel|velocity|velocities)([_ ][xyz])?|[qxyz]_?dot|d[qxyz]/dt",
     "m": r"m|mass|masses",
 }
 
@@ -57,42 +57,66 @@ Reader: TypeAlias = Callable[[Path, list[str], float | None], States]
 
 def kind(name: str) -> Kind | None:
     """What a column of this name holds: units in brackets, numbers and case do not count."""
-    if len(name) > LONGEST_NAME:
-        return None
-    bare = re.sub(r"[\[(].*?[\])]", "", name.strip().strip("\"'#")).strip().lower()
-    bare = re.sub(r"[\s_.]*\d*$", "", bare)
+    bare, _ = _parted(name)
     found: list[Kind] = [one for one, pattern in NAMES.items() if re.fullmatch(pattern, bare)]
     return found[0] if found else None
+
+
+def _parted(name: str) -> tuple[str, str]:
+    """A name without units and case, and the number at its end."""
+    if len(name) > LONGEST_NAME:
+        return "", ""
+    bare = re.sub(r"[\[(].*?[\])]", "", name.strip().strip("\"'#")).strip().lower()
+    found = re.search(r"[\s_.]*(\d*)$", bare)
+    return (bare[: found.start()], found[1]) if found else (bare, "")
+
+
+def _place(name: str) -> tuple[str, str]:
+    """The axis and the number of what a column holds, as its name says them: ("x", "2") of ``vx2``."""
+    bare, number = _parted(name)
+    axis = re.search(r"[xyz](?=$|_?dot|/dt)", bare)
+    return axis[0] if axis else "", number
 
 
 def split(path: Path, columns: Columns, roundoff: float = 2.0**-53) -> States:
     """Named columns as states.  StoreError says which are missing or do not fit together."""
     parts: dict[Kind, list[Floats]] = {}
+    places: dict[Kind, list[tuple[str, str]]] = {}
     for name, values in columns.items():
         what = kind(name)
         if what is not None:
             parts.setdefault(what, []).append(values if values.ndim > 1 else values[:, None])
+            places.setdefault(what, []).append(_place(name))
+    for what, found in places.items():
+        if len({axis for axis, _ in found}) == 1:
+            places[what] = [("", number) for _, number in found]
+    for what in places.keys() & {"p", "v"}:
+        # momenta and velocities stand in the order of the positions, where their names say which is which
+        if len({*places[what]}) == len(parts[what]) and {*places[what]} == {*places.get("q", ())}:
+            parts[what] = [parts[what][places[what].index(place)] for place in places["q"]]
     for what, why in (("t", "times"), ("q", "positions")):
         if what not in parts:
             raise StoreError(f"{path}: no column of {why} among {listed(columns)}; name them, as t,q,v")
     t = np.hstack(parts["t"])
     if t.shape[1] != 1:
         raise StoreError(f"{path}: {t.shape[1]} columns of times")
-    found = {what: np.hstack(parts[what]) for what in parts if what != "m"}
-    n = found["q"].shape[1]
-    for what, values in found.items():
+    states = {what: np.hstack(parts[what]) for what in parts if what != "m"}
+    n = states["q"].shape[1]
+    for what, values in states.items():
         if what != "t" and values.shape != (len(t), n):
             raise StoreError(f"{path}: {values.shape[1]} columns of {what} and {n} of q")
         bad = np.flatnonzero(~np.isfinite(values).all(axis=1))
         if len(bad):
             raise StoreError(f"{path}: row {bad[0] + 1} of {what} is not finite")
-    mass = parts.get("m")
+    mass = np.hstack(parts["m"]) if "m" in parts else None
+    if mass is not None and np.any(mass != mass[:1]):
+        raise StoreError(f"{path}: the masses change from row to row")
     return States(
         t=t[:, 0],
-        q=found["q"],
-        p=found.get("p"),
-        v=found.get("v"),
-        mass=None if mass is None else np.hstack(mass)[0],
+        q=states["q"],
+        p=states.get("p"),
+        v=states.get("v"),
+        mass=None if mass is None else mass[0],
         roundoff=roundoff,
     )
 

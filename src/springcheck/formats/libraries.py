@@ -6,6 +6,7 @@ Each in its own units: ASE's in Angstrom, fs and u, GROMACS' in nm, ps and u, Am
 from __future__ import annotations
 
 import warnings
+from codecs import BOM_UTF8
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from importlib import import_module
@@ -19,7 +20,7 @@ import numpy as np
 from springcheck.errors import StoreError, plain
 from springcheck.formats.columns import States
 from springcheck.formats.lines import MOST_NUMBERS
-from springcheck.formats.molecular import of_frames, times
+from springcheck.formats.molecular import clock, of_frames
 from springcheck.formats.numbers import of_table, shortened, states_of
 from springcheck.formats.tables import roundoff
 
@@ -57,16 +58,16 @@ def read_ase(path: Path, columns: list[str], step: float | None) -> States:
         if len({len(atoms) for atoms in found}) != 1:
             raise StoreError(f"{path}: the number of atoms changes")
         v = []
-        for atoms in found:
+        for i, atoms in enumerate(found):
             bare = atoms.arrays.get("velocities", atoms.arrays.get("vel"))
             if bare is not None or atoms.has("momenta"):
                 v.append(bare if bare is not None else atoms.get_velocities() * units.fs)
-        named = [atoms.info.get("time", atoms.info.get("t")) for atoms in found]
-        t = named if all(x is not None for x in named) else times(path, range(len(found)), step, "fs")
+            if len(v) not in (0, i + 1):
+                raise StoreError(f"{path}: some frames have velocities, and others have none")
+        t = clock(path, [atoms.info.get("time", atoms.info.get("t")) for atoms in found], step, "fs")
         written = 2.0**-53 if kind == "traj" else _written(path.read_text().splitlines())
-        moving = v if len(v) == len(found) else None
         q = [atoms.positions for atoms in found]
-        return of_frames(path, t, q, moving, found[0].get_masses(), written)
+        return of_frames(path, t, q, v or None, found[0].get_masses(), written)
 
 
 def _written(lines: list[str]) -> float:
@@ -116,12 +117,11 @@ def read_amber(path: Path, columns: list[str], step: float | None) -> States:
             known: dict[str, Any] = file.variables
             found = {name: np.ma.filled(one[:], np.nan) for name, one in known.items()}
             kinds = [known[name].data.dtype for name in ("coordinates", "velocities") if name in found]
+            coarse = max([2.0**-53, *(np.finfo(x).eps / 2 for x in kinds)])
     if not {"time", "coordinates"} <= found.keys():
         raise StoreError(f"{path}: NetCDF without time and coordinates, which Amber's trajectories have")
     v = found.get("velocities")
-    return of_frames(
-        path, found["time"], found["coordinates"], v, None, max(np.finfo(x).eps / 2 for x in kinds)
-    )
+    return of_frames(path, found["time"], found["coordinates"], v, None, coarse)
 
 
 def read_mat(path: Path, columns: list[str], step: float | None) -> States:
@@ -143,7 +143,7 @@ def read_json(path: Path, columns: list[str], step: float | None) -> States:
     if path.stat().st_size > LONGEST_JSON:
         raise StoreError(f"{path}: more than {LONGEST_JSON >> 20} MiB of JSON; store it as NPZ or HDF5")
     with _library(path, "msgspec", "msgspec"):
-        said = path.read_bytes()
+        said = path.read_bytes().removeprefix(BOM_UTF8)
         try:
             found = msgspec.json.decode(said)
         except msgspec.DecodeError:
@@ -151,7 +151,8 @@ def read_json(path: Path, columns: list[str], step: float | None) -> States:
                 raise
             found = msgspec.json.Decoder().decode_lines(said)
     if isinstance(found, list) and found and all(isinstance(row, dict) for row in found):
-        found = {name: [row.get(name) for row in found] for name in found[0]}
+        names = dict.fromkeys(name for row in found for name in row)
+        found = {name: [row.get(name) for row in found] for name in names}
     if isinstance(found, list):
         try:
             rows = np.asarray(found, np.float64)
@@ -168,7 +169,7 @@ def read_json(path: Path, columns: list[str], step: float | None) -> States:
             try:
                 arrays[str(name)] = np.asarray(values, np.float64)
             except (ValueError, TypeError):
-                continue
+                arrays[str(name)] = np.array([*values, None], object)[:-1]
     return states_of(path, arrays, columns)
 
 
@@ -178,6 +179,8 @@ def read_pandas(call: str, path: Path, columns: list[str], step: float | None) -
         pandas = import_module("pandas")
 
         table = getattr(pandas, call)(str(path))
+        if table.index.name is not None:
+            table = table.reset_index()
         if table.size > MOST_NUMBERS:
             raise StoreError(f"{path}: more than {MOST_NUMBERS:,} numbers: choose among the columns")
         found: Mapping[str, Any] = {str(name): table[name].to_numpy() for name in table.columns}

@@ -14,6 +14,9 @@ LONGEST_LINE = 1 << 24
 """Characters."""
 MOST_NUMBERS = 1 << 24
 """Numbers of one trajectory."""
+LONGEST_TEXT, MOST_BARE = 1 << 30, 1 << 20
+"""Characters of a text, unpacked, and lines beyond two for each of its numbers: gzip makes gigabytes of a few
+kilobytes of comments."""
 
 
 class Lines:
@@ -22,7 +25,7 @@ class Lines:
     def __init__(self, path: Path) -> None:
         with path.open("rb") as raw:
             zipped = raw.read(2) == b"\x1f\x8b"
-        self.path, self.number, self._numbers = path, 0, 0
+        self.path, self.number, self._numbers, self._size = path, 0, 0, 0
         self._file = (
             gzip.open(path, "rt", encoding="utf-8-sig") if zipped else path.open(encoding="utf-8-sig")  # noqa: SIM115
         )
@@ -37,6 +40,9 @@ class Lines:
         self.number += 1
         if len(line) == LONGEST_LINE:
             raise self.wrong(f"is longer than {LONGEST_LINE >> 20} MiB")
+        self._size += len(line)
+        if self._size > LONGEST_TEXT or self.number > MOST_BARE + 2 * self._numbers:
+            raise self.wrong(f"{self.number:,} lines with {self._numbers:,} numbers: leave out the rest")
         return line.rstrip("\r\n")
 
     def wrong(self, what: str) -> StoreError:
@@ -67,6 +73,9 @@ BARE_EXPONENT = re.compile(r"^([+-]?\d*\.\d*)([+-]\d{3})$")
 def number(cell: str) -> float:
     """The number in a cell, with Fortran's exponents (1.5D+00, 1.5-100) too.  ValueError where there is
     none."""
+    if "_" in cell:
+        # Python's own way to write a number
+        raise ValueError(f"could not convert string to float: {cell!r}")
     try:
         return float(cell)
     except ValueError:

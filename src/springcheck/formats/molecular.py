@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from array import array
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -28,15 +28,33 @@ def times(path: Path, steps: Any, step: float | None, unit: str = "") -> Floats:
     return np.asarray(np.asarray(steps, np.float64) * step)
 
 
+def clock(path: Path, said: Sequence[float | None], step: float | None, unit: str = "") -> Floats:
+    """The times that frames say, or where none says one, those of counted steps."""
+    known = [one for one in said if one is not None]
+    if not known:
+        return times(path, range(len(said)), step, unit)
+    if len(known) < len(said):
+        raise StoreError(f"{path}: frame {[*said].index(None)} says no time, as others do")
+    return np.array(known)
+
+
 def of_frames(path: Path, t: Any, q: Any, v: Any, mass: Any, roundoff: float = 2.0**-53) -> States:
     """States of frames: t (f,), q and v (f, n, 3), v None where there are none, mass (n,) or None."""
-    at, positions = (np.asarray(x, np.float64) for x in (t, q))
-    frames = len(at)
+    try:
+        at, positions, velocities = (np.asarray(x, np.float64) for x in (t, q, q if v is None else v))
+    except (ValueError, TypeError) as error:
+        raise StoreError(f"{path}: its frames are no numbers, or not of as many particles each") from error
+    frames = len(positions) if positions.ndim else 0
+    if at.shape != (frames,) or positions.ndim != 3 or velocities.shape != positions.shape:
+        raise StoreError(
+            f"{path}: times {at.shape}, positions {positions.shape} and velocities {velocities.shape} do not "
+            "belong to the same frames and particles"
+        )
     if frames < 2:
         raise StoreError(f"{path}: holds {frames} frame; two are needed")
     m = None if mass is None else np.repeat(np.asarray(mass, np.float64), positions.shape[2])
-    velocities = None if v is None else np.asarray(v, np.float64).reshape(frames, -1)
-    return States(t=at, q=positions.reshape(frames, -1), p=None, v=velocities, mass=m, roundoff=roundoff)
+    flat = None if v is None else velocities.reshape(frames, -1)
+    return States(t=at, q=positions.reshape(frames, -1), p=None, v=flat, mass=m, roundoff=roundoff)
 
 
 @contextmanager
@@ -45,8 +63,10 @@ def _frames(path: Path, what: str) -> Iterator[Lines]:
     with Lines(path) as lines:
         try:
             yield lines
-        except (ValueError, IndexError) as error:
+        except ValueError as error:
             raise lines.wrong(f"is no {what}: {str(error)[:100]}") from error
+        except IndexError:
+            raise lines.wrong(f"is no {what}: it has fewer words than it should have") from None
         except StopIteration:
             raise lines.wrong("is damaged or cut off") from None
 
@@ -121,6 +141,9 @@ def read_lammps(path: Path, columns: list[str], step: float | None) -> States:
     if "id" in names:
         order = np.argsort(table[:, :, names.index("id")], axis=1, kind="stable")
         table = np.take_along_axis(table, order[:, :, None], axis=1)
+        ids = table[:, :, names.index("id")]
+        if np.any(others := np.any(ids != ids[0], axis=1)):
+            raise StoreError(f"{path}: frame {np.argmax(others)} has other atoms than the first, by their id")
     q, v = table[:, :, :3], table[:, :, 3:6]
     if np.any(boxes):
         q = q + _crossed(q, np.array(boxes))
@@ -189,7 +212,7 @@ def read_log(path: Path, columns: list[str], step: float | None) -> States:
 
 def read_gro(path: Path, columns: list[str], step: float | None) -> States:
     """Frames of a .gro file with velocities; their titles hold the times."""
-    t: list[float] = []
+    t: list[float | None] = []
     numbers = array("d")
     n: int | None = None
     wide = thin = 0
@@ -198,10 +221,11 @@ def read_gro(path: Path, columns: list[str], step: float | None) -> States:
             if not title.strip():
                 break
             n = _atoms(next(lines), lines, n)
-            t.append(float(title.rsplit("t=", 1)[1].split()[0]) if "t=" in title else float(len(t)))
+            said = re.search(r".*\bt=\s*([-+.\deE]+)", title)
+            t.append(float(said[1]) if said else None)
             for atom in range(n):
                 row = next(lines)
-                if not atom:
+                if not (atom or wide):
                     # columns are as wide as the distance between decimal points
                     points = [j for j, c in enumerate(row) if c == "."]
                     if len(points) < 6:
@@ -218,7 +242,7 @@ def read_gro(path: Path, columns: list[str], step: float | None) -> States:
     sizes = (float(np.max(np.abs(q), initial=0)), float(np.max(np.abs(v), initial=0)))
     halves = (0.5 * 10.0 ** (5 - wide), 0.5 * 10.0 ** (4 - thin))
     written = max([half / size for half, size in zip(halves, sizes, strict=True) if size > 0], default=1.0)
-    return of_frames(path, t, q, v, None, written)
+    return of_frames(path, clock(path, t, step, "ps"), q, v, None, written)
 
 
 COUNT = rb"\A[^\S\n]*\d+[^\S\n]*\n"
@@ -253,6 +277,5 @@ def read_xyz(path: Path, columns: list[str], step: float | None) -> States:
                 if len(first) < SHOWN:
                     first.append(cells[:width])
     table = np.frombuffer(numbers).reshape(len(t), n or 1, width or 3)
-    known = t if all(one is not None for one in t) else times(path, range(len(t)), step)
     v = table[:, :, 3:] if width == 6 else None
-    return of_frames(path, known, table[:, :, :3], v, None, roundoff(first, range(width)))
+    return of_frames(path, clock(path, t, step), table[:, :, :3], v, None, roundoff(first, range(width)))

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from springcheck.errors import StoreError, nearest
+from springcheck.errors import StoreError, nearest, plain
 from springcheck.formats.columns import States, kind, listed, named, split
 from springcheck.formats.lines import MOST_NUMBERS
 
@@ -55,32 +55,56 @@ def states_of(path: Path, arrays: Mapping[str, Any], names: Sequence[str] = ()) 
     `names` choose among the arrays, and say what one holds whose name does not: ``t=clock,q=x,v=dx``; of an
     only array they name the columns.
     """
+    given = arrays
     first, *more = arrays.values() or [np.empty(0)]
-    if not more and np.issubdtype(first.dtype, np.number) and first.ndim == 2 and "=" not in "".join(names):
+    if (
+        not more
+        and not isinstance(first, StoreError)
+        and np.issubdtype(first.dtype, np.number)
+        and first.ndim == 2
+        and "=" not in "".join(names)
+    ):
         return of_table(path, first, names)
-    arrays = _chosen(path, arrays, names)
+    arrays = {name: a for name, a in _chosen(path, arrays, names).items() if kind(name) is not None}
     numbers = {
-        name: a
-        for name, a in arrays.items()
-        if np.issubdtype(a.dtype, np.floating) or np.issubdtype(a.dtype, np.integer)
+        name: a for name, a in arrays.items() if not isinstance(a, StoreError) and a.dtype.kind in "fiu"
     }
     numbers = {name: _turned(a) if kind(name) == "t" else a for name, a in numbers.items()}
     rows = next((len(a) for name, a in numbers.items() if kind(name) == "t" and a.ndim == 1), 0)
     if not rows:
-        raise StoreError(
-            f"{path}: no array of times among {listed(arrays)}; name them, as --columns t=clock,q=x,v=dx"
-        )
+        refused = [a for a in arrays.values() if isinstance(a, StoreError)]
+        how = "name them, as --columns t=clock,q=x,v=dx"
+        raise next(iter(refused), StoreError(f"{path}: no array of times among {listed(given)}; {how}"))
     numbers = {
         name: a.T if a.ndim == 2 and len(a) != rows == a.shape[1] else a for name, a in numbers.items()
     }
     columns = {
         name: np.asarray(a, np.float64).reshape(rows, -1)
         for name, a in numbers.items()
-        if kind(name) not in (None, "m") and a.ndim in (1, 2, 3) and len(a) == rows
+        if a.ndim in (1, 2, 3) and len(a) == rows
     }
-    masses = [np.atleast_1d(np.asarray(a, np.float64)) for name, a in numbers.items() if kind(name) == "m"]
+    for name in arrays.keys() - columns.keys():
+        _may_be_left_out(path, name, arrays[name], rows)
+    masses = [
+        np.asarray(a, np.float64).ravel()
+        for name, a in numbers.items()
+        if kind(name) == "m" and name not in columns
+    ]
     states = split(path, columns, _roundoff([numbers[name] for name in columns]))
-    return replace(states, mass=masses[0].ravel()) if masses else states
+    return replace(states, mass=masses[0]) if masses else states
+
+
+def _may_be_left_out(path: Path, name: str, a: Any, rows: int) -> None:
+    """StoreError where what its name says is a quantity of each frame cannot be read as one: without it, the
+    others would be taken for all that was recorded.
+
+    Masses, and fewer numbers than half of the frames, such as initial values, belong to no frame.
+    """
+    if isinstance(a, StoreError):
+        raise a
+    if kind(name) != "m" and 2 * a.size > rows:
+        what = f"{a.dtype} of shape {a.shape}, no numbers of {rows} frames"
+        raise StoreError(f"{path}: {plain(name, 40)} is {what}; choose arrays, as --columns t=t,q=x,v=dx")
 
 
 def shortened(arrays: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -112,8 +136,7 @@ def read_npy(path: Path, columns: list[str], step: float | None) -> States:
     """A structured array with named fields, or a table (f, c) whose columns are named."""
     found = _load(path)
     if found.dtype.names:
-        fields = {name: np.asarray(found[name], np.float64) for name in found.dtype.names}
-        return split(path, fields, _roundoff([found[name] for name in found.dtype.names]))
+        return states_of(path, {name: found[name] for name in found.dtype.names}, columns)
     if found.ndim != 2 or not np.issubdtype(found.dtype, np.number) or np.iscomplexobj(found):
         raise StoreError(f"{path}: an array of {found.dtype} and shape {found.shape} is no table of numbers")
     return of_table(path, found, columns)

@@ -66,6 +66,9 @@ def _variables(lines: Lines) -> Iterator[tuple[str, Any, float]]:
                 values = np.array(numbers, np.float32 if match[2] == "float" else np.float64)
                 values = values.reshape(shape[::-1]).T if columns_first else values.reshape(shape)
                 yield name, values, roundoff([[x] for x in cells[:SHOWN]], [0])
+        elif "matrix" in kind_:
+            # of other numbers: that they are there is said where they are wanted
+            yield name, np.array(_cells(lines)[0], object), 0.0
 
 
 def _integers(lines: Lines, line: str) -> list[int]:

@@ -17,8 +17,8 @@ SHOWN = 1000
 """Rows whose digits are looked at."""
 FEWEST_CELLS = 8
 """Different numbers of nine digits, all of which chance does not round to single precision."""
-LONGEST_HEAD = 1 << 20
-"""Lines before the first row of numbers."""
+COMMENT = ("#", "%")
+"""What a comment begins with: it may name the columns, and holds no row of numbers."""
 
 
 def read_table(path: Path, columns: list[str], step: float | None) -> States:
@@ -27,26 +27,30 @@ def read_table(path: Path, columns: list[str], step: float | None) -> States:
     first: list[list[str]] = []
     numbers = array("d")
     width = 0
+    unlike: StoreError | None = None
     with Lines(path) as lines:
         for line in lines:
             if len(first) == SHOWN and width > 1 and (row := _plain(line)) and len(row) == width:
                 lines.count(width)
                 numbers.extend(row)
                 continue
-            if not width and lines.number > LONGEST_HEAD:
-                raise lines.wrong("no row of numbers so far")
             if width == 1 and len(first) == SHOWN:
                 break  # the message is the same, however many follow
-            cells = _cells(line)
-            if not cells or (width and line.lstrip().startswith("#")):
-                continue
+            cells, is_comment = _cells(line), line.lstrip().startswith(COMMENT)
             row = _numbers(cells)
+            if not cells or (is_comment and (width or row)):
+                continue
             if row is None:
+                bad = [cell for cell in cells if _numbers([cell]) is None]
+                wrong = lines.wrong(f"{bad[0][:40]!r} is no number")
                 if width:
-                    wrong = next(cell for cell in cells if _numbers([cell]) is None)
-                    raise lines.wrong(f"{wrong[:40]!r} is no number")
+                    raise wrong
+                # the first row, if it is one of as many numbers as follow, or names of columns
+                unlike = wrong if not is_comment and 2 * len(bad) <= len(cells) else None
                 header = cells
                 continue
+            if not width and unlike and len(header) == len(row):
+                raise unlike
             width = width or len(row)
             if len(row) != width:
                 raise lines.wrong(f"{len(row)} numbers where there were {width}")
@@ -74,21 +78,26 @@ def of_rows(
 
 
 def _cells(line: str) -> list[str]:
-    text = line.strip(" ").lstrip("#").strip(" ")
+    text = line.strip(" ").lstrip("#%").strip(" ")
     if ";" in text or "\t" in text:
         # there a comma stands for a decimal point
-        parts = [re.sub(r"^([+-]?\d*),(\d+)", r"\1.\2", x.strip()) for x in re.split(r"[;\t]", text)]
+        parts = [re.sub(r"^([+-]?\d*),(\d+)", r"\1.\2", _bare(x)) for x in re.split(r"[;\t]", text)]
     else:
         # a name may hold a blank, as in "t [s]", where something else lies between the columns
-        parts = [x.strip() for x in text.split(",")] if "," in text else text.split()
+        parts = [*map(_bare, text.split(","))] if "," in text else text.split()
     while parts and not parts[-1]:
         parts.pop()
     return parts
 
 
+def _bare(cell: str) -> str:
+    """A cell without blanks and quotes around it."""
+    return cell.strip().removeprefix('"').removesuffix('"').strip()
+
+
 def _plain(line: str) -> list[float] | None:
     """The numbers of a row that needs no more than `float`, which most do: some four times as fast."""
-    if ";" in line or "\t" in line:
+    if ";" in line or "\t" in line or "_" in line:
         return None
     try:
         return [*map(float, line.split("," if "," in line else None))]

@@ -36,7 +36,8 @@ def read_trr(path: Path, columns: list[str], step: float | None) -> States:
                 raise StoreError(f"{path}: is no .trr file from byte {at} on")
             # of positions, velocities or forces, or of the box where there are none
             width = max(sizes[7:]) // (3 * atoms) or sizes[2] // 9
-            kind, roundoff = KINDS[width]
+            kind, coarse = KINDS[width]
+            roundoff = max(roundoff, coarse)
             begin = at + 64 + name
             time = float(np.frombuffer(data, kind, 1, begin)[0])
             begin += 2 * width + sum(sizes[:7])

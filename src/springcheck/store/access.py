@@ -172,8 +172,8 @@ def dataset_at(file: Any, path: str, *, packed: bool = False) -> Any:
     node = find(file, path)
     if node is None:
         raise StoreError(f"cannot read {file.file.filename}: {path} is missing")
-    if not isinstance(node, h5py.Dataset):
-        raise refuse(node, "is no dataset")
+    if not isinstance(node, h5py.Dataset) or node.shape is None:
+        raise refuse(node, "is no dataset of any size")
     how = StoredAs.of(node)
     size = node.file.id.get_filesize()
     claimed = int(np.prod(node.shape, dtype=object)) * node.dtype.itemsize
@@ -320,7 +320,7 @@ def column(dataset: Any, rows: Any = ()) -> np.ndarray:
     """Numbers, truth values or texts of a table's column; of numbers some rows, if told."""
     if is_text(dataset):
         return texts(dataset)
-    if dataset.dtype.kind not in "fiub" or dataset.shape is None:
+    if dataset.dtype.kind not in "fiub":
         raise refuse(dataset, f"is of type {dataset.dtype}, no column of ours")
     return np.asarray(dataset[rows])
 

@@ -25,7 +25,6 @@ from springcheck.errors import StoreError, StoreWarning
 
 JOURNAL = ".parts"
 """Ending of the folder of a store that is being written."""
-JOURNAL_FORMAT = "springcheck journal 1"
 
 TEMPORARY = re.compile(r"springcheck-[0-9a-f]{16}\.new")
 """Names of files that are being written: of a user's files none is called so."""

@@ -92,8 +92,8 @@ def is_foreign(path: str | Path) -> bool:
 def read_arrays(path: str | Path, wanted: Callable[[str], bool]) -> dict[str, dict[str, Any]]:
     """Arrays of numbers of an HDF5 file by group and name, those whose path is wanted.
 
-    What does not lie in the file, has more than three dimensions or is too large is left out.
-    Raises StoreError where the file cannot be read.
+    In the place of one that does not lie in the file, is none of numbers or is too large, stands a StoreError
+    that says so.  Raises StoreError where the file cannot be read.
     """
     path = Path(path)
     trust.trust(path, trust.FOREIGN)
@@ -105,37 +105,41 @@ def read_arrays(path: str | Path, wanted: Callable[[str], bool]) -> dict[str, di
 
 
 def arrays(path: Path, wanted: Callable[[str], bool]) -> Iterator[tuple[str, Any]]:
-    """The same one by one, in this process: together no more than one trajectory may have.
-
-    Raises StoreError where none of those wanted can be read.
-    """
+    """The same one by one, in this process: together no more than one trajectory may have."""
     left = MOST_NUMBERS
-    refused: StoreError | None = None
     with access.for_reading(path) as file:
-        for place, _, node in access.walk(file, access.MOST_MEMBERS, DEEPEST):
-            if isinstance(node, h5py.Dataset) and wanted(place):
-                try:
-                    dataset = _numbers(path, file, place)
-                    if dataset.size > left:
-                        raise StoreError(f"{path}: more than {MOST_NUMBERS:,} numbers, with those in {place}")
-                    if dataset.ndim <= 3:
-                        values = np.asarray(dataset[()])
-                        left -= dataset.size
-                        yield place, values
-                except StoreError as error:
-                    refused = refused or error
-        if refused and left == MOST_NUMBERS:
-            raise refused
+        for place in filter(wanted, _places(file)):
+            try:
+                dataset = _numbers(path, file, place)
+                if dataset.size > left:
+                    raise StoreError(f"{path}: more than {MOST_NUMBERS:,} numbers, with those in {place}")
+                values = np.asarray(dataset[()])
+                left -= dataset.size
+                yield place, values
+            except StoreError as error:
+                yield place, error
+
+
+def _places(file: Any) -> Iterator[str]:
+    """Paths of the datasets of a file, and of the links that lead elsewhere."""
+    groups = [("", file)]
+    for place, _, node in access.walk(file, access.MOST_MEMBERS, DEEPEST):
+        if isinstance(node, h5py.Group):
+            groups.append((f"{place}/", node))
+        elif isinstance(node, h5py.Dataset):
+            yield place
+    for place, group in groups:
+        inside = {*access.members(group)}
+        yield from (place + name for name in group if name not in inside)
 
 
 def _groups(path: Path, file: Any, names: list[str], most: int | None) -> Iterator[tuple[str, Foreign]]:
     for name in names:
         group = access.find(file, f"particles/{name}")
-        elements = set(access.members(group)) if isinstance(group, h5py.Group) else set()
-        if "position" not in elements:
+        if access.find(group, "position") is None:
             continue
         q = _numbers(path, group, "position/value")
-        v = _numbers(path, group, "velocity/value") if "velocity" in elements else q
+        v = q if access.find(group, "velocity") is None else _numbers(path, group, "velocity/value")
         if q.ndim != 3 or q.shape[1:] != v.shape[1:] or not q.size:
             raise _unlike(path, name, q.shape, v.shape)
         kept = min(MOST_FRAMES, MOST_NUMBERS // int(np.prod(q.shape[1:], dtype=object)))
@@ -188,7 +192,7 @@ def _rows(dataset: Any, chosen: Any) -> Floats:
 def _numbers(path: Path, group: Any, name: str) -> Any:
     """A dataset of numbers; StoreError where it is none, or does not lie in the file."""
     dataset = access.dataset_at(group, name, packed=True)
-    if dataset.dtype.kind not in "fiu" or dataset.shape is None:
+    if dataset.dtype.kind not in "fiu":
         raise StoreError(f"{path}: {dataset.name} is no array of numbers")
     return dataset
 

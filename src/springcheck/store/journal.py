@@ -9,7 +9,6 @@ anywhere in this finds everything on starting again.
 from __future__ import annotations
 
 import contextlib
-import json
 import os
 import re
 import traceback
@@ -20,6 +19,7 @@ from pathlib import Path
 from urllib.parse import quote
 
 import h5py
+import msgspec
 
 from springcheck import interrupts
 from springcheck.errors import StoreError, StoreWarning, plain
@@ -28,7 +28,7 @@ from springcheck.physics.trajectory import Comparison, Trajectory, Verdict
 from springcheck.store import adopt, files, layout, merge, pieces, reading, records, seal, tables
 from springcheck.store.access import Scalar
 from springcheck.store.draft import Draft
-from springcheck.store.parts import Parts, claim, name_of, opened, parts_folder, run_of
+from springcheck.store.parts import JournalClaim, Parts, claim, name_of, opened, parts_folder, run_of
 from springcheck.store.tables import Table
 
 COLLECTION = "collection.new"
@@ -118,17 +118,17 @@ def _is_ours(path: Path) -> bool:
 def _claim(path: Path, parts: Path, command: str, *, force: bool) -> str:
     """The run id of the journal that is resumed or started."""
     known = claim(parts)
-    if known is not None and path.is_file() and run_of(path) == known["run"]:
+    if known is not None and path.is_file() and run_of(path) == known.run:
         # killed as it tidied up: the store is complete
         _remove(parts, lambda name: name != "lock")
         known = None
-    if known is not None and (not force or known["forced"]):
-        if known["command"] == command:
-            adopt.recover(parts, parts / COLLECTION, known["run"])
+    if known is not None and (not force or known.forced):
+        if known.command == command:
+            adopt.recover(parts, parts / COLLECTION, known.run)
             _remove(parts, lambda name: name.endswith(".new"))
-            _look_at_parts(parts, known["run"])
-            return known["run"]
-        if not force and not known["failed"]:
+            _look_at_parts(parts, known.run)
+            return known.run
+        if not force and not known.failed:
             raise StoreError(
                 f"{parts} holds finished work of another command, or of other versions of what it runs: "
                 "give that command again to complete it, or --force to discard it"
@@ -137,8 +137,7 @@ def _claim(path: Path, parts: Path, command: str, *, force: bool) -> str:
         raise StoreError(f"{path} exists: --force writes it anew, -o writes another file")
     _remove(parts, lambda name: name not in {"lock", "command"})
     run = os.urandom(16).hex()
-    content = {"format": files.JOURNAL_FORMAT, "run": run, "command": command, "forced": force}
-    files.put_bytes(json.dumps(content).encode(), parts / "command")
+    JournalClaim(run=run, command=command, forced=force).write(parts)
     files.sync_folder(path.absolute().parent)
     return run
 
@@ -294,12 +293,9 @@ class Journal:
     def fail(self) -> None:
         """Note that a method of this command failed: what is finished is resumed by the same command, and
         gives way to any other, the corrected one."""
-        known = claim(self.folder)
-        if known is None:
-            return
-        content = {**known, "format": files.JOURNAL_FORMAT, "forced": bool(known["forced"]), "failed": True}
-        with files.told(self.folder, "write"):
-            files.put_bytes(json.dumps(content).encode(), self.folder / "command")
+        if known := claim(self.folder):
+            with files.told(self.folder, "write"):
+                msgspec.structs.replace(known, failed=True).write(self.folder)
 
     def close(self) -> None:
         """Give the lock back; what is finished stays for the next one."""

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import contextlib
-import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 from urllib.parse import unquote
+
+import msgspec
 
 from springcheck.errors import StoreError
 from springcheck.store import access, files, layout, seal, trust
@@ -32,28 +33,28 @@ def parts_folder(path: Path) -> Path:
     return path.with_name(path.name + files.JOURNAL)
 
 
-def claim(parts: Path) -> dict[str, str] | None:
-    """Run id and command of a journal of ours, whether --force began it and whether a method of it failed.
+class JournalClaim(msgspec.Struct, frozen=True, kw_only=True):
+    """Run id and command of a journal of ours, whether --force began it and whether a method of it failed."""
 
-    None where there is none.
-    StoreError where what stands there cannot be read as ours.
-    """
+    format: Literal["springcheck journal 1"] = "springcheck journal 1"
+    run: str
+    command: str
+    forced: bool
+    failed: bool = False
+
+    def write(self, parts: Path) -> None:
+        """Put it into the journal."""
+        files.put_bytes(msgspec.json.encode(self), parts / "command")
+
+
+def claim(parts: Path) -> JournalClaim | None:
+    """The claim of a journal; None where there is none.  StoreError where it cannot be read as ours."""
     try:
         with files.own(parts / "command") as file:
-            found = json.loads(file.read(1 << 26))
-        if found["format"] != files.JOURNAL_FORMAT:
-            raise ValueError("another format")
-        forced = "forced" if found["forced"] else ""
-        failed = "failed" if found.get("failed") else ""
-        return {
-            "run": str(found["run"]),
-            "command": str(found["command"]),
-            "forced": forced,
-            "failed": failed,
-        }
+            return msgspec.json.decode(file.read(1 << 26), type=JournalClaim)
     except FileNotFoundError:
         return None
-    except (ValueError, KeyError, TypeError, OSError) as error:
+    except (ValueError, OSError, RecursionError) as error:
         raise StoreError(
             f"cannot read {parts / 'command'}, which stands where the journal goes; move it away"
         ) from error
@@ -84,7 +85,7 @@ class Parts:
         folder, known = parts_folder(path), run
         if known is None:
             with contextlib.suppress(StoreError):
-                known = (claim(folder) or {}).get("run")
+                known = getattr(claim(folder), "run", None)
         # what is a pipe there, or leads elsewhere, is none of ours
         there = folder.glob("*-*.h5") if known is not None else ()
         parts = sorted(part for part in there if part.is_file() and not part.is_symlink())

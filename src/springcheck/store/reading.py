@@ -227,7 +227,7 @@ def _is_claimed(path: Path, run: object) -> bool:
     """Whether the journal of another run than its own stands beside a store: a kill may have left that."""
     try:
         found = claim(parts_folder(path))
-        return found is not None and found["run"] != run
+        return found is not None and found.run != run
     except StoreError:
         return False
 

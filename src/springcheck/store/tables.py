@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import astuple, dataclass, field, fields
 from typing import Any
 
 import h5py
@@ -23,6 +23,12 @@ DEEPEST = 8
 MOST_VERDICTS = 1 << 17
 """Most verdicts: as many as there are checks of all trajectories that a store may hold."""
 _PASSED = {None: -1, False: 0, True: 1}
+_VERDICT = {
+    "method": "O", "check": "O", "value": "f", "bound": "f", "unit": "O", "passed": "i", "why": "O",
+    **{f"sees_{one.name}": "f" for one in fields(Limits)},
+}  # fmt: skip
+_OWN = tuple(name for name in _VERDICT if not name.startswith("sees_"))
+"""Columns of the table of verdicts, and the kinds of what is in them; stores of before have fewer limits."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -128,18 +134,16 @@ def all_names(file: Any) -> list[str]:
 
 def of_verdicts(verdicts: Sequence[Verdict]) -> Table:
     """Verdicts as a table; passed is 1, 0, or -1 where the check does not apply."""
+    rows = [
+        (*(_PASSED[v.passed] if name == "passed" else getattr(v, name) for name in _OWN), *astuple(v.sees))
+        for v in verdicts
+    ]
+    types = {"O": object, "f": np.float64, "i": np.int8}
+    columns = zip(_VERDICT.items(), zip(*rows, strict=True), strict=True)
     return Table(
         name="verdicts",
-        columns={
-            "method": [v.method for v in verdicts],
-            "check": [v.check for v in verdicts],
-            "value": np.array([v.value for v in verdicts], dtype=np.float64),
-            "bound": np.array([v.bound for v in verdicts], dtype=np.float64),
-            "unit": [v.unit for v in verdicts],
-            "passed": np.array([_PASSED[v.passed] for v in verdicts], dtype=np.int8),
-            "why": [v.why for v in verdicts],
-            **{f"sees_{name}": _limits(verdicts, name) for name in _LIMITS},
-        },
+        # an unknown limit, None, becomes NaN
+        columns={name: np.array(values, dtype=types[kind]) for (name, kind), values in columns},
         attributes={
             "about": "passed: 1 yes, 0 no, -1 the check does not apply; sees_...: the relative change of the "
             "parameter from which on the check fails, NaN where it says nothing of it"
@@ -149,44 +153,21 @@ def of_verdicts(verdicts: Sequence[Verdict]) -> Table:
 
 def to_verdicts(table: Table) -> tuple[Verdict, ...]:
     """The verdicts of such a table.  StoreError where it is none."""
-    names = ("method", "check", "unit", "why")
-    texts = [_column(table, name, "O") for name in names]
-    value, bound, passed = (_column(table, name, kind) for name, kind in _NUMBERS.items())
-    if len(value) > MOST_VERDICTS:
-        raise StoreError(f"the table of verdicts has {len(value)} rows, more than any of ours")
-    if len({len(column) for column in (*texts, value, bound, passed)}) > 1 or set(passed) - {-1, 0, 1}:
-        raise StoreError("the table of verdicts is none of ours: its columns do not fit together")
+    kept = {name: kind for name, kind in _VERDICT.items() if name in _OWN or name in table.columns}
+    columns = [_column(table, name, kind).tolist() for name, kind in kept.items()]
+    if len(columns[0]) > MOST_VERDICTS:
+        raise StoreError(f"the table of verdicts has {len(columns[0])} rows, more than any of ours")
     back = {number: passed for passed, number in _PASSED.items()}
-    # stores of before have fewer limits, or none
-    known = {name: _column(table, f"sees_{name}", "f") for name in _LIMITS if f"sees_{name}" in table.columns}
-    if any(len(column) != len(value) for column in known.values()):
-        raise StoreError("the table of verdicts is none of ours: its limits do not fit together")
-    sees = [Limits(**{name: _or_none(known[name][j]) for name in known}) for j in range(len(value))]
-    return tuple(
-        Verdict(
-            value=float(x),
-            bound=float(y),
-            passed=back[int(z)],
-            sees=one,
-            **dict(zip(names, row, strict=True)),
-        )
-        for *row, x, y, z, one in zip(*texts, value, bound, passed, sees, strict=True)
-    )
-
-
-_LIMITS = tuple(field.name for field in fields(Limits))
-
-
-def _limits(verdicts: Sequence[Verdict], name: str) -> np.ndarray:
-    found = [getattr(v.sees, name) for v in verdicts]
-    return np.array([np.nan if x is None else x for x in found], dtype=np.float64)
-
-
-def _or_none(x: float) -> float | None:
-    return None if np.isnan(x) else float(x)
-
-
-_NUMBERS = {"value": "f", "bound": "f", "passed": "i"}
+    found = []
+    try:
+        for row in zip(*columns, strict=True):
+            known = dict(zip(kept, row, strict=True))
+            own = {name: known.pop(name) for name in _OWN}
+            sees = {name.removeprefix("sees_"): None if np.isnan(x) else x for name, x in known.items()}
+            found.append(Verdict(**own | {"passed": back[own["passed"]]}, sees=Limits(**sees)))
+    except (ValueError, KeyError) as error:
+        raise StoreError("the table of verdicts is none of ours: its columns do not fit together") from error
+    return tuple(found)
 
 
 def _column(table: Table, name: str, kind: str, dimensions: int = 1) -> np.ndarray:

@@ -1,0 +1,266 @@
+"""Files as strangers write them: what is there is read, or it is said in one line why not; nothing is lost
+without a word."""
+
+from __future__ import annotations
+
+import gzip
+import json
+import struct
+from collections.abc import Callable
+from pathlib import Path
+
+import ase.io
+import h5py
+import numpy as np
+import pandas as pd
+import pytest
+import scipy.io
+from ase import Atoms
+
+from springcheck import formats
+from springcheck.errors import StoreError
+from springcheck.formats import States
+
+pytestmark = pytest.mark.usefixtures("own_folder", "tried_here")
+
+F = 12
+T = 0.1 * np.arange(F)
+Q, V = np.cos(T), -np.sin(T)
+Q2, V2 = 2 * Q + 1, 3 * V
+
+
+def read(name: str, *columns: str, step: float | None = None) -> States:
+    path = Path(name)
+    if formats.is_hdf5(path):
+        (found,) = formats.read_hdf5(path, columns, alone=True).values()
+        return found
+    return formats.read(path, columns, step, alone=True)
+
+
+def table(*columns: object, head: str = "", sep: str = ",") -> str:
+    rows = [sep.join(map(repr, map(float, row))) for row in zip(*columns, strict=True)]  # type: ignore[arg-type]
+    return "\n".join([*([head] if head else []), *rows, ""])
+
+
+def first_row(text: str) -> str:
+    rows = table(T, Q, V).splitlines()
+    return "\n".join([text, *rows[1:]])
+
+
+TABLES = {
+    "a comment of numbers, which is no row": "# t q v\n# 0.1 1.0 0.5\n" + table(T, Q, V, sep=" "),
+    "a comment as MATLAB writes it": table(T, Q, V, head="% t q v", sep=" "),
+    "cells in quotes": '"t","q","v"\n'
+    + "\n".join(",".join(f'"{x}"' for x in row.split(",")) for row in table(T, Q, V).splitlines()),
+    "velocities in another order than positions": table(T, Q, Q2, V2, V, head="t,x,y,vy,vx"),
+    "the same by numbers": table(T, Q2, Q, V, V2, head="t,x2,x1,v1,v2"),
+    "velocities by a dot": table(T, Q, V, head="t,x,xdot"),
+    "velocities by a quotient": table(T, Q, V, head="t,x,dx/dt"),
+    "axes in words": table(T, Q, Q2, V, V2, head="t,position_x,position_y,velocity_x,velocity_y"),
+}
+
+
+@pytest.mark.parametrize("text", TABLES.values(), ids=TABLES)
+def test_a_table_is_read_as_it_is_meant(text: str) -> None:
+    Path("x.csv").write_text(text)
+    found = read("x.csv")
+    assert found.t.tolist() == T.tolist()
+    assert found.v is not None
+    for q, v in zip(found.q.T, found.v.T, strict=True):
+        assert (q.tolist(), v.tolist()) in ((Q.tolist(), V.tolist()), (Q2.tolist(), V2.tolist()))
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (first_row("0.0,n/a,0.3"), "line 1: 'n/a' is no number"),
+        (first_row("0.0,\u22121,0.3"), "line 1: '\u22121' is no number"),
+        ("t,q,v\n0,1,0\n0.1,1_0,0\n", "'1_0' is no number"),
+        (table(T, Q, V, 2 + T, head="t,q,v,m"), "the masses change"),
+    ],
+)
+def test_a_row_is_not_lost(text: str, said: str) -> None:
+    Path("x.csv").write_text(text)
+    with pytest.raises(StoreError, match=said):
+        read("x.csv", *(["t", "q", "v"] if text[0] == "0" else []))
+
+
+def arrays(v: object) -> dict[str, object]:
+    return {"t": T, "q": Q, "v": v}
+
+
+def as_npz(v: object) -> str:
+    np.savez("x.npz", **arrays(v))
+    return "x.npz"
+
+
+def as_json(v: object) -> str:
+    Path("x.json").write_text(json.dumps({name: np.asarray(x).tolist() for name, x in arrays(v).items()}))
+    return "x.json"
+
+
+def as_mat(v: object) -> str:
+    scipy.io.savemat("x.mat", arrays(v))
+    return "x.mat"
+
+
+def as_hdf5(v: object) -> str:
+    with h5py.File("x.h5", "w") as file:
+        for name, x in arrays(v).items():
+            file[name] = x
+    return "x.h5"
+
+
+def as_excel(v: object) -> str:
+    pd.DataFrame(arrays(v)).to_excel("x.xlsx", index=False)
+    return "x.xlsx"
+
+
+def as_octave(v: object) -> str:
+    said = "# Created by Octave\n"
+    for name, x in arrays(v).items():
+        cells = "".join(f" {str(y).replace('j', 'i')}\n" for y in np.asarray(x))
+        kind = "complex matrix" if np.iscomplexobj(x) else "matrix"
+        said += f"# name: {name}\n# type: {kind}\n# rows: {len(np.asarray(x))}\n# columns: 1\n{cells}\n"
+    Path("x.txt").write_text(said)
+    return "x.txt"
+
+
+TEXTS = [*map(str, V[:-1]), "lost"]
+UNREAD = {
+    as_npz: (V[1:], V + 0j, V > 0, V.astype(str), V.reshape(F, 1, 1, 1)),
+    as_json: (V[1:], TEXTS),
+    as_mat: (V[1:], V + 0j),
+    as_hdf5: (V[1:], V + 0j, h5py.SoftLink("/q"), h5py.ExternalLink("y.h5", "q")),
+    as_excel: (TEXTS,),
+    as_octave: (V[1:], V + 0j),
+}
+
+
+@pytest.mark.parametrize("write", UNREAD, ids=lambda write: write.__name__)
+def test_velocities_that_cannot_be_read_are_not_left_out(write: Callable[[object], str]) -> None:
+    """Positions alone would be the same for other schemes: to take them for all there is would be a lie."""
+    for v in UNREAD[write]:
+        with pytest.raises(
+            StoreError, match=r"\bv\b.*(no numbers of 12|no array of numbers|leads elsewhere)"
+        ):
+            read(write(v))
+
+
+@pytest.mark.parametrize("write", [as_npz, as_json, as_hdf5], ids=lambda f: f.__name__)
+def test_initial_values_are_of_no_frame(write: Callable[[object], str]) -> None:
+    assert read(write(V[:1])).v is None
+
+
+def test_velocities_that_some_frames_lack_are_not_left_out() -> None:
+    images = [Atoms("Ar", positions=[[q, 0, 0]], info={"time": t}) for t, q in zip(T, Q, strict=True)]
+    for atoms in images[:-1]:
+        atoms.set_velocities([[1.0, 0, 0]])
+    ase.io.write("x.traj", images)
+    with pytest.raises(StoreError, match="some frames have velocities, and others have none"):
+        read("x.traj", step=0.1)
+
+
+def test_velocities_behind_a_link_of_h5md_are_not_left_out() -> None:
+    with h5py.File("x.h5", "w") as file:
+        for name in ("particles/all/position", "v"):
+            file[f"{name}/value"] = Q[:, None, None]
+            file[f"{name}/time"] = T
+        file["particles/all/velocity"] = h5py.SoftLink("/v")
+    with pytest.raises(StoreError, match="a link 'velocity' that leads elsewhere"):
+        read("x.h5")
+
+
+def gro(title: Callable[[int], str]) -> str:
+    rows = [
+        f"{1:5d}AR      AR{1:5d}{q:8.3f}{0:8.3f}{0:8.3f}{v:8.4f}{0:8.4f}{0:8.4f}"
+        for q, v in zip(Q, V, strict=True)
+    ]
+    return "\n".join(x for i, row in enumerate(rows) for x in (title(i), "1", row, " 5 5 5")) + "\n"
+
+
+def dump(number: Callable[[int], int]) -> str:
+    head = "ITEM: TIMESTEP\n{}\nITEM: NUMBER OF ATOMS\n1\nITEM: ATOMS id x y z vx vy vz\n{} {} 0 0 {} 0 0\n"
+    return "".join(head.format(i, number(i), Q[i], V[i]) for i in range(F))
+
+
+def test_frames_without_times_are_not_counted_as_times() -> None:
+    for title in ("Spring", "the great=yes"):
+        Path("x.gro").write_text(gro(lambda i, title=title: title))  # type: ignore[misc]
+        assert read("x.gro", step=0.1).t.tolist() == pytest.approx(T.tolist())
+        with pytest.raises(StoreError, match="give its time step, as --step H in ps"):
+            read("x.gro")
+    for name, text in (("x.gro", gro(lambda i: f"t= {T[i]}" if i else "Spring")), ("x.xyz", XYZ)):
+        Path(name).write_text(text)
+        with pytest.raises(StoreError, match="frame 0 says no time, as others do"):
+            read(name, step=0.2)
+
+
+XYZ = "".join(
+    f"1\n{f't = {t}' if t else 'no'}\nAr {q} 0 0 {v} 0 0\n" for t, q, v in zip(T, Q, V, strict=True)
+)
+
+
+def test_other_atoms_are_not_taken_for_the_same() -> None:
+    Path("x.dump").write_text(dump(lambda i: 1 if i < 7 else 2))
+    with pytest.raises(StoreError, match="frame 7 has other atoms than the first"):
+        read("x.dump", step=0.1)
+
+
+def trr(atoms: Callable[[int], int]) -> bytes:
+    out = b""
+    for i in range(F):
+        n = atoms(i)
+        out += struct.pack(">3i12s13i", 1993, 13, 12, b"GMX_trn_file", *[0] * 7, 12 * n, 12 * n, 0, n, i, 0)
+        out += struct.pack(f">2f{6 * n}f", T[i], 0, *[Q[i]] * 3 * n, *[V[i]] * 3 * n)
+    return out
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "said"),
+    [
+        ("x.trr", trr(lambda i: 1 + (i > 5)), "not of as many particles each"),
+        ("x.csv.gz", gzip.compress(table(T, Q, V).encode())[:-9], "packed is damaged or cut off"),
+        ("x.csv.gz", gzip.compress(bytes(9999))[:10] + b"\xff" * 99, "packed is damaged or cut off"),
+        ("x.csv.gz", gzip.compress(table(T, Q, V).encode() + b"\n" * 2_000_000), "with 36 numbers"),
+        ("x.gro", gro(lambda i: f"t= {T[i]}")[:-60].encode(), r"line 47: is no \.gro frame"),
+        ("x.dump", dump(lambda i: 1)[:-9].encode(), "fewer words than it should have"),
+    ],
+)
+def test_a_damaged_file_says_what_it_is(name: str, content: bytes, said: str) -> None:
+    Path(name).write_bytes(content)
+    with pytest.raises(StoreError, match=said):
+        read(name, *(["t", "q", "v"] if "csv" in name else []), step=0.1)
+
+
+def test_masses_that_do_not_fit_are_said() -> None:
+    for m, said in ((np.ones(5), "5 masses and 1 columns"), (1 + T, "the masses change")):
+        np.savez("x.npz", m=m, **arrays(V))
+        with pytest.raises(StoreError, match=said):
+            read("x.npz")
+    np.savez("x.npz", m=np.full(F, 2.0), **arrays(V))
+    assert read("x.npz").mass == pytest.approx([2.0])
+
+
+def test_a_mark_of_the_order_of_bytes_hides_no_format() -> None:
+    as_json(V)
+    for name, text in (("x.json", Path("x.json").read_text()), ("x.xyz", XYZ.replace("no", "t = 0"))):
+        Path(name).write_text(text, encoding="utf-8-sig")
+        assert read(name).v is not None
+
+
+def test_columns_of_structs_are_looked_at_as_any() -> None:
+    for kind, values in (("c16", V), ("U9", V.astype(str))):
+        found = np.zeros(F, dtype=[("t", "f8"), ("q", "f8"), ("v", kind)])
+        found["t"], found["q"], found["v"] = T, Q, values
+        np.save("x.npy", found)
+        with pytest.raises(StoreError, match="no numbers of 12 frames"):
+            read("x.npy")
+
+
+def test_the_index_of_a_table_is_a_column() -> None:
+    pd.DataFrame(arrays(V)).set_index("t").to_parquet("x.parquet")
+    assert read("x.parquet").t.tolist() == T.tolist()
+    pd.DataFrame(arrays(V) | {"t": pd.to_timedelta(T, "s")}).to_parquet("x.parquet")
+    with pytest.raises(StoreError, match="no array of times among t, q, v"):
+        read("x.parquet")
