@@ -68,21 +68,21 @@ def driven(
     """Where modes of these one-step matrices (n, 2, 2), at rest at first, are after j steps (f,): y and v
     (f, n), whose real parts are those of the force exp(i angle j); NaN for a mode that does not turn."""
     found = rotation(matrices)
-    less = matrices - np.eye(2, dtype=np.longdouble)
+    # the powers of -A where A is near half a turn, of which its phases would keep no digits
+    sign, pi = found.sign, np.arctan2(np.longdouble(0), np.longdouble(-1))
+    less = sign[:, None, None] * matrices - np.eye(2, dtype=np.longdouble)
     a, d = less[:, 0, 0], less[:, 1, 1]
     decay = np.log1p(a + d + a * d - less[:, 0, 1] * less[:, 1, 0]) / 2
-    turning, half = found.angle != 0, np.arctan2(np.longdouble(0), np.longdouble(-1))
-    flip = np.where(~turning & (found.sign < 0), 1j * half, 0)
-    apart = np.where(turning, 1j * found.angle, found.growth)
-    first, second = (np.asarray(decay + flip + sign * apart) for sign in (1, -1))
-    mu = np.full_like(first, 1j * (angle - 2 * half * np.round(angle / (2 * half))))
+    first, second = decay + found.growth + 1j * found.near, decay - found.growth - 1j * found.near
+    turn = np.where(sign < 0, angle - pi, angle)
+    mu = 1j * (turn - 2 * pi * np.round(turn / (2 * pi)))
     j, one = np.asarray(steps).astype(np.longdouble)[:, None], np.ones((1, 1), np.longdouble)
     y, v = np.zeros((2, len(j), len(matrices)), np.clongdouble)
     with np.errstate(all="ignore"):
         for mine, other in ((first, second), (second, first)):
-            # of the eigenvector of exp(mine): (A - x) g / (exp(mine) - x), x the other eigenvalue
-            gap = np.exp(decay + flip) * 2 * np.sinh((mine - other) / 2)
+            # of the eigenvector of exp(mine): (sign A - x) g / (exp(mine) - x), x the other eigenvalue
+            gap = np.exp(decay) * 2 * np.sinh((mine - other) / 2)
             share = (np.einsum("nij,nj->ni", less, gains) - np.expm1(other)[:, None] * gains) / gap[:, None]
-            grown = first_difference(mine, mu, j) / first_difference(mine, mu, one)
+            grown = sign ** (j - 1) * first_difference(mine, mu, j) / first_difference(mine, mu, one)
             y, v = y + grown * share[:, 0], v + grown * share[:, 1]
     return y, v
