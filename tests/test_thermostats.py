@@ -28,10 +28,11 @@ from springcheck.physics.arrays import Floats
 from springcheck.physics.bath import Bath
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Spring, WallSpring
+from springcheck.physics.trajectory import Trajectory, of_scene
 from springcheck.studies.faults import baths
 from springcheck.studies.run import measure
 from springcheck.studies.run.tally import Heat
-from springcheck.thermal import THERMOSTATS, chance
+from springcheck.thermal import THERMOSTATS, Stepper, chance
 from springcheck.thermal.stepper import forces
 
 pytestmark = pytest.mark.slow
@@ -134,6 +135,75 @@ def test_chances_are_those_of_their_null() -> None:
     assert chance.variance(1.01 * rng.standard_normal(1_000_000)) < 1e-30
     assert chance.neighbours(np.repeat(rng.standard_normal(500), 2)) < 1e-15
     assert np.mean([chance.pairs(rng.standard_normal((300, 5))) <= 0.05 for _ in range(1000)]) < 0.085
+
+
+def test_what_is_known_before_a_draw_foretells_it_as_seldom_as_is_said() -> None:
+    """Momenta that forget slowly, of the draws themselves: their correlation is not normal."""
+    rng = np.random.default_rng(9)
+    found = []
+    for _ in range(4000):
+        x, p = rng.standard_normal(200), np.zeros(200)
+        for i in range(199):
+            p[i + 1] = 0.995 * p[i] + 0.1 * x[i]
+        found.append(chance.foretold(x[None, :, None], p[None, :, None]))
+    for level in (0.5, 0.1, 0.01):
+        assert np.mean(np.array(found) <= level) <= level
+    x, p = rng.standard_normal((2, 1, 4000, 1))
+    assert chance.foretold(x + 0.15 * p, p) < 1e-9
+    assert chance.foretold(x, p) > 0.1
+    assert chance.foretold(np.where(p > 3, np.inf, x), p) == 0.0
+
+
+DRAG_ALONE = ("baoab", "baoa", "gj-i", "gj-i-half", "bbk", "obabo", "vanden-eijnden-ciccotti", "bussi")
+
+
+@pytest.mark.parametrize("name", DRAG_ALONE)
+@pytest.mark.parametrize("factor", [0.5, 1.0, 2.0])
+def test_a_drag_of_another_friction_than_the_noise_is_seen_in_the_states(name: str, factor: float) -> None:
+    """It makes half of the temperature, or twice as much, of draws that are right one by one."""
+    scene = replace(scenefile.load_scene("bath-spring"), p=np.array([3.0]), steps=9000)
+    scheme = THERMOSTATS[name]
+    steppers = [Stepper.of(scheme, x, width=np.float64) for x in (scene, _with(scene, factor))]
+    wrong = steppers[1]
+    # the coefficients of the one, the noise of the other
+    both = zip(*(one._acts for one in steppers), strict=True)
+    wrong._acts = [
+        (kind, right if kind in ("noise", "jump") else c, noise, number)
+        for (_, right, noise, _), (kind, c, _, number) in both
+    ]
+    found = {v.check: v for v in checks.judge(scene, _stepped(scene, wrong))}
+    assert found["draws-state"].passed is (factor == 1)
+    assert factor != 1 or all(v.passed is not False for v in found.values())
+
+
+@pytest.mark.parametrize("name", ["obabo", "oabao", "vanden-eijnden-ciccotti", "baoab-respa2"])
+def test_a_wrong_force_is_seen_where_draws_reach_every_state(name: str) -> None:
+    scene = replace(scenefile.load_scene("bath-spring"), steps=9000)
+    wrong = scene.derived(terms=scene.system.scaled(1.3).terms)
+    for other, passed in ((scene, True), (wrong, False)):
+        run = _stepped(other, Stepper.of(THERMOSTATS[name], other, width=np.float64))
+        run = replace(run, energy=np.asarray(scene.system.energy(run.q, run.p)))
+        (found,) = (v for v in checks.judge(scene, run) if v.check == "draws-state")
+        assert found.passed is passed
+        assert passed or "the force" in found.why
+
+
+def _with(scene: Scene, factor: float) -> Scene:
+    assert scene.bath is not None
+    return replace(scene, bath=replace(scene.bath, friction=factor * scene.bath.friction))
+
+
+def _stepped(scene: Scene, stepper: Stepper) -> Trajectory:
+    rng, scheme = np.random.default_rng(1), stepper.scheme
+    force, states = forces(scheme, scene.system), [(scene.q, scene.p)]
+    carried = list(rng.standard_normal((scheme.carried, scene.n)))
+    for fresh in rng.standard_normal((scene.steps, scheme.fresh, scene.n)):
+        draws = [*carried, *fresh]
+        states.append(stepper(*states[-1], force, draws))  # type: ignore[arg-type]
+        carried = draws[len(draws) - scheme.carried :]
+    q, p = np.array(states).transpose(1, 0, 2)
+    energy = np.asarray(scene.system.energy(q, p))
+    return of_scene(scene, q, p, label="drag", scheme=scheme.name, energy=energy)
 
 
 class _Shared:

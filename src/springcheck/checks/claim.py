@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from springcheck import schemes
-from springcheck.physics.arrays import Extended, Floats, Force, Reals
+from springcheck.physics.arrays import Extended, Floats
 from springcheck.physics.exact.solution import SolvedSystem
 from springcheck.physics.scene import Scene
-from springcheck.physics.term import Term
 from springcheck.physics.trajectory import Trajectory
 from springcheck.schemes import Law
-from springcheck.schemes.stepping import Slope
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -52,25 +50,14 @@ class Claim:
         """What follows from the scheme on that scene."""
         return Law(scheme=self.scheme, scene=self.judged, h=self.trajectory.step)
 
-    def step(
-        self,
-        q: Extended,
-        p: Extended,
-        *,
-        near: Extended | None = None,
-        forces: Callable[[Iterable[Term]], Force] | None = None,
-        met: list[Reals] | None = None,
-        slope: Slope | None = None,
-        varied: bool = False,
-    ) -> tuple[Extended, Extended]:
-        """One step of the scheme from states (..., n), in extended precision; `forces` makes the forces.
+    def step(self, q: Extended, p: Extended, **how: Any) -> tuple[Extended, Extended]:
+        """One step of the scheme from states (..., n), in extended precision: see `Law.step`.
 
-        `slope` stands for the scene's own where the states are not positions.  `near` is where an engine
-        came to: of several solutions of an implicit step, the one there is the scheme's.  `varied` says that
-        all states but the first are changes of it.
+        `near` is where an engine came to: of several solutions of an implicit step, the one there is the
+        scheme's.
         """
         with np.errstate(all="ignore"):
-            a, b = self.law.step(q, p, near=near, forces=forces, met=met, slope=slope, varied=varied)
+            a, b = self.law.step(q, p, **how)
         return np.asarray(a, np.longdouble), np.asarray(b, np.longdouble)
 
     @property

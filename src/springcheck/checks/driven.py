@@ -6,7 +6,7 @@ than rounding is what happened.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -95,16 +95,21 @@ def _fits(case: Case, clock: _Clock) -> bool:
 
 def _later(case: Case) -> float:
     """Delay of the drive's time, in steps, by least squares in units of the allowance."""
-    unit, later, change = np.stack(case.allowance)[..., :-1], 0.0, 1e-6
+    later = 0.0
+    for _ in range(NEWTON_STEPS):
+        later += _delay(case, later)[0]
+    return later if np.isfinite(later) else 0.0
+
+
+def _delay(case: Case, later: float = 0.0) -> tuple[float, float]:
+    """Further delay of the drive's time, in steps, by linear least squares, and what rounding makes of it."""
+    unit, change = np.stack(case.allowance)[..., :-1], 1e-6
     with np.errstate(all="ignore"):
-        for _ in range(NEWTON_STEPS):
-            off = _off(case, _Clock(later=later)) / unit
-            slope = (_off(case, _Clock(later=later + change)) / unit - off) / change
-            move = float(np.sum(off * slope) / np.sum(slope * slope))
-            if not np.isfinite(move):
-                return 0.0
-            later -= move
-    return later
+        off, moved = (_off(case, _Clock(later=at)) / unit for at in (later, later + change))
+        slope = np.where(unit > 0, (moved - off) / change, 0)
+        weight = np.sum(slope * slope)
+        more = -np.sum(np.where(unit > 0, off, 0) * slope) / weight
+        return float(more), float(case.roundings * np.sum(np.abs(slope)) / weight)
 
 
 def time_taken(case: Case) -> Finding | str:
@@ -113,60 +118,42 @@ def time_taken(case: Case) -> Finding | str:
     Each residual may be off by the scheme's roundings: they are added up with their signs in the worst way.
     Where no time and no other drive explains the states, the cause is not the drive.
     """
-    given, case = case, case.clocked
-    unit, change = np.stack(case.allowance)[..., :-1], 1e-6
-    with np.errstate(all="ignore"):
-        off, moved = (_off(case, _Clock(later=later)) / unit for later in (0.0, change))
-        slope = np.where(unit > 0, (moved - off) / change, 0)
-        weight = np.sum(slope * slope)
-        later = -np.sum(np.where(unit > 0, off, 0) * slope) / weight
-        bound = case.roundings * np.sum(np.abs(slope)) / weight
+    later, bound = _delay(case.clocked)
     if not bound < 1:
         return "rounding may be as large as what a drive a whole step later does"
     why = "the roundings of every step, and how far each may shift the time at which a drive fits them best"
     if not abs(later) <= bound:
-        why = found(given)
+        why = found(case)
         if not why:
             return "steps are off, and not by the time of the drive or by another drive that is known here"
     return Finding(abs(later), bound, "of a step", why)
 
 
+OTHER_DRIVES: tuple[tuple[str, str, Callable[[Any, Any], Any]], ...] = (
+    ("the drive does not act", "amplitude", lambda x, m: 0 * x),
+    ("the phase of the drive has the wrong sign", "phase", lambda x, m: -x),
+    ("the phase of the drive is left out", "phase", lambda x, m: 0 * x),
+    ("the drive has the wrong sign", "phase", lambda x, m: x + np.pi),
+    ("the drive goes by the sine, not by the cosine", "phase", lambda x, m: x - np.pi / 2),
+    ("the phase of the drive is taken for degrees", "phase", lambda x, m: x * np.pi / 180),
+    ("the angular frequency of the drive is taken for cycles in a unit of time", "frequency",
+     lambda x, m: 2 * np.pi * x),
+    ("the angular frequency of the drive is divided by 2 pi, as if it were cycles in a unit of time",
+     "frequency", lambda x, m: x / (2 * np.pi)),
+    ("the amplitude of the drive is divided by the mass", "amplitude", lambda x, m: x / m),
+    ("the amplitude of the drive is multiplied by the mass", "amplitude", lambda x, m: x * m),
+    ("the drive has twice its amplitude", "amplitude", lambda x, m: 2 * x),
+    ("the drive has half of its amplitude", "amplitude", lambda x, m: x / 2),
+)  # fmt: skip
+"""What it is, of which field of a drive, by its mass; the amplitude of a modulated spring is its depth."""
+
+
 def _other_drives(scene: Scene) -> Iterator[tuple[str, Scene]]:
     """Scenes with another drive, and what that is."""
-    m = scene.m
-    changes: tuple[tuple[str, Any], ...] = (
-        ("the drive does not act", lambda x: {"amplitude": 0 * x.amplitude}),
-        ("the phase of the drive has the wrong sign", lambda x: {"phase": -x.phase}),
-        ("the phase of the drive is left out", lambda x: {"phase": 0 * x.phase}),
-        ("the drive has the wrong sign", lambda x: {"phase": x.phase + np.pi}),
-        ("the drive goes by the sine, not by the cosine", lambda x: {"phase": x.phase - np.pi / 2}),
-        ("the phase of the drive is taken for degrees", lambda x: {"phase": x.phase * np.pi / 180}),
-        ("the angular frequency of the drive is taken for cycles in a unit of time",
-         lambda x: {"frequency": 2 * np.pi * x.frequency}),
-        ("the angular frequency of the drive is divided by 2 pi, as if it were cycles in a unit of time",
-         lambda x: {"frequency": x.frequency / (2 * np.pi)}),
-        ("the amplitude of the drive is divided by the mass", lambda x: {"amplitude": x.amplitude / m[x.i]}),
-        ("the amplitude of the drive is multiplied by the mass",
-         lambda x: {"amplitude": x.amplitude * m[x.i]}),
-        ("the drive has twice its amplitude", lambda x: {"amplitude": 2 * x.amplitude}),
-        ("the drive has half of its amplitude", lambda x: {"amplitude": x.amplitude / 2}),
-    )  # fmt: skip
-    for words, change in changes:
-        terms = []
-        for term in scene.terms:
-            given: Any = term
+    for words, name, change in OTHER_DRIVES:
+        terms: list[Any] = list(scene.terms)
+        for number, term in enumerate(terms):
             if term.kind == "drive":
-                known = {c.field for c in term.columns}
-                # what is the amplitude of a force is the depth of a modulation
-                like = given if "amplitude" in known else _Deep(given)
-                new = {("depth" if x not in known else x): y for x, y in change(like).items()}
-                given = replace(given, **new)
-            terms.append(given)
+                field = name if name in term.arrays else "depth"
+                terms[number] = replace(term, **{field: change(term.arrays[field], scene.m[term.i])})
         yield words, scene.derived(terms=tuple(terms))
-
-
-class _Deep:
-    """A modulated spring with its depth for an amplitude."""
-
-    def __init__(self, term: Any) -> None:
-        self.i, self.phase, self.frequency, self.amplitude = term.i, term.phase, term.frequency, term.depth

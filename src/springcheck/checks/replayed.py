@@ -92,7 +92,7 @@ def _follow(case: Case) -> _Replayed | str:
         if not steps:
             return "two of its frames lie at one time"
         if max(map(len, (steps, *others))) > left:
-            ended = _too_many()
+            ended = f"more than {MOST_REPLAYED} steps are not replayed"
             break
         left -= len(steps)
         every = list(_rounded(case, steps, before))
@@ -188,10 +188,6 @@ def _untrue(
 
 def _roundings(case: Case) -> int:
     return schemes.roundings(schemes.scheme(case.scheme.steps_of))
-
-
-def _too_many() -> str:
-    return f"more than {MOST_REPLAYED} steps are not replayed"
 
 
 def _until(case: Case, found: _Replayed) -> str:

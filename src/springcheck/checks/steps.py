@@ -125,7 +125,9 @@ def _allowed(case: Case) -> tuple[Floats, NDArray[np.bool_]]:
     if case.ahead is not None:
         told = known(case, case.ahead, case.trajectory.every)
         return np.full(len(told), float(case.roundings)), told
-    bound = case.roundings * _amplified(case, case.trajectory.every)
+    # what the map can make of one rounding a step in so many steps
+    total, grown = schemes.amplification(case.matrices, case.w, np.array([case.trajectory.every]))
+    bound = np.full(len(case.steps) - 1, case.roundings * float(total[0] * grown[0]))
     told = bound * case.trajectory.arithmetic.state < 1
     return np.where(told, bound, 1), told
 
@@ -278,12 +280,6 @@ def _beyond_range(case: Case, off: NDArray[np.bool_]) -> str:
         f"the engine's limit: {overflows(how)}, and step {case.steps[first + 1]}, the first that is off, "
         f"has a force of {case.strongest[first]:.3g}"
     )
-
-
-def _amplified(case: Case, steps: int) -> Floats:
-    """What the map can make of one rounding a step in so many steps, from each frame but the last (f-1,)."""
-    total, grown = schemes.amplification(case.matrices, case.w, np.array([steps]))
-    return np.full(len(case.steps) - 1, float(total[0] * grown[0]))
 
 
 def rates_met(case: Case, *states: Reals) -> Floats:

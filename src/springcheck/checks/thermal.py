@@ -12,7 +12,7 @@ import numpy as np
 
 from springcheck import thermal
 from springcheck.checks.case import Case, small_move
-from springcheck.checks.check import Chance, Finding, check
+from springcheck.checks.check import Chance, Finding, check, largest
 from springcheck.errors import MethodError
 from springcheck.physics.arrays import Floats
 from springcheck.text.wording import count
@@ -45,12 +45,16 @@ def thermostat(case: Case) -> Thermostat:
 
 def _reading(case: Case) -> Reading:
     run, scheme = case.trajectory, thermostat(case)
-    # where a draw acts in two steps, that of the start is not in the record
-    skipped = 1 if scheme.carried and case.steps[0] == 0 else 0
-    q, p = run.q[skipped:], run.p[skipped:]
+    q, p = (x[_unread(case) :] for x in (run.q, run.p))
     with np.errstate(all="ignore"):
         by = thermal.rigid.read if case.judged.system.rods else thermal.draws.read
         return by(scheme, case.judged, q, p, how=run.arithmetic, rebuilt=run.rebuilds_velocity)
+
+
+def _unread(case: Case) -> int:
+    """Frames before the first draw that is read: one that acts in two steps is not in the record at the
+    start."""
+    return int(thermostat(case).carried > 0 and case.steps[0] == 0)
 
 
 @check("across", family="noise", requires={"every-step"})
@@ -98,18 +102,18 @@ def _draws(case: Case) -> tuple[Floats, Reading] | str:
     x = found.draws
     if scheme.uniform and not case.scene.system.rods:
         x = thermal.chance.normal_scores(x)
-    if found.hits is not None:
-        x = x[found.hits][:, None]
-    return (x, found) if x.size >= 2 else "there were no draws"
+    return (x, found) if np.count_nonzero(~np.isnan(x)) >= 2 else "there were no draws"
 
 
 def _of(case: Case, probability: Callable[[Floats], float], value: Callable[[Floats], str]) -> Chance | str:
     found = _draws(case)
     if isinstance(found, str):
         return found
+    x, read = found
+    x = x if read.hits is None else x[read.hits][:, None]
     with np.errstate(all="ignore"):
         # draws that nothing has are infinite
-        return Chance(probability(found[0]), f"{value(found[0])}, of {count(found[0].size, 'draw')}")
+        return Chance(probability(x), f"{value(x)}, of {count(x.size, 'draw')}")
 
 
 @check("mean", family="noise", requires={"every-step"})
@@ -120,7 +124,7 @@ def draws_mean(case: Case) -> Chance | str:
 
 @check("var", family="noise", requires={"every-step"})
 def draws_variance(case: Case) -> Chance | str:
-    """The draws have variance 1: the temperature of the bath, the masses and the friction are right."""
+    """The draws have variance 1: the noise is that of the temperature, the masses and the friction."""
     return _of(case, thermal.chance.variance, lambda x: f"variance {np.mean(x * x):.6f}")
 
 
@@ -165,6 +169,40 @@ def draws_particles(case: Case) -> Chance | str:
     )
 
 
+@check("state", family="noise", requires={"every-step"})
+def draws_state(case: Case) -> Chance | str:
+    """The draws of a step say nothing of the state that it starts from: drag and forces are right.
+
+    A drag that is not that of the noise, or a wrong force, leaves a part of the state in each draw.
+    """
+    found = _draws(case)
+    if isinstance(found, str):
+        return found
+    if case.scene.system.rods:
+        return "a rod turns the draws of its ends"
+    x, read = found
+    scene, unread = case.judged, _unread(case)
+    q, p = (y[unread:-1] for y in (case.trajectory.q, case.trajectory.p))
+    known = {"the momentum": p / np.sqrt(scene.m * scene.thermal)}
+    if THERMOSTATS[case.trajectory.scheme].rescales:
+        known = {"the size of momenta": np.sqrt(np.mean(known["the momentum"] ** 2, axis=1, keepdims=True))}
+    else:
+        k = np.abs(scene.system.hessian_diagonal(scene.q)).astype(np.float64)
+        size = np.sqrt(np.where(k > 0, k, np.inf) * scene.thermal)
+        known["the force"] = scene.system.potential_force(q, 0 * p) / size
+    y = np.asarray(list(known.values()), np.float64)
+    x = x.reshape(len(q), -1, x.shape[1]).transpose(1, 0, 2)
+    if read.hits is not None:
+        x, y = np.where(read.hits, x, 0), np.where(read.hits, y, 0)
+    with np.errstate(all="ignore"):
+        likely = thermal.chance.foretold(x, y)
+        each = np.einsum("usn,ksn->uk", x, y) / np.sqrt(np.sum(x * x) / len(x) * np.sum(y * y, axis=(1, 2)))
+    u, i = largest(np.abs(each))
+    return Chance(
+        likely, f"correlation {each[u, i]:+.2e} with {list(known)[i]} before, of {count(x.size, 'draw')}"
+    )
+
+
 @check("hits", family="noise", requires={"every-step"})
 def collisions(case: Case) -> Chance | str:
     """Collisions come with their chance, 1 - exp(-friction h)."""
@@ -182,5 +220,5 @@ def collisions(case: Case) -> Chance | str:
 
 DRAWN = (
     noise_direction, draws_mean, draws_variance, draws_shape, draws_neighbours, draws_repeat, draws_particles,
-    collisions,
+    draws_state, collisions,
 )  # fmt: skip

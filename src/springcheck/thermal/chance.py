@@ -2,7 +2,7 @@
 
 Each function returns the probability, two-sided, of a value as bad or worse.  They are exact but for `shape`,
 whose saddlepoint approximation is off by a few percent of the probability itself, however small that is
-(Lugannani & Rice, Adv. Appl. Probab. 12 (1980) 475).
+(Lugannani & Rice, Adv. Appl. Probab. 12 (1980) 475), and `foretold`, which is a bound.
 """
 
 from __future__ import annotations
@@ -131,6 +131,28 @@ def neighbours(x: Floats) -> float:
     around[: len(after)] += after[: len(around)]
     size = float(np.sum(around * around))
     return of_normal(float(np.sum(x[1::2] * around)) / math.sqrt(size)) if size > 0 else 0.0
+
+
+def foretold(x: Floats, y: Floats) -> float:
+    """Chance that numbers y (k, s, n) of the usual size 1, each known before its draws x (u, s, n), go with
+    them so well: with those of one column, or of all n together.
+
+    With S = sum x y and V = sum y**2, exp(l S - l**2 V/2) is 1 in the mean however y comes of draws before;
+    so is its average over normal l of variance 1/t, and the product of several x, which is 1/a or more with
+    a chance of at most a (Robbins, Ann. Math. Stat. 41 (1970) 1397): no less than the chance, for any s.
+    """
+    if not np.all(np.isfinite(x)):
+        return 0.0
+    each, squares = np.einsum("usn,ksn->ukn", x, y), np.sum(y * y, axis=1)
+    n = each.shape[-1]
+    S, V = (np.concatenate([z, np.sum(z, axis=-1, keepdims=True)], axis=-1) for z in (each, squares))
+    t = x.shape[1] * np.append(np.ones(n), n) / FEW_TIMES
+    logs = np.sum(np.log1p(V / t) / 2 - S * S / (2 * (V + t)), axis=0)
+    return min(1.0, float(logs.size) * math.exp(min(float(np.min(logs)), 0.0)))
+
+
+FEW_TIMES = 30.0
+"""How much of its usual sum of squares what foretells may lack before it is seen less well."""
 
 
 def crossed(x: Floats, y: Floats) -> float:

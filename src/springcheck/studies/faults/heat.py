@@ -100,6 +100,11 @@ THERMAL_STEPS = each(
           lambda c: played(c, rate=0.5)),
     Fault("bath-friction", "the friction of the bath is too large", _MAP,
           lambda c: played(c, rate=1 + c.x), size=1e-9),
+    Fault("drag-alone", "the drag is too strong for its noise", ("draws-state",), lambda c: played(
+        c, by(np.sqrt(np.expm1(-2 * (x := forgetting(c.scene))) / np.expm1(-2 * x * (1 + c.x)))),
+        rate=1 + c.x), size=0.2, scene="wide bath"),
+    Fault("force-with-two-draws", "every force is too large beside draws that reach every state",
+          ("draws-state",), lambda c: played(c, k=1 + c.x), scheme="obabo", size=0.1, scene="wide bath"),
     Fault("half-kick-lost", "the last half kick is left out", _DIRECTION,
           lambda c: played(c, runs=(B, A, O, A))),
     Fault("half-kick-old", "the last half kick has the old force", _DIRECTION,
