@@ -28,10 +28,12 @@ from springcheck.formats.lines import number
 from springcheck.formats.tables import roundoff
 from springcheck.physics.scenefile import load_scene
 from springcheck.physics.trajectory import Trajectory
+from springcheck.store import apart
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("own_folder", "tried_here")]
 
 SCENE = load_scene("spring-uneven")
+READ_APART = apart.read
 LINE = np.array([0.6, 0.0, 0.8])
 
 
@@ -603,12 +605,15 @@ def test_what_is_of_no_format_is_told_which_are_read(capsys: pytest.CaptureFixtu
 
 
 @pytest.mark.parametrize("write", [excel, parquet, feather, matlab, amber, ase_trajectory, trr], ids=name_of)
-def test_a_library_reads_in_a_process_of_its_own(write: Writer) -> None:
+def test_a_library_reads_in_a_process_of_its_own(
+    write: Writer, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
     arguments = write(made("own:euler"))
-    command = [sys.executable, "-m", "springcheck", "identify", *arguments, "--json"]
-    done = subprocess.run([*command, "--mass", str(SCENE.m[0])], capture_output=True, text=True, check=False)
-    assert done.stderr == ""
-    assert json.loads(done.stdout)["scheme"] == "explicit-euler"
+    monkeypatch.setattr(apart, "read", READ_APART)
+    assert main(["identify", *arguments, "--json", "--mass", str(SCENE.m[0])]) == 0
+    out, err = capfd.readouterr()
+    assert err == ""
+    assert json.loads(out)["scheme"] == "explicit-euler"
 
 
 HARMFUL = {

@@ -246,6 +246,8 @@ def _shortened() -> None:
 
 def _import() -> None:
     """Import what the commands import, so that a forked one need not."""
+    from scipy import special  # noqa: F401
+
     from springcheck import driver, formats, plot  # noqa: F401
     from springcheck.cli import commands, file, inspect, page  # noqa: F401
     from springcheck.figures import render  # noqa: F401

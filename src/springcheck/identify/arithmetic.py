@@ -349,8 +349,6 @@ def _is_rebuilt(match: Match, missing: Floats, size: Floats, difference: Floats)
     Rounding of a position enters the leapfrog's velocity in every step, and the position itself through it:
     it walks at random, with the root of the steps and their power of 3/2.
     """
-    if not _differences(match):
-        return False
     steps = np.sqrt(match.stride)
     if np.any(missing[:, 0] > 2.0**-52 * (4 + 2 * steps**3) * size[:, 0]):
         return False
@@ -359,7 +357,7 @@ def _is_rebuilt(match: Match, missing: Floats, size: Floats, difference: Floats)
         return False
     least, most = REBUILT
     share = float(np.sqrt(np.mean(missing[:, 1] ** 2) / np.mean(unit**2)))
-    return least <= share <= most
+    return least <= share <= most and _differences(match)
 
 
 def _differences(match: Match) -> bool:

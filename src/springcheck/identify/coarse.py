@@ -11,11 +11,10 @@ import math
 from itertools import repeat
 
 import numpy as np
-from scipy.special import chdtri
 
 from springcheck.identify.families import FAMILIES
 from springcheck.identify.fit import Map
-from springcheck.identify.hypothesis import Match
+from springcheck.identify.hypothesis import Match, most
 from springcheck.identify.maps import power, unit
 from springcheck.identify.record import Record
 from springcheck.physics.arrays import Extended, Floats, Reals
@@ -173,7 +172,7 @@ def irregular(missing: Floats, bias: Floats | None = None) -> bool:
     lags = range(LAGS.start, min(LAGS.stop, len(missing) // 4))
     if not lags:
         return True
-    limit = float(chdtri(len(lags), 1e-7))
+    limit = most(len(lags))
     for row in missing.T:
         x = row - np.mean(row) if bias is None else row - bias @ np.linalg.lstsq(bias, row, rcond=None)[0]
         total = float(x @ x)

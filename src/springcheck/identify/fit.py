@@ -16,7 +16,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import fdtri
 
 from springcheck.errors import IdentificationError
 from springcheck.identify.noise import Noise
@@ -341,8 +340,9 @@ def _lengths(z: Extended, centre: Extended | Floats) -> Floats:
 def _constant_part(
     z: Extended, sigma: Floats, process: Floats, start: _Solution | None, record: Record, constant: bool
 ) -> tuple[_Solution, int, Extended | None]:
-    """The plainest of no constant, an equilibrium and any constant that explains the states, and the clock's
-    slips where steps follow them."""
+    """The plainest of no constant, an equilibrium and any constant that explains the states, and its slips."""
+    from scipy.special import fdtri
+
     numbers, slips, centred = 2 * len(process), None, 0
     least = _least(numbers - 6) if record.fine else 1.0
 

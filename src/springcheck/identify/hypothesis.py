@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from scipy.special import chdtri
 
 from springcheck.identify.families import DAMPED, FAMILIES, G_ROUNDING, UNDAMPED, Family, endless, substeps
 from springcheck.identify.maps import unit
@@ -145,6 +144,9 @@ class Joint:
 @cache
 def most(freedom: int) -> float:
     """Largest chi-squared that is accepted; where nothing is left to predict, that of a solution."""
+    # SciPy is imported where it is asked: half of what importing this package takes
+    from scipy.special import chdtri
+
     return float(chdtri(freedom, CHANCE)) if freedom else SOLVED
 
 
