@@ -142,6 +142,21 @@ def test_a_wrong_growth_fails_the_study(need: Need) -> None:
     assert "growth" in wrong.failures[0]
 
 
+@pytest.mark.parametrize("stated", [0.0, 1.5, 2.6, np.inf])
+def test_a_scheme_that_states_a_wrong_limit_fails_and_the_largest_step_is_by_what_was_measured(
+    stated: float,
+) -> None:
+    scheme = replace(schemes.scheme("velocity-verlet"), name=f"stated:{stated}", limit=stated)
+    method = replace(engines.method(engines.parse("own:velocity-verlet")), scheme=scheme.name)
+    own = engines.engine("own")
+    wrong = replace(own, name="stated", methods={method.name: method}, thermostats={}, schemes=(scheme,))
+    with engines.while_here(wrong, "here", "1"):
+        study = stability.measure(scenes.load_scene("spring"), ["stated:velocity-verlet"])
+        assert study.status == 1
+        assert "whose stated limit is wrong" in study.failures[0]
+        assert study.largest(study.limits[0]) == pytest.approx(2.0, rel=1e-9)
+
+
 def test_every_figure_of_stability_is_drawn(tmp_path: Path, need: Need) -> None:
     need("openmm:mts")
     study = stability.measure(

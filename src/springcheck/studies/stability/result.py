@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -59,9 +59,13 @@ class Stability(Studied):
         out = []
         for x in self.limits:
             if not x.agrees:
-                out.append(f"{x.method}: limit {x.limit:.9g}, theory {x.theory:.9g}, allowed {x.bound:.1e}")
+                whose = "; its steps are those of its scheme, whose stated limit is wrong" if x.follows else ""
+                said = f"limit {x.limit:.9g}, theory {x.theory:.9g}, allowed {x.bound:.1e}"
+                out.append(f"{x.method}: {said}{whose}")
             if np.isfinite(x.theory):
-                off = abs(x.growth_above / x.growth_predicted - 1)
+                # a limit stated too low has none there
+                of = x.growth_predicted
+                off = abs(x.growth_above / of - 1) if of else abs(x.growth_above)
                 if not off <= growth_allowed(x):
                     out.append(
                         f"{x.method}: growth {x.growth_above:.9g} a step, predicted {x.growth_predicted:.9g}"
@@ -92,9 +96,13 @@ class Stability(Studied):
             return np.nan
         if engines.refusal(self.scene, label):
             return np.nan
-        # of a method whose limit is not where theory puts it: as much less
-        wrong = 1.0 if found.agrees or not 0 < found.theory < np.inf else found.limit / found.theory
-        return wrong * longest(scheme, self.scene)
+        if found.agrees:
+            return longest(scheme, self.scene)
+        # by what was measured: of an engine that leaves its scheme's own map, as much less as there
+        own = limits.first_exit(label, limits.propagators.theory)
+        own = own if 0 < own < np.inf else found.limit
+        here = longest(replace(scheme, limit=own), self.scene)
+        return here if own == found.limit else here * found.limit / own
 
     @property
     def sentences(self) -> list[str]:
