@@ -206,6 +206,31 @@ def test_a_body_that_the_engine_would_slow_down_ends_the_run(label: str, fast: f
     assert failed(slower, run(slower, label)) == []
 
 
+@pytest.mark.parametrize(
+    ("label", "p", "what"),
+    [("box2d:force", 1e120, "motion"), ("rapier:force", 1e30, "speed"), ("rapier:force", 1e-40, "motion"),
+     ("box2d:distance-joint", 1e-4, "length"), ("rapier:spring-joint", 1e-30, "length"),
+     ("pymunk:damped-spring", 1e-170, "length")],
+)  # fmt: skip
+def test_a_scene_beyond_the_numbers_of_an_engine_is_refused_in_a_line(
+    label: str, p: float, what: str, need: Need
+) -> None:
+    need(label)
+    scene = load_scene("spring")
+    with pytest.raises(MethodError, match=f"{what} of .* is outside what it computes with.*other units"):
+        run(replace(scene, p=np.array([p])), label)
+    assert run(replace(scene, p=np.array([1e-3])), label).outcome.status == "complete"
+
+
+@pytest.mark.parametrize("p", [1e-77, 1e-100, 1e-120])
+def test_a_solver_whose_own_numbers_underflow_ends_in_a_line_not_never(p: float, need: Need) -> None:
+    need("rebound:ias15")
+    scene = load_scene("spring")
+    made = run(replace(scene, p=np.array([p])), "rebound:ias15")
+    assert made.outcome.status == "stopped"
+    assert "comes no further" in made.outcome.message
+
+
 def test_openmms_langevin_integrator_is_the_middle_one_bit_for_bit() -> None:
     scene = load_scene("overdamped")
     one, other = run(scene, "openmm:langevin"), run(scene, "openmm:langevin-middle")

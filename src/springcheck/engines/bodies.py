@@ -8,7 +8,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from springcheck.engines.bonds import far
 from springcheck.engines.contract import Label, Method
+from springcheck.errors import MethodError
 from springcheck.physics.arrays import Arithmetic, Floats
 from springcheck.physics.scene import Scene
 
@@ -29,6 +31,11 @@ class Bodies(ABC):
     y: ClassVar[str]
     v: ClassVar[str]
     """The attributes of a body that are its place along x and y, and its velocity along x."""
+    numbers: ClassVar[type] = np.float32
+    fastest: ClassVar[float] = float(np.finfo(np.float32).max) ** 0.5
+    """Speed up to which the world can square it [L/T]."""
+    shortest: ClassVar[float] = 0.0
+    """Length up to which a joint of the world has no direction, and pulls nothing [L]."""
 
     def __init__(self, scene: Scene, method: Method, label: Label, step: float) -> None:
         ours = method.name == "force"
@@ -36,11 +43,30 @@ class Bodies(ABC):
         self.off_axis = 0.0
         self.m = scene.m
         self._force = scene.system.force if ours else None
+        self._fit(scene, label, ours)
         self.begin(label, step)
         rows = zip(scene.m.tolist(), scene.q.tolist(), scene.p.tolist(), strict=True)
         self.bodies = [self.add(m, q, p / m) for m, q, p in rows]
         if not ours:
             self.tie(scene, label)
+
+    def _fit(self, scene: Scene, label: Label, ours: bool) -> None:
+        """MethodError where the world's numbers do not hold the scene, or the square of a joint's length."""
+        least, most = (float(x) for x in (np.finfo(self.numbers).smallest_normal, np.finfo(self.numbers).max))
+        speeds = np.abs(scene.p / scene.m)
+        # what is small beside the rest of the motion may vanish
+        speed, whole = float(np.max(speeds)), float(np.max([speeds, np.abs(scene.q)]))
+        sizes = [(least, "mass", x, most) for x in scene.m.tolist()]
+        sizes += [(least, "motion", whole or 1.0, most), (0.0, "speed", speed, self.fastest)]
+        if not ours:
+            length = far(scene)
+            sizes += [(max(least**0.5, self.shortest), "joint's length", length, most**0.5)]
+        for lowest, what, size, highest in sizes:
+            if not lowest <= size <= highest:
+                raise MethodError(
+                    f"{label}: a {what} of {size:.3g} is outside what it computes with, {lowest:.3g} to "
+                    f"{highest:.3g}; the scene in other units, its numbers nearer to 1, is inside"
+                )
 
     @abstractmethod
     def begin(self, label: Label, step: float) -> None:

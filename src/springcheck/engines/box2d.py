@@ -31,6 +31,7 @@ class _World(Bodies):
     """Box2D's world in motion."""
 
     x, y, v = "position.x", "position.y", "linearVelocity.x"
+    shortest = 0.005
 
     def begin(self, label: Label, step: float) -> None:
         import Box2D

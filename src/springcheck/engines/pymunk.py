@@ -6,6 +6,7 @@ the old positions, and a spring that it evaluates itself is that of the new ones
 
 from __future__ import annotations
 
+import sys
 from typing import Any
 
 from springcheck.engines.bodies import Bodies
@@ -40,6 +41,8 @@ class _Space(Bodies):
     """Chipmunk's space in motion."""
 
     x, y, v = "position.x", "position.y", "velocity.x"
+    numbers = float
+    fastest = sys.float_info.max
 
     def begin(self, label: Label, step: float) -> None:
         import pymunk

@@ -19,10 +19,23 @@ from typing import Any
 
 import numpy as np
 
-from springcheck.engines.contract import EVERY_POTENTIAL, Engine, Label, Method, by_name, named, version_of
+from springcheck.engines.contract import (
+    EVERY_POTENTIAL,
+    Engine,
+    Label,
+    Method,
+    Stopped,
+    by_name,
+    named,
+    version_of,
+)
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.schemes import solver
+
+LOOK, LEAST = 4096, 1e-9
+"""Force calls after which IAS15, which takes about a hundred a radian, must have come forward by this share of
+the way to the next frame."""
 
 
 @contextmanager
@@ -61,9 +74,16 @@ class _Simulation:
         self._q, self._y, self._v, acceleration = _columns(sim, int(centre), scene.n)
         force = scene.system.force
 
+        self._seen, self._stands = 0.0, False
+
         def forces(_: Any) -> None:
             self.force_calls += 1
             acceleration[:] += force(self._q, self._v * self._m) / self._m
+            if self._adaptive and not self.force_calls % LOOK:
+                self._stands = abs(sim.t - self._seen) < LEAST * abs(step) * scene.every
+                self._seen = sim.t
+                if self._stands:
+                    sim.stop()
 
         sim.additional_forces = forces
 
@@ -74,6 +94,8 @@ class _Simulation:
                 self._done += every
                 if self._adaptive:
                     self._simulation.integrate(self._done * self._step)
+                    if self._stands:
+                        raise Stopped(row, f"IAS15 comes no further: {LOOK} force calls for 1e-9 of a frame")
                 else:
                     steps(every)
                 q[row] = q_now

@@ -25,9 +25,9 @@ AGREED = 1e-6
 """What every limit in double precision is held to."""
 
 BLUR = 16
-"""Times the rounding at which what it hides is looked for again: the growth beyond a limit is of some power n
-of the distance, so rounding hides a distance r**(1/n), and the exit moves by 16**(1/n) - 1 of it, a quarter at
-least up to n = 12."""
+"""Times the rounding at which what it hides is looked for again: the growth beyond a limit is of some power
+n of the distance, so rounding hides a distance r**(1/n), and the exit moves by 16**(1/n) - 1 of it, a quarter
+at least up to n = 12."""
 
 NEXT = 1e-3
 """Relative distance from the limit at which stepping confirms it."""

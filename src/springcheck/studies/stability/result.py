@@ -11,7 +11,7 @@ from springcheck import engines, schemes
 from springcheck.errors import MethodError
 from springcheck.physics.scene import Scene
 from springcheck.studies.keeper import document
-from springcheck.studies.stability import limits
+from springcheck.studies.stability import limits, propagators
 from springcheck.studies.stability.limits import Limit
 from springcheck.studies.stability.longest import fastest, longest
 from springcheck.studies.stability.multipliers import Multiplier
@@ -59,8 +59,8 @@ class Stability(Studied):
         out = []
         for x in self.limits:
             if not x.agrees:
-                whose = "; its steps are those of its scheme, whose stated limit is wrong" if x.follows else ""
                 said = f"limit {x.limit:.9g}, theory {x.theory:.9g}, allowed {x.bound:.1e}"
+                whose = "; its steps are its scheme's, whose stated limit is wrong" if x.follows else ""
                 out.append(f"{x.method}: {said}{whose}")
             if np.isfinite(x.theory):
                 # a limit stated too low has none there
@@ -99,7 +99,7 @@ class Stability(Studied):
         if found.agrees:
             return longest(scheme, self.scene)
         # by what was measured: of an engine that leaves its scheme's own map, as much less as there
-        own = limits.first_exit(label, limits.propagators.theory)
+        own = limits.first_exit(label, propagators.theory)
         own = own if 0 < own < np.inf else found.limit
         here = longest(replace(scheme, limit=own), self.scene)
         return here if own == found.limit else here * found.limit / own
