@@ -15,6 +15,7 @@ import pytest
 import clean
 import springcheck
 from springcheck import checks, driver, store
+from springcheck.errors import SceneError
 from springcheck.physics import scenefile as scenes
 from springcheck.studies import keeper
 from springcheck.studies.faults import baths
@@ -70,6 +71,11 @@ def test_an_engine_that_was_given_a_spring_1e12_too_stiff_is_rejected(label: str
     failed = {v.check for v in checks.judge(scene, run) if v.passed is False}
     # the energies stored are those of the stiffer spring
     assert "step-defect" in failed
+
+
+def test_a_fault_on_a_scene_that_there_is_not_is_named_with_those_that_there_are() -> None:
+    with pytest.raises(SceneError, match=r"scene 'sprinng' is none of spring, .*did you mean spring"):
+        examine(replace(FAULTS[0], scene="sprinng"))
 
 
 def test_a_limit_is_the_smallest_size_that_is_seen() -> None:

@@ -39,6 +39,10 @@ UNHEARD = 0.25
 """Longest call of an engine, which nothing interrupts, where its numbers are thrown away [s]."""
 
 
+UNTOUCHED = np.array(0x7FF8_0000_5C5C_5C5C).view(np.float64)
+"""What stands in rows before an engine fills them: not a number, and none that arithmetic makes."""
+
+
 class Sink(Protocol):
     """Takes recorded frames: t (f,), q and p (f, n), energy and last steps (f,) or None.  The arrays are
     reused."""
@@ -122,7 +126,7 @@ def play(
     piece = scene.every if method.adaptive else min(scene.every, PIECE, WORK // scene.n or 1)
     ready = min(rows, FIRST, WORK // (piece * scene.n) or 1)
     # an engine that fills nothing must not pass for one that has
-    q, p = np.full((rows, scene.n), np.nan), np.full((rows, scene.n), np.nan)
+    q, p = np.full((2, rows, scene.n), UNTOUCHED)
     told = hasattr(simulation, "last_steps")
     _hand_over(scene, sink, 0, scene.q[None], scene.p[None], np.zeros(1) if told else None)
     run_seconds = 0.0
@@ -131,6 +135,7 @@ def play(
     while frame < scene.frames:
         f = min(ready, scene.frames - frame)
         part = _Part(label, simulation, scene.every, piece, progress)
+        q[f - 1], p[f - 1] = UNTOUCHED, UNTOUCHED
         status, good, message, seconds = part.advance(q[:f], p[:f])
         run_seconds += seconds
         ready = min(rows, 4 * ready) if seconds < QUICK else ready
@@ -224,6 +229,12 @@ class _Part:
         finite = np.isfinite(q[:good]).all(axis=1) & np.isfinite(p[:good]).all(axis=1)
         if not finite.all():
             good = int(np.argmin(finite))
+            untouched = UNTOUCHED.tobytes() * q.shape[1]
+            if left := [name for name, x in (("q", q), ("p", p)) if x[good].tobytes() == untouched]:
+                raise MethodError(
+                    f"{self.label} failed: its advance(every, q, p) has left row {good} of "
+                    f"{' and '.join(left)} as it was; it writes every row into these arrays: q[row] = ..."
+                )
             status, message = "diverged", "not finite from the next frame on"
         elif status == "stopped" and "nan" in message.lower():
             status = "diverged"

@@ -34,8 +34,8 @@ from springcheck.physics.scene import Scene
 from springcheck.schemes import solver
 
 LOOK, LEAST = 4096, 1e-9
-"""Force calls after which IAS15, which takes about a hundred a radian, must have come forward by this share of
-the way to the next frame."""
+"""Force calls after which IAS15, which takes about a hundred a radian, must have come forward by this share
+of the way to the next frame."""
 
 
 @contextmanager
@@ -99,8 +99,7 @@ class _Simulation:
                 else:
                     steps(every)
                 q[row] = q_now
-                p[row] = v_now
-            p *= self._m
+                np.multiply(v_now, self._m, out=p[row])
             self.off_axis = max(self.off_axis, float(np.max(np.abs(self._y))))
 
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from springcheck import checks
 from springcheck.checks.seeds import SEEDED
+from springcheck.errors import SceneError, nearest
 from springcheck.physics.builders import spring
 from springcheck.physics.scene import Scene
 from springcheck.physics.scenefile import load_scene
@@ -60,7 +61,9 @@ SCENES: Mapping[str, Callable[[], Scene]] = {
 
 @cache
 def scene(where: str) -> Scene:
-    """One of them, by its name."""
+    """One of them, by its name.  SceneError where there is none."""
+    if where not in SCENES:
+        raise SceneError(f"a fault's scene {where!r} is none of {', '.join(SCENES)}{nearest(where, SCENES)}")
     return replace(SCENES[where](), name=where)
 
 
