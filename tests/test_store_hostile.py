@@ -84,8 +84,14 @@ def test_what_must_not_happen_is_seen(changed: dict[str, object], said: str) -> 
     assert any(said in what for what in found), found
 
 
-def test_a_file_that_nobody_gave_is_seen_by_its_system_call(served: SERVED) -> None:
+@pytest.mark.parametrize("among_programs", [False, True])
+def test_a_file_that_nobody_gave_is_seen_by_its_system_call(
+    among_programs: bool, served: SERVED, monkeypatch: pytest.MonkeyPatch
+) -> None:
     place, _ = served
+    if among_programs:
+        # as where TMPDIR is a folder of the checkout
+        monkeypatch.setattr(campaign, "SYSTEM", (*campaign.SYSTEM, f"{place.home.parent}/"))
     log = place.home / "log"
     lines = [
         f'7 chdir("{place.work}") = 0',

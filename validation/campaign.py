@@ -317,7 +317,9 @@ def trace(log: Path, place: Place, asked: dict[int, tuple[str, ...]]) -> dict[in
             if f"{path}/".startswith((mine, *CACHES)) or path in DEVICES or "/__pycache__" in path:
                 continue
             real = os.path.realpath(os.path.join(folder or f"{mine}work", name))
-            if reads and (path in asked[now] or f"{real}/".startswith(SYSTEM)):
+            # the campaign itself may lie among the programs, in a TMPDIR there
+            program = f"{real}/".startswith(SYSTEM) and not real.startswith(os.path.realpath(place.home))
+            if reads and (path in asked[now] or program):
                 continue
             if {"-o", "--output"} & set(asked[now]) and os.path.dirname(path) in asked[now]:
                 continue
