@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -278,3 +279,10 @@ def test_a_step_off_is_the_engine_s_limit_only_where_that_explains_every_step_th
     (verdict,) = checks.judge(scene, replace(run, p=p), [checks.step_defect])
     assert verdict.passed is False
     assert "limit" not in verdict.why
+
+
+def test_no_list_beside_the_declarations_names_a_check() -> None:
+    studies = (Path(checks.__file__).parents[1] / "studies").rglob("*.py")
+    text = "".join(path.read_text() for path in studies if path.parent.name != "faults")
+    assert [one.name for one in checks.ALL if "-" in one.name and f'"{one.name}"' in text] == []
+    assert sorted(checks.SPECIAL & checks.TELLING) == ["energy-gain", "gyration", "replay", "turn"]

@@ -35,7 +35,7 @@ from springcheck.checks.motion import (
     shadow_energy,
 )
 from springcheck.checks.record import energies, grid, line, start, times
-from springcheck.checks.requires import CONTRACTED
+from springcheck.checks.requires import CONTRACTED, REQUIREMENTS
 from springcheck.checks.rods import rod_length, rod_velocity, turn
 from springcheck.checks.solver import energy_gain, replay, tolerance, tolerance_bound
 from springcheck.checks.steps import BLIND, arithmetic, border, bridges, drive, first_off, step_defect
@@ -44,11 +44,11 @@ from springcheck.physics.trajectory import Limits, Trajectory, Verdict
 from springcheck.text.wording import STATES_SHOW
 
 __all__ = [
-    "ALL", "BLIND", "CHECKS", "CONTRACTED", "RANDOM", "STATES_SHOW", "TELLING", "THOROUGH", "Bench", "Case",
-    "Check", "Experiment", "Run", "angular_momentum", "arithmetic", "bridges", "closed_form", "energies",
-    "experiments_of", "first_off", "frequency", "judge", "judge_thoroughly", "momentum", "not_judged",
-    "shadow_energy", "shared", "start", "status", "step_defect", "summary", "tolerance", "tolerance_bound",
-    "worst",
+    "ALL", "BLIND", "CHECKS", "CONTRACTED", "RANDOM", "SPECIAL", "STATES_SHOW", "TELLING", "THOROUGH",
+    "Bench", "Case", "Check", "Experiment", "Run", "angular_momentum", "arithmetic", "bridges",
+    "closed_form", "energies", "experiments_of", "first_off", "frequency", "judge", "judge_thoroughly",
+    "momentum", "not_judged", "shadow_energy", "shared", "start", "status", "step_defect", "summary",
+    "tolerance", "tolerance_bound", "worst",
 ]  # fmt: skip
 
 Check: TypeAlias = check.Check[Case]
@@ -75,6 +75,8 @@ RANDOM: tuple[Check, ...] = (start, times, grid, energies, *thermal.DRAWN, rod_l
 TELLING = frozenset(["identified", *(one.name for one in (*ALL, *thermal.DRAWN) if one.telling)])
 """Checks that tell the scheme that a method claims from another one; `identified` is of a file's states."""
 
+SPECIAL = frozenset(one.name for one in CHECKS if any(REQUIREMENTS[x].special for x in one.requires))
+"""Checks of what few runs have."""
 
 MOST_NAMED = 8
 """Methods or checks that a summary names."""

@@ -30,6 +30,8 @@ class Requirement(NamedTuple):
     name: str
     word: str
     lacks: Lacks
+    special: bool = False
+    """Whether few runs have it, so that its lack goes without saying."""
 
 
 def _unless(has: Callable[[Any], bool], otherwise: str) -> Lacks:
@@ -95,7 +97,8 @@ _ALL = (
         lambda x: x.scene.box is not None, "the scene has no periodic box")),
     Requirement("driven", "a force that depends on the time", _unless(
         lambda x: x.scene.system.is_driven, "no force depends on the time")),
-    Requirement("rods", "rods", _unless(lambda x: x.scene.system.rods, "the scene has no rods")),
+    Requirement("rods", "rods", _unless(lambda x: x.scene.system.rods, "the scene has no rods"),
+        special=True),
     Requirement("turning", "rods on which nothing acts", _unless(
         lambda x: x.scheme.stages and all(term.kind == "constraint" for term in x.scene.terms)
         and exact.has_true_motion(x.scene),
@@ -104,7 +107,8 @@ _ALL = (
         lambda x: x.law.fields and x.trajectory.every == 1
         and [kind.evaluates for kind in x.scheme.kinds].count("magnetic") == 1
         and not np.any(np.bincount(np.concatenate([i for y in x.law.fields[0] for i in y.particles])) > 1),
-        "no field turns velocities by a stage of every step recorded, or several fields act on one axis")),
+        "no field turns velocities by a stage of every step recorded, or several fields act on one axis"),
+        special=True),
     Requirement("alike", "two axes along which the same springs act", _unless(
         lambda x: bool(x.scene.system.alike), "no two axes are alike, about 0 and by linear springs")),
     Requirement("named", "a scheme that is named", _trait(
@@ -115,7 +119,8 @@ _ALL = (
         lambda x: not x.law.has("one-step") and x.tolerance is not None,
         "a method of fixed step has no tolerance")),
     Requirement("rule", "steps whose lengths follow a rule", _unless(
-        lambda x: x.scheme.rule is not None, "no rule is known that its steps follow")),
+        lambda x: x.scheme.rule is not None, "no rule is known that its steps follow"),
+        special=True),
     Requirement("convergence", "a known law of its tolerance", _unless(
         lambda x: x.scheme.convergence is not None, "no law is known for {title}")),
     Requirement("every-step", "every step recorded", _unless(

@@ -281,9 +281,7 @@ def unjudged(verdicts: Sequence[Verdict]) -> Lines:
     alike: dict[str, list[str]] = {}
     for method in checks.not_judged(verdicts):
         mine = (v for v in verdicts if v.method == method and v.passed is None and v.check in checks.TELLING)
-        # without rods, a field or steps that follow a rule it goes without saying what these cannot tell
-        plainly = ("turn", "gyration", "replay", "energy-gain")
-        why = dict.fromkeys(v.why for v in mine if v.check not in plainly)
+        why = dict.fromkeys(v.why for v in mine if v.check not in checks.SPECIAL)
         alike.setdefault("; ".join(why), []).append(method)
     for reason, methods in alike.items():
         line = f"not judged: {', '.join(methods)}: nothing that applied could tell ({reason})"
