@@ -290,21 +290,24 @@ def test_frames_far_apart_are_reached_in_pieces_to_the_same_numbers(
     assert whole.force_calls == pieces.force_calls
 
 
-def test_an_engine_that_fills_nothing_has_no_frame_but_the_start() -> None:
+@pytest.mark.parametrize("rows", [0, 300])
+def test_an_engine_that_fills_nothing_from_some_row_on_is_told_so(rows: int) -> None:
     class Idle:
         force_calls = 0
 
         def advance(self, every: int, q: np.ndarray, p: np.ndarray) -> None:
-            pass
+            self.force_calls += len(q)
+            if self.force_calls < rows:
+                q[:], p[:] = 1, 0
 
     method = engines.Method(name="m", scheme="velocity-verlet", about="nothing")
     idle = engines.Engine(
         name="idle", title="Idle", methods=engines.named(method), start=lambda *given: Idle(),
         version=dict,
     )  # fmt: skip
-    with engines.while_here(idle, "a test", ""):
-        run = springcheck.simulate("spring-uneven", "idle:m")
-    assert (len(run.t), run.outcome.status, run.outcome.step) == (1, "diverged", 0)
+    scene = replace(scenes.load_scene("spring-uneven"), steps=2000)
+    with engines.while_here(idle, "a test", ""), pytest.raises(MethodError, match="of q and p as it was"):
+        springcheck.simulate(scene, "idle:m")
 
 
 def test_chunks_of_any_length_give_the_same_numbers(monkeypatch: pytest.MonkeyPatch) -> None:

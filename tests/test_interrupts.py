@@ -13,6 +13,8 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -43,6 +45,17 @@ sys.modules["interrupting"] = interrupting
 _spec.loader.exec_module(interrupting)
 
 posix = pytest.mark.skipif(os.name != "posix", reason="signals are POSIX's")
+
+
+@contextmanager
+def begun(words: Sequence[str], **how: Any) -> Iterator[subprocess.Popen[str]]:
+    """A program whose output is caught; it ends with this context: a test of one that does not fails."""
+    pipe = subprocess.PIPE
+    with subprocess.Popen(words, stdout=pipe, stderr=pipe, text=True, **how) as process:
+        try:
+            yield process
+        finally:
+            process.kill()
 
 
 class Interrupted:
@@ -169,16 +182,13 @@ print("went on")
 
 def signalled(body: str, *numbers: int) -> tuple[int, str, str]:
     """Run a program that says when it is ready, and send it signals -> status, output, errors."""
-    with subprocess.Popen(
-        [sys.executable, "-c", SCRIPT.format(body=body)],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-    ) as process:  # fmt: skip
+    with begun([sys.executable, "-c", SCRIPT.format(body=body)]) as process:
         assert process.stdout is not None
         assert process.stdout.readline() == "ready\n"
         for number in numbers:
             process.send_signal(number)
             time.sleep(0.02)  # else the system makes one of them
-        out, err = process.communicate(timeout=60)
+        out, err = process.communicate(timeout=30)
     return process.returncode, out, err
 
 
@@ -244,7 +254,9 @@ sys.exit(__main__.main())
 @posix
 def test_the_one_line_is_said_where_a_library_s_messages_are_still_caught() -> None:
     """The signal may come between the catching of standard error and the place that gives it back."""
-    done = subprocess.run([sys.executable, "-c", CAUGHT], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, "-c", CAUGHT], capture_output=True, text=True, check=False, timeout=60
+    )
     assert (done.returncode, done.stdout) == (130, "")
     assert done.stderr == "springcheck: interrupted; nothing is kept\n"
 
@@ -267,7 +279,7 @@ def test_a_commit_that_has_replaced_the_store_takes_its_journal_away(tmp_path: P
     """An interrupt between the two would leave a complete store beside a journal that says it is not."""
     done = subprocess.run(
         [sys.executable, "-c", SCRIPT.format(body=COMMITTED)],
-        cwd=tmp_path, capture_output=True, text=True, check=False,
+        cwd=tmp_path, capture_output=True, text=True, check=False, timeout=60,
     )  # fmt: skip
     assert (done.returncode, done.stdout) == (130, "")
     assert done.stderr == "springcheck: interrupted; s.h5 is complete\n"
@@ -318,7 +330,7 @@ def test_an_interrupt_as_the_new_store_is_opened_leaves_no_half_of_it(
 def test_no_temporary_folder_outlives_an_interrupt(body: str, tmp_path: Path) -> None:
     done = subprocess.run(
         [sys.executable, "-c", SCRIPT.format(body="import os, signal\n    " + body)],
-        env=os.environ | {"TMPDIR": str(tmp_path)}, capture_output=True, text=True, check=False,
+        env=os.environ | {"TMPDIR": str(tmp_path)}, capture_output=True, text=True, check=False, timeout=60,
     )  # fmt: skip
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "springcheck: interrupted\n")
     assert list(tmp_path.iterdir()) == []
@@ -337,11 +349,8 @@ def test_a_program_that_was_called_ends_with_all_that_it_has_started(swallowed: 
             "            except BaseException: pass\n"
             f"    interrupts.GRACE = 0.1; import subprocess; subprocess.Popen.communicate = deaf; {body}"
         )
-    with subprocess.Popen(
-        [sys.executable, "-c", SCRIPT.format(body=body)],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
-    ) as process:  # fmt: skip
-        out, err = process.communicate(timeout=60)
+    with begun([sys.executable, "-c", SCRIPT.format(body=body)], start_new_session=True) as process:
+        out, err = process.communicate(timeout=30)
     assert (process.returncode, out, err) == (130, "", "springcheck: interrupted\n")
     assert interrupting._left(process.pid) == 0
 
@@ -355,19 +364,78 @@ def test_a_command_ends_with_its_grandchildren_whatever_signal_comes(
     (tmp_path / "slow.sh").write_text(f"#!/bin/sh\nsleep 60 &\ntouch {tmp_path}/begun\nsleep 60\n")
     (tmp_path / "slow.sh").chmod(0o755)
     command = ["run", "spring", "--command", "x=./slow.sh {scene} {out}", "--method", "command:x"]
-    with subprocess.Popen(
-        [sys.executable, "-m", "springcheck", *command],
-        cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
-    ) as process:  # fmt: skip
+    words = [sys.executable, "-m", "springcheck", *command]
+    with begun(words, cwd=tmp_path, start_new_session=True) as process:
         while not (tmp_path / "begun").exists() and process.poll() is None:
             time.sleep(0.05)
         for name in signals:
             os.killpg(process.pid, getattr(signal, name))
             time.sleep(0.05)
-        _, err = process.communicate(timeout=60)
+        _, err = process.communicate(timeout=30)
     assert process.returncode == 130
     assert err.startswith("springcheck: interrupted")
     assert interrupting._left(process.pid) == 0
+
+
+HELD = """import os, time
+def held():
+    open("begun", "w").write(str(os.getpid()))
+    {act}
+from springcheck.engines import Engine, Method, named
+ENGINE = Engine(name="held", title="", version=held, start=held,
+                methods=named(Method(name="m", scheme="velocity-verlet", about="")))
+"""
+
+
+@posix
+def test_a_program_ends_with_the_parent_that_waits_for_it(tmp_path: Path) -> None:
+    """What kills the parent alone, as a queue's limit of time does, was meant for the program."""
+    (tmp_path / "held.py").write_text(HELD.format(act="time.sleep(60)"))
+    words = [
+        sys.executable,
+        "-m",
+        "springcheck",
+        "run",
+        "spring",
+        "--engine",
+        "held.py",
+        "--method",
+        "held:m",
+    ]
+    with begun(words, cwd=tmp_path) as process:
+        until = time.monotonic() + 30
+        while not (tmp_path / "begun").exists() or not (tmp_path / "begun").read_text():
+            assert process.poll() is None
+            assert time.monotonic() < until
+            time.sleep(0.02)
+        program = int((tmp_path / "begun").read_text())
+        assert program != process.pid
+        process.kill()
+        # its ends of the pipes are closed when it is gone
+        try:
+            process.communicate(timeout=5)
+        except subprocess.TimeoutExpired:
+            os.kill(program, signal.SIGKILL)
+            raise
+
+
+@posix
+def test_a_program_that_somebody_kills_is_not_begun_anew(tmp_path: Path) -> None:
+    """As the kernel does where memory runs out: the engine that was called has not ended it."""
+    (tmp_path / "held.py").write_text(HELD.format(act="os.kill(os.getpid(), 9)"))
+    words = [
+        sys.executable,
+        "-m",
+        "springcheck",
+        "run",
+        "spring",
+        "--engine",
+        "held.py",
+        "--method",
+        "held:m",
+    ]
+    done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=60)
+    assert (done.returncode, done.stderr) == (-signal.SIGKILL, "")
 
 
 @posix
@@ -411,7 +479,7 @@ def test_a_disk_that_does_not_answer_leaves_no_half_written_file(number: int, tm
     """The claim, a trajectory and the store, each as it is synced: nobody comes back to remove it."""
     done = subprocess.run(
         [sys.executable, "-c", SCRIPT.format(body=SLOW_DISK.format(number=number))],
-        cwd=tmp_path, capture_output=True, text=True, check=False,
+        cwd=tmp_path, capture_output=True, text=True, check=False, timeout=60,
     )  # fmt: skip
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "springcheck: interrupted\n")
     left = {1: {"lock"}, 4: {"lock", "command"}, 6: {"lock", "command", "run-own%3Aeuler.h5"}}
@@ -436,7 +504,7 @@ sys.exit(__main__.main())
 @posix
 def test_an_interrupt_leaves_no_file_half_written(tmp_path: Path) -> None:
     done = subprocess.run(
-        [sys.executable, "-c", SHOWN], cwd=tmp_path, capture_output=True, text=True, check=False
+        [sys.executable, "-c", SHOWN], cwd=tmp_path, capture_output=True, text=True, check=False, timeout=60
     )
     assert (done.returncode, done.stdout) == (130, "")
     assert done.stderr == "springcheck: interrupted; no file is half written\n"
@@ -447,11 +515,11 @@ def test_an_interrupt_leaves_no_file_half_written(tmp_path: Path) -> None:
 def test_a_signal_that_the_shell_has_ignored_stays_ignored() -> None:
     body = READY + "time.sleep(0.2)"
     script = f"import signal; signal.signal(signal.SIGINT, signal.SIG_IGN){SCRIPT.format(body=body)}"
-    with subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True) as process:
+    with begun([sys.executable, "-c", script]) as process:
         assert process.stdout is not None
         assert process.stdout.readline() == "ready\n"
         process.send_signal(signal.SIGINT)
-        assert process.communicate(timeout=60)[0] == "went on\n"
+        assert process.communicate(timeout=30)[0] == "went on\n"
 
 
 def doubled(number: int) -> int:
@@ -482,7 +550,9 @@ def test_workers_of_a_program_without_a_file_are_refused_in_one_line() -> None:
         "try:\n    list(workers.carried_out([partial(operator.add, 1, 2)] * 3, 2))\n"
         "except SpringcheckError as error:\n    print(error)\n"
     )
-    done = subprocess.run([sys.executable, "-"], input=code, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, "-"], input=code, capture_output=True, text=True, check=False, timeout=60
+    )
     assert (done.returncode, done.stderr) == (0, "")
     assert "need the program as a file, which <stdin> is not" in done.stdout
 
@@ -577,7 +647,7 @@ def test_an_object_that_an_interrupt_left_half_made_is_not_mentioned() -> None:
     def said(fails: str) -> str:
         code = HALF_MADE.format(fails=fails)
         return subprocess.run(
-            [sys.executable, "-c", code], capture_output=True, text=True, check=False
+            [sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=60
         ).stderr
 
     assert said("os.kill(os.getpid(), signal.SIGINT)") == "springcheck: interrupted\n"
@@ -600,6 +670,6 @@ def test_ctrl_c_works_after_rebound_has_run() -> None:
     )
     done = subprocess.run(
         [sys.executable, "-c", "import signal; signal.signal(2, signal.default_int_handler)\n" + code],
-        capture_output=True, text=True, check=False,
+        capture_output=True, text=True, check=False, timeout=60,
     )  # fmt: skip
     assert done.stdout == "heard\n", done.stderr
