@@ -340,7 +340,7 @@ def _lengths(z: Extended, centre: Extended | Floats) -> Floats:
 def _constant_part(
     z: Extended, sigma: Floats, process: Floats, start: _Solution | None, record: Record, constant: bool
 ) -> tuple[_Solution, int, Extended | None]:
-    """The plainest of no constant, an equilibrium and any constant that explains the states, and its slips."""
+    """The plainest of no constant, an equilibrium and any constant that explains the states, and slips."""
     from scipy.special import fdtri
 
     numbers, slips, centred = 2 * len(process), None, 0
