@@ -171,10 +171,11 @@ def _unlike(record: Record, found: Map, matches: list[Match]) -> Floats:
     change = _slipped(matches, found, d, between=False) - _slipped(matches, found, -d, between=False)
     lengths = np.sqrt(np.sum(found.z[:-1].astype(np.float64) ** 2, axis=1))
     out = np.zeros((len(matches), len(lengths), 2))
+    steps = {stride: float(record.interval) / stride for stride in {match.stride for match in matches}}
+    # every time is a multiple of the step, to the last bit
+    even = {s for s, h in steps.items() if np.all(np.diff(h * np.arange(len(lengths) * s + 1)) == h)}
     for i, match in enumerate(matches):
-        step = float(record.interval) / match.stride
-        if np.all(np.diff(step * np.arange(len(lengths) * match.stride + 1)) == step):
-            # every time is a multiple of the step, to the last bit
+        if match.stride in even:
             continue
         ways = powers(one[i], match.stride).astype(np.float64)
         each = ways[::-1] @ (change[i] / (2 * d)).astype(np.float64) @ ways
