@@ -560,9 +560,29 @@ def test_a_stepper_is_named_and_its_order_seen_on_an_anharmonic_well() -> None:
     assert identify_stepper(in_place).scheme == "semi-implicit-euler"
 
 
+def a_kick_too_long(q, p, h, force, mass):
+    p = p + h / 2 * force(q)
+    q = q + h * p / mass
+    return q, p + h * force(q)
+
+
+def heavy_weights(q, p, h, force, mass):
+    def rates(q, p):
+        return p / mass, force(q)
+
+    k, weights = [rates(q, p)], (1, 2, 3, 1)
+    for c in (0.5, 0.5, 1.0):
+        k.append(rates(q + c * h * k[-1][0], p + c * h * k[-1][1]))
+    return tuple(
+        x + h / 6 * sum(w * y[i] for w, y in zip(weights, k, strict=True)) for i, x in enumerate((q, p))
+    )
+
+
 @pytest.mark.parametrize(
     ("stepper", "words"),
     [
+        (a_kick_too_long, "the momentum changes by 1.5 h F and the position by 1 h p/m"),
+        (heavy_weights, "the momentum changes by 1.1667 h F and the position by 1.1667 h p/m"),
         (massless, "mass is left out"),
         (forwards_only, "negative step goes forwards"),
         (linear_only, "not on forces that are not linear"),
@@ -572,6 +592,24 @@ def test_a_stepper_with_a_fault_is_told_which(stepper, words: str) -> None:
     found = identify_stepper(stepper)
     assert not found.fits
     assert words in found.statement, found
+
+
+def test_a_stepper_that_draws_is_named_from_more_states_than_a_map_needs() -> None:
+    rng = np.random.default_rng(1)
+
+    def baoab(q, p, h, force, mass):
+        c = np.exp(-0.5 * h)
+        p = p + h / 2 * force(q)
+        q = q + h / 2 * p / mass
+        p = c * p + np.sqrt(0.47 * mass * (1 - c * c)) * rng.standard_normal()
+        q = q + h / 2 * p / mass
+        return q, p + h / 2 * force(q)
+
+    found = identify_stepper(baoab)
+    assert "baoab" in [one.scheme for one in found.candidates]
+    (told,) = [note for note in found.notes if note.startswith("baoab: ")]
+    thermal, error = (float(x) for x in told.partition("kT ")[2].split(" +- "))
+    assert abs(thermal - 0.47) < 5 * error
 
 
 def test_a_stepper_that_is_not_there_or_fails_is_one_clear_line(tmp_path, monkeypatch) -> None:

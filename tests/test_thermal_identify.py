@@ -13,6 +13,7 @@ import pytest
 import springcheck
 from springcheck import driver
 from springcheck.cli import main
+from springcheck.identify import identify
 from springcheck.identify.result import Candidate, Explanation, nothing
 from springcheck.physics import scenefile
 from springcheck.physics.bath import Bath
@@ -63,6 +64,21 @@ def test_a_thousand_frames_name_the_scheme_or_list_it_among_those_that_share_its
     assert expected in [one.scheme for one in found.candidates if one.nats < 14]
     if found.named:
         assert found.candidates[0].scheme == expected
+
+
+@pytest.mark.parametrize("name", ["baoab", "obabo", "andersen"])
+def test_what_is_stated_of_a_bath_is_held_against_its_states(name: str) -> None:
+    t, q, v = run(name, 1000)
+    told = identify(t, q, v=v, mass=M, stiffness=K, step=0.35)
+    assert name in [one.scheme for one in told.candidates]
+    assert told.fits
+    stated: list[tuple[dict[str, float], str]] = [
+        ({"stiffness": 900.0}, "where 900 is stated"), ({"step": 0.7}, "step 0.35 where 0.7 is stated"),
+        *([] if name == "andersen" else [({"friction": 90.0}, "where 90 is stated")]),
+    ]  # fmt: skip
+    for wrong, words in stated:
+        found = identify(t, q, v=v, mass=M, **wrong)
+        assert (found.fits, words in found.statement) == (False, True), found
 
 
 @pytest.mark.parametrize("name", ["baoab", "baoa", "andersen"])

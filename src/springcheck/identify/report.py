@@ -106,12 +106,12 @@ def _of_states(t: Any, q: Any, p: Any, v: Any, *, mass: ArrayLike | None, **stat
         found = of_few(record, _of_record(record, **stated))
         found = found if found.fits and stated["stiffness"] is not None else of_rotation(record, found)
     except IdentificationError:
-        if in_a_bath := of_bath(t, q, p, v, mass):
+        if in_a_bath := of_bath(t, q, p, v, mass, **stated):
             return in_a_bath
         raise
     # noise is not looked for where a scheme, or a mistake in the record, explains the states
     local = any(x.local for x in found.explanations)
-    return found if found.candidates or local else explained(found, t, q, p, v, mass)
+    return found if found.candidates or local else explained(found, t, q, p, v, mass, **stated)
 
 
 def _of_record(

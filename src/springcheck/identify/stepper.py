@@ -13,6 +13,7 @@ from springcheck.errors import IdentificationError, MethodError, told
 from springcheck.identify.families import title
 from springcheck.identify.report import identify_arrays
 from springcheck.identify.result import Explanation, Identification
+from springcheck.identify.unknown import ONE_MAP
 from springcheck.identify.wrong import faults_like
 from springcheck.physics.arrays import Floats
 from springcheck.schemes import SCHEMES
@@ -24,6 +25,12 @@ SPRINGS = ((3.7, 2.9, 0.31), (0.6, 1.7, 0.11), (1.9, 0.8, 0.43))
 """m, k, h: uneven, so that a mass left out or a half step misplaced shows."""
 
 FRAMES = 81
+
+BATH_FRAMES = 4001
+"""Of a stepper that draws random numbers: its kT is known to a tenth then."""
+
+SHORT = 1e-6, 1e-3
+"""A step that shows the terms linear in h, and by how much their sums of weights may be off 1."""
 
 RUNAWAY = 1e5
 """Growth of a state at which a run ends."""
@@ -109,10 +116,14 @@ def identify_stepper(step: Stepper) -> Identification:
         try:
             results.append(identify_arrays(t, q, p, mass=m, stiffness=k, step=h))
         except IdentificationError as error:
+            if _draws(step):
+                return _in_a_bath(step)
             raise MethodError(f"the stepper does not move a spring as a scheme would: {error}") from error
         if not results[0].fits:
             break
     found = results[0]
+    if not found.fits and _draws(step):
+        return _in_a_bath(step)
     notes = list(dict.fromkeys(note for x in results for note in x.notes))
     wrong: list[Explanation] = []
     schemes = {x.scheme for x in results}
@@ -138,6 +149,8 @@ def identify_stepper(step: Stepper) -> Identification:
                 remedy="set the damping to 0, which many engines do not by default",
             )
         )
+    if any(x.cause.startswith(ONE_MAP) for x in found.explanations[:1]):
+        wrong += _short(step)
     if found.scheme and not wrong:
         wrong += _backwards(step, found)
     if found.scheme in ELSEWHERE and _calls(step) > len(ELSEWHERE[found.scheme].over) - 1 > 0:
@@ -168,6 +181,36 @@ def identify_stepper(step: Stepper) -> Identification:
         notes=tuple(dict.fromkeys(notes)),
         defect_ulp=max(x.defect_ulp for x in results),
     )
+
+
+def _draws(step: Stepper) -> bool:
+    """Whether a third call from one state still gives another result than the second."""
+    m, k, h = SPRINGS[0]
+    _, one, other = (_one(step, 1.3, 0.7 * m, h, _spring(k), m) for _ in range(3))
+    return one != other
+
+
+def _in_a_bath(step: Stepper) -> Identification:
+    """Which thermostat a stepper that draws random numbers is, on the first spring."""
+    m, k, h = SPRINGS[0]
+    states = _run(step, _spring(k), m, h, (1.3, 0.7 * m), BATH_FRAMES)
+    return identify_arrays(*states, mass=m, stiffness=k, step=h)
+
+
+def _short(step: Stepper) -> list[Explanation]:
+    """Terms linear in h whose weights do not add up to 1: no scheme, whatever its order."""
+    (m, k, _), (h, off) = SPRINGS[0], SHORT
+    q, p = 1.3, 0.7 * m
+    new_q, new_p = _one(step, q, p, h, _spring(k), m)
+    drift, kick = (new_q - q) / (h * p / m), (new_p - p) / (-h * k * q)
+    if max(abs(drift - 1), abs(kick - 1)) < off:
+        return []
+    cause = (
+        f"Over a short step the momentum changes by {kick:.5g} h F and the position by {drift:.5g} h p/m, "
+        "where a scheme of any order has 1 and 1"
+    )
+    remedy = "add up the lengths of its kicks and of its drifts, or the weights of its stages: each sum is 1"
+    return [Explanation(cause=cause, remedy=remedy, misfit=max(abs(drift - 1), abs(kick - 1)))]
 
 
 def _calls(step: Stepper) -> int:

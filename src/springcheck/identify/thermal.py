@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from springcheck.identify.factor import by_a_factor
+from springcheck.identify.hypothesis import SURE
 from springcheck.identify.result import Candidate, Explanation, Identification
 from springcheck.physics.arrays import Floats
+from springcheck.text.wording import either
 from springcheck.thermal import THERMOSTATS
 from springcheck.thermal.catalogue import family_of
 from springcheck.thermal.likelihood import SUBSTEPS_TRIED
@@ -20,10 +23,17 @@ from springcheck.thermal.states import FEWEST, Thermal, identify_thermal
 MOST = 8
 """Oscillators that are looked at, each by itself."""
 
+AGREES = 1e-6
+"""Relative difference up to which a measured number is the stated one, beside its standard errors."""
+
+UNITS = "look at the units of what is stated, and at what the engine was given"
+
 REMEDY = "record every step, each oscillator by itself, with the velocities that the engine stores"
 
 
-def explained(found: Identification, t: Any, q: Any, p: Any, v: Any, mass: Any) -> Identification:
+def explained(
+    found: Identification, t: Any, q: Any, p: Any, v: Any, mass: Any, **stated: Any
+) -> Identification:
     """Identify a bath in states (f, n) at times t (f,) that no scheme explains; else what was found
     before."""
     given = _given(t, q, p, v, mass)
@@ -31,13 +41,16 @@ def explained(found: Identification, t: Any, q: Any, p: Any, v: Any, mass: Any) 
         return found
     times, positions, u, _ = given
     h = float(np.mean(np.diff(times)))
-    return by_a_factor(of_bath(t, q, p, v, mass) or found, h, positions, u)
+    return by_a_factor(of_bath(t, q, p, v, mass, **stated) or found, h, positions, u)
 
 
-def of_bath(t: Any, q: Any, p: Any, v: Any, mass: Any, *, mixed: bool = False) -> Identification | None:
+def of_bath(
+    t: Any, q: Any, p: Any, v: Any, mass: Any, *, mixed: bool = False, **stated: Any
+) -> Identification | None:
     """Identification of the thermostat of states (f, n) at times t (f,); None where nothing random shows.
 
-    `mixed` says that several draws act on each coordinate, whose distribution then does not show.
+    `mixed` says that several draws act on each coordinate, whose distribution then does not show.  The
+    `stiffness`, `friction` c and `step` that are `stated` are held against what each scheme would mean.
     """
     given = _given(t, q, p, v, mass)
     if given is None:
@@ -57,11 +70,11 @@ def of_bath(t: Any, q: Any, p: Any, v: Any, mass: Any, *, mixed: bool = False) -
         if all(one and (None not in found or one.misfit < FREE_OF_NOISE) for one in apart):
             # in a mode of sqrt(m) q the mass is 1
             known = [replace(one, known=one.known and joined[1]) for one in apart if one is not None]
-            return _said(known, h, np.ones(len(m)), with_mass=True, joined=True)
+            return _said(known, h, np.ones(len(m)), stated, with_mass=True, joined=True)
     if None in found:
         return None
     known = [one for one in found if one is not None]
-    return _said(known, h, None if mass is None and v is None else m, with_mass=mass is not None)
+    return _said(known, h, None if mass is None and v is None else m, stated, with_mass=mass is not None)
 
 
 def _given(t: Any, q: Any, p: Any, v: Any, mass: Any) -> tuple[Floats, Floats, Floats, Floats] | None:
@@ -82,7 +95,37 @@ def _given(t: Any, q: Any, p: Any, v: Any, mass: Any) -> tuple[Floats, Floats, F
     return times, positions, u, m
 
 
-def _said(found: list[Thermal], h: float, m: Any, *, with_mass: bool, joined: bool = False) -> Identification:
+def _against(one: Any, first: Thermal, h: float, m: float, stated: Mapping[str, Any]) -> list[str]:
+    """What is stated and is not so if this candidate made the states; m is 0 where no mass is known."""
+    steps = [h / stride for stride in one.strides]
+    step = min(steps, key=lambda x: abs(x - (stated.get("step") or x)))
+    # a standard error that was not worked out, NaN, is the best candidate's, whose noise is the same
+    share = first.candidates[0].friction_error / (first.candidates[0].friction or math.nan)
+    omega, friction = (
+        (x, share * x if math.isnan(error) else error)
+        for x, error in ((one.omega, one.omega_error), (one.friction, one.friction_error))
+    )
+    # where noise leaves a combination of the states alone, omega is as exact as the digits of the states
+    stiff = max(2 * omega[0] * omega[1], first.misfit / step**2)
+    found = {"step": (step, 0.0), "stiffness": (m * omega[0] ** 2, m * stiff)}
+    found["friction"] = (m * friction[0], m * friction[1])
+    return [
+        f"{name} {x:.6g} where {given:.6g} is stated"
+        for name, (x, error) in found.items()
+        if (given := stated.get(name)) is not None and (m or name == "step")
+        if abs(x - given) > SURE * error + AGREES * abs(x)
+    ]
+
+
+def _said(
+    found: list[Thermal],
+    h: float,
+    m: Any,
+    stated: Mapping[str, Any],
+    *,
+    with_mass: bool,
+    joined: bool = False,
+) -> Identification:
     first = found[0]
     names = [y.scheme for y in first.candidates]
     schemes = [name for name in names if all(name in [y.scheme for y in one.candidates] for one in found)]
@@ -92,6 +135,22 @@ def _said(found: list[Thermal], h: float, m: Any, *, with_mass: bool, joined: bo
     rows = {name: [next(y for y in one.candidates if y.scheme == name) for one in found] for name in schemes}
     kept = [name for name in schemes if all(y.nats < math.inf for y in rows[name])]
     every = {name: rows[name][0].strides[0] for name in kept}
+    scales = m if with_mass and not joined else np.zeros(len(found))
+    stiff = np.broadcast_to(np.asarray(stated.get("stiffness"), dtype=object), len(found))
+    differ = {
+        name: [
+            word
+            for y, scale, k in zip(rows[name], scales, stiff, strict=True)
+            for word in _against(y, first, h, scale, {**stated, "stiffness": k})
+        ]
+        for name in kept
+    }
+    agreeing = [name for name in kept if not differ[name]]
+    against = differ[kept[0]] if kept and not agreeing else []
+    if agreeing and agreeing != kept:
+        kept, best = agreeing, agreeing[0]
+        named = len(kept) == 1 and all(one.known and rows[best][0].strides == (1,) for one in found)
+        verdict = "named" if named else verdict
     several = len(kept) > 1
     candidates = tuple(
         Candidate(
@@ -113,10 +172,10 @@ def _said(found: list[Thermal], h: float, m: Any, *, with_mass: bool, joined: bo
         notes.append("the draws are uniform, not normal")
     apart = any(s > 1 for one in found for y in one.candidates for s in y.strides)
     if first.candidates and not named:
-        more = "frames of every step, a stated" if apart else "a stated"
+        more = ["frames of every step"] * apart + ["a stated stiffness"] * (stated.get("stiffness") is None)
         notes.append(
             "one scheme is named where it beats every other, of any number of steps between two frames, by a "
-            f"factor of 1e6; {more} stiffness, or more frames, may tell them apart"
+            f"factor of 1e6; {either([*more, 'more frames'])} may tell them apart"
         )
     if apart:
         notes.append("of frames several steps apart whole turns between two of them do not show")
@@ -143,15 +202,19 @@ def _said(found: list[Thermal], h: float, m: Any, *, with_mass: bool, joined: bo
         statement = (
             f"{head}, by no scheme known here, or of joined particles, or frames lie several steps apart"
         )
+    if against:
+        statement = f"{statement}, but of {', '.join(against)}"
     only = candidates[0] if named else None
     return Identification(
         verdict=verdict, statement=statement, scheme=best if named else None, candidates=candidates,
         step=h, stride=1 if named else None, omega=only.omega if only else unknown,
         stiffness=only.stiffness if only else None, friction=only.friction if only else unknown,
         velocity_offset=math.nan if not only else 0.0 if THERMOSTATS[only.scheme].synchronised else -0.5,
-        determinant=unknown, fits=best is not None and first.known, undecided=not first.known,
+        determinant=unknown, fits=best is not None and first.known and not against, undecided=not first.known,
         nearest=best if named else None, notes=tuple(notes),
-        explanations=() if best else (Explanation(cause=statement, remedy=REMEDY, misfit=math.nan),),
+        explanations=() if best and not against else (
+            Explanation(cause=statement, remedy=UNITS if against else REMEDY, misfit=math.nan),
+        ),
     )  # fmt: skip
 
 

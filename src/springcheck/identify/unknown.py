@@ -31,6 +31,7 @@ dies."""
 READ, CHOSEN = 1e-6, 1200
 """Error up to which a parameter is read from a map, and a denominator of what people choose for one."""
 
+ONE_MAP = "One linear map explains the states"
 MAP_OF = "if every step was recorded, it is that of a one-step method, "
 UNKNOWN_METHOD = "a one-step method that is not known here, which"
 
@@ -65,7 +66,7 @@ def misfit(e: Evidence) -> Explanation:
     few, many = STRIDES
     none = f", but it is none of the known schemes' in up to {many} steps to a frame, or {few} with friction"
     return Explanation(
-        cause=f"One linear map explains the states{'' if kind.startswith(MAP_OF) else none}: {kind}{near}",
+        cause=f"{ONE_MAP}{'' if kind.startswith(MAP_OF) else none}: {kind}{near}",
         remedy="compare the order of its stages and their coefficients with the scheme's; state the step "
         "where more of them lie between frames",
         misfit=math.nan if closest is None else distance(e.found, closest.parts[0]),
