@@ -179,6 +179,18 @@ def test_no_check_of_all_gives_a_verdict_that_is_no_number(where: str, what: str
         assert v.passed is None or not v.passed or v.value <= v.bound, v
 
 
+def test_a_frequency_that_is_off_by_turns_says_that_whole_turns_are_not_counted() -> None:
+    scene = uneven(steps=2000)
+    stiff = replace(scene, terms=(WallSpring(i=np.array([0]), k=np.array([4.35]), at=np.array([0.0])),))
+    right, wrong = plain(scene), replace(plain(stiff), scene=scene)
+    found = one(scene, wrong, checks.frequency)
+    # by 22 %
+    assert found.passed is False
+    assert found.value < 0.05
+    assert "whole turns are not counted" in found.reason
+    assert "whole turns" not in one(scene, right, checks.frequency).reason
+
+
 @pytest.mark.parametrize("what", ["it comes to nothing", "it is nothing after the start", "it stands still"])
 def test_a_phase_is_told_only_where_there_is_a_mode(what: str) -> None:
     scene = uneven(steps=57)

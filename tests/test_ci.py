@@ -146,6 +146,7 @@ def test_a_program_that_reads_a_scene_is_judged_in_half_a_minute(tmp_path: Path)
     status, sentence, error = judged(tmp_path, program="c=./verlet {scene} {out}", scheme="velocity-verlet")
     assert status == 0, error
     assert "none failed" in sentence
+    assert (tmp_path / "summary.md").read_text().count("passed, ") == 1
     assert time.monotonic() - begun < 30
     assert (tmp_path / "springcheck-report" / "report.html").stat().st_size > 10_000
     wrong = source.read_text().replace("q += h * p / m", "q += h / 2 * p / m")

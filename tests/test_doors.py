@@ -17,6 +17,7 @@ from springcheck.cli import main
 from springcheck.errors import MethodError
 from springcheck.physics.scenefile import load_scene
 from springcheck.studies import team
+from springcheck.studies.choose import choose
 
 EXAMPLES = Path(__file__).parent / "command-examples"
 
@@ -66,6 +67,22 @@ def test_a_function_that_is_not_the_scheme_that_it_claims_fails(
     assert run(capsys, "--stepper", "mine.py:leapfrog", "--scheme", "position-verlet")["status"] == 1
 
 
+def test_what_is_brought_runs_beside_the_default_methods_and_not_beside_all(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "mine.py").write_text(VERLET)
+
+    def ran(scene: str, *arguments: str) -> list[str]:
+        main(["run", scene, "--steps", "2", "--json", "--force", *arguments])
+        return [one["method"] for one in json.loads(capsys.readouterr().out)["runs"]]
+
+    # multiple-time-steps names its methods itself
+    for scene in ("spring", "multiple-time-steps"):
+        default = ran(scene)
+        assert sorted(ran(scene, "--stepper", "mine.py:leapfrog")) == sorted([*default, "stepper:leapfrog"])
+    assert "own:rk4" in map(str, choose(load_scene("spring"), ["*"])[0])
+
+
 @pytest.mark.usefixtures("sketched")
 def test_a_wrong_function_runs_among_the_engines_without_a_name(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -78,7 +95,7 @@ def test_a_wrong_function_runs_among_the_engines_without_a_name(
     assert all(v["passed"] is not False for v in found["verdicts"])
     assert main(["run", "spring", "--method", "own:euler", "--stepper", "mine.py:leapfrog", "--force"]) == 2
     said = " ".join(capsys.readouterr().out.split())
-    assert "springcheck identify FILE --trajectory stepper:leapfrog looks for it" in said
+    assert "springcheck identify spring.h5 --trajectory stepper:leapfrog looks for it" in said
     assert main(["plot", "spring-uneven.h5", "--quiet"]) == 0
 
 

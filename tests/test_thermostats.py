@@ -307,6 +307,8 @@ def test_a_bath_that_makes_no_sense_is_one_line(text: str) -> None:
         (["--temperature", "warm"], "--temperature warm: a number is needed"),
         (["--temperature", "300K", "--method", "own:euler"],
          "explicit-euler has no noise, and the scene has a bath"),
+        (["--temperature", "1", "--command", "c=false {scene} {out}", "--scheme", "baoab"],
+         "a thermostat of your own joins by --engine, and `springcheck identify` reads friction and kT off"),
         (["--method", "own:baoab"], "it is a thermostat, for scenes with a bath"),
         (["--seed", "3"], "--seed goes with --vary, or with a scene that has a bath"),
         (["--temperature", "1", "--seed", "0"], "seed = 0: a whole number from 1"),

@@ -177,11 +177,13 @@ def frequency(case: Case) -> Finding | str:
         return np.asarray(abs(x * dy - y * dx) / (x * x + y * y) / angle)
 
     true = float(turn.angle[j] / (abs(np.longdouble(case.trajectory.step)) * case.w[j]) - 1)
+    more = "" if abs(off) <= angle else "; whole turns are not counted, it may be off by more"
+    own = f"the scheme itself is off the true frequency by {true:.2e}"
     return Finding(
         abs(off) / abs(expected),
         limit,
         "relative",
-        f"the closed form's bound as an angle; the scheme itself is off the true frequency by {true:.2e}",
+        f"the closed form's bound as an angle; {own}{more}",
         sight.of_modes(case, part),
     )
 

@@ -149,7 +149,13 @@ def sentence(found: Sequence[Case], status: int) -> str:
     schemes = [x for x in found if x.name == "scheme"]
     if len(schemes) == 1:
         return f"{schemes[0].subject}: {schemes[0].why}"
-    return f"{count(sum(x.passed is True for x in found), 'check')} passed, none failed."
+    return _tally(found)
+
+
+def _tally(found: Sequence[Case]) -> str:
+    wrong = sum(x.passed is False or x.error for x in found)
+    passed, skipped = (sum(x.passed is value and not x.error for x in found) for value in (True, None))
+    return f"{count(passed, 'check')} passed, {wrong or 'none'} failed, {skipped} not applicable."
 
 
 def junit(command: str, found: Sequence[Case]) -> bytes:
@@ -188,13 +194,13 @@ def badge(found: Sequence[Case], status: int) -> bytes:
 def summary(command: str, found: Sequence[Case], status: int) -> str:
     """A summary in Markdown; its first sentence is the cause."""
     wrong = [x for x in found if x.passed is False or x.error]
-    lines = [f"### springcheck {command}: {WORDS[status]}", "", _cell(sentence(found, status)), ""]
+    first, tally = sentence(found, status), _tally(found)
+    lines = [f"### springcheck {command}: {WORDS[status]}", "", _cell(first), ""]
     if len(wrong) > 1:
         lines += ["| what | check | why |", "|---|---|---|"]
         lines += [f"| {_cell(x.subject)} | {_cell(x.name)} | {_cell(x.why)} |" for x in wrong[:MOST_CASES]]
         lines += ["", f"and {len(wrong) - MOST_CASES} more", ""] if len(wrong) > MOST_CASES else [""]
-    passed, skipped = (sum(x.passed is value and not x.error for x in found) for value in (True, None))
-    lines += [f"{count(passed, 'check')} passed, {len(wrong)} failed, {skipped} not applicable.", ""]
+    lines += [] if tally == first else [tally, ""]
     return "\n".join(lines) + "\n"
 
 

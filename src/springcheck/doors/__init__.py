@@ -95,7 +95,7 @@ def bring(options: Namespace) -> None:
         )
     if labels and hasattr(options, "method"):
         # where methods are named, those that are brought here are meant as well
-        options.method = [*(options.method or ["*"]), *(x for x in labels if x not in options.method)]
+        options.method = list(dict.fromkeys([*(options.method or [engines.DEFAULT]), *labels]))
 
 
 def _labels(found: engines.Engine) -> list[str]:

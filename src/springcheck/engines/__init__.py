@@ -50,10 +50,11 @@ from springcheck.physics.scene import Scene
 from springcheck.thermal import THERMOSTATS
 
 __all__ = [
-    "ANY_POTENTIAL", "BRAKES", "DRIVEN", "EVERY_FORCE", "EVERY_POTENTIAL", "OURS", "Arithmetic", "Engine",
-    "Label", "Method", "Need", "Simulation", "Stopped", "absence", "bring", "engine", "foreign", "from_file",
-    "guarded", "installed_version", "is_brought", "load", "match", "method", "module_name", "module_of",
-    "named", "names", "obstacle", "origin", "parse", "refusal", "start", "unusable", "while_here",
+    "ANY_POTENTIAL", "BRAKES", "DEFAULT", "DRIVEN", "EVERY_FORCE", "EVERY_POTENTIAL", "OURS", "Arithmetic",
+    "Engine", "Label", "Method", "Need", "Simulation", "Stopped", "absence", "bring", "engine", "foreign",
+    "from_file", "guarded", "installed_version", "is_brought", "load", "match", "method", "module_name",
+    "module_of", "named", "names", "obstacle", "origin", "parse", "refusal", "start", "unusable",
+    "while_here",
 ]  # fmt: skip
 
 T = TypeVar("T")
@@ -211,6 +212,10 @@ def _methods_meant(name: str, glob: str, bath: bool | None) -> list[str]:
     return meant
 
 
+DEFAULT = "**"
+"""The pattern of those that run where nobody names a method: a scene's own list, or `*`."""
+
+
 def match(patterns: tuple[str, ...], *, bath: bool | None = False) -> tuple[Label, ...]:
     """Labels that glob patterns name, each once, in the order of the engines.
 
@@ -222,7 +227,7 @@ def match(patterns: tuple[str, ...], *, bath: bool | None = False) -> tuple[Labe
     """
     chosen: dict[str, Label] = {}
     for pattern in patterns:
-        head, at, place = pattern.partition("@")
+        head, at, place = ("*" if pattern == DEFAULT else pattern).partition("@")
         if not any(c in head for c in "*?["):
             chosen[pattern] = parse(pattern)
             continue
@@ -251,6 +256,11 @@ def refusal(scene: Scene, label: Label) -> str | None:
     """Why a method cannot serve a scene, or None where it can; imports nothing."""
     what = method(label)
     if scene.bath and not what.generator:
+        if is_brought(label.engine):
+            return (
+                "it declares no noise, and the scene has a bath; a thermostat of your own joins by --engine, "
+                "and `springcheck identify` reads friction and kT off its states"
+            )
         return f"{what.scheme} has no noise, and the scene has a bath; its methods are thermostats"
     if what.generator and not scene.bath:
         return "it is a thermostat, for scenes with a bath: --temperature or [bath] gives one"

@@ -236,7 +236,7 @@ def positions(runs: Runs, shown: Sequence[View], truth: Motion | None) -> Bank:
 
 
 def _off(runs: Runs, view: View) -> str:
-    """How far the best and the worst are off the exact solution at most, as parts of its reach."""
+    """Largest error of the best and of the worst, as parts of the exact solution's peak-to-peak range."""
     exact = Exact(runs.scene)
     if not exact.known:
         return ""
@@ -246,7 +246,7 @@ def _off(runs: Runs, view: View) -> str:
         x, true = (view.pick(*one)[0] for one in ((run.q, run.p), exact.at(run)))
         with np.errstate(all="ignore"):
             found[group.title] = float(np.max(np.abs(x - true))) / (float(np.ptp(true)) or 1.0)
-    return extremes(found, f"off the exact {view.what} by at most {{}} of its reach")
+    return extremes(found, f"off the exact {view.what} by at most {{}} of its peak-to-peak range")
 
 
 def extremes(found: Mapping[str, float], text: str, *, beyond: float = 10.0) -> str:

@@ -278,8 +278,9 @@ def _rule(axes: Axes, rule: Rule, height: float) -> None:
     if rule.axis == "x":
         axes.annotate(rule.name, (rule.at, height), xycoords=("data", "axes fraction"), xytext=(3, -6), **how)
     else:
-        place = (0.99, rule.at)
-        axes.annotate(rule.name, place, xycoords=("axes fraction", "data"), xytext=(0, 3), ha="right", **how)
+        # errors begin small: their curves leave the left of the line at 1 free
+        place, how["ha"] = ((0.01, rule.at), "left") if rule.look == "one" else ((0.99, rule.at), "right")
+        axes.annotate(rule.name, place, xycoords=("axes fraction", "data"), xytext=(0, 3), **how)
 
 
 def _tiles(axes: Axes, chart: Chart) -> None:

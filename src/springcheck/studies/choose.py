@@ -41,11 +41,17 @@ def choose(scene: Scene, patterns: Sequence[str]) -> tuple[list[Label], list[Lef
     Raises MethodError when a method that is named in full cannot run: it was asked for.
     """
     # a scene's `*` stands for the default methods, one that somebody gives for all
-    named = tuple(ALL if x == "*" else x for x in patterns) or scene.include
+    patterns = patterns or [engines.DEFAULT]
+    own = engines.DEFAULT in patterns
+    named = [
+        name
+        for x in patterns
+        for name in (scene.include if x == engines.DEFAULT else [ALL if x == "*" else x])
+    ]
     try:
-        matched = engines.match(named, bath=scene.bath is not None)
+        matched = engines.match(tuple(named), bath=scene.bath is not None)
     except MethodError as error:
-        if patterns:
+        if not own:
             raise
         raise MethodError(f"methods.include of scene {scene.name}: {error}") from error
     chosen, left = sorted_out(matched, partial(engines.obstacle, scene))
@@ -54,6 +60,6 @@ def choose(scene: Scene, patterns: Sequence[str]) -> tuple[list[Label], list[Lef
             raise MethodError(f"{one.method} cannot run scene {scene.name}: {one.reason}")
     if not chosen:
         raise MethodError(f"no method can serve scene {scene.name}: {left[0].reason}")
-    rest = () if patterns else engines.match((ALL,), bath=scene.bath is not None)
+    rest = engines.match((ALL,), bath=scene.bath is not None) if own else ()
     others = (x for x in rest if x not in matched and not engines.obstacle(scene, x))
     return chosen, left, tuple(map(str, others))

@@ -92,8 +92,8 @@ class Chart {
     root.append(element("clipPath", { id: clip }, element("rect", box)));
     if (spec.tiles) this.tiles(inside, x, y);
     for (const { axis, at, name, look } of spec.rules) {
-      const v = this.ways["xy".indexOf(axis)](at);
-      const place = axis === "x" ? { x: x(v) + 5, y: T + 11 } : { x: W - R - 5, y: y(v) - 5, ...END };
+      const v = this.ways["xy".indexOf(axis)](at), [left, more] = look === "one" ? [L + 5] : [W - R - 5, END];
+      const place = axis === "x" ? { x: x(v) + 5, y: T + 11 } : { x: left, y: y(v) - 5, ...more };
       inside.append(line(axis, v, look || "limit"), element("text", place, name));
     }
     for (const curve of this.seen()) this.curve(inside, curve, x, y);

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 from argparse import Namespace
 from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -33,7 +34,7 @@ def lines(found: Report | Repeats | Stored | Ensemble, options: Namespace | None
     out: Lines = []
     if found.verdicts:
         out += _fractions(found.verdicts)
-        out += [*failures(found.verdicts), *unjudged(found.verdicts)]
+        out += [*failures(found.verdicts), *unjudged(found.verdicts, found.path)]
         if verdicts:
             out.append(verdicts_table(found.verdicts))
     if found.comparison is not None:
@@ -79,7 +80,7 @@ def _report(report: Report) -> Lines:
                 "same motion are of these"
             )
         )
-    out += [plain(), *unjudged(report.verdicts), *_summary(report)]
+    out += [plain(), *unjudged(report.verdicts, report.path), *_summary(report)]
     return out
 
 
@@ -271,7 +272,7 @@ def _faults(report: Report) -> Lines:
     return out
 
 
-def unjudged(verdicts: Sequence[Verdict]) -> Lines:
+def unjudged(verdicts: Sequence[Verdict], store: Path | None) -> Lines:
     """Methods whose scheme no check that applied could tell from another, with the reasons; and the parts of
     other methods that no check could judge."""
     out: Lines = []
@@ -286,7 +287,8 @@ def unjudged(verdicts: Sequence[Verdict]) -> Lines:
     for reason, methods in alike.items():
         line = f"not judged: {', '.join(methods)}: nothing that applied could tell ({reason})"
         if "--scheme NAME states it" in reason:
-            line += f"; springcheck identify FILE --trajectory {methods[0]} looks for it"
+            name = shlex.quote(str(store)) if store else "FILE"
+            line += f"; springcheck identify {name} --trajectory {methods[0]} looks for it"
         out.append(plain(line, "bold yellow"))
     return out
 
