@@ -96,11 +96,11 @@ def assert_right(scene: Scene, run: Trajectory) -> None:
 
 
 def _shown(scene: Scene, run: Trajectory, about: int) -> str:
-    """What the states of a run that failed show; where SciPy is not here, that it would say so."""
+    """What the states of a run that failed show; where SciPy or h5py is not here, that it would say so."""
     try:
         from springcheck.identify import files
     except ModuleNotFoundError as error:
-        if error.name and error.name.partition(".")[0] == "scipy":
+        if error.name and error.name.partition(".")[0] in ("scipy", "h5py"):
             return "with SciPy installed, this line says what they are"
         raise
     return files.shown(scene, run, about)

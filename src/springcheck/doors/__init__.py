@@ -95,7 +95,7 @@ def bring(options: Namespace) -> None:
         )
     if labels and hasattr(options, "method"):
         # where methods are named, those that are brought here are meant as well
-        options.method = list(dict.fromkeys([*(options.method or [engines.DEFAULT]), *labels]))
+        options.method = list(dict.fromkeys([*(options.method or [engines.UNNAMED]), *labels]))
 
 
 def _labels(found: engines.Engine) -> list[str]:

@@ -50,7 +50,7 @@ from springcheck.physics.scene import Scene
 from springcheck.thermal import THERMOSTATS
 
 __all__ = [
-    "ANY_POTENTIAL", "BRAKES", "DEFAULT", "DRIVEN", "EVERY_FORCE", "EVERY_POTENTIAL", "OURS", "Arithmetic",
+    "ANY_POTENTIAL", "BRAKES", "UNNAMED", "DRIVEN", "EVERY_FORCE", "EVERY_POTENTIAL", "OURS", "Arithmetic",
     "Engine", "Label", "Method", "Need", "Simulation", "Stopped", "absence", "bring", "engine", "foreign",
     "from_file", "guarded", "installed_version", "is_brought", "load", "match", "method", "module_name",
     "module_of", "named", "names", "obstacle", "origin", "parse", "refusal", "start", "unusable",
@@ -212,7 +212,7 @@ def _methods_meant(name: str, glob: str, bath: bool | None) -> list[str]:
     return meant
 
 
-DEFAULT = "**"
+UNNAMED = "**"
 """The pattern of those that run where nobody names a method: a scene's own list, or `*`."""
 
 
@@ -227,7 +227,7 @@ def match(patterns: tuple[str, ...], *, bath: bool | None = False) -> tuple[Labe
     """
     chosen: dict[str, Label] = {}
     for pattern in patterns:
-        head, at, place = ("*" if pattern == DEFAULT else pattern).partition("@")
+        head, at, place = ("*" if pattern == UNNAMED else pattern).partition("@")
         if not any(c in head for c in "*?["):
             chosen[pattern] = parse(pattern)
             continue

@@ -29,7 +29,7 @@ FRAMES = 81
 BATH_FRAMES = 4001
 """Of a stepper that draws random numbers: its kT is known to a tenth then."""
 
-SHORT = 1e-6, 1e-3
+TINY_STEP = 1e-6, 1e-3
 """A step that shows the terms linear in h, and by how much their sums of weights may be off 1."""
 
 RUNAWAY = 1e5
@@ -199,7 +199,7 @@ def _in_a_bath(step: Stepper) -> Identification:
 
 def _short(step: Stepper) -> list[Explanation]:
     """Terms linear in h whose weights do not add up to 1: no scheme, whatever its order."""
-    (m, k, _), (h, off) = SPRINGS[0], SHORT
+    (m, k, _), (h, off) = SPRINGS[0], TINY_STEP
     q, p = 1.3, 0.7 * m
     new_q, new_p = _one(step, q, p, h, _spring(k), m)
     drift, kick = (new_q - q) / (h * p / m), (new_p - p) / (-h * k * q)

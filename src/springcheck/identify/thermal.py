@@ -23,10 +23,10 @@ from springcheck.thermal.states import FEWEST, Thermal, identify_thermal
 MOST = 8
 """Oscillators that are looked at, each by itself."""
 
-AGREES = 1e-6
+STATED_AGREES = 1e-6
 """Relative difference up to which a measured number is the stated one, beside its standard errors."""
 
-UNITS = "look at the units of what is stated, and at what the engine was given"
+OF_UNITS = "look at the units of what is stated, and at what the engine was given"
 
 REMEDY = "record every step, each oscillator by itself, with the velocities that the engine stores"
 
@@ -113,7 +113,7 @@ def _against(one: Any, first: Thermal, h: float, m: float, stated: Mapping[str, 
         f"{name} {x:.6g} where {given:.6g} is stated"
         for name, (x, error) in found.items()
         if (given := stated.get(name)) is not None and (m or name == "step")
-        if abs(x - given) > SURE * error + AGREES * abs(x)
+        if abs(x - given) > SURE * error + STATED_AGREES * abs(x)
     ]
 
 
@@ -213,7 +213,7 @@ def _said(
         determinant=unknown, fits=best is not None and first.known and not against, undecided=not first.known,
         nearest=best if named else None, notes=tuple(notes),
         explanations=() if best and not against else (
-            Explanation(cause=statement, remedy=UNITS if against else REMEDY, misfit=math.nan),
+            Explanation(cause=statement, remedy=OF_UNITS if against else REMEDY, misfit=math.nan),
         ),
     )  # fmt: skip
 

@@ -41,12 +41,12 @@ def choose(scene: Scene, patterns: Sequence[str]) -> tuple[list[Label], list[Lef
     Raises MethodError when a method that is named in full cannot run: it was asked for.
     """
     # a scene's `*` stands for the default methods, one that somebody gives for all
-    patterns = patterns or [engines.DEFAULT]
-    own = engines.DEFAULT in patterns
+    patterns = patterns or [engines.UNNAMED]
+    own = engines.UNNAMED in patterns
     named = [
         name
         for x in patterns
-        for name in (scene.include if x == engines.DEFAULT else [ALL if x == "*" else x])
+        for name in (scene.include if x == engines.UNNAMED else [ALL if x == "*" else x])
     ]
     try:
         matched = engines.match(tuple(named), bath=scene.bath is not None)
