@@ -18,7 +18,7 @@ BUDGETS = {
     ("engines",): 2803,
     ("driver", "conformance", "doors"): 1254,
     ("checks",): 5095,
-    ("identify",): 8374,
+    ("identify",): 8375,
     ("formats", "store"): 5212,
     ("studies",): 1477,
     ("studies/*",): 10070,
