@@ -5,6 +5,7 @@ The trajectories are of schemes that springcheck does not run, which many of the
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -570,3 +571,23 @@ def test_a_remark_on_one_reading_of_the_states_is_not_one_on_another() -> None:
     assert wrong[0].cause.startswith("Exact flow, but of a spring")
     assert "does not fit" in remarks[0]
     assert stated.notes == plain.notes
+
+
+@pytest.mark.parametrize(("hw", "away", "frames"), [(0.0201, 7.2, 8), (0.022, 2.1, 10), (0.0127, 0.0, 8)])
+def test_numbers_of_double_precision_leave_room_for_an_unknown_scheme_too(
+    hw: float, away: float, frames: int
+) -> None:
+    """The Taylor series of fifth order, of which frames show but one number, or none: Yoshida's fourth order
+    in 5 steps was named, Ruth's third in an unknown number, and schemes without it were said to be all."""
+    m, k = 0.83, 2.73
+    h = hw / np.sqrt(k / m)
+    step = sum(
+        np.linalg.matrix_power(h * np.array([[0, 1], [-k / m, 0]]), n) / math.factorial(n) for n in range(6)
+    )
+    states = [np.array([-1.44, 0.24])]
+    for _ in range(frames - 1):
+        states.append(step @ states[-1])
+    q, v = np.array(states).T
+    found = identify(h * np.arange(frames), q + away, v=v)
+    assert found.fits
+    assert found.statement.endswith("or a scheme that is not known here")

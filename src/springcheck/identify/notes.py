@@ -88,16 +88,16 @@ def of_few(record: Record, found: Identification) -> Identification:
 
 
 def beside_unknown(record: Record, found: Identification, *, stated: bool, seen: bool) -> Identification:
-    """Add "or a scheme that is not known here" where coarse numbers or times leave room for one.  At a
+    """Add "or a scheme that is not known here" where the numbers or times leave room for one.  At a
     number of steps that nobody stated what lies between two schemes fits as well, and above
     `CERTAIN_STEPS` none is named; of deep ones a list of many steps says so.  Where the exact flow fits,
     any scheme fits whose own error does not show; and where the error of the scheme's step, or the law of
     its friction, is not plainly `seen`, another fits as well."""
     few = found.scheme or any(x.stride <= CERTAIN_STEPS for x in found.candidates)
     clear = record.jitter < DEEP
-    # what lies between two schemes that coarse numbers do not tell apart they do not exclude either
-    near = not (found.scheme and seen) or any(x.scheme == "exact" for x in found.candidates)
-    near = near and not (record.fine and clear)
+    # what lies between two schemes that the numbers do not tell apart they do not exclude either
+    one = found.scheme and len({x.stride for x in found.candidates}) == 1
+    near = not (one and seen) or any(x.scheme == "exact" for x in found.candidates)
     certain = stated or found.stride == 1 or (record.deep and clear and few) or found.scheme == "exact"
     if not found.fits or (certain and not near):
         return found
