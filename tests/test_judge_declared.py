@@ -50,6 +50,26 @@ def test_no_arithmetic_excuses_a_force_half_as_large_again(declared: dict[str, f
     assert f"the engine declares {name} = " in grid.why
 
 
+@pytest.mark.parametrize(
+    "declared", [{"lengths": 1e-2}, {"lengths": 1.0}, {"lengths": 1e6}, {"cancels": 9}, {"lengths": np.inf}]
+)
+def test_no_arithmetic_of_rods_or_baths_excuses_a_step_a_fifth_too_long(declared: dict[str, Any]) -> None:
+    scene = replace(scenefile.load_scene("bath-dumbbell"), steps=100)
+    right = springcheck.simulate(scene, "own:baoab", seed=3)
+    wrong = springcheck.simulate(replace(scene, step=1.2 * scene.step), "own:baoab", seed=3)
+    wrong = replace(
+        wrong, t=right.t, step=right.step, energy=scene.system.energy(wrong.q, wrong.p),
+        arithmetic=replace(Arithmetic(), **declared),
+    )  # fmt: skip
+    assert "grid" in failed(scene, wrong)
+
+
+@pytest.mark.parametrize("off", [1e-300, -1e-300, float("nan")])
+def test_a_size_beside_the_line_is_none_below_0(off: float) -> None:
+    scene = uneven()
+    assert failed(scene, replace(run_of(scene), off_axis=off)) == {"line"}
+
+
 def test_a_declared_arithmetic_is_said_in_the_verdict() -> None:
     scene = uneven()
     run = run_of(scene)

@@ -188,6 +188,24 @@ def test_a_wrong_force_is_seen_where_draws_reach_every_state(name: str) -> None:
         assert passed or "the force" in found.why
 
 
+@pytest.mark.parametrize("name", ["baoab", "gj-i", "andersen", "nose-hoover"])
+@pytest.mark.parametrize("at", [1e9, 1e13, 1e17])
+def test_what_stands_still_so_far_out_that_nothing_shows_is_not_judged(name: str, at: float) -> None:
+    """Nor does a right engine fail there, whose collisions nobody can see."""
+    near = replace(scenefile.load_scene("bath-spring"), steps=400, p=np.array([3.0]))
+    scene = replace(near.derived(terms=tuple(x.shifted(at) for x in near.terms)), q=near.q + at)
+    right = driver.run(scene, f"own:{name}", seed=3)
+    still = replace(
+        right,
+        p=0 * right.p,
+        q=0 * right.q + right.q[0],
+        energy=np.full(401, scene.system.energy(right.q[:1], 0 * right.p[:1])[0]),
+    )
+    wanted = {1e9: {0}, 1e13: {2}, 1e17: {2}}[at]
+    assert checks.status(checks.judge(scene, right)) in wanted
+    assert checks.status(checks.judge(scene, still)) != 0
+
+
 def _with(scene: Scene, factor: float) -> Scene:
     assert scene.bath is not None
     return replace(scene, bath=replace(scene.bath, friction=factor * scene.bath.friction))

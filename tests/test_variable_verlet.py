@@ -390,7 +390,7 @@ def test_a_step_left_over_by_roundings_alone_is_followed_where_it_is_told() -> N
     assert run.last_step[row] < 1e-14
     near = run.at(slice(row - 3, row + 4))
     case = checks.Case(trajectory=near, scene=scene, piece=True)
-    found = replayed.steps(case)
+    found = replayed.replay.judge(case)
     assert isinstance(found, Finding)
     assert found.value <= found.bound
 

@@ -5,9 +5,9 @@ one step, times what the map can make of them.  Values and bounds of the roundin
 rounding of what was added up, so that "4.1 of 19" reads: four roundings were seen where nineteen take
 place.
 
-`record`, `steps`, `motion` and `solver` hold the checks of a trajectory, `experiments` and `laws` those
-that need runs of their own; `sight` says of each what it would have seen, `drag` adds up what single steps
-hide.  A check is an object (see `Check`); the two lists here are the only ones.
+`record`, `steps`, `motion`, `solver` and `replayed` hold the checks of a trajectory, `experiments` and `laws`
+those that need runs of their own; `sight` says of each what it would have seen, `drag` adds up what single
+steps hide.  A check is an object (see `Check`); the two lists here are the only ones.
 
 Prior art: the exact discrete solution of one's own solver (Langtangen & Linge, Finite Difference
 Computing with PDEs, 2017); the step defect, taken in extended precision at every step, does not need
@@ -35,9 +35,10 @@ from springcheck.checks.motion import (
     shadow_energy,
 )
 from springcheck.checks.record import energies, grid, line, start, times
+from springcheck.checks.replayed import energy_gain, replay
 from springcheck.checks.requires import CONTRACTED, REQUIREMENTS
 from springcheck.checks.rods import rod_length, rod_velocity, turn
-from springcheck.checks.solver import energy_gain, replay, tolerance, tolerance_bound
+from springcheck.checks.solver import tolerance, tolerance_bound
 from springcheck.checks.steps import BLIND, arithmetic, border, bridges, drive, first_off, step_defect
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Limits, Trajectory, Verdict

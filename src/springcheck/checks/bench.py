@@ -59,11 +59,6 @@ class Bench:
         return schemes.Law(scheme=self.scheme, scene=self.scene, h=self.scene.step)
 
     @property
-    def tolerance(self) -> float:
-        """The tolerance that an adaptive solver is given."""
-        return self.scene.tolerance
-
-    @property
     def stiffness(self) -> Floats:
         """What holds each particle (n,) [M/T2], that of one radian a step where nothing does."""
         k = np.abs(self.scene.system.hessian_diagonal(self.scene.q)).astype(np.float64)

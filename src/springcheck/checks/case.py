@@ -65,11 +65,6 @@ class Case(Claim):
         ) * self.trajectory.every
 
     @property
-    def tolerance(self) -> float | None:
-        """The tolerance of an adaptive solver."""
-        return self.trajectory.tolerance
-
-    @property
     def linear(self) -> bool:
         """Whether each normal mode has a one-step matrix of its own."""
         return self.scene.system.has_modes and not self.law.has("mixes")

@@ -65,6 +65,8 @@ MOST_DECLARED = {
     "force": (2.0**-8, "8 bits, those of bfloat16, are the fewest of any format"),
     "quantum": (2.0**-32, "the unit of 64-bit fixed point, half of it behind the point"),
     "excess": (2.0**-31, "2**32 for 2**32 - 1 in 64-bit fixed point"),
+    "lengths": (1e-4, "the tolerance of SHAKE in GROMACS and in LAMMPS' manual"),
+    "cancels": (2, "a difference of 1 and what is itself taken from a difference"),
 }
 """The coarsest arithmetic that an engine may declare, and why: the bounds of all checks follow what it
 declares, and more would excuse any force."""
@@ -126,7 +128,7 @@ def line(case: Case) -> Finding:
     """Along axes that the scene leaves out nothing moves, exactly."""
     off = case.trajectory.off_axis
     assert off is not None
-    return Finding(off, 0.0, "L", "every force along another axis is a product with 0")
+    return Finding(abs(off), 0.0, "L", "every force along another axis is a product with 0")
 
 
 @check("energy", family="record", requires={"energies"})

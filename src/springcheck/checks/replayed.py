@@ -16,7 +16,7 @@ import numpy as np
 
 from springcheck import schemes
 from springcheck.checks.case import Case
-from springcheck.checks.check import Finding, largest
+from springcheck.checks.check import Finding, check, largest
 from springcheck.physics.arrays import ROUNDOFF, Extended, by_identity
 from springcheck.schemes.variable import Taken, allowed, push_of, taken
 from springcheck.text.wording import count
@@ -228,8 +228,9 @@ def _hidden(case: Case, found: _Replayed) -> str:
     )
 
 
-def steps(case: Case) -> Finding | str:
-    """How far the frames are from where the steps of the rule lead, in roundings."""
+@check("replay", family="motion", requires={"rule", "two-frames"})
+def replay(case: Case) -> Finding | str:
+    """Each step between two frames is that of a fixed-step scheme, as long as the solver's rule says."""
     with np.errstate(all="ignore"):
         found = case.once(_follow)
         if isinstance(found, str):
@@ -256,8 +257,9 @@ def steps(case: Case) -> Finding | str:
     )
 
 
-def gain(case: Case) -> Finding | str:
-    """How far the change of the energy is from the sum over the steps of the rule, over the energy."""
+@check("gain", family="motion", requires={"rule", "two-frames", "linear"})
+def energy_gain(case: Case) -> Finding | str:
+    """The energy changes by what the lengths of the steps make of it, and by nothing else."""
     with np.errstate(all="ignore"):
         found = case.once(_follow)
         if isinstance(found, str):

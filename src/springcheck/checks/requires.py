@@ -116,7 +116,7 @@ _ALL = (
     Requirement("one-step", "a fixed step", _trait(
         "one-step", "an adaptive solver has no one-step map; it is judged by its tolerance")),
     Requirement("tolerance", "a tolerance", _unless(
-        lambda x: not x.law.has("one-step") and x.tolerance is not None,
+        lambda x: not x.law.has("one-step") and x.trajectory.tolerance is not None,
         "a method of fixed step has no tolerance")),
     Requirement("rule", "steps whose lengths follow a rule", _unless(
         lambda x: x.scheme.rule is not None, "no rule is known that its steps follow"),

@@ -12,6 +12,7 @@ from springcheck.checks.check import Finding, check
 from springcheck.checks.steps import fastest
 from springcheck.physics import exact
 from springcheck.physics.arrays import Extended, Floats
+from springcheck.schemes.variable import allowed, push_of, taken
 
 
 @check("toler", family="motion", requires={"tolerance", "two-frames", "solution"})
@@ -42,23 +43,6 @@ def tolerance(case: Case) -> Finding | str:
         + _not_believed(case),
         sight.of_exact(case, lambda change: case.system.norm(*change) / bound),
     )
-
-
-@check("replay", family="motion", requires={"rule", "two-frames"})
-def replay(case: Case) -> Finding | str:
-    """Each step between two frames is that of a fixed-step scheme, as long as the solver's rule says."""
-    # imported here: solvers without a rule do without it
-    from springcheck.checks import replayed
-
-    return replayed.steps(case)
-
-
-@check("gain", family="motion", requires={"rule", "two-frames", "linear"})
-def energy_gain(case: Case) -> Finding | str:
-    """The energy changes by what the lengths of the steps make of it, and by nothing else."""
-    from springcheck.checks import replayed
-
-    return replayed.gain(case)
 
 
 def tolerance_bound(case: Case) -> float:
@@ -97,9 +81,6 @@ def _first_step(case: Case) -> float:
     force acts at the start, nothing makes it short."""
     if case.scheme.rule is None or case.steps[0] != 0:
         return 0.0
-    # imported here: solvers without a rule do without it
-    from springcheck.schemes.variable import allowed, taken
-
     run, scene = case.trajectory, case.judged
     times = 0.0, float(case.steps[1] * run.step)
     allow, start = allowed(case.scene), (run.q[0], run.p[0])
@@ -120,9 +101,6 @@ def _rebuilt(case: Case, q: Floats, p: Floats) -> float:
     run, scene, rule = case.trajectory, case.judged, case.scheme.rule
     if rule is None or not run.rebuilds_velocity:
         return 0.0
-    # imported here: solvers without a rule do without it
-    from springcheck.schemes.variable import allowed, push_of
-
     with np.errstate(all="ignore"):
         force = scene.system.force(q, p)
         most = force[np.argmax(np.sum((force / scene.m) ** 2, axis=1))]

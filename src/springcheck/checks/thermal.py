@@ -13,6 +13,7 @@ import numpy as np
 from springcheck import thermal
 from springcheck.checks.case import Case, small_move
 from springcheck.checks.check import Chance, Finding, check, largest
+from springcheck.checks.steps import STILL
 from springcheck.errors import MethodError
 from springcheck.physics.arrays import Floats
 from springcheck.text.wording import count
@@ -44,8 +45,11 @@ def thermostat(case: Case) -> Thermostat:
 
 
 def _reading(case: Case) -> Reading:
+    return _read(case, *(x[_unread(case) :] for x in (case.trajectory.q, case.trajectory.p)))
+
+
+def _read(case: Case, q: Floats, p: Floats) -> Reading:
     run, scheme = case.trajectory, thermostat(case)
-    q, p = (x[_unread(case) :] for x in (run.q, run.p))
     with np.errstate(all="ignore"):
         by = thermal.rigid.read if case.judged.system.rods else thermal.draws.read
         return by(scheme, case.judged, q, p, how=run.arithmetic, rebuilt=run.rebuilds_velocity)
@@ -79,6 +83,14 @@ def noise_direction(case: Case) -> Finding | str:
         return "fresh draws of a step reach every state: their covariance is judged"
     worst = np.where(np.isfinite(found.across), found.across, np.inf).max(axis=1)
     off = np.flatnonzero(~(worst <= found.roundings))
+    if not len(off):
+        run = case.trajectory
+        liveliest = int(np.argmax(np.sum(run.p * run.p / case.judged.m, axis=1)))
+        still = _read(case, *(np.repeat(x[liveliest][None], 4, axis=0) for x in (run.q, run.p))).across
+        # without draws what is at rest stays there by right
+        least = -1.0 if thermostat(case).draws else 0.0
+        if still is not None and least < np.max(still) <= found.roundings:
+            return f"{STILL} any step"
     where = f"; first at step {case.steps[0] + int(off[0]) + 1}" if len(off) else ""
     if limit := small_move(case.trajectory) if where else "":
         return limit
@@ -215,6 +227,9 @@ def collisions(case: Case) -> Chance | str:
         return limit
     p = thermal.draws.law_of(THERMOSTATS[case.trajectory.scheme], case.judged).collision
     hits, n = int(np.count_nonzero(found.hits)), found.hits.size
+    # a collision that changes less than a rounding is not seen
+    if found.missed is None or not p * np.sum(np.minimum(found.missed, 1)) <= 0.05 * np.sqrt(n * p):
+        return HIDDEN
     return Chance(thermal.chance.count(hits, n, p), f"{hits} of {n} steps, expected {n * p:.1f}")
 
 

@@ -53,6 +53,8 @@ class Reading:
     """What rounding may leave of each draw, (f-1, n), or of two a step (2, f-1, n)."""
     hits: NDArray[np.bool_] | None = None
     """Where collisions took place, (f-1, n)."""
+    missed: Floats | None = None
+    """Size of what a collision changes, in draws, up to which none is seen, (f-1, n)."""
     rescaled: Floats | None = None
     """Twice the kinetic energy over kT before and after one factor for all momenta, (2, f-1)."""
     allowed: tuple[Extended, Extended] | None = None
@@ -172,9 +174,12 @@ class _Reader:
         straight = np.maximum(np.abs(end[0] - q) / of_q, np.abs(end[1] - p) / of_p)
         draws, across, unit, _ = self._solved(start, end, hit=True)
         hits = ~(straight <= self.roundings)
-        return self._reading(
+        found = self._reading(
             np.where(hits, draws[0], np.nan), np.where(hits, across, straight), unit[0], hits
         )
+        after, before = (self.stepper(*start, self._force, [none[0] + x], True, end[0]) for x in (1, 0))
+        makes = np.maximum(np.abs(after[0] - before[0]) / of_q, np.abs(after[1] - before[1]) / of_p)
+        return replace(found, missed=np.asarray(self.roundings / makes, np.float64))
 
     def _rescaled(self, start: tuple[Extended, Extended], end: tuple[Extended, Extended]) -> Reading:
         """The factor of all momenta follows from them, and leaves n - 1 of them and all positions to check.
