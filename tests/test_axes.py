@@ -126,7 +126,10 @@ def test_scene_files_say_axes_and_are_read_back_to_the_bit(tmp_path: Path) -> No
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("position = [1.0, 2.0]\nmomentum = [1.0]", "particle[0].momentum: 1 numbers for the axes xy"),
+        (
+            "position = [1.0, 2.0]\nmomentum = [1.0]",
+            "particle[0].momentum: a number for each of xy is needed, not 1",
+        ),
         ("position = [1.0, 2.0, 3.0, 4.0]", "position"),
         ('position = [1.0, 2.0]\naxes = "xx"', "each axis once"),
         ("position = 1.0\nmomentum = [1.0, 2.0]", "a number for each of xy is needed"),

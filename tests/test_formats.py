@@ -554,14 +554,14 @@ def test_a_file_that_ends_before_its_scene_says_so(capsys: pytest.CaptureFixture
     short = replace(run, t=run.t[:-3], q=run.q[:-3], p=run.p[:-3])
     assert main(["judge", *csv(short), "--scene", "spring-uneven", "--scheme", "semi-implicit-euler"]) == 0
     steps = SCENE.steps - 3 * SCENE.every
-    assert f"ends after {steps:,} steps, the scene after {SCENE.steps:,}" in capsys.readouterr().out
+    assert f"ends after step {steps:,}, the scene after {SCENE.steps:,}" in capsys.readouterr().out
 
 
 BAD = [
     ("", "is empty"),
     ("hello\n", "holds no row of numbers"),
     ("1,2,3\n", "have no names"),
-    ("t,q,p\n0,1\n", "2 columns and 3 names"),
+    ("t,q,p\n0,1\n", "columns: 2, names: 3"),
     ("t,q\n0,1\n", "no momenta or velocities"),
     ("q,p\n0,1\n", "no column of times"),
     ("t,q,p\n0,1,2\n1,2\n", "line 3"),
@@ -573,7 +573,7 @@ BAD = [
     ("ITEM: TIMESTEP\n0\n", "damaged or cut off"),
     ("1\nProperties=species:S:1:pos:R:3\nX 0 0 0\n", "give its time step"),
     ("PK\x03\x04zip", "NumPy cannot read it"),
-    ("# name: t\n# type: matrix\n# rows: 2\n# columns: 1\n 1\n", "line 5: t: 1 numbers where 2 are said"),
+    ("# name: t\n# type: matrix\n# rows: 2\n# columns: 1\n 1\n", "line 5: t: numbers: 1, and 2 are said"),
     ("# name: t\n# type: matrix\n# rows: x\n", "'# rows: x' says no size"),
     ("# name: t\n# type: range\n# base, limit, increment\n0 1 0\n", "t: range holds what is no number"),
     ("# name: t\n# type: range\n# base, limit, increment\n0 1e9 1e-9\n", "more than 16,777,216 numbers"),

@@ -55,7 +55,7 @@ def test_twice_as_many_steps_are_none_either(tmp_path: Path) -> None:
     run = driver.run(replace(SCENE, steps=2 * SCENE.steps), "own:velocity-verlet")
     found, notes = verdicts(tmp_path, np.c_[run.t, run.q, run.p])
     assert found["grid"].passed is None
-    assert any(f"ends after {2 * SCENE.steps:,} steps, the scene after {SCENE.steps:,}" in x for x in notes)
+    assert any(f"ends after step {2 * SCENE.steps:,}, the scene after {SCENE.steps:,}" in x for x in notes)
 
 
 @pytest.mark.parametrize(("what", "check"), [("start", "start"), ("clock", "times")])

@@ -191,7 +191,7 @@ def bad(path: Path, **parts: str) -> Path:
             "its advance(every, q, p) has left row 0 of q and p as it was; it writes",
         ),
         ({"advance": "q[:] = 0"}, "has left row 0 of p as it was"),
-        ({"advance": "import springcheck.engines as e; raise e.Stopped(900, '')"}, "after 900 of 200 rows"),
+        ({"advance": "import springcheck.engines as e; raise e.Stopped(900, '')"}, "after 900 rows of 200"),
     ],
     ids=str,
 )

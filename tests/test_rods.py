@@ -401,7 +401,7 @@ def test_a_length_that_is_left_out_is_that_of_the_start() -> None:
         ("[0.8, -0.6]", "{ends = [0, 2]}", "rod[0].ends = 2: there are 2 particles"),
         ("[0.8, -0.6]", "{ends = ['wall', 'wall']}", "a rod between two walls holds nothing"),
         ("[0.8, -0.6]", "{ends = [0, 1], wall = 0.1}", "no end of it is a wall"),
-        ("[0.8, -0.6]", "{ends = ['wall', 1], wall = [0.1]}", "1 numbers for 2 axes"),
+        ("[0.8, -0.6]", "{ends = ['wall', 1], wall = [0.1]}", "2 for its axes are needed, not 1"),
         ("[0.8, -0.6]", "{ends = ['wall', 0]}", "its ends are at one place"),
         ("[0.8, -0.6]", "{ends = [0, 1], length = -1}", "rod[0].length = -1"),
         ("[0.8, -0.6]", "{ends = [0, 1], lenght = 1}", "lenght"),

@@ -234,7 +234,7 @@ def test_a_damaged_file_says_what_it_is(name: str, content: bytes, said: str) ->
 
 
 def test_masses_that_do_not_fit_are_said() -> None:
-    for m, said in ((np.ones(5), "5 masses and 1 columns"), (1 + T, "the masses change")):
+    for m, said in ((np.ones(5), "masses: 5, columns of q: 1"), (1 + T, "the masses change")):
         np.savez("x.npz", m=m, **arrays(V))
         with pytest.raises(StoreError, match=said):
             read("x.npz")

@@ -224,7 +224,7 @@ class _Part:
         except Stopped as stop:
             status, good, message = "stopped", stop.rows, str(stop)
             if good not in range(len(q) + 1):
-                raise MethodError(f"{self.label}: Stopped after {good!r} of {len(q)} rows") from stop
+                raise MethodError(f"{self.label}: Stopped after {good!r} rows of {len(q)}") from stop
         seconds = perf_counter() - began
         finite = np.isfinite(q[:good]).all(axis=1) & np.isfinite(p[:good]).all(axis=1)
         if not finite.all():

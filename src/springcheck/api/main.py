@@ -104,11 +104,11 @@ def judge(scene: Scene | str | Path, trajectory: Trajectory) -> Verdicts:
             )
         if values is not None and (np.shape(values) != shape or not frames):
             raise SpringcheckError(
-                f"{run.label}: {name} has the shape {np.shape(values)}; {frames} times of scene {found.name} "
+                f"{run.label}: {name} has the shape {np.shape(values)}; the times of scene {found.name} "
                 f"need {shape}, and one at least"
             )
     if run.every < 1 or run.step == 0:
-        raise SpringcheckError(f"{run.label}: frames {run.every} steps of {run.step:g} apart are none")
+        raise SpringcheckError(f"{run.label}: every = {run.every} by step = {run.step:g} lie no frames apart")
     return Verdicts(checks.judge(found, run))
 
 

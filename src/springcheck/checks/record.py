@@ -49,13 +49,13 @@ def grid(case: Case) -> Finding:
     last, asked = int(case.steps[-1]), (scene.frames - 1) * scene.every
     status = run.outcome.status
     if last > asked or (status == "complete" and last != asked):
-        wrong.append(f"{last} of {asked} steps, and the run is called {status}")
+        wrong.append(f"{last} of {count(asked, 'step')}, and the run is called {status}")
     elif (
         status in ("stopped", "diverged")
         and not case.law.has("random")
         and not (_gives_up(case) or _explodes(case))
     ):
-        wrong.append(f"{status} after {last} of {asked} steps for no reason that is known here")
+        wrong.append(f"{status} after {last} of {count(asked, 'step')} for no reason that is known here")
     why = "; ".join(wrong) or "every fact of the grid is the scene's own"
     return Finding(len(wrong), 0.0, "facts", why)
 

@@ -251,7 +251,7 @@ def replay(case: Case) -> Finding | str:
         number,
         "roundings",
         f"roundings of {count(int(found.counts[worst]), 'step')} from the frame before, each carried on, and "
-        f"of the time{_told(case, found)}; {int(np.sum(found.counts))} steps by the rule, "
+        f"of the time{_told(case, found)}; {count(int(np.sum(found.counts)), 'step')} by the rule, "
         f"{np.min(lengths):.3g} to {np.max(lengths):.3g} long in the mean between two frames"
         f"{_hidden(case, found)}{_until(case, found)}",
     )

@@ -230,7 +230,7 @@ def collisions(case: Case) -> Chance | str:
     # a collision that changes less than a rounding is not seen
     if found.missed is None or not p * np.sum(np.minimum(found.missed, 1)) <= 0.05 * np.sqrt(n * p):
         return HIDDEN
-    return Chance(thermal.chance.count(hits, n, p), f"{hits} of {n} steps, expected {n * p:.1f}")
+    return Chance(thermal.chance.count(hits, n, p), f"{hits} of {count(n, 'step')}, expected {n * p:.1f}")
 
 
 DRAWN = (

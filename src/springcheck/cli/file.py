@@ -231,7 +231,7 @@ def as_trajectory(
             q, scene = q - moved + far, _moved(scene, far)
             beside /= max(1.0, far / (float(np.ptp(q)) or 1.0))
     if q.shape[1] != scene.n:
-        raise StoreError(f"{path}: {q.shape[1]} positions a frame, {scene.n} in scene {scene.name}")
+        raise StoreError(f"{path}: positions in a frame: {q.shape[1]}, in scene {scene.name}: {scene.n}")
     p = other if states.p is not None else other * scene.m
     if len(q) < 2:
         raise StoreError(f"{path}: holds {len(q)} frame; two are needed")
@@ -272,7 +272,7 @@ def as_trajectory(
         notes.append(f"numbers are written to {states.roundoff:.1g}, and judged to that")
     steps = (len(q) - 1) * every
     if steps != scene.steps:
-        notes.append(f"ends after {steps:,} steps, the scene after {scene.steps:,}")
+        notes.append(f"ends after step {steps:,}, the scene after {scene.steps:,}")
     if every != scene.every:
         notes.append(f"frames are {count(every, 'step')} apart, {scene.every} in the scene")
     ours = states.run if isinstance(states, Recorded) else None

@@ -123,7 +123,7 @@ class _Command:
         rows = self._row + stride * np.arange(1, len(q) + 1)
         if rows[-1] >= len(self._q):
             raise MethodError(
-                f"command {self._name}: {len(self._q)} rows, too few: {rows[-1] + 1} are needed"
+                f"command {self._name}: too few rows: {len(self._q)}, {rows[-1] + 1} are needed"
             )
         q[:], p[:] = self._q[rows], self._p[rows]
         self._row = int(rows[-1])
@@ -163,7 +163,7 @@ class _Command:
         scene = self._scene
         if states.q.shape[1] != scene.n:
             raise MethodError(
-                f"command {self._name}: its output has {states.q.shape[1]} positions a row, not {scene.n}"
+                f"command {self._name}: positions in a row of its output: {states.q.shape[1]}, not {scene.n}"
             )
         p = states.p if states.p is not None else np.asarray(states.v) * scene.m
         t = np.arange(len(states.t)) * every * self._h
@@ -173,7 +173,7 @@ class _Command:
             row = int(np.argmax(off))
             raise MethodError(
                 f"command {self._name}: row {row + 1} is at t = {states.t[row]:.12g}, not {t[row]:.12g}; the "
-                f"first row is the start, the next {every} steps of {self._h:g} later"
+                f"first row is the start, the next {every} x {self._h:g} later"
             )
         if not (np.array_equal(states.q[0], scene.q) and np.array_equal(p[0], scene.p)):
             close = np.allclose(states.q[0], scene.q, rtol=1e-9) and np.allclose(p[0], scene.p, rtol=1e-9)

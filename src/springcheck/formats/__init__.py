@@ -223,5 +223,5 @@ def _moving(path: Path, found: States, *, alone: bool) -> States:
     if found.p is None and found.v is None and not alone:
         raise StoreError(f"{path}: holds no momenta or velocities; {ALONE}")
     if found.mass is not None and (not len(found.mass) or found.q.shape[1] % len(found.mass)):
-        raise StoreError(f"{path}: {len(found.mass)} masses and {found.q.shape[1]} columns of q")
+        raise StoreError(f"{path}: masses: {len(found.mass)}, columns of q: {found.q.shape[1]}")
     return found

@@ -99,12 +99,12 @@ def split(path: Path, columns: Columns, roundoff: float = 2.0**-53) -> States:
             raise StoreError(f"{path}: no column of {why} among {listed(columns)}; name them, as t,q,v")
     t = np.hstack(parts["t"])
     if t.shape[1] != 1:
-        raise StoreError(f"{path}: {t.shape[1]} columns of times")
+        raise StoreError(f"{path}: columns of times: {t.shape[1]}, and there is one time")
     states = {what: np.hstack(parts[what]) for what in parts if what != "m"}
     n = states["q"].shape[1]
     for what, values in states.items():
         if what != "t" and values.shape != (len(t), n):
-            raise StoreError(f"{path}: {values.shape[1]} columns of {what} and {n} of q")
+            raise StoreError(f"{path}: columns of {what}: {values.shape[1]}, of q: {n}")
         bad = np.flatnonzero(~np.isfinite(values).all(axis=1))
         if len(bad):
             raise StoreError(f"{path}: row {bad[0] + 1} of {what} is not finite")
@@ -134,7 +134,7 @@ def listed(names: Iterable[str]) -> str:
 def named(path: Path, values: Floats, names: Sequence[str]) -> Columns:
     """The columns of a table (f, c) under names; StoreError where the numbers of the two differ."""
     if len(names) != values.shape[1]:
-        raise StoreError(f"{path}: {values.shape[1]} columns and {len(names)} names: {listed(names)}")
+        raise StoreError(f"{path}: columns: {values.shape[1]}, names: {len(names)}: {listed(names)}")
     out: dict[str, Floats] = {}
     for i, name in enumerate(names):
         # columns may share a name, as the q of several particles do

@@ -273,7 +273,7 @@ def read_xyz(path: Path, columns: list[str], step: float | None) -> States:
                 width = width or (6 if len(cells) >= 6 else 3)
                 numbers.extend(number(cell) for cell in cells[:width])
                 if len(numbers) % width or len(cells) < width:
-                    raise lines.wrong(f"an atom of {len(cells)} numbers, {width} are expected")
+                    raise lines.wrong(f"an atom has {width} numbers, not {len(cells)}")
                 if len(first) < SHOWN:
                     first.append(cells[:width])
     table = np.frombuffer(numbers).reshape(len(t), n or 1, width or 3)

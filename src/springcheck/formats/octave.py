@@ -61,7 +61,7 @@ def _variables(lines: Lines) -> Iterator[tuple[str, Any, float]]:
             except (ValueError, ArithmeticError):
                 raise lines.wrong(f"{name}: {kind_} holds what is no number") from None
             if len(numbers) != prod(shape):
-                raise lines.wrong(f"{name}: {len(numbers)} numbers where {prod(shape)} are said")
+                raise lines.wrong(f"{name}: numbers: {len(numbers)}, and {prod(shape)} are said")
             if cells and len(shape) < 4:
                 values = np.array(numbers, np.float32 if match[2] == "float" else np.float64)
                 values = values.reshape(shape[::-1]).T if columns_first else values.reshape(shape)

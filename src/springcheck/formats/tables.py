@@ -53,7 +53,7 @@ def read_table(path: Path, columns: list[str], step: float | None) -> States:
                 raise unlike
             width = width or len(row)
             if len(row) != width:
-                raise lines.wrong(f"{len(row)} numbers where there were {width}")
+                raise lines.wrong(f"numbers in this row: {len(row)}, in the first: {width}")
             lines.count(width)
             numbers.extend(row)
             if len(first) < SHOWN:
@@ -72,7 +72,7 @@ def of_rows(
         header = ["", *header]
     chosen = names or header
     if not chosen:
-        raise StoreError(f"{path}: its {width} columns have no names; give them, as --columns t,q,v")
+        raise StoreError(f"{path}: its columns ({width}) have no names; give them, as --columns t,q,v")
     states = [i for i, name in enumerate(chosen[:width]) if kind(name) in ("q", "p", "v")]
     return split(path, named(path, values, chosen), roundoff(first, states))
 

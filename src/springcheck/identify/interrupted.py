@@ -17,7 +17,7 @@ from springcheck.identify.maps import powers, unit
 from springcheck.identify.record import ROUNDING
 from springcheck.identify.result import Explanation
 from springcheck.physics.arrays import Extended, Floats
-from springcheck.text.wording import either
+from springcheck.text.wording import count, either
 
 FEW_BAD = 0.06
 """Largest share of pairs that may be bad where the others make one motion."""
@@ -188,7 +188,7 @@ def _interruption(e: Evidence, found: Map, run: NDArray[np.intp], whose: str) ->
         digits = -math.log10(max(float(np.max(np.abs(back))), 1e-16))
         return (
             f"The motion{whose} jumps by {10**-digits:.1e} of its size between frames {first} and {at}, as "
-            f"after a restart from numbers of {max(1, round(digits))} digits",
+            f"after a restart from numbers of {count(max(1, round(digits)), 'digit')}",
             "write restarts in full precision",
         )
     if len(run) == 2 and near(z[last + 1], b @ (b @ z[first])):

@@ -37,7 +37,7 @@ def identify_positions(
         raise IdentificationError("nothing moves: at rest all schemes agree; start away from rest")
     if len(record.q) < FEWEST_FRAMES:
         raise IdentificationError(
-            f"{len(record.q)} frames of positions alone are too few; give {FEWEST_FRAMES}, or velocities"
+            f"too few frames of positions alone: {len(record.q)}; give {FEWEST_FRAMES}, or velocities"
         )
     strides = range(stride, stride + 1) if stride is not None and stride > 0 else FEW
     every = {j: recurrence(record, j, strides.stop - 1) for j in moving}

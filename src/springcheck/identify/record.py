@@ -85,7 +85,7 @@ def _states(x: ArrayLike, name: str, frames: int) -> Floats:
     if out.ndim == 1:
         out = out[:, None]
     if out.ndim != 2 or out.shape[0] != frames:
-        raise IdentificationError(f"{name} has shape {np.shape(x)}, but there are {frames} times")
+        raise IdentificationError(f"{name} has shape {np.shape(x)}, and the times ({frames},)")
     if not np.all(np.isfinite(out)):
         frame = int(np.argmin(np.all(np.isfinite(out), axis=1)))
         raise IdentificationError(f"{name} is not finite in frame {frame}; give the part before it")
@@ -130,7 +130,7 @@ def read(
         raise IdentificationError(f"times must be one row of finite numbers; found shape {np.shape(t)}")
     if len(times) < FEWEST_STATES:
         raise IdentificationError(
-            f"{len(times)} states are too few to read a map from; give {FEWEST_STATES} or more"
+            f"too few states to read a map from: {len(times)}; give {FEWEST_STATES} or more"
         )
     positions = _states(q, "q", len(times))
     given = [_states(x, name, len(times)) for name, x in (("p", p), ("v", v)) if x is not None]

@@ -110,7 +110,7 @@ def _between(masses: int, k: Floats) -> tuple[Spring, WallSpring]:
         walls = WallSpring(i=ends, k=np.full(len(ends), k * (2 if masses == 1 else 1)), at=0.0 * ends)
         return Spring(a=row, b=row + 1, k=none + k, rest=none), walls
     if k.shape != (masses + 1,):
-        raise SceneError(f"k has the shape {k.shape}: a chain of {masses} masses has {masses + 1} springs")
+        raise SceneError(f"k has the shape {k.shape}: springs are one more than masses, ({masses + 1},)")
     walls = WallSpring(i=np.array([0, masses - 1]), k=k[[0, -1]], at=np.zeros(2))
     return Spring(a=row, b=row + 1, k=k[1:-1], rest=none), walls
 

@@ -185,7 +185,7 @@ class Trajectory:
 
     def __repr__(self) -> str:
         n = self.q.shape[1] if self.q.ndim == 2 else 1
-        size = f"{len(self.t)} frames, {n} particle{'s' if n != 1 else ''}"
+        size = f"{len(self.t)} frame{'s' if len(self.t) != 1 else ''}, {n} particle{'s' if n != 1 else ''}"
         span = f", t = {self.t[0]:g} to {self.t[-1]:g}" if len(self.t) else ""
         return f"Trajectory({self.label!r}, {size}{span}, {self.outcome.status})"
 

@@ -84,7 +84,7 @@ class Draft:
                     found = None if values is None else values.shape
                     raise ValueError(f"{name} of {self.label}: shape {found}, not {expected}")
         if self.rows + f > self.scene.frames:
-            raise ValueError(f"{self.label}: more than the scene's {self.scene.frames} frames")
+            raise ValueError(f"{self.label}: more frames than the scene's {self.scene.frames}")
         done = 0
         while done < f:
             count = min(f - done, self._length - self._held)

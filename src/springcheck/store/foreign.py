@@ -216,7 +216,7 @@ def _column(path: Path, group: Any, element: str, name: str, frames: int, kept: 
         return np.asarray(float(offset) + np.arange(min(frames, kept)) * float(dataset[()]))
     if dataset.shape != (frames,):
         raise StoreError(
-            f"{path}: {group.name}/{element} has {frames} frames and {name} of shape {dataset.shape}"
+            f"{path}: frames of {group.name}/{element}: {frames}, and {name} has shape {dataset.shape}"
         )
     return np.asarray(dataset[:kept], np.float64)
 

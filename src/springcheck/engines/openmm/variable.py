@@ -73,7 +73,7 @@ def _stays(scene: Scene, label: Label, step: float, w: float) -> float:
             if not np.all(np.abs(one.end[0] - scene.q) <= farthest) or number >= MOST_TRIED:
                 raise MethodError(
                     f"{label}: its steps have no end where a motion escapes to infinity, as it does here or "
-                    f"may after {number} steps; --set time.steps asks for a shorter run"
+                    f"may after step {number}; --set time.steps asks for a shorter run"
                 )
     return np.inf
 

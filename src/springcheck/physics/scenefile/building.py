@@ -167,7 +167,9 @@ def _particles(rows: Sequence[Any]) -> _Bodies:
             raise MistakeError(f"particle[{j}].axes = {along!r}: each axis once")
         for name, length in lengths.items():
             if length != len(along):
-                raise MistakeError(f"particle[{j}].{name}: {length} numbers for the axes {along}")
+                raise MistakeError(
+                    f"particle[{j}].{name}: a number for each of {along} is needed, not {length}"
+                )
         start = [x if isinstance(x, tuple) else (x,) * len(along) for x in given.values()]
         for name, x in given.items():
             if name not in lengths and x and len(along) > 1:
@@ -190,10 +192,12 @@ def _chain(table: Any) -> Scene:
         raise MistakeError("chain: its start is needed: [[chain.wave]], or position and momentum")
     for name in ("position", "momentum"):
         if len(getattr(table, name)) not in (0, n):
-            raise MistakeError(f"chain.{name}: {len(getattr(table, name))} numbers for {n} masses")
+            raise MistakeError(
+                f"chain.{name}: {n} for its masses are needed, not {len(getattr(table, name))}"
+            )
     for j, wave in enumerate(table.wave):
         if wave.mode > n:
-            raise MistakeError(f"chain.wave[{j}].mode = {wave.mode}: a chain of {n} masses has {n} modes")
+            raise MistakeError(f"chain.wave[{j}].mode = {wave.mode}: the highest of this chain is {n}")
     waves = [(wave.mode, wave.amplitude) for wave in table.wave] or [(1, 0.0)]
     try:
         return builders.chain(
@@ -259,7 +263,7 @@ def _rods(rods: Sequence[Any], bodies: _Bodies) -> _Rows:
         ends = bodies.along(field, None, *numbers)
         wall = rod.wall if isinstance(rod.wall, tuple) else (rod.wall,) * (1 if rod.wall else len(ends))
         if len(wall) != len(ends):
-            raise MistakeError(f"rod[{j}].wall: {len(wall)} numbers for {len(ends)} axes")
+            raise MistakeError(f"rod[{j}].wall: {len(ends)} for its axes are needed, not {len(wall)}")
         one, other = np.transpose(ends)[[0, -1]]
         way = bodies.q[other] - (wall if len(numbers) == 1 else bodies.q[one])
         length = rod.length or float(np.hypot.reduce(way))

@@ -117,7 +117,7 @@ def entry(label: Label) -> Entry:
     whole = hot.outcome.status == "complete"
     both = temperatures(*(x[UNCOUNTED:] for x in read(hot))) if whole else ((nan, nan), (nan, nan))
     configurational, kinetic = both
-    ends = "" if whole else f"{SIDE_BY_SIDE} springs: {hot.outcome.status} after {hot.outcome.step} steps"
+    ends = "" if whole else f"{SIDE_BY_SIDE} springs: {hot.outcome.status} after step {hot.outcome.step}"
     return Entry(
         method=str(label), about=method.about, note="; ".join(filter(None, (method.note, ends))),
         version=", ".join(f"{key} {value}" for key, value in engines.load(label.engine).version().items()),
