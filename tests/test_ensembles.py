@@ -154,6 +154,9 @@ def test_samples_come_from_their_seed_and_are_spread_as_asked(tmp_path: Path) ->
         (["spring.0.stifness=1,2"], "stifness"),
         (["spring.7.stiffness=1,2"], "has no such number"),
         (["title=1,2"], "has no such number"),
+        (["particle.momentum=1,2"], "has no such number, did you mean particle.0.momentum?"),
+        (["particle.-1.mass=1,2"], "has no such number"),
+        ([".=1,2"], "has no such number"),
         (["particle.0.mass=-1,1"], "mass"),
         (["spring.0.stiffness=1:2:0"], "is needed"),
         (["spring.0.stiffness=1:2:100000", "particle.0.mass=1:2:100000"], "can be run"),
@@ -168,6 +171,19 @@ def test_what_cannot_be_varied_is_said_in_one_line(given: list[str], words: str,
         record()
     assert "\n" not in str(refused.value)
     assert not (tmp_path / "e.h5").exists()
+
+
+@pytest.mark.parametrize(
+    ("scene", "field", "words"),
+    [
+        ("diatomic", "box.lengths.0=3.9,4.5", "as a whole"),
+        ("bath-spring", "particle.0.mass=1,2", "has a bath"),
+    ],
+)
+def test_what_no_cell_has_of_its_own_is_refused(scene: str, field: str, words: str) -> None:
+    """Cells that should differ were alike."""
+    with pytest.raises(SpringcheckError, match=words):
+        measure.record(scenefile.load_scene(scene), vary.plan([field]), None)
 
 
 @pytest.mark.slow

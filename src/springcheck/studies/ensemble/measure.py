@@ -17,7 +17,7 @@ import numpy as np
 
 from springcheck import engines
 from springcheck.engines.contract import Label
-from springcheck.errors import MethodError
+from springcheck.errors import MethodError, SceneError
 from springcheck.physics import exact, scenefile
 from springcheck.physics.arrays import Floats, Reals
 from springcheck.physics.scene import Scene
@@ -51,9 +51,12 @@ def record(
 
     Raises SpringcheckError, before anything is run, where a field cannot be varied or no method can serve.
     """
+    if scene.bath:
+        raise SceneError(f"scene {scene.name} has a bath: cells of an ensemble are of motion without noise")
     labels, left, _ = choose(scene, methods)
     fields = tuple(axis.field for axis in cells.axes)
-    Varied(scene, cells).substitutions(cells.values(0))
+    varied, first = Varied(scene, cells), cells.values(0)
+    varied.check(first, varied.substitutions(first))
     command = keeper.command("ensemble", labels, scene.digest, repr(cells))
     with keeper.kept(path, command, **how) as kept:
         tallies = {str(label): Tally(method=str(label), smallest={}, largest={}) for label in labels}

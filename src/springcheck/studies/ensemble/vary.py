@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from springcheck.errors import SpringcheckError
+from springcheck.errors import SpringcheckError, nearest
 from springcheck.physics import scenefile
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
@@ -176,17 +176,18 @@ class Varied:
     def _at(self, field: str) -> tuple[Any, Any]:
         """The table and the key of a field."""
         found: Any = self._data
-        *parts, last = re.findall(r"[^.\[\]]+", field)
         try:
+            *parts, last = re.findall(r"[^.\[\]]+", field)
             for part in parts:
-                found = found[int(part)] if isinstance(found, list) else found[part]
-            key = int(last) if isinstance(found, list) else last
+                found = found[_key(found, part)]
+            key = _key(found, last)
             held = found.get(key) if isinstance(found, dict) else found[key]
             if isinstance(held, dict | list | str) or not isinstance(found, dict | list):
                 raise KeyError
         except (KeyError, IndexError, ValueError, TypeError):
             raise SpringcheckError(
-                f"{self._option} {field}: scene {self.scene.name} has no such number; "
+                f"{self._option} {field}: scene {self.scene.name} has no such number"
+                f"{nearest(field, fields(self._data))}; "
                 "fields are named as in its file, such as spring.0.stiffness or time.step"
             ) from None
         return found, key
@@ -219,9 +220,26 @@ class Varied:
         for j in sorted({*np.linspace(0, count - 1, CHECKED).astype(int).tolist()}):
             wanted = self.whole({field: float(column[j]) for field, column in values.items()})
             made = together(self.scene, changes, np.array([j]))
-            if list(_differences(wanted, made, "")):
+            if wanted.digest != made.digest:
                 names = " and ".join(values)
-                raise SpringcheckError(f"--vary: {names} act on one another, which no ensemble can")
+                what = "act on one another" if len(values) > 1 else "is of the scene as a whole"
+                raise SpringcheckError(f"--vary: {names} {what}, which no ensemble can")
+
+
+def fields(tables: Mapping[str, Any]) -> list[str]:
+    """The fields of a scene file as --vary and --set name them."""
+    return [
+        f"{name}.{i}.{field}" if isinstance(table, list) else f"{name}.{field}"
+        for name, table in tables.items()
+        for i, row in enumerate(table if isinstance(table, list) else [table])
+        if isinstance(row, dict)
+        for field in row
+    ]
+
+
+def _key(table: Any, part: str) -> Any:
+    """The key of this name in a table; ValueError of a row that a list has not, counted from its end too."""
+    return range(len(table)).index(int(part)) if isinstance(table, list) else part
 
 
 def _differences(one: Scene, other: Scene, field: str) -> Iterator[tuple[Place, float]]:

@@ -100,13 +100,9 @@ def _put(given: dict[str, float], field: str, value: object, needed: str) -> Non
 
 def _whole(field: str, scene: str) -> str:
     """The fields of a scene whose last part this is, in full."""
-    tables = tomllib.loads(scenefile.text_of(scene))
-    found = [
-        f"{name}.{i}.{field}" if isinstance(table, list) else f"{name}.{field}"
-        for name, table in tables.items()
-        for i, row in enumerate(table if isinstance(table, list) else [table])
-        if isinstance(row, dict) and field in row
-    ]
+    from springcheck.studies.ensemble.vary import fields
+
+    found = (x for x in fields(tomllib.loads(scenefile.text_of(scene))) if x.endswith(f".{field}"))
     return " or ".join(found)
 
 

@@ -60,16 +60,18 @@ def perform(options: Namespace, progress: Progress | None) -> Report | Repeats |
         raise SpringcheckError("--samples, --workers and --cluster go with --vary")
     if options.vary and (options.source is not None or options.thorough or options.verdicts):
         raise SpringcheckError("--from, --thorough and --verdicts do not go with --vary")
-    changes = bool(options.set) or options.step is not None or options.steps is not None
+    changes = options.set or {options.step, options.steps, options.temperature, options.friction} != {None}
     if (changes or options.fault) and (options.vary or options.source is not None):
-        raise SpringcheckError("--set, --step, --steps and --fault go with one SCENE")
+        raise SpringcheckError(
+            "what changes a scene (--set, --step, --temperature ...) or --fault goes with one SCENE"
+        )
     if options.vary:
         from springcheck.studies.ensemble import measure as ensemble
 
         return ensemble.perform(options, progress)
     if options.source is not None:
         return Repeats(repeats=tuple(repeat(Path(options.source), methods=options.method, progress=progress)))
-    if changes or options.temperature is not None or options.friction is not None:
+    if changes:
         from springcheck.studies.run.changes import changed
 
         scene = changed(options)
