@@ -246,7 +246,7 @@ def test_a_scene_with_bonds_is_written_and_read_with_the_same_numbers() -> None:
     ("bond", "said"),
     [
         ("{ends = [0, 0], stiffness = 1}", "the two ends are the same particle"),
-        ("{ends = [0, 3], stiffness = 1}", "bond[0].ends = 3: there are 3 particles"),
+        ("{ends = [0, 3], stiffness = 1}", "bond[0].ends = 3: particles here are numbered from 0 to 2"),
         ("{ends = [0, 2], stiffness = 1}", "the two move along"),
         ("{ends = [0, 1]}", "stiffness"),
         ("{ends = [0, 1], stiffness = 1, rest = -1}", "rest"),

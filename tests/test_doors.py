@@ -178,7 +178,7 @@ BAD_FUNCTIONS = [
         "    return q.real_part, p",
         "AttributeError: 'float' object has no attribute 'real_part' (mine.py, line 3)",
     ),
-    ("    return q, p, h", "returned a tuple of 3; a step returns (q, p)"),
+    ("    return q, p, h", "returned tuple of 3; a step returns (q, p)"),
     ("    return None", "returned NoneType"),
     ("    return q, undefined", "NameError: name 'undefined' is not defined (mine.py, line 3)"),
     ("    raise ValueError('no\\nidea')", "ValueError: no idea (mine.py, line 3)"),

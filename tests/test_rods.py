@@ -398,7 +398,7 @@ def test_a_length_that_is_left_out_is_that_of_the_start() -> None:
         ("[-0.8, -0.6]", "{ends = [0, 1]}", "its ends approach each other by 0.457 a unit of time"),
         ("[0.8, -0.6]", "{ends = [0, 1]}, {ends = [0, 1]}", "the rods before it keep its length too"),
         ("[0.8, -0.6]", "{ends = [0, 0]}", "the two ends are the same particle"),
-        ("[0.8, -0.6]", "{ends = [0, 2]}", "rod[0].ends = 2: there are 2 particles"),
+        ("[0.8, -0.6]", "{ends = [0, 2]}", "rod[0].ends = 2: particles here are numbered from 0 to 1"),
         ("[0.8, -0.6]", "{ends = ['wall', 'wall']}", "a rod between two walls holds nothing"),
         ("[0.8, -0.6]", "{ends = [0, 1], wall = 0.1}", "no end of it is a wall"),
         ("[0.8, -0.6]", "{ends = ['wall', 1], wall = [0.1]}", "2 for its axes are needed, not 1"),

@@ -218,11 +218,7 @@ class _Steps:
             given = (float(self._q[0]), float(self._p[0]), float(self._m[0]))
         out = self._function(given[0], given[1], self._h, self._force, given[2])
         if not isinstance(out, tuple | list | np.ndarray) or len(out) != 2:
-            what = (
-                f"a {type(out).__name__} of {len(out)}"
-                if isinstance(out, tuple | list)
-                else type(out).__name__
-            )
+            what = type(out).__name__ + (f" of {len(out)}" if isinstance(out, tuple | list) else "")
             raise MethodError(f"{self._name}: returned {what}; a step returns (q, p)")
         q, p = (np.atleast_1d(np.asarray(x, np.float64)) for x in out)
         if q.shape != (self._n,) or p.shape != (self._n,):

@@ -145,7 +145,5 @@ def read_npy(path: Path, columns: list[str], step: float | None) -> States:
 def of_table(path: Path, found: Any, names: Sequence[str]) -> States:
     """The states in the columns (f, c) of an array, which have no names but these."""
     if not names:
-        raise StoreError(
-            f"{path}: its columns ({found.shape[1]}) have no names; give them, as --columns t,q,v"
-        )
+        raise StoreError(f"{path}: its columns have no names; give all {found.shape[1]}, as --columns t,q,v")
     return split(path, named(path, np.asarray(found, np.float64), names), _roundoff([found]))

@@ -72,7 +72,7 @@ def of_rows(
         header = ["", *header]
     chosen = names or header
     if not chosen:
-        raise StoreError(f"{path}: its columns ({width}) have no names; give them, as --columns t,q,v")
+        raise StoreError(f"{path}: its columns have no names; give all {width}, as --columns t,q,v")
     states = [i for i, name in enumerate(chosen[:width]) if kind(name) in ("q", "p", "v")]
     return split(path, named(path, values, chosen), roundoff(first, states))
 

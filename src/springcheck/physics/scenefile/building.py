@@ -59,7 +59,7 @@ class _Bodies:
         n = len(self.axes) or len(self.m)
         if not 0 <= value < n:
             several = tables.BODIES[self.name].several
-            raise MistakeError(f"{field} = {value}: there are {n} {several}, numbered 0 to {n - 1}")
+            raise MistakeError(f"{field} = {value}: {several} here are numbered from 0 to {n - 1}")
         return value
 
     def along(self, field: str, axis: str | None, *bodies: int) -> list[tuple[int, ...]]:
@@ -167,9 +167,7 @@ def _particles(rows: Sequence[Any]) -> _Bodies:
             raise MistakeError(f"particle[{j}].axes = {along!r}: each axis once")
         for name, length in lengths.items():
             if length != len(along):
-                raise MistakeError(
-                    f"particle[{j}].{name}: a number for each of {along} is needed, not {length}"
-                )
+                raise MistakeError(f"particle[{j}].{name}: one for each of {along} is needed, not {length}")
         start = [x if isinstance(x, tuple) else (x,) * len(along) for x in given.values()]
         for name, x in given.items():
             if name not in lengths and x and len(along) > 1:
@@ -192,9 +190,7 @@ def _chain(table: Any) -> Scene:
         raise MistakeError("chain: its start is needed: [[chain.wave]], or position and momentum")
     for name in ("position", "momentum"):
         if len(getattr(table, name)) not in (0, n):
-            raise MistakeError(
-                f"chain.{name}: {n} for its masses are needed, not {len(getattr(table, name))}"
-            )
+            raise MistakeError(f"chain.{name}: {n} are needed, not {len(getattr(table, name))}")
     for j, wave in enumerate(table.wave):
         if wave.mode > n:
             raise MistakeError(f"chain.wave[{j}].mode = {wave.mode}: the highest of this chain is {n}")
