@@ -132,7 +132,7 @@ def test_scene_files_say_axes_and_are_read_back_to_the_bit(tmp_path: Path) -> No
         ),
         ("position = [1.0, 2.0, 3.0, 4.0]", "position"),
         ('position = [1.0, 2.0]\naxes = "xx"', "each axis once"),
-        ("position = 1.0\nmomentum = [1.0, 2.0]", "one for each of xy is needed"),
+        ("position = 1.0\nmomentum = [1.0, 2.0]", "a number for each of xy is needed"),
         ('position = [1.0]\naxes = "w"', "axes"),
     ],
 )

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from springcheck.physics.arrays import Floats
-from springcheck.text.wording import count
 
 SAMPLE = 500
 """Values whose decimal form is looked at; fewer than all of a long file, spread evenly over it."""
@@ -104,7 +103,7 @@ def storage(x: Floats) -> Storage:
     if not single and digits > DIGITS_OF_SINGLE and single_of(values, digits):
         # nine digits hold a number of single precision
         return Storage(name="single")
-    found = [Storage(name=f"text, {count(digits, 'digit')}", digits=digits)] if digits else []
+    found = [Storage(name=f"text, {digits} digits", digits=digits)] if digits else []
     if decimals is not None:
         found.append(Storage(name=f"text, {decimals} decimals", decimals=decimals))
     # text that is finer than the numbers around it says nothing: every number has such a decimal form

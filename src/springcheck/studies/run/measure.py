@@ -62,9 +62,7 @@ def perform(options: Namespace, progress: Progress | None) -> Report | Repeats |
         raise SpringcheckError("--from, --thorough and --verdicts do not go with --vary")
     changes = options.set or {options.step, options.steps, options.temperature, options.friction} != {None}
     if (changes or options.fault) and (options.vary or options.source is not None):
-        raise SpringcheckError(
-            "what changes a scene (--set, --step, --temperature ...) or --fault goes with one SCENE"
-        )
+        raise SpringcheckError("--fault and what changes a scene, as --set or --step, goes with one SCENE")
     if options.vary:
         from springcheck.studies.ensemble import measure as ensemble
 

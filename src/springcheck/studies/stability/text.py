@@ -38,9 +38,7 @@ def lines(study: Stability, options: Namespace | None = None) -> Lines:
     if study.multipliers and (exact := floquet(study.scene.system)):
         count = study.multipliers[0].steps
         step = exact[1] / count
-        out.append(
-            plain(f"Floquet multipliers of a period of the modulation, by steps of {step:.6g} ({count})")
-        )
+        out.append(plain(f"Floquet multipliers of a period of the modulation, by {count} x {step:.6g}"))
         found = [("exact motion", f"{exact[0]:.9f}", f"{exact[2]:.9f}", "")]
         found += [(x.method, f"{x.grown:.9f}", f"{x.turned:.9f}", f"{x.off:.0e}") for x in study.multipliers]
         out += [table(("method", "grows by", "turns by", "off its scheme's"), found), plain()]
