@@ -16,7 +16,7 @@ BUDGETS = {
     ("engines/own",): 1697,
     ("engines/openmm", "engines/ase", "engines/sundials"): 1327,
     ("engines",): 2803,
-    ("driver", "conformance", "doors"): 1254,
+    ("driver", "conformance", "doors"): 1278,
     ("checks",): 5083,
     ("identify",): 8375,
     ("formats", "store"): 5212,

@@ -41,6 +41,60 @@ def test_the_example_passes_every_check() -> None:
         check()
 
 
+BATH = """        for row in range(len(q)):
+            for _ in range(every):
+                self.kick(self.h / 2)
+                for drift in (0, 1):
+                    self.q = [x + self.h / 2 * y / m for x, y, m in zip(self.q, self.p, self.m, strict=True)]
+                    if not drift:
+                        c = np.exp(-self.gamma * self.h)
+                        a = np.sqrt((1 - c * c) * self.kT * np.array(self.m))
+                        self.p = (c * np.array(self.p) + a * self.rng.standard_normal(len(self.m))).tolist()
+                self.kick(self.h / 2)
+            q[row], p[row] = self.q, self.p
+"""
+
+
+def thermostat() -> str:
+    head, _, tail = CODE.partition("        for row in range(len(q)):")
+    start = "        self.rng, self.gamma = np.random.default_rng(seed), scene.bath.friction\n"
+    start += "        self.kT = scene.bath.thermal(scene.units)\n"
+    method = 'Method(name="bath", scheme="baoab", about="", terms={"wall-spring"}, generator="PCG64")'
+    text = f"import numpy as np\n{head}{BATH}{tail[tail.index(chr(10) * 2) :]}"
+    for old, new in (
+        ("def __init__(self, scene, step):\n", f"def __init__(self, scene, step, seed):\n{start}"),
+        ("    start=", f"    thermostats=named({method}),\n    start="),
+        ("label, step: Simulation(scene, step)", "label, step, seed=None: Simulation(scene, step, seed)"),
+    ):
+        assert old in text
+        text = text.replace(old, new)
+    return text
+
+
+def test_a_thermostat_passes_and_a_broken_one_does_not() -> None:
+    def checks(code: str) -> list[conformance.Check]:
+        return [x for x in conformance.checks_of(made(code)) if x.label.method == "bath"]
+
+    right = checks(thermostat())
+    assert right[-1].name == "seeds"
+    for check in right:
+        check()
+    for said, old, new in (
+        ("draws-variance", "(1 - c * c)", "(1 - c)"),
+        ("noise-direction", "self.h / 2 * y / m", "self.h / 2 * y / m**1.0000001"),
+        ("two seeds give one trajectory", "default_rng(seed)", "default_rng(3)"),
+        ("two runs of one seed differ", "default_rng(seed)", "default_rng()"),
+    ):
+        assert old in thermostat()
+        failed = []
+        for check in checks(thermostat().replace(old, new)):
+            try:
+                check()
+            except AssertionError as error:
+                failed.append(str(error))
+        assert any(said in text for text in failed), (said, failed)
+
+
 STEP, ROW, COUNT = (
     "                self.q = ",
     "        for row in range(len(q)):",

@@ -27,10 +27,12 @@ from springcheck import checks, driver, engines
 from springcheck.engines import Engine, Label
 from springcheck.errors import MethodError, SpringcheckError
 from springcheck.physics.arrays import Floats
+from springcheck.physics.bath import Bath
 from springcheck.physics.scene import Scene
 from springcheck.physics.scenefile import load_scene
 from springcheck.physics.terms import Damping, Quartic, Spring, WallSpring
 from springcheck.physics.trajectory import Trajectory
+from springcheck.thermal import THERMOSTATS
 
 __all__ = ["Check", "assert_right", "checks_of", "parametrize_with_checks", "uneven_scenes"]
 
@@ -66,12 +68,19 @@ def checks_of(engine: Engine) -> list[Check]:
     """Every check of every method of an engine."""
     if engine.name not in engines.names() or engines.engine(engine.name) is not engine:
         engines.bring(engine, "the tests of its own")
-    labels = [Label(engine=engine.name, method=name) for name in engine.methods]
-    found = [Check("declaring imports no library", labels[0], _imports_nothing)]
+    labels, random = (
+        [Label(engine=engine.name, method=name) for name in some]
+        for some in (engine.methods, engine.thermostats)
+    )
+    found = [Check("declaring imports no library", [*labels, *random][0], _imports_nothing)]
     for label in labels:
         scenes = _some(label)
         found += [Check(f"right on {scene.name}", label, partial(_right, scene=scene)) for scene in scenes]
         found += [Check(name, label, test) for name, test in TESTS.items()]
+    for label in random:
+        scenes = _some(label)
+        found += [Check(f"right on {scene.name}", label, partial(_right, scene=scene)) for scene in scenes]
+        found += [Check("seeds", label, _seeds)] * bool(scenes)
     return found
 
 
@@ -165,6 +174,7 @@ def _some(label: Label) -> list[Scene]:
         (_in_haste(scene) for scene in several[8:10]),
         (load_scene(name) for name in ("lc-circuit", "rlc-circuit", "pendulum", "torsion-pendulum")),
         (load_scene(name) for name in ("dumbbell",)),
+        (_in_a_bath(scene) for scene in several if not scene.system.is_damped),
     ):
         found = [scene for scene in scenes if engines.refusal(scene, label) is None]
         if found:
@@ -174,6 +184,10 @@ def _some(label: Label) -> list[Scene]:
 
 def _damped(scene: Scene) -> Scene:
     return replace(scene, terms=(*scene.terms, Damping(i=np.arange(scene.n), c=0.3 * scene.m)))
+
+
+def _in_a_bath(scene: Scene) -> Scene:
+    return replace(scene, bath=Bath(temperature=1.7, friction=0.8), steps=400, every=1)
 
 
 def _in_haste(scene: Scene) -> Scene:
@@ -230,7 +244,7 @@ def _imports_nothing(label: Label) -> None:
 def _right(label: Label, scene: Scene) -> None:
     """Every verdict on a scene passes."""
     try:
-        run = driver.run(scene, label)
+        run = driver.run(scene, label, seed=SEED if scene.bath else None)
     except MethodError as error:
         # the line of the engine that raised stands in the message
         raise AssertionError(f"{label} does not run {scene.name}: {error}") from None
@@ -273,6 +287,16 @@ def _untouched(label: Label) -> None:
     assert np.array_equal(scene.q, q), "the run has changed scene.q: copy it"
     assert np.array_equal(scene.p, p), "the run has changed scene.p: copy it"
     assert np.array_equal(one.q, other.q), "two runs of one scene differ: is a state shared between them?"
+
+
+def _seeds(label: Label) -> None:
+    """One seed gives one trajectory, and another seed another."""
+    one, same, other = (driver.run(_served(label)[0], label, seed=seed).q for seed in (SEED, SEED, SEED + 1))
+    assert np.array_equal(one, same), "two runs of one seed differ: let the seed alone decide the draws"
+    drawn = THERMOSTATS[engines.method(label).scheme].draws
+    assert not drawn or not np.array_equal(one, other), (
+        "two seeds give one trajectory: is the seed handed on?"
+    )
 
 
 def _backwards(label: Label) -> None:

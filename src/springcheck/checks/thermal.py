@@ -137,7 +137,7 @@ def draws_mean(case: Case) -> Chance | str:
 @check("var", family="noise", requires={"every-step"})
 def draws_variance(case: Case) -> Chance | str:
     """The draws have variance 1: the noise is that of the temperature, the masses and the friction."""
-    return _of(case, thermal.chance.variance, lambda x: f"variance {np.mean(x * x):.6f}")
+    return _of(case, thermal.chance.variance, lambda x: f"variance {np.mean(x * x):.6f} where 1 is right")
 
 
 @check("shape", family="noise", requires={"every-step"})
