@@ -192,7 +192,7 @@ def ends(status: int) -> int:
 def unread() -> int:
     """Nobody reads the output any more, nor is anything left to say -> `BROKEN_PIPE`."""
     for stream in (1, 2):
-        # of what stands in a buffer the interpreter's shutdown would say that it cannot be written
+        # at shutdown the interpreter would complain that buffered output cannot be written
         os.dup2(os.open(os.devnull, os.O_WRONLY), stream)
     return BROKEN_PIPE
 

@@ -51,7 +51,7 @@ class Case(Claim):
 
     @cached_property
     def undriven(self) -> Case:
-        """The case without driving forces, of the same normal modes; itself where there are none."""
+        """The case without driving forces, of the same normal modes; this case where nothing drives it."""
         alone = self.scene.system.without("drive").scene
         return replace(self, scene=alone) if len(alone.terms) < len(self.scene.terms) else self
 

@@ -121,7 +121,7 @@ def time_taken(case: Case) -> Finding | str:
     later, bound = _delay(case.clocked)
     if not bound < 1:
         return "rounding may be as large as what a drive a whole step later does"
-    why = "the roundings of every step, and how far each may shift the time at which a drive fits them best"
+    why = "rounding errors of every step, and how far each may shift the time at which the drive fits best"
     if not abs(later) <= bound:
         why = found(case)
         if not why:

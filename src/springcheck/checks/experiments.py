@@ -169,7 +169,7 @@ def reversibility(bench: Bench) -> Finding | str:
     if two_stage:
         state = _shifted(case.judged, scheme, state, -1)
     back = bench.run(bench.scene.derived(q=state[0], p=state[1], steps=steps, every=1), bench.label)
-    # of the way out alone: a way back that explodes must not enlarge what it is judged by
+    # size of the forward run alone: a backward run that explodes must not enlarge its own bound
     size = np.max(case.system.norm.most(*case.allowance_at(out.q, out.p)))
     enlarged = _enlarged(case, steps, state, size)
     if enlarged is None:

@@ -234,7 +234,8 @@ def rounding_growth(bench: Bench) -> Finding | str:
         slope,
         0.5 + SIGMAS * se,
         "exponent",
-        f"a walk has 1/2, a bias 1; {slope:.3f} +- {se:.3f} by the jackknife, {MEMBERS} springs, "
+        f"rounding errors that walk at random have 1/2, a bias 1; "
+        f"{slope:.3f} +- {se:.3f} by the jackknife, {MEMBERS} springs, "
         f"{LONG} steps of {ODD:g}",
         Limits(area=_seen_bias(steps, change)),
     )

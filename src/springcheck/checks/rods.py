@@ -46,7 +46,7 @@ def rod_length(case: Case) -> Finding:
         step = int(case.steps[int(np.argmax(lost))])
         why += f"; after step {step} a rod turns by h w of 1 or more, and no push along it keeps its length"
     elif heated and np.any(wrong := np.any(~(off <= bound), axis=1)):
-        # of the frames beside the step, whose draws may have turned it three times as fast as is usual
+        # rates at the frames beside the step: draws may have turned the rod three times as fast as usual
         i = int(np.argmax(wrong))
         near = rods.rates(case.trajectory.q[i : i + 2], case.trajectory.p[i : i + 2])
         usual = np.sqrt(case.judged.thermal * rods.inverse_mass) / rods.length

@@ -106,7 +106,7 @@ def _force(case: Claim, terms: tuple[Term, ...], near: Reals | None, whole: floa
 
     far = case.scene.periods
     if how.from_start:
-        # of the force at the start, and of what the displacement from it changes
+        # roundings of the force at the start, and of its change with the displacement from there
         far = far + np.abs(case.scene.q)
 
     def force(q: Reals, p: Reals) -> Reals:

@@ -68,7 +68,7 @@ class Seeded:
         return Stepper.of(self.scheme, scene, absolute=absolute)
 
     def allowed(self, run: Trajectory, row: int = 0, factor: Any = True) -> tuple[Extended, Extended]:
-        """What a step from a frame of a run may be off by; `factor` is that of all momenta, if any."""
+        """Bound on the rounding of a step from a frame; `factor` multiplies all momenta, if any does."""
         start = run.q[row].astype(np.longdouble), run.p[row].astype(np.longdouble)
         draws = [np.full(self.scene.n, LARGEST_DRAW)] * self.scheme.draws
         met: list[Met] = []
@@ -156,7 +156,7 @@ def noise_size(subject: Seeded) -> Finding | str:
         if collides:
             return f"no collision in {COLLIDED} steps"
         return Finding(np.inf, 1.0, "of what rounding allows", "there is no noise")
-    # what a state tells of two new draws is a sum that friction weighs
+    # where a step takes two draws, its state determines only a sum of them, weighted by friction
     if not collides and not scheme.rescales and scheme.fresh == 1:
         worst = max(worst, _redrawn(subject, one))
     return Finding(worst, 1.0, "of what rounding allows", "a factor of 2, and the same draws, of both runs")
@@ -225,7 +225,7 @@ def noise_matrix(subject: Seeded) -> Finding | str:
             force = scene.system.potential_force if scheme.rescales_after else lambda q, p: 0 * q
             both = [subject.stepper(scene)(*start, force, draws, hit)[1] for hit in (None, 1.0)]
             factor = max(1.0, float(np.max(np.abs(both[0])) / np.max(np.abs(both[1]))))
-        # of a noise that comes of 1 - c, taken from c
+        # an amplitude formed from 1 - c, with c rounded, loses digits by cancellation
         lost = run.arithmetic.unit / min(1.0, scene.bath.friction * scene.step)
         allowed = [
             x + lost * np.abs(y - z)

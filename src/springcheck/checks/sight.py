@@ -106,7 +106,7 @@ def change_of(steps: int) -> float:
 
 
 def rows(case: Case, total: int, told: NDArray[np.bool_] | None = None) -> Integers:
-    """Numbers of some rows of so many, or of those that are `told`, evenly spaced, the last one among
+    """Indices of some of so many rows, or of the rows that are `told`: evenly spaced, the last one among
     them."""
     chosen = np.arange(total) if told is None else np.flatnonzero(told)
     most = max(2, min(LOOKED_AT, NUMBERS // case.scene.n))

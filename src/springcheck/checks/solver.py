@@ -233,7 +233,7 @@ def _units(case: Case) -> tuple[Extended, Extended]:
 
 
 def _stiff(case: Case) -> Extended:
-    """What a difference of position counts in the norm of errors, at most (n,) [M/T2]."""
+    """Upper bound of the weight of a position error in the error norm (n,) [M/T2]."""
     # (du)**2 of a spring is at most twice the sum of its ends' squares; nothing held: see `Norm`
     stiff = case.system.rigidity.astype(np.longdouble)
     for group in case.system.norm.groups:

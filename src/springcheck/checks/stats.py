@@ -18,7 +18,7 @@ class Line(NamedTuple):
     """Standard error of the slope; NaN where there are as many unknowns as points."""
     intercept: float
     leverage: Floats
-    """What the slope changes by for a change of each y (n,)."""
+    """Derivative of the slope by each y (n,)."""
 
 
 def line(x: Floats, y: Floats, *terms: Floats) -> Line:
@@ -38,7 +38,7 @@ def line(x: Floats, y: Floats, *terms: Floats) -> Line:
 
 
 def student(freedom: int, chance: float) -> float:
-    """What |t| of so many degrees of freedom exceeds by this chance."""
+    """Two-sided quantile of Student's t: |t| exceeds it with this probability."""
     from scipy.special import stdtrit
 
     return float(stdtrit(freedom, 1 - chance / 2))

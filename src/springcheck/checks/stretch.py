@@ -58,7 +58,8 @@ WIDENED = 3.32
 chi-squared."""
 
 NUMBERS = 1 << 20
-"""Numbers of states and tangent maps that are kept at a time: 16 MB, and a few times that on the way."""
+"""Entries of states and tangent maps that are held in memory at a time: 16 MB, and a few times as much for
+temporaries."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -67,7 +68,7 @@ class Stretch:
 
     end: Extended
     allowance: Extended
-    """What the roundings of all steps may have become there (2, f, n)."""
+    """Bound on the error that the roundings of all steps add up to there (2, f, n)."""
     last: Extended
     """The allowance of the last step alone (2, f, n)."""
     reach: Extended
@@ -100,7 +101,7 @@ def follow(case: Claim, q: Extended, p: Extended, steps: int) -> Stretch:
         end, bound = _one(case, q, p, near=near)
         reach = np.maximum(np.abs([q, p]), np.abs(end))
         turns = np.zeros(len(q), dtype=np.longdouble)
-        # of an implicit step the sums of n products that its solver has
+        # the solver of an implicit step forms sums of n products
         implicit, separate = case.law.has("implicit"), case.system.is_separate
         solved = (1 if separate else q.shape[1]) * implicit
         spread = bound * np.sqrt(_walk(case) + _to_one_side(case) ** 2 + (2 + solved) / 3)

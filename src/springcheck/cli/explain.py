@@ -61,7 +61,7 @@ def lines(name: str) -> Iterator[str]:
     if name in _CHECKS:
         return chain(check_lines(_CHECKS[name]), _seen(_CHECKS[name]))
     known = schemes.known()
-    # by its title too, which is what tables print
+    # a scheme is found by its title too, which is what tables print
     for scheme in known.values():
         if name in (scheme.name, scheme.title):
             return scheme_lines(scheme)

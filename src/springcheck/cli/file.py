@@ -283,7 +283,7 @@ def as_trajectory(
     start: dict[str, Any] = {"q": q[0].copy(), "p": p[0].copy()}
     grid: dict[str, Any] = {"steps": steps, "every": every, "quantities": kept}
     if scene.system.rods and states.roundoff > 2.0**-53:
-        # what a few digits have of a start leaves its lengths by as much
+        # a start of few digits has rods of the right length only to those digits
         scene.system.rods.check(start["q"], start["p"], UNTRUE * 2.0**53 * states.roundoff)
         judged = replace(scene, **grid).derived(**start)
     else:

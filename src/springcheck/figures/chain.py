@@ -121,7 +121,7 @@ def _scale(found: Sequence[Floats], true: Floats | None) -> Frame:
 
 
 def _wave(runs: Runs, exact: Exact) -> Bank:
-    """Displacement over particle and time: the exact wave, and what each scheme's differs from it."""
+    """Displacement over particle and time: the exact wave, and the error of each scheme's."""
     scene, modes, longest = runs.scene, runs.scene.system.modes, runs.longest
     rest = np.asarray(modes.rest, np.float64)
     dt, t_unit = runs.time_unit

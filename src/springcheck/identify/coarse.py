@@ -191,7 +191,7 @@ def white(found: Map, match: Match, signed: Floats) -> bool:
     """Whether what single frames miss (f - 1, 2) is irregular but for the bias of cutting off."""
     biased = cut_off(found, match)
     biased = np.concatenate([biased, np.ones((len(biased), 1))], axis=1)
-    # of a motion that dies or grows every frame counts by its size as well
+    # where the motion decays or grows, residuals are tested relative to the size of each frame as well
     weight = found.weight[:, None] / np.max(found.weight)
     return irregular(signed, biased) and irregular(weight * signed, weight * biased)
 

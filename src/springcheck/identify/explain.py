@@ -113,7 +113,7 @@ def _left(columns: Floats, missing: Floats) -> float:
 def _hats(x: Floats, count: int) -> Floats:
     """Piecewise linear functions of x that add up to 1, (f, count)."""
     at = np.linspace(float(np.min(x)), float(np.max(x)), count)
-    # of what stands still there are none
+    # a constant x has no such functions: NaN
     with np.errstate(invalid="ignore"):
         return np.asarray(np.maximum(0, 1 - np.abs(x[:, None] - at) / (at[1] - at[0])))
 
@@ -170,8 +170,8 @@ def _shape(e: Evidence) -> list[Explanation]:
         "map in time": [*own, *(q[:, None] * _hats(t, count)).T, *(v[:, None] * _hats(t, count)).T],
         "drive": [*linear, *driven.waves(np.ones_like(q), tuned["drive"])],
     }
-    # what a few pairs miss follows any law of as many numbers: a frequency that was looked for is more,
-    # the map's own constant is none
+    # residuals of a few pairs fit any law with as many parameters; a fitted frequency counts as a further
+    # parameter, the map's own constant does not
     numbers = {"oscillation": 7, "drive": 7, "parity": 4}
     square = np.sum((weight * missing) ** 2, axis=1)
     counted = float(np.sum(square) ** 2 / np.sum(square**2)) if np.any(square) else 0.0
@@ -195,7 +195,7 @@ def _shape(e: Evidence) -> list[Explanation]:
     fitting = [name for name, share in left.items() if share < 0.35]
     if not fitting:
         return [_noise(e, size, counted)]
-    # of those that explain nearly as much, each number counted, the one of the fewest numbers
+    # of the laws that explain nearly as much per parameter, take the one of the fewest parameters
     best = min(left[name] * math.sqrt(len(groups[name])) for name in fitting)
     room = {name: max(3 * best / math.sqrt(len(groups[name])), 0.02) for name in fitting}
     good = [name for name in groups if name in fitting and left[name] <= room[name]]

@@ -333,7 +333,7 @@ def substeps(share: float, error: float) -> tuple[range, bool]:
     The position gets (n + 1)/2n of h**2 F/m where substeps kick first, (n - 1)/2n where they drift first.
     """
     if math.isnan(share + error):
-        # of a fit that the noise leaves without one
+        # noise left the fit without a share
         return range(0), False
     off, room = abs(2 * share - 1), 12 * error
     least = math.ceil(1 / (off + room))

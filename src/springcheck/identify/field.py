@@ -40,7 +40,7 @@ def _of_two(record: Record, i: int, j: int) -> list[Explanation]:
     (x, y), (u, v) = (a[:, [i, j]].astype(np.float64).T for a in (record.q, record.v * record.interval))
     z = np.stack([x + 1j * y, u + 1j * v, np.ones(len(x))], axis=1)
     size = np.max(np.abs(z), axis=0)
-    # of what grows or dies every frame counts by its size
+    # where the motion grows or decays, each frame is weighted by its size
     each = np.max(np.abs(z[:-1, :2]) / size[:2], axis=1, keepdims=True)
     weight = 1 / each if np.all(each > 0) else 1.0
     scaled = weight * z[:-1] / size

@@ -138,7 +138,7 @@ def _adaptive(run: store.Run) -> str:
     try:
         scheme = schemes.scheme(str(run.parameters.get("scheme", "")))
     except MethodError:
-        # of an engine that is not here
+        # the scheme is one of an engine that is not installed here
         return ""
     return "" if scheme.has("one-step") or scheme.has("flow") else scheme.title
 

@@ -38,7 +38,7 @@ FEWEST_PAIRS = 8
 """Pairs beside the bad ones from which they make one motion."""
 
 SCHEMES_SAID = 2
-"""Schemes that a sentence names of those that fit the rest of a motion."""
+"""How many of the schemes that fit the rest of the motion a sentence names."""
 
 START_OFF = 64.0
 """Roundings that each step may leave over of a start that is predicted."""
@@ -99,7 +99,7 @@ def few_bad_frames(e: Evidence) -> list[Explanation]:
     if float(np.min(off[bad])) < APART * float(np.max(off[kept])):
         # what falls off from frame to frame has no few bad ones
         return []
-    # of a motion that dies or grows every frame counts by its size
+    # where the motion decays or grows, each frame is weighted by its size
     weight = e.found.weight[:, None] / np.max(e.found.weight)
     before = float(np.max(weight * np.abs(e.misses)))
     after = float(np.sqrt(np.mean((weight * found.misses(e.found))[kept] ** 2)))

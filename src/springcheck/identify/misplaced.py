@@ -72,7 +72,7 @@ def _wrapped(record: Record, j: int) -> Iterator[Repair]:
     times = np.rint(way / box)
     if not LEAPS * usual < box > np.ptp(q) - usual or np.any(np.abs(way - times * box) > LEAPS * usual):
         return
-    # a box is a short number; what the states show of it is as long as their roundings allow
+    # a box edge is a number of few digits; its estimate from the states is exact only to their rounding
     short = next((x for n in range(1, 17) if abs((x := float(f"{box:.{n}g}")) - box) < usual), box)
     shift = np.concatenate([[0.0], np.cumsum(times)]) * short
     moved = record.q.copy()

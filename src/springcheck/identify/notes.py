@@ -129,7 +129,7 @@ def of_stated_friction(found: Identification, stated: float, mass: float) -> Ide
 
 
 def _between(low: float, high: float) -> str:
-    """One number, or the ends of those that laws of friction give."""
+    """One number, or the range of the values by several laws of friction."""
     if abs(high - low) <= 1e-6 * abs(high):
         return f"{high:.6g}"
     return f"{low:.5g} to {high:.5g} (by its law)"
@@ -145,7 +145,7 @@ def of_unasked_friction(found: Identification) -> Identification:
     for one in found.candidates:
         for w, rate, det in zip(one.omega, one.friction, found.determinant, strict=True):
             a = (w * one.step) ** 2
-            # what a step loses of the area by friction is the same by every law; an inverted spring has no a
+            # every law of friction gives the same loss of area in a step; an inverted spring has no a
             lost = [rate * one.step, 1 - det, 1 / det - 1] if a > 0 and det > 0 else []
             lost = [x for x in lost if abs(x - lost[0]) <= a * lost[0]]
             parts = [n for x in lost for n in range(1, MOST_PARTS + 1) if abs(x * n / a - 1) < MARK]

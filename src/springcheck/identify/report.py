@@ -100,7 +100,7 @@ def identify_arrays(
 
 
 def _of_states(t: Any, q: Any, p: Any, v: Any, *, mass: ArrayLike | None, **stated: Any) -> Identification:
-    """The scheme of times, positions, momenta and velocities, of which one may be None."""
+    """Identify the scheme from times, positions, momenta or velocities, of which one may be None."""
     record = read(t, q, p, v, mass)
     try:
         found = of_few(record, _of_record(record, **stated))

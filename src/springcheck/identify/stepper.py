@@ -27,7 +27,7 @@ SPRINGS = ((3.7, 2.9, 0.31), (0.6, 1.7, 0.11), (1.9, 0.8, 0.43))
 FRAMES = 81
 
 BATH_FRAMES = 4001
-"""Of a stepper that draws random numbers: its kT is known to a tenth then."""
+"""Frames of a stepper that draws random numbers, by which its kT is known to a tenth."""
 
 TINY_STEP = 1e-6, 1e-3
 """A step that shows the terms linear in h, and by how much their sums of weights may be off 1."""

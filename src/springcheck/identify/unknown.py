@@ -137,7 +137,7 @@ def memory(e: Evidence) -> list[Explanation]:
     size = np.sqrt(np.sum(z**2, axis=1))
     if len(z) < FEWEST_WITH_MEMORY or np.min(size) < 1e-100 * np.max(size):
         return []
-    # of a motion that dies down or grows each frame counts by its size
+    # where the motion decays or grows, each frame is weighted by its size
     unit = float(np.max(e.unit / size[1:]))
     off = np.max(np.abs(e.misses), axis=1) / size[1:]
     if np.max(off[1:]) < 64 * unit:

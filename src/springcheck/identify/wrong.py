@@ -97,7 +97,7 @@ UNSCALED = 1e-6
 """Factor of velocities less 1 below which it is none of units."""
 
 SHOWN = 4
-"""Schemes that a sentence names of those that would fit at a scale of their own."""
+"""How many of the schemes that would fit at another scale a sentence names."""
 
 ASE, AKMA = 10.180505710759414, 48.88821290839616
 """Units of time [fs] of A sqrt(u/eV), and of A sqrt(u mol/kcal)."""

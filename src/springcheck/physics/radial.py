@@ -98,7 +98,7 @@ class RadialSpring(LinearLaw, Term):
         size = self.most_stretch(np.abs(q))
         d, s = self._ways(q if near is None else near)
         e, bent = np.abs(d) / s, self.rest / s
-        # of the way, of the length that is its root, of their quotient, and of the products
+        # roundings of the difference vector, of its length by a root, of their quotient, of the products
         way = np.abs(1 - bent) * size + bent * (size + e * self._sum(e * size))
         self.scatter(np.abs(self.k) * (way + np.abs(d) * (2 * np.abs(1 - bent) + 4 * (1 + bent))), out)
 

@@ -337,7 +337,7 @@ class Rods:
 
         def first(matrix: Floats) -> int:
             unit = np.sqrt(np.diag(matrix))
-            # of a push that those of the rods before it make together nothing is left
+            # a column that depends linearly on those before it leaves a diagonal entry of 0 in R
             left = np.abs(np.diag(np.linalg.qr(matrix / np.outer(unit, unit), mode="r")))
             return int(np.argmax(np.append(left <= UNTRUE * len(self), True)))
 

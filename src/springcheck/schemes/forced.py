@@ -80,7 +80,7 @@ def driven(
     y, v = np.zeros((2, len(j), len(matrices)), np.clongdouble)
     with np.errstate(all="ignore"):
         for mine, other in ((first, second), (second, first)):
-            # of the eigenvector of exp(mine): (sign A - x) g / (exp(mine) - x), x the other eigenvalue
+            # g along the eigenvector of exp(mine): (sign A - x) g / (exp(mine) - x), x the other eigenvalue
             gap = np.exp(decay) * 2 * np.sinh((mine - other) / 2)
             share = (np.einsum("nij,nj->ni", less, gains) - np.expm1(other)[:, None] * gains) / gap[:, None]
             grown = sign ** (j - 1) * first_difference(mine, mu, j) / first_difference(mine, mu, one)

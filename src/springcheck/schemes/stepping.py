@@ -175,7 +175,7 @@ def _implicit_stage(
         change = _newton(residual, k, joined, factor)
         guess = guess - change
         off = np.abs(change)
-        # a component near 0 never has all its digits; at the last ones of what it is made of nothing shrinks
+        # a component near 0 never has all its digits: its change stops shrinking at the rounding of its terms
         going = (off > 4 * eps * np.abs(guess)) & (
             (off < last / 2) | (off > 1e3 * eps * (scale + np.abs(guess)))
         )

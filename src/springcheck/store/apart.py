@@ -21,7 +21,7 @@ LIMIT, SPEED = 8.0, 1e8
 MEMORY = 1 << 30
 """Bytes of memory that it may take."""
 REFUSED = b"refused "
-"""Before what a reader says of a file that it does not take."""
+"""Prefix of a reader's message on a file that it refuses."""
 
 
 class EndedError(Exception):

@@ -81,7 +81,7 @@ def check_file(path: Path, most: int | None = None) -> list[Damage]:
             )
     try:
         said = [Damage(place, what) for place, what in json.loads(trust.guarded(path, trust.OURS))]
-        # of what is no store nothing else needs to be said
+        # where the file is no store, no other finding matters
         found = said if said and NO_STORE in said[0].what else found + said
     except StoreError as error:
         found.append(Damage("/", str(error)))
@@ -148,7 +148,7 @@ def _structure(file: Any, *, arrays: bool) -> Iterator[Damage]:
 
 
 def _before(file: Any, kept: dict[str, str], now: dict[str, str]) -> Iterator[Damage]:
-    """The same of a store of before, which lists no arrays, and of a part, which has no list."""
+    """Damage of a store of an earlier format, which lists no arrays, or of a part, which has no list."""
     for label in access.children(file, "parameters"):
         try:
             reading.arrays_of(file, label, reading.known_of(file, label)[0])

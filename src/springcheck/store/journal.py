@@ -276,7 +276,7 @@ class Journal:
                 for part in found.everything:
                     part.unlink(missing_ok=True)
                 self._end()
-                # the same command would not go on, but refuse to write it again
+                # the store is complete: the same command would refuse to overwrite it
                 interrupts.announce(plain(f"interrupted; {self.path} is complete"))
 
     def _end(self) -> None:

@@ -1,7 +1,7 @@
 """Pieces of a study by the workers of a dask scheduler that runs.
 
-Workers come and go: what one has not answered goes to another.  A worker whose versions are not this
-program's is refused, because its numbers might not be; a `Client.get_executor` does neither.  When the
+Workers come and go: what one has not answered goes to another.  A worker of other versions is refused,
+because its numbers might differ; dask's `Client.get_executor` does neither.  When the
 scheduler is gone, what was finished is kept, and the same command goes on with another one.
 """
 

@@ -176,7 +176,7 @@ def _values(one: _Field, table: Table) -> list[Any]:
     if is_dataclass(one.hint):
         names = [part.name for part in _fields(one.hint)]
         rows = zip(*(_values(part, table) for part in _fields(one.hint)), strict=True)
-        # an unknown result is one whose first number is
+        # a result is unknown where its first number is NaN
         kind: Any = one.hint
         return [None if np.isnan(row[0]) else kind(**dict(zip(names, row, strict=True))) for row in rows]
     if one.keys:

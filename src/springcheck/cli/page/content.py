@@ -224,7 +224,7 @@ def _motion(path: Path, wrong: Collection[str], most: int) -> dict[str, Any] | N
         """What is no number of the file is written with seven digits."""
         return x if np.asarray(x).tobytes() in kept else [float(f"{value:.7g}") for value in x]
 
-    # of a bath the finding is a temperature, not its clouds
+    # in a bath the finding is the temperature: its chart comes before the clouds of states
     found.sort(key=lambda bank: bank.name != "temperature")
     charts = [
         replace(

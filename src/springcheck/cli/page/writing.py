@@ -75,7 +75,7 @@ def html(content: Content) -> str:
     return around.get_template("page.html").render(
         content=content,
         scene=content.scene,
-        # of the file alone, its lines kept
+        # the text is the file's, hence stripped of control characters line by line
         scene_lines=[plain(line) for line in content.scene_text.splitlines()],
         mark=Markup(MARK),
         style=Markup(style),

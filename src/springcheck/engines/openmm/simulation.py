@@ -55,7 +55,8 @@ DRIVEN_ENERGY = {
     "drive": ("-({amplitude!r})*cos(({frequency!r})*time+({phase!r}))*x", ()),
     "modulated-spring": ("0.5*k*(1+({depth!r})*cos(({frequency!r})*time+({phase!r})))*(x-at)^2", ("k", "at")),
 }
-"""The same of what depends on the time, with the numbers in it that every platform keeps as double."""
+"""Energies of terms that depend on the time, as OpenMM reads them; the numbers written into an expression are
+kept as double by every platform."""
 
 SHIFTED = frozenset(
     {"verlet", "langevin-middle", "langevin", "langevin-middle-synchronised"}

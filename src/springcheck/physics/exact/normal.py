@@ -85,7 +85,7 @@ class Modes:
         return self.out_of(self.centre(), np.zeros_like(self.w2))[0]
 
     def spread(self, reach: Extended) -> Extended:
-        """|V| reach (n,): bound of what modes of these amplitudes add up to on each particle."""
+        """|V| reach (n,): bound on the displacement of each particle by modes of these amplitudes."""
         if self.waves:
             return _absolute_sines(reach)
         return reach if self.vectors is None else np.abs(self.vectors) @ reach

@@ -93,7 +93,7 @@ def _of_states(z: Floats) -> tuple[float, float]:
     left = z[:, 1:] - fitted @ z[:, :-1]
     noise = np.sqrt((left**2).sum() / (left.size - fitted.size)) + 2.0**-52
     values, vectors = np.linalg.eig(fitted)
-    # of a map whose eigenvectors coincide, as at a limit, the error is the root of the entries'
+    # where eigenvectors coincide, as at a limit, eigenvalues err by the root of the entries' error
     entries = noise * np.linalg.norm(inverse, 2)
     error = SPREAD * min(entries * np.linalg.cond(vectors), np.sqrt(entries))
     return float(np.abs(values).max()) - 1, max(1e-12, float(error))

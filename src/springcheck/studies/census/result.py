@@ -48,7 +48,7 @@ class Entry:
     thermostat: str = ""
     """The heat bath that is on, as its scheme's title; "" where none is."""
     along: str = "x"
-    """Along which it moves points, by its states, and whether it serves a periodic box."""
+    """Axes along which the engine moves particles, by its states, and whether it serves a periodic box."""
     constraint: str = ""
     """What is held rigid, how far a step turns it and how well its length is kept; "" where nothing is."""
     configurational: float = nan

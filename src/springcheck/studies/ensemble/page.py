@@ -350,7 +350,7 @@ def _kinds(quantity: str, values: Sequence[Floats]) -> tuple[list[tuple[str, str
     low, high = float(np.min(every)), float(np.max(every))
     shades: Sequence[str] = [f"s{i}" for i in range(SHADES)]
     if low < 0:
-        # of methods that explode as much as twice what the middle one shows
+        # a scale to twice the median method's largest value: one that explodes would hide the others
         sizes = sorted(float(np.max(np.abs(x[np.isfinite(x)]), initial=0.0)) for x in values)
         high = min(max(-low, high), 2 * sizes[(len(sizes) - 1) // 2]) or max(-low, high)
         low, shades = -high, SIGNED_SHADES

@@ -114,7 +114,7 @@ Ahead = dict[Place, Point]
 def _errors_first(
     scene: Scene, sweeps: list[Sweep], kept: Keeper, ahead: Ahead, budget: float, before: float
 ) -> float:
-    """The errors of these sweeps by the workers, within half of the budget -> seconds of each that they took.
+    """Measure the errors of these sweeps on the workers, within half of the budget -> seconds that each took.
 
     Times are not theirs to measure.  They have ended when this returns: seconds are measured with nothing of
     ours beside them.

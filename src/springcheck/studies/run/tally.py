@@ -126,7 +126,7 @@ class Heat:
 
 
 FAINTEST_ENERGY = np.finfo(np.float64).tiny / np.finfo(np.float64).eps
-"""An energy of the start below which those of double precision lose digits."""
+"""Initial energy below which energies in double precision are subnormal and lose digits."""
 
 
 class Tally:
