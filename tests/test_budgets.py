@@ -17,7 +17,7 @@ BUDGETS = {
     ("engines/openmm", "engines/ase", "engines/sundials"): 1327,
     ("engines",): 2803,
     ("driver", "conformance", "doors"): 1278,
-    ("checks",): 5083,
+    ("checks",): 5085,
     ("identify",): 8375,
     ("formats", "store"): 5212,
     ("studies",): 1477,

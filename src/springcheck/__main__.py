@@ -17,7 +17,7 @@ def main() -> int:
 
 def _main() -> int:
     interrupts.install()
-    # what is imported stays: until a command begins its work nothing is searched for cycles
+    # imported modules stay alive: no garbage collection until the command begins its work
     gc.disable()
     # figures are drawn without any window; what matplotlib does not know is said by `plot`
     os.environ.setdefault("MPLBACKEND", "agg")

@@ -68,7 +68,7 @@ MOST_SEED = 900_000_000
 
 
 GIVEN_DRAWS = "none: drawn by a generator that the caller gave"
-"""What a run keeps in place of a seed that it was not given."""
+"""Stored in place of a seed where a generator was given."""
 
 
 def checked_seed(seed: int | None) -> int:

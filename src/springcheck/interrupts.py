@@ -45,7 +45,7 @@ class _State:
     held = 0
     message = "interrupted"
     ends: ClassVar[set[Callable[[], object]]] = set()
-    """What the end of the process takes with it, wherever it is then: temporary folders, other processes."""
+    """Called as the process ends, wherever it is: to remove temporary folders and end child processes."""
     board: Any = None
     """Memory shared with the parent process: whether the program has ended by itself, and whom it calls."""
     ended: ClassVar[dict[str, str]] = {}

@@ -33,7 +33,7 @@ class Case(Claim):
         return {}
 
     def once(self, work: Callable[[Case], T]) -> T:
-        """What a function makes of this case, worked out at its first call: several checks may ask for it."""
+        """Result of a function of this case, computed at its first call and kept for other checks."""
         if work not in self._made:
             self._made[work] = work(self)
         return self._made[work]  # type: ignore[no-any-return]

@@ -100,7 +100,7 @@ def _of_bath(case: Case) -> str:
 
 
 def _rescaled(case: Case, kinetic: Floats) -> str:
-    """What one factor for all momenta leaves of the kinetic energy, and what it adds; weighted least squares.
+    """Factor and offset of the kinetic energy by one factor for all momenta; weighted least squares.
 
     After it twice the kinetic energy over kT has the mean c K + n b and the variance 2 n b**2 + 4 c K b,
     where b = 1 - c in equation (A7) of Bussi, Donadio & Parrinello.

@@ -2,8 +2,8 @@
 
 A run of an engine that is off by a fraction x departs from the right one by x D to first order, D the
 derivative of the scheme's own motion: taken here as the quotient of two such motions in extended precision.
-A check sees it where x D exceeds the bound, so its limit is the least bound/D.  What it sees besides are the
-roundings of the engine, which fill a quarter of a bound at most: three limits fail for certain, and a tenth
+A check sees it where x D exceeds the bound, so its limit is the least bound/D.  The engine's own
+roundings add to it, and fill a quarter of a bound at most: three limits fail for certain, and a tenth
 of one passes.
 
 Of several springs the limit is that of the least visible one among those that show at all: an error of all of

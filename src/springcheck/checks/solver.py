@@ -77,8 +77,8 @@ def _radians(case: Case) -> float:
 
 
 def _first_step(case: Case) -> float:
-    """What the first step of a solver whose steps follow a rule is off by, in initial energy norms: where no
-    force acts at the start, nothing makes it short."""
+    """Error of the first step of a solver whose steps follow a rule, in initial energy norms: where no force
+    acts at the start, nothing makes that step short."""
     if case.scheme.rule is None or case.steps[0] != 0:
         return 0.0
     run, scene = case.trajectory, case.judged

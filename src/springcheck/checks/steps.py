@@ -125,7 +125,7 @@ def _allowed(case: Case) -> tuple[Floats, NDArray[np.bool_]]:
     if case.ahead is not None:
         told = known(case, case.ahead, case.trajectory.every)
         return np.full(len(told), float(case.roundings)), told
-    # what the map can make of one rounding a step in so many steps
+    # growth by the map of one rounding a step, over the steps from frame to frame
     total, grown = schemes.amplification(case.matrices, case.w, np.array([case.trajectory.every]))
     bound = np.full(len(case.steps) - 1, case.roundings * float(total[0] * grown[0]))
     told = bound * case.trajectory.arithmetic.state < 1

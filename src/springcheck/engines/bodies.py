@@ -70,7 +70,7 @@ class Bodies(ABC):
 
     @abstractmethod
     def begin(self, label: Label, step: float) -> None:
-        """Make the world, without gravity.  MethodError where it cannot take such steps."""
+        """Make the world, without gravity.  MethodError where the engine cannot take steps of this length."""
 
     @abstractmethod
     def add(self, m: float, q: float, v: float) -> Any:

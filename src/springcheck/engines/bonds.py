@@ -113,8 +113,8 @@ its length moves them by h w of it, below 1, and what 16 leaves has lost 4 bits 
 def without_push(rods: Rods, q: Floats, p: Floats, reach: Floats, row: int) -> Floats:
     """Momenta p (n,) without the half of the next step's push along rods that SHAKE leaves in them.
 
-    `reach` is 2h/m, by which that half moves the ends in the next step.  Raises Stopped where there is no
-    such step, and momenta have lost their digits in the push that was looked for.
+    `reach` is 2h/m, by which that half moves the ends in the next step.  Raises Stopped where no
+    such step exists: the search for the push has then cancelled the digits of the momenta.
     """
     projected = rods.projected(q, p)
     if np.all(np.isfinite(p)) and np.any(rods.strain(q + reach * (p - projected)) > LOST):

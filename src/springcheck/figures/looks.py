@@ -180,7 +180,7 @@ def members(labels: Iterable[str]) -> str:
 
 PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "\u00b5", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 SCALED = {"nm": ("m", -9), "ps": ("s", -12)}
-"""Units that carry a prefix already: what they are a power of ten of."""
+"""Units that carry a prefix already: the bare unit and its power of ten."""
 
 
 def prefixed(largest: float, unit: str) -> tuple[float, str]:

@@ -61,9 +61,9 @@ Pick = Callable[[Trajectory], tuple[Floats, Floats]]
 
 
 class Runs:
-    """Trajectories of a scene by their motions; what has but its start is left out.
+    """Trajectories of a scene by their motions; those of a single frame are left out.
 
-    `failed`: labels of those that some verdict rejects.
+    `failed`: labels of the trajectories that some verdict rejects.
     """
 
     def __init__(self, scene: Scene, runs: Mapping[str, Trajectory], failed: Collection[str] = ()) -> None:
@@ -328,7 +328,7 @@ def at_ends(
 
 
 def alone(named: Iterable[tuple[str, Curve]], xs: Frame, ys: Frame) -> list[Naming]:
-    """Names of curves where they are farthest from all others, of those that stand apart somewhere."""
+    """Names of the curves that stand apart somewhere, each where it is farthest from all others."""
     points: dict[tuple[str, str], Floats] = {}
     for text, curve in named:
         u, v = xs.parts(curve.x), ys.parts(curve.y)

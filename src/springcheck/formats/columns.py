@@ -56,7 +56,7 @@ Reader: TypeAlias = Callable[[Path, list[str], float | None], States]
 
 
 def kind(name: str) -> Kind | None:
-    """What a column of this name holds: units in brackets, numbers and case do not count."""
+    """Quantity that a column of this name holds; units in brackets, numbers and case do not count."""
     bare, _ = _parted(name)
     found: list[Kind] = [one for one, pattern in NAMES.items() if re.fullmatch(pattern, bare)]
     return found[0] if found else None

@@ -191,7 +191,7 @@ to i h halves the last step, or adds one of a rounding, and its clock rounds eac
 
 
 def _stepped_to(record: Record, found: Map, matches: list[Match], signed: Floats, unit: Floats) -> Floats:
-    """Residuals (c, f - 1, 2), of errors `unit`, less what the clock's rounding of each step explains."""
+    """Residuals (c, f - 1, 2), of errors `unit`, less the part that rounding of the clock explains."""
     d = 1e-6
     change = _slipped(matches, found, d) - _slipped(matches, found, -d)
     way = found.z[:-1].astype(np.float64) @ np.swapaxes(change.astype(np.float64) / (2 * d), 1, 2)
@@ -229,7 +229,7 @@ def _defects(
     stride = np.array([float(match.stride) for match in matches])
     # a force is that of the whole position, whose rounding it carries into the velocity
     at = centre + np.maximum(step, first) @ centre
-    # sums of absolute values: what a rounding of either term is relative to
+    # sums of absolute values: a rounding of either term is relative to them
     size = np.abs(z[:-1]) @ np.swapaxes(first, 1, 2) + np.abs(z[1:]) + 2 * at[:, None, :]
     # states between two frames lie on the same orbit: either component may be as large as the whole, and a
     # frame's last step rounds by what it adds up

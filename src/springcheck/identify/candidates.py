@@ -72,7 +72,7 @@ def stated_stiffness(
     for what, other, of_force in _single_constants(seen.record, stated, plainest.stride):
         if seen.disagreements(plainest, other, quantum if of_force else 0.0):
             continue
-        # what is told from the stated one by a little only may be anything of that size
+        # a difference barely above its own error may have any cause of that size
         if (quantum and of_force) or room < 0.1 * float(np.max(np.abs(other / stated - 1))):
             why = ", as GPU-type platforms keep it" if quantum else ""
             return [], [f"the {what} is the stated one in single precision{why}"]

@@ -53,8 +53,8 @@ def map_of_all(record: Record, chosen: list[int]) -> tuple[Extended, Floats, flo
 
 
 def modes(record: Record, chosen: list[int]) -> tuple[Record, float] | None:
-    """Positions and velocities of the normal modes of the chosen coordinates as a record, and what the map of
-    all leaves over in units of the states' size; None where there are none to find."""
+    """Positions and velocities of the normal modes of the chosen coordinates as a record, and the residual of
+    the map of all in units of the states' size; None where no modes are found."""
     found = map_of_all(record, chosen)
     if found is None:
         return None

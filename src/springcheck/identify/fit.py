@@ -89,7 +89,7 @@ class Map:
     weight: Floats
     """Weight (f - 1,) of each pair of states, by which weighted states have a mean square of 2."""
     residual: Floats
-    """Root mean square (2,) of what the map leaves over of each component, weighted."""
+    """Root mean square (2,) of the weighted residuals of each component."""
     noise: Noise
     chi2: float
     """Chi-squared: residuals in squares of what the observation model expects."""
@@ -134,7 +134,7 @@ class Map:
         return self.chi2 <= self.freedom + ERRORS * math.sqrt(KURTOSIS * self.freedom + 1)
 
     def misses(self, other: Map | None = None) -> Floats:
-        """What the map leaves over in each pair of its states, or of those of another fit, (f - 1, 2)."""
+        """Residuals (f - 1, 2) of the map on the pairs of its own states, or of another fit's."""
         z = self.z
         if other is not None:
             z = (other.z * other.size + other.centre - self.centre) / self.size

@@ -72,8 +72,8 @@ LARGEST = 30.0
 @dataclass(frozen=True, slots=True, eq=False)
 class _Curves:
     """One-step maps of the frictionless families as functions of their phase, on each interval where it is
-    monotonic.  Of each curve the family and the first and last phase; at `CELLS` + 1 phases h w, the log of
-    the determinant, and M11 and M12 over its root; and how far these bend within a cell."""
+    monotonic.  Each curve has its family, first and last phase; at `CELLS` + 1 phases h w the log of the
+    determinant, and M11 and M12 over its root; and their curvature within a cell."""
 
     family: Integers
     low: Floats
@@ -195,8 +195,8 @@ class Guesses:
 
 
 def first(every: MapTable, roots: Roots, *, growing: bool, free_scale: bool, far: bool) -> Guesses:
-    """First guesses: a from the phase of the family's own step, g from what it leaves of the determinant; but
-    for `far` of those alone whose entries may agree."""
+    """First guesses: a from the phase of the family's own step, g from the rest of the determinant; unless
+    `far`, of those alone whose entries may agree."""
     turning = np.flatnonzero(np.isfinite(roots.phase))
     standing = np.flatnonzero(~np.isfinite(roots.phase))
     curved = [i for i, f in enumerate(every.families) if not (f.held or f.flow)]
@@ -338,8 +338,8 @@ def polished(every: MapTable, roots: Roots, x: Guesses, *, free_scale: bool, far
 
 
 def _entry_sizes(wanted: Floats, roots: Roots, x: Guesses) -> Floats:
-    """Scales of the entries: of diagonal ones the root of the determinant, of the others their own size,
-    but for what a half turn takes away of it."""
+    """Scales of the entries: the root of the determinant for diagonal ones; for the others their own size,
+    without its decrease near half a turn."""
     whole = np.exp(np.maximum(roots.log_det[x.root] / 2, -600))
     bend = np.nan_to_num(np.abs(np.sinc(roots.phase[x.root] / np.pi)), nan=1.0)
     out = np.abs(wanted)

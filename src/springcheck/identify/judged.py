@@ -67,7 +67,7 @@ def _oscillators(record: Record) -> tuple[Record, list[int], list[Map], list[str
     if not good:
         if (lost and maps[lost[0]].conditioned) or not lost:
             raise IdentificationError(
-                f"the velocities of oscillator {lost[0]} do not depend on its positions to its digits"
+                f"the velocities of oscillator {lost[0]} do not depend on its positions beyond their digits"
                 if lost
                 else f"no force acts on oscillator {free[0]}: every scheme moves it in a straight line"
             )

@@ -67,7 +67,7 @@ class Record:
 
     @property
     def deep(self) -> bool:
-        """Whether all numbers show roundings of single precision: `fine`, or text of that many digits."""
+        """Whether all numbers show roundings of single precision: `fine`, or text with as many digits."""
         pairs = ((self.q, self.q_quantum), (self.v, self.v_quantum))
         return self.fine or all(
             bool(np.max(quantum) <= DEEP * np.max(np.abs(x))) and x_storage.name not in BINARY

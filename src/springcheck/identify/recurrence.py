@@ -27,7 +27,7 @@ FEWEST_FRAMES = 9
 """Five unknowns of an orbit, and as many frames again that they have to explain."""
 
 UNUSUAL = 2.5
-"""Roundings of a frame in units of those that are usual, 4 + 2 sqrt(steps), if they are irregular."""
+"""Largest irregular residual of a frame, in units of its usual rounding error, 4 + 2 sqrt(steps)."""
 
 ERRORS = 5.0
 """Standard errors within which a number is no other."""

@@ -37,7 +37,7 @@ class Storage:
 
     name: str = "double"
     digits: int = 0
-    """Significant decimal digits; 0 where the numbers are not decimal text of that kind."""
+    """Significant decimal digits; 0 where the numbers are not text of a fixed number of digits."""
     decimals: int | None = None
     """Digits after the point, where that is what is constant."""
 

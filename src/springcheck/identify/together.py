@@ -27,7 +27,7 @@ def of_a_bond(record: Record, moving: list[int], stated: Floats) -> Floats | Non
     """The stiffness of each coordinate (n,) where the stated one is that of a bond between two particles at
     rest as a whole: k m_j/mu, mu the reduced mass; None where the states are no pair's.
 
-    Of two halves of the coordinates the momenta are opposite in every frame, in whatever direction.
+    The momenta of one half of the coordinates are opposite to those of the other half in every frame.
     """
     half = len(moving) // 2
     if record.mass is None or len(moving) % 2 or not half:

@@ -156,7 +156,7 @@ def memory(e: Evidence) -> list[Explanation]:
                 local=True,
             )
         ]
-    # of a motion that grows what comes from outside dies in the same way, but not by itself
+    # where the motion grows, a lasting disturbance falls relative to it too: its own size has to fall
     alone = np.maximum(np.max(np.abs(e.misses), axis=1) - 8 * e.unit, 0.0)
     if any(np.max(y[len(off) // 4 :]) > FORGOTTEN * np.max(y) for y in (off, alone)):
         return []

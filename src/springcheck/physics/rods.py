@@ -64,7 +64,7 @@ class WallRod(_Rigid, OnParticles):
 
 
 def _where_regular(work: Callable[..., Floats], matrix: Floats, *more: Floats) -> Floats:
-    """What a function of numpy.linalg makes of matrices (..., c, c); of singular ones, NaN."""
+    """Apply a function of numpy.linalg to matrices (..., c, c); NaN for singular ones."""
     try:
         return work(matrix, *more)
     except np.linalg.LinAlgError:
@@ -218,7 +218,7 @@ class Rods:
         k = np.zeros_like(self.dot(r, s))
         last, going = np.full(k.shape[:-1], np.inf), np.ones(k.shape[:-1], np.bool_)
         m = self.m.astype(s.dtype)
-        # each state by itself: one without a solution says nothing of those beside it
+        # each state by itself: one without a solution must not stop the others
         for _ in range(MOST_NEWTON):
             now = s + self.apart(self._push(k, r) / m)
             gap = (self.dot(now, now) - length * length) / 2

@@ -221,7 +221,7 @@ class System(Generic[Fields]):
         return rates
 
     def elements(self, q: Reals) -> Iterator[tuple[Integers, Integers, Reals]]:
-        """Rows, columns and values (..., s) of what each pair of ends adds to the `hessian` at q (..., n)."""
+        """Rows, columns and values (..., s) that each pair of ends adds to the `hessian` at q (..., n)."""
         for term in self.terms:
             yield from term.elements(q)
 

@@ -66,8 +66,8 @@ class Term:
     rounding: ClassVar[Any]
     """rounding(size, u, *parameters): the rounding of `slope` at u, in units of one rounding.
 
-    Every product and difference in it is taken as a sum of absolute values; `size` is the sum of those
-    whose difference is u.
+    Every product and difference in it is taken as a sum of absolute values; `size` is the sum of the
+    absolute values of the two numbers whose difference is u.
     """
 
     def __post_init__(self) -> None:
@@ -119,7 +119,7 @@ class Term:
 
     @cached_property
     def parameters(self) -> tuple[Floats, ...]:
-        """What the functions of the law take after u, each (s,)."""
+        """Arguments of the law's functions after u, each (s,)."""
         return tuple(getattr(self, c.field) for c in self.columns if c.field != self.origin)
 
     @cached_property

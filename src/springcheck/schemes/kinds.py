@@ -139,7 +139,7 @@ _ALL = (
     # the sum, and the quotient
     StageKind(name="implicit-friction", word="p = p / (1 + {c}c/m)", act=_implicit_friction,
               sizes=_implicit_friction_sizes, roundings=3, friction=True),
-    # of the force 4, the square 4, its product, the difference, the sum 1 + square, the quotient and the sum
+    # force 4, square 4, and one each: its product, difference, sum 1 + square, quotient and sum
     StageKind(name="gyrate", word="p turned by 2 atan({c}B/2m) about the magnetic field", act=_gyrate,
               sizes=_gyrate_sizes, roundings=13, evaluates="magnetic"),
 )  # fmt: skip

@@ -294,7 +294,7 @@ def text(file: Any, path: str) -> str:
 
 
 def json(text: str, kind: Any = Any) -> Any:
-    """What a text of a file says in JSON.  ValueError where it is none, or longer than any of ours."""
+    """Parse a text of a file as JSON.  ValueError where it is no JSON, or longer than any text of ours."""
     if len(text) > LONGEST_DOCUMENT:
         raise ValueError(f"has {len(text)} characters, more than any of ours")
     try:

@@ -32,8 +32,8 @@ class Damage:
 def check(path: str | Path, *, most: int | None = None) -> list[Damage]:
     """Everything wrong with a store and its journal; an empty list where all is well.
 
-    Bytes against the seal, then everything that is laid out against its digest.  Of a file of more than
-    `most` bytes the recorded arrays are left out, and that is a finding.  Raises StoreError when there is
+    Bytes against the seal, then everything that is laid out against its digest.  In a file of more than
+    `most` bytes the recorded arrays are not read, which is a finding.  Raises StoreError when there is
     nothing to check: no such file, or one that cannot be opened at all.
     """
     path = Path(path)

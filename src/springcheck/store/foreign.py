@@ -105,14 +105,16 @@ def read_arrays(path: str | Path, wanted: Callable[[str], bool]) -> dict[str, di
 
 
 def arrays(path: Path, wanted: Callable[[str], bool]) -> Iterator[tuple[str, Any]]:
-    """The same one by one, in this process: together no more than one trajectory may have."""
+    """Read the wanted arrays one by one, in this process: as many numbers as one trajectory may have."""
     left = MOST_NUMBERS
     with access.for_reading(path) as file:
         for place in filter(wanted, _places(file)):
             try:
                 dataset = _numbers(path, file, place)
                 if dataset.size > left:
-                    raise StoreError(f"{path}: more than {MOST_NUMBERS:,} numbers, with those in {place}")
+                    raise StoreError(
+                        f"{path}: the arrays up to {place} hold more than {MOST_NUMBERS:,} numbers"
+                    )
                 values = np.asarray(dataset[()])
                 left -= dataset.size
                 yield place, values

@@ -39,7 +39,7 @@ class Extent:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Seal:
-    """What the bytes of a file were when it was written, and by which run.  `end` is where HDF5 ends [B]."""
+    """Digests of a file's bytes as they were written, and the run.  `end` is where HDF5 ends [B]."""
 
     end: int
     extents: tuple[Extent, ...]

@@ -97,7 +97,7 @@ def program(scheme: Scheme, scene: Scene, h: float) -> Program:
 
     Raises:
         MethodError: an adaptive scheme, or a random one.
-        NoKernelError: another one that the kernels do not have.
+        NoKernelError: the kernels lack a stage of the scheme.
     """
     if scheme.has("random") or not scheme.has("one-step"):
         raise MethodError(f"own: the scheme {scheme.name} has no fixed step that can be repeated")

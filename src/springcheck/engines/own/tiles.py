@@ -23,7 +23,7 @@ WIDTH = 4096
 """Particles of a tile: 6 rows of 32 KiB stay in the second-level cache."""
 
 NARROW, MANY_STEPS = 1024, 32
-"""Particles of a tile that nothing joins where it is carried through so many steps or more: 5 rows of 8 KiB
+"""Particles of a tile of uncoupled particles that takes at least this many steps at a time: 5 rows of 8 KiB
 stay in the first-level cache."""
 
 MARGIN = 64
@@ -59,7 +59,7 @@ class Job:
     """Whether neighbours are joined."""
 
     def room(self, n: int) -> tuple[Any, ...]:
-        """What the kernel needs beside the state of n particles."""
+        """Work arrays of the kernel for n particles."""
         t = np.zeros(n + 1)
         s = self.stages
         if s:

@@ -198,8 +198,8 @@ def _length(x: Extended) -> Extended:
 
 
 def reaches(found: Modes, t: np.longdouble) -> tuple[Extended, Extended, Extended, Extended]:
-    """Bounds of |u|, of |v|, of the phase that its last digits come to, and of what a kick of 1 moves u by,
-    from the start to time t, for each mode (n,)."""
+    """Bounds of |u|, of |v|, of the phase, whose last digits are lost, and of the response of u to a unit
+    kick, from the start to time t, for each mode (n,)."""
     u, v, slow, fast = found.start.sizes
     duration, b, w = np.abs(t), found.rate / 2, np.sqrt(np.abs(found.w2))
     turns, falls = found.w2 > 0, found.w2 < 0

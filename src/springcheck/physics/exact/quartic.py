@@ -156,7 +156,7 @@ def _dn(well: _Duffing, t: Extended) -> States:
     amplitude = np.copysign(well.amplitude, well.u)
     # of twice am(phase) sine and cosine are rational in the start
     y, x = -np.copysign(np.sqrt(2 * well.b) * well.v, well.u * well.v), well.pull
-    # half of that angle, without the angle: what is small of the two follows from the other
+    # half of that angle, without the angle: the smaller of sine and cosine follows from the larger
     large = np.sqrt((well.root + np.abs(x)) / 2)
     small = np.abs(y) / (2 * np.where(large > 0, large, 1))
     sine, cosine = np.where(x < 0, large, small), np.where(x < 0, small, large)

@@ -89,7 +89,7 @@ def read(run: Trajectory) -> tuple[Floats, Floats]:
 def temperatures(q: Floats, p: Floats) -> tuple[tuple[float, float], tuple[float, float]]:
     """k <q**2>/kT and <p**2>/m kT of frames (f, n) of `springs`, each with its standard error.
 
-    The error is the larger of that of springs as if each were alone, and that of blocks of steps.
+    The standard error is the larger of two: across springs as if independent, and across blocks of steps.
     """
     out = []
     for square in (STIFFNESS * q * q / KT, p * p / (MASS * KT)):

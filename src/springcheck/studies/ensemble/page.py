@@ -324,7 +324,7 @@ def _maps(scene: Scene, choice: Choice, shown: Mapping[str, Map]) -> list[Chart]
 
 
 def _across(scene: Scene, choice: Choice, one: Map) -> list[Curve]:
-    """Where h omega = 2 on a map of stiffness and step, by the places of its tiles."""
+    """The line h omega = 2 on a map of stiffness against step, in coordinates of its tiles."""
     if set(choice.over) != set(_limits(scene)):
         return []
     flat = choice.over[0] == "time.step"

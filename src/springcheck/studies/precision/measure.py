@@ -116,8 +116,8 @@ def _errors_first(
 ) -> float:
     """Measure the errors of these sweeps on the workers, within half of the budget -> seconds that each took.
 
-    Times are not theirs to measure.  They have ended when this returns: seconds are measured with nothing of
-    ours beside them.
+    Workers measure no run times.  They have ended when this returns: times are measured with no other process
+    of ours at work.
     """
     left = [x for x in sweeps if x.scene is not None and ahead.get(blank(x, "").place) is None]
     share = budget / 2 * kept.team.workers / max(1, len(left))

@@ -151,7 +151,7 @@ def run(
                     made = driver.play(scene, label, draft.append, progress=told, **seeds)
                     draft.finish(keeper.attributes(made))
             except MethodError as error:
-                # what only shows as an engine starts; a method that was asked for by name must not go missing
+                # it shows only as the engine starts; the one method that was asked for must not vanish
                 if len(labels) == 1:
                     raise
                 labels.remove(label)

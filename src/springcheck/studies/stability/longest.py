@@ -123,7 +123,7 @@ def fastest(scene: Scene) -> float:
 
 
 def linear(scene: Scene, scheme: Scheme) -> Linear | None:
-    """What decides of a scheme's stability on a scene; None of more coupled particles than are looked at, and
+    """What decides a scheme's stability on a scene; None for more coupled particles than are looked at, and
     in a magnetic field, which is no stiffness, and where friction that depends on positions joins them."""
     system = _at_its_stiffest(scene).system
     if "magnetic" in system.acting or (system.brakes_by_place and not system.is_separate):
@@ -157,7 +157,7 @@ def linear(scene: Scene, scheme: Scheme) -> Linear | None:
 
 
 def _oscillators(w2: Floats, modes: Floats, rate: Floats) -> Linear:
-    """Oscillators with the eigenvalues of modes that friction joins: Runge-Kutta steps of both grow alike.
+    """Oscillators with the eigenvalues of modes that friction joins: a Runge-Kutta step needs no more.
 
     Between the modes the motion is a skew matrix less C, so the decay of an eigenvector (u, v) is
     v* C v/(u* u + v* v), which no frequency beside it hides.
