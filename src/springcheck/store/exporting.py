@@ -28,7 +28,10 @@ def export(path: str | Path, label: str, out: str | Path) -> list[Damage]:
     if not folder.is_dir():
         raise StoreError(f"cannot write {out}: there is no folder {folder}")
     if out.suffix != ".h5md":
-        raise StoreError(f"{out}: the name must end in .h5md, readers go by it")
+        raise StoreError(
+            f"{out}: the name must end in .h5md, readers go by it; .csv and .npz are written in Python, by "
+            f"springcheck.read({str(path)!r})[{label!r}].save({str(out)!r})"
+        )
     source = reading.source_of(path, label)
     found = checking.check(path)
     for finding in found:
