@@ -54,17 +54,18 @@ def test_a_link_where_the_journal_goes_is_not_followed(capsys: pytest.CaptureFix
 
 @pytest.mark.parametrize("make", [os.symlink, os.link])
 @pytest.mark.parametrize("name", ["lock", "command", "undo"])
+@pytest.mark.parametrize("content", ["years of work", ""])
 def test_no_link_within_a_journal_reaches_what_it_leads_to(
-    make: Callable[[Any, Any], None], name: str, capsys: pytest.CaptureFixture[str]
+    make: Callable[[Any, Any], None], name: str, content: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with store.open_new("x.h5", "run") as journal:
         journal.save(trajectory(scene(), LABELS[0]), scene())
-    Path("mine").write_text("years of work")
+    Path("mine").write_text(content)
     Path("x.h5.parts", name).unlink(missing_ok=True)
     make(Path("mine").absolute(), Path("x.h5.parts", name))
     main(["run", "spring", *OWN, "--force", "-o", "x.h5"])
     assert "Traceback" not in capsys.readouterr().err
-    assert Path("mine").read_text() == "years of work"
+    assert Path("mine").read_text() == content
 
 
 def test_what_a_user_puts_into_a_journal_outlives_it() -> None:

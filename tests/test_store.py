@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import hashlib
+import shutil
 import subprocess
 import sys
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
 
 import h5py
 import numpy as np
@@ -200,7 +202,7 @@ def test_frames_of_the_wrong_shape_or_number_are_refused(tmp_path: Path) -> None
         with pytest.raises(ValueError, match="without frames"):
             made.finish({})
         made.append(one.t, one.q, one.p, one.energy)
-        with pytest.raises(ValueError, match="more than"):
+        with pytest.raises(ValueError, match="more frames than"):
             made.append(one.t[:1], one.q[:1], one.p[:1], one.energy[:1])
 
 
@@ -292,6 +294,12 @@ def test_a_recording_that_would_not_fit_is_told_before_it_starts(tmp_path: Path)
     s = scene(steps=10**13, every=1)
     with pytest.raises(StoreError, match=r"would take 960 TB; .* are free in"):
         store.need_space(tmp_path / "s.h5", store.size(s))
+    free = shutil.disk_usage(tmp_path).free
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(shutil, "disk_usage", lambda folder: SimpleNamespace(free=free))
+        store.need_space(tmp_path / "s.h5", free)
+        with pytest.raises(StoreError, match="are free in"):
+            store.need_space(tmp_path / "s.h5", free + 1)
 
 
 def test_importing_the_store_imports_no_engine_and_no_plots() -> None:

@@ -122,6 +122,10 @@ def _verdict(file: Any) -> None:
     file["verdicts/passed"][0] = 1 - file["verdicts/passed"][0]
 
 
+def _mass(file: Any) -> None:
+    file[f"particles/{LABEL}/mass"][0] = 9.0
+
+
 def _without_a_run(file: Any) -> None:
     for tree in ("parameters", "observables", "particles"):
         del file[f"{tree}/{OTHER}"]
@@ -133,6 +137,7 @@ def _without_a_run(file: Any) -> None:
         (_attribute(f"/parameters/{LABEL}", "run_seconds", 1e-9), f"/parameters/{LABEL}"),
         (_attribute(f"/parameters/{LABEL}", "origin.numpy", "9.9"), f"/parameters/{LABEL}"),
         (_attribute(f"/parameters/{LABEL}", "note", "mine"), f"/parameters/{LABEL}"),
+        (_mass, f"/parameters/{LABEL}"),
         (_attribute("/verdicts", "about", "passed: 1 no, 0 yes"), "/verdicts"),
         (_verdict, "/verdicts"),
         (_attribute("/comparison/max_difference", "units", "m"), "/comparison"),

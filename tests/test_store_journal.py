@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import resource
@@ -11,13 +12,14 @@ import sys
 import warnings
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 import power
 from springcheck import store
-from springcheck.errors import StoreError
-from springcheck.store import adopt, files, merge, seal
+from springcheck.errors import StoreError, StoreWarning
+from springcheck.store import Draft, adopt, files, merge, seal
 from springcheck.store.parts import parts_folder
 from stores import LABELS, assert_same, scene, trajectory, written
 
@@ -201,6 +203,90 @@ def test_a_commit_that_fails_puts_an_adopted_part_back(
         assert parts(path) == ["command", "lock", part.name]
         journal.commit(s)
     assert store.check(path) == []
+
+
+def test_an_adopted_part_is_changed_only_once_its_new_name_outlives_a_loss_of_power(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Under its old name a part that was changed would be taken for whole, and no undo file be asked for."""
+    path, s = tmp_path / "s.h5", scene()
+    monkeypatch.setattr(adopt, "LARGE", 0)
+    synced: list[list[str]] = []
+    real = files.sync_folder
+
+    def noted(folder: Path) -> None:
+        real(folder)
+        synced.append(sorted(os.listdir(folder)))
+
+    with store.open_new(path, "run") as journal:
+        journal.save(trajectory(s, LABELS[0]), s)
+        monkeypatch.setattr(files, "sync_folder", noted)
+        monkeypatch.setattr(merge.layout, "reopened", _dies(print, 1))
+        with pytest.raises(Killed):
+            journal.commit(s)
+    assert synced[1] == ["collection.new", "command", "lock", "undo"]
+
+
+def test_large_parts_alone_are_adopted(tmp_path: Path) -> None:
+    """A copy of a third of a gigabyte takes a second; of two large ones the larger stays where it is."""
+    for name, size in (("small", 10**8), ("large", 3 * 10**8), ("larger", 4 * 10**8)):
+        with (tmp_path / name).open("wb") as file:
+            file.truncate(size)
+    known = [tmp_path / name for name in ("small", "larger", "large")]
+    assert adopt.choice(known) == tmp_path / "larger"
+    assert adopt.choice(known[:1]) is None
+
+
+def test_what_a_kill_left_half_written_goes_with_the_next_writer(tmp_path: Path) -> None:
+    with store.open_new(tmp_path / "s.h5", "run") as journal:
+        journal.save(trajectory(scene(), LABELS[0]), scene())
+    left = files.temporary(parts_folder(tmp_path / "s.h5") / "run-x.h5")
+    left.write_bytes(bytes(10))
+    with store.open_new(tmp_path / "s.h5", "run"):
+        assert not left.exists()
+
+
+def test_a_number_of_a_part_that_changed_is_measured_again(tmp_path: Path) -> None:
+    path, s = tmp_path / "s.h5", scene()
+    with store.open_new(path, "run") as journal:
+        journal.save(trajectory(s, LABELS[0]), s)
+    (part,) = parts_folder(path).glob("run-*")
+    known = seal.find(part)
+    assert known is not None
+    content = bytearray(part.read_bytes())
+    content[known.extents[0].offset] ^= 1
+    part.write_bytes(content)
+    with (
+        pytest.warns(StoreWarning, match="was damaged and is removed"),
+        store.open_new(path, "run") as journal,
+    ):
+        assert journal.finished() == ()
+
+
+class Grudging(io.FileIO):
+    """A file that takes some bytes at a time, as the system may."""
+
+    def write(self, content: Any) -> int:
+        return super().write(content[:7])
+
+
+def test_a_system_that_takes_some_bytes_at_a_time_loses_none(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    real = Draft._create
+
+    def made(draft: Draft, frames: int) -> None:
+        real(draft, frames)
+        for name, file in draft._files.items():
+            draft._files[name] = Grudging(file.name, "rb+")
+            draft._files[name].seek(file.tell())
+            file.close()
+
+    monkeypatch.setattr(Draft, "_create", made)
+    found = written(tmp_path / "s.h5", scene())
+    assert store.check(tmp_path / "s.h5") == []
+    for label, one in store.read(tmp_path / "s.h5").items():
+        assert_same(found[label], one)
 
 
 def test_a_second_writer_is_told_who_has_the_store(tmp_path: Path) -> None:
