@@ -245,6 +245,21 @@ def test_a_unit_is_of_no_account(name: str, length: float, time: float) -> None:
         assert x.thermal * (time / length) ** 2 == pytest.approx(y.thermal, rel=1e-6, nan_ok=True)
 
 
+@pytest.mark.parametrize("start", [0.7, 1.3])
+def test_dry_friction_is_no_collision(start: float) -> None:
+    """A force that changes sign with the velocity moves frames by one of few numbers, and no draw: it was a
+    thermostat, Andersen's."""
+    h, q, v, frames = 1.33, start, -1.1, []
+    for _ in range(400):
+        frames.append((q, v))
+        v -= h / 2 * (K / M * q + 0.02 * np.sign(v))
+        q += h * v
+        v -= h / 2 * (K / M * q + 0.02 * np.sign(v))
+    q, v = np.array(frames).T
+    assert between_collisions(q, v, h) == []
+    assert not identify(h * np.arange(400), q, v=v).fits
+
+
 def test_a_stop_of_all_noise_halfway_is_no_collision() -> None:
     t, q, v = run("obabo", 1000)
     still = driver.run(replace(scene(1000), bath=None), "own:velocity-verlet")

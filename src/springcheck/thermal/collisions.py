@@ -43,13 +43,16 @@ def between_collisions(q: Floats, v: Floats, h: float) -> list[Candidate]:
     rows = rows[np.abs(np.linalg.det(known[rows])) > 1e-6]
     maps = np.linalg.solve(known[rows], after[rows])
     best = int(np.argmax(np.sum(np.abs(maps[:, :, 0] @ known[few].T - after[few, 0]) < NO_COLLISION, axis=1)))
-    off = np.max(np.abs(known @ maps[best] - after), axis=1)
-    still = off < NO_COLLISION
+    left = known @ maps[best] - after
+    still = np.max(np.abs(left), axis=1) < NO_COLLISION
     share = float(np.mean(still))
     if not FEWEST_OF_EACH <= np.sum(still) <= n - FEWEST_OF_EACH:
         return []
     spread = (still - share) / np.sqrt(share * (1 - share))
-    if not chance.neighbours(spread[:, None]) > TOGETHER_BY_CHANCE:
+    # a force that jumps, such as dry friction, changes a momentum by the same again and again: no draw does
+    jumps = np.sort(left[np.abs(left[:, 1]) > TIMES_LEFT_OVER * NO_COLLISION, 1])
+    again = len(jumps) > FEWEST_OF_EACH and np.median(np.diff(jumps)) < NO_COLLISION
+    if again or not chance.neighbours(spread[:, None]) > TOGETHER_BY_CHANCE:
         return []
     entries = np.linalg.lstsq(known[still], after[still], rcond=None)[0]
     off = max(float(np.sqrt(np.mean((known[still] @ entries - after[still]) ** 2))), 2.0**-52)
@@ -58,15 +61,10 @@ def between_collisions(q: Floats, v: Floats, h: float) -> list[Candidate]:
         return []
     # both ends of a step of leapfrog are unlike by (h w)**2, which few digits may hide
     apart, least = abs(A[0, 0] - A[1, 1]), -A[0, 1] * A[1, 0] / MOST_A_FRAME
-    alike = (
-        {True}
-        if apart <= TIMES_LEFT_OVER * off < least
-        else {False}
-        if apart > TIMES_LEFT_OVER * off
-        else {True, False}
-    )
+    room = TIMES_LEFT_OVER * off
+    alike = {apart <= room} if apart > room or room < least else {True, False}
     names = [name for name, one in THERMOSTATS.items() if one.collides and one.synchronised in alike]
-    close = TIMES_LEFT_OVER * off * (1 / abs(A[0, 1]) + 1 / abs(A[1, 0]))
+    close = room * (1 / abs(A[0, 1]) + 1 / abs(A[1, 0]))
     A = A * sizes[:, None] / sizes
     return [y for name in names for y in _of_scheme(name, A, h, share, n, float(np.var(v)), close)]
 
