@@ -354,6 +354,11 @@ def test_several_short_runs_in_one_timing_count_as_one() -> None:
         assert found.force_calls == 70
 
 
+def test_a_scene_in_a_bath_is_told_that_the_bath_is_in_the_way() -> None:
+    with pytest.raises(SceneError, match=r"none of its errors is.*and no bath"):
+        precision.study(scenes.load_scene("bath-spring"), [engines.parse("own:euler")])
+
+
 def test_a_scene_at_rest_has_no_error_to_measure() -> None:
     scene = scenes.load_scene("spring")
     with pytest.raises(SceneError, match="rests in equilibrium"):

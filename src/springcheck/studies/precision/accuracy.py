@@ -80,8 +80,8 @@ def truth(scene: Scene) -> Truth:
     """
     if not exact.has_true_motion(scene):
         raise SceneError(
-            f"scene {scene.name}: no closed form of its exact solution is known, so errors "
-            "cannot be measured; a study of precision needs springs, or quartic potentials without couplings"
+            f"scene {scene.name}: no closed form of its exact solution is known, so none of its errors is; "
+            "a study of precision needs springs, or quartic potentials without couplings, and no bath"
         )
     if not scene.system.norm.unit > 0:
         raise SceneError(f"scene {scene.name} rests in equilibrium: give a particle a position or a momentum")
