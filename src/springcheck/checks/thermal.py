@@ -85,7 +85,7 @@ def noise_direction(case: Case) -> Finding | str:
     off = np.flatnonzero(~(worst <= found.roundings))
     if not len(off):
         run = case.trajectory
-        liveliest = int(np.argmax(np.sum(run.p * run.p / case.judged.m, axis=1)))
+        liveliest = int(np.argmax(np.sum(np.square(run.p.astype(np.longdouble)) / case.judged.m, axis=1)))
         still = _read(case, *(np.repeat(x[liveliest][None], 4, axis=0) for x in (run.q, run.p))).across
         # without draws what is at rest stays there by right
         least = -1.0 if thermostat(case).draws else 0.0
