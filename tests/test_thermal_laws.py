@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from springcheck.thermal import THERMOSTATS, Law, Stepper
+from springcheck.thermal.decays import GJ
 
 LINEAR = [name for name, one in THERMOSTATS.items() if not one.rescales]
 
@@ -239,3 +240,17 @@ def test_the_error_of_a_variance_is_that_of_the_squares_of_all_pairs_of_frames()
 def test_a_step_beyond_its_limit_has_no_stationary_state() -> None:
     found = replace(law("baoab", *SPRINGS[0]), h=2.4)
     assert np.all(np.isinf(found.covariance))
+
+
+@pytest.mark.parametrize("width", [np.float64, np.longdouble])
+def test_a_decay_that_newton_solves_is_found_in_few_steps(
+    width: type[np.floating], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # of hundreds of numbers some go round by a rounding for ever
+    steps = []
+    monkeypatch.setattr(np, "sinh", lambda y, sinh=np.sinh: steps.append(y) or sinh(y))
+    x = np.linspace(0.005, 4.0, 252, dtype=width)
+    left = GJ["vii"](x)
+    assert len(steps) <= 24
+    c = np.log(left)
+    assert np.all(np.abs((1 + left) / (1 - left) * c * c / 2 - x) <= 16 * np.finfo(width).eps * (x + 1))
