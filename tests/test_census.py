@@ -430,7 +430,7 @@ def test_a_thermostat_is_a_row_whose_temperatures_are_measured(capsys: pytest.Ca
 def test_a_thermostat_whose_springs_diverge_says_so_in_place_of_temperatures() -> None:
     # its chain counts three degrees of freedom for each of a thousand springs that have one
     row = baths.entry(engines.parse("ase:nose-hoover"))
-    assert "1000 springs: diverged after 1 steps" in row.note
+    assert "1000 springs: diverged after step 1" in row.note
     assert np.isnan([row.configurational, row.kinetic]).all()
 
 

@@ -417,3 +417,20 @@ def test_a_stated_stiffness_of_0_is_another_spring(form: str) -> None:
         assert "old force" not in found.statement
     else:
         assert found.explanations[0].cause.endswith("where 0 is stated")
+
+
+@pytest.mark.parametrize("k", [1.0, 0.09])
+def test_velocities_of_the_wrong_sign_give_no_frequency(k: float) -> None:
+    """The motion turned round was read as one of 40 times the frequency, and that stood beside the cause."""
+    q, v, h, frames = 1.0, 0.3, 0.1, []
+    for _ in range(60):
+        frames.append((q, v))
+        v -= h / 2 * k * q
+        q += h * v
+        v -= h / 2 * k * q
+    q, v = np.array(frames).T
+    found = identify(h * np.arange(60), q, v=-v, mass=1.0)
+    assert "wrong sign" in found.statement
+    assert np.isnan(found.omega).all()
+    assert found.stiffness is None
+    assert found.nearest is None

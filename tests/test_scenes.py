@@ -463,7 +463,7 @@ def test_a_mistake_in_a_term_is_answered_with_its_field_and_what_is_accepted(nam
     ("old", "new", "words"),
     [
         ("masses = 1000", "masses = 0", ("chain.masses", "0", ">= 1")),
-        ("mode = 400", "mode = 4000", ("chain.wave[2].mode = 4000", "1000 modes")),
+        ("mode = 400", "mode = 4000", ("chain.wave[2].mode = 4000", "the highest of this chain is 1000")),
         ("mode = 400", "mode = 0", ("chain.wave[2].mode", ">= 1")),
     ],
 )

@@ -30,6 +30,7 @@ from springcheck.identify.fit import fit
 from springcheck.identify.hypothesis import FEW, Joint, distinct, likely
 from springcheck.identify.interrupted import remembered
 from springcheck.identify.judged import judged
+from springcheck.identify.misplaced import turned
 from springcheck.identify.notes import (
     LEAPFROG,
     beside_unknown,
@@ -339,8 +340,7 @@ def _known(
 
 
 def _unknown(seen: Measured, strides: range) -> Identification:
-    """No scheme: what may be wrong, and the nearest of these strides."""
-
+    """No scheme: what may be wrong, and the nearest of these strides, but to velocities of the other sign."""
     maps = seen.maps
 
     def distance(joint: Joint) -> float:
@@ -349,7 +349,7 @@ def _unknown(seen: Measured, strides: range) -> Identification:
     tried = nearest(maps, seen.terms, distinct(damped=False), strides)
     determinant, symplectic = determinants(maps, 1)
     near: dict[str, Any] = {}
-    if tried:
+    if tried and not turned(seen.record, seen.moving):
         least = min(distance(x) for x in tried)
         # many schemes and strides come close by chance; the plainest of the close ones is the better guess
         close = min((x for x in tried if distance(x) <= 10 * least), key=lambda x: x.plainness)
