@@ -12,7 +12,6 @@ from pathlib import Path
 import ase.io
 import h5py
 import numpy as np
-import pandas as pd
 import pytest
 import scipy.io
 from ase import Atoms
@@ -112,7 +111,7 @@ def as_hdf5(v: object) -> str:
 
 
 def as_excel(v: object) -> str:
-    pd.DataFrame(arrays(v)).to_excel("x.xlsx", index=False)
+    pytest.importorskip("pandas").DataFrame(arrays(v)).to_excel("x.xlsx", index=False)
     return "x.xlsx"
 
 
@@ -259,6 +258,7 @@ def test_columns_of_structs_are_looked_at_as_any() -> None:
 
 
 def test_the_index_of_a_table_is_a_column() -> None:
+    pd = pytest.importorskip("pandas")
     pd.DataFrame(arrays(V)).set_index("t").to_parquet("x.parquet")
     assert read("x.parquet").t.tolist() == T.tolist()
     pd.DataFrame(arrays(V) | {"t": pd.to_timedelta(T, "s")}).to_parquet("x.parquet")
