@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import json
 import os
 import signal
@@ -37,20 +38,16 @@ def killed(arguments: Sequence[str], path: Path, tables: int) -> dict[str, store
     """Start a command, kill it (SIGKILL) once so many tables are there; what it had finished."""
     environment = os.environ | {"PYTHONPATH": str(Path(springcheck.__file__).parents[1])}
     parts = path.with_name(path.name + ".parts")
-    lifeline, held = os.pipe()
     with subprocess.Popen(
-        [sys.executable, "-m", "springcheck", *arguments, "-o", str(path), "--quiet"],
-        env=environment,
-        pass_fds=(held,),
+        [sys.executable, "-m", "springcheck", *arguments, "-o", str(path), "--quiet"], env=environment
     ) as process:
-        os.close(held)
         while process.poll() is None and len(list(parts.glob("table-*.h5"))) < tables:
             time.sleep(0.002)
         process.send_signal(signal.SIGKILL)
     assert process.returncode == -signal.SIGKILL, "it ended before it could be killed"
-    # the program that it waited for ends with it, as soon as it hears of that
-    with open(lifeline, "rb") as pipe:
-        assert pipe.read() == b""
+    # the program that it waited for ends with it, as soon as it hears of that, and lets go of the store
+    with (parts / "lock").open("rb") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
     return dict(store.tables_of(path))
 
 

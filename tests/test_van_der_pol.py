@@ -12,6 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import mpmath as mp
 import numpy as np
 import pytest
 
@@ -20,7 +21,8 @@ import stiffness_costs
 from springcheck import checks, engines
 from springcheck.physics import builders, exact
 from springcheck.physics import scenefile as scenes
-from springcheck.physics.arrays import Floats
+from springcheck.physics.arrays import EPS, Floats
+from springcheck.physics.exact import relaxation
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Damping, Spring, VanDerPol, WallSpring
 from springcheck.schemes import scheme
@@ -205,3 +207,21 @@ def test_a_jump_in_which_the_implicit_equation_divides_by_almost_nothing_keeps_i
     found = {v.check: v for v in checks.judge(scene, springcheck.simulate(scene, label))}
     assert found["step-defect"].passed is True
     assert found["step-defect"].value < 6
+
+
+def test_the_nodes_of_a_step_are_real_where_close_zeros_of_a_series_come_out_in_pairs(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Eigenvalues of a matrix that is not symmetric may: those of 16 nodes did on one machine in two."""
+    of = np.linalg.eigvals
+    monkeypatch.setattr(np.linalg, "eigvals", lambda matrix: of(matrix) + 1e-13j * np.eye(1, len(matrix))[0])
+    rule = relaxation._rule.__wrapped__()
+    x = 2 * rule.nodes - 1
+    s = relaxation.RADAU_STAGES
+    with mp.workdps(40):
+        for node in x:
+            at = mp.mpf(float(node)) + mp.mpf(float(node - np.longdouble(float(node))))
+            off = mp.legendre(s, at) - mp.legendre(s - 1, at)
+            slope = mp.diff(lambda y: mp.legendre(s, y) - mp.legendre(s - 1, y), at)
+            assert abs(off / slope) < 4 * EPS
+    assert np.all(np.diff(x) > 0)

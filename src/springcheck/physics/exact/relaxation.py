@@ -90,10 +90,10 @@ def _integrals(x: Extended, count: int) -> Extended:
 @lru_cache(maxsize=1)
 def _rule() -> _Rule:
     s = RADAU_STAGES
-    ends = np.zeros(s + 1)
-    ends[-2:] = -1, 1
-    x = np.sort(np.polynomial.legendre.legroots(ends)).astype(np.longdouble)
-    x[-1] = 1
+    # all but the last are zeros of Jacobi's polynomial (1, 0): eigenvalues of a symmetric matrix, all real
+    k = np.arange(s - 1)
+    jacobi = np.diag(-1 / ((2 * k + 1) * (2 * k + 3))) + np.diag((np.sqrt(k * (k + 1)) / (2 * k + 1))[1:], -1)
+    x = np.append(np.linalg.eigvalsh(jacobi), 1).astype(np.longdouble)
     for _ in range(4):
         p = _legendre(x[:-1], s + 1)
         # (x**2 - 1) P_s' = s (x P_s - P_(s-1))
