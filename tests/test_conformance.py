@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import json
 import re
 import subprocess
 import sys
@@ -14,6 +15,7 @@ import pytest
 
 import springcheck.engines
 from springcheck import conformance, driver, engines
+from springcheck.cli import main
 from springcheck.engines import Engine
 from springcheck.physics.scenefile import load_scene
 
@@ -93,6 +95,23 @@ def test_a_thermostat_passes_and_a_broken_one_does_not() -> None:
             except AssertionError as error:
                 failed.append(str(error))
         assert any(said in text for text in failed), (said, failed)
+
+
+def test_an_engine_may_bring_thermostats_alone(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """It was refused: "it has no methods"."""
+    head, _, tail = thermostat().partition("    methods=")
+    code = head + tail[tail.index("    thermostats=") :]
+    assert not made(code).methods
+    for check in conformance.checks_of(made(code)):
+        check()
+    (tmp_path / "bath.py").write_text(code)
+    arguments = ["run", "bath-spring", "--steps", "300", "--engine", str(tmp_path / "bath.py"), "--json"]
+    assert main([*arguments, "-o", str(tmp_path / "a.h5")]) == 0
+    runs = json.loads(capsys.readouterr().out)["runs"]
+    assert "mine:bath" in {run["method"] for run in runs}
+    arguments[1] = "spring"
+    assert main([*arguments, "-o", str(tmp_path / "b.h5")]) == 2
+    assert "no method matches 'mine:*' for a scene without a bath" in capsys.readouterr().err
 
 
 STEP, ROW, COUNT = (

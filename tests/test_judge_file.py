@@ -126,3 +126,18 @@ def test_nine_digits_of_single_precision_are_judged_and_a_clock_beside_them_is_n
     late[7:, 0] += 1e-5
     with pytest.raises(StoreError, match="row 8 is at t = "):
         file.judge(written(np.float32(late)), scene=SCENE, scheme="velocity-verlet")
+
+
+def test_what_does_not_apply_is_said_once_for_each_reason(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Each check that did not apply had a row of its own, with no verdict and no value in it."""
+    run = driver.run(scenefile.load_scene("spring"), "own:velocity-verlet")
+    np.savetxt(tmp_path / "a.txt", np.column_stack([run.t, run.q, run.p]), header="t q p", fmt="%.17g")
+    assert main(["judge", str(tmp_path / "a.txt"), "--scene", "spring", "--scheme", "velocity-verlet"]) == 0
+    said = capsys.readouterr().out.splitlines()
+    assert "Not applicable: rod-length, rod-velocity, turn: the scene has no rods" in said
+    rows = [line.split()[0] for line in said if " passed " in line]
+    assert "step-defect" in rows
+    assert not {"rod-length", "drive", "border"} & set(rows)
+    assert f"{len(rows) - 1} verdicts passed" in said[-1] or f"{len(rows)} verdicts passed" in said[-1]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -320,6 +321,9 @@ def test_every_method_runs_by_all_and_by_a_star(
     (line,) = [one for one in said.splitlines() if "not among the default methods; --all" in one]
     assert "own:rk4" in line
     assert "own:euler" not in line
+    # some names and how many there are beside: all of them were a wall of text
+    assert re.search(r" and \d+ more: not among", line)
+    assert len(line) < 350
     counts = []
     for arguments in (["--all"], ["--method", "*"])[: 2 if whole else 1]:
         short = ["--steps", "20", "-o", path, "--force", "--json"]

@@ -9,8 +9,9 @@ A million cells (--pieces --cells 1000000): 299 s of processor time, 104 MB at m
 
 Command: python validation/beyond_one_core.py [--pieces N ...] [--atlas]       (two idle cores; minutes)
 
-Printed on two idle cores: 1,135 bytes a piece in the file, 3.26 ms a piece at 1,000; 0.36 ms a cell at
-10,000 cells, 89 MB; the atlas 70 s by one worker, 40 s by two, 0.57 of it, with the same numbers.  Under a
+Printed on two idle cores: 1,135 bytes a piece in the file, 1.79 ms a piece at 1,000 and at 10,000; 0.37 ms
+a cell at 10,000 cells, 0.27 at 100,000, 106 MB; the atlas 12 s by one worker, 6 s by two, 0.52 of it, with
+the same numbers.  Under a
 load of 10 to 23 a piece took 4.26 ms at 10,000 and 4.54 at 100,000, journal and store in memory.
 """
 

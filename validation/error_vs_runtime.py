@@ -16,21 +16,21 @@ Expected (AMD EPYC, Zen 4, openmm 8.6, ase 3.29, scikit-sundae 1.2; 75 s a scene
 its standard error):
 
                                     spring          spring-uneven   anharmonic
-    own:euler                  1.0000(3e-06)   1.0000(1e-06)   1.0015(3e-04)
-    own:semi-implicit-euler    1.0000(1e-07)   1.0000(3e-07)   0.9991(2e-04)
-    own:implicit-euler         0.9999(1e-05)   0.9999(2e-05)   -
-    ase:velocity-verlet        2.0004(2e-04)   2.0007(3e-04)   2.0000(3e-05)
+    own:euler                  1.0000(2e-06)   1.0000(1e-06)   1.0007(2e-04)
+    own:semi-implicit-euler    1.0000(1e-07)   1.0000(5e-07)   0.9999(3e-05)
+    own:implicit-euler         1.0000(4e-06)   0.9997(8e-05)   -
+    ase:velocity-verlet        2.0002(1e-04)   2.0004(2e-04)   2.0000(7e-06)
     openmm:verlet              2.0000(1e-05)   2.0000(5e-05)   2.0000(6e-06)
       floor (of eps*condition) 1.0e-9 (0.15)   1.1e-9 (0.20)   2.9e-9 (0.9)
-    openmm:leapfrog            1.0000(5e-05)   0.9998(8e-05)   0.9981(5e-04)
-      floor (of eps*condition) 8.6e-7 (2): 28 s of stepping at 0.115 us a step
-    openmm:euler               1.0021(5e-04)   1.0015(4e-04)   - (fewer than four points below 2e-2)
-    openmm:semi-implicit-euler 0.9999(2e-05)   1.0001(2e-05)   0.9963(9e-04)
+    openmm:leapfrog            1.0000(5e-05)   0.9998(8e-05)   0.9988(6e-04)
+      floor (of eps*condition) 8.6e-7 (2)       9.3e-7 (2.6)    -
+    openmm:euler               1.0008(2e-04)   1.0007(2e-04)   1.0011(3e-04)
+    openmm:semi-implicit-euler 1.0000(5e-06)   1.0000(5e-06)   0.9995(1e-04)
 
-    cheapest for an error of 1e-2    own:semi-implicit-euler, 998 force calls, 8.5 us    (spring)
-                             1e-4    openmm:verlet, 1886 force calls, 0.24 ms
-                             1e-6    sundials:adams at 1e-10, 292 force calls, 1.1 ms
-                             1e-12   sundials:adams at 1e-15, 447 force calls, 1.7 ms
+    cheapest for an error of 1e-2    own:semi-implicit-euler, 998 force calls, 8.1 us    (spring)
+                             1e-4    openmm:verlet, 1886 force calls, 0.20 ms
+                             1e-6    sundials:adams at 1e-10, 292 force calls, 1.0 ms
+                             1e-12   sundials:adams at 1e-15, 447 force calls, 1.4 ms
 
 A fit takes the finest points that the time allowed, so that its last digits vary with the machine's speed.
 

@@ -20,7 +20,8 @@ from springcheck.physics.rods import UNTRUE
 from springcheck.physics.scene import Scene
 from springcheck.physics.scenefile import load_scene
 from springcheck.physics.trajectory import Outcome, Trajectory, Verdict
-from springcheck.studies import keeper
+from springcheck.studies import choose, keeper
+from springcheck.studies.text import left_out
 from springcheck.text.lines import Lines, plain, table
 from springcheck.text.wording import count
 
@@ -64,23 +65,22 @@ class Judgement:
 
     def lines(self) -> Lines:
         """The report as text."""
-        told = {True: plain("passed"), False: plain("FAILED", "bold red"), None: plain("-")}
+        told = {True: plain("passed"), False: plain("FAILED", "bold red")}
+        titles = ("check", "verdict", "value", "why")
         rows = [
-            (
-                v.check, told[v.passed],
-                "" if v.passed is None else f"{v.value:.3g} of {v.bound:.3g} {v.unit}".strip(), v.reason,
-            )
+            (v.check, told[v.passed], f"{v.value:.3g} of {v.bound:.3g} {v.unit}".strip(), v.reason)
             for v in self.verdicts
-        ]  # fmt: skip
+            if v.passed is not None
+        ]
+        others = [choose.LeftOut(method=v.check, reason=v.reason) for v in self.verdicts if v.passed is None]
         frames, scheme = count(self.frames, "frame"), schemes.title(self.scheme)
         head = f"{self.path}: {frames} of {self.scene}, judged as {scheme}"
         return [
             plain(head, "bold"),
             *(plain(f"  {note}") for note in self.notes),
             plain(),
-            table(
-                ("check", "verdict", "value", "why"), rows, left=("check", "verdict", "value"), prose="why"
-            ),
+            table(titles, rows, left=titles[:3], prose="why"),
+            *left_out(others, "Not applicable:"),
             *([plain(NOT_JUDGED, "bold yellow")] if self.not_judged else ()),
             plain(),
             plain(checks.summary(self.verdicts), ("bold green", "bold red", "bold yellow")[self.status]),

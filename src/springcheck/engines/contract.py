@@ -142,7 +142,7 @@ class Engine:
     name: str
     """Also the name of its entry point."""
     title: str
-    methods: Mapping[str, Method]
+    methods: Mapping[str, Method] = field(default_factory=dict)
     """By name; see `named`."""
     start: Callable[..., Simulation]
     """start(scene, method, label, step): the engine at the scene's start.  The step may be negative.  Of a

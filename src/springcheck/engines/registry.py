@@ -149,8 +149,8 @@ def _checked(found: object, name: str = "") -> Engine:
             raise MethodError(
                 f"its {what} are a {type(by_name).__name__}, not by name; named(...) makes them so"
             )
-    if not found.methods:
-        raise MethodError("it has no methods")
+    if not (found.methods or found.thermostats):
+        raise MethodError("it has no methods and no thermostats")
     known = (*terms.known(), ANY_POTENTIAL)
     for scheme in found.schemes:
         schemes.bring(scheme)

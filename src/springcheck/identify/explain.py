@@ -21,6 +21,7 @@ from springcheck.identify.unknown import memory, misfit
 from springcheck.identify.wrong import wrong_map
 from springcheck.physics.arrays import Floats
 from springcheck.schemes import rotation
+from springcheck.text.wording import count
 
 FEWEST_MISSES = 24.0
 """Fewest pairs that count among the residuals for their pattern to show."""
@@ -360,15 +361,10 @@ def _sentence(e: Evidence, name: str, q: Floats, v: Floats, missing: Floats, siz
     )
 
 
-NEEDS_TWO = (
-    "; a bath whose factor multiplies all momenta, as a Nose-Hoover chain, shows in two particles or more"
-)
-
-
 def _too_few(size: float, counted: float) -> Explanation:
     return Explanation(
-        cause=f"What one map leaves over, {size:.1e} of the state's size, stands in about {counted:.0f} "
-        "frames: too few to show its cause",
+        cause=f"What one map leaves over, {size:.1e} of the state's size, stands in about "
+        f"{count(round(counted), 'frame')}: too few to show its cause",
         remedy="record more of the motion, before it dies down or after it has begun to grow; a solver "
         "that chooses its steps has no fixed scheme to find",
         misfit=size,
@@ -387,7 +383,9 @@ def _noise(e: Evidence, size: float, counted: float) -> Explanation:
             cause="No known cause alone explains what one map leaves over, and it is no noise: it comes back "
             f"from frame to frame, {size:.1e} of the state's size in each, in {where}",
             remedy="look for several errors at once, and take them out one by one; a solver that chooses its "
-            "steps has no fixed scheme to find" + (NEEDS_TWO if e.record.q.shape[1] == 1 else ""),
+            "steps has no fixed scheme to find"
+            + "; a bath whose factor multiplies all momenta, as a Nose-Hoover chain, shows in two or more"
+            * (e.record.q.shape[1] == 1),
             misfit=size,
         )
     return Explanation(

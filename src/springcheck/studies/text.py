@@ -12,13 +12,13 @@ from springcheck.text.lines import Lines, plain
 from springcheck.text.wording import count
 
 
-def left_out(left: Sequence[LeftOut]) -> Lines:
+def left_out(left: Sequence[LeftOut], word: str = "Left out") -> Lines:
     """One line for each reason, which names no method again."""
     reasons: dict[str, list[str]] = {}
     for one in left:
         reasons.setdefault(one.reason.removeprefix(f"{one.method}: "), []).append(one.method)
     said = [
-        plain(f"Left out {', '.join(names)}: {re.sub('^it ', 'each ', why) if len(names) > 1 else why}")
+        plain(f"{word} {', '.join(names)}: {re.sub('^it ', 'each ', why) if len(names) > 1 else why}")
         for why, names in reasons.items()
     ]
     return [plain(), *said] if said else []

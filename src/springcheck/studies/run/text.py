@@ -16,7 +16,7 @@ from springcheck.studies.ensemble import STUDY as ENSEMBLE
 from springcheck.studies.run.result import MethodRun, Repeat, Repeats, Report, Stored
 from springcheck.studies.text import left_out, of_energy
 from springcheck.text.lines import Lines, Row, Text, TextTable, hanging, plain, table
-from springcheck.text.wording import count, number, seconds
+from springcheck.text.wording import count, few, number, seconds
 
 if TYPE_CHECKING:
     from springcheck.studies.ensemble.result import Ensemble
@@ -70,8 +70,8 @@ def _report(report: Report) -> Lines:
     out += _beyond(report)
     out += left_out(report.left_out)
     if report.others:
-        names = ", ".join(report.others)
-        out.append(plain(f"Left out {names}: not among the default methods; --all runs every one"))
+        others = few(report.others, 8)
+        out.append(plain(f"Left out {others}: not among the default methods; --all runs every one"))
     if report.judged_frames < report.scene.frames:
         share = f"{report.judged_frames} of {report.scene.frames} frames"
         out.append(
