@@ -31,7 +31,7 @@ def _main() -> int:
             warnings.simplefilter("ignore")
         status = cli.main()
         interrupts.finish()
-        # what a command has made ends with it: the interpreter need not search it for cycles at its exit
+        # objects live until the command ends: the interpreter need not collect cycles at exit
         gc.freeze()
     except SystemExit as ended:
         # argparse: --help, or a mistake that it has named

@@ -40,7 +40,7 @@ UNHEARD = 0.25
 
 
 UNTOUCHED = np.array(0x7FF8_0000_5C5C_5C5C).view(np.float64)
-"""What stands in rows before an engine fills them: not a number, and none that arithmetic makes."""
+"""Fill value of rows before an engine writes them: a NaN that no arithmetic makes."""
 
 
 class Sink(Protocol):

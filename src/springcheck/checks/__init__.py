@@ -125,7 +125,7 @@ def explained(
     if first is None:
         return list(verdicts)
     case = Case(trajectory=run, scene=scene)
-    # what failed alone asks where the time was taken, and what rods and baths did
+    # imported here: only failures are explained
     from springcheck.checks import causes, driven
 
     said = driven.found(case) or causes.found(case) or shown(scene, run, first_off(case) or 0)
@@ -184,7 +184,7 @@ def judge(
 
 
 def not_exercised(scene: Scene) -> str:
-    """What an engine that passes here may still have wrong: a scene of particles does not exercise it.
+    """Features of an engine that this scene does not exercise, and that may be wrong though it passes here.
 
     Empty of circuits and rotors.
     """
@@ -193,7 +193,7 @@ def not_exercised(scene: Scene) -> str:
     system = scene.system
     pulled = np.abs(scene.p) + np.abs(system.force_of(scene.terms)(scene.q, scene.p)) > 0
     for term in scene.terms:
-        # what is at rest and not pulled at the start may be driven later
+        # a particle at rest without a force at the start may be driven later
         if term.kind == "drive":
             pulled[np.concatenate(term.particles)] = True
     moved = np.bincount(scene.all_places[pulled] % 3, minlength=3)

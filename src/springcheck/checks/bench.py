@@ -1,4 +1,4 @@
-"""What experiments share: the runs of one method that several of them look at."""
+"""Runs of one method that several experiments share."""
 
 from __future__ import annotations
 
@@ -55,12 +55,12 @@ class Bench:
 
     @cached_property
     def law(self) -> schemes.Law:
-        """What follows from it on the scene."""
+        """The law of the scheme on the scene."""
         return schemes.Law(scheme=self.scheme, scene=self.scene, h=self.scene.step)
 
     @property
     def stiffness(self) -> Floats:
-        """What holds each particle (n,) [M/T2], that of one radian a step where nothing does."""
+        """Stiffness that holds each particle (n,) [M/T2]; where none does, that of one radian a step."""
         k = np.abs(self.scene.system.hessian_diagonal(self.scene.q)).astype(np.float64)
         return np.where(k > 0, k, self.scene.m / self.scene.step**2)
 

@@ -330,7 +330,7 @@ def advance(
     *,
     forces: Callable[[Iterable[Term]], Force] | None = None,
 ) -> tuple[Extended, Extended]:
-    """So many steps of the scheme from states (f, n), in extended precision; `forces` makes the forces."""
+    """The scheme's own steps from states (f, n), in extended precision; `forces` computes the forces."""
     if steps > REPEATED and case.linear:
         return _leap(case, q, p, steps)
     for _ in range(steps):

@@ -1,4 +1,4 @@
-"""What a check is: one object that names itself, says what it needs, and judges; and what passes."""
+"""A check: one object with a name, its requirements and a function that judges."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ class Check(Generic[Subject_contra]):
     sentence: str
     """What holds where it passes."""
     judge: Callable[[Subject_contra], Finding | Chance | str]
-    """What it finds, or why what it measures says nothing."""
+    """Its finding, or the reason why the measurement decides nothing."""
     telling: bool
     """Whether a pass tells the scheme that a method claims from another one."""
 

@@ -1,4 +1,4 @@
-"""What is claimed of a trajectory: the scene and the scheme that made it, and the law that follows."""
+"""The claim on a trajectory: the scene and the scheme that made it, and the law that follows."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Claim:
 
     @cached_property
     def law(self) -> Law:
-        """What follows from the scheme on that scene."""
+        """The law of the scheme on that scene."""
         return Law(scheme=self.scheme, scene=self.judged, h=self.trajectory.step)
 
     def step(self, q: Extended, p: Extended, **how: Any) -> tuple[Extended, Extended]:

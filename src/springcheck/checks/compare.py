@@ -30,7 +30,7 @@ class Same:
     difference: float
     allowed: float
     within: Literal["rounding", "tolerance"] = "rounding"
-    """What allows it: rounding alone, or the tolerance of some adaptive solver among them."""
+    """Origin of the allowed difference: rounding alone, or the tolerance of some adaptive solver."""
 
 
 def compare(scene: Scene, pieces: Mapping[str, Trajectory]) -> Comparison:
@@ -73,7 +73,7 @@ def allowed(scene: Scene, trajectory: Trajectory) -> float:
             sizes = np.asarray(unit / case.system.norm.unit, np.float64)
             return float(np.max((bound * sizes)[case.steps > 0], initial=0.0))
     # roundings shift the energy, and with it the frequency of an anharmonic motion: as random ones do where
-    # they walk, and coefficients, which are rounded once, turn the phase at every step alike
+    # roundings of states walk at random; those of coefficients, made once, shift the phase at each step alike
     steps = float(case.steps[-1])
     rounding = float(np.max(case.system.norm.most(*case.allowance) / case.system.norm.unit))
     turn = fastest(case) * abs(trajectory.step)
@@ -105,7 +105,7 @@ class _Motion(NamedTuple):
 
 
 def _motion(scene: Scene, run: Trajectory) -> _Motion:
-    """Its limit is NaN where that is no small part of the motion: then nothing can be said of it."""
+    """Its limit is NaN where it is no small part of the motion: then the two cannot be compared."""
     limit = allowed(scene, run)
     with np.errstate(over="ignore", invalid="ignore"):
         size = np.max(scene.system.norm(run.q - scene.q, run.p - scene.p))

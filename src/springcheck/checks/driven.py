@@ -145,7 +145,7 @@ OTHER_DRIVES: tuple[tuple[str, str, Callable[[Any, Any], Any]], ...] = (
     ("the drive has twice its amplitude", "amplitude", lambda x, m: 2 * x),
     ("the drive has half of its amplitude", "amplitude", lambda x, m: x / 2),
 )  # fmt: skip
-"""What it is, of which field of a drive, by its mass; the amplitude of a modulated spring is its depth."""
+"""Faults of a drive: words, field, its value by the mass; a modulated spring's amplitude is its depth."""
 
 
 def _other_drives(scene: Scene) -> Iterator[tuple[str, Scene]]:

@@ -168,7 +168,7 @@ def predicted_drift(run: Trajectory) -> float:
 
 
 WALK = frozenset({"one-step", "splitting", "symplectic", "double"})
-"""What keeps a shadow energy but for a walk of its roundings."""
+"""Traits of schemes that conserve a shadow energy up to a random walk of its roundings."""
 
 
 @check("bias", family="law", requires=WALK)
@@ -202,7 +202,7 @@ def rounding_bias(bench: Bench) -> Finding | str:
 SHORT = "a run of it ended early"
 
 ROUNDED_MATRIX = 2.0**-52
-"""What elements near 1 of a one-step matrix, each rounded, do to its determinant at most."""
+"""Largest error of the determinant of a one-step matrix whose elements near 1 are rounded."""
 
 
 def _is_short(bench: Bench, h: float) -> bool:

@@ -189,7 +189,7 @@ def frequency(case: Case) -> Finding | str:
 
 
 _LOW_TWO_PI = 2.4492935982947064e-16
-"""What the double 2 pi lacks."""
+"""2 pi less its rounding to a double."""
 
 
 def _phase(form: Extended, u: np.longdouble, v: np.longdouble) -> np.longdouble:

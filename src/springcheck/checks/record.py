@@ -73,7 +73,7 @@ declares, and more would excuse any force."""
 
 
 def beyond(how: Arithmetic) -> list[str]:
-    """What of a declared arithmetic is coarser than any that is known."""
+    """The parts of a declared arithmetic that are coarser than any known one."""
     return [
         f"the engine declares {name} = {value:.3g} of its arithmetic, and at most {most:.3g} is taken: {why}"
         for name, (most, why) in MOST_DECLARED.items()

@@ -124,7 +124,7 @@ def _follow(case: Case) -> _Replayed | str:
 
 
 def _gain(case: Case, steps: list[Taken]) -> Extended:
-    """What steps add to the energy, of linear forces."""
+    """Energy gained in the steps, for linear forces."""
     total = np.longdouble(0)
     for step in steps:
         old, new = (np.sum(case.system.force(*x) ** 2 / case.judged.m) for x in (step.start, step.end))

@@ -66,7 +66,7 @@ def rod_velocity(case: Case) -> Finding | str:
     if bath and bath.held and bath.held[-1] != PROJECT:
         return "momenta are stored as the drift leaves them, with what is taken off them in the next step"
     if heated:
-        # what a step adds up depends on its draws, which frames further apart do not tell
+        # the sum over a step depends on its draws, which frames further apart do not determine
         if why := missing(case, {"every-step"}):
             return why
         found = reading(case)
@@ -101,7 +101,7 @@ def turn(case: Case) -> Finding | str:
         # a later piece of a long run: from its own first frame on
         steps, (q0, p0) = steps - steps[0], (x[0].astype(np.longdouble) for x in (run.q, run.p))
     w = rods.rates(q0, p0)
-    # what rounding leaves of momenta along a line is no turn
+    # rounding errors of momenta along a line are no rotation
     w = np.where(w * rods.length > UNTRUE * rods.spans(np.abs(p0) / m), w, 0)
     if not np.any(w > 0):
         return "no rod turns"

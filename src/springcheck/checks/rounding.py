@@ -64,7 +64,7 @@ def of_step(
 
 
 def _evaluations(case: Claim, places: list[Reals] | None, recorded: bool) -> list[Met]:
-    """What bounds each evaluation of the force within a step."""
+    """Error bound of each evaluation of the force within a step."""
     scene, scheme = case.judged, case.scheme
     acting = {"slow": scene.system.slow, "fast": scene.system.fast, "magnetic": sum(case.law.fields, ())}
     found: list[Met] = []

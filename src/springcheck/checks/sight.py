@@ -270,7 +270,7 @@ def _mode_motions(case: Case) -> tuple[Integers, float, States, dict[str, list[S
 
     with np.errstate(all="ignore"):
         found = ((name, changed_matrices(case, name, change)) for name in NAMES[:3])
-        # beside a step without a solution the change may reverse orientation
+        # near a step without a solution the changed map may reverse orientation
         # the modes of several springs change otherwise with each of them
         motions = {
             name: [states(matrices)]

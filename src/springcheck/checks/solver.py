@@ -54,7 +54,7 @@ def tolerance_bound(case: Case) -> float:
     """
     states = case.trajectory.q, case.trajectory.p
     if case.scene.system.is_linear and case.scene.system.is_separate and case.linear:
-        # what a state has grown to, an error made there no longer grows: from the start, both together
+        # an error made later grows for a shorter time: state and growth are both taken from the start
         states = (case.scene.q[None], case.scene.p[None]) if np.any(case.system.modes.w2 < 0) else states
     local = _worst_local_error(case, *states)
     with np.errstate(over="ignore"):

@@ -173,7 +173,7 @@ above which a verdict that passes says that the number is known no better than t
 
 
 def _list(case: Case, which: NDArray[np.bool_], said: str, size: Reals | None = None) -> str:
-    """What is said of these positions and momenta (2, n), each with its size, or nothing."""
+    """List the coordinates of `which` (2, n), each with its size if sizes are given; "" for none."""
     of, axes = np.divmod(case.scene.all_places, 3)
     along = [""] * len(of) if case.scene.places is None else [f"_{'xyz'[axis]}" for axis in axes]
     names = [

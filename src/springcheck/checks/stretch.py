@@ -95,7 +95,7 @@ def known(case: Claim, ahead: Stretch, steps: int) -> NDArray[np.bool_]:
 
 
 def follow(case: Claim, q: Extended, p: Extended, steps: int) -> Stretch:
-    """So many steps from states (f, n), with what their roundings may become."""
+    """Steps from states (f, n), with bounds on the growth of their roundings."""
     if steps == 1:
         near = None if case.system.is_linear else case.trajectory.q[1:].astype(np.longdouble)
         end, bound = _one(case, q, p, near=near)
@@ -140,7 +140,7 @@ def _many(case: Claim, q: Extended, p: Extended, steps: int) -> Stretch:
     with np.errstate(all="ignore"):
         for i in range(steps):
             on[:, i + 1] = case.step(*on[:, i])
-        # what belongs to each step alone is worked out for all steps at once
+        # terms of single steps are computed for all steps at once
         at_q, at_p = on[:, :-1].reshape(2, -1, q.shape[1])
         _, bound = _one(case, at_q, at_p)
         each = bound.reshape(2, steps, *q.shape)
@@ -236,7 +236,7 @@ def _allowed(
     """What roundings of all steps may be, in those of one: at worst, or so many standard deviations of them
     and beside them the worst of the last step, or one more where they are as good as `random`."""
     how = case.trajectory.arithmetic
-    # what a solver takes from positions it takes at every step alike, and all of it is in rebuilt velocities
+    # a solver errs alike at every step, and its whole error is in velocities that are rebuilt from positions
     alike = case.trajectory.rebuilds_velocity and case.law.has("implicit")
     if not WIDE or how.quantum or how.lengths or how.stale or alike:
         return worst
@@ -289,7 +289,7 @@ def tangent(case: Claim, q: Extended, p: Extended) -> Extended:
 
 
 def variational(system: System[Scene]) -> Callable[[Iterable[Term]], Force]:
-    """What makes forces on states (1 + d, ..., n): the first is a motion, the others are changes of it."""
+    """Function of forces on states (1 + d, ..., n): the first is a motion, the others its perturbations."""
 
     def of(terms: Iterable[Term]) -> Force:
         terms = tuple(terms)

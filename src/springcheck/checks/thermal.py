@@ -32,12 +32,12 @@ NO_DRAWS = "it takes no draws: its bath is a chain"
 
 
 def reading(case: Case) -> Reading:
-    """What the frames say of the draws behind them."""
+    """The draws behind the frames, as far as the frames determine them."""
     return case.once(_reading)
 
 
 def thermostat(case: Case) -> Thermostat:
-    """Its scheme.  MethodError: of one that nobody knows how it holds rods."""
+    """Its scheme.  MethodError for a scheme of which it is not known how it holds rods."""
     scheme = THERMOSTATS[case.trajectory.scheme]
     if case.judged.system.rods and not scheme.held:
         raise MethodError(f"no stages of {scheme.title} with rods are known")

@@ -1,4 +1,4 @@
-"""What a job of continuous integration reads: a JUnit report, a badge, and a summary in Markdown.
+"""Reports for continuous integration: JUnit, a badge, and a summary in Markdown.
 
 All three are made from the JSON document of a command, so that nothing is decided twice.
 """

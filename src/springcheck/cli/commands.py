@@ -130,7 +130,7 @@ def _identify(options: Namespace) -> int:
     asked = schemes.scheme(options.scheme).name if options.scheme is not None else None
     answers: Iterable[tuple[str, Any]]
     if options.integrator is not None:
-        # what it prints is not ours to show
+        # its output is not shown
         with redirect_stdout(sys.stderr):
             found = {options.integrator: identify_stepper(function.load(options.integrator))}
         answers = [(options.integrator, (found, []))]
@@ -203,7 +203,7 @@ def _in_order(parts: Sequence[Callable[[], Any]], workers: int) -> Iterator[Any]
 
 
 def _look(file: str, trajectory: str | None, columns: list[str], stated: dict[str, float | None]) -> Any:
-    """What a file holds and what of it cannot be trusted, or why it cannot be read."""
+    """The contents of a file and its untrustworthy parts, or the reason why it cannot be read."""
     from springcheck import formats
     from springcheck.identify import files
 

@@ -12,7 +12,7 @@ Arguments = Sequence[tuple[tuple[str, ...], dict[str, Any]]]
 
 
 def script(shell: str, commands: Mapping[str, Arguments]) -> str:
-    """What `eval` or a shell's folder of completions takes; of `commands` the names and the arguments."""
+    """A script for `eval` or a shell's folder of completions, from the names and arguments of `commands`."""
     labels = [f"{name}:{one}" for name in engines.names() for one in engines.engine(name).methods]
     named = {"--method": labels, "--scheme": schemes.known(), "--scene": scenefile.names()}
     words = {"SCENE": scenefile.names(), "NAME": [x.name for x in checks.ALL] + list(schemes.known())}

@@ -17,7 +17,7 @@ from springcheck.physics import scenefile
 from springcheck.physics.arrays import WIDE
 
 LIBRARIES = ("numpy", "scipy", "h5py", "numba", "matplotlib", "jinja2", "rich", "msgspec", "pandas", "xarray")
-"""What results depend on, then what only makes more possible."""
+"""Libraries that results depend on, then optional ones."""
 
 
 def found() -> dict[str, Any]:

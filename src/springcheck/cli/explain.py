@@ -92,7 +92,7 @@ _CHECKS = {check.name: check for check in (*checks.ALL, *checks.RANDOM, *SEEDED)
 
 
 def check_lines(check: Any) -> Iterator[str]:
-    """What holds where a check passes, how, and for what it applies; what it must reject."""
+    """What a pass proves, how it is measured, the scope of the check, and the faults that it must reject."""
     yield f"{check.name}, a check of the {check.family}"
     first, _, rest = inspect.cleandoc(check.judge.__doc__ or "").partition("\n\n")
     yield _line(first)

@@ -118,7 +118,7 @@ def judge(
 
 
 def _taken(states: States, judged: Scene, run: Trajectory, asked: Scene) -> dict[str, str]:
-    """What was taken from the file in place of the scene, and so not judged, by check of the record."""
+    """Data taken from the file in place of the scene, and so not judged, by the check of the record."""
     out: dict[str, str] = {}
     if np.any(states.t != run.t):
         off = float(np.max(np.abs(states.t - states.t[0] - run.t)))
@@ -152,7 +152,7 @@ def _shown(scene: Scene, run: Trajectory, states: States) -> Verdict:
             passed=passed, why=why,
         )  # fmt: skip
 
-    # as they are written: projected on a line they would not show their decimals
+    # digits are counted as written: projections on a line would not show their decimals
     mass = np.repeat(scene.m, states.q.shape[1] // scene.n)
     try:
         found = identify_states(of_arrays(run.label, replace(states, mass=mass)), step=scene.step)
@@ -226,7 +226,7 @@ def as_trajectory(
         far = float(np.max(np.abs(q), initial=0.0))
         q, other, beside = _along(path, q, other, scene, notes, off)
         if moved := _beside_start(q, scene, off):
-            # as far from 0 as the points are, for they are rounded there
+            # moved as far from 0 as the points are, since they are rounded there
             notes.append(f"positions counted from {moved:.6g} along it, where the scene has its 0")
             q, scene = q - moved + far, _moved(scene, far)
             beside /= max(1.0, far / (float(np.ptp(q)) or 1.0))

@@ -1,4 +1,4 @@
-"""What the command line shows: lines and JSON on standard output, doubts and progress on standard error."""
+"""Output of the command line: lines and JSON on standard output, warnings and progress on standard error."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def show(lines: Lines) -> None:
 
     # who wants no colours wants none, whatever else is said; Rich would still write bold
     colours: Literal["auto"] | None = None if os.environ.get("NO_COLOR") else "auto"
-    # what Rich writes to a pipe that is closed ends the program with a status of Rich's
+    # on a closed pipe Rich would end the program with an exit status of its own
     width, into = (None, None) if terminal else (PIPE, StringIO())
     drawn(lines, Console(highlight=False, width=width, color_system=colours, file=into))
     if into is not None:
@@ -66,7 +66,7 @@ def document(command: str, data: dict[str, Any]) -> None:
 
 
 def doubts(file: str) -> list[dict[str, str]]:
-    """What of a store cannot be trusted, for JSON; `warn` says it first."""
+    """Damage found in a store, for JSON; `warn` reports it first."""
     from springcheck import store
 
     return listed(store.doubts(Path(file)))
@@ -110,7 +110,7 @@ def alone() -> Iterator[None]:
         if os.name == "posix":
             import ctypes
 
-            # what C has printed may still stand in its buffer
+            # output of C code may still be in its buffer
             ctypes.CDLL(None).fflush(None)
         os.dup2(kept, 1)
         os.close(kept)

@@ -54,7 +54,7 @@ class Bodies(ABC):
         """MethodError where the world's numbers do not hold the scene, or the square of a joint's length."""
         least, most = (float(x) for x in (np.finfo(self.numbers).smallest_normal, np.finfo(self.numbers).max))
         speeds = np.abs(scene.p / scene.m)
-        # what is small beside the rest of the motion may vanish
+        # components that are small beside the rest of the motion may vanish
         speed, whole = float(np.max(speeds)), float(np.max([speeds, np.abs(scene.q)]))
         sizes = [(least, "mass", x, most) for x in scene.m.tolist()]
         sizes += [(least, "motion", whole or 1.0, most), (0.0, "speed", speed, self.fastest)]

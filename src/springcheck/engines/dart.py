@@ -25,7 +25,7 @@ class _World:
         import dartpy
 
         if step < 0:
-            # it would warn, and go on by its own step
+            # DART would warn, and continue with a step of its own
             raise MethodError(f"{label}: DART takes no negative step")
         springs = method.name == "joint-spring"
         self.force_calls = 0

@@ -202,7 +202,7 @@ class _Run:
             for i, (k, at) in layer.items():
                 stiffness[i], x[i] = k, at
             command(f"variable k{number} atom d_k{number}")
-            # it takes atoms to be at rest where they are now
+            # the fix takes the present positions for those of rest
             command(f"fix spring{number} mobile spring/self v_k{number}")
         for number, (a, b, k, rest, _) in enumerate(
             _bonds(scene, [t for t in held if isinstance(t, Spring)], self._origins)
@@ -282,7 +282,7 @@ def _thermostat(scene: Scene, method: Method, seed: int) -> list[str]:
     if method.scheme == "lammps-langevin":
         return ["fix move mobile nve", f"fix bath mobile langevin {given}"]
     if method.name == "csvr":
-        # it counts three degrees of freedom for each atom, less three; nothing moves along some
+        # LAMMPS counts three degrees of freedom for each atom, less three; along some axes nothing moves
         given = f"{scene.thermal!r} {scene.thermal!r} {1 / (2 * scene.bath.friction)!r} {seed}"
         none = 3 * scene.particles - scene.n
         modified = f"compute_modify bath_temp extra/dof {none}"
@@ -294,7 +294,7 @@ def _thermostat(scene: Scene, method: Method, seed: int) -> list[str]:
     _, number, *half = method.scheme.split("-")
     more = ""
     if number == "vii":
-        # it takes the decay and sets the step by it: the one that belongs to the scene's step
+        # LAMMPS derives the method's own step from the decay: hand it the decay of the scene's step
         x = np.asarray(scene.bath.friction * scene.step)
         more = f" {float(GJ['vii'](x))!r}"
     velocity = "vhalf" if half else "vfull"

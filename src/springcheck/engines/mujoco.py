@@ -133,7 +133,7 @@ class _Steps:
         how = HOW[method.name]
         self.force_calls = 0
         self._step = mujoco.mj_step
-        # it would write its warnings to a file in the current folder
+        # MuJoCo would write its warnings to a file in the current folder
         mujoco.set_mju_user_warning(_unheard)
         self._model = _model(mujoco, scene, how, step, label)
         self._data = mujoco.MjData(self._model)
@@ -171,7 +171,7 @@ def arithmetic(label: Label) -> Arithmetic:
 
 
 def _unheard(message: str) -> None:
-    """What MuJoCo warns of shows in the states."""
+    """Conditions that MuJoCo warns of are visible in the states."""
 
 
 ENGINE = Engine(

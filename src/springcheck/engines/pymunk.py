@@ -48,7 +48,7 @@ class _Space(Bodies):
         import pymunk
 
         if step < 0 and label.method == "damped-spring":
-            # it would end in numbers that are none
+            # the motion would end in NaN
             raise MethodError(f"{label}: Chipmunk's DampedSpring takes no negative step")
         self._library, self._h, self._space = pymunk, step, pymunk.Space()
 

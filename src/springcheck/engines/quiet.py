@@ -36,7 +36,7 @@ def caught(descriptor: int) -> Iterator[list[str]]:
             with redirected(printed):
                 yield text
         finally:
-            # what C++ has printed may still stand in the C library's buffer
+            # output of C++ code may still be in the C library's buffer
             if os.name == "posix":
                 ctypes.CDLL(None).fflush(None)
             os.dup2(saved, descriptor)

@@ -198,7 +198,7 @@ def _find(name: str) -> Engine | str | None:
 
 
 def engine(name: str) -> Engine:
-    """What an engine says of itself; imports no library."""
+    """The declarations of an engine; imports no library."""
     found = _find(name)
     if isinstance(found, Engine):
         return found

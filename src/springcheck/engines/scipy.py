@@ -33,7 +33,7 @@ from springcheck.schemes import Scheme, solver
 SOLVERS = {"rk45": "RK45", "dop853": "DOP853", "radau": "Radau", "bdf": "BDF", "lsoda": "LSODA"}
 
 SMALLEST_TOLERANCE = 100 * np.finfo(np.float64).eps
-"""What SciPy raises smaller relative tolerances to."""
+"""Smallest relative tolerance that SciPy takes; it raises smaller ones to this."""
 
 
 class _Solver:

@@ -1,1 +1,1 @@
-"""What all figures share.  Each study draws its own (`figure.py` beside its measure)."""
+"""Helpers that all figures share.  Each study draws its own (`figure.py` beside its measure)."""

@@ -34,7 +34,7 @@ class Scale:
     shown: tuple[float, float] | None = None
     """Range shown at first; left out: that of the curves."""
     factor: float = 1.0
-    """What numbers are multiplied by in the unit of the name."""
+    """Factor of numbers shown in the unit of the name."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -52,7 +52,7 @@ class Curve:
     line: bool = True
     marks: bool = False
     notes: Sequence[str] = ()
-    """What is said of each point beside its numbers."""
+    """Annotation of each point beside its numbers."""
     open: Sequence[bool] = ()
     """Which points are estimates: these have hollow marks, all others filled ones."""
     title: str = ""
@@ -73,7 +73,7 @@ class Tiles:
     """Name and shade of each: good, wild, limit, refused, wrong; or of sizes s0 to s6."""
     rows: Sequence[Sequence[int]]
     notes: Sequence[Sequence[str]] = ()
-    """What is said of each tile beside its kind; left out: nothing."""
+    """Annotation of each tile beside its kind; none by default."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -110,7 +110,7 @@ class Chart:
     tiles: Tiles | None = None
     rules: Sequence[Rule] = ()
     short: str = ""
-    """What tells it from the other charts of its bank."""
+    """Label that distinguishes it from the other charts of its bank."""
     equal: bool = False
     """Whether a unit is of one length on both axes."""
     labels: Sequence[Naming] = ()
@@ -129,7 +129,7 @@ class Bank:
     heading: str = ""
     """Heading of its figure; left out: the title of its first chart."""
     on: Sequence[str] | None = None
-    """What is drawn at first; left out: everything."""
+    """Series drawn at first; all by default."""
     columns: int = 0
     """Charts beside each other in a figure; left out: as many as suit it."""
     size: tuple[float, float] | None = None

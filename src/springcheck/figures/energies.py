@@ -164,7 +164,7 @@ def orbits(runs: Runs, exact: Exact) -> str:
                 e = np.asarray(scene.system.energy(run.q, run.p), np.float64)
             first, last = e[: len(e) // 4 + 1], e[-(len(e) // 4) - 1 :]
             unit = CHANGED * float(scene.system.norm.unit) ** 2
-            # what ran away did not turn
+            # a motion that diverged did not oscillate
             out = not np.isfinite(e).all() or np.min(last) > np.max(first) + unit
             # at once, or more and more; half of a negative energy is more of it
             inwards = not out and np.max(last) < max(np.min(first), min(e[0], e[0] / 2)) - unit
@@ -197,7 +197,7 @@ def _scale(found: Sequence[Floats], true: Floats | None) -> Frame:
         bottom = max(min(LEAST, 0.1 * float(np.min(true)) if true is not None else LEAST), FLOOR)
         return Frame(max(low / 2, bottom), 2 * high, len(near) < len(found) or low < bottom, log=True)
     ys = overlay.widened(low, high, clipped=len(near) < len(found))
-    # what differs by less is for the differences below
+    # smaller differences are for the panel of differences below
     room = max(ys.half, SEEN * abs(ys.centre))
     return Frame(ys.centre - room, ys.centre + room, ys.clipped)
 
@@ -264,7 +264,7 @@ def _apart(found: Mapping[str, Floats]) -> list[set[str]]:
     for label, x in found.items():
         some = x[1:][(x[1:] > 0) & np.isfinite(x[1:])]
         low, high = np.quantile(some, [0.1, 1.0]) if len(some) else (FLOOR, FLOOR)
-        # what explodes stands with the largest of the others
+        # diverging methods are placed with the largest of the others
         spans.append((min(float(low), 1.0), min(float(high), MOST), label))
     sets: list[set[str]] = []
     lowest = np.inf

@@ -51,7 +51,7 @@ ON_SCREEN = {
     _OLIVE: ("#85852B", "#C8C850"),
     _GREY: (_GREY, "#A0A0A0"),
 }
-"""Each colour where it must be seen on white and on black: the same, as far as its contrast is 3 to 1."""
+"""Each colour on white and on black: unchanged where its contrast to both is 3 to 1."""
 
 LOOKS = {
     "explicit-euler": Look(_RED, DASHED),
@@ -167,7 +167,7 @@ MOST_MEMBERS = 6
 
 
 def members(labels: Iterable[str]) -> str:
-    """Whose marks lie on a scheme's line: the one label, or the engines with their marks."""
+    """Legend of a scheme's line: the one label, or the engines with their marks."""
     given = list(labels)
     if len(given) == 1:
         return f"{mark(engine(given[0]))[1]} {given[0]}"

@@ -200,7 +200,7 @@ class Frame:
         return self.low, self.high
 
     def axis(self, name: str, unit: str) -> Scale:
-        """What it shows, in a readable unit."""
+        """Scale of this axis, in a readable unit."""
         factor, readable = looks.prefixed(max(abs(self.low), abs(self.high)), unit)
         return Scale(name=with_unit(name, readable), log=self.log, shown=self.ends, factor=factor)
 

@@ -60,7 +60,7 @@ def _size(charts: Sequence[Chart], wide: float, most: float) -> tuple[float, flo
 
 
 def _heading(runs: Runs, what: str, said: str) -> str:
-    """What was found of what; what is wrong comes first."""
+    """Heading of a figure; what is wrong with its runs comes first."""
     return f"{runs.scene.title}: {runs.wrong}{f'{said} ({what})' if said else what}"
 
 
@@ -150,7 +150,7 @@ def clouds(runs: Runs, view: View, thermal: float) -> Bank:
 
 
 def _frames(picked: Sequence[State], true: State | None, view: View) -> tuple[Frame, Frame]:
-    """What a phase portrait shows: a run that goes far in one direction sets the scale of neither."""
+    """Limits of a phase portrait: a run that goes far in one direction does not set the scale."""
     steep = _steep({str(i): one for i, one in enumerate(picked)}, true)
     if steep is not None:
         return steep

@@ -1,4 +1,4 @@
-"""What a picture of a scene shows: which coordinate beside which momentum, in which units."""
+"""Axes of a picture of a scene: a coordinate, its momentum, and their units."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class View:
     title: str
     """Title of its panel: "particle 1", or "" for a scene of one."""
     what: str
-    """What x is, in one word."""
+    """Name of the abscissa, in one word."""
     x_name: str
     y_name: str
     x_unit: str
@@ -125,7 +125,7 @@ _NAMES = {
 
 
 def views(scene: Scene, particle: int | None = None) -> list[View]:
-    """What the pictures of a scene show: this particle, a free pair's bond, or the first ones, one by one.
+    """Views of a scene: this particle, a free pair's bond, or the first particles one by one.
 
     SpringcheckError where there is no such particle.
     """
@@ -197,7 +197,7 @@ def _single(scene: Scene, i: int) -> View:
 
 
 def _place(scene: Scene, i: int) -> str:
-    """Whose coordinate it is where particles move in space, "" where they do not."""
+    """The particle whose coordinate it is where particles move in space, else ""."""
     if scene.places is None:
         return ""
     particle, axis = divmod(int(scene.places[i]), 3)

@@ -222,7 +222,7 @@ class Term:
         return self._changed(**kept)
 
     def tiled(self, copies: int, n: int) -> Self:
-        """So many copies of its rows, the j-th on particles n j places further."""
+        """Copies of its rows, the j-th on particles n j places further."""
         shift = n * np.arange(copies)[:, None]
         return self._changed(
             **{name: (getattr(self, name) + shift).ravel() for name in self.ends},

@@ -1,4 +1,4 @@
-"""What runs yield: trajectories, and what is said of them: comparisons and verdicts."""
+"""Results of runs: trajectories, comparisons and verdicts."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class Trajectory:
     origin: Mapping[str, str] = field(default_factory=dict)
     """Versions, platform, velocity convention and the like: what a reader needs to repeat the run."""
     scene: Scene | None = None
-    """What was run, where that is known: `v` and `error` need it."""
+    """The scene that was run, where that is known: `v` and `error` need it."""
 
     @classmethod
     def from_arrays(
@@ -337,7 +337,7 @@ class Verdict:
     why: str
     """The bound's reason, or why the check does not apply."""
     sees: Limits = NOT_KNOWN
-    """What the check would have seen in this run."""
+    """Smallest fault that the check would have detected in this run."""
 
     @property
     def reason(self) -> str:

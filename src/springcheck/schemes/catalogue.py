@@ -78,7 +78,7 @@ class Scheme:
 
     @cached_property
     def traits(self) -> frozenset[Trait]:
-        """What the scheme is, as far as anything depends on it."""
+        """Traits of the scheme that other modules ask for."""
         one_step = bool(self.stages or self.b)
         implicit = any(x for i, row in enumerate(self.a) for x in row[i:])
         facts: dict[Trait, bool] = {

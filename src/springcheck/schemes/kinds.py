@@ -58,7 +58,7 @@ class StageKind(NamedTuple):
     friction: bool = False
     """Whether it does nothing without friction."""
     decay: Callable[[Any, Reals], Reals] | None = None
-    """What p is multiplied by for a time x at rates (n,), where that is all that it does."""
+    """Factor of p over a time x at rates (n,), for a stage that only multiplies it."""
 
 
 def _kick(q: Reals, p: Reals, x: Any, at: Setting) -> tuple[Reals, Reals]:

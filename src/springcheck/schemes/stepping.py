@@ -232,7 +232,7 @@ def _newton(residual: Reals, stiffness: Reals, joined: bool, factor: Reals) -> R
     """The residual (..., n) over 1 + factor K, with K (..., n, n) if joined, else its diagonal (..., n)."""
     if not joined:
         return np.asarray(residual / (1 + np.asarray(stiffness, residual.dtype) * factor))
-    # it only steers: what counts is the residual, which may be of any size that no double has
+    # this quotient only steers the iteration: the residual decides, and may lie beyond the range of doubles
     size = np.max(np.abs(residual), axis=-1, keepdims=True)
     size = np.where((size > 0) & np.isfinite(size), size, 1)
     residual = residual / size

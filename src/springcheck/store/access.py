@@ -273,7 +273,7 @@ def _length(dataset: Any) -> int:
     if not size or dataset.dtype.kind != "O":
         return int(size * dataset.dtype.itemsize)
     if dataset.file.mode != "r":
-        # it is being written, here
+        # this process is writing it
         return 0
     offset = dataset.id.get_offset()
     if offset is None or dataset.file.userblock_size:
@@ -330,7 +330,7 @@ def attributes(node: Any) -> dict[str, Any]:
     count = h5py.h5a.get_num_attrs(node.id)
     if count > MOST_ATTRIBUTES:
         raise refuse(node, f"has {count} attributes, more than any of ours")
-    # to open one by its number, libhdf5 makes a table of all of them each time
+    # opening an object by its index makes libhdf5 build a table of all of them each time
     names: list[bytes] = []
     h5py.h5a.iterate(node.id, names.append)
     found: dict[str, Any] = {}

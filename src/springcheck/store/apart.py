@@ -52,7 +52,7 @@ def read(module: str, function: str, path: Path, *words: str) -> bytes:
 
 
 def answer(module: str, function: str, path: Path, *words: str) -> bytes:
-    """What such a process answers: what its function returns, or says against the file."""
+    """Answer of such a process: its function's result, or its complaint about the file."""
     try:
         found: bytes = getattr(import_module(module), function)(path, *words)
     except StoreError as error:

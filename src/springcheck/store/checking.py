@@ -51,7 +51,7 @@ def check(path: str | Path, *, most: int | None = None) -> list[Damage]:
 
 
 def doubts(path: str | Path) -> list[Damage]:
-    """What cannot be trusted of a store whose numbers are about to be shown; none of a file of others."""
+    """Damage of a store whose numbers are about to be shown; none for a file of another program."""
     found = check(path, most=LONGEST_CHECK)
     return [] if any(NO_STORE in finding.what for finding in found) else found
 
@@ -137,7 +137,7 @@ def _structure(file: Any, *, arrays: bool) -> Iterator[Damage]:
     found = [*_differences(kept, now)] if "/h5md" in kept else [*_before(file, kept, now)]
     yield from found
     if arrays:
-        # what is laid out otherwise may claim to be as long as it likes
+        # arrays of another layout may claim any length
         places = {finding.place for finding in found}
         as_laid_out = [x for x in extents if not {x.name, x.name.rsplit("/", 2)[0]} & places]
         for name in seal.broken(Path(file.filename), as_laid_out):
@@ -160,7 +160,7 @@ def _before(file: Any, kept: dict[str, str], now: dict[str, str]) -> Iterator[Da
 
 
 def _differences(kept: dict[str, str], now: dict[str, str]) -> Iterator[Damage]:
-    """What is missing, added or another than its digest."""
+    """Arrays that are missing, added or differ from their digest."""
     for place in sorted(kept.keys() | now.keys()):
         if place not in now:
             yield Damage(place, "missing")

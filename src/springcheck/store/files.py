@@ -30,7 +30,7 @@ TEMPORARY = re.compile(r"springcheck-[0-9a-f]{16}\.new")
 """Names of files that are being written: of a user's files none is called so."""
 
 UNSUPPORTED = {errno.EOPNOTSUPP, errno.ENOTSUP, errno.ENOSYS, errno.EINVAL, errno.ENOLCK, errno.EINTR}
-"""What a file system says that does not offer an operation, or never ends one."""
+"""Error numbers of a file system that lacks an operation, or never completes one."""
 
 INTERRUPTED_FOR = 1.0
 """Time for which a call of the system that was interrupted is made again [s]; Python makes it for ever."""
@@ -52,7 +52,7 @@ CAUSES = {
 
 
 def cause(error: BaseException, *, writing: bool = False) -> str:
-    """What an exception of the system or of HDF5 says, in a few words."""
+    """Message of an exception of the system or of HDF5, in a few words."""
     if isinstance(error, MemoryError):
         return "it asks for more memory than there is"
     if not isinstance(error, OSError):
@@ -95,7 +95,7 @@ BROKEN = (
     ArithmeticError,
     MemoryError,
 )
-"""What reading a damaged file may raise."""
+"""Exceptions that reading a damaged file may raise."""
 
 
 @contextlib.contextmanager

@@ -80,7 +80,7 @@ def open_new(path: str | Path, command: str, *, force: bool = False) -> Journal:
 
 
 _NAMES = re.compile(rf"lock|command|undo|collection\.new|(run|table|rows)-.*\.h5|{files.TEMPORARY.pattern}")
-"""What files of a journal are called: nothing else in its folder is ever touched."""
+"""Names of the files of a journal: nothing else in its folder is ever touched."""
 
 
 def _is_free(parts: Path) -> bool:
@@ -284,7 +284,7 @@ class Journal:
         (self.folder / "command").unlink()
         _remove(self.folder, lambda _: True)
         with contextlib.suppress(OSError):
-            # what a user has put into it stays
+            # files that a user has put into it stay
             self.folder.rmdir()
 
     def _part(self, kind: str, name: str) -> Path:

@@ -49,7 +49,7 @@ CHUNK = 1 << 20
 
 RESERVED = ("h5md", "particles", "observables", "parameters", "comparison", "verdicts", "documents", "plots")
 QUANTITIES = ("q", "p", "energy", "last_step")
-"""What may be kept of a trajectory beside its times."""
+"""Quantities of a trajectory that may be stored beside its times."""
 _STRING = h5py.string_dtype("utf-8")
 
 _MD = {
@@ -246,7 +246,7 @@ def skeleton(file: Any, label: str, scene: Scene, found: Mapping[str, Column]) -
 
 
 def _named(text: str, unit: str, scene: Scene) -> str:
-    """What viewers write at an axis: H5Web adds no unit to a long_name, and reduced numbers carry none."""
+    """Axis labels for viewers: H5Web adds no unit to a long_name, and reduced numbers carry none."""
     return text if scene.units == "reduced" or unit == "1" else f"{text} ({unit})"
 
 

@@ -86,7 +86,7 @@ class Parts:
         if known is None:
             with contextlib.suppress(StoreError):
                 known = getattr(claim(folder), "run", None)
-        # what is a pipe there, or leads elsewhere, is none of ours
+        # a pipe or a link in that place is not ours
         there = folder.glob("*-*.h5") if known is not None else ()
         parts = sorted(part for part in there if part.is_file() and not part.is_symlink())
         parts = [part for part in parts if (found := seal.find(part)) is None or found.run == known]

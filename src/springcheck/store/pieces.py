@@ -29,7 +29,7 @@ BY = "measured_by"
 WORKERS, PIECES = "provenance/workers", "provenance/pieces"
 
 Worker = Mapping[str, str]
-"""What is known of a worker: host, processor, versions ..."""
+"""Provenance of a worker: host, processor, versions ..."""
 
 
 def by_text(by: Sequence[Worker]) -> dict[str, str]:

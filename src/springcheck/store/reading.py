@@ -1,4 +1,4 @@
-"""What is in a store: trajectories, tables and texts of a collection and of the parts not yet in it."""
+"""Contents of a store: trajectories, tables and texts of a collection and of the parts not yet in it."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def arrays_of(file: Any, label: str, known: RunRecord) -> dict[str, Any]:
 
 @contextlib.contextmanager
 def _held(path: str | Path, label: str) -> Iterator[tuple[RunRecord, dict[str, Any], dict[str, Any]]]:
-    """What is known of a trajectory of a store (see `known_of`), and its arrays (see `arrays_of`)."""
+    """Metadata of a trajectory of a store (see `known_of`), and its arrays (see `arrays_of`)."""
     with opened(source_of(Path(path), label)) as file:
         known, rest = known_of(file, label)
         yield known, rest, arrays_of(file, label, known)
@@ -188,7 +188,7 @@ class Summary:
 
 
 def summary(path: str | Path) -> Summary:
-    """What is in a store, at no cost that grows with its length."""
+    """Contents of a store, at a cost that does not grow with its length."""
     path = Path(path)
     runs = []
     for label, source in sources(path).items():

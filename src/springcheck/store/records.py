@@ -1,4 +1,4 @@
-"""What is kept of a trajectory besides its numbers: attributes, read back with types and limits."""
+"""Metadata of a trajectory: attributes, read back with types and limits."""
 
 from __future__ import annotations
 
@@ -109,7 +109,7 @@ def record(place: str, known: Mapping[str, Any]) -> RunRecord:
 
 
 def attributes(trajectory: Trajectory) -> dict[str, Scalar | None]:
-    """What `Draft.finish` stores of a trajectory besides its numbers, which are not looked at."""
+    """Metadata of a trajectory that `Draft.finish` stores; its numbers are not looked at."""
     kept = {name: attrgetter(field)(trajectory) for name, field in KEPT.items()}
     origin = {f"origin.{key}": value for key, value in trajectory.origin.items()}
     return {"method": trajectory.label, **kept, **origin}

@@ -15,7 +15,7 @@ from springcheck.errors import StoreError
 from springcheck.store import apart, files, seal
 
 OURS, FOREIGN = "checking", "foreign"
-"""What a file is read as when it is tried: the modules whose `tried` does it."""
+"""Modules whose `tried` tries a file: a store of ours, or a file of another program."""
 
 PACKAGE = "springcheck.store"
 
@@ -35,7 +35,7 @@ def trust(path: Path, kind: str) -> None:
 
 @lru_cache(maxsize=4096)
 def _against(path: Path, kind: str, state: tuple[int, ...]) -> str:
-    """What speaks against a file, once for each state of it; nothing where it can be read."""
+    """The reason not to read a file, once for each state of it; "" where it can be read."""
     found = seal.find(path)
     if not h5py.is_hdf5(path):
         return "it is no HDF5 file"
@@ -65,7 +65,7 @@ def guarded(path: Path, kind: str) -> str:
 
 @lru_cache(maxsize=4096)
 def _tried(path: Path, kind: str, state: tuple[int, ...]) -> tuple[str, bool]:
-    """What the process says, and whether it lived to say it."""
+    """The answer of the process, and whether it lived to give it."""
     try:
         return apart.read(f"{PACKAGE}.{kind}", "tried", path).decode(), True
     except StoreError as error:

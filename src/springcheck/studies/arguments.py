@@ -1,4 +1,4 @@
-"""What commands are told: arguments that several of them take, and how they tell how far they are."""
+"""Arguments that several commands take, and how they report progress."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ def sorted_out(
 
 
 ALL = "*:?*"
-"""What names every method, and not the default ones alone."""
+"""Pattern of every method, beyond the default ones."""
 
 
 def choose(scene: Scene, patterns: Sequence[str]) -> tuple[list[Label], list[LeftOut], tuple[str, ...]]:

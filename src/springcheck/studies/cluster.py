@@ -84,7 +84,7 @@ class Cluster:
                 "--cluster needs dask; install it with: python -m pip install 'springcheck[cluster]'"
             ) from None
         with ExitStack() as stack:
-            # what is logged of connections that are lost is not for users: what is to be said is raised
+            # dask's log of lost connections is not for users: errors that concern them are raised
             for logger in map(logging.getLogger, LOGGERS):
                 stack.callback(logger.setLevel, logger.level)
                 logger.setLevel(logging.CRITICAL)

@@ -1,4 +1,4 @@
-"""What studies keep: their only way to a store, to the pieces of an interrupted call, and to JSON."""
+"""Storage for studies: their only way to a store, to the pieces of an interrupted call, and to JSON."""
 
 from __future__ import annotations
 
@@ -187,7 +187,7 @@ class How(TypedDict, total=False):
 
 
 def how(options: Namespace, progress: Progress | None) -> How:
-    """What the command line asks for."""
+    """How the command line asks to write the store."""
     return {"force": options.force, "progress": progress, "team": teams.of(options)}
 
 
@@ -267,7 +267,7 @@ def _measured(work: Callable[[], T]) -> tuple[T, dict[str, str]]:
 
 
 def who(path: Path) -> list[str]:
-    """What is to be said of those who measured the pieces of a store; nothing where they were of one kind."""
+    """Remarks on the machines that measured the pieces of a store; none where they were of one kind."""
     return provenance.sentences(store.measured_by(path))
 
 

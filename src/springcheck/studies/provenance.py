@@ -23,7 +23,7 @@ MOST_HOSTS = 4
 """Hosts that are named for each kind of processor."""
 
 BITS = ("elementary functions", "sums", "linear algebra")
-"""What is computed for comparison: the results differ where the processors' libraries round differently."""
+"""Operations whose results differ where the processors' libraries round differently."""
 
 
 def versions() -> dict[str, str]:

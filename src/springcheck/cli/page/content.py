@@ -1,4 +1,4 @@
-"""What a report shows of a store and its studies, as plain data, in bounded memory however long its runs."""
+"""Contents of a report on a store and its studies: plain data, in memory that does not grow with its runs."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from springcheck.text.wording import STATES_SHOW
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Section:
-    """What the page says of one study."""
+    """The page's section on one study."""
 
     name: str
     title: str
@@ -120,7 +120,7 @@ class Content:
     not_trusted: tuple[Damage, ...]
     methods: tuple[Passed, ...]
     explained: Mapping[str, tuple[str, tuple[str, ...]]]
-    """What each check among the verdicts looks at, in a sentence and in lines."""
+    """Description of each check among the verdicts, in a sentence and in lines."""
     same: tuple[Same, ...] | None
     """None where it cannot be told: a scheme that is not here, or states that were not recorded."""
     comparison: Comparison | None
@@ -138,14 +138,14 @@ class Content:
 
     @property
     def finding(self) -> str:
-        """What the first of its charts shows, with its title."""
+        """Heading of its first chart, else its title."""
         banks = iter(self.data["banks"].values())
         found = str(self.data["banks"].get("motion", next(banks, {})).get("heading", ""))
         return found.partition(" (phase portrait")[0] or self.title
 
     @property
     def not_exercised(self) -> str:
-        """What a pass does not cover; empty of a study without a scene."""
+        """The features that a pass does not cover; empty for a study without a scene."""
         return checks.not_exercised(self.scene) if self.scene and self.methods else ""
 
     @property
@@ -188,7 +188,7 @@ def gather(path: Path) -> Content:
         sections=tuple(studies),
         summary=summary,
         not_trusted=tuple(store.doubts(path)),
-        # what failed comes first
+        # failures come first
         methods=tuple(sorted(_methods(summary, verdicts), key=lambda one: not one.count(False))),
         explained={
             check.name: (check.sentence, tuple(explain.check_lines(check)))
@@ -221,7 +221,7 @@ def _motion(path: Path, wrong: Collection[str], most: int) -> dict[str, Any] | N
     kept = {x.tobytes() for run in shown.runs.values() for x in (run.t, *run.q.T, *run.p.T)}
 
     def few(x: Sequence[float] | Floats) -> Sequence[float] | Floats:
-        """What is no number of the file is written with seven digits."""
+        """Numbers that are not the file's own are written with seven digits."""
         return x if np.asarray(x).tobytes() in kept else [float(f"{value:.7g}") for value in x]
 
     # in a bath the finding is the temperature: its chart comes before the clouds of states

@@ -52,7 +52,7 @@ def html(content: Content) -> str:
         autoescape=True,
         trim_blocks=True,
         lstrip_blocks=True,
-        # what a file says is text without control characters
+        # text of a file is shown without control characters
         finalize=lambda value: plain(value) if type(value) is str and not value.isprintable() else value,
     )
     kept: list[str] = []

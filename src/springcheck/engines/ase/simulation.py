@@ -95,7 +95,7 @@ def _thermostat(
         from ase.constraints import FixCartesian
         from ase.md.bussi import Bussi
 
-        # it counts degrees of freedom, and those that nothing moves along are none
+        # ASE counts degrees of freedom; axes without motion must not be among them
         fixed = np.ones((scene.particles, 3), np.bool_)
         fixed.reshape(-1)[scene.where] = False
         atoms.set_constraint([FixCartesian(i, mask=tuple(row)) for i, row in enumerate(fixed) if np.any(row)])

@@ -62,7 +62,7 @@ ENGINE = Engine(
             "leapfrog", "semi-implicit-euler", "VerletIntegrator, handed p0 as it is", _DRIVEN,
             rebuilds_velocity=True,
             note="velocities half a step early, as documented; openmm#4929"),
-        # its growing motion would turn a Morse bond over, of which OpenMM knows only the length
+        # a growing motion would invert a Morse bond, of which OpenMM knows only the length
         by_default("euler", "explicit-euler", "explicit Euler by CustomIntegrator", _DRIVEN - {"morse"},
             note="a CustomIntegrator of ours, as a user may write it"),
         by_default(

@@ -364,7 +364,7 @@ class _Context:
                 self.off_axis = max(self.off_axis, bonds.off_axis(x, self._elsewhere))
 
     def _take_each(self, done: int, steps: int) -> None:
-        """So many steps after as many as are done, the time set before each."""
+        """Take these steps one by one, setting the time before each."""
         for i in range(done, done + steps):
             self._context.setParameter("time", i * self._step)
             self._integrator.step(1)

@@ -28,7 +28,7 @@ order makes it narrower."""
 
 
 def factors(scene: Scene, x: float) -> Factors:
-    """What solves the implicit step of length x; not a number throughout where no solution exists.
+    """Solver of the implicit step of length x; it gives NaN throughout where no solution exists.
 
     Raises:
         MethodError: the factors would take more than `MOST_BYTES`.

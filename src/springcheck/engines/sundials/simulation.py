@@ -113,7 +113,7 @@ class Solver:
             self._solver = circuit.solver(scene, atol, MOST_STEPS, self._called)
             return
         with warnings.catch_warnings():
-            # it says that our Jacobian takes the place of its own, which is what we want
+            # scikit-sundae warns that our Jacobian replaces its own, as is intended
             warnings.filterwarnings("ignore", message="Custom sparse Jacobian", category=UserWarning)
             self._solver = CVODE(
                 by_matrix if as_matrix else by_terms,

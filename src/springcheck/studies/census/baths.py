@@ -46,7 +46,7 @@ SEED_OF_ROWS = 26
 
 
 def springs(n: int, steps: int) -> Scene:
-    """So many equal springs in a bath, at typical thermal states."""
+    """Equal springs in a bath, at typical thermal states."""
     w = np.sqrt(STIFFNESS / MASS)
     walls = WallSpring(i=np.arange(n), k=np.full(n, STIFFNESS), at=np.zeros(n))
     start = np.random.default_rng(SEED_OF_ROWS).standard_normal((2, n))
@@ -58,7 +58,7 @@ def springs(n: int, steps: int) -> Scene:
 
 
 def rods(n: int, steps: int) -> Scene:
-    """So many dumbbells, whose centres are three times as many of these springs."""
+    """Dumbbells; their centres move as three times as many of these springs."""
     centres, parts = springs(3 * n, steps), np.array([[NEAR_PART], [1 - NEAR_PART]])
     way = np.random.default_rng(SEED_OF_ROWS).standard_normal((n, 1, 3))
     way *= DUMBBELL / np.linalg.norm(way, axis=2, keepdims=True)
@@ -101,7 +101,7 @@ def temperatures(q: Floats, p: Floats) -> tuple[tuple[float, float], tuple[float
 
 
 def entry(label: Label) -> Entry:
-    """What one thermostat is, by its states.  Its time, measured here, is of a step of a thousand springs."""
+    """Identify one thermostat by its states.  Its time, measured here, is of a step of a thousand springs."""
     from springcheck.identify.thermal import of_bath
 
     one = scene_of(label, 1, NAMED_BY)
@@ -112,7 +112,7 @@ def entry(label: Label) -> Entry:
     found = of_bath(run.t, q, p, None, np.full(q.shape[1], MASS), mixed=joined is not None)
     names = tuple(dict.fromkeys(x.scheme for x in found.candidates)) if found is not None else ()
     named = found is not None and found.verdict == "named"
-    # what a single spring does not tell is judged as it is declared: by what no draw can explain
+    # a single spring may not determine the scheme: the declared one is judged as well
     kept = all(v.passed is not False for v in checks.shared(checks.judge(one, run)))
     whole = hot.outcome.status == "complete"
     both = temperatures(*(x[UNCOUNTED:] for x in read(hot))) if whole else ((nan, nan), (nan, nan))

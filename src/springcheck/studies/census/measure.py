@@ -120,7 +120,7 @@ def stored(kept: keeper.Kept) -> Census:
 
 
 def entry(label: Label) -> Entry:
-    """What one method is, by its states; its time is measured separately."""
+    """Identify one method by its states; its time is measured separately."""
     if engines.method(label).generator:
         return baths.entry(label)
     blog, uneven = load_scene(BLOG), load_scene(UNEVEN)
@@ -166,7 +166,7 @@ def _spring(scene: Scene) -> tuple[float, float]:
 
 
 def _identified(scene: Scene, run: Trajectory) -> Identification | None:
-    """What the states say, the mass and the stiffness being known; the step is how often they are written."""
+    """Identify the states, given mass and stiffness; the step is the interval between frames."""
     m, k = _spring(scene)
     try:
         return identify(run.t, run.q, run.p, mass=m, stiffness=k)

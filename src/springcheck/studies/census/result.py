@@ -1,4 +1,4 @@
-"""What the census has found: one entry for each engine and way to attach a spring."""
+"""Result of the census: one entry for each engine and way to attach a spring."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ class Entry:
 
     method: str
     about: str
-    """What of the library is called."""
+    """The library's classes and functions that are called."""
     note: str
-    """What its authors would want to be said beside it, and the thread that asked."""
+    """A caveat that its authors would want, and the thread that asked."""
     version: str
     claimed: str
     """The scheme that the engine is declared with here."""
@@ -50,7 +50,7 @@ class Entry:
     along: str = "x"
     """Axes along which the engine moves particles, by its states, and whether it serves a periodic box."""
     constraint: str = ""
-    """What is held rigid, how far a step turns it and how well its length is kept; "" where nothing is."""
+    """The rigid part, the angle of a step and the error of its length; "" where nothing is rigid."""
     configurational: float = nan
     """k <x**2>/kT where a thermostat is on."""
     configurational_error: float = nan
@@ -83,7 +83,7 @@ class Census(Studied):
 
     entries: tuple[Entry, ...]
     changes: tuple[str, ...] | None = None
-    """What is not as it was in an earlier census; None where none was named."""
+    """Differences from an earlier census; None where none was named."""
     since: str = ""
     """Versions that differ from that census's, each with both."""
 

@@ -40,7 +40,7 @@ WORSE = 4
 NO_SCHEME = "none that is known"
 
 ROUNDED = 1e-13
-"""What is called rounding: 400 steps of 2**-52."""
+"""Largest error that counts as rounding: 400 steps of 2**-52."""
 
 ALIKE = 1e-9
 """Difference of one-step maps along two axes up to which they are one: fits of 60 states leave 1e-13, solvers

@@ -1,4 +1,4 @@
-"""What of a census is compared with an earlier one, in words: from their JSON documents."""
+"""Comparison of a census with an earlier one, in words, from their JSON documents."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def rows(document: Mapping[str, Any]) -> Cells:
 
 
 def changes(before: Cells, after: Cells) -> Iterator[str]:
-    """What is not as it was, one line each; methods that only one of the two has are said as such."""
+    """Differences, one line each; methods that only one of the two has are listed as such."""
     for name in (x for x in before if x not in after):
         yield f"{name} is no longer here ({before[name]['version']})"
     for name, row in after.items():

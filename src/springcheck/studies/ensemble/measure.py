@@ -36,7 +36,7 @@ OUTCOMES = ("complete", "diverged", "stopped")
 
 
 def perform(options: Namespace, progress: Progress | None) -> Ensemble:
-    """What `springcheck ensemble` and `springcheck run --vary` do."""
+    """The work of `springcheck ensemble` and `springcheck run --vary`."""
     scene = scenefile.load_scene(options.scene)
     text = scenefile.text_of(options.scene)
     cells = plan(options.vary, options.samples, options.seed or 0, text=text)
@@ -234,7 +234,7 @@ def _errors(scene: Scene, changes: Any, chosen: np.ndarray, many: Scene, q: Floa
     solution, m = many.system.solution, many.m.astype(np.longdouble)
     assert solution is not None
     known_q, known_p = solution.doubt(float(steps[-1]) * many.step)
-    # nothing below what is known of the exact solution is reported as an error
+    # errors below the uncertainty of the exact solution are not reported
     dq, dp = (
         np.where(x == 0, 0, np.maximum(np.abs(x), y))
         for x, y in ((q - true_q, known_q), (p - true_p, known_p))

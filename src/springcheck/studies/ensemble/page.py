@@ -101,7 +101,7 @@ def choices(found: Ensemble, quantity: str | None = None, over: str | None = Non
 
 
 def parts(found: Ensemble, choice: Choice) -> Iterator[tuple[str, Line | Map]]:
-    """What is shown of each method, read one by one; methods without a number are left out."""
+    """Cells shown of each method, read one by one; methods without a number are left out."""
     for tally in found.tallies:
         cells = found.of(tally.method)
         part = reduced(cells, found, choice)
@@ -110,7 +110,7 @@ def parts(found: Ensemble, choice: Choice) -> Iterator[tuple[str, Line | Map]]:
 
 
 def reduced(cells: Columns, found: Ensemble, choice: Choice) -> Line | Map:
-    """What is shown of the cells of one method; the other fields of a grid have the value in their middle."""
+    """Cells of one method that are shown; the other fields of a grid have the value in their middle."""
     keep = np.ones(len(cells[choice.quantity]), dtype=bool)
     fixed = {}
     for name in found.fields:
@@ -223,7 +223,7 @@ def banks(found: Ensemble, *, quantity: str | None = None, over: str | None = No
 
 
 def _heading(scene: Scene, choice: Choice, shown: Mapping[str, Line | Map]) -> str:
-    """What was found, over what, and at which values of the fields that are not shown."""
+    """The quantity, the fields on the axes, and the values of the fields that are not shown."""
     typical = {x: float(np.nanmedian(y.y if isinstance(y, Line) else y.values)) for x, y in shown.items()}
     best = min(typical, key=lambda x: abs(typical[x]))
     over = " and ".join(named(x, scene) for x in choice.over)

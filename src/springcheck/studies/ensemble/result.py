@@ -1,4 +1,4 @@
-"""What an ensemble has found: columns of numbers, one row a cell."""
+"""Result of an ensemble: columns of numbers, one row a cell."""
 
 from __future__ import annotations
 

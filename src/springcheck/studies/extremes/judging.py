@@ -58,7 +58,7 @@ class Cell:
     @property
     def decade(self) -> int:
         """Power of ten of the largest force at the start."""
-        # of the logarithms: the product itself may leave the range
+        # compared as logarithms: the product itself may leave the range
         return int(np.round(np.log10(self.parameters["k"]) + np.log10(self.parameters["q"])))
 
 
@@ -126,7 +126,7 @@ def judge(label: Label, specs: Sequence[Spec], scene: Scene, q: Floats, p: Float
         inside = sizes(
             label, case.judged, q[:-1].astype(np.longdouble), p[:-1].astype(np.longdouble), exact_q, exact_p
         )
-        # what the engine moved by itself: with the forces that it has kept
+        # displacements as the engine made them, by forces that it may have cached
         inside = replace(inside, moved=np.abs(np.diff(q, axis=0)))
         growth = growth_of(case, scene)
     bound = float(case.roundings)

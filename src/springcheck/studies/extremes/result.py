@@ -1,4 +1,4 @@
-"""What the atlas of extreme cases has found: plain data, and the form in which it is kept."""
+"""Result of the atlas of extreme cases: plain data, and its stored form."""
 
 from __future__ import annotations
 

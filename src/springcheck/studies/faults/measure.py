@@ -143,7 +143,7 @@ _EXPERIMENTS: dict[str, Any] = {
 
 
 def examine(fault: Fault, *, limits: bool = True) -> Result:
-    """What the checks say of a fault at its size in the table, and down to which size they see it."""
+    """Verdicts on a fault at its size in the table, and the smallest size that is detected."""
     passed, every = probe(fault), checks_of(fault)
     rejected = tuple(name for name in every if passed(name, fault.size) is False)
     found: dict[str, float] = {}

@@ -1,4 +1,4 @@
-"""What the study of the faults has found: plain data."""
+"""Result of the study of faults: plain data."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from springcheck.text.wording import count
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Result:
-    """What the checks say of one fault."""
+    """Verdicts of the checks on one fault."""
 
     name: str
     about: str

@@ -1,4 +1,4 @@
-"""What a fault is: a plain engine that is right but for one thing, which a hook of its row changes."""
+"""A fault: a plain right engine of which a hook changes one thing."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Case:
     seed: Any = 1
     """Seed of a thermostat: a number, or a script of draws."""
     kept: list[Any] = field(default_factory=list)
-    """What a hook remembers from one call to the next."""
+    """State of a hook between calls."""
 
     @property
     def force(self) -> Force:

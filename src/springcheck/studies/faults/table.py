@@ -62,7 +62,7 @@ PARAMETERS = (
 
 
 def unpaired(c: Case, f: Reals, q: Reals, p: Reals) -> Reals:
-    """What springs do to their second particle is too large."""
+    """The force of springs on their second particle is too large."""
     for term in c.scene.terms:
         if term.kind == "potential":
             np.subtract.at(f, term.particles[-1], c.x * term.pull(q))

@@ -135,7 +135,7 @@ class Errors:
         true_q, true_p = exact.true_motion(known.scene, steps, self._h)
         with np.errstate(over="ignore", invalid="ignore"):
             error = norm(q - true_q, p - true_p)
-            # nothing below what is known of the exact solution is reported as an error
+            # errors below the uncertainty of the exact solution are not reported
             error = np.maximum(error, exact.uncertainty(known.scene, float(steps[-1]) * self._h))
             wide_q, wide_p = q.astype(np.longdouble), p.astype(np.longdouble)
             energy_off = known.scene.system.energy(wide_q, wide_p) - known.scene.system.energy(true_q, true_p)

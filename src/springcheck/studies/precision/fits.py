@@ -184,7 +184,7 @@ def order(points: Sequence[Point]) -> Fit | None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Condition:
-    """What one rounding a step becomes in the end: eps times `value(steps)`, with its name and reason."""
+    """Final error by one rounding a step: eps times `value(steps)`, with its name and reason."""
 
     name: Literal["sqrt(N)", "N", "N**1.5/(w T)", "w T"]
     why: str

@@ -73,7 +73,7 @@ def study(
     spent = max(before, default=0.0)
     if kept.team.workers > 1:
         spent += _errors_first(scene, able, kept, ahead, budget, spent)
-    # imports and compilation are paid once, and by whoever comes first: they are not the methods' to share
+    # imports and compilation are paid once, by the first method that needs them, and charged to none
     began = perf_counter() - spent
 
     def tell(what: str) -> None:
@@ -90,7 +90,7 @@ def study(
             kept.keep(form, str(sweep.label), sweep.points, study_seconds=perf_counter() - began)
     for sweep in _open(sweeps):
         while (point := ahead.get(blank(sweep, "").place)) is not None and sweep.scene is not None:
-            # its errors are known; its time was not to be had
+            # its errors are known, its time could not be measured
             take(sweep, point)
     for sweep in _open(sweeps):
         sweep.points.append(blank(sweep, CUT_OFF, f"the budget of {budget:g} s ends before it"))
@@ -164,7 +164,7 @@ def _take_up(sweep: Sweep, kept: Keeper, ahead: Ahead) -> float:
     for point in points:
         if point.complete and not point.run_seconds_repeats:
             ahead[point.place] = point
-        # what the end of that call cut off is this one's to measure
+        # points that the end of that call cut off are measured by this one
         elif point.outcome != CUT_OFF:
             take(sweep, point)
     return float(kept.attribute(POINTS, str(sweep.label), "study_seconds"))
@@ -301,7 +301,7 @@ def _summary(
     condition: fits.Condition | None,
     first_start: float | None,
 ) -> MethodSummary:
-    """What the points of a method come to."""
+    """Summary of the points of a method."""
     points = [point for point in points if point.complete]
     timed = [point for point in points if point.run_seconds_repeats]
     read = [point for point in timed if point.read_seconds_repeats]
@@ -323,7 +323,7 @@ def _summary(
         floor_steps=points[best].steps if best is not None else None,
         condition=condition,
         expected_floor=expected,
-        # what a call costs beside its steps only adds to a short run, so that the minimum is the step's own
+        # the overhead of a call only lengthens short runs, so the minimum is the step's own time
         seconds_per_step=min((p.seconds / p.steps for p in timed if p.steps), default=None),
         seconds_per_force_call=min((p.seconds / p.force_calls for p in timed if p.force_calls), default=None),
         read_seconds_per_step=min(

@@ -1,4 +1,4 @@
-"""What a study of precision has found: plain data, and the forms in which it is kept."""
+"""Result of a study of precision: plain data, and its stored forms."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from springcheck.text.wording import count
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MethodSummary:
-    """What the points of one method come to."""
+    """Summary of the points of one method."""
 
     method: str
     order: float | None

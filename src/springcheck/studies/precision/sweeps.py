@@ -49,14 +49,14 @@ class Sweep:
     overhead: float = 0.0
     """Seconds that the last point took beside its runs: starts, comparisons, reading."""
     growth: float = 2.0
-    """What one point costs, compared with the one before."""
+    """Cost of a point relative to the one before."""
     read: float = 0.0
     """Seconds of the last run with every step read."""
     first_start: float | None = None
 
     @property
     def method(self) -> Method:
-        """What the engine says of the method."""
+        """The engine's declaration of the method."""
         return engines.method(self.label)
 
     @property
@@ -215,7 +215,7 @@ def is_finished(sweep: Sweep) -> bool:
 
 
 def to_time(scene: Scene, sweep: Sweep) -> Scene:
-    """What is timed at a point: an adaptive solver on the scene's own time grid, else the point itself."""
+    """The run timed at a point: an adaptive solver on the scene's own time grid, else the point itself."""
     assert sweep.scene is not None
     if sweep.method.adaptive:
         return replace(scene, tolerance=sweep.scene.tolerance)

@@ -1,4 +1,4 @@
-"""What of a stored run is drawn, in bounded memory however long its trajectories are."""
+"""The frames of a stored run that are drawn, in memory that does not grow with its trajectories."""
 
 from __future__ import annotations
 

@@ -34,7 +34,7 @@ class Broken:
 
     @property
     def about(self) -> str:
-        """What is wrong, and by how much."""
+        """The fault and its size."""
         size = self.fault.size if self.size is None else self.size
         return self.fault.about + ("" if size is None else f" ({size:.0e})")
 

@@ -88,7 +88,7 @@ def perform(options: Namespace, progress: Progress | None) -> Report | Repeats |
 
 
 def stored(path: Path) -> Stored:
-    """What a store keeps of a run beside its trajectories."""
+    """Data of a run that are stored beside its trajectories."""
     # an unfinished run has trajectories beside the file that it will write
     if not path.is_file():
         return Stored(path=path, verdicts=(), comparison=None)
@@ -151,7 +151,7 @@ def run(
                     made = driver.play(scene, label, draft.append, progress=told, **seeds)
                     draft.finish(keeper.attributes(made))
             except MethodError as error:
-                # it shows only as the engine starts; the one method that was asked for must not vanish
+                # this shows only when the engine starts; the one method that was asked for must not vanish
                 if len(labels) == 1:
                     raise
                 labels.remove(label)
@@ -242,7 +242,7 @@ def judge(
     if stride > 1:
         worst = {name: _bridged(mine, verdicts[name], judged_frames) for name, mine in worst.items()}
     if scene.bath:
-        # what states show is said of deterministic motion
+        # states are explained for deterministic motion only
         failed = {}
     if failed:
         from springcheck.identify import files
@@ -342,7 +342,7 @@ def repeat(path: Path, *, methods: Sequence[str] = (), progress: Progress | None
                 mine = replace(scene, quantities=quantities)
                 with journal.draft(name, mine) as draft:
                     told = bar.of(label, scene.steps)
-                    # what an older version did not keep is no difference
+                    # fields that an older version did not store are no difference
                     kept = 5 if "last_step" in known[name].quantities else 4
                     sink = lambda *frames, add=draft.append, kept=kept: add(*frames[:kept])  # noqa: E731
                     seed = _seed(path, name, before.get("origin.seed")) if scene.bath else None

@@ -1,4 +1,4 @@
-"""What a run has found: plain data."""
+"""Result of a run: plain data."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from springcheck.studies.run.drawable import Drawable
 
 FAULT = "fault"
-"""What stands for an engine in the labels of engines broken on purpose."""
+"""Engine name in the labels of engines broken on purpose."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,7 +84,7 @@ class Report(Shown):
     broke: Mapping[str, str] = field(default_factory=dict)
     """Methods that were asked for and failed, and why: then nothing is stored."""
     faults: Mapping[str, str] = field(default_factory=dict)
-    """What is wrong with each run of an engine that is broken on purpose."""
+    """The fault of each run of an engine that is broken on purpose."""
 
     trajectories: Mapping[str, Trajectory] = field(default_factory=dict)
     """Where nothing was kept on disk: the runs by label."""
@@ -174,7 +174,7 @@ class Repeats:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Stored:
-    """What a store keeps of a run."""
+    """The stored data of a run."""
 
     path: Path
     verdicts: tuple[Verdict, ...]

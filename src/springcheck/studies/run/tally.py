@@ -90,7 +90,7 @@ class Heat:
         """What was found."""
         nan = np.full(self._scene.n, np.nan)
         thermal = self._scene.thermal
-        # what pushes along a rod is no part of a virial
+        # forces along a rod do no virtual work and are no part of the virial
         held = any(term.kind == "potential" for term in self._scene.terms) and not self._scene.system.rods
         with np.errstate(all="ignore"):
             q, p = self._sums / (self._frames * thermal) if self._frames else (nan, nan)
@@ -181,7 +181,7 @@ def line(piece: Trajectory, tally: Tally) -> MethodRun:
         outcome=piece.outcome.status,
         steps=piece.outcome.step,
         message=piece.outcome.message,
-        # nothing below what is known of the exact solution is an error of the engine
+        # differences below the uncertainty of the exact solution are no errors of the engine
         max_error=np.nan if ended else tally.error + (tally.doubt if tally.error < tally.doubt else 0.0),
         error_below=not ended and tally.error < tally.doubt,
         energy_drift=np.nan if ended else tally.drift,

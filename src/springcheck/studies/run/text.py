@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 def lines(found: Report | Repeats | Stored | Ensemble, options: Namespace | None = None) -> Lines:
-    """What `springcheck run` says, what `run --from` says, and what `inspect` says of a stored run."""
+    """Reports of `springcheck run`, `run --from`, and `inspect` of a stored run."""
     if not isinstance(found, Report | Repeats | Stored):
         return ENSEMBLE.lines(found, options)
     verdicts = getattr(options, "verdicts", False)
@@ -108,7 +108,7 @@ def _beyond(report: Report) -> Lines:
 
 
 def _fractions(verdicts: Sequence[Verdict], question: str = "") -> Lines:
-    """What each check has found of each method."""
+    """Findings of each check for each method."""
     return [
         plain(),
         plain(f"{question}Largest value of each check, as a fraction of its bound:"),
@@ -262,7 +262,7 @@ def failures(verdicts: Iterable[Verdict]) -> Lines:
 
 
 def _faults(report: Report) -> Lines:
-    """What is wrong with each engine that is broken on purpose, and which checks reject it."""
+    """The fault of each engine that is broken on purpose, and the checks that reject it."""
     out: Lines = []
     for method, about in report.faults.items():
         mine = [v for v in report.verdicts if v.method == method and v.passed is not None]

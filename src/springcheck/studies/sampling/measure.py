@@ -103,14 +103,14 @@ def measured(label: Label) -> Sampled:
 
 
 def _memory(law: Law) -> float:
-    """What the slowest part of the motion decays by in a step, as its logarithm."""
+    """Logarithm of the decay of the slowest part of the motion in a step."""
     return max(-np.log(law.slowest), 0.02) if law.slowest > 0 else 1.0
 
 
 def _off(law: Law | None, frames: int) -> float:
-    """What k <q**2>/kT over so many frames is off from 1: a systematic error and a statistical one."""
+    """Error of k <q**2>/kT over so many frames: systematic and statistical."""
     if law is None or law.scheme.collides:
-        # of collisions the motion is a mixture, and not Gaussian
+        # with collisions the motion is a mixture, not Gaussian
         return nan
     ratio = float(law.configurational[0])
     return float(np.hypot(ratio - 1, ratio * law.error_of_variances(frames)[0, 0]))

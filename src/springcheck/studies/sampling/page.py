@@ -100,7 +100,7 @@ def _temperatures(methods: Sequence[Sampled]) -> str:
 
 
 def _costs(methods: Sequence[Sampled]) -> str:
-    """What the longest runs are off, of the best and of the worst."""
+    """Errors of the longest runs, of the best method and of the worst."""
     ends = {title(x.scheme): (float(x.off_law[-1]), float(x.off[-1])) for x in methods}
     off = {name: measured if np.isnan(law) else law for name, (law, measured) in ends.items()}
     after = f"After {methods[0].frames[-1]:.0f} steps of h {W_SIGN} = {methods[0].turn[1]:g}"

@@ -1,4 +1,4 @@
-"""What the study of sampling has found: one record for each thermostat."""
+"""Result of the study of sampling: one record for each thermostat."""
 
 from __future__ import annotations
 

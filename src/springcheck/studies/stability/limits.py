@@ -22,7 +22,7 @@ FINE = 1024
 """Springs in each refinement of the bracket, each 1/1000 of the one before."""
 
 AGREED = 1e-6
-"""What every limit in double precision is held to."""
+"""Relative tolerance of every limit in double precision."""
 
 BLUR = 16
 """Times the rounding at which what it hides is looked for again: the growth beyond a limit is of some power
@@ -41,7 +41,7 @@ LARGE = 1e3
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Limit:
-    """What was measured of one method on one spring."""
+    """Measurement of one method on one spring."""
 
     method: str
     scheme: str

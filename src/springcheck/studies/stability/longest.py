@@ -144,7 +144,7 @@ def linear(scene: Scene, scheme: Scheme) -> Linear | None:
         modes, rate = system.modes, system.modes.rate
         # no np.unique, which imports masked arrays
         some = np.argsort(modes.w2)[np.linspace(0, scene.n - 1, min(scene.n, MOST_MODES)).astype(int)]
-        # of particles side by side each has its own friction
+        # independent particles have a friction each
         some = np.append(some, [np.argmax(rate), np.argmin(np.where(rate > 0, rate, np.inf))])
         return Linear.of_modes(modes.w2[some], rate[some])
     here = stiffest(scene)
@@ -209,7 +209,7 @@ def longest(scheme: Scheme, scene: Scene) -> float:
     For a scheme of multiple time steps that is where its first resonance begins.
     """
     if not scheme.has("one-step") or np.isinf(scheme.limit):
-        # what is bounded on every spring is bounded with friction too
+        # a scheme that is bounded on every spring is bounded with friction too
         return np.inf
     of = linear(scene, scheme)
     if of is None:

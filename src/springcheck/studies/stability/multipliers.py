@@ -120,7 +120,7 @@ def _largest(values: np.ndarray) -> complex:
 def _powers(
     scene: Scene, label: Label, starts: list[tuple[float, float]], rest: float, size: float
 ) -> np.ndarray:
-    """What the scheme's own first j + 1 steps make of a displacement and of a momentum, (steps, 2, 2)."""
+    """Propagators of the scheme's own first j + 1 steps, (steps, 2, 2)."""
     law = schemes.Law(scheme=_scheme(label), scene=scene.system.clocked, h=scene.step)
     q, p = (
         np.array([[one[i], clock] for one in starts], np.longdouble) for i, clock in enumerate((0.0, CLOCK))

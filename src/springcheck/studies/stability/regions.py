@@ -68,7 +68,7 @@ def measure(label: Label, points: int = 200) -> Region:
     radius, moved = propagators.radius(measured, rounding)
     truth, moved_truth = propagators.radius(predicted, rounding)
     allowed = np.maximum(moved, moved_truth)
-    # what may differ in the product h c/m of a friction of many steps is its own rounding
+    # with a friction of many steps the product h c/m may differ by its own rounding
     allowed += rounding * (1 + brake)
     stable = propagators.bounded(measured, rounding)
     inside = truth <= 1
