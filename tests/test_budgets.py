@@ -19,7 +19,7 @@ BUDGETS = {
     ("driver", "conformance", "doors"): 1278,
     ("checks",): 5085,
     ("identify",): 8373,
-    ("formats", "store"): 5211,
+    ("formats", "store"): 5250,
     ("studies",): 1477,
     ("studies/*",): 10087,
     ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 6929,

@@ -328,9 +328,54 @@ def test_a_fixed_interval_and_velocities_at_fewer_steps_are_understood(tmp_path:
 
 
 @pytest.mark.usefixtures("tried_here")
+@pytest.mark.parametrize("edges", ["vector", "matrix", "vectors", "matrices"])
+def test_images_are_put_back_by_the_edges_of_the_box(tmp_path: Path, edges: str) -> None:
+    """They were left out, and positions taken for those within the box."""
+    rng = np.random.default_rng(4)
+    image, q = rng.integers(-2, 3, (5, 4, 3)), rng.random((5, 4, 3))
+    box = np.array([3.0, 5.0, 7.0]) if "vec" in edges else np.array([[3, 0, 0], [1, 5, 0], [0.5, 2, 7.0]])
+    whole = q + np.einsum("fni,ij->fnj", image, np.diag(box) if box.ndim == 1 else box)
+    path = h5md(tmp_path / "a.h5", position=q)
+    with h5py.File(path, "r+") as file:
+        file["particles/all/image/value"] = image
+        moving = edges in ("vectors", "matrices")
+        file["particles/all/box/edges" + "/value" * moving] = np.stack([box] * 5) if moving else box
+    assert store.read_foreign(path)["all"].q == pytest.approx(whole, rel=1e-15)
+    with h5py.File(path, "r+") as file:
+        del file["particles/all/box"]
+    with pytest.raises(StoreError, match="does not count borders"):
+        store.read_foreign(path)
+
+
+@pytest.mark.usefixtures("tried_here")
+def test_particles_that_change_places_are_told_by_their_ids(tmp_path: Path) -> None:
+    """Places alone were read: a frame written in another order was another motion."""
+    rng = np.random.default_rng(5)
+    q, v = rng.random((2, 5, 4, 3))
+    places = np.stack([rng.permutation(4) for _ in range(5)])
+    shuffled = [np.take_along_axis(x, places[:, :, None], axis=1) for x in (q, v)]
+    path = h5md(tmp_path / "a.h5", position=shuffled[0], velocity=shuffled[1])
+    with h5py.File(path, "r+") as file:
+        file["particles/all/id/value"] = 7 + 3 * places
+    found = store.read_foreign(path)["all"]
+    assert np.array_equal(found.q, q[:, places[0]])
+    assert np.array_equal(found.v, v[:, places[0]])
+    with h5py.File(path, "r+") as file:
+        file["particles/all/id/value"][2, 1] = 99
+    with pytest.raises(StoreError, match="not the same in all frames"):
+        store.read_foreign(path)
+    with h5py.File(path, "r+") as file:
+        del file["particles/all/id/value"]
+        file["particles/all/id/value"] = places[:3]
+    with pytest.raises(StoreError, match="has 5 positions, and id is"):
+        store.read_foreign(path)
+
+
+@pytest.mark.usefixtures("tried_here")
 @pytest.mark.parametrize(
     ("changed", "said"),
     [
+        ({"velocity": np.zeros((4, 4, 3)), "velocity_step": np.array([0, 2, 2, 4])}, "steps of all repeat"),
         ({"velocity": None}, "velocities"),
         ({"time": None}, "has no time"),
         ({"time": np.arange(4.0)}, "frames of .*: 5, and time has shape"),

@@ -153,11 +153,17 @@ def _groups(path: Path, file: Any, names: list[str], most: int | None) -> Iterat
         if v is not q:
             t_v, step_v = _axis(path, group, "velocity", frames_v, kept)
             if not np.array_equal(t, t_v):
+                for steps in (step, step_v):
+                    if len(np.unique(steps)) < len(steps):
+                        raise StoreError(f"{path}: steps of {name} repeat: which velocities belong to which?")
                 _, rows, rows_v = np.intersect1d(step, step_v, return_indices=True)
                 if len(rows) == 0:
                     raise StoreError(f"{path}: no position and velocity of {name} belong to the same step")
         t, rows, rows_v = t[rows][:most], rows[:most], rows_v[:most]
         values = [_rows(dataset, chosen) for dataset, chosen in ((q, rows), (v, rows_v))]
+        values[0] = values[0] + _crossed(path, group, q.shape, rows)
+        if (order := _order(path, group, q.shape, rows)) is not None:
+            values = [np.take_along_axis(x, order[:, :, None], axis=1) for x in values]
         time = access.find(group, "position/time")
         units = {
             key: _unit(node) for key, node in (("q", q), ("v", v), ("t", time)) if key != "v" or v is not q
@@ -177,6 +183,39 @@ def _groups(path: Path, file: Any, names: list[str], most: int | None) -> Iterat
                 ),
             ),
         )
+
+
+def _beside(path: Path, group: Any, element: str, frames: int, rows: Any) -> Any:
+    """An element beside so many positions: (f, ...) at rows of them, (1, ...) without time, or None."""
+    node = access.find(group, element)
+    if not isinstance(node, h5py.Group):
+        return None if node is None else np.asarray(_numbers(path, group, element)[()], np.float64)[None]
+    dataset = _numbers(path, group, f"{element}/value")
+    if dataset.shape[:1] != (frames,):
+        raise StoreError(f"{path}: {group.name} has {frames} positions, and {element} is {dataset.shape}")
+    return _rows(dataset, rows)
+
+
+def _crossed(path: Path, group: Any, shape: tuple[int, ...], rows: Any) -> Any:
+    """What borders of a box took off positions: images times its edges, a matrix of rows if triclinic."""
+    image = _beside(path, group, "image", shape[0], rows)
+    if image is None or not np.any(image):
+        return 0.0
+    edges = _beside(path, group, "box/edges", shape[0], rows)
+    if edges is None or image.shape[1:] != shape[1:] or edges.shape[1:] not in ((d := shape[2:]), (*d, *d)):
+        raise StoreError(f"{path}: image of {group.name} does not count borders of its positions' box/edges")
+    return image @ edges if edges.ndim == 3 else image * edges[:, None]
+
+
+def _order(path: Path, group: Any, shape: tuple[int, ...], rows: Any) -> Any:
+    """Where the particles of the first frame stand in each (f, n), by their ids; None where none moves."""
+    ids = _beside(path, group, "id", shape[0], rows)
+    if ids is None or ids.shape[1:] != shape[1:2] or np.all(ids == ids[:1]):
+        return None
+    order = np.argsort(ids, axis=1, kind="stable")
+    if np.any(np.diff(np.take_along_axis(ids, order, axis=1), axis=0)):
+        raise StoreError(f"{path}: particles of {group.name} are not the same in all frames, by their ids")
+    return order[:, np.argsort(order[0])]
 
 
 def _unlike(path: Path, name: str, q: tuple[int, ...], v: tuple[int, ...]) -> StoreError:
