@@ -36,25 +36,9 @@ class Act(NamedTuple):
     """One stage: what is done, for which part, and by which draw of the step."""
 
     kind: Literal[
-        "kick",
-        "slow",
-        "fast",
-        "held",
-        "drift",
-        "exchange",
-        "damp",
-        "undamp",
-        "noise",
-        "jump",
-        "creep",
-        "rebuild",
-        "collide",
-        "rescale",
-        "scale",
-        "chain",
-        "shake",
-        "project",
-    ]
+        "kick", "slow", "fast", "held", "drift", "exchange", "damp", "undamp", "noise", "jump",
+        "creep", "rebuild", "collide", "rescale", "scale", "chain", "shake", "project",
+    ]  # fmt: skip
     part: Part = ONE
     draw: int = 0
 

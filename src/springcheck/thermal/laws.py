@@ -14,9 +14,16 @@ from typing import Any
 
 import numpy as np
 
-from springcheck.physics.arrays import Extended, Floats, Reals
+from springcheck.physics.arrays import ROUNDOFF, Extended, Floats, Reals
 from springcheck.thermal.catalogue import Thermostat
 from springcheck.thermal.stepper import Stepper
+
+UNKNOWN_FROM = 1e-6
+"""Relative error from which on a covariance is not given."""
+AT_A_LIMIT = 1e-5
+"""Growth that may be rounding."""
+REFINEMENTS = 6
+"""Steps of refinement, each of which gains what 1 - A A' has of digits in double precision."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -53,8 +60,8 @@ class Law:
         """The maps that a step may take."""
         if not self.scheme.collides:
             return (self._branch(1.0, hit=False),)
-        p = self.collision
-        return self._branch(1 - p, hit=False), self._branch(p, hit=True)
+        x = np.asarray(self.rate * self.h, np.longdouble).reshape((-1, 1, 1) if np.ndim(self.rate) else ())
+        return self._branch(np.exp(-x), hit=False), self._branch(-np.expm1(-x), hit=True)
 
     def _branch(self, chance: Any, *, hit: bool) -> Branch:
         m, k = (np.atleast_1d(np.asarray(x, np.longdouble)) for x in (self.m, self.k))
@@ -84,13 +91,13 @@ class Law:
         return self.branches[-1].G
 
     @cached_property
-    def _state(self) -> tuple[tuple[Any, Floats, Floats], ...]:
+    def _maps(self) -> tuple[tuple[Any, Extended, Extended], ...]:
         """The maps on (q, p, carried draws), with fresh draws alone."""
         d, r, c = 2, self.scheme.draws, self.scheme.carried
         out = []
         for one in self.branches:
             n = len(one.A)
-            A, G = np.zeros((n, d + c, d + c)), np.zeros((n, d + c, r - c))
+            A, G = (np.zeros((n, d + c, x), np.longdouble) for x in (d + c, r - c))
             A[:, :d, :d], A[:, :d, d:], G[:, :d] = one.A, one.G[:, :, :c], one.G[:, :, c:]
             for i in range(c):
                 # the last draws of this step are the first of the next
@@ -99,31 +106,59 @@ class Law:
         return tuple(out)
 
     @cached_property
-    def _covariance(self) -> Floats:
-        """Stationary covariance of (q, p, carried draws), infinite where there is none.
-
-        The carried draws keep the unit covariance of their own.
-        """
-        n, d = self._state[0][1].shape[:2]
-        scale = self._scale
-        right = np.zeros((n, d * d))
-        for chance, _, G in self._state:
-            g = G / scale[:, :, None]
-            right += (chance * np.einsum("nij,nkj->nik", g, g)).reshape(n, d * d)
-        out = np.full((n, d, d), np.inf)
-        left = np.eye(d * d) - self._moments
-        # a growth of 1, rounded to less
-        i = np.flatnonzero(self.growth < 1)
-        i = i[np.linalg.det(left[i]) != 0]
-        out[i] = np.linalg.solve(left[i], right[i][..., None]).reshape(-1, d, d)
-        return np.asarray(out * scale[:, :, None] * scale[:, None, :])
+    def _state(self) -> tuple[tuple[Any, Floats, Floats], ...]:
+        return tuple(tuple(np.asarray(x, np.float64) for x in one) for one in self._maps)  # type: ignore[misc]
 
     @cached_property
-    def _moments(self) -> Floats:
+    def _even(self) -> Floats:
+        """Stationary covariance of (q, p, carried draws) in units of `_scale`; infinite where there is none,
+        NaN where the step says less of it than `UNKNOWN_FROM`.
+
+        With little friction, or much, next to nothing is left of 1 - A A': it is taken in extended precision,
+        as are the residuals by which the solution is refined.  The carried draws keep the unit covariance of
+        their own.
+        """
+        n, d = self._maps[0][1].shape[:2]
+        right = np.zeros((n, d * d), np.longdouble)
+        for chance, _, G in self._maps:
+            g = G / self._scale[:, :, None]
+            right += (chance * (g @ g.transpose(0, 2, 1))).reshape(n, d * d)
+        left = np.eye(d * d) - self._moments
+        rough, bound = left.astype(np.float64), np.atleast_1d(np.asarray(self.k)) != 0
+        # at a limit of stability three roots of a map meet, and are known to the third root of a rounding
+        out = np.where(bound & ~(self.growth > 1 + AT_A_LIMIT), np.nan, np.inf)[:, None, None] * np.ones(
+            (d, d)
+        )
+        i = np.flatnonzero(np.isfinite(rough).all(axis=(1, 2)))
+        i = i[np.linalg.det(rough[i]) != 0]
+        inverse = np.linalg.inv(rough[i])
+        S, change, noise = *np.zeros((2, len(i), d * d, 1), np.longdouble), right[i][..., None]
+        with np.errstate(all="ignore"):
+            for _ in range(REFINEMENTS):
+                S = S + (change := inverse @ (noise - left[i] @ S))
+            lost = ROUNDOFF * np.abs(inverse) @ (np.abs(self._moments[i]) @ np.abs(S) + noise)
+            off, S = (x.reshape(-1, d, d).astype(np.float64) for x in (lost + np.abs(change), S))
+            size = np.sqrt(np.abs(np.diagonal(S, axis1=1, axis2=2)))
+            unit = size[:, :, None] * size[:, None, :]
+        known = np.all(off <= UNKNOWN_FROM * unit, axis=(1, 2))
+        out[i[~known]] = np.nan
+        # it is one where the step is stable, and only there (Lyapunov)
+        known[known] = np.linalg.eigvalsh((S / unit)[known])[:, 0] > 0
+        out[i[known]] = S[known]
+        return out
+
+    @cached_property
+    def _covariance(self) -> Floats:
+        """The same in units of the scene."""
+        with np.errstate(over="ignore"):
+            return np.asarray(self._even * self._scale[:, :, None] * self._scale[:, None, :], np.float64)
+
+    @cached_property
+    def _moments(self) -> Extended:
         """What a step makes of second moments of (q, p, carried draws) but for its noise (n, d d, d d)."""
-        n, d = self._state[0][1].shape[:2]
-        scale, total = self._scale, np.zeros((n, d * d, d * d))
-        for chance, A, _ in self._state:
+        n, d = self._maps[0][1].shape[:2]
+        scale, total = self._scale, np.zeros((n, d * d, d * d), np.longdouble)
+        for chance, A, _ in self._maps:
             a = A * scale[:, None, :] / scale[:, :, None]
             total += chance * np.einsum("nij,nkl->nikjl", a, a).reshape(n, d * d, d * d)
         return total
@@ -131,9 +166,10 @@ class Law:
     @property
     def growth(self) -> Floats:
         """Spectral radius of the map of second moments (n,), bounded below 1; infinite beyond all numbers."""
-        out = np.full(len(self._moments), np.inf)
-        finite = np.isfinite(self._moments).all(axis=(1, 2))
-        out[finite] = np.max(np.abs(np.linalg.eigvals(self._moments[finite])), axis=-1)
+        moments = self._moments.astype(np.float64)
+        out = np.full(len(moments), np.inf)
+        finite = np.isfinite(moments).all(axis=(1, 2))
+        out[finite] = np.max(np.abs(np.linalg.eigvals(moments[finite])), axis=-1)
         return out
 
     @property
@@ -141,13 +177,12 @@ class Law:
         """Spectral radius of the mean map: what a step leaves of the slowest part of the motion."""
         return float(np.max(np.abs(np.linalg.eigvals(self.A.astype(np.float64)))))
 
-    @property
-    def _scale(self) -> Floats:
+    @cached_property
+    def _scale(self) -> Extended:
         """Sizes of q, p and draws in thermal motion (n, d)."""
-        m, k = (np.atleast_1d(np.asarray(x, np.float64)) for x in (self.m, self.k))
-        free = np.sqrt(self.thermal / m) * abs(self.h)
-        q = np.where(k > 0, np.sqrt(self.thermal / np.where(k > 0, k, 1)), free)
-        return np.stack([q, np.sqrt(m * self.thermal), *[np.ones_like(q)] * self.scheme.carried], axis=-1)
+        m, k, thermal = (np.atleast_1d(np.asarray(x, np.longdouble)) for x in (self.m, self.k, self.thermal))
+        q = np.sqrt(thermal / np.where(k > 0, k, m / np.longdouble(self.h) ** 2))
+        return np.stack([q, np.sqrt(m * thermal), *[np.ones_like(q)] * self.scheme.carried], axis=-1)
 
     @property
     def covariance(self) -> Floats:
@@ -183,12 +218,12 @@ class Law:
     @property
     def configurational(self) -> Floats:
         """k <q**2> / kT (n,): the configurational temperature over that of the bath."""
-        return np.asarray(np.atleast_1d(self.k) * self.covariance[:, 0, 0] / self.thermal)
+        return np.where(np.atleast_1d(self.k) > 0, self._even[:, 0, 0], np.nan)
 
     @property
     def kinetic(self) -> Floats:
         """<p**2> / m kT (n,): the kinetic temperature over the bath's, by the momenta that are stored."""
-        return np.asarray(self.covariance[:, 1, 1] / (np.atleast_1d(self.m) * self.thermal))
+        return self._even[:, 1, 1]
 
     def displacement(self, steps: int) -> Floats:
         """<(q(t + steps h) - q(t))**2> of a bound particle (n,)."""
