@@ -56,7 +56,7 @@ def test_temperatures_are_those_of_all_frames_though_few_are_drawn(
 
 def test_its_heading_is_a_temperature_that_is_off_by_law(content: page.Content) -> None:
     assert content.finding.endswith(
-        "the configurational temperature of own:obabo is 1.7 % too hot by its law, however long it runs"
+        "the configurational temperature of own:andersen is 1.7 % too hot by its law, however long it runs"
     )
 
 

@@ -225,3 +225,29 @@ def test_the_nodes_of_a_step_are_real_where_close_zeros_of_a_series_come_out_in_
             slope = mp.diff(lambda y: mp.legendre(s, y) - mp.legendre(s - 1, y), at)
             assert abs(off / slope) < 4 * EPS
     assert np.all(np.diff(x) > 0)
+
+
+@pytest.mark.parametrize(
+    ("mu", "start", "end"), [(2e4, 1.001, 0.1), (2.6e4, 1.0001, 0.065), (1e6, 1.001, 0.002)]
+)
+def test_near_the_jump_no_error_is_larger_than_stated(mu: float, start: float, end: float) -> None:
+    # there the brake is nearly 0, and a rounding of u is a large part of it
+    scene = of(mu, m=np.ones(1), q=np.array([start]), p=np.zeros(1), step=end, steps=1)
+    spring, brake = scene.terms
+    spring = replace(spring, k=np.ones(1))  # type: ignore[type-var]
+    brake = replace(brake, c=np.array([mu]), width=np.ones(1))  # type: ignore[type-var]
+    scene = replace(scene, terms=(spring, brake))
+    assert scene.system.solution is not None
+    stated = scene.system.solution.doubt(end)
+    with mp.workdps(30):
+        path = mp.odefun(
+            lambda t, y: [y[1], mu * (1 - y[0] ** 2) * y[1] - y[0]], 0, [mp.mpf(start), mp.mpf(0)]
+        )
+        for time in (end / 2, 0.9 * end, end):
+            known = path(time)
+            for found, exactly, bound in zip(
+                exact.true_motion(scene, np.array([1]), time), known, stated, strict=True
+            ):
+                high = float(found[0, 0])
+                off = abs(mp.mpf(high) + mp.mpf(float(found[0, 0] - np.longdouble(high))) - exactly)
+                assert off <= mp.mpf(float(bound[0]))
