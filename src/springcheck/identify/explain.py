@@ -384,7 +384,7 @@ def _noise(e: Evidence, size: float, counted: float) -> Explanation:
             f"from frame to frame, {size:.1e} of the state's size in each, in {where}",
             remedy="look for several errors at once, and take them out one by one; a solver that chooses its "
             "steps has no fixed scheme to find"
-            + "; a bath whose factor multiplies all momenta, as a Nose-Hoover chain, shows in two particles or more"
+            + "; a bath of one factor for all momenta, as a Nose-Hoover chain, shows in two particles or more"
             * (e.record.q.shape[1] == 1),
             misfit=size,
         )
