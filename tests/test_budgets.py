@@ -18,7 +18,7 @@ BUDGETS = {
     ("engines",): 2803,
     ("driver", "conformance", "doors"): 1278,
     ("checks",): 5085,
-    ("identify",): 8373,
+    ("identify",): 8388,
     ("formats", "store"): 5250,
     ("studies",): 1477,
     ("studies/*",): 10087,

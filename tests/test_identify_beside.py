@@ -74,3 +74,28 @@ def test_how_many_steps_were_looked_at_with_friction_is_said() -> None:
     found = identify(t, q, v=v)
     assert found.verdict == "none"
     assert "in up to 100 steps to a frame, or 12 with friction" in found.statement
+
+
+def test_coarse_velocities_of_the_other_sign_name_no_scheme_on_a_stiffer_spring() -> None:
+    seen = 0
+    for k in (0.7, 1.0, 3.1, 4.4):
+        for digits in (4, 6):
+            a = 2.3
+            h = 0.06 / np.sqrt(k / a)
+            q, v, rows = 0.8, -0.5, []
+            for _ in range(24):
+                rows.append((q, -v))
+                v -= h / 2 * k * q / a
+                q += h * v
+                v -= h / 2 * k * q / a
+            text = np.array([[float(f"{x:.{digits}g}") for x in row] for row in rows])
+            t = h * np.arange(24)
+            found = identify(t, text[:, 0], v=text[:, 1], mass=a)
+            assert found.scheme is None
+            assert not found.fits
+            cause = found.explanations[0].cause
+            assert "wrong sign" in cause
+            seen += "nearly comes round" in cause
+            right = identify(t, text[:, 0], v=-text[:, 1], mass=a)
+            assert not any("wrong sign" in x.cause for x in right.explanations)
+    assert seen >= 2

@@ -109,6 +109,20 @@ def beside_unknown(record: Record, found: Identification, *, stated: bool, seen:
     return replace(out, verdict="not told apart", scheme=None, aliases=())
 
 
+def of_either_sign(found: Identification, against: list[Explanation]) -> Identification:
+    """Withhold the name where positions move against the velocities and the numbers are coarse: a spring so
+    stiff that it nearly comes round between two frames looks like a slow one with the sign of v turned, and a
+    map of few digits fits some scheme on it."""
+    if not (found.candidates and against):
+        return found
+    cause = f"{against[0].cause}; or the motion nearly comes round between two frames: {found.statement}"
+    remedy = f"{against[0].remedy}; if they are right, state the stiffness, which tells the two apart"
+    return replace(
+        found, verdict="not told apart", scheme=None, aliases=(), fits=False, undecided=True, statement=cause,
+        explanations=(Explanation(cause=cause, remedy=remedy, local=True),),
+    )  # fmt: skip
+
+
 def of_stated_friction(found: Identification, stated: float, mass: float) -> Identification:
     """Say that the stated friction c [M/T] is that of no law: there is one of another size, or none."""
     rates = sorted(mass * x.friction[0] for x in found.candidates)

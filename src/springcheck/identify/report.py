@@ -34,6 +34,7 @@ from springcheck.identify.misplaced import turned
 from springcheck.identify.notes import (
     LEAPFROG,
     beside_unknown,
+    of_either_sign,
     of_few,
     of_stated_friction,
     of_unasked_friction,
@@ -215,7 +216,7 @@ def _of_coordinates(
     if friction is not None and seen.friction is None and seen.record.mass is not None:
         found = of_stated_friction(found, friction, float(seen.record.mass[seen.moving[0]]))
     if seen.stiffness is None:
-        return found
+        return found if fine else of_either_sign(found, turned(seen.record, seen.moving))
     found = of_unasked_friction(found) if seen.friction is None else found
     faults = faults_of(seen, friction) if found.explanations and found.candidates else []
     if faults:
