@@ -72,7 +72,7 @@ def test_an_h5md_file_of_positions_alone_says_what_they_leave_open(
     assert main(["identify", path]) == 0
     assert "positions alone show a frequency" in " ".join(capsys.readouterr().out.split())
     assert main(["judge", path, "--scene", "spring", "--scheme", "velocity-verlet"]) == 2
-    assert "velocity beside its positions" in capsys.readouterr().err
+    assert "holds no momenta or velocities" in capsys.readouterr().err
 
 
 def test_a_file_of_single_precision_without_masses_is_named(capsys: pytest.CaptureFixture[str]) -> None:

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from springcheck.errors import StoreError
-from springcheck.store import access, foreign
+from springcheck.formats import hdf5
+from springcheck.store import access
 
 HELD = np.arange(8.0)
 
@@ -84,7 +85,7 @@ def test_arrays_of_any_program_say_what_lies_in_another_file_in_its_place(
     path = _made(tmp_path, way)
     with h5py.File(path, "r+") as file:
         file["run/v"] = 2 * HELD
-    found = dict(foreign.arrays(path, lambda place: True))
+    found = dict(hdf5.arrays(path, lambda place: True))
     np.testing.assert_array_equal(found.pop("run/v"), 2 * HELD)
     assert len(found) > 0
     for refused in found.values():

@@ -12,7 +12,7 @@ import numpy as np
 from springcheck import checks, schemes, store
 from springcheck.errors import IdentificationError, StoreError
 from springcheck.figures.views import units
-from springcheck.formats import States, is_hdf5, read, read_hdf5
+from springcheck.formats import States, is_foreign, is_hdf5, moving, read, read_hdf5
 from springcheck.identify import files
 from springcheck.identify.files import identify_states, of_arrays
 from springcheck.physics.arrays import AS_WRITTEN, Arithmetic, Floats
@@ -171,7 +171,7 @@ def states_in(
 ) -> States:
     """The one trajectory of a file, or that of this label.  StoreError where there are several or none."""
     if not is_hdf5(path):
-        return read(path, columns, step)
+        return moving(path, read(path, columns, step))
     found = _in_hdf5(path, columns)
     if label is None and len(found) == 1:
         return next(iter(found.values()))
@@ -191,8 +191,11 @@ class Recorded(States):
 
 def _in_hdf5(path: Path, columns: Sequence[str]) -> dict[str, States]:
     """Trajectories of a store of ours, of an H5MD file of any program, or of datasets by their names."""
-    if columns or store.is_foreign(path):
-        return read_hdf5(path, columns)
+    if columns or is_foreign(path):
+        every = read_hdf5(path, columns)
+        return {name: x for name, x in every.items() if x.v is not None or x.p is not None} or {
+            name: moving(path, x) for name, x in every.items()
+        }
     found: dict[str, States] = {}
     for run in store.summary(path).runs:
         # one frame more than is looked at in a piece of a very long run

@@ -1,4 +1,4 @@
-"""Trajectories of others, told by what is in them, not by their names; the store opens those in HDF5.
+"""Trajectories of others, told by what is in them, not by their names.
 
 What our own code reads (texts, NPY, NPZ) is bounded as it is read; what a library reads is read by a process
 of its own (see `springcheck.store.apart`).
@@ -20,14 +20,13 @@ from typing import Any
 
 import numpy as np
 
-from springcheck import store
 from springcheck.errors import StoreError
 from springcheck.formats import libraries, molecular, numbers, octave, tables, trr
-from springcheck.formats.columns import ALONE, Reader, States, kind
-from springcheck.formats.numbers import states_of
+from springcheck.formats.columns import Reader, States, fitting, moving
+from springcheck.formats.hdf5 import is_foreign, read_hdf5
 from springcheck.store import apart
 
-__all__ = ["BY_NAME", "FORMATS", "States", "is_hdf5", "read", "read_hdf5"]
+__all__ = ["BY_NAME", "FORMATS", "States", "is_foreign", "is_hdf5", "moving", "read", "read_hdf5"]
 
 HDF5 = b"\x89HDF\r\n\x1a\n"
 BEGINNING = 1 << 12
@@ -101,19 +100,13 @@ def is_hdf5(path: Path) -> bool:
     return any(head[at : at + 8] == HDF5 for at in (0, 512, 1024, 2048))
 
 
-def read(
-    path: Path, columns: Sequence[str] = (), step: float | None = None, *, alone: bool = False
-) -> States:
+def read(path: Path, columns: Sequence[str] = (), step: float | None = None) -> States:
     """The states of a file that is no HDF5, of one of the `FORMATS`; `columns` names what has no names, as
     t, q, v.
 
     `step` is the time step of files that count steps alone.  Raises StoreError, in one line, where it cannot
-    be read, or lacks times, positions or, unless these may be `alone`, velocities.
+    be read, or lacks times or positions.
     """
-    return _moving(path, _read(path, list(columns), step), alone=alone)
-
-
-def _read(path: Path, columns: list[str], step: float | None) -> States:
     head = _beginning(path)
     if not head:
         raise StoreError(f"{path}: is empty")
@@ -124,9 +117,8 @@ def _read(path: Path, columns: list[str], step: float | None) -> States:
                 head = file.read(BEGINNING)
         head = head.removeprefix(BOM_UTF8)
         found = next(one for one in FORMATS if one.recognise(head, path) and (one.by == LINES or not zipped))
-        if found.by != LIBRARY:
-            return found.read(path, columns, step)
-        return _apart(found, path, columns, step)
+        reader = partial(_apart, found) if found.by == LIBRARY else found.read
+        return fitting(path, reader(path, list(columns), step))
     except (gzip.BadGzipFile, EOFError, zlib.error) as error:
         raise StoreError(f"{path}: what gzip has packed is damaged or cut off ({error})") from error
     except UnicodeDecodeError as error:
@@ -154,74 +146,3 @@ def packed(path: Path, name: str, columns: str, step: str) -> bytes:
     out = BytesIO()
     np.savez(out, **{part: x for part, x in known.items() if x is not None})
     return out.getvalue()
-
-
-def read_hdf5(
-    path: Path, columns: Sequence[str] = (), most: int | None = None, *, alone: bool = False
-) -> dict[str, States]:
-    """The trajectories of an HDF5 file that is no store, by name; of H5MD the first `most` frames.
-
-    Every particle group of H5MD is one.  Elsewhere every group with datasets of times, positions, and momenta
-    or velocities (unless positions may be `alone`) is one; or `columns` name the datasets, as
-    ``t=run/clock,q=run/x,v=run/dx``.  Raises StoreError where there is none.
-    """
-    if columns:
-        wanted = {text.rpartition("=")[2].strip("/") for text in columns}
-        groups = store.read_arrays(path, lambda place: place in wanted)
-        flat = {
-            f"{group}/{name}".strip("/"): a for group, found in groups.items() for name, a in found.items()
-        }
-        names = [x.replace("=/", "=").removeprefix("/") for x in columns]
-        return {path.name: _moving(path, states_of(path, flat, names), alone=alone)}
-    if particles := store.read_foreign(path, most, alone=alone):
-        return {
-            name: States(
-                t=group.t,
-                q=group.q.reshape(len(group.t), -1),
-                p=None,
-                v=None if group.v is None else group.v.reshape(len(group.t), -1),
-                mass=group.mass,
-                roundoff=max(2.0**-53, group.roundoff),
-                units=group.units,
-            )
-            for name, group in particles.items()
-        }
-    groups = store.read_arrays(path, lambda place: kind(_name_of(place).rpartition("/")[2]) is not None)
-    made: dict[str, States] = {}
-    refused = []
-    for name, arrays in _by_trajectory(groups).items():
-        try:
-            if {"t", "q"} <= {kind(one) for one in arrays}:
-                made[name or path.name] = _moving(path, states_of(path, arrays), alone=alone)
-        except StoreError as error:
-            refused.append(error)
-    if not made:
-        said = (
-            f"{path} has no /particles as H5MD has, and no datasets of times, positions and velocities by "
-            "their names; give these, as --columns t=clock,q=run/x,v=run/dx"
-        )
-        raise next(iter(refused), StoreError(said))
-    return made
-
-
-def _name_of(place: str) -> str:
-    """A dataset's place; Octave has each in a group of its name, as ``t/value``."""
-    return place.removesuffix("/value")
-
-
-def _by_trajectory(groups: dict[str, dict[str, object]]) -> dict[str, dict[str, object]]:
-    """Arrays by the group that they belong to, and by their names in it."""
-    found: dict[str, dict[str, object]] = {}
-    for group, arrays in groups.items():
-        for name, values in arrays.items():
-            whose, _, called = _name_of(f"{group}/{name}".strip("/")).rpartition("/")
-            found.setdefault(whose, {})[called] = values
-    return found
-
-
-def _moving(path: Path, found: States, *, alone: bool) -> States:
-    if found.p is None and found.v is None and not alone:
-        raise StoreError(f"{path}: holds no momenta or velocities; {ALONE}")
-    if found.mass is not None and (not len(found.mass) or found.q.shape[1] % len(found.mass)):
-        raise StoreError(f"{path}: masses: {len(found.mass)}, columns of q: {found.q.shape[1]}")
-    return found

@@ -55,6 +55,23 @@ Reader: TypeAlias = Callable[[Path, list[str], float | None], States]
 """(path, names of columns, time step of a file that counts steps) -> its states."""
 
 
+def fitting(path: Path, found: States) -> States:
+    """States whose masses fit their positions; StoreError where they do not."""
+    if found.mass is not None and (not len(found.mass) or found.q.shape[1] % len(found.mass)):
+        raise StoreError(f"{path}: masses: {len(found.mass)}, columns of q: {found.q.shape[1]}")
+    return found
+
+
+def moving(path: Path, found: States) -> States:
+    """States with momenta or velocities; StoreError where positions stand alone."""
+    if found.p is None and found.v is None:
+        raise StoreError(
+            f"{path}: holds no momenta or velocities; {ALONE}; `springcheck identify` says what positions "
+            "alone leave open"
+        )
+    return found
+
+
 def kind(name: str) -> Kind | None:
     """Quantity that a column of this name holds; units in brackets, numbers and case do not count."""
     bare, _ = _parted(name)

@@ -70,13 +70,13 @@ def read(
     Raises StoreError where the file cannot be read, or has no such trajectory.
     """
     if path.is_file() and not formats.is_hdf5(path) and not label:
-        return [of_arrays(path.name, formats.read(path, columns, step, alone=True))]
+        return [of_arrays(path.name, formats.read(path, columns, step))]
     # an unfinished store has its journal beside it and no file yet
-    foreign = bool(columns) or (path.is_file() and store.is_foreign(path))
+    foreign = bool(columns) or (path.is_file() and formats.is_foreign(path))
     own = () if foreign else store.summary(path).runs
     names = [run.label for run in own]
     if foreign:
-        known = formats.read_hdf5(path, columns, MOST_FRAMES + 1, alone=True)
+        known = formats.read_hdf5(path, columns, MOST_FRAMES + 1)
         names = list(known)
         found = [of_arrays(name, states) for name, states in known.items() if label in (None, name)]
     else:

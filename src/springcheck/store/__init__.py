@@ -9,7 +9,6 @@ from springcheck.store.checking import Damage, check, doubts
 from springcheck.store.draft import Draft
 from springcheck.store.exporting import export
 from springcheck.store.files import need_space
-from springcheck.store.foreign import is_foreign, read_arrays, read_foreign
 from springcheck.store.journal import Journal, open_new
 from springcheck.store.layout import machine, size
 from springcheck.store.reading import (
@@ -37,7 +36,6 @@ from springcheck.store.tables import Table
 __all__ = [
     "Draft", "Damage", "Journal", "Run", "StoreError", "StoreWarning", "Summary", "Table", "attributes",
     "check", "comparison", "decoded", "digest", "document", "doubts", "end", "export", "machine",
-    "is_foreign", "measured_by", "need_space", "open_new", "read", "read_arrays", "read_foreign",
-    "read_one", "scene_text", "size", "sources", "strided", "summary", "tables_of", "verdicts",
-    "windows",
+    "measured_by", "need_space", "open_new", "read", "read_one", "scene_text", "size", "sources", "strided",
+    "summary", "tables_of", "verdicts", "windows",
 ]  # fmt: skip

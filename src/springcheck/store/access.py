@@ -73,6 +73,11 @@ def refuse(node: Any, why: str) -> StoreError:
     return StoreError(f"cannot read {node.file.filename}: {node.name} {why}")
 
 
+def is_group(node: Any) -> bool:
+    """Whether an object is a group, and no dataset or nothing."""
+    return isinstance(node, h5py.Group)
+
+
 def is_name(name: str) -> bool:
     """Whether a group or dataset may be called so: printable, not too long, no formula to a figure."""
     return 0 < len(name) <= LONGEST_NAME and name.isprintable() and "$" not in name

@@ -124,7 +124,7 @@ def names(file: Any) -> Iterator[str]:
 
 
 def _is_table(node: Any) -> bool:
-    return isinstance(node, h5py.Group) and access.attribute(node, "kind") == "table"
+    return access.is_group(node) and access.attribute(node, "kind") == "table"
 
 
 def all_names(file: Any) -> list[str]:

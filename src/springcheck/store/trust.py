@@ -14,33 +14,31 @@ import h5py
 from springcheck.errors import StoreError
 from springcheck.store import apart, files, seal
 
-OURS, FOREIGN = "checking", "foreign"
-"""Modules whose `tried` tries a file: a store of ours, or a file of another program."""
-
-PACKAGE = "springcheck.store"
+OURS = "springcheck.store.checking"
+"""The module whose `tried` tries a store of ours."""
 
 
-def trust(path: Path, kind: str) -> None:
+def trust(path: Path, module: str) -> None:
     """Return when this process can read a file without harm; raise StoreError otherwise.
 
-    `kind` says how a file that carries no seal is tried.
+    A file that carries no seal is tried by the function `tried` of a module.
     """
     with files.told(path, "read"):
         with path.open("rb"):
             pass
-        said = _against(path.absolute(), kind, _state(path))
+        said = _against(path.absolute(), module, _state(path))
     if said:
         raise StoreError(f"cannot read {path}: {said}")
 
 
 @lru_cache(maxsize=4096)
-def _against(path: Path, kind: str, state: tuple[int, ...]) -> str:
+def _against(path: Path, module: str, state: tuple[int, ...]) -> str:
     """The reason not to read a file, once for each state of it; "" where it can be read."""
     found = seal.find(path)
     if not h5py.is_hdf5(path):
         return "it is no HDF5 file"
     if found is None:
-        said, harmless = _tried(path, kind, state)
+        said, harmless = _tried(path, module, state)
         return "" if harmless else said
     if not seal.is_whole(path, found):
         return "it is damaged, it has changed since it was written; springcheck check names the places"
@@ -52,22 +50,22 @@ def _state(path: Path) -> tuple[int, ...]:
     return state.st_dev, state.st_ino, state.st_mtime_ns, state.st_size
 
 
-def guarded(path: Path, kind: str) -> str:
+def guarded(path: Path, module: str) -> str:
     """Read a file in a process of its own -> what that says.
 
     Raises StoreError when it crashes, or takes so long that it will never end.
     """
-    said, harmless = _tried(path.absolute(), kind, _state(path))
+    said, harmless = _tried(path.absolute(), module, _state(path))
     if not harmless:
         raise StoreError(f"cannot read {path}: {said}")
     return said
 
 
 @lru_cache(maxsize=4096)
-def _tried(path: Path, kind: str, state: tuple[int, ...]) -> tuple[str, bool]:
+def _tried(path: Path, module: str, state: tuple[int, ...]) -> tuple[str, bool]:
     """The answer of the process, and whether it lived to give it."""
     try:
-        return apart.read(f"{PACKAGE}.{kind}", "tried", path).decode(), True
+        return apart.read(module, "tried", path).decode(), True
     except StoreError as error:
         return str(error), True
     except apart.EndedError as error:
