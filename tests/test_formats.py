@@ -246,6 +246,32 @@ def lammps_log(run: Trajectory) -> list[str]:
     return ["log.lammps", "--step", repr(SCENE.step)]
 
 
+def test_every_run_of_a_log_is_read_whose_columns_suffice_and_the_others_are_said(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """The columns of the first run were those of the log: what had others was lost without a word."""
+    run = made()
+    q, p, half, end = run.q[:, 0].tolist(), run.p[:, 0].tolist(), len(run.t) // 2, len(run.t)
+    parts = {
+        "Step Temp PotEng": [f"{-i} 1.0 2.0" for i in (4, 2, 0)],
+        "Step v_q v_p": [f"{i} {q[i]!r} {p[i]!r}" for i in range(half + 1)],
+        "Step Temp v_p v_q": [f"{i} 1 {p[i]!r} {q[i]!r}" for i in range(half, end)],
+        "Step Temp": [f"{i} 1.0" for i in (end - 1, end + 1)],
+    }
+    text = "".join(f"{head}\n" + "\n".join(rows) + "\nLoop time of 1\n" for head, rows in parts.items())
+    Path("log.lammps").write_text("LAMMPS (29 Aug 2024)\n" + text)
+    found = formats.read(Path("log.lammps"), step=SCENE.step)
+    assert np.array_equal(found.q, run.q)
+    assert np.array_equal(found.p, run.p)
+    assert [note.partition(" are")[0] for note in found.notes] == [
+        "steps -4 to 0",
+        f"steps {end - 1} to {end + 1}",
+    ]
+    scene = ["--scene", "spring-uneven", "--scheme", "semi-implicit-euler", "--step", repr(SCENE.step)]
+    assert main(["judge", "log.lammps", *scene]) == 0
+    assert "left out: their columns are Step, Temp" in capsys.readouterr().out
+
+
 def json_of_lists(run: Trajectory) -> list[str]:
     Path("x.json").write_text(json.dumps({"made": "by hand", **rows_of(run)}))
     return ["x.json"]

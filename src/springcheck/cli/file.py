@@ -211,7 +211,7 @@ def as_trajectory(
 
     StoreError where they are not of the scene: another number of particles, other times, another start.
     """
-    notes: list[str] = []
+    notes = [*states.notes]
     q = states.q
     other = states.p if states.p is not None else np.asarray(states.v)
     for name, values in (("positions", q), ("momenta" if states.p is not None else "velocities", other)):

@@ -49,6 +49,8 @@ class States:
     """Unit roundoff of what is written: 2**-24 for single precision, 5e-d for d significant digits."""
     units: Mapping[str, str] = field(default_factory=dict)
     """Units of q, v, t and mass that an H5MD file names."""
+    notes: tuple[str, ...] = ()
+    """What of the file was left out."""
 
 
 Reader: TypeAlias = Callable[[Path, list[str], float | None], States]

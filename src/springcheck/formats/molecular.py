@@ -9,13 +9,14 @@ import re
 from array import array
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from springcheck.errors import StoreError
-from springcheck.formats.columns import ALONE, Floats, States
+from springcheck.formats.columns import ALONE, Floats, States, kind, listed
 from springcheck.formats.lines import MOST_NUMBERS, Lines, number
 from springcheck.formats.tables import SHOWN, of_rows, roundoff
 
@@ -177,37 +178,62 @@ def _wanted(path: Path, names: list[str]) -> dict[str, int]:
 
 
 def read_log(path: Path, columns: list[str], step: float | None) -> States:
-    """The thermodynamic output of a LAMMPS log, of all runs with the same columns: Step or Time, v_... ."""
-    header: list[str] = []
-    numbers = array("d")
-    first: list[list[str]] = []
+    """The thermodynamic output of a LAMMPS log: Step or Time, v_... .
+
+    Of all runs whose columns hold what those of the first one with positions do; the others are noted.
+    """
+    runs: list[tuple[list[str], array[float], list[list[str]]]] = []
     within = False
     with _frames(path, "LAMMPS log") as lines:
         for line in lines:
             cells = line.split()
-            if cells[:1] == ["Step"] or (cells and header == cells):
-                within = header in ([], cells)
-                header = header or cells
+            if cells[:1] == ["Step"]:
+                runs.append((cells, array("d"), []))
+                within = True
             elif cells[:3] == ["Loop", "time", "of"]:
                 within = False
-            elif within and len(cells) == len(header) and re.match(r"[-+.\d]", cells[0]):
-                if numbers and float(cells[0]) == numbers[-len(header)]:
-                    # a run begins with the frame that the last one ended with
-                    continue
+            elif within and len(cells) == len(runs[-1][0]) and re.match(r"[-+.\d]", cells[0]):
                 lines.count(len(cells))
-                numbers.extend(number(cell) for cell in cells)
-                if len(first) < SHOWN:
-                    first.append(cells)
-    if not numbers:
+                runs[-1][1].extend(number(cell) for cell in cells)
+                if len(runs[-1][2]) < SHOWN:
+                    runs[-1][2].append(cells)
+    runs = [run for run in runs if run[1]]
+    if not runs:
         raise StoreError(f"{path}: this LAMMPS log has no thermodynamic output that begins with Step")
-    values = np.frombuffer(numbers).reshape(-1, len(header))
-    # LAMMPS writes v_ before a variable, c_ and f_ before what a compute or a fix has found
-    names = columns or [re.sub(r"^[vcf]_", "", name) for name in header]
-    if not columns and "Time" not in header:
-        values = values.copy()
+    wanted = next((found for header, *_ in runs if (found := _read_of(header, columns))), runs[0][0])
+    parts: list[Floats] = []
+    first: list[list[str]] = []
+    notes = []
+    for header, numbers, shown in runs:
+        values = np.frombuffer(numbers).reshape(-1, len(header))
+        if not set(wanted) <= set(header) or (columns and header != wanted):
+            steps = f"steps {values[0, 0]:.0f} to {values[-1, 0]:.0f}"
+            notes.append(f"{steps} are left out: their columns are {listed(header)}")
+            continue
+        places = [header.index(name) for name in wanted]
+        # a run begins with the frame that the last one ended with
+        again = bool(parts) and values[0, 0] == parts[-1][-1, 0]
+        parts.append(values[int(again) :, places])
+        first += [[cells[i] for i in places] for cells in shown]
+    values = np.concatenate(parts)
+    names = columns or [_bare(name) for name in wanted]
+    if not columns and "Time" not in wanted:
         values[:, 0] = times(path, values[:, 0], step)
         names[0] = "t"
-    return of_rows(path, values, first, names, [])
+    return replace(of_rows(path, values, first, names, []), notes=tuple(notes))
+
+
+def _bare(name: str) -> str:
+    """A column's name without what LAMMPS writes before that of a variable, a compute or a fix."""
+    return re.sub(r"^[vcf]_", "", name)
+
+
+def _read_of(header: list[str], columns: list[str]) -> list[str]:
+    """The columns of a run that are read, all where they were named; none where it has no positions."""
+    kinds = [kind(_bare(name)) for name in header]
+    if columns:
+        return header if len(columns) == len(header) else []
+    return [x for x, what in zip(header, kinds, strict=True) if what or x == "Step"] if "q" in kinds else []
 
 
 def read_gro(path: Path, columns: list[str], step: float | None) -> States:

@@ -99,7 +99,9 @@ def of_arrays(name: str, found: formats.States) -> FileStates:
     """A trajectory that stands in arrays of a file."""
     kept = slice(MOST_FRAMES)
     speed = next((x for x in (found.p, found.v) if x is not None), np.zeros_like(found.q))
-    notes = [f"the first {MOST_FRAMES} frames were looked at"] if len(found.t) > MOST_FRAMES else []
+    notes = [*found.notes]
+    if len(found.t) > MOST_FRAMES:
+        notes.append(f"the first {MOST_FRAMES} frames were looked at")
     p, v, mass = found.p, found.v, found.mass
     if v is not None and found.units:
         v = v * _velocity_factor(found.units, notes)
