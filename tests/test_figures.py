@@ -14,7 +14,7 @@ import pytest
 from springcheck import driver, schemes
 from springcheck.cli import main
 from springcheck.errors import SpringcheckError
-from springcheck.figures import chain, energies, looks, overlay, portraits, render, style
+from springcheck.figures import chain, energies, frames, looks, overlay, portraits, render, style
 from springcheck.figures.charts import Bank, Chart, Curve, Scale
 from springcheck.figures.motion import Exact, periods, smooth
 from springcheck.figures.views import views
@@ -193,15 +193,15 @@ def test_a_free_pair_is_shown_by_its_bond_and_a_particle_where_it_is_asked_for()
 def test_what_grows_does_not_set_the_scale_and_what_is_large_does() -> None:
     t = np.linspace(0, 20, 400)
     truth = np.sin(t)
-    assert overlay.frame([truth, 5 * truth], truth).high == pytest.approx(5, rel=0.2)
-    grown = overlay.frame([truth, truth * np.exp(t)], truth)
+    assert frames.frame([truth, 5 * truth], truth).high == pytest.approx(5, rel=0.2)
+    grown = frames.frame([truth, truth * np.exp(t)], truth)
     assert grown.high == pytest.approx(1, rel=0.5)
     assert grown.clipped
     left = grown.leaves(truth * np.exp(t))
     assert left is not None
     assert t[left] == pytest.approx(1, abs=0.5)
     # a value that differs by roundings is one value, not a picture of its roundings
-    flat = overlay.frame([np.array([7.0, 7 + 1e-14])], np.array([7.0, 7.0]))
+    flat = frames.frame([np.array([7.0, 7 + 1e-14])], np.array([7.0, 7.0]))
     assert flat.half > 0.1
 
 
@@ -498,7 +498,7 @@ def test_a_map_of_many_faults_stands_in_columns_with_the_checks_of_each() -> Non
 
 
 def test_frames_that_jump_to_and_fro_are_dots_and_an_exact_line_has_no_chords() -> None:
-    ys = overlay.Frame(-2.0, 2.0)
+    ys = frames.Frame(-2.0, 2.0)
     t = np.arange(200)
     assert portraits._swings(0.8 * (-1.0) ** t, ys)
     assert not portraits._swings(0.8 * np.sin(t / 5), ys)

@@ -23,9 +23,9 @@ import springcheck
 from springcheck import engines, store
 from springcheck.cli import main, output
 from springcheck.errors import StoreError
-from springcheck.figures import overlay, render
+from springcheck.figures import frames, render
+from springcheck.figures.frames import Frame
 from springcheck.figures.motion import true_motion
-from springcheck.figures.overlay import Frame
 from springcheck.figures.style import save
 from springcheck.physics import exact
 from springcheck.physics import scenefile as scenes
@@ -286,10 +286,10 @@ def test_a_line_that_leaves_the_picture_leaves_it_towards_the_next_state(tmp_pat
 def test_a_state_brought_nearer_keeps_its_direction_at_any_size() -> None:
     q, p = np.array([3e-201, 3e300, -0.2]), np.array([-4e-201, 4e300, 0.1])
     small, large = (Frame(-x, x, clipped=True) for x in (1e-200, 1e301))
-    near_q, near_p = overlay.nearer(q, p, small, small)
+    near_q, near_p = frames.nearer(q, p, small, small)
     np.testing.assert_allclose(near_p * (q[:2] / 3), near_q * (p[:2] / 3), rtol=1e-15)
     assert np.max(np.abs([near_q, near_p])) == pytest.approx(1e-194)
-    np.testing.assert_array_equal(overlay.nearer(q, p, large, large), (q, p))
+    np.testing.assert_array_equal(frames.nearer(q, p, large, large), (q, p))
 
 
 def test_with_friction_energies_are_drawn_beside_that_of_the_true_motion(tmp_path: Path) -> None:

@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from springcheck.figures import overlay
+from springcheck.figures import frames
 from springcheck.figures.charts import Bank, Chart, Scale, Tiles
+from springcheck.figures.frames import Frame
 from springcheck.figures.motion import Exact
-from springcheck.figures.overlay import NAME_HIGH, Frame, Runs, exact_curve, share
+from springcheck.figures.naming import NAME_HIGH
+from springcheck.figures.overlay import Runs, exact_curve, share
 from springcheck.figures.portraits import extremes
 from springcheck.figures.views import with_unit
 from springcheck.physics.arrays import Floats, Reals
 from springcheck.physics.scene import Scene
-from springcheck.physics.trajectory import Trajectory
 
 FEWEST_MASSES, LONG = 3, 8
 """Particles from which a scene has modes worth drawing, and from which its wave is drawn as an image."""
@@ -77,26 +79,18 @@ def _modes(runs: Runs, exact: Exact) -> Bank:
     for j, mode in enumerate(chosen):
         mine = {label: x[:, j] for label, x in found.items()}
         ys = _scale(list(mine.values()), None if true is None else true[:, j])
-
-        def inside(run: Trajectory, ys: Frame = ys, mine: dict[str, Floats] = mine) -> tuple[Floats, Floats]:
-            y = ys.within(mine[run.label])
-            return run.t[: len(y)], y
-
-        def when(run: Trajectory, ys: Frame = ys, mine: dict[str, Floats] = mine) -> int | None:
-            return ys.leaves(mine[run.label])
-
         turn = abs(scene.step) * np.sqrt(max(float(scene.system.modes.w2[mode]), 0.0))
         name = f"mode {order[mode] + 1} of {scene.n}, h \N{GREEK SMALL LETTER OMEGA} = {turn:.3g}"
-        curves = runs.curves(inside)
         charts.append(
-            Chart(
+            runs.over_time(
+                mine,
+                ys,
                 title=f"Energy of {name}.",
+                name="energy / its start",
+                lines=[] if true is None else [exact_curve(longest.t, true[:, j])],
                 short=f"{name}, {100 * start[mode] / total:.2g} % of the energy",
-                x=runs.time(xs),
-                y=Scale(name="energy / its start", log=ys.log, shown=ys.ends),
-                curves=[*([] if true is None else [exact_curve(longest.t, true[:, j])]), *curves],
-                labels=overlay.at_ends(runs.first(curves), xs, ys, height=2 * NAME_HIGH),
-                note=runs.leaving(when),
+                span=xs,
+                height=2 * NAME_HIGH,
             )
         )
     off = {}
@@ -105,15 +99,12 @@ def _modes(runs: Runs, exact: Exact) -> Bank:
         with np.errstate(all="ignore"):
             off[group.title] = float(np.max(np.abs(x - (1.0 if true is None else true[: len(x), -1]))))
     fastest = f"the energy of mode {order[chosen[-1]] + 1} is off by at most {{}}"
-    return Bank(
-        name="modes", title="Methods drawn", charts=charts, columns=1, size=(7.2, 2.0),
-        heading=f"{scene.title}: {runs.wrong}{extremes(off, fastest)}",
-    )  # fmt: skip
+    return runs.bank("modes", charts, extremes(off, fastest), (7.2, 2.0))
 
 
 def _scale(found: Sequence[Floats], true: Floats | None) -> Frame:
     """The scale of the energies of one mode."""
-    ys = overlay.frame(found, true, far=10.0)
+    ys = frames.frame(found, true, far=10.0)
     least = min((float(np.min(x)) for x in found if ys.leaves(x) is None), default=0.0)
     if least > 0 and ys.high > DECADES * least:
         return Frame(least / 1.5, ys.high, ys.clipped, log=True)
@@ -164,11 +155,9 @@ def _wave(runs: Runs, exact: Exact) -> Bank:
                 tiles=Tiles(kinds=kinds, rows=rows.tolist()),
             )
         )
-    return Bank(
-        name="wave", title="The exact wave over its largest displacement, and errors", charts=charts,
-        heading=f"{scene.title}: {runs.wrong}{extremes(largest, 'the wave is off by at most {}')}",
-        columns=min(3, len(charts)), size=(3.4, 2.9),
-    )  # fmt: skip
+    said = extremes(largest, "the wave is off by at most {}")
+    bank = runs.bank("wave", charts, said, (3.4, 2.9), columns=min(3, len(charts)))
+    return replace(bank, title="The exact wave over its largest displacement, and errors")
 
 
 def _few(image: Floats, *, signed: bool = False) -> Floats:

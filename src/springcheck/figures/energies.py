@@ -7,10 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from springcheck.figures import overlay
-from springcheck.figures.charts import Bank, Chart, Curve, Rule, Scale
+from springcheck.figures import frames, naming
+from springcheck.figures.charts import Bank, Chart, Rule, Scale
+from springcheck.figures.frames import Frame
 from springcheck.figures.motion import Exact, periods, true_motion
-from springcheck.figures.overlay import NAME_HIGH, Frame, Runs, exact_curve
+from springcheck.figures.naming import NAME_HIGH
+from springcheck.figures.overlay import Runs, exact_curve
 from springcheck.figures.portraits import extremes
 from springcheck.physics.arrays import Floats, Reals
 from springcheck.physics.trajectory import Trajectory
@@ -81,32 +83,17 @@ def energy(runs: Runs, exact: Exact) -> Bank:
         true = np.full(2, start / unit)
         lines.append(exact_curve(runs.longest.t[[0, -1]], true))
     ys = _scale(list(found.values()), true)
-
-    def inside(run: Trajectory) -> tuple[Floats, Floats]:
-        y = ys.within(found[run.label])
-        return run.t[: len(y)], y
-
-    curves = runs.curves(inside)
-    time = runs.time()
-    upper = Chart(
-        title="Energy over time.",
-        x=time,
-        y=Scale(name=f"energy / {of}", log=ys.log, shown=ys.ends),
-        curves=[*lines, *curves],
-        labels=overlay.at_ends(runs.first(curves), runs.times, ys, height=1.5 * NAME_HIGH),
-        note=runs.leaving(lambda run: ys.leaves(found[run.label])),
+    upper = runs.over_time(
+        found, ys, title="Energy over time.", name=f"energy / {of}", lines=lines, height=1.5 * NAME_HIGH
     )
     differences = {run.label: off(run) for run in runs.every}
     what = "exact" if changes else "initial"
-    lower = decades(runs, differences, time, f"|energy - {what}| / {of}", f"Energy off the {what} one.")
+    lower = decades(runs, differences, f"|energy - {what}| / {of}", f"Energy off the {what} one.")
     said = _said(runs, found, differences) if scene.system.keeps_energy or changes else ""
     # lines that lie on one another say nothing beside their differences
     flat = lower and scene.system.keeps_energy and max(map(np.max, differences.values())) < FLAT * ys.half
-    return Bank(
-        name="energy", title="Methods drawn", charts=lower if flat else [upper, *lower], columns=1,
-        size=(7.2, 4.2 if flat and len(lower) == 1 else 2.7),
-        heading=f"{scene.title}: {runs.wrong}{said or 'energy'}",
-    )  # fmt: skip
+    charts = lower if flat else [upper, *lower]
+    return runs.bank("energy", charts, said or "energy", (7.2, 4.2 if flat and len(lower) == 1 else 2.7))
 
 
 def _said(runs: Runs, found: Mapping[str, Floats], differences: Mapping[str, Floats]) -> str:
@@ -196,66 +183,60 @@ def _scale(found: Sequence[Floats], true: Floats | None) -> Frame:
         # the right energy may fall further
         bottom = max(min(LEAST, 0.1 * float(np.min(true)) if true is not None else LEAST), FLOOR)
         return Frame(max(low / 2, bottom), 2 * high, len(near) < len(found) or low < bottom, log=True)
-    ys = overlay.widened(low, high, clipped=len(near) < len(found))
+    ys = frames.widened(low, high, clipped=len(near) < len(found))
     # smaller differences are for the panel of differences below
     room = max(ys.half, SEEN * abs(ys.centre))
     return Frame(ys.centre - room, ys.centre + room, ys.clipped)
 
 
 def decades(
-    runs: Runs, found: Mapping[str, Floats], time: Scale, name: str, title: str, *, known: bool = False
+    runs: Runs, found: Mapping[str, Floats], name: str, title: str, *, known: bool = False
 ) -> list[Chart]:
     """Differences (f,) of each run on logarithmic scales: those far smaller than all others apart, so that no
     decade is empty; none where all are roundings.
 
     `known`: what says how large they are follows from the scene, and 1 is as large as the motion itself.
     """
-    charts = []
     finite = {label: np.where(np.isfinite(x), x, np.inf) for label, x in found.items()}
     if max((float(np.max(x)) for x in finite.values()), default=0.0) <= ALL_ROUNDED and not known:
         return []
-    for labels in _apart(finite):
-        mine = {label: finite[label] for label in labels}
-        # the start is right; what is less than the floor at other frames stands on the lower edge
-        positive = [x[1:][x[1:] > 0] for x in mine.values()]
-        low = max(min((float(np.quantile(x, 0.02)) for x in positive if len(x)), default=FLOOR) / 2, FLOOR)
-        inside = [float(np.max(x)) for x in mine.values() if np.max(x) <= MOST]
-        clipped = len(inside) < len(mine)
-        high = max((20 if clipped else 2) * max(inside, default=MOST / 20), 10 * low)
-        ys = Frame(low, high, clipped, log=True)
-        # an engine may be farther off than others of its scheme
-        groups = [
-            replace(group, members=members)
-            for group in runs.groups
-            if (members := tuple(run for run in group.members if run.label in labels))
-        ]
+    one = [Rule(axis="y", at=1.0, name="as large as the motion", look="one")] if known else []
+    return [
+        _panel(runs, {label: x for label, x in finite.items() if label in labels}, name, title, one)
+        for labels in _apart(finite)
+    ]
 
-        def shown(run: Trajectory, ys: Frame = ys) -> tuple[Floats, Floats]:
-            y = found[run.label]
-            end = _beyond(y, ys.high)
-            last = len(y) if end is None else end + 1
-            return run.t[1:last], np.clip(y[1:last], min(ys.low, FLOOR), ys.high * overlay.FAR_OFF)
 
-        curves: list[Curve] = runs.curves(shown, groups=groups)
-        xs = Frame(*(time.shown or (0.0, 1.0)))
+def _panel(runs: Runs, found: Mapping[str, Floats], name: str, title: str, rules: Sequence[Rule]) -> Chart:
+    """Differences (f,) of some of the runs, and the rules that their decades meet."""
+    # the start is right; what is less than the floor at other frames stands on the lower edge
+    positive = [x[1:][x[1:] > 0] for x in found.values()]
+    low = max(min((float(np.quantile(x, 0.02)) for x in positive if len(x)), default=FLOOR) / 2, FLOOR)
+    inside = [float(np.max(x)) for x in found.values() if np.max(x) <= MOST]
+    clipped = len(inside) < len(found)
+    high = max((20 if clipped else 2) * max(inside, default=MOST / 20), 10 * low)
+    leaves = {label: int(np.argmax(x > high)) for label, x in found.items() if np.any(x > high)}
 
-        def when(run: Trajectory, ys: Frame = ys) -> int | None:
-            return _beyond(found[run.label], ys.high)
+    def shown(run: Trajectory) -> tuple[Floats, Floats]:
+        y = found[run.label]
+        last = leaves.get(run.label, len(y) - 1) + 1
+        return run.t[1:last], np.clip(y[1:last], FLOOR, high * frames.FAR_OFF)
 
-        charts.append(
-            Chart(
-                title=title,
-                x=time,
-                y=Scale(name=name, log=True, shown=ys.ends),
-                curves=curves,
-                rules=[Rule(axis="y", at=1.0, name="as large as the motion", look="one")]
-                if known and low < 1 < high
-                else [],
-                labels=overlay.at_ends(runs.first(curves), xs, ys, height=1.4 * NAME_HIGH),
-                note=runs.leaving(when) if clipped else "",
-            )
-        )
-    return charts
+    # an engine may be farther off than others of its scheme
+    groups = [
+        replace(group, members=members)
+        for group in runs.groups
+        if (members := tuple(run for run in group.members if run.label in found))
+    ]
+    chart = Chart(
+        title=title,
+        x=runs.time(),
+        y=Scale(name=name, log=True, shown=(low, high)),
+        curves=runs.curves(shown, groups=groups),
+        rules=[rule for rule in rules if low < rule.at < high],
+        note=runs.leaving(lambda run: leaves.get(run.label)),
+    )
+    return naming.at_ends(chart, height=1.4 * NAME_HIGH)
 
 
 def _apart(found: Mapping[str, Floats]) -> list[set[str]]:
@@ -277,23 +258,15 @@ def _apart(found: Mapping[str, Floats]) -> list[set[str]]:
     return sets
 
 
-def _beyond(values: Floats, high: float) -> int | None:
-    above = ~(values <= high)
-    return int(np.argmax(above)) if np.any(above) else None
-
-
 def error(runs: Runs, exact: Exact) -> Bank:
     """Distance from the exact solution over time, on a logarithmic scale."""
     found = {run.label: exact.error(run) for run in runs.every}
     name, title = "error / initial energy norm", "Distance from the exact solution."
-    charts = decades(runs, found, runs.time(), name, title, known=True)
+    charts = decades(runs, found, name, title, known=True)
     largest = _largest(runs, found)
     some = {label: x for label, x in largest.items() if np.isfinite(x)}
     said = extremes(some, "off the exact solution by at most {}", beyond=MOST) if some else "errors"
-    return Bank(
-        name="error", title="Methods drawn", charts=charts, columns=1,
-        size=(7.2, 4.2 if len(charts) == 1 else 2.6), heading=f"{runs.scene.title}: {runs.wrong}{said}",
-    )  # fmt: skip
+    return runs.bank("error", charts, said, (7.2, 4.2 if len(charts) == 1 else 2.6))
 
 
 def means(runs: Runs, thermal: float) -> Bank:
@@ -308,23 +281,15 @@ def means(runs: Runs, thermal: float) -> Bank:
     usual = float(np.median(list(ends.values())))
     near = [x for x in found.values() if abs(x[-1] - usual) <= 3 * abs(usual)]
     later = [x[len(x) // 20 :] for x in near] or [np.array([usual])]
-    ys = overlay.widened(min(map(np.min, later)), max(map(np.max, later)))
+    ys = frames.widened(min(map(np.min, later)), max(map(np.max, later)))
     some = {name: x for name, x in ends.items() if np.isfinite(x)}
     low, high = (f(some, key=lambda x: some[x]) for f in (min, max))
     linear = scene.system.has_modes and bool(np.all(scene.system.modes.w2 > 0))
     equal = linear and ys.low < scene.n < ys.high
-    curves = runs.curves(lambda run: (run.t, np.clip(found[run.label], *ys.far)), alike=False)
-    chart = Chart(
-        title="Mean energy up to each time, over kT.",
-        x=runs.time(),
-        y=Scale(name="mean energy so far / kT", shown=ys.ends),
-        curves=curves,
-        rules=[Rule(axis="y", at=float(scene.n), look="here")] if equal else [],
-        note=f"dotted: equipartition, {scene.n} kT" if equal else "",
-        labels=overlay.at_ends(runs.first(curves), runs.times, ys),
-    )
+    title, name = "Mean energy up to each time, over kT.", "mean energy so far / kT"
+    chart = runs.over_time(found, ys, title=title, name=name, alike=False)
+    if equal:
+        rule = Rule(axis="y", at=float(scene.n), look="here")
+        chart = replace(chart, rules=[rule], note=f"dotted: equipartition, {scene.n} kT")
     said = f"mean energies from {some[low]:.3g} kT ({low}) to {some[high]:.3g} kT ({high})"
-    return Bank(
-        name="energy", title="Methods drawn", charts=[chart], columns=1, size=(7.2, 4.2),
-        heading=f"{scene.title}: {runs.wrong}{said}",
-    )  # fmt: skip
+    return runs.bank("energy", [chart], said, (7.2, 4.2))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable
 from pathlib import Path
 
 from springcheck.errors import StoreError
@@ -19,25 +18,18 @@ def folder_of(path: Path) -> Path:
     return Path("figures", path.stem)
 
 
-def look(names: Iterable[str], folder: Path, path: Path) -> None:
-    """StoreError where figures of a store under these names would replace any other file in a folder."""
+def put(drawn: list[Path], folder: Path, path: Path) -> list[Path]:
+    """Put figures of a store into a folder; StoreError where that would replace any other file."""
     mine = str(path.absolute())
     known = _known(folder)
-    for name in names:
+    content = {one.name: one.read_bytes() for one in drawn}
+    for name in content:
         target = folder / name
         whose, *old = known.get(name, [mine])
         if target.is_symlink() or (target.exists() and _sha256(target.read_bytes()) not in old):
             raise StoreError(f"{target} is no figure of ours as it was drawn: move it away")
         if target.exists() and whose != mine:
             raise StoreError(f"{target} shows {whose}: name another folder with -o")
-
-
-def put(drawn: list[Path], folder: Path, path: Path) -> list[Path]:
-    """Put figures of a store into a folder; StoreError where that would replace any other file."""
-    look([one.name for one in drawn], folder, path)
-    mine = str(path.absolute())
-    known = _known(folder)
-    content = {one.name: one.read_bytes() for one in drawn}
     for name, figure in content.items():
         _, *old = known.get(name, [mine])
         # the last one too: whoever is killed in between may find it in its place

@@ -7,10 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from springcheck.figures import looks, overlay
+from springcheck.figures import frames, looks, naming
 from springcheck.figures.charts import BEGIN, GUIDE, SEPARATRIX, Bank, Chart, Curve, Scale
+from springcheck.figures.frames import Frame
 from springcheck.figures.motion import Exact, Motion, periods, smooth
-from springcheck.figures.overlay import Frame, Runs, exact_curve, share
+from springcheck.figures.overlay import Runs, exact_curve, share
 from springcheck.figures.views import State, View, with_unit
 from springcheck.physics.arrays import Floats
 from springcheck.physics.trajectory import Trajectory
@@ -44,12 +45,9 @@ def phase_portraits(runs: Runs, shown: Sequence[View], truth: Motion | None, sai
     charts = [_portrait(runs, view, truth, alone=len(shown) == 1) for view in shown]
     what = "path" if shown[0].what == "path" else "phase portrait"
     planes = what == "path" and len(charts) == 3
-    return Bank(
-        name=what.replace(" ", "-"), title="Methods drawn", charts=charts,
-        columns=3 if planes else min(2, len(charts)),
-        heading=_heading(runs, f"{what}{_of(runs, shown)}", said),
-        size=(4.0, 3.6) if planes else _size(charts, *((5.6, 5.2) if len(charts) == 1 else (4.9, 3.4))),
-    )  # fmt: skip
+    size = (4.0, 3.6) if planes else _size(charts, *((5.6, 5.2) if len(charts) == 1 else (4.9, 3.4)))
+    said = _heading(f"{what}{_of(runs, shown)}", said)
+    return runs.bank(what.replace(" ", "-"), charts, said, size, columns=3 if planes else min(2, len(charts)))
 
 
 def _size(charts: Sequence[Chart], wide: float, most: float) -> tuple[float, float]:
@@ -59,9 +57,9 @@ def _size(charts: Sequence[Chart], wide: float, most: float) -> tuple[float, flo
     return wide, min(most, wide * high + 0.8) if all(one.equal for one in charts) else most
 
 
-def _heading(runs: Runs, what: str, said: str) -> str:
-    """Heading of a figure; what is wrong with its runs comes first."""
-    return f"{runs.scene.title}: {runs.wrong}{f'{said} ({what})' if said else what}"
+def _heading(what: str, said: str) -> str:
+    """What was found, and in brackets what is drawn."""
+    return f"{said} ({what})" if said else what
 
 
 def _of(runs: Runs, shown: Sequence[View]) -> str:
@@ -80,7 +78,7 @@ def _portrait(runs: Runs, view: View, truth: Motion | None, *, alone: bool) -> C
     xs, ys = _frames(list(picked.values()), true, view)
 
     def near(x: Floats, y: Floats) -> State:
-        return view.wrapped(*overlay.nearer(x, y, xs, ys))
+        return view.wrapped(*frames.nearer(x, y, xs, ys))
 
     def when(run: Trajectory) -> int | None:
         x, y = picked[run.label]
@@ -101,17 +99,16 @@ def _portrait(runs: Runs, view: View, truth: Motion | None, *, alone: bool) -> C
     # where the motion itself runs away all of them leave
     note = runs.leaving(when) if _steep(picked, true) is None else ""
     of = f" of {view.title}" if view.title and view.what != "path" else ""
-    named = [*runs.first(curves), *((SEPARATRIX, one) for one in lines[:1] if parting)]
-    return Chart(
+    chart = Chart(
         title=f"{view.y_name} over {view.x_name}{of}.".capitalize(),
         short="" if alone else view.title,
         x=xs.axis(view.x_name, view.x_unit),
         y=ys.axis(view.y_name, view.y_unit),
         curves=[*lines, *curves, begin],
         equal=square and (view.what == "path" or max(sizes) <= ALIKE * min(sizes)),
-        labels=overlay.alone(named, xs, ys) if alone else (),
         note=note,
     )
+    return naming.labelled(chart) if alone else chart
 
 
 def clouds(runs: Runs, view: View, thermal: float) -> Bank:
@@ -122,9 +119,7 @@ def clouds(runs: Runs, view: View, thermal: float) -> Bank:
     sizes = sorted(max(float(np.max(np.abs(a))) for a in one) for one in picked.values())
     usual = [one for one in picked.values() if np.max(np.abs(one[0])) <= 100 * (sizes[len(sizes) // 2] or 1)]
     xs, ys = (
-        overlay.widened(
-            *(float(f([f(one[j]) for one in usual or picked.values()])) for f in (np.min, np.max))
-        )
+        frames.widened(*(float(f([f(one[j]) for one in usual or picked.values()])) for f in (np.min, np.max)))
         for j in (0, 1)
     )
     ring = [Curve(name="H = kT", group=GUIDE, x=x, y=y) for x, y in view.ring(xs.low, xs.high, thermal)]
@@ -143,10 +138,8 @@ def clouds(runs: Runs, view: View, thermal: float) -> Bank:
     left = len(runs.groups) - len(groups)
     more = f"; {left} more are not drawn" if left else ""
     said = f"states by {len(runs.groups)} thermostats" + ("; on the ring H = kT" if ring else "") + more
-    return Bank(
-        name="phase-portrait", title="Methods drawn", charts=charts, columns=min(4, len(charts)),
-        heading=_heading(runs, f"phase portrait{_of(runs, [view])}", said), size=(2.6, 2.4),
-    )  # fmt: skip
+    said = _heading(f"phase portrait{_of(runs, [view])}", said)
+    return runs.bank("phase-portrait", charts, said, (2.6, 2.4), columns=min(4, len(charts)))
 
 
 def _frames(picked: Sequence[State], true: State | None, view: View) -> tuple[Frame, Frame]:
@@ -154,10 +147,10 @@ def _frames(picked: Sequence[State], true: State | None, view: View) -> tuple[Fr
     steep = _steep({str(i): one for i, one in enumerate(picked)}, true)
     if steep is not None:
         return steep
-    sizes = [overlay.frame([one[j] for one in picked], None if true is None else true[j]) for j in (0, 1)]
+    sizes = [frames.frame([one[j] for one in picked], None if true is None else true[j]) for j in (0, 1)]
     near = [one for one in picked if all(its.leaves(one[j]) is None for j, its in enumerate(sizes))]
     x, y = (
-        overlay.frame([one[j] for one in near or picked], None if true is None else true[j]) for j in (0, 1)
+        frames.frame([one[j] for one in near or picked], None if true is None else true[j]) for j in (0, 1)
     )
     clipped = len(near) < len(picked)
     if view.turn:
@@ -228,11 +221,9 @@ def positions(runs: Runs, shown: Sequence[View], truth: Motion | None) -> Bank:
     few = "; a few periods" if spans[-1][1] < _last(runs) else ""
     bath = f"every method draws noise of its own{few}"
     off = _off(runs, shown[0]) if runs.scene.bath is None else bath
-    return Bank(
-        name="position", title="Methods drawn", charts=charts, columns=len(spans),
-        heading=_heading(runs, f"{shown[0].what}{_of(runs, shown)}", off) + parts,
-        size=(7.6 if len(spans) == 1 else 5.0, 3.8 if len(shown) == 1 else 1.9),
-    )  # fmt: skip
+    said = _heading(f"{shown[0].what}{_of(runs, shown)}", off) + parts
+    size = (7.6 if len(spans) == 1 else 5.0, 3.8 if len(shown) == 1 else 1.9)
+    return runs.bank("position", charts, said, size, columns=len(spans))
 
 
 def _off(runs: Runs, view: View) -> str:
@@ -291,7 +282,7 @@ def _position(
     states = {run.label: view.pick(run.q, run.p) for run in runs.every}
     picked = {label: x for label, (x, _) in states.items()}
     steep = _steep(states, true) is not None
-    ys = overlay.frame(list(picked.values()), None if true is None else true[0])
+    ys = frames.frame(list(picked.values()), None if true is None else true[0])
     if truth is not None and true is not None:
         span = span[0], min(span[1], _settles(np.abs(truth[0]), true[0]))
     dy, unit_x = looks.prefixed(max(abs(ys.low), abs(ys.high)), view.x_unit)
@@ -321,17 +312,17 @@ def _position(
     last = span[1] if runs.longest.step > 0 else -span[1]
     xs = Frame(min(span[0], last), max(span[0], last))
     name = with_unit(view.x_name, unit_x)
-    return Chart(
+    chart = Chart(
         title=f"{view.x_name}{f' of {view.title}' if view.title else ''} over time.".capitalize(),
         short="" if alone else view.title,
         x=runs.time(xs),
         y=Scale(name=f"|{name}|" if steep else name, log=steep, shown=ys.ends, factor=dy),
         curves=[*lines, *curves],
-        labels=overlay.at_ends(runs.first(curves), xs, ys, height=overlay.NAME_HIGH * (1 if alone else 2))
-        if (alone or span[0] == 0) and span[1] == _last(runs)
-        else (),
         note=runs.leaving(lambda run: ys.leaves(picked[run.label])) if span[0] == 0 else "",
     )
+    if (alone or span[0] == 0) and span[1] == _last(runs):
+        return naming.at_ends(chart, height=naming.NAME_HIGH * (1 if alone else 2))
+    return chart
 
 
 def _last(runs: Runs) -> float:

@@ -75,19 +75,14 @@ def save(figure: Figure, folder: Path, name: str) -> list[Path]:
             for text in texts:
                 text.set_parse_math(False)
             drawn = _drawn(figure)
-        for one in file_names(name):
-            files.put_bytes(drawn[one.rpartition(".")[2]], folder / one)
-            written.append(folder / one)
+        safe = re.sub(r"[^\w-]", "-", name)[:LONGEST_LINE]
+        for ending, content in drawn.items():
+            written.append(folder / f"{safe}.{ending}")
+            files.put_bytes(content, written[-1])
     except OSError as error:
         why = files.cause(error, writing=True)
         raise StoreError(f"{folder}: figures cannot be written: {why}") from error
     return written
-
-
-def file_names(name: str) -> list[str]:
-    """The files that a figure of this name is saved as."""
-    safe = re.sub(r"[^\w-]", "-", name)[:LONGEST_LINE]
-    return [f"{safe}.{ending}" for ending in ("png", "svg")]
 
 
 def _drawn(figure: Figure) -> dict[str, bytes]:

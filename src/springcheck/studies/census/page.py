@@ -6,7 +6,7 @@ import numpy as np
 
 from springcheck.figures.charts import Bank, Chart, Curve, Scale
 from springcheck.figures.looks import engine, title
-from springcheck.figures.overlay import labelled
+from springcheck.figures.naming import labelled
 from springcheck.studies.census.result import Census, Entry
 from springcheck.text.wording import count, few
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from springcheck.figures.charts import Bank, Chart, Curve, Naming, Scale, Tiles
-from springcheck.figures.overlay import Frame
+from springcheck.figures.frames import Frame
 from springcheck.studies.faults.result import FaultReport, Result
 
 KINDS = (

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 
 from springcheck.figures.charts import GUIDE, Bank, Chart, Curve, Rule, Scale
 from springcheck.figures.looks import scheme_of
-from springcheck.figures.overlay import labelled
+from springcheck.figures.naming import labelled
 from springcheck.studies.precision.fits import Point
 from springcheck.studies.precision.result import PrecisionStudy
 from springcheck.text.wording import seconds

@@ -8,7 +8,7 @@ import numpy as np
 
 from springcheck.figures.charts import Bank, Chart, Curve, Rule, Scale, Tiles
 from springcheck.figures.looks import scheme_of
-from springcheck.figures.overlay import labelled
+from springcheck.figures.naming import labelled
 from springcheck.studies.stability.limits import Limit
 from springcheck.studies.stability.longest import fastest
 from springcheck.studies.stability.regions import Region
