@@ -158,20 +158,18 @@ def _study(study: Study, options: argparse.Namespace) -> int:
     with output.alone(), output.progress(study.name, quiet=options.quiet) as progress:
         found = study.perform(options, progress)
     output.warn(str(source), doubts)
-    status = found.status or int(bool(doubts))
-    if options.json or reported(options):
-        document = {**found.document(), **({"not_trusted": doubts} if source else {})}
-        if reported(options):
-            from springcheck.cli import ci
-
-            ci.report(options, document, status)
-    if options.json:
-        output.document(study_of(found).name, document)
-    elif not options.quiet:
-        output.show(study.lines(found, options))
-    elif found.status == 2 and not getattr(found, "broke", {}):
+    trusted = {"not_trusted": doubts} if source else {}
+    broke: dict[str, str] = getattr(found, "broke", {})
+    status = output.answer(
+        options,
+        lambda: {**found.document(), **trusted},
+        lambda: study.lines(found, options),
+        found.status or int(bool(doubts)),
+        study_of(found).name,
+    )
+    if options.quiet and not options.json and found.status == 2 and not broke:
         why = "nothing was measured, or not all could be judged; without --quiet the report says what"
         print(f"springcheck: {why}", file=sys.stderr)
-    for why in getattr(found, "broke", {}).values():
+    for why in broke.values():
         print(f"springcheck: {plain(why)}; mend it, and give the command again", file=sys.stderr)
     return status

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 from springcheck import interrupts
 from springcheck.cli import output
 from springcheck.errors import SpringcheckError, plain
-from springcheck.studies.arguments import ENGINE, JSON, QUIET, Argument, argument, reported
+from springcheck.studies.arguments import ENGINE, JSON, QUIET, Argument, argument
 from springcheck.studies.team import processes
 
 
@@ -38,15 +38,12 @@ def _inspect(options: Namespace) -> int:
         raise SpringcheckError(f"--rows {options.rows}: a number of frames from 1 on is needed")
     doubts = output.doubts(options.file)
     summary = store.summary(Path(options.file))
-    if options.json:
-        document = inspect.document(summary, options)
-        output.warn(options.file, doubts)
-        output.document(options.name, {"not_trusted": doubts, **document})
-    else:
-        lines = inspect.lines(summary, options)
-        output.warn(options.file, doubts)
-        output.show(lines)
-    return int(bool(doubts))
+    # all of it is read before anything is said
+    document = inspect.document(summary, options) if options.json else {}
+    lines = [] if options.json else inspect.lines(summary, options)
+    output.warn(options.file, doubts)
+    whole = {"not_trusted": doubts, **document}
+    return output.answer(options, lambda: whole, lambda: lines, int(bool(doubts)))
 
 
 def _plot(options: Namespace) -> int:
@@ -107,9 +104,9 @@ def _show(options: Namespace) -> int:
 
 def _explain(options: Namespace) -> int:
     from springcheck.cli import explain
+    from springcheck.text.lines import plain as plain_line
 
-    for line in explain.lines(options.word):
-        print(output.folded(line))
+    output.show([plain_line(line) for line in explain.lines(options.word)])
     return 0
 
 
@@ -168,14 +165,8 @@ def _identify(options: Namespace) -> int:
         undecided = any(one.undecided for one in found.values())
         statuses.append(1 if doubts or not fits or any(unlike.values()) else 2 if undecided else 0)
     status = 1 if 1 in statuses else max(statuses)
-    document = {"files": documents} if many else documents[0]
-    if reported(options):
-        from springcheck.cli import ci
-
-        ci.report(options, document, status)
-    if options.json:
-        output.document(options.name, document)
-    return status
+    # the text of each file is already shown
+    return output.answer(options, lambda: {"files": documents} if many else documents[0], list, status)
 
 
 def _unlike(found: Any, asked: str) -> str:
@@ -229,16 +220,8 @@ def _judge(options: Namespace) -> int:
         trajectory=options.trajectory,
     )
     output.warn(options.file, doubts)
-    document, status = {**found.document(), "not_trusted": doubts}, found.status or int(bool(doubts))
-    if reported(options):
-        from springcheck.cli import ci
-
-        ci.report(options, document, status)
-    if options.json:
-        output.document(options.name, document)
-    else:
-        output.show(found.lines())
-    return status
+    status = found.status or int(bool(doubts))
+    return output.answer(options, lambda: {**found.document(), "not_trusted": doubts}, found.lines, status)
 
 
 def _check(options: Namespace) -> int:
@@ -267,12 +250,7 @@ def _list(options: Namespace) -> int:
     from springcheck.cli import listing
 
     found = listing.listing()
-    if options.json:
-        output.document(options.name, found)
-    else:
-        for line in listing.lines(found):
-            print(line)
-    return 0
+    return output.answer(options, lambda: found, lambda: listing.lines(found))
 
 
 def _doctor(options: Namespace) -> int:
@@ -280,12 +258,8 @@ def _doctor(options: Namespace) -> int:
 
     with output.alone():
         found = doctor.found()
-    if options.json:
-        output.document(options.name, found)
-    else:
-        for line in doctor.lines(found):
-            print(output.folded(plain(line)))
-    return 0 if any(one["problem"] is None for one in found["engines"]) else 2
+    status = 0 if any(one["problem"] is None for one in found["engines"]) else 2
+    return output.answer(options, lambda: found, lambda: doctor.lines(found), status)
 
 
 def _completion(options: Namespace) -> int:

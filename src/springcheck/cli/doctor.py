@@ -15,6 +15,7 @@ from springcheck import engines
 from springcheck.errors import MethodError
 from springcheck.physics import scenefile
 from springcheck.physics.arrays import WIDE
+from springcheck.text.lines import Lines, plain
 
 LIBRARIES = ("numpy", "scipy", "h5py", "numba", "matplotlib", "jinja2", "rich", "msgspec", "pandas", "xarray")
 """Libraries that results depend on, then optional ones."""
@@ -72,8 +73,12 @@ def _usable(engine: engines.Engine) -> Iterator[str]:
             yield place
 
 
-def lines(data: dict[str, Any]) -> Iterator[str]:
+def lines(data: dict[str, Any]) -> Lines:
     """The same for people, the problems with what mends them."""
+    return list(map(plain, _said(data)))
+
+
+def _said(data: dict[str, Any]) -> Iterator[str]:
     wide = data["long_double"]
     yield f"springcheck {data['springcheck']}, python {data['python']} on {data['system']}"
     yield f"long double has {wide['bits']} bits of mantissa: {wide['means']}"

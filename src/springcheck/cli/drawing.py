@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -62,7 +61,7 @@ def draw(path: Path, into: Path, **chosen: Any) -> tuple[list[Path], list[str]]:
     with interrupts.folder() as made:
         written: list[Path] = []
         for study, found in drawn:
-            written += study.draw(found, made, look=partial(folder.look, folder=into, path=path), **chosen)
+            written += study.draw(found, made, **chosen)
             notes += getattr(found, "notes", ())
         if not written:
             raise SpringcheckError(f"{path}: nothing was measured in its study that can be drawn")
@@ -93,11 +92,9 @@ def draw_foreign(
     moving = np.flatnonzero(np.ptp(found.q, axis=0) > 0)
     chosen = moving[:MOST_COORDINATES] if particle is None else np.array([particle])
     left = len(moving) - len(chosen)
-    notes = (
-        [f"{count(left, 'moving coordinate')} more, which --particle draws"]
-        if particle is None and left
-        else []
-    )
+    notes = [*found.notes]
+    if particle is None and left:
+        notes.append(f"{count(left, 'moving coordinate')} more, which --particle draws")
     chosen = chosen if len(chosen) else np.array([0])
     # fewer frames of a period are chords
     few = any(len(found.t) < FRAMES * periods(found.q[:, i]) for i in chosen)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import textwrap
 import tomllib
-from collections.abc import Iterator
 from typing import Any
 
 from springcheck import checks, engines, schemes
 from springcheck.checks.seeds import SEEDED
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.scene import Scene
+from springcheck.text.lines import Lines, plain
 
 
 def listing() -> dict[str, Any]:
@@ -62,25 +62,26 @@ def methods(scene: Scene | None) -> list[dict[str, Any]]:
     return rows
 
 
-def lines(found: dict[str, Any]) -> Iterator[str]:
+def lines(found: dict[str, Any]) -> Lines:
     """The list as text of 80 columns."""
-    yield "Scenes"
+    out = ["Scenes"]
     width = max(len(scene["name"]) for scene in found["scenes"])
     for scene in found["scenes"]:
-        yield from _entry(scene["name"], width, scene["title"])
-    yield "Engines and methods"
+        out += _entry(scene["name"], width, scene["title"])
+    out.append("Engines and methods")
     for engine in found["engines"]:
         here = f"{engine['title']} {engine['version']}".strip()
-        yield from _entry(f"{engine['absence'] or here}, from {engine['origin']}", 0, "")
+        out += _entry(f"{engine['absence'] or here}, from {engine['origin']}", 0, "")
         for method in engine["methods"]:
-            yield from _entry(f"  {method['method']}", 28, method["about"])
+            out += _entry(f"  {method['method']}", 28, method["about"])
         if engine["platforms"]:
-            yield from _entry("  platforms", 28, "as METHOD@PLATFORM: " + ", ".join(engine["platforms"]))
+            out += _entry("  platforms", 28, "as METHOD@PLATFORM: " + ", ".join(engine["platforms"]))
     for reason in found["unusable_engines"].values():
-        yield from _entry(reason, 0, "")
-    yield "Checks"
+        out += _entry(reason, 0, "")
+    out.append("Checks")
     for check in found["checks"]:
-        yield from _entry(check["name"], 16, f"{check['sentence']} Applies to: {check['applies_to']}.")
+        out += _entry(check["name"], 16, f"{check['sentence']} Applies to: {check['applies_to']}.")
+    return list(map(plain, out))
 
 
 def _entry(name: str, width: int, words: str) -> list[str]:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import os
-import shutil
 import sys
-import textwrap
-from collections.abc import Iterator, Sequence
+from argparse import Namespace
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from io import StringIO
 from pathlib import Path
@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from springcheck import interrupts
 from springcheck.errors import SpringcheckError, StoreError, plain
+from springcheck.studies.arguments import reported
 
 if TYPE_CHECKING:
     from springcheck.studies.arguments import Progress
@@ -50,19 +51,27 @@ def show(lines: Lines) -> None:
         print("\n".join(line.rstrip() for line in into.getvalue().splitlines()))
 
 
-def folded(line: str) -> str:
-    """A line broken between words where the terminal ends; as it is in a pipe."""
-    if not line or not sys.stdout.isatty():
-        return line
-    return textwrap.fill(line, shutil.get_terminal_size().columns, break_on_hyphens=False)
+def answer(
+    options: Namespace,
+    document: Callable[[], dict[str, Any]],
+    lines: Callable[[], Lines],
+    status: int = 0,
+    name: str = "",
+) -> int:
+    """Say what a command has found, as it was asked to: reports for continuous integration, and one JSON
+    document (of the command's name, unless told) or text.  Returns the exit status."""
+    reports = reported(options)
+    data = document() if reports or options.json else {}
+    if reports:
+        from springcheck.cli import ci
 
-
-def document(command: str, data: dict[str, Any]) -> None:
-    """Print the one JSON document of a command, which says its schema first."""
-    import json
-
-    schema = f"springcheck/{command}/{SCHEMAS.get(command, 1)}"
-    print(json.dumps({"schema": schema, **data}, allow_nan=False, indent=2))
+        ci.report(options, data, status)
+    if options.json:
+        schema = f"springcheck/{name or options.name}/{SCHEMAS.get(name or options.name, 1)}"
+        print(json.dumps({"schema": schema, **data}, allow_nan=False, indent=2))
+    elif not getattr(options, "quiet", False) and (said := lines()):
+        show(said)
+    return status
 
 
 def doubts(file: str) -> list[dict[str, str]]:

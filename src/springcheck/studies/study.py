@@ -146,23 +146,12 @@ class Study:
         found: Result = self._part("measure").stored(path)
         return found
 
-    def draw(
-        self,
-        found: Result,
-        folder: Path,
-        *,
-        look: Callable[[list[str]], None] = lambda names: None,
-        **chosen: Any,
-    ) -> list[Path]:
-        """Draw a stored or a fresh result into a folder, as it is `chosen`; returns the files.
-
-        `look` is given their names before the work that takes longest.
-        """
-        from springcheck.figures.style import file_names, save, style
+    def draw(self, found: Result, folder: Path, **chosen: Any) -> list[Path]:
+        """Draw a stored or a fresh result into a folder, as it is `chosen`; returns the files."""
+        from springcheck.figures.style import save, style
 
         with style():
             pictures = self.pictures(found, **chosen)
-            look([file for name in pictures for file in file_names(name)])
             return [path for name, picture in pictures.items() for path in save(picture, folder, name)]
 
     def pictures(self, found: Result, **chosen: Any) -> dict[str, Any]:

@@ -55,18 +55,7 @@ function bath() {
       html("th", { scope: "row" }, name), ...(S ? [S[0], S[2]] : ["", ""]).map((x) =>
         cell(S ? `${number(x * now.T, 6)} ${unit}` : "none: unstable")))));
   };
-  const put = (name, value) => {
-    const away = sliders[name].map((x) => Math.abs(Math.log(x / value)));
-    if (!(value > 0 && value < Infinity)) return;
-    now[name] = value;
-    by(`slide-bath-${name}`).value = away.indexOf(Math.min(...away));
-  };
-  for (const name of Object.keys(sliders)) {
-    const field = by(`show-bath-${name}`), slide = by(`slide-bath-${name}`);
-    put(name, own[name]);
-    made(slide, { input: () => show((now[name] = sliders[name][slide.value])) });
-    made(field, { change: () => show(put(name, field.valueAsNumber)) });
-  }
+  sliding("bath-", sliders, now, (_, value) => value > 0, show);
   by("bath").hidden = false;
   show();
 }

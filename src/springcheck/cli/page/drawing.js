@@ -32,6 +32,24 @@ function tile(name, shade, attributes) {
   return element(name, { class: "tile", ...attributes, style: { fill } });
 }
 
+// Sliders and the fields beside them, by name: `now` follows both where a value is `right`, and is shown.
+// Returns what puts a value into all of them; a slider stands at the nearest of its places.
+function sliding(prefix, places, now, right, show) {
+  const put = (name, value) => {
+    if (!Number.isFinite(value) || !right(name, value)) return;
+    const away = places[name].map((x) => Math.abs(x - value));
+    by(`slide-${prefix}${name}`).value = away.indexOf(Math.min(...away));
+    now[name] = value;
+  };
+  for (const name of Object.keys(places)) {
+    const slide = by(`slide-${prefix}${name}`), field = by(`show-${prefix}${name}`);
+    put(name, now[name]);
+    made(slide, { input: () => show((now[name] = places[name][slide.value])) });
+    made(field, { change: () => show(put(name, field.valueAsNumber)) });
+  }
+  return put;
+}
+
 const raised = (n) => String(n).replace("-", "\u207b").replace(/\d/g, (c) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[c]);
 
 // Marks of an axis between low and high, as it draws: [place, text].

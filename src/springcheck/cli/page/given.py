@@ -49,7 +49,7 @@ def to_scripts(scene: Scene | None, pieces: Sequence[Trajectory], wrong: Collect
     return {
         "runs": [drawn(piece, scene, failed=piece.label in wrong) for piece in pieces],
         "spring": one,
-        "sliders": one and {name: [float(f"{x:.6g}") for x in y] for name, y in sliders(**one).items()},
+        "sliders": one and sliders(**one),
         "live": one and charts.plain(_live()),
         "bath": bath(scene, {piece.scheme for piece in pieces}),
         "linear": linear(scene) if scene else None,
@@ -96,21 +96,25 @@ def spring(scene: Scene) -> dict[str, float] | None:
     return {name: float(values[0]) for name, values in given.items()} | {"h": scene.step}
 
 
-def sliders(*, h: float, k: float, m: float, q: float, p: float, at: float) -> dict[str, Floats]:
+def sliders(*, h: float, k: float, m: float, q: float, p: float, at: float) -> dict[str, list[float]]:
     """Values at each place of each slider, in even ratios where a sign is kept."""
     w = math.sqrt(abs(k) / m) or 1.0
-
-    def ratios(least: float, most: float, sign: float) -> Floats:
-        return np.asarray(math.copysign(1, sign) * least * (most / least) ** SLIDING)
-
     start = abs(p) or abs(q - at) * m * w or 1.0
     return {
-        "h": ratios(min(0.01 / w, abs(h) / 2), max(3 / w, 2 * abs(h)), h),
-        "k": ratios(abs(k) / 10 or 0.1, abs(k) * 10 or 10, k),
-        "m": ratios(m / 10, m * 10, 1),
-        "p": (2 * SLIDING - 1) * 3 * start,
-        "c": SLIDING * 3 * m * w,
+        "h": _ratios(min(0.01 / w, abs(h) / 2), max(3 / w, 2 * abs(h)), h),
+        "k": _ratios(abs(k) / 10 or 0.1, abs(k) * 10 or 10, k),
+        "m": _ratios(m / 10, m * 10),
+        "p": _rounded((2 * SLIDING - 1) * 3 * start),
+        "c": _rounded(SLIDING * 3 * m * w),
     }
+
+
+def _ratios(least: float, most: float, sign: float = 1.0) -> list[float]:
+    return _rounded(math.copysign(1, sign) * least * (most / least) ** SLIDING)
+
+
+def _rounded(places: Floats) -> list[float]:
+    return [float(f"{x:.6g}") for x in places]
 
 
 def linear(scene: Scene) -> dict[str, Any] | None:
@@ -232,8 +236,3 @@ def bath(scene: Scene | None, ran: Collection[str]) -> dict[str, Any] | None:
         "values": [[*at, {name: moments(name, *at) for name in splittings}] for at in points],
         "live": charts.plain(Bank(title="Drawn", charts=[chart], on=["Boltzmann", *on])),
     }  # fmt: skip
-
-
-def _ratios(least: float, most: float) -> list[float]:
-    places: Floats = least * (most / least) ** (np.arange(201) / 200)
-    return [float(f"{x:.6g}") for x in places]

@@ -60,13 +60,6 @@ function live() {
   const right = { h: (v) => v !== 0, k: () => true, m: (v) => v > 0, p: () => true, c: (v) => v >= 0 };
   const names = Object.keys(DATA.sliders), time = by("slide-t");
   by("live").hidden = false;
-  // the slider stands where it is nearest
-  const put = (name, value) => {
-    if (!Number.isFinite(value) || !right[name](value)) return;
-    const away = DATA.sliders[name].map((x) => Math.abs(x - value));
-    by(`slide-${name}`).value = away.indexOf(Math.min(...away));
-    now[name] = value;
-  };
   const bank = new Bank(by("orbits"), { ...DATA.live, charts: tried(now) }), [orbits] = bank.charts;
   const most = orbits.spec.curves[1].x.length - 1, move = () => moving(now, orbits, Number(time.value));
   const show = () => {
@@ -76,18 +69,9 @@ function live() {
     if (changed.length || asked.size) history.replaceState(null, "", `#${new URLSearchParams(changed)}`);
     move();
   };
-  const listen = (id, event, act) => made(by(id), { [event]: () => {
-    act();
-    show();
-  } });
-  for (const name of names) {
-    const slide = by(`slide-${name}`), field = by(`show-${name}`);
-    put(name, own[name]);
-    if (asked.has(name)) put(name, Number(asked.get(name)));
-    listen(slide.id, "input", () => (now[name] = DATA.sliders[name][slide.value]));
-    listen(field.id, "change", () => put(name, field.valueAsNumber));
-  }
-  listen("reset", "click", () => names.forEach((name) => put(name, own[name])));
+  const put = sliding("", DATA.sliders, now, (name, value) => right[name](value), show);
+  for (const name of names.filter((one) => asked.has(one))) put(name, Number(asked.get(name)));
+  made(by("reset"), { click: () => show(names.forEach((name) => put(name, own[name]))) });
   made(time, { max: most, input: move });
   made(by("play"), { click: () => {
     const began = performance.now(), from = Number(time.value) % most;
