@@ -41,6 +41,13 @@ def made(label: str = "own:semi-implicit-euler") -> Trajectory:
     return driver.run(SCENE, label)
 
 
+def read_one(
+    name: str, columns: tuple[str, ...] | list[str] = (), step: float | None = None
+) -> formats.States:
+    (found,) = formats.read(Path(name), columns, step).values()
+    return found
+
+
 def csv(run: Trajectory) -> list[str]:
     rows = [f"{t:.17g},{q:.17g},{p:.17g}" for t, q, p in zip(run.t, run.q[:, 0], run.p[:, 0], strict=True)]
     Path("x.csv").write_text("\n".join(["t [s],q,p", *rows, ""]))
@@ -260,7 +267,7 @@ def test_every_run_of_a_log_is_read_whose_columns_suffice_and_the_others_are_sai
     }
     text = "".join(f"{head}\n" + "\n".join(rows) + "\nLoop time of 1\n" for head, rows in parts.items())
     Path("log.lammps").write_text("LAMMPS (29 Aug 2024)\n" + text)
-    found = formats.read(Path("log.lammps"), step=SCENE.step)
+    found = read_one("log.lammps", step=SCENE.step)
     assert np.array_equal(found.q, run.q)
     assert np.array_equal(found.p, run.p)
     assert [note.partition(" are")[0] for note in found.notes] == [
@@ -527,14 +534,14 @@ def test_numbers_as_fortran_octave_and_matlab_write_them() -> None:
     t = "# name: t\n# type: range\n# base, limit, increment\n0 2 1\n\n"
     for kind in ("int32 ", "float "):
         Path("x.txt").write_text(OCTAVE + q.format(kind) + v + t)
-        assert formats.read(Path("x.txt")).q.tolist() == [[0, 3], [1, 4], [2, 5]]
-    assert formats.read(Path(octave_text(made())[0])).roundoff == 2.0**-53
+        assert read_one("x.txt").q.tolist() == [[0, 3], [1, 4], [2, 5]]
+    assert read_one(octave_text(made())[0]).roundoff == 2.0**-53
     Path("x.txt").write_text(OCTAVE + v + v.replace("# name: v", "# name: q") + t)
-    assert formats.read(Path("x.txt")).roundoff == 0.05
+    assert read_one("x.txt").roundoff == 0.05
     scipy.io.savemat("x.mat", {"a": {"t": [0, 1.0], "q": [1, 2.0]}, "b": {"t": [0, 2.0], "q": [3, 5.0]}})
     with pytest.raises(StoreError, match=r"no array of times among a\.t, a\.q, b\.t, b\.q; name them"):
-        formats.read(Path("x.mat"))
-    assert formats.read(Path("x.mat"), ["t=b.t", "q=b.q"]).q.ravel().tolist() == [3, 5]
+        read_one("x.mat")
+    assert read_one("x.mat", ["t=b.t", "q=b.q"]).q.ravel().tolist() == [3, 5]
 
 
 def test_arrays_that_are_not_there_are_said(capsys: pytest.CaptureFixture[str]) -> None:

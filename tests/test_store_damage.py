@@ -18,9 +18,10 @@ import h5py
 import numpy as np
 import pytest
 
-from springcheck import formats, store
+from springcheck import store
 from springcheck.cli import file
 from springcheck.errors import StoreError
+from springcheck.formats import hdf5
 from springcheck.physics.trajectory import Comparison
 from springcheck.store import apart, checking, seal, trust
 from stores import LABELS, scene, trajectory
@@ -34,7 +35,7 @@ READERS: list[Callable[[Path], object]] = [
     store.verdicts,
     store.comparison,
     lambda path: dict(store.tables_of(path)),
-    formats.read_hdf5,
+    hdf5.read_hdf5,
     lambda path: list(store.windows(path, LABELS[0], 7)),
     lambda path: store.strided(path, LABELS[0], 7),
 ]
@@ -253,7 +254,7 @@ def test_a_file_that_another_program_is_writing_is_told(tmp_path: Path) -> None:
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as writer:
         assert writer.stdout is not None
         assert writer.stdout.readline() == b"open\n"
-        for reader in (store.read, store.summary, formats.read_hdf5):
+        for reader in (store.read, store.summary, hdf5.read_hdf5):
             with pytest.raises(StoreError, match="another program is writing it"):
                 reader(tmp_path / "s.h5")
         writer.communicate()
@@ -307,7 +308,7 @@ def h5md(path: Path, **changed: Any) -> Path:
 
 
 def test_a_foreign_trajectory_is_read_with_its_precision(tmp_path: Path) -> None:
-    found = formats.read_hdf5(h5md(tmp_path / "a.h5"))["all"]
+    found = hdf5.read_hdf5(h5md(tmp_path / "a.h5"))["all"]
     assert np.array_equal(found.q, np.arange(60.0).reshape(5, 12))
     assert np.array_equal(found.t, 0.2 * np.arange(5))
     assert found.units == {"q": "nm", "v": "nm"}
@@ -317,12 +318,12 @@ def test_a_foreign_trajectory_is_read_with_its_precision(tmp_path: Path) -> None
 
 
 def test_a_fixed_interval_and_velocities_at_fewer_steps_are_understood(tmp_path: Path) -> None:
-    found = formats.read_hdf5(h5md(tmp_path / "a.h5", time=np.float64(0.25), mass=None))["all"]
+    found = hdf5.read_hdf5(h5md(tmp_path / "a.h5", time=np.float64(0.25), mass=None))["all"]
     assert found.t.tolist() == [0, 0.25, 0.5, 0.75, 1]
     assert found.mass is None
     fewer = np.arange(36.0).reshape(3, 4, 3)
     path = h5md(tmp_path / "b.h5", velocity=fewer, velocity_step=np.array([0, 4, 8]))
-    found = formats.read_hdf5(path)["all"]
+    found = hdf5.read_hdf5(path)["all"]
     assert np.array_equal(found.q, np.arange(60.0).reshape(5, 12)[::2])
     assert np.array_equal(found.v, fewer.reshape(3, 12))
 
@@ -340,11 +341,11 @@ def test_images_are_put_back_by_the_edges_of_the_box(tmp_path: Path, edges: str)
         file["particles/all/image/value"] = image
         moving = edges in ("vectors", "matrices")
         file["particles/all/box/edges" + "/value" * moving] = np.stack([box] * 5) if moving else box
-    assert formats.read_hdf5(path)["all"].q == pytest.approx(whole.reshape(5, 12), rel=1e-15)
+    assert hdf5.read_hdf5(path)["all"].q == pytest.approx(whole.reshape(5, 12), rel=1e-15)
     with h5py.File(path, "r+") as file:
         del file["particles/all/box"]
     with pytest.raises(StoreError, match="does not count borders"):
-        formats.read_hdf5(path)
+        hdf5.read_hdf5(path)
 
 
 @pytest.mark.usefixtures("tried_here")
@@ -357,18 +358,18 @@ def test_particles_that_change_places_are_told_by_their_ids(tmp_path: Path) -> N
     path = h5md(tmp_path / "a.h5", position=shuffled[0], velocity=shuffled[1])
     with h5py.File(path, "r+") as file:
         file["particles/all/id/value"] = 7 + 3 * places
-    found = formats.read_hdf5(path)["all"]
+    found = hdf5.read_hdf5(path)["all"]
     assert np.array_equal(found.q, q[:, places[0]].reshape(5, 12))
     assert np.array_equal(found.v, v[:, places[0]].reshape(5, 12))
     with h5py.File(path, "r+") as file:
         file["particles/all/id/value"][2, 1] = 99
     with pytest.raises(StoreError, match="not the same in all frames"):
-        formats.read_hdf5(path)
+        hdf5.read_hdf5(path)
     with h5py.File(path, "r+") as file:
         del file["particles/all/id/value"]
         file["particles/all/id/value"] = places[:3]
     with pytest.raises(StoreError, match="has 5 positions, and id is"):
-        formats.read_hdf5(path)
+        hdf5.read_hdf5(path)
 
 
 @pytest.mark.usefixtures("tried_here")

@@ -17,8 +17,9 @@ from silx.io import nxdata
 from silx.io import open as silx_open
 
 import springcheck
-from springcheck import formats, store
+from springcheck import store
 from springcheck.errors import StoreError
+from springcheck.formats import hdf5
 from springcheck.physics.trajectory import Comparison
 from stores import LABELS, scene, trajectory, written
 
@@ -76,7 +77,7 @@ def test_our_own_reader_takes_an_exported_file_as_anyones(tmp_path: Path) -> Non
     s = scene()
     made = written(tmp_path / "s.h5", s)[LABELS[0]]
     store.export(tmp_path / "s.h5", LABELS[0], tmp_path / "out.h5md")
-    found = formats.read_hdf5(tmp_path / "out.h5md")["trajectory"]
+    found = hdf5.read_hdf5(tmp_path / "out.h5md")["trajectory"]
     assert np.array_equal(found.q[:, ::3], made.q)
     assert np.array_equal(found.v[:, ::3], made.p / s.m)
     assert np.array_equal(found.t, made.t)

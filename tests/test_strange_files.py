@@ -29,11 +29,8 @@ Q2, V2 = 2 * Q + 1, 3 * V
 
 
 def read(name: str, *columns: str, step: float | None = None) -> States:
-    path = Path(name)
-    if formats.is_hdf5(path):
-        (found,) = formats.read_hdf5(path, columns).values()
-        return found
-    return formats.read(path, columns, step)
+    (found,) = formats.read(Path(name), columns, step).values()
+    return found
 
 
 def table(*columns: object, head: str = "", sep: str = ",") -> str:

@@ -57,7 +57,7 @@ def _plot(options: Namespace) -> int:
     if into.suffix in (".png", ".svg", ".pdf") and not into.is_dir():
         raise SpringcheckError(f"-o {into}: a folder is needed, figures have names of their own in it")
     doubts: list[dict[str, str]] = []
-    if path.is_file() and (options.columns or not formats.is_hdf5(path) or formats.is_foreign(path)):
+    if path.is_file() and (options.columns or not formats.is_store(path)):
         if options.quantity or options.over:
             raise SpringcheckError(f"{path}: --quantity and --over go with the store of an ensemble")
         which = {"columns": _columns(options), "step": options.step, "trajectory": options.trajectory}

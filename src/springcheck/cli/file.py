@@ -12,7 +12,7 @@ import numpy as np
 from springcheck import checks, schemes, store
 from springcheck.errors import IdentificationError, StoreError
 from springcheck.figures.views import units
-from springcheck.formats import States, is_foreign, is_hdf5, moving, read, read_hdf5
+from springcheck.formats import States, is_store, moving, read
 from springcheck.identify import files
 from springcheck.identify.files import identify_states, of_arrays
 from springcheck.physics.arrays import AS_WRITTEN, Arithmetic, Floats
@@ -170,9 +170,10 @@ def states_in(
     path: Path, columns: Sequence[str] = (), step: float | None = None, label: str | None = None
 ) -> States:
     """The one trajectory of a file, or that of this label.  StoreError where there are several or none."""
-    if not is_hdf5(path):
-        return moving(path, read(path, columns, step))
-    found = _in_hdf5(path, columns)
+    found = _recorded(path) if not columns and is_store(path) else read(path, columns, step)
+    found = {name: x for name, x in found.items() if x.p is not None or x.v is not None} or {
+        name: moving(path, x) for name, x in found.items()
+    }
     if label is None and len(found) == 1:
         return next(iter(found.values()))
     if label not in found:
@@ -189,13 +190,8 @@ class Recorded(States):
     run: Trajectory
 
 
-def _in_hdf5(path: Path, columns: Sequence[str]) -> dict[str, States]:
-    """Trajectories of a store of ours, of an H5MD file of any program, or of datasets by their names."""
-    if columns or is_foreign(path):
-        every = read_hdf5(path, columns)
-        return {name: x for name, x in every.items() if x.v is not None or x.p is not None} or {
-            name: moving(path, x) for name, x in every.items()
-        }
+def _recorded(path: Path) -> dict[str, States]:
+    """The trajectories of a store of ours."""
     found: dict[str, States] = {}
     for run in store.summary(path).runs:
         # one frame more than is looked at in a piece of a very long run

@@ -155,7 +155,7 @@ class _Command:
             # a function that is judged needs no reader of files, and so no h5py
             from springcheck import formats
 
-            states = formats.moving(out, formats.read(out))
+            states = formats.moving(out, next(iter(formats.read(out).values())))
         except StoreError as error:
             raise MethodError(
                 f"command {self._name}: its output{str(error).removeprefix(str(out))}"

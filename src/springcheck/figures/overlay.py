@@ -1,6 +1,6 @@
-"""Runs laid over each other: a curve a motion, marks of its engines, and what explodes cut off.
+"""Runs in one picture: a curve for each motion with the marks of its engines, cut off where it leaves.
 
-Right engines of one scheme move alike and share a line; one that failed has its own, in red and on top.
+Engines of one scheme that pass share a line; one that failed has its own, in red and on top.
 """
 
 from __future__ import annotations

@@ -26,7 +26,7 @@ from springcheck.formats.columns import Reader, States, fitting, moving
 from springcheck.formats.hdf5 import is_foreign, read_hdf5
 from springcheck.store import apart
 
-__all__ = ["BY_NAME", "FORMATS", "States", "is_foreign", "is_hdf5", "moving", "read", "read_hdf5"]
+__all__ = ["BY_NAME", "FORMATS", "States", "is_hdf5", "is_store", "moving", "read"]
 
 HDF5 = b"\x89HDF\r\n\x1a\n"
 BEGINNING = 1 << 12
@@ -100,13 +100,24 @@ def is_hdf5(path: Path) -> bool:
     return any(head[at : at + 8] == HDF5 for at in (0, 512, 1024, 2048))
 
 
-def read(path: Path, columns: Sequence[str] = (), step: float | None = None) -> States:
-    """The states of a file that is no HDF5, of one of the `FORMATS`; `columns` names what has no names, as
-    t, q, v.
+def is_store(path: Path) -> bool:
+    """Whether a file is a store of ours, not one of another program."""
+    return is_hdf5(path) and not is_foreign(path)
 
-    `step` is the time step of files that count steps alone.  Raises StoreError, in one line, where it cannot
-    be read, or lacks times or positions.
+
+def read(
+    path: Path, columns: Sequence[str] = (), step: float | None = None, most: int | None = None
+) -> dict[str, States]:
+    """The trajectories of a file of any program by name: one, but of HDF5 (see `read_hdf5`, for `most` too).
+
+    `columns` names what has no names, as t, q, v; `step` is the time step of files that count steps alone.
+    Raises StoreError, in one line, where it cannot be read, or lacks times or positions.
     """
+    found = read_hdf5(path, columns, most) if is_hdf5(path) else {path.name: _read(path, list(columns), step)}
+    return {name: fitting(path, states) for name, states in found.items()}
+
+
+def _read(path: Path, columns: list[str], step: float | None) -> States:
     head = _beginning(path)
     if not head:
         raise StoreError(f"{path}: is empty")
@@ -117,8 +128,7 @@ def read(path: Path, columns: Sequence[str] = (), step: float | None = None) -> 
                 head = file.read(BEGINNING)
         head = head.removeprefix(BOM_UTF8)
         found = next(one for one in FORMATS if one.recognise(head, path) and (one.by == LINES or not zipped))
-        reader = partial(_apart, found) if found.by == LIBRARY else found.read
-        return fitting(path, reader(path, list(columns), step))
+        return _apart(found, path, columns, step) if found.by == LIBRARY else found.read(path, columns, step)
     except (gzip.BadGzipFile, EOFError, zlib.error) as error:
         raise StoreError(f"{path}: what gzip has packed is damaged or cut off ({error})") from error
     except UnicodeDecodeError as error:

@@ -40,10 +40,9 @@ def read_hdf5(path: Path, columns: Sequence[str] = (), most: int | None = None) 
         wanted = {text.rpartition("=")[2].strip("/") for text in columns}
         names = [text.replace("=/", "=").removeprefix("/") for text in columns]
         found = dict(arrays(path, lambda place: place in wanted))
-        return {path.name: fitting(path, states_of(path, found, names))}
+        return {path.name: states_of(path, found, names)}
     if particles := particle_groups(path, most):
-        moving = {name: states for name, states in particles.items() if states.v is not None}
-        return {name: fitting(path, states) for name, states in (moving or particles).items()}
+        return {name: states for name, states in particles.items() if states.v is not None} or particles
     groups: dict[str, dict[str, Any]] = {}
     for place, values in arrays(path, lambda place: kind(_name_of(place).rpartition("/")[2]) is not None):
         group, _, name = _name_of(place).rpartition("/")

@@ -46,16 +46,10 @@ TIMES = {"ps": 1.0, "fs": 1e-3, "ns": 1e3, "s": 1e12, "us": 1e6}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class FileStates:
-    """Recorded states: t (f,), q and p or v (f, n), mass (n,) or None; `notes` on what was left out."""
+class FileStates(formats.States):
+    """The states of a trajectory of a file of which some coordinates and frames may be left out."""
 
     label: str
-    t: Floats
-    q: Floats
-    p: Floats | None
-    v: Floats | None
-    mass: Floats | None
-    notes: tuple[str, ...]
     adaptive: str = ""
     """The title of the adaptive solver that one of our own stores says made them."""
     whole: Floats | None = None
@@ -69,17 +63,14 @@ def read(
 
     Raises StoreError where the file cannot be read, or has no such trajectory.
     """
-    if path.is_file() and not formats.is_hdf5(path) and not label:
-        return [of_arrays(path.name, formats.read(path, columns, step))]
     # an unfinished store has its journal beside it and no file yet
-    foreign = bool(columns) or (path.is_file() and formats.is_foreign(path))
-    own = () if foreign else store.summary(path).runs
-    names = [run.label for run in own]
-    if foreign:
-        known = formats.read_hdf5(path, columns, MOST_FRAMES + 1)
+    if columns or (path.is_file() and not formats.is_store(path)):
+        known = formats.read(path, columns, step, MOST_FRAMES + 1)
         names = list(known)
         found = [of_arrays(name, states) for name, states in known.items() if label in (None, name)]
     else:
+        own = store.summary(path).runs
+        names = [run.label for run in own]
         found = list(_ours(path, own, label))
     if not found:
         asked = f" {label!r}; it has {', '.join(names)}" if names else " to identify"

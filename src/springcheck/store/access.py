@@ -58,7 +58,7 @@ def for_reading(path: Path) -> Iterator[Any]:
 
 
 def opened(path: Path) -> Any:
-    """The same, and what is wrong with it as libhdf5 says it."""
+    """A file open for reading; what is wrong with it is raised as libhdf5 says it."""
     try:
         return h5py.File(path, "r", locking="best-effort")
     except OSError as error:
@@ -128,10 +128,10 @@ def _has_one_name(node: Any) -> Any:
 def walk(
     group: Any, most: int, deepest: int, into: Callable[[str, Any], bool] = lambda place, node: True
 ) -> Iterator[tuple[str, int, Any]]:
-    """Places below a group, addresses and objects: groups once, datasets under each of their names, opened at
-    the first (then None).
+    """Path, address and object of all that is below a group: of a group once, of a dataset under each of its
+    names, the object at the first of them alone (later None).
 
-    What a group holds follows it where `into` says so.  StoreError where there are more than `most`.
+    `into(path, object)` says whether a group is entered.  StoreError where there are more than `most`.
     """
     seen, count = {address(group)}, 0
 

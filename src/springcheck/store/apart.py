@@ -1,4 +1,4 @@
-"""Files of strangers, read in a process of its own with little memory and time: whatever that does, we live.
+"""Files of others, read in a child process with limited memory and time: whatever happens to it, we live.
 
 Libraries that read them (libhdf5, pandas, MDAnalysis, ASE ...) crash, hang and fill the memory on files that
 are damaged, or were made to do so.

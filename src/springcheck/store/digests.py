@@ -31,7 +31,7 @@ LAID_OUT = ("h5md", "observables", "particles")
 """Groups of the root whose members have a digest each; stores of before list none of them."""
 MOST_OBJECTS = 64 * access.MOST_MEMBERS
 DEEPEST = 4
-"""Members of these groups, and groups in groups, of as many trajectories as a store may have."""
+"""Most objects below these groups, and levels of them: what the most trajectories of a store need."""
 
 
 def combined(digests: Mapping[str, str], columns: Mapping[str, Column]) -> str:

@@ -33,7 +33,7 @@ UNSUPPORTED = {errno.EOPNOTSUPP, errno.ENOTSUP, errno.ENOSYS, errno.EINVAL, errn
 """Error numbers of a file system that lacks an operation, or never completes one."""
 
 INTERRUPTED_FOR = 1.0
-"""Time for which a call of the system that was interrupted is made again [s]; Python makes it for ever."""
+"""How long a system call that was interrupted is retried [s]; Python would retry it for ever."""
 
 CAUSES = {
     errno.ENOSPC: "the disk is full",

@@ -23,7 +23,7 @@ from springcheck.store.tables import Table
 MAPPED = 1 << 26
 """Arrays larger than this [B] are mapped into memory, not read: their pages come when they are used."""
 PIECE = 1 << 20
-"""Rows of a window unless told."""
+"""Rows of a window by default."""
 
 
 def sources(path: Path, run: str | None = None) -> dict[str, Path]:

@@ -1,7 +1,7 @@
-"""Whether libhdf5 may be let loose on a file: it can crash, or never end, on a damaged one.
+"""Whether this process may open a file by libhdf5, which can crash or hang on a damaged one.
 
-A file that carries our seal is checked against it, in milliseconds.  Any other is first read by a process
-of its own, with little memory and time, whose end tells; what survives that is read again here.
+A file that carries our seal is checked against it, in milliseconds.  Any other is first read in a child
+process with limited memory and time, and here only if that one ends normally.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def _state(path: Path) -> tuple[int, ...]:
 
 
 def guarded(path: Path, module: str) -> str:
-    """Read a file in a process of its own -> what that says.
+    """Read a file in a child process -> its answer.
 
     Raises StoreError when it crashes, or takes so long that it will never end.
     """
@@ -63,7 +63,7 @@ def guarded(path: Path, module: str) -> str:
 
 @lru_cache(maxsize=4096)
 def _tried(path: Path, module: str, state: tuple[int, ...]) -> tuple[str, bool]:
-    """The answer of the process, and whether it lived to give it."""
+    """The answer of the child process, and whether it ended normally."""
     try:
         return apart.read(module, "tried", path).decode(), True
     except StoreError as error:
