@@ -50,14 +50,13 @@ function bath() {
   const show = () => {
     const curves = drawn(), cell = (x) => html("td", { class: "number" }, x);
     bank.charts[0].show({ ...chart, curves });
-    for (const name of Object.keys(sliders)) by(`show-bath-${name}`).value = number(now[name], 6);
     by("bath-said").replaceChildren(...curves.slice(1).map(({ name, S }) => html("tr", {},
       html("th", { scope: "row" }, name), ...(S ? [S[0], S[2]] : ["", ""]).map((x) =>
         cell(S ? `${number(x * now.T, 6)} ${unit}` : "none: unstable")))));
   };
-  sliding("bath-", sliders, now, (_, value) => value > 0, show);
+  const [, tell] = sliding("bath-", sliders, now, (_, value) => value > 0, show);
   by("bath").hidden = false;
-  show();
+  tell();
 }
 
 bath();

@@ -32,22 +32,29 @@ function tile(name, shade, attributes) {
   return element(name, { class: "tile", ...attributes, style: { fill } });
 }
 
-// Sliders and the fields beside them, by name: `now` follows both where a value is `right`, and is shown.
-// Returns what puts a value into all of them; a slider stands at the nearest of its places.
+// `now` follows sliders and their fields where a value is `right`.  Returns what puts a value into them, and
+// what shows all.
 function sliding(prefix, places, now, right, show) {
+  const [slide, field] = ["slide", "show"].map((kind) => (name) => by(`${kind}-${prefix}${name}`));
   const put = (name, value) => {
     if (!Number.isFinite(value) || !right(name, value)) return;
     const away = places[name].map((x) => Math.abs(x - value));
-    by(`slide-${prefix}${name}`).value = away.indexOf(Math.min(...away));
+    slide(name).value = away.indexOf(Math.min(...away));
     now[name] = value;
   };
-  for (const name of Object.keys(places)) {
-    const slide = by(`slide-${prefix}${name}`), field = by(`show-${prefix}${name}`);
+  const tell = () => {
+    for (const name in places) {
+      field(name).value = number(now[name], 6);
+      made(slide(name), { "aria-valuetext": number(now[name]) });
+    }
+    show();
+  };
+  for (const name in places) {
     put(name, now[name]);
-    made(slide, { input: () => show((now[name] = places[name][slide.value])) });
-    made(field, { change: () => show(put(name, field.valueAsNumber)) });
+    made(field(name), { change: (event) => tell(put(name, event.target.valueAsNumber)) });
+    made(slide(name), { input: (event) => tell((now[name] = places[name][event.target.value])) });
   }
-  return put;
+  return [put, tell];
 }
 
 const raised = (n) => String(n).replace("-", "\u207b").replace(/\d/g, (c) => "⁰¹²³⁴⁵⁶⁷⁸⁹"[c]);

@@ -101,6 +101,6 @@ function drop() {
     event.preventDefault();
     if (event.type === "drop" && event.dataTransfer.files.length) take(event.dataTransfer.files[0]);
   };
-  made(by("file"), { change: () => take(by("file").files[0]) }, []);
-  made(by("yours"), { dragover: dropped, drop: dropped }, []);
+  made(by("file"), { change: () => take(by("file").files[0]) });
+  made(by("yours"), { dragover: dropped, drop: dropped });
 }

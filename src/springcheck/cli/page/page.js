@@ -57,7 +57,6 @@ function changed() {
 function live() {
   if (!DATA.spring) return;
   const own = { ...DATA.spring, c: 0 }, now = { ...own }, asked = new URLSearchParams(location.hash.slice(1));
-  const right = { h: (v) => v !== 0, k: () => true, m: (v) => v > 0, p: () => true, c: (v) => v >= 0 };
   const names = Object.keys(DATA.sliders), time = by("slide-t");
   by("live").hidden = false;
   const bank = new Bank(by("orbits"), { ...DATA.live, charts: tried(now) }), [orbits] = bank.charts;
@@ -69,9 +68,10 @@ function live() {
     if (changed.length || asked.size) history.replaceState(null, "", `#${new URLSearchParams(changed)}`);
     move();
   };
-  const put = sliding("", DATA.sliders, now, (name, value) => right[name](value), show);
+  const right = (name, v) => ({ h: v !== 0, m: v > 0, c: v >= 0 })[name] ?? true;
+  const [put, tell] = sliding("", DATA.sliders, now, right, show);
   for (const name of names.filter((one) => asked.has(one))) put(name, Number(asked.get(name)));
-  made(by("reset"), { click: () => show(names.forEach((name) => put(name, own[name]))) });
+  made(by("reset"), { click: () => tell(names.forEach((name) => put(name, own[name]))) });
   made(time, { max: most, input: move });
   made(by("play"), { click: () => {
     const began = performance.now(), from = Number(time.value) % most;
@@ -83,7 +83,7 @@ function live() {
     };
     requestAnimationFrame(next);
   } });
-  show();
+  tell();
 }
 
 // Mass and spring by each scheme after a step, a row each, and their places on the orbits of the chart.
@@ -100,8 +100,8 @@ function moving(s, chart, step) {
     return [element("path", { class: "frame", d }), name, element("rect", { ...mass, x: end - 9, y: y - 9 })];
   });
   const box = { viewBox: `0 0 720 ${46 * drawn.length}`, role: "img" };
-  const words = { "aria-label": `mass and spring after ${step} steps` };
-  by("moving").replaceChildren(element("svg", { ...box, ...words }, ...drawn.flat()));
+  box["aria-label"] = `mass and spring after ${step} steps`;
+  by("moving").replaceChildren(element("svg", box, ...drawn.flat()));
   by("show-t").textContent = `t = ${number(step * s.h)}`;
 }
 
@@ -136,10 +136,6 @@ function tried(s) {
 }
 
 function said(s) {
-  for (const name of Object.keys(DATA.sliders)) {
-    by(`show-${name}`).value = number(s[name], 6);
-    by(`slide-${name}`).setAttribute("aria-valuetext", number(s[name]));
-  }
   const size = Math.abs(s.h) * Math.sqrt(s.k / s.m), zeta = dampingOf(s), turn = `h \u03c9 = ${number(size)}`;
   const each = DATA.live.charts[1].curves.map(({ name, group }) => {
     const factor = radius(DATA.laws[group], size, zeta);
