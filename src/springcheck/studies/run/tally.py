@@ -9,8 +9,9 @@ import numpy as np
 
 from springcheck import checks, thermal
 from springcheck.physics import exact
-from springcheck.physics.arrays import Reals
+from springcheck.physics.arrays import Floats, Reals
 from springcheck.physics.scene import Scene
+from springcheck.physics.system import MOST_DENSE
 from springcheck.physics.trajectory import Trajectory
 from springcheck.studies.run.result import Heated, MethodRun
 from springcheck.thermal import THERMOSTATS
@@ -18,6 +19,10 @@ from springcheck.thermal import THERMOSTATS
 SETTLED = 5.0
 """Times over which the slowest part of the motion decays before frames count: exp(-5) of a start is left in
 its mean, exp(-10) in its square."""
+
+PLACES, RESISTED = 8, 1e-9
+"""Frames at which the Hessian is evaluated, and the smallest singular value of a direction in which forces
+change, for elements up to 1; those of translations are roundings."""
 
 
 def heated_of(scene: Scene, pieces: Iterable[Trajectory]) -> Heated:
@@ -29,6 +34,23 @@ def heated_of(scene: Scene, pieces: Iterable[Trajectory]) -> Heated:
     return heat.line(label)
 
 
+def bound_freedoms(scene: Scene, q: Floats) -> int:
+    """Coordinates less the directions in which no force changes, seen at frames q (f, n): the virial of these
+    is 0, and they have no configurational temperature.  0 with rods, along which forces do no virtual work
+    and are no part of the virial."""
+    system = scene.system
+    if system.rods or not any(term.kind == "potential" for term in scene.terms):
+        return 0
+    if system.has_modes:
+        return int(np.count_nonzero(system.modes.w2))
+    if scene.n > MOST_DENSE:
+        return scene.n - len(system.free_groups)
+    there = system.hessian(q[np.linspace(0, len(q) - 1, PLACES).astype(int)]).astype(np.float64)
+    size = np.sqrt(np.max(np.abs(there), axis=(0, 1)))
+    size[size == 0] = 1
+    return int(np.linalg.matrix_rank((there / size / size[:, None]).reshape(-1, scene.n), tol=RESISTED))
+
+
 class Heat:
     """Configurational and kinetic temperature of a run, from its pieces."""
 
@@ -37,6 +59,7 @@ class Heat:
         self._law: thermal.Law | None = None
         rods = scene.system.rods
         self._freedoms = rods.freedoms if rods else scene.n
+        self._bound = scene.n
         self._sums = np.zeros((2, scene.n))
         self._frames = 0
         self._from = 0
@@ -68,17 +91,21 @@ class Heat:
     def _begin(self, piece: Trajectory) -> None:
         scene, self._scheme, self._every = self._scene, piece.scheme, piece.every
         assert scene.bath is not None
+        self._bound = bound_freedoms(scene, piece.q)
         if scene.system.rods:
             self._from = round(SETTLED / (scene.bath.friction * piece.step))
             return
-        linear = scene.system.has_modes and bool(np.all(scene.system.modes.w2 > 0))
+        linear = scene.system.has_modes and bool(np.all(scene.system.modes.w2 >= 0))
         if piece.scheme in THERMOSTATS and linear and not THERMOSTATS[piece.scheme].rescales:
             if not THERMOSTATS[piece.scheme].splits:
+                held = scene.system.modes.w2[scene.system.modes.w2 > 0]
+                if not len(held):
+                    return
                 self._law = thermal.Law(
-                    scheme=THERMOSTATS[piece.scheme], h=piece.step, m=np.ones(scene.n),
-                    k=scene.system.modes.w2, rate=scene.bath.friction, thermal=scene.thermal,
+                    scheme=THERMOSTATS[piece.scheme], h=piece.step, m=np.ones(len(held)), k=held,
+                    rate=scene.bath.friction, thermal=scene.thermal,
                 )  # fmt: skip
-            elif scene.system.is_separate:
+            elif scene.system.is_separate and self._bound == scene.n:
                 # modes of all terms are not those of the fast ones
                 self._law = thermal.draws.law_of(THERMOSTATS[piece.scheme], scene.derived(step=piece.step))
             else:
@@ -89,9 +116,7 @@ class Heat:
     def line(self, method: str) -> Heated:
         """What was found."""
         nan = np.full(self._scene.n, np.nan)
-        thermal = self._scene.thermal
-        # forces along a rod do no virtual work and are no part of the virial
-        held = any(term.kind == "potential" for term in self._scene.terms) and not self._scene.system.rods
+        thermal, bound = self._scene.thermal, self._bound
         with np.errstate(all="ignore"):
             q, p = self._sums / (self._frames * thermal) if self._frames else (nan, nan)
             if self._law is None:
@@ -100,12 +125,14 @@ class Heat:
                 law = self._law.configurational, self._law.kinetic
                 several = self._law.error_of_variances(max(self._frames, 2), self._every)
                 errors = several.T * np.stack(law)
-        n = len(nan)
-        error = np.sqrt(np.sum(errors**2, axis=1)) / n
+        error = np.sqrt(np.sum(errors**2, axis=1)) / errors.shape[1]
+        if bound < len(nan):
+            # of motion that nothing holds the law has no stationary state
+            law, error[1] = (law[0], nan), np.nan
         if self._scene.system.rods:
-            law, error[1] = (nan, np.full(n, self._law_of_rods)), self._error_of_rods()
+            law, error[1] = (nan, np.full(len(nan), self._law_of_rods)), self._error_of_rods()
         return Heated(
-            method=method, scheme=self._scheme, configurational=float(np.mean(q)) if held else np.nan,
+            method=method, scheme=self._scheme, configurational=float(np.sum(q)) / bound if bound else np.nan,
             configurational_error=float(error[0]), configurational_law=float(np.mean(law[0])),
             kinetic=float(np.sum(p)) / self._freedoms, kinetic_error=float(error[1]),
             kinetic_law=float(np.mean(law[1])),
