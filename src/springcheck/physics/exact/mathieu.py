@@ -12,8 +12,8 @@ import numpy as np
 
 from springcheck.physics.arrays import Extended, by_identity
 from springcheck.physics.driven import ModulatedSpring
+from springcheck.physics.exact.closedform import LAST, PI, ClosedForm, States, one_each
 from springcheck.physics.exact.powers import propagate
-from springcheck.physics.exact.well import LAST, PI, States, Well, one_each
 from springcheck.physics.system import System
 
 TAYLOR_ORDER = 22
@@ -47,22 +47,73 @@ class _Mode(NamedTuple):
         return float(np.maximum(np.sqrt(np.abs(self.w2) * (1 + np.abs(self.depth))), np.abs(self.turn)))
 
 
-def prepare(system: System[Any]) -> tuple[_Mode, ...] | None:
-    """None where anything else acts, or where a period is too long."""
-    term = system.terms[0]
-    if not isinstance(term, ModulatedSpring) or len(system.terms) > 1 or not one_each(system):
-        return None
-    found = []
-    for i, k, depth, frequency, phase, at in term.rows():
-        m, q, p = (np.longdouble(x[i]) for x in (system.m, system.q, system.p))
-        start = np.array([q - np.longdouble(at), p / m])
-        deep, turn, angle = (np.longdouble(x) for x in (depth, frequency, phase))
-        none = np.empty(0, np.longdouble)
-        blank = _Mode(np.longdouble(k) / m, deep, turn, angle, start, at, np.longdouble(0), none)
-        if frequency == 0 or not 2 * blank.rate * 2 * np.pi / abs(frequency) < MOST_NODES:
-            return None
-        found.append((i, _with_nodes(blank)))
-    return tuple(mode for _, mode in sorted(found, key=lambda one: one[0]))
+class ModulatedMotion(ClosedForm):
+    """A whole scene of springs of modulated stiffness, one on each particle, each with its `_Mode`."""
+
+    def __init__(self, system: System[Any]) -> None:
+        """Nothing else may act, and no period be too long."""
+        super().__init__(system)
+        term = next(iter(system.terms), None)
+        self.need(isinstance(term, ModulatedSpring) and len(system.terms) == 1 and one_each(system))
+        assert isinstance(term, ModulatedSpring)
+        found = {}
+        for i, k, depth, frequency, phase, at in term.rows():
+            m, q, p = (np.longdouble(x[i]) for x in (system.m, system.q, system.p))
+            start = np.array([q - np.longdouble(at), p / m])
+            deep, turn, angle = (np.longdouble(x) for x in (depth, frequency, phase))
+            none = np.empty(0, np.longdouble)
+            blank = _Mode(np.longdouble(k) / m, deep, turn, angle, start, at, np.longdouble(0), none)
+            self.need(frequency != 0 and 2 * blank.rate * 2 * np.pi / abs(frequency) < MOST_NODES)
+            found[i] = _with_nodes(blank)
+        self.modes = [found[i] for i in sorted(found)]
+
+    def at(self, t: Extended) -> States:
+        q, p = np.empty((2, len(t), self.system.n), dtype=np.longdouble)
+        for i, mode in enumerate(self.modes):
+            period = 2 * PI / np.abs(mode.turn)
+            n = np.floor(t[:, 0] / period).astype(np.int64)
+            rest = t[:, 0] - n * period
+            j = np.clip((rest / mode.node).astype(np.int64), 0, len(mode.nodes) - 2)
+            last = _series(mode, mode.node * j, rest - mode.node * j)
+            # what turns by nearly half a turn a period, its negative turns by little
+            sign, begun = np.copysign(1, np.trace(mode.nodes[-1])), np.empty((2, len(t)), np.longdouble)
+            (a, b), (c, d) = sign * mode.nodes[-1]
+            for matrix, mine in ((np.array([[a, b], [c, d]]), n >= 0), (np.array([[d, -b], [-c, a]]), n < 0)):
+                u0, v0 = mode.start[:, None]
+                u, v = propagate(matrix[None], u0, v0, np.abs(n[mine]), area_preserving=True)
+                begun[:, mine] = np.stack([u[:, 0], v[:, 0]]) * np.where(n[mine] % 2 == 1, sign, 1)
+            q[:, i], p[:, i] = np.einsum("fij,jf->if", last @ mode.nodes[j], begun)
+        return q + np.array([mode.at for mode in self.modes]), p * self.system.m
+
+    def doubt(self, t: np.longdouble) -> States:
+        """Roundings of the angle turned through, times the largest state.
+
+        Of eigenvalues x and y, and the length N of M - x, the matrix M of a period has powers of at most
+        1 + n N or the condition of its eigenvectors, k + root(k**2 - 1) with k = N/|x - y|: close to the edge
+        of a resonance they grow, once with the state and once with what becomes of an error.  That holds in
+        the coordinates (z u, v) for any z, and the least of several is taken; errors begin with rate/z there.
+        """
+        u, v = np.empty((2, self.system.n), dtype=np.longdouble)
+        for i, mode in enumerate(self.modes):
+            M = mode.nodes[-1]
+            half = np.trace(M) / 2
+            root = np.emath.sqrt((half - 1) * (half + 1)) * np.copysign(1, half)
+            radius, gap = max(float(np.abs(np.real(half + root))), 1.0), max(2 * float(np.abs(root)), LAST)
+            period = 2 * PI / np.abs(mode.turn)
+            # before the start a whole period goes back, and some of it on
+            turned, periods = mode.rate * (t if t >= 0 else period - t), float(np.abs(t) / period) + 1
+            sizes = []
+            for z in mode.rate * np.geomspace(1, _balance(M) / mode.rate, SCALES):
+                scaled = mode.nodes * [[1, z], [1 / z, 1]]
+                length = float(np.linalg.norm((scaled[-1] - (half + root) * np.eye(2)).astype(complex)))
+                k = max(length / gap, 1.0)
+                power = min(k + np.sqrt(k * k - 1), 1 + periods * length)
+                within = np.max(np.linalg.norm(scaled.astype(np.float64), axis=(1, 2)))
+                grown = within * power**2 * max(mode.rate / z, z / mode.rate)
+                sizes.append(grown * np.hypot(z * mode.start[0], mode.start[1]) / np.array([z, 1]))
+            u[i], v[i] = np.min(sizes, axis=0) * radius**periods * LAST * (1 + turned)
+            u[i] += LAST * np.abs(mode.at)
+        return u, v * self.system.m
 
 
 def _with_nodes(mode: _Mode) -> _Mode:
@@ -97,57 +148,6 @@ def _series(mode: _Mode, t: Extended, s: Extended) -> Extended:
     return np.asarray(np.moveaxis(np.stack([y, v]), -1, 0))
 
 
-def motion(system: System[Any], found: tuple[_Mode, ...], t: Extended) -> States:
-    """Exact q and p (f, n) at times t (f, 1) [T]."""
-    q, p = np.empty((2, len(t), system.n), dtype=np.longdouble)
-    for i, mode in enumerate(found):
-        period = 2 * PI / np.abs(mode.turn)
-        n = np.floor(t[:, 0] / period).astype(np.int64)
-        rest = t[:, 0] - n * period
-        j = np.clip((rest / mode.node).astype(np.int64), 0, len(mode.nodes) - 2)
-        last = _series(mode, mode.node * j, rest - mode.node * j)
-        # what turns by nearly half a turn a period, its negative turns by little
-        sign, begun = np.copysign(1, np.trace(mode.nodes[-1])), np.empty((2, len(t)), np.longdouble)
-        (a, b), (c, d) = sign * mode.nodes[-1]
-        for matrix, mine in ((np.array([[a, b], [c, d]]), n >= 0), (np.array([[d, -b], [-c, a]]), n < 0)):
-            u0, v0 = mode.start[:, None]
-            u, v = propagate(matrix[None], u0, v0, np.abs(n[mine]), area_preserving=True)
-            begun[:, mine] = np.stack([u[:, 0], v[:, 0]]) * np.where(n[mine] % 2 == 1, sign, 1)
-        q[:, i], p[:, i] = np.einsum("fij,jf->if", last @ mode.nodes[j], begun)
-    return q + np.array([mode.at for mode in found]), p * system.m
-
-
-def doubt(system: System[Any], found: tuple[_Mode, ...], t: np.longdouble) -> States:
-    """Bounds (n,) of the errors of `motion`: roundings of the angle turned through, times the largest state.
-
-    Of eigenvalues x and y, and the length N of M - x, the matrix M of a period has powers of at most 1 + n N
-    or the condition of its eigenvectors, k + root(k**2 - 1) with k = N/|x - y|: close to the edge of a
-    resonance they grow, once with the state and once with what becomes of an error.  That holds in the
-    coordinates (z u, v) for any z, and the least of several is taken; errors begin with rate/z there.
-    """
-    u, v = np.empty((2, system.n), dtype=np.longdouble)
-    for i, mode in enumerate(found):
-        M = mode.nodes[-1]
-        half = np.trace(M) / 2
-        root = np.emath.sqrt((half - 1) * (half + 1)) * np.copysign(1, half)
-        radius, gap = max(float(np.abs(np.real(half + root))), 1.0), max(2 * float(np.abs(root)), LAST)
-        period = 2 * PI / np.abs(mode.turn)
-        # before the start a whole period goes back, and some of it on
-        turned, periods = mode.rate * (t if t >= 0 else period - t), float(np.abs(t) / period) + 1
-        sizes = []
-        for z in mode.rate * np.geomspace(1, _balance(M) / mode.rate, SCALES):
-            scaled = mode.nodes * [[1, z], [1 / z, 1]]
-            length = float(np.linalg.norm((scaled[-1] - (half + root) * np.eye(2)).astype(complex)))
-            k = max(length / gap, 1.0)
-            power = min(k + np.sqrt(k * k - 1), 1 + periods * length)
-            within = np.max(np.linalg.norm(scaled.astype(np.float64), axis=(1, 2)))
-            grown = within * power**2 * max(mode.rate / z, z / mode.rate)
-            sizes.append(grown * np.hypot(z * mode.start[0], mode.start[1]) / np.array([z, 1]))
-        u[i], v[i] = np.min(sizes, axis=0) * radius**periods * LAST * (1 + turned)
-        u[i] += LAST * np.abs(mode.at)
-    return u, v * system.m
-
-
 def _balance(M: Extended) -> float:
     """The z with which M (2, 2) on (z u, v) has elements alike beside its diagonal."""
     one, other = np.abs(M[0, 1]), np.abs(M[1, 0])
@@ -159,7 +159,8 @@ def floquet(system: System[Any]) -> tuple[float, float, float] | None:
     where that is above 1 and else 1, the period [T], and the angle of the multiplier, 0 to pi [rad], of what
     grows fastest; None of other scenes."""
     each = []
-    for mode in prepare(system) or () if "modulated-spring" in system.acting else ():
+    found = ModulatedMotion.of(system)
+    for mode in found.modes if found else ():
         half = float(np.trace(mode.nodes[-1])) / 2
         # the matrix of a period has the determinant 1
         grown = abs(half) + float(np.sqrt(max(half * half - 1, 0)))
@@ -167,7 +168,3 @@ def floquet(system: System[Any]) -> tuple[float, float, float] | None:
             (max(grown, 1.0), float(2 * PI / np.abs(mode.turn)), float(np.arccos(np.clip(half, -1, 1))))
         )
     return max(each, default=None)
-
-
-MATHIEU = Well(key="modulated-spring", terms=frozenset(), prepare=prepare, motion=motion, doubt=doubt)
-"""A whole scene of springs of modulated stiffness, one on each particle."""

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from springcheck.physics.arrays import EPS, Extended, Integers, Reals, by_identity
+from springcheck.physics.exact.closedform import PI
 from springcheck.physics.exact.digits import ENOUGH, Wide, digits, eigen, exactly, extended
 from springcheck.physics.system import System
 from springcheck.physics.terms import Damping, Spring
@@ -267,9 +268,6 @@ def _drag(system: System[Any], force: Extended) -> Extended:
         moves = abs(total) > len(group) * EPS * np.sum(np.abs(force[group]))
         out[group] = np.sqrt(m) * total / np.sum(m) if moves else 0
     return out
-
-
-PI = 4 * np.arctan(np.longdouble(1))
 
 
 def _wave_frequencies(system: System[Any]) -> Extended:
