@@ -123,17 +123,14 @@ class Cosine(OnParticles):
         # the sine's own rounding, and that of its argument, which turns round and round
         return np.abs(depth * wave) * (1 + np.abs(wave) * size)
 
-    def add_rounding(
-        self, q: Reals, v: Reals, out: Reals, near: Reals | None, *, exact: bool = False
-    ) -> None:
+    def pull_rounding(self, q: Reals, v: Reals, near: Reals | None, exact: bool) -> Reals:
         """Many turns away the argument's rounding is all there is, unless nothing is subtracted and the
         product with `wave` is exact."""
         whole = (self.at == 0) & (np.frexp(self.wave)[0] == 0.5)
         if near is None or not exact or not np.any(whole):
-            return Term.add_rounding(self, q, v, out, near)
+            return Term.pull_rounding(self, q, v, near, exact)
         size = np.where(whole, 0, np.abs(np.take(q, self.i, axis=-1)) + np.abs(self.at))
-        self.scatter(np.abs(self.rounding(size, self.elongation(near), self.depth, self.wave)), out)
-        return None
+        return np.abs(self.rounding(size, self.elongation(near), self.depth, self.wave))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -230,10 +227,8 @@ class Damping(WithoutPotential):
     def add_force(self, q: Reals, v: Reals, out: Reals) -> None:
         Term.add_force(self, v, q, out)
 
-    def add_rounding(
-        self, q: Reals, v: Reals, out: Reals, near: Reals | None, *, exact: bool = False
-    ) -> None:
-        Term.add_rounding(self, v, q, out, v)
+    def pull_rounding(self, q: Reals, v: Reals, near: Reals | None, exact: bool) -> Reals:
+        return Term.pull_rounding(self, v, q, v, exact)
 
 
 _KNOWN: dict[str, type[Term]] = {

@@ -6,13 +6,22 @@ node of a grid is a product of Taylor series in time, whose step turns by less t
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
-from springcheck.physics.arrays import Extended, by_identity
+from springcheck.physics.arrays import Extended
 from springcheck.physics.driven import ModulatedSpring
-from springcheck.physics.exact.closedform import LAST, PI, ClosedForm, States, one_each
+from springcheck.physics.exact.closedform import (
+    LAST,
+    PI,
+    ClosedForm,
+    NoClosedFormError,
+    States,
+    one_each,
+    wide,
+)
 from springcheck.physics.exact.powers import propagate
 from springcheck.physics.system import System
 
@@ -26,55 +35,69 @@ MOST_NODES = 1 << 14
 """Nodes of a period: a modulation so slow that it takes more is left out."""
 
 
-@by_identity
-class _Mode(NamedTuple):
-    """One particle: u'' = -w2 (1 + depth cos(W t + phase)) u, u = q - at, its start (u, v), its matrices."""
+class _Mode:
+    """One particle: u'' = -w2 (1 + depth cos(turn t + phase)) u, u = q - at, and its start (u, v).
 
-    w2: np.longdouble
-    depth: np.longdouble
-    turn: np.longdouble
-    phase: np.longdouble
-    start: Extended
-    at: float
-    node: np.longdouble
-    """Distance of the nodes [T]."""
-    nodes: Extended
-    """What takes (u, v) from the start to each node of a period (j + 1, 2, 2), the last its end."""
+    `rate` is the largest frequency, that of the spring or of the modulation [1/T], and `nodes` (j + 1, 2, 2)
+    what takes (u, v) from the start to each node of a period, the last its end, which are `node` [T] apart.
+    """
 
-    @property
-    def rate(self) -> float:
-        """The largest frequency, that of the spring or of the modulation [1/T]."""
-        return float(np.maximum(np.sqrt(np.abs(self.w2) * (1 + np.abs(self.depth))), np.abs(self.turn)))
+    def __init__(self, found: Extended, row: Sequence[float]) -> None:
+        """Of mass, position and momentum, and a row of its term.  NoClosedFormError: a period is too long."""
+        m, q, p = found
+        k, self.depth, self.turn, self.phase, self.at = wide(row)
+        self.w2, self.start = k / m, np.array([q - self.at, p / m])
+        spring = np.sqrt(np.abs(self.w2) * (1 + np.abs(self.depth)))
+        self.rate = float(np.maximum(spring, np.abs(self.turn)))
+        if self.turn == 0 or not 2 * self.rate * 2 * np.pi / abs(float(self.turn)) < MOST_NODES:
+            raise NoClosedFormError
+        self.period = 2 * PI / np.abs(self.turn)
+        count = int(np.ceil(2 * self.rate * float(self.period)))
+        self.node = self.period / count
+        nodes = [np.asarray(np.eye(2), np.longdouble)]
+        for one in self.steps(self.node * np.arange(count), np.full(count, self.node)):
+            nodes.append(np.asarray(one @ nodes[-1], np.longdouble))
+        self.nodes = np.stack(nodes)
+
+    def steps(self, t: Extended, s: Extended) -> Extended:
+        """What takes (u, v) from the times t (f,) to t + s: (f, 2, 2)."""
+        angle = self.turn * t + self.phase
+        waves, factor = [], np.longdouble(1)
+        for j in range(TAYLOR_ORDER):
+            # the j-th derivative of the cosine: cos, -sin, -cos, sin
+            wave = (np.cos(angle), -np.sin(angle), -np.cos(angle), np.sin(angle))[j % 4]
+            waves.append(self.depth * factor * wave + (1 if j == 0 else 0))
+            factor = factor * self.turn / (j + 1)
+        # both unit starts at once, coefficients (order, 2, f)
+        u = [np.stack([np.ones_like(s), np.zeros_like(s)]), np.stack([np.zeros_like(s), np.ones_like(s)])]
+        for j in range(TAYLOR_ORDER):
+            total = sum((waves[i] * u[j - i] for i in range(j + 1)), np.zeros_like(u[0]))
+            u.append(np.asarray(-self.w2 * total / ((j + 1) * (j + 2)), np.longdouble))
+        y, v = np.zeros_like(u[0]), np.zeros_like(u[0])
+        for j in reversed(range(len(u))):
+            y = y * s + u[j]
+            v = v * s + j * u[j] if j else v
+        return np.asarray(np.moveaxis(np.stack([y, v]), -1, 0))
 
 
 class ModulatedMotion(ClosedForm):
     """A whole scene of springs of modulated stiffness, one on each particle, each with its `_Mode`."""
 
     def __init__(self, system: System[Any]) -> None:
-        """Nothing else may act, and no period be too long."""
         super().__init__(system)
         term = next(iter(system.terms), None)
         self.need(isinstance(term, ModulatedSpring) and len(system.terms) == 1 and one_each(system))
         assert isinstance(term, ModulatedSpring)
-        found = {}
-        for i, k, depth, frequency, phase, at in term.rows():
-            m, q, p = (np.longdouble(x[i]) for x in (system.m, system.q, system.p))
-            start = np.array([q - np.longdouble(at), p / m])
-            deep, turn, angle = (np.longdouble(x) for x in (depth, frequency, phase))
-            none = np.empty(0, np.longdouble)
-            blank = _Mode(np.longdouble(k) / m, deep, turn, angle, start, at, np.longdouble(0), none)
-            self.need(frequency != 0 and 2 * blank.rate * 2 * np.pi / abs(frequency) < MOST_NODES)
-            found[i] = _with_nodes(blank)
-        self.modes = [found[i] for i in sorted(found)]
+        found = wide([system.m, system.q, system.p])
+        self.modes = [_Mode(found[:, i], row) for i, *row in sorted(term.rows())]
 
     def at(self, t: Extended) -> States:
         q, p = np.empty((2, len(t), self.system.n), dtype=np.longdouble)
         for i, mode in enumerate(self.modes):
-            period = 2 * PI / np.abs(mode.turn)
-            n = np.floor(t[:, 0] / period).astype(np.int64)
-            rest = t[:, 0] - n * period
+            n = np.floor(t[:, 0] / mode.period).astype(np.int64)
+            rest = t[:, 0] - n * mode.period
             j = np.clip((rest / mode.node).astype(np.int64), 0, len(mode.nodes) - 2)
-            last = _series(mode, mode.node * j, rest - mode.node * j)
+            last = mode.steps(mode.node * j, rest - mode.node * j)
             # what turns by nearly half a turn a period, its negative turns by little
             sign, begun = np.copysign(1, np.trace(mode.nodes[-1])), np.empty((2, len(t)), np.longdouble)
             (a, b), (c, d) = sign * mode.nodes[-1]
@@ -99,9 +122,11 @@ class ModulatedMotion(ClosedForm):
             half = np.trace(M) / 2
             root = np.emath.sqrt((half - 1) * (half + 1)) * np.copysign(1, half)
             radius, gap = max(float(np.abs(np.real(half + root))), 1.0), max(2 * float(np.abs(root)), LAST)
-            period = 2 * PI / np.abs(mode.turn)
             # before the start a whole period goes back, and some of it on
-            turned, periods = mode.rate * (t if t >= 0 else period - t), float(np.abs(t) / period) + 1
+            turned, periods = (
+                mode.rate * (t if t >= 0 else mode.period - t),
+                float(np.abs(t) / mode.period) + 1,
+            )
             sizes = []
             for z in mode.rate * np.geomspace(1, _balance(M) / mode.rate, SCALES):
                 scaled = mode.nodes * [[1, z], [1 / z, 1]]
@@ -114,38 +139,6 @@ class ModulatedMotion(ClosedForm):
             u[i], v[i] = np.min(sizes, axis=0) * radius**periods * LAST * (1 + turned)
             u[i] += LAST * np.abs(mode.at)
         return u, v * self.system.m
-
-
-def _with_nodes(mode: _Mode) -> _Mode:
-    period = 2 * PI / np.abs(mode.turn)
-    count = int(np.ceil(2 * mode.rate * float(period)))
-    step = period / count
-    steps = _series(mode, step * np.arange(count), np.full(count, step))
-    nodes = [np.asarray(np.eye(2), np.longdouble)]
-    for one in steps:
-        nodes.append(np.asarray(one @ nodes[-1], np.longdouble))
-    return mode._replace(node=step, nodes=np.stack(nodes))
-
-
-def _series(mode: _Mode, t: Extended, s: Extended) -> Extended:
-    """What takes (u, v) from the times t (f,) to t + s: (f, 2, 2)."""
-    angle = mode.turn * t + mode.phase
-    waves, factor = [], np.longdouble(1)
-    for j in range(TAYLOR_ORDER):
-        # the j-th derivative of the cosine: cos, -sin, -cos, sin
-        wave = (np.cos(angle), -np.sin(angle), -np.cos(angle), np.sin(angle))[j % 4]
-        waves.append(mode.depth * factor * wave + (1 if j == 0 else 0))
-        factor = factor * mode.turn / (j + 1)
-    # both unit starts at once, coefficients (order, 2, f)
-    u = [np.stack([np.ones_like(s), np.zeros_like(s)]), np.stack([np.zeros_like(s), np.ones_like(s)])]
-    for j in range(TAYLOR_ORDER):
-        total = sum((waves[i] * u[j - i] for i in range(j + 1)), np.zeros_like(u[0]))
-        u.append(np.asarray(-mode.w2 * total / ((j + 1) * (j + 2)), np.longdouble))
-    y, v = np.zeros_like(u[0]), np.zeros_like(u[0])
-    for j in reversed(range(len(u))):
-        y = y * s + u[j]
-        v = v * s + j * u[j] if j else v
-    return np.asarray(np.moveaxis(np.stack([y, v]), -1, 0))
 
 
 def _balance(M: Extended) -> float:
@@ -164,7 +157,5 @@ def floquet(system: System[Any]) -> tuple[float, float, float] | None:
         half = float(np.trace(mode.nodes[-1])) / 2
         # the matrix of a period has the determinant 1
         grown = abs(half) + float(np.sqrt(max(half * half - 1, 0)))
-        each.append(
-            (max(grown, 1.0), float(2 * PI / np.abs(mode.turn)), float(np.arccos(np.clip(half, -1, 1))))
-        )
+        each.append((max(grown, 1.0), float(mode.period), float(np.arccos(np.clip(half, -1, 1)))))
     return max(each, default=None)
