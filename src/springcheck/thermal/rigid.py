@@ -137,12 +137,12 @@ def _pseudoinverse(J: Floats) -> Floats:
     and is not nothing: each number of a state is measured by its own largest slope.
     """
     size = np.linalg.norm(J, axis=-1, keepdims=True)
-    _, weights, turned = np.linalg.svd(J / np.where(size > 0, size, 1), full_matrices=False)
-    seen = weights > UNSEEN_DRAW * weights[:, :1]
-    of_all = np.linalg.svd(J, compute_uv=False)
-    if np.array_equal(np.sum(seen, axis=-1), np.sum(of_all > UNSEEN_DRAW * of_all[:, :1], axis=-1)):
+    even = J / np.where(size > 0, size, 1)
+    weights = (np.linalg.svd(of, compute_uv=False) for of in (even, J))
+    seen, of_all = (each > UNSEEN_DRAW * each[:, :1] for each in weights)
+    if np.array_equal(np.sum(seen, axis=-1), np.sum(of_all, axis=-1)):
         return np.asarray(np.linalg.pinv(J, rcond=UNSEEN_DRAW))
-    basis = np.swapaxes(turned * seen[..., None], -1, -2)
+    basis = np.swapaxes(np.linalg.svd(even, full_matrices=False)[2] * seen[..., None], -1, -2)
     return np.asarray(basis @ np.linalg.pinv(J @ basis, rcond=LEAST_SLOPE))
 
 
