@@ -28,9 +28,6 @@ class Magnetic(WithoutPotential):
     b: Integers
     strength: Floats
 
-    def pull(self, q: Reals) -> Reals:
-        return np.zeros((*q.shape[:-1], len(self)), q.dtype)
-
     def add_force(self, q: Reals, v: Reals, out: Reals) -> None:
         one, other = (np.take(v, index, axis=-1) for index in self.particles)
         self._add(out, self.strength * other, -self.strength * one)

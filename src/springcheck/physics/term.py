@@ -289,6 +289,9 @@ class WithoutPotential(Term):
     def potential(u: Reals, *_: Floats) -> Reals:
         return np.zeros_like(u)
 
+    slope: ClassVar[Any] = potential
+    rounding: ClassVar[Any] = potential
+
     @staticmethod
     def second(u: Reals, strength: Floats, *_: Floats) -> Reals:
         return np.zeros_like(strength)

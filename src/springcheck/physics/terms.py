@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import ClassVar, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
@@ -28,12 +28,8 @@ __all__ = [
 ]  # fmt: skip
 
 
-class Hooke(LinearLaw):
-    """Linear springs along an axis, whose force is added up before that of others."""
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
-class WallSpring(Hooke, OnParticles):
+class WallSpring(LinearLaw, OnParticles):
     """Springs from particles i to fixed points: V = k/2 (q - at)**2.  k [M/T2], at [L]."""
 
     key: ClassVar[str] = "wall-spring"
@@ -49,7 +45,7 @@ class WallSpring(Hooke, OnParticles):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Spring(Hooke, OnPairs):
+class Spring(LinearLaw, OnPairs):
     """Springs between particles a and b: V = k/2 (q[b] - q[a] - rest)**2.  k [M/T2], rest [L]."""
 
     key: ClassVar[str] = "spring"
@@ -215,14 +211,9 @@ class Damping(WithoutPotential):
     i: Integers
     c: Floats
 
-    @staticmethod
-    def slope(u: Reals, c: Floats) -> Reals:
-        """The force by the velocity u, not by an elongation."""
-        return c * u
-
-    @staticmethod
-    def rounding(size: Reals, u: Reals, c: Floats) -> Reals:
-        return c * size
+    # of the velocity, not of an elongation
+    slope: ClassVar[Any] = staticmethod(LinearLaw.slope)
+    rounding: ClassVar[Any] = staticmethod(LinearLaw.rounding)
 
     def add_force(self, q: Reals, v: Reals, out: Reals) -> None:
         Term.add_force(self, v, q, out)
@@ -289,6 +280,12 @@ def in_order(terms: Iterable[Term]) -> tuple[Term, ...]:
 
     def place(term: Term) -> tuple[bool, bool, bool, int, str]:
         number = known.index(term.key) if term.key in known else len(known)
-        return (term.kind != "potential", not isinstance(term, Hooke), term.fast, number, term.key)
+        return (
+            term.kind != "potential",
+            not isinstance(term, WallSpring | Spring),
+            term.fast,
+            number,
+            term.key,
+        )
 
     return tuple(sorted(found.values(), key=place))

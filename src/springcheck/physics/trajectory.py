@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from springcheck.errors import SpringcheckError
-from springcheck.physics.arrays import Arithmetic, Floats
+from springcheck.physics.arrays import Arithmetic, Extended, Floats
 
 if TYPE_CHECKING:
     from springcheck.physics.scene import Scene
@@ -129,14 +129,17 @@ class Trajectory:
 
         SpringcheckError where no closed form of the exact solution is known.
         """
+        scene = self._known
+        if scene.system.solution is None:
+            raise SpringcheckError(f"scene {scene.name}: no closed form of its exact solution is known")
+        q, p = self._exact(scene)
+        return scene.system.norm(self.q - q, self.p - p)
+
+    def _exact(self, scene: Scene) -> tuple[Extended, Extended]:
+        """The exact solution at each frame."""
         from springcheck.physics import exact
 
-        scene = self._known
-        if not exact.has_true_motion(scene):
-            raise SpringcheckError(f"scene {scene.name}: no closed form of its exact solution is known")
-        steps = np.arange(len(self.t), dtype=np.int64) * self.every
-        q, p = exact.true_motion(scene, steps, self.step)
-        return scene.system.norm(self.q - q, self.p - p)
+        return exact.true_motion(scene, np.arange(len(self.t), dtype=np.int64) * self.every, self.step)
 
     def at(self, rows: slice) -> Trajectory:
         """These frames alone."""
@@ -173,10 +176,7 @@ class Trajectory:
         """
         axes = library("matplotlib.pyplot").figure(layout="constrained").add_subplot() if ax is None else ax
         if self.scene is not None and self.scene.system.solution is not None:
-            from springcheck.physics import exact
-
-            steps = np.arange(len(self.t), dtype=np.int64) * self.every
-            q, p = exact.true_motion(self.scene, steps, self.step)
+            q, p = self._exact(self.scene)
             axes.plot(q[:, particle], p[:, particle], color="#b3b3b3", linewidth=4, label="exact")
         axes.plot(self.q[:, particle], self.p[:, particle], label=self.label)
         axes.set(xlabel="q", ylabel="p", title=f"{self.label}: phase portrait of {len(self.t)} frames")

@@ -46,9 +46,6 @@ class VanDerPol(WithoutPotential):
         for values, each in zip(self.resistance(q), out, strict=True):
             self.scatter(values / m[self.i].astype(q.dtype), each)
 
-    def pull(self, q: Reals) -> Reals:
-        return np.zeros((*q.shape[:-1], len(self)), q.dtype)
-
     def add_force(self, q: Reals, v: Reals, out: Reals) -> None:
         self.add_pull(self.resistance(q)[0] * np.take(v, self.i, axis=-1), out)
 

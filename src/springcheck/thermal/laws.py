@@ -26,16 +26,6 @@ REFINEMENTS = 6
 """Steps of refinement, each of which gains what 1 - A A' has of digits in double precision."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Branch:
-    """One affine map that a step may take: its probability, A (n, 2, 2) and G (n, 2, draws)."""
-
-    chance: Any
-    """One, or (n, 1, 1)."""
-    A: Extended
-    G: Extended
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Law:
     """A random scheme on n separate springs m, k (n,), at friction rate gamma [1/T], one or (n,) of them,
@@ -56,14 +46,15 @@ class Law:
         return np.reshape(p, (-1, 1, 1)) if np.ndim(p) else float(p)
 
     @cached_property
-    def branches(self) -> tuple[Branch, ...]:
-        """The maps that a step may take."""
+    def branches(self) -> tuple[tuple[Any, Extended, Extended], ...]:
+        """The affine maps that a step may take: the chance of each, one or (n, 1, 1), A (n, 2, 2) and
+        G (n, 2, draws)."""
         if not self.scheme.collides:
             return (self._branch(1.0, hit=False),)
         x = np.asarray(self.rate * self.h, np.longdouble).reshape((-1, 1, 1) if np.ndim(self.rate) else ())
         return self._branch(np.exp(-x), hit=False), self._branch(-np.expm1(-x), hit=True)
 
-    def _branch(self, chance: Any, *, hit: bool) -> Branch:
+    def _branch(self, chance: Any, *, hit: bool) -> tuple[Any, Extended, Extended]:
         m, k = (np.atleast_1d(np.asarray(x, np.longdouble)) for x in (self.m, self.k))
         r, n = self.scheme.draws, len(m)
         q, p = np.zeros((2, 2 + r, n), np.longdouble)
@@ -78,31 +69,31 @@ class Law:
         whole = parts if self.scheme.splits else lambda q, p: -k * q
         a, b = stepper(q, p, whole, list(draws), hit)
         both = np.stack([a, b], axis=0).transpose(2, 0, 1)
-        return Branch(chance=chance, A=both[:, :, :2], G=both[:, :, 2:])
+        return chance, both[:, :, :2], both[:, :, 2:]
 
     @property
     def A(self) -> Extended:  # noqa: N802 - the letter of the propagator
         """The propagator (n, 2, 2) of the means."""
-        return np.asarray(sum(np.asarray(one.chance, np.longdouble) * one.A for one in self.branches))
+        return np.asarray(sum(np.asarray(chance, np.longdouble) * A for chance, A, _ in self.branches))
 
     @property
     def G(self) -> Extended:  # noqa: N802 - the letter of the noise
         """The noise (n, 2, draws) of the last map: the only one, or that of a collision."""
-        return self.branches[-1].G
+        return self.branches[-1][2]
 
     @cached_property
     def _maps(self) -> tuple[tuple[Any, Extended, Extended], ...]:
         """The maps on (q, p, carried draws), with fresh draws alone."""
         d, r, c = 2, self.scheme.draws, self.scheme.carried
         out = []
-        for one in self.branches:
-            n = len(one.A)
+        for chance, of_state, noise in self.branches:
+            n = len(of_state)
             A, G = (np.zeros((n, d + c, x), np.longdouble) for x in (d + c, r - c))
-            A[:, :d, :d], A[:, :d, d:], G[:, :d] = one.A, one.G[:, :, :c], one.G[:, :, c:]
+            A[:, :d, :d], A[:, :d, d:], G[:, :d] = of_state, noise[:, :, :c], noise[:, :, c:]
             for i in range(c):
                 # the last draws of this step are the first of the next
                 G[:, d + i, r - 2 * c + i] = 1
-            out.append((one.chance, A, G))
+            out.append((chance, A, G))
         return tuple(out)
 
     @cached_property
