@@ -23,7 +23,7 @@ from springcheck.physics.arrays import Floats
 from springcheck.physics.bath import Bath
 from springcheck.physics.scene import Scene
 from springcheck.physics.scenefile import load_scene
-from springcheck.physics.terms import WallSpring
+from springcheck.physics.terms import Rod, WallSpring
 from springcheck.physics.trajectory import Trajectory
 from springcheck.studies.faults import measure
 from springcheck.studies.faults.heat import RODS_IN_BATHS
@@ -161,6 +161,22 @@ def test_the_draws_that_are_found_are_those_of_the_generator() -> None:
     run = driver.run(scene, "own:baoab", seed=5)
     tangential = read(THERMOSTATS["baoab"], scene, run.q, run.p)
     assert tangential.draws.shape == (scene.steps, 5)
+
+
+def test_draws_of_a_heavy_end_that_hardly_show_in_its_position_keep_their_variance() -> None:
+    """In roundings of a state they do a millionth of what those of the light end do to its momentum."""
+    q = np.array([-0.0031, -0.0019, 0.0007, -0.0001, -0.0010, 0.0016])
+    length = float(np.sqrt(np.sum((q[3:] - q[:3]) ** 2)))
+    a, bath = np.arange(3), Bath(temperature=7.4e-14, friction=0.0061)
+    scene = Scene(
+        m=np.repeat([0.66, 3.6e-5], 3), q=q, p=0 * q, places=np.arange(6), step=0.0154, steps=400, bath=bath,
+        terms=(Rod(a=a, b=a + 3, length=np.full(3, length)),),
+    )  # fmt: skip
+    run = driver.run(scene, "own:oabao", seed=3)
+    assert [v for v in checks.judge(scene, run) if v.passed is False] == []
+    draws = read(THERMOSTATS["oabao"], scene, run.q, run.p, how=run.arithmetic).draws
+    assert draws.shape == (400, 10)
+    assert abs(np.mean(draws**2) - 1) < 4 * np.sqrt(2 / draws.size)
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ a = (h w)**2, x = gamma h, c = exp(-x), s = sqrt(c); covariances in units of kT/
 from __future__ import annotations
 
 import math
+import time
 from dataclasses import replace
 
 import mpmath as mp
@@ -235,6 +236,27 @@ def test_the_error_of_a_variance_is_that_of_the_squares_of_all_pairs_of_frames()
     apart = np.abs(np.subtract.outer(range(frames), range(frames)))
     expected = np.sqrt(2 * np.mean((C / C[0])[apart] ** 2, axis=(0, 1)))
     assert found.error_of_variances(frames, 5)[0] == pytest.approx(expected, rel=1e-12)
+
+
+def test_the_error_of_a_variance_over_ten_million_frames_takes_no_sum_of_them() -> None:
+    x, frames = 1e-6, 10**7
+    found = law("obabo", 0.2, 1.0, 1.0, x / 0.2, 1.0)
+    started = time.process_time()
+    errors = found.error_of_variances(frames)[0]
+    assert time.process_time() - started < 1
+    # C(j) / C(0) is exp(-x j/2) cos(w j) but for x/w: squares of the cosine are 1/2 in the mean
+    expected = math.sqrt(2 / frames * (1 / x - (1 - math.exp(-x * frames)) / (x * x * frames)))
+    assert errors == pytest.approx([expected] * 2, rel=1e-3)
+    # next to the limit nothing is known, and that is said at once
+    assert np.all(np.isnan(law("baoab", 1.0, 1.0, 4 - 1e-15, 1e-15, 1.0).error_of_variances(frames)))
+
+
+@pytest.mark.parametrize("name", ["aoboa", "boaob"])
+def test_a_displacement_small_beside_the_motion_keeps_its_digits(name: str) -> None:
+    """<(q' - q)**2> of two springs so soft that three steps of both are next to those of a free particle."""
+    h, m, rate = 0.37, 2.9, 25.0
+    soft, softer = (law(name, h, m, a * m / h**2, rate / h, 1.3).displacement(3)[0] for a in (1e-7, 1e-8))
+    assert soft == pytest.approx(softer, rel=1e-9)
 
 
 def test_a_step_beyond_its_limit_has_no_stationary_state() -> None:

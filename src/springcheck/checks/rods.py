@@ -9,7 +9,7 @@ from springcheck.checks.case import Case
 from springcheck.checks.check import Finding, check, largest
 from springcheck.checks.requires import MAP, missing
 from springcheck.checks.thermal import reading, thermostat
-from springcheck.physics.exact.well import PI
+from springcheck.physics.exact.closedform import PI
 from springcheck.physics.rods import UNTRUE, Rods
 from springcheck.physics.trajectory import Limits
 from springcheck.text.wording import count

@@ -72,10 +72,8 @@ class Drive(WithoutPotential, _Driven):
     def pull(self, q: Reals) -> Reals:
         return -self.amplitude * self.wave(q)
 
-    def add_rounding(
-        self, q: Reals, v: Reals, out: Reals, near: Reals | None, *, exact: bool = False
-    ) -> None:
-        self.scatter(np.abs(self.amplitude) * self.turned(q if near is None else near), out)
+    def pull_rounding(self, q: Reals, v: Reals, near: Reals | None, exact: bool) -> Reals:
+        return np.abs(self.amplitude) * self.turned(q if near is None else near)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -110,12 +108,10 @@ class ModulatedSpring(LinearLaw, _Driven):
     def curvature(self, q: Reals) -> Reals:
         return np.asarray(self.k * (1 + self.depth * self.wave(q)))
 
-    def add_rounding(
-        self, q: Reals, v: Reals, out: Reals, near: Reals | None, *, exact: bool = False
-    ) -> None:
+    def pull_rounding(self, q: Reals, v: Reals, near: Reals | None, exact: bool) -> Reals:
         size = self.most_stretch(np.abs(q)) + np.abs(self.at)
         turned = 1 + np.abs(self.depth) * self.turned(q if near is None else near)
-        self.scatter(np.abs(self.k) * turned * size, out)
+        return np.abs(self.k) * turned * size
 
 
 def with_clock(scene: Any) -> Any:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -12,10 +12,11 @@ from springcheck.physics.term import Term
 from springcheck.physics.terms import RadialSpring, Spring, WallSpring
 
 
-def is_uniform_chain(m: Floats, terms: Sequence[Term]) -> bool:
+def is_uniform_chain(system: Any) -> bool:
     """Whether equal masses stand in a row between two walls, neighbours joined by equal springs."""
-    walls = [term for term in terms if isinstance(term, WallSpring)]
-    links = [term for term in terms if isinstance(term, Spring)]
+    m = system.m
+    walls = [term for term in system.terms if isinstance(term, WallSpring)]
+    links = [term for term in system.terms if isinstance(term, Spring)]
     if len(walls) != 1 or len(links) != 1 or len(m) < 2 or np.any(m != m[0]):
         return False
     wall, link = walls[0], links[0]
@@ -29,8 +30,9 @@ def is_uniform_chain(m: Floats, terms: Sequence[Term]) -> bool:
     )
 
 
-def free_groups(n: int, terms: Sequence[Term]) -> tuple[Integers, ...]:
+def free_groups(system: Any) -> tuple[Integers, ...]:
     """Groups of particles joined to each other and held by nothing with a stiffness: they can drift."""
+    n, terms = system.n, system.terms
     held = np.zeros(n, dtype=bool)
     for term in terms:
         if term.bodies == 1:
@@ -109,13 +111,13 @@ def _in_a_row(n: int, springs: Spring) -> Floats:
     return found
 
 
-def alike(places: Integers | None, terms: Iterable[Term]) -> tuple[tuple[Integers, Integers], ...]:
+def alike(system: Any) -> tuple[tuple[Integers, Integers], ...]:
     """The coordinates, by particle, along each pair of axes on which all terms act alike.
 
     Linear terms, rods and bonds that act on both alike and rest in 0 keep the angular momentum about 0 in
-    their plane.  `places` (n,) are those of `Scene`.
+    their plane.
     """
-    parts = tuple(terms)
+    places, parts = system.scene.places, system.terms
     if not all(
         term.is_linear or term.kind == "constraint" or isinstance(term, RadialSpring) for term in parts
     ):

@@ -28,16 +28,11 @@ class Magnetic(WithoutPotential):
     b: Integers
     strength: Floats
 
-    def pull(self, q: Reals) -> Reals:
-        return np.zeros((*q.shape[:-1], len(self)), q.dtype)
-
     def add_force(self, q: Reals, v: Reals, out: Reals) -> None:
         one, other = (np.take(v, index, axis=-1) for index in self.particles)
         self._add(out, self.strength * other, -self.strength * one)
 
-    def add_rounding(
-        self, q: Reals, v: Reals, out: Reals, near: Reals | None, *, exact: bool = False
-    ) -> None:
+    def add_rounding(self, q: Reals, v: Reals, out: Reals, near: Reals | None, exact: bool) -> None:
         one, other = (np.abs(np.take(v, index, axis=-1) * self.strength) for index in self.particles)
         self._add(out, other, one)
 

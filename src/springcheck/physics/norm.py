@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
@@ -61,19 +60,18 @@ class Norm:
             return np.asarray(size)
 
     def _energy(self, dq: Reals, dp: Reals, stretch: Callable[[Term, Reals], Reals]) -> Reals:
-        whole = partial(self._energy_at_once, stretch)
-        return in_pieces(whole, max(map(len, self.terms), default=0))(dq, dp)
+        def whole(dq: Reals, dp: Reals) -> Reals:
+            total = kinetic_energy(self.m, dp)
+            for term in self.terms:
+                du = stretch(term, dq)
+                total = total + 0.5 * np.sum(term.rigidity * du * du, axis=-1)
+            for group in self.groups:
+                m = self.m[group]
+                centre = np.sum(m * dq[..., group], axis=-1) / np.sum(m)
+                total = total + 0.5 * np.sum(m) * (centre / self.duration) ** 2
+            return np.asarray(total)
 
-    def _energy_at_once(self, stretch: Callable[[Term, Reals], Reals], dq: Reals, dp: Reals) -> Reals:
-        total = kinetic_energy(self.m, dp)
-        for term in self.terms:
-            du = stretch(term, dq)
-            total = total + 0.5 * np.sum(term.rigidity * du * du, axis=-1)
-        for group in self.groups:
-            m = self.m[group]
-            centre = np.sum(m * dq[..., group], axis=-1) / np.sum(m)
-            total = total + 0.5 * np.sum(m) * (centre / self.duration) ** 2
-        return np.asarray(total)
+        return in_pieces(whole, max(map(len, self.terms), default=0))(dq, dp)
 
 
 def kinetic_energy(m: Floats, p: Reals) -> Reals:

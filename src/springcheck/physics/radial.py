@@ -92,15 +92,13 @@ class RadialSpring(LinearLaw, Term):
             for there in self.particles:
                 yield here[one], there[other], k if here is there else -k
 
-    def add_rounding(
-        self, q: Reals, v: Reals, out: Reals, near: Reals | None, *, exact: bool = False
-    ) -> None:
+    def pull_rounding(self, q: Reals, v: Reals, near: Reals | None, exact: bool) -> Reals:
         size = self.most_stretch(np.abs(q))
         d, s = self._ways(q if near is None else near)
         e, bent = np.abs(d) / s, self.rest / s
         # roundings of the difference vector, of its length by a root, of their quotient, of the products
         way = np.abs(1 - bent) * size + bent * (size + e * self._sum(e * size))
-        self.scatter(np.abs(self.k) * (way + np.abs(d) * (2 * np.abs(1 - bent) + 4 * (1 + bent))), out)
+        return np.abs(self.k) * (way + np.abs(d) * (2 * np.abs(1 - bent) + 4 * (1 + bent)))
 
     def joined(self, other: Self) -> Self:
         more = other._changed(number=other.number + np.max(self.number) + 1 - np.min(other.number))

@@ -30,28 +30,22 @@ UNTRUE = 2.0**-46
 roundings, as numbers have that are written with all of their digits."""
 
 
-class _Rigid(WithoutPotential):
-    """A term without energy or force, which keeps a length."""
-
-    kind: ClassVar[Origin] = "constraint"
-    slope = rounding = staticmethod(WithoutPotential.potential)
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Rod(_Rigid):
+class Rod(WithoutPotential):
     """Rods between particles: |q[b] - q[a]| = length [L], a row for each axis."""
 
     key: ClassVar[str] = "rod"
     formula: ClassVar[str] = "|q[b] - q[a]| = length"
     columns: ClassVar[tuple[Column, ...]] = (Column("length", "length", sign="positive"),)
     ends: ClassVar[tuple[str, ...]] = ("a", "b")
+    kind: ClassVar[Origin] = "constraint"
     a: Integers
     b: Integers
     length: Floats
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class WallRod(_Rigid, OnParticles):
+class WallRod(WithoutPotential, OnParticles):
     """Rods from particles i to fixed points: |q - at| = length [L], a row for each axis."""
 
     key: ClassVar[str] = "wall-rod"
@@ -60,6 +54,7 @@ class WallRod(_Rigid, OnParticles):
         Column("length", "length", sign="positive"),
         Column("wall", "at", 0.0, single=False),
     )
+    kind: ClassVar[Origin] = "constraint"
     length: Floats
 
 

@@ -81,11 +81,6 @@ class System(Generic[Fields]):
         return any(isinstance(term, VanDerPol) for term in self.terms)
 
     @cached_property
-    def is_uniform_chain(self) -> bool:
-        """Whether equal masses stand in a row between two walls, neighbours joined by equal springs."""
-        return graph.is_uniform_chain(self.m, self.terms)
-
-    @cached_property
     def has_modes(self) -> bool:
         """Whether the motion falls apart into modes: linear, uncoupled by friction, and they can be had.
 
@@ -119,20 +114,14 @@ class System(Generic[Fields]):
             term.scatter(np.ones(len(term)), count)
         return count.astype(np.int64)
 
-    @cached_property
-    def alike(self) -> tuple[tuple[Integers, Integers], ...]:
-        """The coordinates along each pair of axes on which all terms act alike: see `graph.alike`."""
-        return graph.alike(self.scene.places, self.terms)
+    alike = cached_property(graph.alike)
+    free_groups = cached_property(graph.free_groups)
+    is_uniform_chain = cached_property(graph.is_uniform_chain)
 
     @cached_property
     def rods(self) -> Rods | None:
         """The rods of the scene, None where it has none."""
         return rods_of(self.m, self.scene.places, self.terms)
-
-    @cached_property
-    def free_groups(self) -> tuple[Integers, ...]:
-        """Groups of particles joined to each other and held by nothing with a stiffness: they can drift."""
-        return graph.free_groups(self.n, self.terms)
 
     @cached_property
     def rest_positions(self) -> Floats | None:

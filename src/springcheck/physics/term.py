@@ -170,10 +170,13 @@ class Term:
         v."""
         self.add_pull(self.curvature(q) * self.stretch(dq), out)
 
-    def add_rounding(
-        self, q: Reals, v: Reals, out: Reals, near: Reals | None, *, exact: bool = False
-    ) -> None:
-        """Add what bounds the rounding of add_force at states of sizes q, v (see `System.magnitude`).
+    def add_rounding(self, q: Reals, v: Reals, out: Reals, near: Reals | None, exact: bool) -> None:
+        """Add to out (..., n) what bounds the rounding of add_force at states of sizes q, v."""
+        self.scatter(self.pull_rounding(q, v, near, exact), out)
+
+    def pull_rounding(self, q: Reals, v: Reals, near: Reals | None, exact: bool) -> Reals:
+        """What bounds the rounding of each row's force (..., s) at states of sizes q, v (..., n), the law
+        taken near a state, or where that is not given at the worst place within the sizes.
 
         `exact` says that the force is taken at `near` itself: a law that feels a rounding of its position
         more than that of its elongation may say less then.
@@ -182,7 +185,7 @@ class Term:
         if self.origin:
             size = size + np.abs(getattr(self, self.origin))
         u = -size if near is None else self.elongation(near)
-        self.scatter(np.abs(self.rounding(size, u, *self.parameters)), out)
+        return np.asarray(np.abs(self.rounding(size, u, *self.parameters)))
 
     def curvature(self, q: Reals) -> Reals:
         """Second derivative of each row's energy by u, at q (..., n) -> (..., s) or (s,) [M/T2]."""
@@ -285,6 +288,9 @@ class WithoutPotential(Term):
     @staticmethod
     def potential(u: Reals, *_: Floats) -> Reals:
         return np.zeros_like(u)
+
+    slope: ClassVar[Any] = potential
+    rounding: ClassVar[Any] = potential
 
     @staticmethod
     def second(u: Reals, strength: Floats, *_: Floats) -> Reals:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import ClassVar, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
@@ -28,12 +28,8 @@ __all__ = [
 ]  # fmt: skip
 
 
-class Hooke(LinearLaw):
-    """Linear springs along an axis, whose force is added up before that of others."""
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
-class WallSpring(Hooke, OnParticles):
+class WallSpring(LinearLaw, OnParticles):
     """Springs from particles i to fixed points: V = k/2 (q - at)**2.  k [M/T2], at [L]."""
 
     key: ClassVar[str] = "wall-spring"
@@ -49,7 +45,7 @@ class WallSpring(Hooke, OnParticles):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Spring(Hooke, OnPairs):
+class Spring(LinearLaw, OnPairs):
     """Springs between particles a and b: V = k/2 (q[b] - q[a] - rest)**2.  k [M/T2], rest [L]."""
 
     key: ClassVar[str] = "spring"
@@ -123,17 +119,14 @@ class Cosine(OnParticles):
         # the sine's own rounding, and that of its argument, which turns round and round
         return np.abs(depth * wave) * (1 + np.abs(wave) * size)
 
-    def add_rounding(
-        self, q: Reals, v: Reals, out: Reals, near: Reals | None, *, exact: bool = False
-    ) -> None:
+    def pull_rounding(self, q: Reals, v: Reals, near: Reals | None, exact: bool) -> Reals:
         """Many turns away the argument's rounding is all there is, unless nothing is subtracted and the
         product with `wave` is exact."""
         whole = (self.at == 0) & (np.frexp(self.wave)[0] == 0.5)
         if near is None or not exact or not np.any(whole):
-            return Term.add_rounding(self, q, v, out, near)
+            return Term.pull_rounding(self, q, v, near, exact)
         size = np.where(whole, 0, np.abs(np.take(q, self.i, axis=-1)) + np.abs(self.at))
-        self.scatter(np.abs(self.rounding(size, self.elongation(near), self.depth, self.wave)), out)
-        return None
+        return np.abs(self.rounding(size, self.elongation(near), self.depth, self.wave))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -218,22 +211,15 @@ class Damping(WithoutPotential):
     i: Integers
     c: Floats
 
-    @staticmethod
-    def slope(u: Reals, c: Floats) -> Reals:
-        """The force by the velocity u, not by an elongation."""
-        return c * u
-
-    @staticmethod
-    def rounding(size: Reals, u: Reals, c: Floats) -> Reals:
-        return c * size
+    # of the velocity, not of an elongation
+    slope: ClassVar[Any] = staticmethod(LinearLaw.slope)
+    rounding: ClassVar[Any] = staticmethod(LinearLaw.rounding)
 
     def add_force(self, q: Reals, v: Reals, out: Reals) -> None:
         Term.add_force(self, v, q, out)
 
-    def add_rounding(
-        self, q: Reals, v: Reals, out: Reals, near: Reals | None, *, exact: bool = False
-    ) -> None:
-        Term.add_rounding(self, v, q, out, v)
+    def pull_rounding(self, q: Reals, v: Reals, near: Reals | None, exact: bool) -> Reals:
+        return Term.pull_rounding(self, v, q, v, exact)
 
 
 _KNOWN: dict[str, type[Term]] = {
@@ -294,6 +280,12 @@ def in_order(terms: Iterable[Term]) -> tuple[Term, ...]:
 
     def place(term: Term) -> tuple[bool, bool, bool, int, str]:
         number = known.index(term.key) if term.key in known else len(known)
-        return (term.kind != "potential", not isinstance(term, Hooke), term.fast, number, term.key)
+        return (
+            term.kind != "potential",
+            not isinstance(term, WallSpring | Spring),
+            term.fast,
+            number,
+            term.key,
+        )
 
     return tuple(sorted(found.values(), key=place))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from springcheck.errors import SpringcheckError
-from springcheck.physics.arrays import Arithmetic, Floats
+from springcheck.physics.arrays import Arithmetic, Extended, Floats
 
 if TYPE_CHECKING:
     from springcheck.physics.scene import Scene
@@ -129,14 +129,17 @@ class Trajectory:
 
         SpringcheckError where no closed form of the exact solution is known.
         """
+        scene = self._known
+        if scene.system.solution is None:
+            raise SpringcheckError(f"scene {scene.name}: no closed form of its exact solution is known")
+        q, p = self._exact(scene)
+        return scene.system.norm(self.q - q, self.p - p)
+
+    def _exact(self, scene: Scene) -> tuple[Extended, Extended]:
+        """The exact solution at each frame."""
         from springcheck.physics import exact
 
-        scene = self._known
-        if not exact.has_true_motion(scene):
-            raise SpringcheckError(f"scene {scene.name}: no closed form of its exact solution is known")
-        steps = np.arange(len(self.t), dtype=np.int64) * self.every
-        q, p = exact.true_motion(scene, steps, self.step)
-        return scene.system.norm(self.q - q, self.p - p)
+        return exact.true_motion(scene, np.arange(len(self.t), dtype=np.int64) * self.every, self.step)
 
     def at(self, rows: slice) -> Trajectory:
         """These frames alone."""
@@ -173,10 +176,7 @@ class Trajectory:
         """
         axes = library("matplotlib.pyplot").figure(layout="constrained").add_subplot() if ax is None else ax
         if self.scene is not None and self.scene.system.solution is not None:
-            from springcheck.physics import exact
-
-            steps = np.arange(len(self.t), dtype=np.int64) * self.every
-            q, p = exact.true_motion(self.scene, steps, self.step)
+            q, p = self._exact(self.scene)
             axes.plot(q[:, particle], p[:, particle], color="#b3b3b3", linewidth=4, label="exact")
         axes.plot(self.q[:, particle], self.p[:, particle], label=self.label)
         axes.set(xlabel="q", ylabel="p", title=f"{self.label}: phase portrait of {len(self.t)} frames")
@@ -267,56 +267,48 @@ class Comparison:
         return html_table(repr(self), [("", *self.labels), *cells])
 
 
+def _told(words: str) -> Any:
+    """A field of `Limits`, and what is said of it."""
+    return field(default=None, metadata={"words": words})
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Limits:
     """The relative change of each quantity from which on a check fails; None where it says nothing of it."""
 
-    stiffness: float | None = None
+    stiffness: float | None = _told("a stiffness off by {:.1e}")
     """Relative change of the spring, or other potential's row, that shows least among those that show."""
-    step: float | None = None
-    friction: float | None = None
+    step: float | None = _told("a step off by {:.1e}")
+    friction: float | None = _told("a friction off by {:.1e}")
     """Relative change of the friction on one particle."""
-    area: float | None = None
+    area: float | None = _told("an area in phase space off by {:.1e} a step")
     """Relative change of every particle's phase-space area a step: its momentum is multiplied by 1 + x."""
-    reaction: float | None = None
+    reaction: float | None = _told("a force off its reaction by {:.1e}")
     """Relative excess of the force on one particle over its reactions on the others."""
-    order: float | None = None
+    order: float | None = _told("an order or exponent off by {:.1e}")
     """Change of an order or an exponent, absolute."""
-
-    amplitude: float | None = None
+    amplitude: float | None = _told("a drive's amplitude off by {:.1e}")
     """Relative change of the amplitude of the drive, or depth of the modulation, that shows least."""
-    frequency: float | None = None
+    frequency: float | None = _told("its frequency off by {:.1e}")
     """Relative change of the frequency of a drive."""
-    phase: float | None = None
+    phase: float | None = _told("its phase off by {:.1e} rad")
     """Change of the phase of a drive, in radians."""
-    late: float | None = None
+    late: float | None = _told("a drive late by {:.1e} of a step")
     """Delay of a drive, in steps."""
 
     def __str__(self) -> str:
         """The same in words, or nothing."""
-        said = [words.format(x) for name, words in _SEEN.items() if (x := getattr(self, name)) is not None]
+        known = ((of.metadata["words"], getattr(self, of.name)) for of in fields(self))
+        said = [words.format(x) for words, x in known if x is not None]
         return f"would see {', '.join(said)}" if said else ""
 
     @classmethod
     def least(cls, several: Iterable[Limits]) -> Limits:
         """The least limits among several checks, or among the pieces of a run that one check has seen."""
-        every = list(several)
-        known = {name: [x for one in every if (x := getattr(one, name)) is not None] for name in _SEEN}
+        every, names = list(several), [of.name for of in fields(cls)]
+        known = {name: [x for one in every if (x := getattr(one, name)) is not None] for name in names}
         return cls(**{name: min(x, default=None) for name, x in known.items()})
 
-
-_SEEN = {
-    "stiffness": "a stiffness off by {:.1e}",
-    "step": "a step off by {:.1e}",
-    "friction": "a friction off by {:.1e}",
-    "area": "an area in phase space off by {:.1e} a step",
-    "reaction": "a force off its reaction by {:.1e}",
-    "order": "an order or exponent off by {:.1e}",
-    "amplitude": "a drive's amplitude off by {:.1e}",
-    "frequency": "its frequency off by {:.1e}",
-    "phase": "its phase off by {:.1e} rad",
-    "late": "a drive late by {:.1e} of a step",
-}
 
 NOT_KNOWN = Limits()
 

@@ -46,9 +46,6 @@ class VanDerPol(WithoutPotential):
         for values, each in zip(self.resistance(q), out, strict=True):
             self.scatter(values / m[self.i].astype(q.dtype), each)
 
-    def pull(self, q: Reals) -> Reals:
-        return np.zeros((*q.shape[:-1], len(self)), q.dtype)
-
     def add_force(self, q: Reals, v: Reals, out: Reals) -> None:
         self.add_pull(self.resistance(q)[0] * np.take(v, self.i, axis=-1), out)
 
@@ -56,9 +53,7 @@ class VanDerPol(WithoutPotential):
         v, dq = (np.take(x, self.i, axis=-1) for x in (v, dq))
         self.add_pull(self.resistance(q)[1] * v * dq, out)
 
-    def add_rounding(
-        self, q: Reals, v: Reals, out: Reals, near: Reals | None, *, exact: bool = False
-    ) -> None:
+    def pull_rounding(self, q: Reals, v: Reals, near: Reals | None, exact: bool) -> Reals:
         x = (np.abs(np.take(q if near is None else near, self.i, axis=-1)) + np.abs(self.at)) / self.width
         # a rounding of the place is felt twice in its square
-        self.scatter(self.c * (1 + 3 * x * x) * np.abs(np.take(v, self.i, axis=-1)), out)
+        return self.c * (1 + 3 * x * x) * np.abs(np.take(v, self.i, axis=-1))

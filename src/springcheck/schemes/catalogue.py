@@ -17,7 +17,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property, lru_cache
-from typing import Any, Literal, TypeAlias
+from typing import Any, ClassVar, Literal, TypeAlias
 
 import numpy as np
 
@@ -67,7 +67,7 @@ class Scheme:
     """Name of the scheme whose steps a solver takes, with lengths of its own choice."""
     rule: Rule | None = None
     """The rule that chooses these lengths."""
-    thermostat: bool = False
+    thermostat: ClassVar[bool] = False
     """Whether it has noise, and a step that `springcheck.thermal` carries out."""
     source: str = ""
 

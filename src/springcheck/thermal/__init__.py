@@ -34,15 +34,5 @@ def __getattr__(name: str) -> Any:
 
 
 for _one in THERMOSTATS.values():
-    # known by name and title wherever schemes are
-    schemes.bring(
-        schemes.Scheme(
-            name=_one.name,
-            title=_one.title,
-            order=0,
-            limit=2.0,
-            symplectic=False,
-            thermostat=True,
-            source=_one.source,
-        )
-    )
+    # known wherever schemes are
+    schemes.bring(_one)

@@ -19,10 +19,11 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
 from math import inf
-from typing import Any, Literal, NamedTuple, TypeAlias
+from typing import Any, ClassVar, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
+from springcheck.schemes import Scheme
 from springcheck.thermal.chain import FOURTH, SIXTH, Chain
 from springcheck.thermal.decays import GJ, MOST_FRICTION, Decay, decay
 
@@ -53,12 +54,14 @@ def rigidly(acts: tuple[Act, ...]) -> tuple[Act, ...]:
     return sum(shaken, ())
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Thermostat:
+@dataclass(frozen=True, kw_only=True)
+class Thermostat(Scheme):
     """A random scheme: p and q of one step, by stages that friction and noise belong to."""
 
-    name: str
-    title: str
+    thermostat: ClassVar[bool] = True
+    order: int = 0
+    limit: float = 2.0
+    symplectic: bool = False
     acts: tuple[Act, ...]
     draws: int = 1
     """Draws that act in a step."""
@@ -70,7 +73,6 @@ class Thermostat:
     """Whether draws are uniform in place of normal."""
     synchronised: bool = True
     """Whether the momentum that it stores belongs to the time of the position."""
-    source: str = ""
     most: float = inf
     """gamma h below which it is a thermostat: from there on the variance of its noise is negative."""
     chain: Chain | None = None
@@ -224,7 +226,7 @@ def _gj_half(number: str) -> Thermostat:
 
 
 def _times(part: Fraction, function: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    return lambda x: function(x) * (x.dtype.type(part.numerator) / x.dtype.type(part.denominator))
+    return lambda x: function(x) * value_of(part, x)
 
 
 def _of_x(*coefficients: Fraction | int) -> Callable[[Any], Any]:

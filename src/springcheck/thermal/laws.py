@@ -8,7 +8,7 @@ Lyapunov), averaged over the maps; the autocovariance A**n S; the rest follows.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -24,16 +24,6 @@ AT_A_LIMIT = 1e-5
 """Growth that may be rounding."""
 REFINEMENTS = 6
 """Steps of refinement, each of which gains what 1 - A A' has of digits in double precision."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Branch:
-    """One affine map that a step may take: its probability, A (n, 2, 2) and G (n, 2, draws)."""
-
-    chance: Any
-    """One, or (n, 1, 1)."""
-    A: Extended
-    G: Extended
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -56,14 +46,15 @@ class Law:
         return np.reshape(p, (-1, 1, 1)) if np.ndim(p) else float(p)
 
     @cached_property
-    def branches(self) -> tuple[Branch, ...]:
-        """The maps that a step may take."""
+    def branches(self) -> tuple[tuple[Any, Extended, Extended], ...]:
+        """The affine maps that a step may take: the chance of each, one or (n, 1, 1), A (n, 2, 2) and
+        G (n, 2, draws)."""
         if not self.scheme.collides:
             return (self._branch(1.0, hit=False),)
         x = np.asarray(self.rate * self.h, np.longdouble).reshape((-1, 1, 1) if np.ndim(self.rate) else ())
         return self._branch(np.exp(-x), hit=False), self._branch(-np.expm1(-x), hit=True)
 
-    def _branch(self, chance: Any, *, hit: bool) -> Branch:
+    def _branch(self, chance: Any, *, hit: bool) -> tuple[Any, Extended, Extended]:
         m, k = (np.atleast_1d(np.asarray(x, np.longdouble)) for x in (self.m, self.k))
         r, n = self.scheme.draws, len(m)
         q, p = np.zeros((2, 2 + r, n), np.longdouble)
@@ -78,31 +69,31 @@ class Law:
         whole = parts if self.scheme.splits else lambda q, p: -k * q
         a, b = stepper(q, p, whole, list(draws), hit)
         both = np.stack([a, b], axis=0).transpose(2, 0, 1)
-        return Branch(chance=chance, A=both[:, :, :2], G=both[:, :, 2:])
+        return chance, both[:, :, :2], both[:, :, 2:]
 
     @property
     def A(self) -> Extended:  # noqa: N802 - the letter of the propagator
         """The propagator (n, 2, 2) of the means."""
-        return np.asarray(sum(np.asarray(one.chance, np.longdouble) * one.A for one in self.branches))
+        return np.asarray(sum(np.asarray(chance, np.longdouble) * A for chance, A, _ in self.branches))
 
     @property
     def G(self) -> Extended:  # noqa: N802 - the letter of the noise
         """The noise (n, 2, draws) of the last map: the only one, or that of a collision."""
-        return self.branches[-1].G
+        return self.branches[-1][2]
 
     @cached_property
     def _maps(self) -> tuple[tuple[Any, Extended, Extended], ...]:
         """The maps on (q, p, carried draws), with fresh draws alone."""
         d, r, c = 2, self.scheme.draws, self.scheme.carried
         out = []
-        for one in self.branches:
-            n = len(one.A)
+        for chance, of_state, noise in self.branches:
+            n = len(of_state)
             A, G = (np.zeros((n, d + c, x), np.longdouble) for x in (d + c, r - c))
-            A[:, :d, :d], A[:, :d, d:], G[:, :d] = one.A, one.G[:, :, :c], one.G[:, :, c:]
+            A[:, :d, :d], A[:, :d, d:], G[:, :d] = of_state, noise[:, :, :c], noise[:, :, c:]
             for i in range(c):
                 # the last draws of this step are the first of the next
                 G[:, d + i, r - 2 * c + i] = 1
-            out.append((one.chance, A, G))
+            out.append((chance, A, G))
         return tuple(out)
 
     @cached_property
@@ -189,20 +180,32 @@ class Law:
         """Stationary covariance of (q, p), (n, 2, 2); infinite where the step has none."""
         return self._covariance[:, :2, :2]
 
+    @cached_property
+    def _mean(self) -> Floats:
+        """The map of the means of (q, p, carried draws), (n, d, d)."""
+        return np.asarray(sum(chance * A for chance, A, _ in self._state))
+
+    @cached_property
+    def _noise(self) -> Floats:
+        """Covariance (n, d, d) of what a step adds to that: of draws, and of which map it takes."""
+        if not self.scheme.collides:
+            ((_, _, G),) = self._state
+            return np.asarray(G @ G.transpose(0, 2, 1))
+        parts = [(chance, A - self._mean, G) for chance, A, G in self._state]
+        each = (
+            c * (D @ self._covariance @ D.transpose(0, 2, 1) + G @ G.transpose(0, 2, 1)) for c, D, G in parts
+        )
+        return np.asarray(sum(each))
+
     def autocovariance(self, steps: int) -> Floats:
         """<z(t + steps h) z(t)'> of (q, p), (n, 2, 2)."""
-        mean = np.asarray(sum(chance * A for chance, A, _ in self._state))
-        return np.asarray((np.linalg.matrix_power(mean, steps) @ self._covariance)[:, :2, :2])
+        return np.asarray((np.linalg.matrix_power(self._mean, steps) @ self._covariance)[:, :2, :2])
 
     def apart(self, steps: Any) -> tuple[Floats, Floats]:
         """What so many steps (n,) come to, as a map (n, 2, 2) and a covariance of noise (n, 2, 2): of draws
         that are carried on into them that part which q and p say nothing of."""
-        (_, A, G), every = self._state[0], np.asarray(steps)[:, None, None]
-        W = G @ G.transpose(0, 2, 1)
-        if self.scheme.collides:
-            # no normal noise, but one of such second moments
-            A = np.asarray(sum(c * a for c, a, _ in self._state))
-            W = self.covariance - A @ self.covariance @ A.transpose(0, 2, 1)
+        # of collisions no normal noise, but one of such second moments
+        A, W, every = self._mean, self._noise, np.asarray(steps)[:, None, None]
         B, Q = A, W
         for j in range(1, int(np.max(every))):
             B = np.where(j < every, A @ B, B)
@@ -227,7 +230,13 @@ class Law:
 
     def displacement(self, steps: int) -> Floats:
         """<(q(t + steps h) - q(t))**2> of a bound particle (n,)."""
-        return np.asarray(2 * (self.covariance - self.autocovariance(steps))[:, 0, 0])
+        A, W = self._mean, self._noise
+        B, Q = np.eye(A.shape[1]) + np.zeros_like(A), np.zeros_like(A)
+        for _ in range(steps):
+            B, Q = A @ B, A @ Q @ A.transpose(0, 2, 1) + W
+        # of a slow motion 2 (C(0) - C(steps)) would cancel
+        moved = B - np.eye(A.shape[1])
+        return np.asarray((moved @ self._covariance @ moved.transpose(0, 2, 1) + Q)[:, 0, 0])
 
     @property
     def diffusion(self) -> Floats:
@@ -236,37 +245,47 @@ class Law:
         Half of what a step adds to <q**2> in the long run, the spectral density of q' - q at frequency 0:
         C(0) + 2 sum C(j), with momenta that forget as the mean of A has it.
         """
-        free = Law(
-            scheme=self.scheme, h=self.h, m=self.m, k=np.zeros_like(self.m), rate=self.rate,
-            thermal=self.thermal,
-        )  # fmt: skip
-        # all but q itself, of which nothing depends: (p, carried draws)
-        parts = [(chance, A[:, 1:, 1:], A[:, 0, 1:], G[:, 1:], G[:, 0]) for chance, A, G in free._state]
-        n, d = parts[0][2].shape
-        rate = np.empty(n)
-        for i in range(n):
-            A = sum(chance * a[i] for chance, a, *_ in parts)
-            total = sum(chance * np.kron(a[i], a[i]) for chance, a, *_ in parts)
-            right = sum(chance * (g[i] @ g[i].T).ravel() for chance, *_, g, _ in parts)
-            S = np.linalg.solve(np.eye(d * d) - total, right).reshape(d, d)
-            at_once = sum(c * (b[i] @ S @ b[i] + j[i] @ j[i]) for c, _, b, _, j in parts)
-            onwards = sum(c * (a[i] @ S @ b[i] + g[i] @ j[i]) for c, a, b, g, j in parts)
-            reach = sum(chance * b[i] for chance, _, b, *_ in parts)
-            rate[i] = at_once + 2 * reach @ np.linalg.solve(np.eye(d) - A, onwards)
-        return np.asarray(rate / (2 * self.h) * np.asarray(self.m, np.float64) * self.rate / self.thermal)
+        # nothing depends on q itself: all is a map of (p, carried draws), in extended precision where next to
+        # nothing is lost in a step
+        free = replace(self, k=np.zeros_like(self.m), fast=0.0)
+        maps = [(chance, A[:, :, 1:], G) for chance, A, G in free._maps]
+        mean = sum(chance * A for chance, A, _ in maps)
+        noise = sum(chance * (G @ G.transpose(0, 2, 1)) for chance, _, G in maps)
+        n, _, d = mean.shape
+        pairs = sum(chance * np.einsum("nij,nkl->nikjl", A[:, 1:], A[:, 1:]) for chance, A, _ in maps)
+
+        def without(map_: Any, right: Any) -> Floats:
+            """What adds up to the right-hand side where a step keeps so much of it."""
+            left = np.eye(map_.shape[-1]) - map_
+            return np.linalg.solve(left.astype(np.float64), right.astype(np.float64))
+
+        S = without(pairs.reshape(n, d * d, d * d), noise[:, 1:, 1:].reshape(n, d * d, 1)).reshape(n, d, d)
+        # moments of q' - q and (p', carried draws)
+        N = sum(chance * (A @ S @ A.transpose(0, 2, 1)) for chance, A, _ in maps) + noise
+        rate = (N[:, :1, :1] + 2 * mean[:, :1] @ without(mean[:, 1:], N[:, 1:, :1]))[:, 0, 0]
+        return np.asarray(rate * self.m * self.rate / (2 * self.h * self.thermal), np.float64)
 
     def error_of_variances(self, frames: int, every: int = 1) -> Floats:
         """Relative standard errors of <q**2> and <p**2> over so many frames, `every` steps apart, (n, 2).
 
-        Var of the mean of x**2 is 2/N sum (1 - |j|/N) C(j)**2 / C(0)**2 for a Gaussian x.
+        Var of the mean of x**2 is 2/N sum (1 - |j|/N) C(j)**2 / C(0)**2 for a Gaussian x.  C(j)**2 is a
+        moment of pairs, which a power of one map M makes: sums of M**j and j M**j over j < N, by doubling.
         """
-        mean = np.linalg.matrix_power(np.asarray(sum(c * A for c, A, _ in self._state)), every)
-        start = np.diagonal(self._covariance, axis1=1, axis2=2)[:, :2]
-        total, now = np.ones_like(start), self._covariance
-        for j in range(1, frames):
-            now = mean @ now
-            part = (np.diagonal(now, axis1=1, axis2=2)[:, :2] / start) ** 2
-            total += 2 * (1 - j / frames) * part
-            if np.all(part < 1e-14):
-                break
-        return np.asarray(np.sqrt(2 * total / frames))
+        with np.errstate(all="ignore"):
+            n, d = self._mean.shape[:2]
+            one = np.linalg.matrix_power(
+                self._mean * self._scale[:, None, :] / self._scale[:, :, None], every
+            )
+            M = np.einsum("nij,nkl->nikjl", one, one).reshape(n, d * d, d * d).astype(np.float64)
+            total, by_lag, power, count = np.eye(d * d) + 0 * M, 0 * M, M, 1
+            for bit in f"{frames:b}"[1:]:
+                by_lag = by_lag + power @ (by_lag + count * total)
+                total, power, count = total + power @ total, power @ power, 2 * count
+                if bit == "1":
+                    total, by_lag, power, count = total + power, by_lag + count * power, power @ M, count + 1
+            S, out = self._even, np.empty((n, 2))
+            for i in range(2):
+                pair = np.einsum("ni,nj->nij", S[:, :, i], S[:, :, i]).reshape(n, d * d, 1)
+                lags = ((total - by_lag / frames) @ pair)[:, i * d + i, 0] / S[:, i, i] ** 2
+                out[:, i] = np.sqrt(2 * (2 * lags - 1) / frames)
+        return out

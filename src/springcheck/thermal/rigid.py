@@ -28,6 +28,9 @@ UNSEEN_DRAW = 1e-6
 """Singular value over the largest below which a combination of draws does nothing: roundings over such a
 change, also where the reference is no wider than double, make 1e-8."""
 
+LEAST_SLOPE = 1e-13
+"""The same of combinations of which each is known to do something to some number of a state."""
+
 MOST_GAUSS_NEWTON = 10
 """Gauss-Newton iterations, each of which about squares a small residual: 4 to 9 are needed."""
 
@@ -77,7 +80,7 @@ class _Reader:
             sides = ((self._at(x + unit), self._at(x - unit)) for unit in SMALL_DRAW * np.eye(u * n))
             slopes = [(more - less) / (2 * SMALL_DRAW) for more, less in sides]
             J = _finite(np.stack(slopes, axis=-1) / of[..., None])
-            inverse = np.linalg.pinv(J, rcond=UNSEEN_DRAW)
+            inverse = _pseudoinverse(J)
             change = (inverse @ _finite((target - now) / of)[..., None])[..., 0]
             last = np.all(np.isfinite(now), axis=-1)
             for _ in range(MOST_HALVINGS):
@@ -98,7 +101,7 @@ class _Reader:
         # of all draws those that were found leave the least, in the mean over the numbers of a state
         across = np.sqrt(np.mean(left, axis=-1, keepdims=True))
         position = J[:, :n]
-        first = np.linalg.pinv(position, rcond=UNSEEN_DRAW) @ position
+        first = _pseudoinverse(position) @ position
         second = inverse @ J - first
         V = _carried(first), _carried(second)
         roundings = roundings_of(self._scheme, self._scene)
@@ -125,6 +128,22 @@ class _Reader:
 def _finite(values: Reals) -> Floats:
     """In double precision; what is no number is 0, and shows in what is left over."""
     return np.nan_to_num(np.asarray(values, np.float64), nan=0.0, posinf=0.0, neginf=0.0)
+
+
+def _pseudoinverse(J: Floats) -> Floats:
+    """That of slopes (f, k, r), where combinations of draws that do nothing are left out.
+
+    What a draw does to a heavy particle, or to a position in a short step, may be small beside what others do
+    and is not nothing: each number of a state is measured by its own largest slope.
+    """
+    size = np.linalg.norm(J, axis=-1, keepdims=True)
+    even = J / np.where(size > 0, size, 1)
+    weights = (np.linalg.svd(of, compute_uv=False) for of in (even, J))
+    seen, of_all = (each > UNSEEN_DRAW * each[:, :1] for each in weights)
+    if np.array_equal(np.sum(seen, axis=-1), np.sum(of_all, axis=-1)):
+        return np.asarray(np.linalg.pinv(J, rcond=UNSEEN_DRAW))
+    basis = np.swapaxes(np.linalg.svd(even, full_matrices=False)[2] * seen[..., None], -1, -2)
+    return np.asarray(basis @ np.linalg.pinv(J @ basis, rcond=LEAST_SLOPE))
 
 
 def _carried(projectors: Any) -> Floats:

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from springcheck.physics.arrays import EPS, Extended, Integers
-from springcheck.physics.exact.linear import energy_of_doubt
+from springcheck.physics.exact.linear import LinearMotion
 from springcheck.physics.exact.normal import Modes
 
 if TYPE_CHECKING:
@@ -68,7 +68,9 @@ def uncertainty(scene: Scene, duration: float) -> float:
         raise ValueError(f"the motion of scene {scene.name!r} has no closed form here")
     with np.errstate(all="ignore"):
         # errors of all particles together are not all as large as each of them may be; a chain is held
-        square = energy_of_doubt(system, system.modes, np.longdouble(duration)) if system.has_modes else None
+        square = (
+            None if not system.has_modes else LinearMotion(system).energy_of_doubt(np.longdouble(duration))
+        )
         if square is None:
             dq, dp = system.solution.doubt(duration)
             # the elongation of a spring is off by what both of its ends are

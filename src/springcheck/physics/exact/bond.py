@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from springcheck.physics.arrays import Extended
+from springcheck.physics.exact.closedform import (
+    CANCELS,
+    LAST,
+    ClosedForm,
+    States,
+    one_each,
+    wide,
+)
 from springcheck.physics.exact.digits import ENOUGH, digits, exactly, extended
-from springcheck.physics.exact.well import CANCELS, LAST, States, Well, one_each, wide
 from springcheck.physics.system import System
 from springcheck.physics.terms import Morse
-
-
-def _bonds(system: System[Any]) -> tuple[Morse, _Bond] | None:
-    """One bond each that pulls together."""
-    (term,) = (term for term in system.terms if isinstance(term, Morse))
-    if not one_each(system) or not np.all((term.depth > 0) & (term.steepness != 0)):
-        return None
-    return term, _bond(system, term)
-
 
 MOST = np.log(np.finfo(np.longdouble).max) - 64
 """Exponents whose exponential, times what stands beside it here, is a number."""
@@ -29,26 +26,122 @@ FAR_OUT = 64.0
 """A phase whose exponential leaves nothing of 1 in any precision that is used here."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Bond:
-    """Relative motion of each bond: reduced mass, elongation, relative momentum, E / depth, and that less 1.
+class MorseMotion(ClosedForm):
+    """One bond each that pulls together: with s = exp(steepness u), s'' = w**2 (excess s + 1), a circular or
+    hyperbolic function (Morse 1929).  The centre of mass moves uniformly.
 
-    Near the bottom of the well the one is small, near dissociation the other: neither follows from the other.
+    Of each bond (s,): masses of both ends, reduced mass, elongation u, relative momentum p, energy E / depth
+    and its excess over 1; w**2 = 2 depth steepness**2 / mass; and the phase of the start from the inner
+    turning point, an angle or beyond dissociation its hyperbolic kin, with its rate.
     """
 
-    mass: Extended
-    u: Extended
-    p: Extended
-    share: Extended
-    """m_a / (m_a + m_b)."""
-    energy: Extended
-    excess: Extended
-    w: Extended
-    """w**2 = 2 depth steepness**2 / mass."""
-    start: Extended
-    """Phase of the start from the inner turning point, an angle or beyond dissociation its hyperbolic kin."""
-    rate: Extended
-    """Rate of the phase."""
+    key = "morse"
+    terms = frozenset({"morse"})
+
+    def __init__(self, system: System[Any]) -> None:
+        super().__init__(system)
+        (self.term,) = (term for term in system.terms if isinstance(term, Morse))
+        term = self.term
+        self.need(one_each(system) and np.all((term.depth > 0) & (term.steepness != 0)))
+        ends = term.a, term.b
+        m, q, p = ([wide(x[end]) for end in ends] for x in (system.m, system.q, system.p))
+        total, depth, a = m[0] + m[1], wide(term.depth), wide(term.steepness)
+        mass = m[0] * m[1] / total
+        u, pull = _relative(m, q, p, term.rest)
+        # where exp(steepness u) leaves the range of numbers nothing pulls
+        x = np.where(a * u > MOST, 0, np.exp(-np.minimum(a * u, MOST)))
+        kinetic = (pull / total) ** 2 / (2 * mass * depth)
+        # near the bottom of the well the energy is small, near dissociation its excess over 1: neither
+        # follows from the other
+        excess = kinetic + x * (x - 2)
+        near = kinetic + x * (x + 2) > CANCELS * np.abs(excess)
+        near |= np.abs(q[1]) + np.abs(q[0]) + np.abs(term.rest) > CANCELS * np.abs(u)
+        near |= m[0] * np.abs(p[1]) + m[1] * np.abs(p[0]) > CANCELS * np.abs(pull)
+        if np.any(near):
+            j = np.flatnonzero(near)
+            u[j], pull[j], excess[j] = _of_bonds(
+                *([exactly(x[end[j]]) for end in ends] for x in (system.m, system.q, system.p)),
+                *(exactly(x[j]) for x in (term.rest, term.depth, term.steepness)),
+            )
+        y = np.minimum(a * u, MOST)
+        gap, p_ = np.expm1(-y), pull / total
+        energy = p_ * p_ / (2 * mass * depth) + gap * gap
+        w = np.abs(a) * np.sqrt(2 * depth / mass)
+        rate, z, dz = w * np.sqrt(np.abs(excess)), np.expm1(y), a * p_ / mass * np.exp(y)
+        safe = np.where(rate > 0, rate, 1)
+        root = np.sqrt(energy)
+        endless = np.arcsinh(dz * excess / (safe * np.where(root > 0, root, 1)))
+        self.start = np.where(
+            excess < 0,
+            np.arctan2(-dz * excess / safe, energy + excess * z),
+            # there arcsinh is a logarithm
+            endless + np.sign(endless) * (a * u - y),
+        )
+        self.masses, self.mass, self.share = m, mass, m[0] / total
+        self.u, self.p, self.energy, self.excess, self.w, self.rate = u, p_, energy, excess, w, rate
+
+    def at(self, t: Extended) -> States:
+        q, p = np.empty((2, len(t), self.system.n), dtype=np.longdouble)
+        term, share = self.term, self.share
+        stretch, speed = self._stretched(wide(term.steepness), t)
+        u, pull = stretch / term.steepness, self.mass * speed / term.steepness
+        total = wide(self.system.p[term.a]) + self.system.p[term.b]
+        qa, qb = wide(self.system.q[term.a]), wide(self.system.q[term.b])
+        centre = share * qa + (1 - share) * qb + total / (self.masses[0] + self.masses[1]) * t
+        length = term.rest + u
+        q[:, term.a], q[:, term.b] = centre - (1 - share) * length, centre + share * length
+        p[:, term.a], p[:, term.b] = share * total - pull, (1 - share) * total + pull
+        return q, p
+
+    def _stretched(self, a: Extended, t: Extended) -> States:
+        """log(s) and its time derivative at times t.
+
+        At the inner turning point s = 1/(1 + root), root**2 = 1 + excess; from there on it grows by
+        root (cosh(phase) - 1) / excess, or root (1 - cos(phase)) / |excess|: nothing cancels.  Far beyond
+        dissociation only root exp(|phase|) / (2 excess) of it is left, whose logarithm cannot overflow.
+        """
+        root, bound, edge = np.sqrt(self.energy), self.excess < 0, self.excess == 0
+        phase = self.rate * t + self.start
+        turn, run = np.where(bound, phase, 0), np.where(bound, 0, phase)
+        far = np.abs(run) > FAR_OUT
+        endless, run = np.where(far, run, FAR_OUT), np.where(far, 0, run)
+        half, whole = (
+            np.where(bound, np.sin(turn / 2), np.sinh(run / 2)),
+            np.where(bound, np.sin(turn), np.sinh(run)),
+        )
+        size = np.where(edge, 1, np.abs(self.excess))
+        z, dz = 2 * root * half * half / size - root / (root + 1), root * self.rate * whole / size
+        leaving = np.abs(endless) + np.log(np.where(far, root / (2 * size), 1))
+        # at the edge of dissociation a parabola
+        fast = np.where(edge, a * self.p / self.mass, 0)
+        slow = np.where(edge, self.w**2 * np.exp(np.where(edge, -a * self.u, 0)), 0)
+        grown = fast * t + slow * t * t / 2
+        away = np.where(far, self.rate * np.sign(endless), dz / (1 + z))
+        return (
+            np.where(edge, a * self.u + np.log1p(grown), np.where(far, leaving, np.log1p(z))),
+            np.where(edge, (fast + slow * t) / (1 + grown), away),
+        )
+
+    def doubt(self, t: np.longdouble) -> States:
+        system, term = self.system, self.term
+        q, p = np.empty((2, system.n), dtype=np.longdouble)
+        a = np.abs(wide(term.steepness))
+        root = np.sqrt(self.energy)
+        speed = np.sqrt(2 * term.depth * self.energy / self.mass)
+        time = np.abs(t) + np.abs(self.start) / np.where(self.rate > 0, self.rate, 1) + 2 / self.w
+        bound = self.excess < 0
+        reach = np.where(
+            bound, -np.log(np.where(bound, -self.excess, 1) / (1 + root)) / a, np.abs(self.u) + speed * time
+        )
+        force = 2 * term.depth * a * (1 + root) * root
+        ends = term.a, term.b
+        pushed = sum(np.abs(wide(system.p[end])) for end in ends)
+        far = sum(np.abs(wide(system.q[end])) for end in ends) + np.abs(term.rest)
+        far = far + pushed / (system.m[term.a] + system.m[term.b]) * np.abs(t)
+        for end in ends:
+            q[end] = LAST * (far + np.abs(self.u) + reach + speed * time)
+            p[end] = LAST * (pushed + self.mass * speed + force * time)
+        return q, p
 
 
 def _relative(m: Any, q: Any, p: Any, rest: Any) -> tuple[Any, Any]:
@@ -56,125 +149,11 @@ def _relative(m: Any, q: Any, p: Any, rest: Any) -> tuple[Any, Any]:
     return q[1] - q[0] - rest, m[0] * p[1] - m[1] * p[0]
 
 
-def _bond(system: System[Any], term: Morse) -> _Bond:
-    ends = term.a, term.b
-    m, q, p = ([wide(x[end]) for end in ends] for x in (system.m, system.q, system.p))
-    total, depth, a = m[0] + m[1], wide(term.depth), wide(term.steepness)
-    mass = m[0] * m[1] / total
-    u, pull = _relative(m, q, p, term.rest)
-    # where exp(steepness u) leaves the range of numbers nothing pulls
-    x = np.where(a * u > MOST, 0, np.exp(-np.minimum(a * u, MOST)))
-    kinetic = (pull / total) ** 2 / (2 * mass * depth)
-    excess = kinetic + x * (x - 2)
-    near = kinetic + x * (x + 2) > CANCELS * np.abs(excess)
-    near |= np.abs(q[1]) + np.abs(q[0]) + np.abs(term.rest) > CANCELS * np.abs(u)
-    near |= m[0] * np.abs(p[1]) + m[1] * np.abs(p[0]) > CANCELS * np.abs(pull)
-    if np.any(near):
-        j = np.flatnonzero(near)
-        u[j], pull[j], excess[j] = _of_bonds(
-            *([exactly(x[end[j]]) for end in ends] for x in (system.m, system.q, system.p)),
-            *(exactly(x[j]) for x in (term.rest, term.depth, term.steepness)),
-        )
-    y = np.minimum(a * u, MOST)
-    gap, p_ = np.expm1(-y), pull / total
-    energy = p_ * p_ / (2 * mass * depth) + gap * gap
-    w = np.abs(a) * np.sqrt(2 * depth / mass)
-    rate, z, dz = w * np.sqrt(np.abs(excess)), np.expm1(y), a * p_ / mass * np.exp(y)
-    safe = np.where(rate > 0, rate, 1)
-    root = np.sqrt(energy)
-    endless = np.arcsinh(dz * excess / (safe * np.where(root > 0, root, 1)))
-    start = np.where(
-        excess < 0,
-        np.arctan2(-dz * excess / safe, energy + excess * z),
-        # there arcsinh is a logarithm
-        endless + np.sign(endless) * (a * u - y),
-    )
-    return _Bond(
-        mass=mass, u=u, p=p_, share=m[0] / total, energy=energy, excess=excess, w=w, start=start, rate=rate
-    )
-
-
 def _of_bonds(m: Any, q: Any, p: Any, rest: Any, depth: Any, a: Any) -> tuple[Extended, Extended, Extended]:
-    """Elongation, relative momentum times both masses, and E / depth - 1."""
+    """Elongation, relative momentum times both masses, and E / depth - 1, in more digits."""
     with digits():
         u, pull = _relative(m, q, p, rest)
     with digits(ENOUGH):
         x = np.exp(-a * u)
         excess = pull * pull / (2 * m[0] * m[1] * (m[0] + m[1]) * depth) + x * (x - 2)
         return extended(u), extended(pull), extended(excess)
-
-
-def _morse(system: System[Any], bonds: tuple[Morse, _Bond], t: Extended) -> States:
-    """With s = exp(steepness u), s'' = w**2 (excess s + 1): a circular or hyperbolic function (Morse 1929).
-
-    w**2 = 2 depth steepness**2 / mass; excess = E/depth - 1.  The centre of mass moves uniformly.
-    """
-    q, p = np.empty((2, len(t), system.n), dtype=np.longdouble)
-    term, bond = bonds
-    stretch, speed = _stretched(bond, wide(term.steepness), t)
-    u, pull = stretch / term.steepness, bond.mass * speed / term.steepness
-    ma, mb = wide(system.m[term.a]), wide(system.m[term.b])
-    total = wide(system.p[term.a]) + system.p[term.b]
-    share = bond.share
-    qa, qb = wide(system.q[term.a]), wide(system.q[term.b])
-    centre = share * qa + (1 - share) * qb + total / (ma + mb) * t
-    length = term.rest + u
-    q[:, term.a], q[:, term.b] = centre - (1 - share) * length, centre + share * length
-    p[:, term.a], p[:, term.b] = share * total - pull, (1 - share) * total + pull
-    return q, p
-
-
-def _stretched(bond: _Bond, a: Extended, t: Extended) -> States:
-    """log(s) and its time derivative at times t.
-
-    At the inner turning point s = 1/(1 + root), root**2 = 1 + excess; from there on it grows by
-    root (cosh(phase) - 1) / excess, or root (1 - cos(phase)) / |excess|: nothing cancels.  Far beyond
-    dissociation only root exp(|phase|) / (2 excess) of it is left, whose logarithm cannot overflow.
-    """
-    root, bound, edge = np.sqrt(bond.energy), bond.excess < 0, bond.excess == 0
-    phase = bond.rate * t + bond.start
-    turn, run = np.where(bound, phase, 0), np.where(bound, 0, phase)
-    far = np.abs(run) > FAR_OUT
-    endless, run = np.where(far, run, FAR_OUT), np.where(far, 0, run)
-    half, whole = (
-        np.where(bound, np.sin(turn / 2), np.sinh(run / 2)),
-        np.where(bound, np.sin(turn), np.sinh(run)),
-    )
-    size = np.where(edge, 1, np.abs(bond.excess))
-    z, dz = 2 * root * half * half / size - root / (root + 1), root * bond.rate * whole / size
-    leaving = np.abs(endless) + np.log(np.where(far, root / (2 * size), 1))
-    # at the edge of dissociation a parabola
-    fast = np.where(edge, a * bond.p / bond.mass, 0)
-    slow = np.where(edge, bond.w**2 * np.exp(np.where(edge, -a * bond.u, 0)), 0)
-    grown = fast * t + slow * t * t / 2
-    return (
-        np.where(edge, a * bond.u + np.log1p(grown), np.where(far, leaving, np.log1p(z))),
-        np.where(
-            edge, (fast + slow * t) / (1 + grown), np.where(far, bond.rate * np.sign(endless), dz / (1 + z))
-        ),
-    )
-
-
-def _morse_doubt(system: System[Any], bonds: tuple[Morse, _Bond], t: np.longdouble) -> States:
-    q, p = np.empty((2, system.n), dtype=np.longdouble)
-    term, bond = bonds
-    a = np.abs(wide(term.steepness))
-    root = np.sqrt(bond.energy)
-    speed = np.sqrt(2 * term.depth * bond.energy / bond.mass)
-    time = np.abs(t) + np.abs(bond.start) / np.where(bond.rate > 0, bond.rate, 1) + 2 / bond.w
-    bound = bond.excess < 0
-    reach = np.where(
-        bound, -np.log(np.where(bound, -bond.excess, 1) / (1 + root)) / a, np.abs(bond.u) + speed * time
-    )
-    force = 2 * term.depth * a * (1 + root) * root
-    ends = term.a, term.b
-    pushed = sum(np.abs(wide(system.p[end])) for end in ends)
-    far = sum(np.abs(wide(system.q[end])) for end in ends) + np.abs(term.rest)
-    far = far + pushed / (system.m[term.a] + system.m[term.b]) * np.abs(t)
-    for end in ends:
-        q[end] = LAST * (far + np.abs(bond.u) + reach + speed * time)
-        p[end] = LAST * (pushed + bond.mass * speed + force * time)
-    return q, p
-
-
-MORSE = Well(key="morse", terms=frozenset({"morse"}), prepare=_bonds, motion=_morse, doubt=_morse_doubt)

@@ -8,14 +8,14 @@ nothing holds has the position over the time constant of A in place of w.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from springcheck.physics.arrays import EPS, Extended, by_identity
+from springcheck.physics.arrays import EPS, Extended
+from springcheck.physics.exact.closedform import ClosedForm, States
 from springcheck.physics.exact.linear import ROUNDINGS
-from springcheck.physics.exact.normal import Modes, normal_modes
-from springcheck.physics.exact.well import States, Well
+from springcheck.physics.exact.normal import normal_modes
 from springcheck.physics.system import System
 
 MOST_UNLIKE = 32
@@ -31,41 +31,56 @@ MOST_STEP_DIGITS = 15
 """Digits of that number: up to 2**60 steps, beyond which no digit of a phase is left."""
 
 
-@by_identity
-class _Flow(NamedTuple):
-    """The modes, what takes z to z' (2n, 2n) [1/T], the start (2n,), and 1/z of positions (n,)."""
+class UnlikeFriction(ClosedForm):
+    """A whole linear scene whose friction joins modes: A takes z to z' (2n, 2n) [1/T], `scale` (n,) is z over
+    positions, `rate` a bound of |A|, rows or columns, and `free` the scale of modes that nothing holds, 0
+    where there is none.
+    """
 
-    modes: Modes
-    A: Extended
-    start: Extended
-    scale: Extended
-    rate: np.longdouble
-    """A bound of |A|, rows or columns [1/T]."""
-    free: np.longdouble
-    """The scale of modes that nothing holds, 0 where there is none [1/T]."""
+    def __init__(self, system: System[Any]) -> None:
+        """Something else may not act, no mode may grow, and none that nothing holds may be pulled."""
+        super().__init__(system)
+        self.need(system.is_linear and system.n <= MOST_UNLIKE)
+        self.need(all(term.kind in ("potential", "friction") for term in system.terms))
+        self.modes = modes = normal_modes(system.without("damping"))
+        held = modes.w2 > 0
+        self.need(not (np.any(modes.w2 < 0) or np.any(modes.pull[~held])))
+        n, V = system.n, modes.vectors if modes.vectors is not None else np.eye(system.n, dtype=np.longdouble)
+        friction = V.T @ (system.friction_rates.astype(np.longdouble)[:, None] * V)
+        w = np.sqrt(np.where(held, modes.w2, 0))
+        self.free = np.longdouble(0) if np.all(held) else np.max(w) + np.max(system.friction_rates)
+        self.scale = np.where(held, w, self.free)
+        self.A = A = np.zeros((2 * n, 2 * n), np.longdouble)
+        A[:n, n:], A[n:, :n], A[n:, n:] = np.diag(self.scale), -np.diag(w), -friction
+        # the larger of the two bounds |A|**2 by their product
+        self.rate = np.sqrt(np.max(np.sum(np.abs(A), axis=0)) * np.max(np.sum(np.abs(A), axis=1)))
+        self.start = np.concatenate([self.scale * modes.start.u, modes.start.v])
 
+    def at(self, t: Extended) -> States:
+        n, z = self.system.n, np.empty((len(t), 2 * self.system.n), np.longdouble)
+        for sign, mine in ((1, t[:, 0] >= 0), (-1, t[:, 0] < 0)):
+            if np.any(mine):
+                z[mine] = _from_start(sign * self.A, self.start, np.abs(t[mine]), self.rate)
+        return self.modes.from_centres(z[:, :n] / self.scale, z[:, n:])
 
-def prepare(system: System[Any]) -> _Flow | None:
-    """None where something acts beside springs, constant forces and friction, where a mode grows, or where a
-    mode that nothing holds is pulled."""
-    if not system.is_linear or system.is_driven or system.rods or system.n > MOST_UNLIKE:
-        return None
-    if any(term.kind not in ("potential", "friction") for term in system.terms):
-        return None
-    modes = normal_modes(system.without("damping"))
-    held = modes.w2 > 0
-    if np.any(modes.w2 < 0) or np.any(modes.pull[~held]):
-        return None
-    n, V = system.n, modes.vectors if modes.vectors is not None else np.eye(system.n, dtype=np.longdouble)
-    friction = V.T @ (system.friction_rates.astype(np.longdouble)[:, None] * V)
-    w = np.sqrt(np.where(held, modes.w2, 0))
-    free = np.longdouble(0) if np.all(held) else np.max(w) + np.max(system.friction_rates)
-    scale = np.where(held, w, free)
-    A = np.zeros((2 * n, 2 * n), np.longdouble)
-    A[:n, n:], A[n:, :n], A[n:, n:] = np.diag(scale), -np.diag(w), -friction
-    # the larger of the two bounds |A|**2 by their product
-    rate = np.sqrt(np.max(np.sum(np.abs(A), axis=0)) * np.max(np.sum(np.abs(A), axis=1)))
-    return _Flow(modes, A, np.concatenate([scale * modes.start.u, modes.start.v]), scale, rate, free)
+    def doubt(self, t: np.longdouble) -> States:
+        """A product of matrices (k, k) of length 1 is off by k**2/2 EPS (Higham, Accuracy and Stability of
+        Numerical Algorithms, 3.13), and a power of a step by the sum of what its factors are at most: each of
+        2 |A| t steps counts, with 4 such products for its series, A and the power.  What modes are off by is
+        a force.  Friction drives backwards in time.  The position of a mode that nothing holds acts on
+        nothing, and adds up velocities.
+        """
+        system, modes, n, duration = self.system, self.modes, self.system.n, np.abs(t)
+        of_u, of_v, *_ = modes.start.sizes
+        size, begun = (np.sqrt(np.sum(x**2)) for x in (self.start, np.append(self.scale * of_u, of_v)))
+        if t < 0:
+            size, begun = (x * np.exp(np.max(system.friction_rates) * duration) for x in (size, begun))
+        last = 2 * ((2 * n) ** 2 + ROUNDINGS) * EPS * (2 + 2 * self.rate * duration)
+        known = (last + duration * np.max(modes.doubt / self.scale)) * size + ROUNDINGS * EPS * begun
+        far = np.where(modes.w2 > 0, known, known * (1 + self.free * duration)) / self.scale
+        y = modes.spread(far + ROUNDINGS * EPS * np.abs(modes.centre()))
+        v = modes.spread(np.full(n, known))
+        return y / modes.root_m, v * modes.root_m
 
 
 def _series(A: Extended, z: Extended, t: Extended) -> Extended:
@@ -74,15 +89,6 @@ def _series(A: Extended, z: Extended, t: Extended) -> Extended:
     for j in range(SERIES_TERMS, 0, -1):
         out = z + (out @ A.T) * (t / j)
     return np.asarray(out)
-
-
-def motion(system: System[Any], found: _Flow, t: Extended) -> States:
-    """Exact q and p (f, n) at times t (f, 1) [T]."""
-    n, z = system.n, np.empty((len(t), 2 * system.n), np.longdouble)
-    for sign, mine in ((1, t[:, 0] >= 0), (-1, t[:, 0] < 0)):
-        if np.any(mine):
-            z[mine] = _from_start(sign * found.A, found.start, np.abs(t[mine]), found.rate)
-    return found.modes.from_centres(z[:, :n] / found.scale, z[:, n:])
 
 
 def _from_start(A: Extended, start: Extended, t: Extended, rate: np.longdouble) -> Extended:
@@ -116,29 +122,3 @@ def _flown(A: Extended, z: Extended, t: Extended, rate: np.longdouble) -> Extend
             z = np.where((digit == j)[:, None], z @ power.T, z)
         one, whole = power @ one, np.floor(whole / RADIX_OF_STEPS)
     return np.asarray(z)
-
-
-def doubt(system: System[Any], found: _Flow, t: np.longdouble) -> States:
-    """Bounds (n,) of the errors of `motion` in q [L] and p [M L/T], from the start to time t [T].
-
-    A product of matrices (k, k) of length 1 is off by k**2/2 EPS (Higham, Accuracy and Stability of Numerical
-    Algorithms, 3.13), and a power of a step by the sum of what its factors are at most: each of 2 |A| t steps
-    counts, with 4 such products for its series, A and the power.  What modes are off by is a force.  Friction
-    drives backwards in time.  The position of a mode that nothing holds acts on nothing, and adds up
-    velocities.
-    """
-    n, duration = system.n, np.abs(t)
-    of_u, of_v, *_ = found.modes.start.sizes
-    size, begun = (np.sqrt(np.sum(x**2)) for x in (found.start, np.append(found.scale * of_u, of_v)))
-    if t < 0:
-        size, begun = (x * np.exp(np.max(system.friction_rates) * duration) for x in (size, begun))
-    last = 2 * ((2 * n) ** 2 + ROUNDINGS) * EPS * (2 + 2 * found.rate * duration)
-    known = (last + duration * np.max(found.modes.doubt / found.scale)) * size + ROUNDINGS * EPS * begun
-    far = np.where(found.modes.w2 > 0, known, known * (1 + found.free * duration)) / found.scale
-    y = found.modes.spread(far + ROUNDINGS * EPS * np.abs(found.modes.centre()))
-    v = found.modes.spread(np.full(n, known))
-    return y / found.modes.root_m, v * found.modes.root_m
-
-
-UNLIKE_FRICTION = Well(key="damping", terms=frozenset(), prepare=prepare, motion=motion, doubt=doubt)
-"""A whole linear scene whose friction joins modes."""

@@ -9,20 +9,85 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from springcheck.physics.arrays import EPS, Extended, by_identity
-from springcheck.physics.exact.normal import Modes, normal_modes, split
-from springcheck.physics.exact.well import Well
-from springcheck.physics.system import System
+from springcheck.physics.exact.closedform import ClosedForm, States
+from springcheck.physics.exact.normal import Modes, split
 
 SMALLEST = np.finfo(np.longdouble).tiny
 ROUNDINGS = 32
 """Roundings of a motion in extended precision, of each of its summands and of its phase."""
 
 
-def motion(system: System[Any], found: Modes, t: Extended) -> tuple[Extended, Extended]:
-    """Exact q and p (f, n) of a linear scene at times t (f, 1) [T]."""
-    start = found.start
-    y, v = _moved(start.u, start.v, t, _Law(found.w2, found.rate, found.pull, start.slow, start.fast))
-    return found.out_of(y + found.centre(), v)
+class LinearMotion(ClosedForm):
+    """Whatever has normal modes."""
+
+    def __init__(self, system: Any) -> None:
+        super().__init__(system)
+        self.need(system.has_modes)
+        self.modes: Modes = system.modes
+
+    def at(self, t: Extended) -> States:
+        found, start = self.modes, self.modes.start
+        law = _Law(found.w2, found.rate, found.pull, start.slow, start.fast)
+        return found.from_centres(*_moved(start.u, start.v, t, law))
+
+    def doubt(self, t: np.longdouble) -> States:
+        """A mode is known to a few roundings of its amplitude, of its phase, and of what its start was taken
+        from.  What is not known of the equations themselves, y'' = -A y - r y' + g, is a force, and a force f
+        moves y by |t f| min(t, 1/w) at most (variation of constants).
+        """
+        system, found = self.system, self.modes
+        if found.waves:
+            y, v, of_y, of_v = self._of_waves(t)
+            return (found.spread(y) + of_y) / found.root_m, (found.spread(v) + of_v) * found.root_m
+        reach, speed, phase, hold = reaches(found, t)
+        joined = found.vectors is not None
+        last, duration = (ROUNDINGS + (system.n if joined else 0)) * EPS, np.abs(t)
+        y, v = last * ((1 + phase) * reach + np.abs(found.centre())), last * (1 + phase) * speed
+        # friction is taken for one rate where it is one but for rounding
+        force = found.doubt * reach + (np.ptp(found.rate) * speed if joined else 0)
+        if np.any(found.doubt):
+            zero = np.zeros(system.n, dtype=np.longdouble)
+            force = force + last * system.magnitude()(zero, zero) / found.root_m
+        if not joined:
+            y, v = y + duration * hold * force, v + duration * force
+        else:
+            kick = duration * _length(force)
+            # what mixes modes may put the errors of all into one
+            y, v = found.spread(y) + np.max(hold) * kick, found.spread(v) + kick
+        return np.asarray(y / found.root_m), np.asarray(v * found.root_m)
+
+    def energy_of_doubt(self, t: np.longdouble) -> np.longdouble | None:
+        """Bound of the energy of the error at time t [M L2/T2]; None where `doubt` says all that is known."""
+        if not self.modes.waves:
+            return None
+        y, v, of_y, of_v = self._of_waves(t)
+        w = np.sqrt(np.max(self.modes.w2))
+        of_modes = _length(np.hypot(np.sqrt(self.modes.w2) * y, v))
+        known: np.longdouble = (of_modes + np.hypot(w * of_y, of_v)) ** 2 / 2
+        return known
+
+    def _of_waves(self, t: np.longdouble) -> tuple[Extended, Extended, Extended, Extended]:
+        """Error bounds (n,) of each wave's position and velocity in a uniform chain, and those of the
+        transform.
+
+        A wave is known like any mode.  The transform, an orthogonal one, errs by some log2(n) roundings of
+        the length of what it turns (Higham, Accuracy and Stability of Numerical Algorithms, 24.1), three
+        times that where n + 1 has large factors (Bluestein); the exact motion passes the error of the start
+        on as it is.
+        """
+        system, found = self.system, self.modes
+        reach, speed, phase, hold = reaches(found, t)
+        last, transform = ROUNDINGS * EPS, 24 * np.log2(8 * (system.n + 1)) * EPS
+        y, v = last * ((1 + phase) * reach + np.abs(found.centre())), last * (1 + phase) * speed
+        # friction is taken for one rate where it is one but for rounding
+        v = v + np.abs(t) * np.ptp(found.rate) * speed
+        whole_y, whole_v = (_length(x) for x in found.into(system.q, system.p))
+        w, driven = np.sqrt(np.max(found.w2)), np.exp(np.maximum(-t, 0) * np.max(found.rate))
+        of_y = transform * (
+            driven * (whole_y + np.max(hold) * whole_v) + _length(found.centre()) + _length(reach)
+        )
+        of_v = transform * (driven * (whole_v + w * whole_y) + _length(speed))
+        return np.asarray(y), np.asarray(v), of_y, of_v
 
 
 def flow(w2: Extended, rate: Extended, t: np.longdouble) -> Extended:
@@ -132,67 +197,6 @@ def _dragged(u: Extended, v: Extended, t: Extended, law: _Law) -> tuple[Extended
     return u + v * gone + law.pull * t * t * fallen, v * np.exp(-x) + law.pull * gone
 
 
-def doubt(system: System[Any], found: Modes, t: np.longdouble) -> tuple[Extended, Extended]:
-    """Bounds (n,) of the errors of `motion` in q [L] and p [M L/T], from the start to time t [T].
-
-    A mode is known to a few roundings of its amplitude, of its phase, and of what its start was taken from.
-    What is not known of the equations themselves, y'' = -A y - r y' + g, is a force, and a force f moves y by
-    |t f| min(t, 1/w) at most (variation of constants).
-    """
-    if found.waves:
-        y, v, of_y, of_v = _of_waves(system, found, t)
-        return (found.spread(y) + of_y) / found.root_m, (found.spread(v) + of_v) * found.root_m
-    reach, speed, phase, hold = reaches(found, t)
-    joined = found.vectors is not None
-    last, duration = (ROUNDINGS + (system.n if joined else 0)) * EPS, np.abs(t)
-    y, v = last * ((1 + phase) * reach + np.abs(found.centre())), last * (1 + phase) * speed
-    # friction is taken for one rate where it is one but for rounding
-    force = found.doubt * reach + (np.ptp(found.rate) * speed if joined else 0)
-    if np.any(found.doubt):
-        zero = np.zeros(system.n, dtype=np.longdouble)
-        force = force + last * system.magnitude()(zero, zero) / found.root_m
-    if not joined:
-        y, v = y + duration * hold * force, v + duration * force
-    else:
-        kick = duration * _length(force)
-        # what mixes modes may put the errors of all into one
-        y, v = found.spread(y) + np.max(hold) * kick, found.spread(v) + kick
-    return np.asarray(y / found.root_m), np.asarray(v * found.root_m)
-
-
-def energy_of_doubt(system: System[Any], found: Modes, t: np.longdouble) -> np.longdouble | None:
-    """Bound of the energy of the error at time t [M L2/T2]; None where `doubt` says all that is known."""
-    if not found.waves:
-        return None
-    y, v, of_y, of_v = _of_waves(system, found, t)
-    w = np.sqrt(np.max(found.w2))
-    known: np.longdouble = (_length(np.hypot(np.sqrt(found.w2) * y, v)) + np.hypot(w * of_y, of_v)) ** 2 / 2
-    return known
-
-
-def _of_waves(
-    system: System[Any], found: Modes, t: np.longdouble
-) -> tuple[Extended, Extended, Extended, Extended]:
-    """Error bounds (n,) of each wave's position and velocity in a uniform chain, and those of the transform.
-
-    A wave is known like any mode.  The transform, an orthogonal one, errs by some log2(n) roundings of the
-    length of what it turns (Higham, Accuracy and Stability of Numerical Algorithms, 24.1), three times that
-    where n + 1 has large factors (Bluestein); the exact motion passes the error of the start on as it is.
-    """
-    reach, speed, phase, hold = reaches(found, t)
-    last, transform = ROUNDINGS * EPS, 24 * np.log2(8 * (system.n + 1)) * EPS
-    y, v = last * ((1 + phase) * reach + np.abs(found.centre())), last * (1 + phase) * speed
-    # friction is taken for one rate where it is one but for rounding
-    v = v + np.abs(t) * np.ptp(found.rate) * speed
-    whole_y, whole_v = (_length(x) for x in found.into(system.q, system.p))
-    w, driven = np.sqrt(np.max(found.w2)), np.exp(np.maximum(-t, 0) * np.max(found.rate))
-    of_y = transform * (
-        driven * (whole_y + np.max(hold) * whole_v) + _length(found.centre()) + _length(reach)
-    )
-    of_v = transform * (driven * (whole_v + w * whole_y) + _length(speed))
-    return np.asarray(y), np.asarray(v), of_y, of_v
-
-
 def _length(x: Extended) -> Extended:
     return np.asarray(np.sqrt(np.sum(x * x)))
 
@@ -229,13 +233,3 @@ def reaches(found: Modes, t: np.longdouble) -> tuple[Extended, Extended, Extende
     reach = reach + np.where(falls, late + early, 0)
     speed = speed + np.where(falls, up * late + down * early, 0)
     return np.asarray(reach), np.asarray(speed), np.asarray(phase), np.asarray(hold)
-
-
-LINEAR = Well(
-    key="",
-    terms=frozenset(),
-    prepare=lambda system: normal_modes(system) if system.has_modes else None,
-    motion=motion,
-    doubt=doubt,
-)
-"""Whatever has normal modes."""

@@ -6,14 +6,23 @@ node of a grid is a product of Taylor series in time, whose step turns by less t
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
-from springcheck.physics.arrays import Extended, by_identity
+from springcheck.physics.arrays import Extended
 from springcheck.physics.driven import ModulatedSpring
+from springcheck.physics.exact.closedform import (
+    LAST,
+    PI,
+    ClosedForm,
+    NoClosedFormError,
+    States,
+    one_each,
+    wide,
+)
 from springcheck.physics.exact.powers import propagate
-from springcheck.physics.exact.well import LAST, PI, States, Well, one_each
 from springcheck.physics.system import System
 
 TAYLOR_ORDER = 22
@@ -26,126 +35,110 @@ MOST_NODES = 1 << 14
 """Nodes of a period: a modulation so slow that it takes more is left out."""
 
 
-@by_identity
-class _Mode(NamedTuple):
-    """One particle: u'' = -w2 (1 + depth cos(W t + phase)) u, u = q - at, its start (u, v), its matrices."""
+class _Mode:
+    """One particle: u'' = -w2 (1 + depth cos(turn t + phase)) u, u = q - at, and its start (u, v).
 
-    w2: np.longdouble
-    depth: np.longdouble
-    turn: np.longdouble
-    phase: np.longdouble
-    start: Extended
-    at: float
-    node: np.longdouble
-    """Distance of the nodes [T]."""
-    nodes: Extended
-    """What takes (u, v) from the start to each node of a period (j + 1, 2, 2), the last its end."""
-
-    @property
-    def rate(self) -> float:
-        """The largest frequency, that of the spring or of the modulation [1/T]."""
-        return float(np.maximum(np.sqrt(np.abs(self.w2) * (1 + np.abs(self.depth))), np.abs(self.turn)))
-
-
-def prepare(system: System[Any]) -> tuple[_Mode, ...] | None:
-    """None where anything else acts, or where a period is too long."""
-    term = system.terms[0]
-    if not isinstance(term, ModulatedSpring) or len(system.terms) > 1 or not one_each(system):
-        return None
-    found = []
-    for i, k, depth, frequency, phase, at in term.rows():
-        m, q, p = (np.longdouble(x[i]) for x in (system.m, system.q, system.p))
-        start = np.array([q - np.longdouble(at), p / m])
-        deep, turn, angle = (np.longdouble(x) for x in (depth, frequency, phase))
-        none = np.empty(0, np.longdouble)
-        blank = _Mode(np.longdouble(k) / m, deep, turn, angle, start, at, np.longdouble(0), none)
-        if frequency == 0 or not 2 * blank.rate * 2 * np.pi / abs(frequency) < MOST_NODES:
-            return None
-        found.append((i, _with_nodes(blank)))
-    return tuple(mode for _, mode in sorted(found, key=lambda one: one[0]))
-
-
-def _with_nodes(mode: _Mode) -> _Mode:
-    period = 2 * PI / np.abs(mode.turn)
-    count = int(np.ceil(2 * mode.rate * float(period)))
-    step = period / count
-    steps = _series(mode, step * np.arange(count), np.full(count, step))
-    nodes = [np.asarray(np.eye(2), np.longdouble)]
-    for one in steps:
-        nodes.append(np.asarray(one @ nodes[-1], np.longdouble))
-    return mode._replace(node=step, nodes=np.stack(nodes))
-
-
-def _series(mode: _Mode, t: Extended, s: Extended) -> Extended:
-    """What takes (u, v) from the times t (f,) to t + s: (f, 2, 2)."""
-    angle = mode.turn * t + mode.phase
-    waves, factor = [], np.longdouble(1)
-    for j in range(TAYLOR_ORDER):
-        # the j-th derivative of the cosine: cos, -sin, -cos, sin
-        wave = (np.cos(angle), -np.sin(angle), -np.cos(angle), np.sin(angle))[j % 4]
-        waves.append(mode.depth * factor * wave + (1 if j == 0 else 0))
-        factor = factor * mode.turn / (j + 1)
-    # both unit starts at once, coefficients (order, 2, f)
-    u = [np.stack([np.ones_like(s), np.zeros_like(s)]), np.stack([np.zeros_like(s), np.ones_like(s)])]
-    for j in range(TAYLOR_ORDER):
-        total = sum((waves[i] * u[j - i] for i in range(j + 1)), np.zeros_like(u[0]))
-        u.append(np.asarray(-mode.w2 * total / ((j + 1) * (j + 2)), np.longdouble))
-    y, v = np.zeros_like(u[0]), np.zeros_like(u[0])
-    for j in reversed(range(len(u))):
-        y = y * s + u[j]
-        v = v * s + j * u[j] if j else v
-    return np.asarray(np.moveaxis(np.stack([y, v]), -1, 0))
-
-
-def motion(system: System[Any], found: tuple[_Mode, ...], t: Extended) -> States:
-    """Exact q and p (f, n) at times t (f, 1) [T]."""
-    q, p = np.empty((2, len(t), system.n), dtype=np.longdouble)
-    for i, mode in enumerate(found):
-        period = 2 * PI / np.abs(mode.turn)
-        n = np.floor(t[:, 0] / period).astype(np.int64)
-        rest = t[:, 0] - n * period
-        j = np.clip((rest / mode.node).astype(np.int64), 0, len(mode.nodes) - 2)
-        last = _series(mode, mode.node * j, rest - mode.node * j)
-        # what turns by nearly half a turn a period, its negative turns by little
-        sign, begun = np.copysign(1, np.trace(mode.nodes[-1])), np.empty((2, len(t)), np.longdouble)
-        (a, b), (c, d) = sign * mode.nodes[-1]
-        for matrix, mine in ((np.array([[a, b], [c, d]]), n >= 0), (np.array([[d, -b], [-c, a]]), n < 0)):
-            u0, v0 = mode.start[:, None]
-            u, v = propagate(matrix[None], u0, v0, np.abs(n[mine]), area_preserving=True)
-            begun[:, mine] = np.stack([u[:, 0], v[:, 0]]) * np.where(n[mine] % 2 == 1, sign, 1)
-        q[:, i], p[:, i] = np.einsum("fij,jf->if", last @ mode.nodes[j], begun)
-    return q + np.array([mode.at for mode in found]), p * system.m
-
-
-def doubt(system: System[Any], found: tuple[_Mode, ...], t: np.longdouble) -> States:
-    """Bounds (n,) of the errors of `motion`: roundings of the angle turned through, times the largest state.
-
-    Of eigenvalues x and y, and the length N of M - x, the matrix M of a period has powers of at most 1 + n N
-    or the condition of its eigenvectors, k + root(k**2 - 1) with k = N/|x - y|: close to the edge of a
-    resonance they grow, once with the state and once with what becomes of an error.  That holds in the
-    coordinates (z u, v) for any z, and the least of several is taken; errors begin with rate/z there.
+    `rate` is the largest frequency, that of the spring or of the modulation [1/T], and `nodes` (j + 1, 2, 2)
+    what takes (u, v) from the start to each node of a period, the last its end, which are `node` [T] apart.
     """
-    u, v = np.empty((2, system.n), dtype=np.longdouble)
-    for i, mode in enumerate(found):
-        M = mode.nodes[-1]
-        half = np.trace(M) / 2
-        root = np.emath.sqrt((half - 1) * (half + 1)) * np.copysign(1, half)
-        radius, gap = max(float(np.abs(np.real(half + root))), 1.0), max(2 * float(np.abs(root)), LAST)
-        period = 2 * PI / np.abs(mode.turn)
-        # before the start a whole period goes back, and some of it on
-        turned, periods = mode.rate * (t if t >= 0 else period - t), float(np.abs(t) / period) + 1
-        sizes = []
-        for z in mode.rate * np.geomspace(1, _balance(M) / mode.rate, SCALES):
-            scaled = mode.nodes * [[1, z], [1 / z, 1]]
-            length = float(np.linalg.norm((scaled[-1] - (half + root) * np.eye(2)).astype(complex)))
-            k = max(length / gap, 1.0)
-            power = min(k + np.sqrt(k * k - 1), 1 + periods * length)
-            within = np.max(np.linalg.norm(scaled.astype(np.float64), axis=(1, 2)))
-            grown = within * power**2 * max(mode.rate / z, z / mode.rate)
-            sizes.append(grown * np.hypot(z * mode.start[0], mode.start[1]) / np.array([z, 1]))
-        u[i], v[i] = np.min(sizes, axis=0) * radius**periods * LAST * (1 + turned)
-        u[i] += LAST * np.abs(mode.at)
-    return u, v * system.m
+
+    def __init__(self, found: Extended, row: Sequence[float]) -> None:
+        """Of mass, position and momentum, and a row of its term.  NoClosedFormError: a period is too long."""
+        m, q, p = found
+        k, self.depth, self.turn, self.phase, self.at = wide(row)
+        self.w2, self.start = k / m, np.array([q - self.at, p / m])
+        spring = np.sqrt(np.abs(self.w2) * (1 + np.abs(self.depth)))
+        self.rate = float(np.maximum(spring, np.abs(self.turn)))
+        if self.turn == 0 or not 2 * self.rate * 2 * np.pi / abs(float(self.turn)) < MOST_NODES:
+            raise NoClosedFormError
+        self.period = 2 * PI / np.abs(self.turn)
+        count = int(np.ceil(2 * self.rate * float(self.period)))
+        self.node = self.period / count
+        nodes = [np.asarray(np.eye(2), np.longdouble)]
+        for one in self.steps(self.node * np.arange(count), np.full(count, self.node)):
+            nodes.append(np.asarray(one @ nodes[-1], np.longdouble))
+        self.nodes = np.stack(nodes)
+
+    def steps(self, t: Extended, s: Extended) -> Extended:
+        """What takes (u, v) from the times t (f,) to t + s: (f, 2, 2)."""
+        angle = self.turn * t + self.phase
+        waves, factor = [], np.longdouble(1)
+        for j in range(TAYLOR_ORDER):
+            # the j-th derivative of the cosine: cos, -sin, -cos, sin
+            wave = (np.cos(angle), -np.sin(angle), -np.cos(angle), np.sin(angle))[j % 4]
+            waves.append(self.depth * factor * wave + (1 if j == 0 else 0))
+            factor = factor * self.turn / (j + 1)
+        # both unit starts at once, coefficients (order, 2, f)
+        u = [np.stack([np.ones_like(s), np.zeros_like(s)]), np.stack([np.zeros_like(s), np.ones_like(s)])]
+        for j in range(TAYLOR_ORDER):
+            total = sum((waves[i] * u[j - i] for i in range(j + 1)), np.zeros_like(u[0]))
+            u.append(np.asarray(-self.w2 * total / ((j + 1) * (j + 2)), np.longdouble))
+        y, v = np.zeros_like(u[0]), np.zeros_like(u[0])
+        for j in reversed(range(len(u))):
+            y = y * s + u[j]
+            v = v * s + j * u[j] if j else v
+        return np.asarray(np.moveaxis(np.stack([y, v]), -1, 0))
+
+
+class ModulatedMotion(ClosedForm):
+    """A whole scene of springs of modulated stiffness, one on each particle, each with its `_Mode`."""
+
+    def __init__(self, system: System[Any]) -> None:
+        super().__init__(system)
+        term = next(iter(system.terms), None)
+        self.need(isinstance(term, ModulatedSpring) and len(system.terms) == 1 and one_each(system))
+        assert isinstance(term, ModulatedSpring)
+        found = wide([system.m, system.q, system.p])
+        self.modes = [_Mode(found[:, i], row) for i, *row in sorted(term.rows())]
+
+    def at(self, t: Extended) -> States:
+        q, p = np.empty((2, len(t), self.system.n), dtype=np.longdouble)
+        for i, mode in enumerate(self.modes):
+            n = np.floor(t[:, 0] / mode.period).astype(np.int64)
+            rest = t[:, 0] - n * mode.period
+            j = np.clip((rest / mode.node).astype(np.int64), 0, len(mode.nodes) - 2)
+            last = mode.steps(mode.node * j, rest - mode.node * j)
+            # what turns by nearly half a turn a period, its negative turns by little
+            sign, begun = np.copysign(1, np.trace(mode.nodes[-1])), np.empty((2, len(t)), np.longdouble)
+            (a, b), (c, d) = sign * mode.nodes[-1]
+            for matrix, mine in ((np.array([[a, b], [c, d]]), n >= 0), (np.array([[d, -b], [-c, a]]), n < 0)):
+                u0, v0 = mode.start[:, None]
+                u, v = propagate(matrix[None], u0, v0, np.abs(n[mine]), area_preserving=True)
+                begun[:, mine] = np.stack([u[:, 0], v[:, 0]]) * np.where(n[mine] % 2 == 1, sign, 1)
+            q[:, i], p[:, i] = np.einsum("fij,jf->if", last @ mode.nodes[j], begun)
+        return q + np.array([mode.at for mode in self.modes]), p * self.system.m
+
+    def doubt(self, t: np.longdouble) -> States:
+        """Roundings of the angle turned through, times the largest state.
+
+        Of eigenvalues x and y, and the length N of M - x, the matrix M of a period has powers of at most
+        1 + n N or the condition of its eigenvectors, k + root(k**2 - 1) with k = N/|x - y|: close to the edge
+        of a resonance they grow, once with the state and once with what becomes of an error.  That holds in
+        the coordinates (z u, v) for any z, and the least of several is taken; errors begin with rate/z there.
+        """
+        u, v = np.empty((2, self.system.n), dtype=np.longdouble)
+        for i, mode in enumerate(self.modes):
+            M = mode.nodes[-1]
+            half = np.trace(M) / 2
+            root = np.emath.sqrt((half - 1) * (half + 1)) * np.copysign(1, half)
+            radius, gap = max(float(np.abs(np.real(half + root))), 1.0), max(2 * float(np.abs(root)), LAST)
+            # before the start a whole period goes back, and some of it on
+            turned, periods = (
+                mode.rate * (t if t >= 0 else mode.period - t),
+                float(np.abs(t) / mode.period) + 1,
+            )
+            sizes = []
+            for z in mode.rate * np.geomspace(1, _balance(M) / mode.rate, SCALES):
+                scaled = mode.nodes * [[1, z], [1 / z, 1]]
+                length = float(np.linalg.norm((scaled[-1] - (half + root) * np.eye(2)).astype(complex)))
+                k = max(length / gap, 1.0)
+                power = min(k + np.sqrt(k * k - 1), 1 + periods * length)
+                within = np.max(np.linalg.norm(scaled.astype(np.float64), axis=(1, 2)))
+                grown = within * power**2 * max(mode.rate / z, z / mode.rate)
+                sizes.append(grown * np.hypot(z * mode.start[0], mode.start[1]) / np.array([z, 1]))
+            u[i], v[i] = np.min(sizes, axis=0) * radius**periods * LAST * (1 + turned)
+            u[i] += LAST * np.abs(mode.at)
+        return u, v * self.system.m
 
 
 def _balance(M: Extended) -> float:
@@ -159,15 +152,10 @@ def floquet(system: System[Any]) -> tuple[float, float, float] | None:
     where that is above 1 and else 1, the period [T], and the angle of the multiplier, 0 to pi [rad], of what
     grows fastest; None of other scenes."""
     each = []
-    for mode in prepare(system) or () if "modulated-spring" in system.acting else ():
+    found = ModulatedMotion.of(system)
+    for mode in found.modes if found else ():
         half = float(np.trace(mode.nodes[-1])) / 2
         # the matrix of a period has the determinant 1
         grown = abs(half) + float(np.sqrt(max(half * half - 1, 0)))
-        each.append(
-            (max(grown, 1.0), float(2 * PI / np.abs(mode.turn)), float(np.arccos(np.clip(half, -1, 1))))
-        )
+        each.append((max(grown, 1.0), float(mode.period), float(np.arccos(np.clip(half, -1, 1)))))
     return max(each, default=None)
-
-
-MATHIEU = Well(key="modulated-spring", terms=frozenset(), prepare=prepare, motion=motion, doubt=doubt)
-"""A whole scene of springs of modulated stiffness, one on each particle."""

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from springcheck.physics.arrays import EPS, Extended, Integers, Reals, by_identity
+from springcheck.physics.exact.closedform import PI
 from springcheck.physics.exact.digits import ENOUGH, Wide, digits, eigen, exactly, extended
 from springcheck.physics.system import System
 from springcheck.physics.terms import Damping, Spring
@@ -170,12 +171,11 @@ def _start(system: System[Any], modes: Modes) -> Start:
     y, v = modes.into(system.q, system.p)
     centre = modes.centre()
     u = y - centre
-    slow, fast, size = split(u, v, modes.w2, modes.rate)
-    if modes.vectors is not None:
-        whole = (np.sqrt(np.sum(x * x)) + np.zeros_like(x) for x in (y, v))
-        size_u, size_v = next(whole) + np.abs(centre), next(whole)
-    else:
-        size_u, size_v = np.abs(y) + np.abs(centre), np.abs(v)
+    slow, fast, _ = split(u, v, modes.w2, modes.rate)
+    # what mixes modes may put the last digits of all into one
+    of_all = modes.vectors is not None
+    size_u, size_v = (np.sqrt(np.sum(x * x)) + np.zeros_like(x) if of_all else np.abs(x) for x in (y, v))
+    size_u = size_u + np.abs(centre)
     _, _, size = split(size_u, size_v, modes.w2, modes.rate)
     sizes = [size_u, size_v, size, size.copy()]
     lost = (modes.w2 < 0) & (np.minimum(np.abs(slow), np.abs(fast)) * 16 < size)
@@ -267,9 +267,6 @@ def _drag(system: System[Any], force: Extended) -> Extended:
         moves = abs(total) > len(group) * EPS * np.sum(np.abs(force[group]))
         out[group] = np.sqrt(m) * total / np.sum(m) if moves else 0
     return out
-
-
-PI = 4 * np.arctan(np.longdouble(1))
 
 
 def _wave_frequencies(system: System[Any]) -> Extended:

@@ -8,17 +8,20 @@ from typing import Any
 import numpy as np
 
 from springcheck.physics.arrays import Extended
+from springcheck.physics.exact.closedform import (
+    CANCELS,
+    LAST,
+    PI,
+    ClosedForm,
+    States,
+    latency,
+    one_each,
+    wide,
+)
 from springcheck.physics.exact.digits import digits, exactly, extended, pi, sine_cosine
 from springcheck.physics.exact.elliptic import argument, jacobi
-from springcheck.physics.exact.well import CANCELS, LAST, PI, States, Well, latency, one_each, wide
-from springcheck.physics.rods import Rods
 from springcheck.physics.system import System
 from springcheck.physics.terms import Cosine, Weight
-
-
-def _swings(system: System[Any]) -> tuple[Cosine, _Swing] | None:
-    (term,) = (term for term in system.terms if isinstance(term, Cosine))
-    return None if np.any(term.depth == 0) or not one_each(system) else (term, _swing(system, term))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -35,6 +38,32 @@ class _Swing:
     rate: Extended
     m: Extended
     m1: Extended
+
+    def at(self, t: Extended) -> States:
+        """Half the angle, and its rate in units of w, at times t: libration, sin(angle/2) =
+        R sn(w t + phase | R**2), and rotation, angle/2 = am(R w t + phase | 1/R**2).
+
+        w**2 = depth wave**2 / mass; Landau & Lifshitz, Mechanics, section 11.
+        """
+        s, c, r, m, m1 = self.sine, self.cosine, self.rate, self.m, self.m1
+        over = m1 < 0
+        # over the top the modulus is 1/m, and the arguments run sqrt(m) times as fast
+        fast = np.where(over, np.sqrt(m), 1)
+        safe = np.where(m > 0, m, 1)
+        modulus, other = np.where(over, 1 / safe, m), np.where(over, -m1 / safe, m1)
+        phase = argument(np.where(over, np.sign(r) * s, s), np.where(over, c, r), modulus, other)
+        at = jacobi(self.w * t * fast + phase, modulus, other)
+        root = np.sqrt(m)
+        swing = np.arctan2(root * at.sn, at.dn)
+        return (
+            np.asarray(np.where(over, np.sign(r) * at.am, swing)),
+            np.asarray(np.where(over, np.sign(r) * root * at.dn, root * at.cn)),
+        )
+
+    @property
+    def latency(self) -> Extended:
+        """Bound of the time [T] from the bottom to the start, of as much as numbers tell."""
+        return latency(self.m1 / np.maximum(self.m, 1)) / self.w
 
 
 def _swing(system: System[Any], term: Cosine) -> _Swing:
@@ -68,133 +97,101 @@ def _of_swing(m: Any, q: Any, p: Any, depth: Any, wave: Any, at: Any) -> Extende
         return extended(np.array([half, sine, cosine, m1], dtype=object))
 
 
-def _pendulum(system: System[Any], swings: tuple[Cosine, _Swing], t: Extended) -> States:
-    """Libration, sin(angle/2) = R sn(w t + phase | R**2), and rotation, angle/2 = am(R w t + phase | 1/R**2).
+class PendulumMotion(ClosedForm):
+    """Pendulums along an axis, swinging and rotating."""
 
-    R**2 = E / 2 depth, w**2 = depth wave**2 / mass; Landau & Lifshitz, Mechanics, section 11.
+    key = "cosine"
+    terms = frozenset({"cosine"})
+
+    def __init__(self, system: System[Any]) -> None:
+        super().__init__(system)
+        (self.term,) = (term for term in system.terms if isinstance(term, Cosine))
+        self.need(np.all(self.term.depth != 0) and one_each(system))
+        self.swing = _swing(system, self.term)
+
+    def at(self, t: Extended) -> States:
+        q, p = np.empty((2, len(t), self.system.n), dtype=np.longdouble)
+        i, swing = self.term.i, self.swing
+        a, r = swing.at(t)
+        q[:, i] = self.system.q[i] + swing.length * (2 * (a - swing.half))
+        p[:, i] = swing.mass * swing.length * 2 * swing.w * r
+        return q, p
+
+    def doubt(self, t: np.longdouble) -> States:
+        q, p = np.empty((2, self.system.n), dtype=np.longdouble)
+        i, swing = self.term.i, self.swing
+        root = np.sqrt(swing.m)
+        size = 2 * swing.length * np.minimum(root, PI / 2)
+        speed = 2 * swing.length * swing.w * root
+        time = np.abs(t) + swing.latency
+        force = swing.mass * swing.w**2 * np.minimum(size, swing.length)
+        q[i] = LAST * (np.abs(self.system.q[i]) + size + speed * time)
+        p[i] = LAST * (swing.mass * speed + force * time)
+        return q, p
+
+
+class HangingRods(ClosedForm):
+    """Rods to fixed points in a plane, a weight on each: the angle from the weight swings as that of any
+    pendulum, w**2 = force / (mass length).  Unit vectors along the weight and across it are (c, 2).
     """
-    q, p = np.empty((2, len(t), system.n), dtype=np.longdouble)
-    term, found = swings
-    a, r = _swung(found, t)
-    q[:, term.i] = system.q[term.i] + found.length * (2 * (a - found.half))
-    p[:, term.i] = found.mass * found.length * 2 * found.w * r
-    return q, p
 
+    key = "weight"
+    terms = frozenset({"weight", "wall-rod"})
 
-def _pendulum_doubt(system: System[Any], swings: tuple[Cosine, _Swing], t: np.longdouble) -> States:
-    q, p = np.empty((2, system.n), dtype=np.longdouble)
-    term, found = swings
-    root = np.sqrt(found.m)
-    size = 2 * found.length * np.minimum(root, PI / 2)
-    speed = 2 * found.length * found.w * root
-    time = np.abs(t) + latency(found.m1 / np.maximum(found.m, 1)) / found.w
-    force = found.mass * found.w**2 * np.minimum(size, found.length)
-    q[term.i] = LAST * (np.abs(system.q[term.i]) + size + speed * time)
-    p[term.i] = LAST * (found.mass * speed + force * time)
-    return q, p
+    def __init__(self, system: System[Any]) -> None:
+        """In more digits: near the barrier all hangs on what the energy lacks of it."""
+        super().__init__(system)
+        rods: Any = system.rods
+        self.need(rods and not rods.share and all(len(ends) == 1 for ends in rods.ends))
+        self.need(system.n == 2 * len(rods))
+        shape = (len(rods), 2)
+        with digits():
+            at, weight = exactly(np.zeros((2, system.n)))
+            for term in system.terms:
+                if isinstance(term, Weight):
+                    np.add.at(weight, term.i, exactly(term.force))
+                else:
+                    at[term.particles[0]] = exactly(getattr(term, term.origin))
+            given: Any = exactly(system.q) - at, exactly(system.p), weight, exactly(system.m)
+            (x, y), (u, v), (a, b), (m, _) = (rods.apart(of).reshape(shape).T for of in given)
+            square, force = x * x + y * y, a * a + b * b
+            self.need(np.all(force != 0))
+            both = np.sqrt(square * force)
+            low, side, area = x * a + y * b, a * y - b * x, x * v - y * u
+            # both - |low| without its cancellation
+            sum_, less = both + np.abs(low), side * side / (both + np.abs(low))
+            down, up = (np.where(here, sum_, less) for here in (low > 0, low <= 0))
+            sine, cosine = np.sqrt(up / (2 * both)), np.sqrt(down / (2 * both))
+            rest = 2 * m * square
+            parts = {
+                "length": np.sqrt(square), "mass": m, "w": np.sqrt(both / m / square),
+                "sine": np.where(side < 0, -sine, sine), "cosine": cosine,
+                "rate": area / np.sqrt(2 * rest * both),
+                "m1": (rest * down - area * area) / (2 * rest * both),
+            }  # fmt: skip
+            swing = {name: extended(values) for name, values in parts.items()}
+            size = np.sqrt(force)
+            self.start = extended(np.stack([x, y], axis=1)).ravel()
+            self.across = extended(np.stack([-b / size, a / size], axis=1))
+        half, m_ = np.arctan2(swing["sine"], swing["cosine"]), swing["sine"] ** 2 + swing["rate"] ** 2
+        self.down = np.stack([self.across[:, 1], -self.across[:, 0]], axis=1)
+        self.rods, self.swing = rods, _Swing(half=half, m=m_, **swing)
 
+    def at(self, t: Extended) -> States:
+        rods, swing = self.rods, self.swing
+        half, rate = swing.at(t)
+        sine, cosine = np.sin(2 * half)[..., None], np.cos(2 * half)[..., None]
+        speed = (swing.length * 2 * swing.w * rate)[..., None]
+        r = swing.length[:, None] * (cosine * self.down + sine * self.across)
+        v = speed * (cosine * self.across - sine * self.down)
+        rows = (*t.shape[:-1], -1)
+        q = self.system.q + rods.spread(r.reshape(rows) - self.start)
+        return wide(q), wide(rods.spread((swing.mass[:, None] * v).reshape(rows)))
 
-def _swung(found: _Swing, t: Extended) -> States:
-    """Half the angle, and its rate in units of w, at times t."""
-    s, c, r, m, m1 = found.sine, found.cosine, found.rate, found.m, found.m1
-    over = m1 < 0
-    # over the top the modulus is 1/m, and the arguments run sqrt(m) times as fast
-    fast = np.where(over, np.sqrt(m), 1)
-    safe = np.where(m > 0, m, 1)
-    modulus, other = np.where(over, 1 / safe, m), np.where(over, -m1 / safe, m1)
-    phase = argument(np.where(over, np.sign(r) * s, s), np.where(over, c, r), modulus, other)
-    at = jacobi(found.w * t * fast + phase, modulus, other)
-    root = np.sqrt(m)
-    swing = np.arctan2(root * at.sn, at.dn)
-    return (
-        np.asarray(np.where(over, np.sign(r) * at.am, swing)),
-        np.asarray(np.where(over, np.sign(r) * root * at.dn, root * at.cn)),
-    )
-
-
-COSINE = Well(
-    key="cosine", terms=frozenset({"cosine"}), prepare=_swings, motion=_pendulum, doubt=_pendulum_doubt
-)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Hung:
-    """Rods to fixed points in a plane, a weight on each: unit vectors along it and across (c, 2), swings."""
-
-    rods: Rods
-    start: Extended
-    down: Extended
-    across: Extended
-    swing: _Swing
-
-
-def _hung(system: System[Any]) -> _Hung | None:
-    """In more digits: near the barrier all hangs on what the energy lacks of it."""
-    rods = system.rods
-    if rods is None or rods.share or any(len(ends) > 1 for ends in rods.ends) or system.n != 2 * len(rods):
-        return None
-    shape = (len(rods), 2)
-    with digits():
-        at, weight = exactly(np.zeros((2, system.n)))
-        for term in system.terms:
-            if isinstance(term, Weight):
-                np.add.at(weight, term.i, exactly(term.force))
-            else:
-                at[term.particles[0]] = exactly(getattr(term, term.origin))
-        given: Any = exactly(system.q) - at, exactly(system.p), weight, exactly(system.m)
-        (x, y), (u, v), (a, b), (m, _) = (rods.apart(of).reshape(shape).T for of in given)
-        square, force = x * x + y * y, a * a + b * b
-        if np.any(force == 0):
-            return None
-        both = np.sqrt(square * force)
-        low, side, area = x * a + y * b, a * y - b * x, x * v - y * u
-        # both - |low| without its cancellation
-        sum_, less = both + np.abs(low), side * side / (both + np.abs(low))
-        down, up = (np.where(here, sum_, less) for here in (low > 0, low <= 0))
-        sine, cosine = np.sqrt(up / (2 * both)), np.sqrt(down / (2 * both))
-        rest = 2 * m * square
-        parts = {
-            "length": np.sqrt(square), "mass": m, "w": np.sqrt(both / m / square),
-            "sine": np.where(side < 0, -sine, sine), "cosine": cosine,
-            "rate": area / np.sqrt(2 * rest * both), "m1": (rest * down - area * area) / (2 * rest * both),
-        }  # fmt: skip
-        swing = {name: extended(values) for name, values in parts.items()}
-        size = np.sqrt(force)
-        start, across = extended(np.stack([x, y], axis=1)), extended(np.stack([-b / size, a / size], axis=1))
-    half, m_ = np.arctan2(swing["sine"], swing["cosine"]), swing["sine"] ** 2 + swing["rate"] ** 2
-    down = np.stack([across[:, 1], -across[:, 0]], axis=1)
-    return _Hung(
-        rods=rods, start=start.ravel(), down=down, across=across,
-        swing=_Swing(half=half, m=m_, **swing),
-    )  # fmt: skip
-
-
-def _hanging(system: System[Any], found: _Hung, t: Extended) -> States:
-    """The angle from the weight swings as that of any pendulum: w**2 = force / (mass length)."""
-    rods, swing = found.rods, found.swing
-    half, rate = _swung(swing, t)
-    sine, cosine = np.sin(2 * half)[..., None], np.cos(2 * half)[..., None]
-    speed = (swing.length * 2 * swing.w * rate)[..., None]
-    r = swing.length[:, None] * (cosine * found.down + sine * found.across)
-    v = speed * (cosine * found.across - sine * found.down)
-    rows = (*t.shape[:-1], -1)
-    q = system.q + rods.spread(r.reshape(rows) - found.start)
-    return wide(q), wide(rods.spread((swing.mass[:, None] * v).reshape(rows)))
-
-
-def _hanging_doubt(system: System[Any], found: _Hung, t: np.longdouble) -> States:
-    rods, swing = found.rods, found.swing
-    speed = 2 * swing.length * swing.w * np.sqrt(swing.m)
-    time = np.abs(t) + latency(swing.m1 / np.maximum(swing.m, 1)) / swing.w
-    q = rods.spread(rods.each(swing.length + speed * time))
-    p = rods.spread(rods.each(swing.mass * (speed + swing.w**2 * swing.length * time)))
-    return wide(LAST * (np.abs(system.q) + q)), wide(LAST * p)
-
-
-RIGID = Well(
-    key="weight",
-    terms=frozenset({"weight", "wall-rod"}),
-    prepare=_hung,
-    motion=_hanging,
-    doubt=_hanging_doubt,
-)
+    def doubt(self, t: np.longdouble) -> States:
+        rods, swing = self.rods, self.swing
+        speed = 2 * swing.length * swing.w * np.sqrt(swing.m)
+        time = np.abs(t) + swing.latency
+        q = rods.spread(rods.each(swing.length + speed * time))
+        p = rods.spread(rods.each(swing.mass * (speed + swing.w**2 * swing.length * time)))
+        return wide(LAST * (np.abs(self.system.q) + q)), wide(LAST * p)

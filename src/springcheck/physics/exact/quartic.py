@@ -10,9 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from springcheck.physics.arrays import Extended
+from springcheck.physics.exact.closedform import (
+    CANCELS,
+    LAST,
+    ClosedForm,
+    States,
+    latency,
+    wide,
+)
 from springcheck.physics.exact.digits import digits, exactly, extended
 from springcheck.physics.exact.elliptic import argument, jacobi
-from springcheck.physics.exact.well import CANCELS, LAST, States, Well, latency, wide
 from springcheck.physics.system import System
 from springcheck.physics.terms import Quartic, WallSpring
 
@@ -62,35 +69,62 @@ def _sums(m: Any, k: Any, b: Any, u: Any, p: Any) -> tuple[Any, Any, Any]:
     return x, m * x * x + 2 * b * p * p, 2 * p * p + m * (2 * k + b * u * u) * u * u
 
 
-def _duffing(system: System[Any]) -> tuple[_Duffing, Extended] | None:
-    """The wells and their centres, or None where one has several centres, or no turning point."""
-    m, k, b, q, at, p = _gathered(system, wide)
-    for term in system.terms:
-        if isinstance(term, Quartic | WallSpring) and np.any(term.at != at[term.i]):
-            return None
-    u = q - at
-    sums = _sums(m, k, b, u, p)
-    m_, k_, b_, q_, at_, p_ = _gathered(system, lambda x: np.abs(wide(x)))
-    sizes = _sums(m_, k_, b_, q_ + at_, p_)
-    near = np.any([size > CANCELS * np.abs(x) for x, size in zip(sums, sizes, strict=True)], axis=0)
-    if np.any(near):
-        chosen = np.flatnonzero(near)
-        with digits():
-            m_, k_, b_, q_, at_, p_ = _gathered(system.beside(system.part(chosen)), exactly)
-            for out, x in zip(sums, _sums(m_, k_, b_, q_ - at_, p_), strict=True):
-                out[chosen] = extended(x)
-    x, square, energy = sums[0] / m, sums[1] / m**3, sums[2] / m**2
-    k, b = k / m, b / m
-    if not np.all((b > 0) | ((k > 0) & (square >= 0) & (x >= 0))):
-        return None
-    root = np.sqrt(square)
-    # root**2 - k**2 is 4 b E, so that of plus and minus the one that cancels follows from the other
-    large = root + np.abs(k)
-    small = b * energy / np.where(large > 0, large, 1)
-    minus, plus = np.where(k < 0, large, small), np.where(k < 0, small, large)
-    parts = {"k": k, "b": b, "u": u, "v": p / m, "pull": x, "energy": energy}
-    parts |= {"root": root, "plus": plus}
-    return _Duffing(**parts, **_orbit(b, root, minus, plus, energy)), at
+class QuarticMotion(ClosedForm):
+    """Single particles in wells of one centre each."""
+
+    key = "quartic"
+    terms = frozenset({"quartic", "wall-spring"})
+
+    def __init__(self, system: System[Any]) -> None:
+        super().__init__(system)
+        m, k, b, q, at, p = _gathered(system, wide)
+        for term in system.terms:
+            self.need(not isinstance(term, Quartic | WallSpring) or np.all(term.at == at[term.i]))
+        u = q - at
+        sums = _sums(m, k, b, u, p)
+        m_, k_, b_, q_, at_, p_ = _gathered(system, lambda x: np.abs(wide(x)))
+        sizes = _sums(m_, k_, b_, q_ + at_, p_)
+        near = np.any([size > CANCELS * np.abs(x) for x, size in zip(sums, sizes, strict=True)], axis=0)
+        if np.any(near):
+            chosen = np.flatnonzero(near)
+            with digits():
+                m_, k_, b_, q_, at_, p_ = _gathered(system.beside(system.part(chosen)), exactly)
+                for out, x in zip(sums, _sums(m_, k_, b_, q_ - at_, p_), strict=True):
+                    out[chosen] = extended(x)
+        x, square, energy = sums[0] / m, sums[1] / m**3, sums[2] / m**2
+        k, b = k / m, b / m
+        # a turning point
+        self.need(np.all((b > 0) | ((k > 0) & (square >= 0) & (x >= 0))))
+        root = np.sqrt(square)
+        # root**2 - k**2 is 4 b E, so that of plus and minus the one that cancels follows from the other
+        large = root + np.abs(k)
+        small = b * energy / np.where(large > 0, large, 1)
+        minus, plus = np.where(k < 0, large, small), np.where(k < 0, small, large)
+        parts = {"k": k, "b": b, "u": u, "v": p / m, "pull": x, "energy": energy}
+        parts |= {"root": root, "plus": plus}
+        self.well, self.centre = _Duffing(**parts, **_orbit(b, root, minus, plus, energy)), at
+
+    def at(self, t: Extended) -> States:
+        """cn, dn or sn, by what holds the particle."""
+        well = self.well
+        u, v = np.empty((2, len(t), self.system.n), dtype=np.longdouble)
+        softening = well.b <= 0
+        # the sign of the energy: beside |k| it may be lost in the root
+        caught = ~softening & (well.plus < 0)
+        for which, law in ((softening, _sn), (caught, _dn), (~softening & ~caught, _cn)):
+            if np.any(which):
+                u[:, which], v[:, which] = law(well[which], t)
+        return u + self.centre, v * self.system.m
+
+    def doubt(self, t: np.longdouble) -> States:
+        well, hill = self.well, (self.well.k < 0) & (self.well.b > 0)
+        # at the bottom of the potential
+        fastest = np.where(hill, well.root**2 / (2 * np.abs(well.b)), np.abs(well.energy) / 2)
+        a, speed = well.amplitude, np.sqrt(fastest)
+        time = np.abs(t) + latency(well.m1) / np.where(well.w > 0, well.w, 1)
+        q = LAST * (np.abs(self.centre) + a + speed * time)
+        p = LAST * (speed + (np.abs(well.k) + np.abs(well.b) * a * a) * a * time)
+        return np.asarray(q), np.asarray(p * self.system.m)
 
 
 def _orbit(
@@ -111,32 +145,6 @@ def _orbit(
     m = np.where(soft, -minus / broad, np.where(caught, 2 * root / deep, m))
     m1 = np.where(soft, 2 * root / broad, np.where(caught, -plus / deep, m1))
     return {"amplitude": amplitude, "w": w, "m": m, "m1": m1}
-
-
-def _stiffening(system: System[Any], found: tuple[_Duffing, Extended], t: Extended) -> States:
-    """cn, dn or sn, by what holds the particle."""
-    well, at = found
-    u, v = np.empty((2, len(t), system.n), dtype=np.longdouble)
-    softening = well.b <= 0
-    # the sign of the energy: beside |k| it may be lost in the root
-    caught = ~softening & (well.plus < 0)
-    for which, law in ((softening, _sn), (caught, _dn), (~softening & ~caught, _cn)):
-        if np.any(which):
-            u[:, which], v[:, which] = law(well[which], t)
-    return u + at, v * system.m
-
-
-def _stiffening_doubt(system: System[Any], found: tuple[_Duffing, Extended], t: np.longdouble) -> States:
-    well, at = found
-    # at the bottom of the potential
-    fastest = np.where(
-        (well.k < 0) & (well.b > 0), well.root**2 / (2 * np.abs(well.b)), np.abs(well.energy) / 2
-    )
-    a, speed = well.amplitude, np.sqrt(fastest)
-    time = np.abs(t) + latency(well.m1) / np.where(well.w > 0, well.w, 1)
-    q = LAST * (np.abs(at) + a + speed * time)
-    p = LAST * (speed + (np.abs(well.k) + np.abs(well.b) * a * a) * a * time)
-    return np.asarray(q), np.asarray(p * system.m)
 
 
 def _cn(well: _Duffing, t: Extended) -> States:
@@ -170,12 +178,3 @@ def _sn(well: _Duffing, t: Extended) -> States:
     dn = np.sqrt((well.root + well.pull) / well.plus)
     at = jacobi(t * w + argument(well.u, well.v / (w * np.where(dn > 0, dn, 1)), m, m1), m, m1)
     return np.asarray(well.amplitude * at.sn), np.asarray(well.amplitude * w * at.cn * at.dn)
-
-
-QUARTIC = Well(
-    key="quartic",
-    terms=frozenset({"quartic", "wall-spring"}),
-    prepare=_duffing,
-    motion=_stiffening,
-    doubt=_stiffening_doubt,
-)

@@ -14,9 +14,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from springcheck.physics.arrays import EPS, Extended, Floats, by_identity
+from springcheck.physics.exact.closedform import LAST, ClosedForm, States, wide
 from springcheck.physics.exact.digits import digits, exactly, extended
 from springcheck.physics.exact.normal import exact_sums
-from springcheck.physics.exact.well import LAST, States, Well, wide
 from springcheck.physics.system import System
 from springcheck.physics.vanderpol import VanDerPol
 
@@ -195,75 +195,64 @@ def _growth(maps: Floats, w: float, u: Floats) -> tuple[float, tuple[float, floa
     return most, (float(felt[0]), float(felt[1] * w))
 
 
-def prepare(system: System[Any]) -> tuple[_Path, ...] | None:
-    """None where a particle has more than one such friction, and backwards in time, where it blows up."""
-    found: list[_Path] = []
-    term = next(term for term in system.terms if isinstance(term, VanDerPol))
-    if system.scene.step < 0 or len(term) != system.n or len(np.unique(term.i)) < system.n:
-        return None
-    with digits():
-        k, springs, _ = exact_sums(system.without(term.key), np.diagonal)
-    for i, c, width, at in sorted(term.rows()):
-        m, wall, wide_at = (np.longdouble(x) for x in (system.m[i], width, at))
-        if not k[i] and springs[i]:
-            return None
+class VanDerPolMotion(ClosedForm):
+    """Single particles with such a friction, on springs to walls."""
+
+    key = "van-der-pol"
+    terms = frozenset({"van-der-pol", "wall-spring", "damping"})
+
+    def __init__(self, system: System[Any]) -> None:
+        """No particle may have more than one such friction; backwards in time it blows up."""
+        super().__init__(system)
+        found: list[_Path] = []
+        term = next(term for term in system.terms if isinstance(term, VanDerPol))
+        self.need(system.scene.step > 0 and len(term) == len(np.unique(term.i)) == system.n)
         with digits():
-            # the force at `at`, in units of the stiffness: where the springs rest; far from 0 it cancels
-            away = (springs[i] - k[i] * exactly(at)[()]) / (k[i] or 1)
-            stiffness, rests = extended(np.array([k[i], away], object))
-        w2, centre = stiffness / m, rests / wall
-        law = _Law(np.longdouble(c) / m, system.friction_rates[i], w2, centre)
-        start = float(system.q[i]), float(system.p[i])
-        u, v = (system.q[i] - wide_at) / wall, np.longdouble(system.p[i]) / m / wall
-        if u == centre and v == 0:
-            return None
-        done = _path(law, u, v, np.longdouble(system.scene.step) * system.scene.steps)
-        if done is None:
-            return None
-        t, us, series, most, maps = done
-        slow = float(np.sqrt(np.abs(w2))) or 1 / float(t[-1])
-        found.append(_Path(wide_at, wall, start, t, us, series, most, *_growth(maps, slow, us.astype(float))))
-    return tuple(found)
+            k, springs, _ = exact_sums(system.without(term.key), np.diagonal)
+        for i, c, width, at in sorted(term.rows()):
+            m, wall, wide_at = (np.longdouble(x) for x in (system.m[i], width, at))
+            self.need(k[i] or not springs[i])
+            with digits():
+                # the force at `at`, in units of the stiffness: where the springs rest; far from 0 it cancels
+                away = (springs[i] - k[i] * exactly(at)[()]) / (k[i] or 1)
+                stiffness, rests = extended(np.array([k[i], away], object))
+            w2, centre = stiffness / m, rests / wall
+            law = _Law(np.longdouble(c) / m, system.friction_rates[i], w2, centre)
+            start = float(system.q[i]), float(system.p[i])
+            u, v = (system.q[i] - wide_at) / wall, np.longdouble(system.p[i]) / m / wall
+            self.need(u != centre or v != 0)
+            done: Any = _path(law, u, v, np.longdouble(system.scene.step) * system.scene.steps)
+            self.need(done)
+            t, us, series, most, maps = done
+            slow = float(np.sqrt(np.abs(w2))) or 1 / float(t[-1])
+            found.append(
+                _Path(wide_at, wall, start, t, us, series, most, *_growth(maps, slow, us.astype(float)))
+            )
+        self.paths, self.growth = found, max(path.growth for path in found)
 
+    def at(self, t: Extended) -> States:
+        """Not known beyond the end of the scene."""
+        q, p = np.full((2, len(t), self.system.n), np.nan, dtype=np.longdouble)
+        for i, path in enumerate(self.paths):
+            inside = np.flatnonzero((t[:, 0] >= 0) & (t[:, 0] <= path.t[-1]))
+            times = t[inside, 0]
+            j = np.clip(np.searchsorted(path.t, times) - 1, 0, len(path.u) - 1)
+            h = path.t[j + 1] - path.t[j]
+            x = 2 * (times - path.t[j]) / h - 1
+            series = path.series[j]
+            u = path.u[j] + h / 2 * np.sum(series * _integrals(x, RADAU_STAGES), axis=-1)
+            q[inside, i] = path.at + path.width * u
+            p[inside, i] = (
+                path.width * np.sum(series * _legendre(x, RADAU_STAGES), axis=-1) * self.system.m[i]
+            )
+            q[t[:, 0] == 0, i], p[t[:, 0] == 0, i] = path.start
+        return q, p
 
-def motion(system: System[Any], found: tuple[_Path, ...], t: Extended) -> States:
-    """Exact q and p (f, n) at times t (f, 1) [T]; not known beyond the end of the scene."""
-    q, p = np.full((2, len(t), system.n), np.nan, dtype=np.longdouble)
-    for i, path in enumerate(found):
-        inside = np.flatnonzero((t[:, 0] >= 0) & (t[:, 0] <= path.t[-1]))
-        times = t[inside, 0]
-        j = np.clip(np.searchsorted(path.t, times) - 1, 0, len(path.u) - 1)
-        h = path.t[j + 1] - path.t[j]
-        x = 2 * (times - path.t[j]) / h - 1
-        series = path.series[j]
-        u = path.u[j] + h / 2 * np.sum(series * _integrals(x, RADAU_STAGES), axis=-1)
-        q[inside, i] = path.at + path.width * u
-        p[inside, i] = path.width * np.sum(series * _legendre(x, RADAU_STAGES), axis=-1) * system.m[i]
-        q[t[:, 0] == 0, i], p[t[:, 0] == 0, i] = path.start
-    return q, p
-
-
-def doubt(system: System[Any], found: tuple[_Path, ...], t: np.longdouble) -> States:
-    """Bounds (n,) of the errors of `motion`: those of its size and place, and the larger of a time known to
-    `LATENESS` and of what roundings are felt by."""
-    u, v, a = (np.array([path.fastest[j] * float(path.width) for path in found]) for j in range(3))
-    late, at = LATENESS * np.abs(t), np.array([np.abs(path.at) for path in found])
-    felt = FELT * np.array([path.width * np.array(path.felt) for path in found]).T
-    dq, dv = np.maximum(LAST * u + late * v, felt[0]), np.maximum(LAST * v + late * a, felt[1])
-    return np.asarray(LAST * at + dq), np.asarray(dv * system.m)
-
-
-def growth(system: System[Any], found: tuple[_Path, ...]) -> float:
-    """The largest |D phi| of the exact flow between two times of the scene, in the energy norm."""
-    return max(path.growth for path in found)
-
-
-VAN_DER_POL = Well(
-    key="van-der-pol",
-    terms=frozenset({"van-der-pol", "wall-spring", "damping"}),
-    prepare=prepare,
-    motion=motion,
-    doubt=doubt,
-    growth=growth,
-)
-"""Single particles with such a friction, on springs to walls."""
+    def doubt(self, t: np.longdouble) -> States:
+        """Errors of its size and place, and the larger of a time known to `LATENESS` and of what roundings
+        are felt by."""
+        u, v, a = (np.array([path.fastest[j] * float(path.width) for path in self.paths]) for j in range(3))
+        late, at = LATENESS * np.abs(t), np.array([np.abs(path.at) for path in self.paths])
+        felt = FELT * np.array([path.width * np.array(path.felt) for path in self.paths]).T
+        dq, dv = np.maximum(LAST * u + late * v, felt[0]), np.maximum(LAST * v + late * a, felt[1])
+        return np.asarray(LAST * at + dq), np.asarray(dv * self.system.m)

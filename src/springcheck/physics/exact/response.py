@@ -8,15 +8,15 @@ free particle alike, where points coincide (de Boor, Surveys in Approximation Th
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from springcheck.physics.arrays import EPS, Extended
-from springcheck.physics.exact import linear
-from springcheck.physics.exact.normal import Modes, normal_modes
-from springcheck.physics.exact.well import States, Well
+from springcheck.physics.exact.closedform import ClosedForm, States
+from springcheck.physics.exact.linear import ROUNDINGS, LinearMotion, reaches
+from springcheck.physics.exact.normal import Modes
 from springcheck.physics.system import System
 
 _Complex = NDArray[np.complexfloating[Any, Any]]
@@ -28,21 +28,43 @@ SERIES_TERMS = 26
 _Drive: TypeAlias = tuple[np.longdouble, np.longdouble, Extended]
 
 
-class _Found(NamedTuple):
-    """The system without its drives, its modes, and of each drive frequency, phase and force on each mode."""
+class Response(ClosedForm):
+    """A whole scene of linear springs, friction with modes, and drives: the motion `alone` without these, and
+    of each frequency, phase and force on each mode.
+    """
 
-    alone: System[Any]
-    modes: Modes
-    drives: tuple[_Drive, ...]
+    def __init__(self, system: System[Any]) -> None:
+        super().__init__(system)
+        self.alone = LinearMotion(system.without("drive"))
+        self.modes = self.alone.modes
+        self.drives = drives(system, self.modes)
 
+    def at(self, t: Extended) -> States:
+        q, p = self.alone.at(t)
+        slow, fast = roots(self.modes)
+        for frequency, phase, force in self.drives:
+            turn = np.full_like(slow, 1j * frequency)
+            strength = force * np.exp(1j * phase)
+            y = second_difference(turn, slow, fast, t)
+            # x / ((x - a)(x - b)(x - c)) is 1 / ((x - a)(x - c)) and b times what belongs to y
+            v = first_difference(turn, fast, t) + slow * y
+            dq, dp = self.modes.out_of((strength * y).real, (strength * v).real)
+            q, p = q + dq, p + dp
+        return q, p
 
-def prepare(system: System[Any]) -> _Found | None:
-    """None where something else than linear springs, friction with modes, and drives acts."""
-    alone = system.without("drive")
-    if not alone.has_modes:
-        return None
-    modes = normal_modes(alone)
-    return _Found(alone, modes, drives(system, modes))
+    def doubt(self, t: np.longdouble) -> States:
+        """Those of the motion without a drive, and roundings of the angles and of what the force moves: g
+        moves a mode by |t g| min(t, 1/w) at most (variation of constants).
+        """
+        q, p = self.alone.doubt(t)
+        modes, duration = self.modes, np.abs(t)
+        _, _, phase, hold = reaches(modes, t)
+        grown = np.exp(np.maximum(np.max([x.real * t for x in roots(modes)], axis=0), 0))
+        for frequency, _, force in self.drives:
+            angles = 1 + phase + np.abs(frequency) * duration
+            kick = ROUNDINGS * EPS * angles * grown * np.abs(force) * duration
+            q, p = q + modes.spread(kick * hold) / modes.root_m, p + modes.spread(kick) * modes.root_m
+        return np.asarray(q), np.asarray(p)
 
 
 def drives(system: System[Any], modes: Modes) -> tuple[_Drive, ...]:
@@ -97,39 +119,3 @@ def second_difference(a: _Complex, b: _Complex, c: _Complex, t: Extended) -> _Co
     return np.asarray(
         np.where(near, t * t * np.exp(y * t) * total, apart / np.where(near | (x == z), 1, x - z))
     )
-
-
-def motion(system: System[Any], found: _Found, t: Extended) -> States:
-    """Exact q and p (f, n) at times t (f, 1) [T]."""
-    q, p = linear.motion(found.alone, found.modes, t)
-    slow, fast = roots(found.modes)
-    for frequency, phase, force in found.drives:
-        turn = np.full_like(slow, 1j * frequency)
-        strength = force * np.exp(1j * phase)
-        y = second_difference(turn, slow, fast, t)
-        # x / ((x - a)(x - b)(x - c)) is 1 / ((x - a)(x - c)) and b times what belongs to y
-        v = first_difference(turn, fast, t) + slow * y
-        dq, dp = found.modes.out_of((strength * y).real, (strength * v).real)
-        q, p = q + dq, p + dp
-    return q, p
-
-
-def doubt(system: System[Any], found: _Found, t: np.longdouble) -> States:
-    """Bounds (n,) of the errors of `motion` in q and p, from the start to time t.
-
-    Those of the motion without a drive, and roundings of the angles and of what the force moves: g moves a
-    mode by |t g| min(t, 1/w) at most (variation of constants).
-    """
-    q, p = linear.doubt(found.alone, found.modes, t)
-    modes, duration = found.modes, np.abs(t)
-    _, _, phase, hold = linear.reaches(modes, t)
-    grown = np.exp(np.maximum(np.max([x.real * t for x in roots(modes)], axis=0), 0))
-    for frequency, _, force in found.drives:
-        angles = 1 + phase + np.abs(frequency) * duration
-        kick = linear.ROUNDINGS * EPS * angles * grown * np.abs(force) * duration
-        q, p = q + modes.spread(kick * hold) / modes.root_m, p + modes.spread(kick) * modes.root_m
-    return np.asarray(q), np.asarray(p)
-
-
-RESPONSE = Well(key="drive", terms=frozenset(), prepare=prepare, motion=motion, doubt=doubt)
-"""A whole scene of linear springs, friction and drives."""

@@ -6,96 +6,79 @@ straight on.  Rounding of the start leaves some turning: it is no more than what
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from springcheck.physics.arrays import Extended
+from springcheck.physics.exact.closedform import LAST, ClosedForm, States, one_each, wide
 from springcheck.physics.exact.digits import Wide, digits, exactly, extended
-from springcheck.physics.exact.well import LAST, States, Well, one_each, wide
 from springcheck.physics.rods import UNTRUE
 from springcheck.physics.system import System
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class _Swing:
+class SwingingMotion(ClosedForm):
     """Arrays by coordinate (n,): signed share of the length, and direction; the centre and its velocity;
-    length less rest and its rate at the start, rest, frequency, amplitude, and the speed across."""
+    length less rest and its rate at the start, rest, frequency, amplitude, and the speed across.
+    """
 
-    share: Extended
-    along: Extended
-    centre: Extended
-    drift: Extended
-    u: Extended
-    rate: Extended
-    rest: Extended
-    w: Extended
-    most: Extended
-    across: Extended
+    key = "bond"
+    terms = frozenset({"bond"})
 
+    def __init__(self, system: System[Any]) -> None:
+        """No bond may turn, close, or share a particle with another."""
+        super().__init__(system)
+        term: Any = system.terms[0]
+        self.need(one_each(system))
+        a, b, zero = term.a, term.b, np.zeros(system.n)
+        bond = np.unique(term.number, return_inverse=True)[1]
 
-def _swings(system: System[Any]) -> _Swing | None:
-    """None where some bond turns, may close, or shares a particle with another."""
-    term: Any = system.terms[0]
-    if not one_each(system):
-        return None
-    a, b, zero = term.a, term.b, np.zeros(system.n)
-    bond = np.unique(term.number, return_inverse=True)[1]
+        def summed(values: Wide) -> Wide:
+            out = exactly(zero)
+            np.add.at(out, bond, values)
+            return out[bond]
 
-    def summed(values: Wide) -> Wide:
-        out = exactly(zero)
-        np.add.at(out, bond, values)
-        return out[bond]
+        # ways and velocities are differences, which may be small beside what they are of
+        with digits():
+            m, q, p, k, rest = (exactly(x) for x in (system.m, system.q, system.p, term.k, term.rest))
+            whole, d, v = m[a] + m[b], q[b] - q[a], p / m
+            apart, square = v[b] - v[a], summed(d * d)
+            self.need(np.all(square != 0) and np.all(term.k > 0))
+            s = np.sqrt(square)
+            e, rate = d / s, summed(d * apart) / s
+            across, speed = summed((apart - rate * e) ** 2), summed(v[a] ** 2 + v[b] ** 2) / 2
+            rows = extended(
+                np.stack([
+                    e, (m[a] * q[a] + m[b] * q[b]) / whole, (p[a] + p[b]) / whole,
+                    (square - rest * rest) / (s + rest), rate, rest, np.sqrt(k * whole / m[a] / m[b]),
+                    np.sqrt(across), np.sqrt(speed),
+                ])
+            )  # fmt: skip
+            share = extended(np.concatenate([-m[b], m[a]]) / np.tile(whole, 2))
+        ends = np.argsort(np.concatenate([a, b]))
+        self.share, rows = share[ends], np.tile(rows, 2)[:, ends]
+        self.along, self.centre, self.drift, self.u, self.rate, self.rest, self.w, self.across, speed = rows
+        with np.errstate(all="ignore"):
+            self.most = np.hypot(self.u, self.rate / self.w)
+        self.need(np.all((self.rest > self.most) & (self.across <= UNTRUE * speed)))
 
-    # ways and velocities are differences, which may be small beside what they are of
-    with digits():
-        m, q, p, k, rest = (exactly(x) for x in (system.m, system.q, system.p, term.k, term.rest))
-        whole, d, v = m[a] + m[b], q[b] - q[a], p / m
-        apart, square = v[b] - v[a], summed(d * d)
-        if np.any(square == 0) or not np.all(term.k > 0):
-            return None
-        s = np.sqrt(square)
-        e, rate = d / s, summed(d * apart) / s
-        across, speed = summed((apart - rate * e) ** 2), summed(v[a] ** 2 + v[b] ** 2) / 2
-        rows = extended(
-            np.stack([
-                e, (m[a] * q[a] + m[b] * q[b]) / whole, (p[a] + p[b]) / whole,
-                (square - rest * rest) / (s + rest), rate, rest, np.sqrt(k * whole / m[a] / m[b]),
-                np.sqrt(across), np.sqrt(speed),
-            ])
-        )  # fmt: skip
-        share = extended(np.concatenate([-m[b], m[a]]) / np.tile(whole, 2))
-    ends = np.argsort(np.concatenate([a, b]))
-    along, centre, drift, u, rate, rest, w, across, speed = np.tile(rows, 2)[:, ends]
-    with np.errstate(all="ignore"):
-        most = np.hypot(u, rate / w)
-    if not np.all((rest > most) & (across <= UNTRUE * speed)):
-        return None
-    return _Swing(
-        share=share[ends], along=along, centre=centre, drift=drift, u=u, rate=rate, rest=rest, w=w,
-        most=wide(most), across=across,
-    )  # fmt: skip
+    def at(self, t: Extended) -> States:
+        sine, cosine = np.sin(self.w * t), np.cos(self.w * t)
+        way = self.share * self.along
+        q = self.centre + self.drift * t + way * (self.rest + self.u * cosine + self.rate * sine / self.w)
+        speed = self.drift + way * (self.rate * cosine - self.u * self.w * sine)
+        return wide(q), wide(self.system.m * speed)
 
-
-def _motion(system: System[Any], found: _Swing, t: Extended) -> States:
-    sine, cosine = np.sin(found.w * t), np.cos(found.w * t)
-    way = found.share * found.along
-    q = found.centre + found.drift * t + way * (found.rest + found.u * cosine + found.rate * sine / found.w)
-    return wide(q), wide(system.m * (found.drift + way * (found.rate * cosine - found.u * found.w * sine)))
-
-
-def _doubt(system: System[Any], found: _Swing, t: np.longdouble) -> States:
-    time, share, far = np.abs(t), np.abs(found.share), found.rest + found.most
-    near = found.rest - found.most
-    # an angle at most, of what keeps its angular momentum, and the way that its turning pushes the ends apart
-    turned = found.across * time * far / near**2 * far
-    pushed = (found.across * far / found.w) ** 2 / near**3
-    phase = 2 + found.w * time
-    q = LAST * (np.abs(found.centre) + np.abs(found.drift) * time + share * (far + found.most * phase))
-    size = np.abs(found.drift) + share * found.most * found.w * phase
-    swung = found.w * (turned + pushed * phase) + found.across * far / near
-    return wide(q + share * (turned + pushed * phase)), wide(system.m * (LAST * size + share * swung))
-
-
-SWINGING = Well(key="bond", terms=frozenset({"bond"}), prepare=_swings, motion=_motion, doubt=_doubt)
+    def doubt(self, t: np.longdouble) -> States:
+        time, share, far = np.abs(t), np.abs(self.share), self.rest + self.most
+        near, w = self.rest - self.most, self.w
+        # an angle at most, of what keeps its angular momentum, and the way that its turning pushes the ends
+        # apart
+        turned = self.across * time * far / near**2 * far
+        pushed = (self.across * far / w) ** 2 / near**3
+        phase = 2 + w * time
+        q = LAST * (np.abs(self.centre) + np.abs(self.drift) * time + share * (far + self.most * phase))
+        size = np.abs(self.drift) + share * self.most * w * phase
+        swung = w * (turned + pushed * phase) + self.across * far / near
+        p = self.system.m * (LAST * size + share * swung)
+        return wide(q + share * (turned + pushed * phase)), wide(p)

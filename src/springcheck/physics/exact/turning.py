@@ -8,68 +8,87 @@ is too long, (1 - cos) x, is what pushes along its rods can balance.
 from __future__ import annotations
 
 from collections import Counter
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from springcheck.physics.arrays import Extended, Integers, by_identity
+from springcheck.physics.arrays import Extended, Integers
+from springcheck.physics.exact.closedform import LAST, ClosedForm, States, wide
 from springcheck.physics.exact.digits import Wide, digits, exactly, extended
-from springcheck.physics.exact.well import LAST, States, Well, wide
 from springcheck.physics.rods import UNTRUE, Rods
 from springcheck.physics.system import System
 
 
-@by_identity
-class _Turning(NamedTuple):
-    """Arrays by coordinate (n,): position and velocity from the centre, the distance of its particle,
-    the angular velocity, and the velocity of the centre."""
+class TurningRods(ClosedForm):
+    """Flat rigid bodies.  Arrays by coordinate (n,): position x and velocity v from the centre, the distance
+    `reach` of its particle, the angular velocity w, and the velocity `drift` of the centre.
+    """
 
-    x: Extended
-    v: Extended
-    reach: Extended
-    w: Extended
-    drift: Extended
+    key = "rod"
+    terms = frozenset({"rod"})
+
+    def __init__(self, system: System[Any]) -> None:
+        super().__init__(system)
+        rods, places, n = system.rods, system.scene.all_places, system.scene.particles
+        assert rods is not None
+        of, at = _bodies(rods, n), np.zeros(system.n)
+        self.need(of is not None)
+        assert of is not None
+        for term in system.terms:
+            if term.origin:
+                at[term.particles[0]] = getattr(term, term.origin)
+        held = np.isin(np.arange(n), [ends[0] for ends in rods.ends if len(ends) == 1])[:, None]
+
+        def by_axes(values: Any) -> Any:
+            out = np.zeros((n, 3), values.dtype)
+            out.reshape(-1)[places] = values
+            return out
+
+        def summed(values: Wide) -> Wide:
+            out = exactly(np.zeros_like(values, np.float64))
+            np.add.at(out, of, values)
+            return out[of]
+
+        # in more digits: a body may be small beside where it is, and turn slowly beside how it moves
+        with digits():
+            q, p, m = (exactly(by_axes(x)) for x in (system.q, system.p, system.m))
+            q, m = q - exactly(by_axes(at)), np.max(m, axis=1, keepdims=True)
+            drift, centre = (np.where(held, 0 * x, summed(x) / summed(m)) for x in (p, m * q))
+            x = q - centre
+            square = np.sum(x * x, axis=1, keepdims=True)
+            turn = summed(np.cross(x, p)) / summed(m * square)
+            v, w = np.cross(turn, x), np.sqrt(np.sum(turn * turn, axis=1, keepdims=True)) + 0 * x
+            self.x, self.v, self.reach, self.w, self.drift = (
+                extended(y).reshape(-1)[places] for y in (x, v, np.sqrt(square) + 0 * x, w, drift)
+            )
+        if rods.share:
+            # momenta are those of such a turn
+            off = rods.projected(wide(system.q), wide(system.p)) / system.m - self.drift - self.v
+            body, speed = of[places // 3], self.reach * self.w
+            each = (
+                (np.max(np.abs(off[here])), np.max(speed[here])) for here in (body == b for b in set(body))
+            )
+            self.need(not any(moved > UNTRUE / 2 * most for moved, most in each))
+
+    def at(self, t: Extended) -> States:
+        turn, m = self.w * t, wide(self.system.m)
+        sine, cosine = np.sin(turn), np.cos(turn)
+        rate = np.where(self.w > 0, self.w, 1)
+        q = self.system.q + self.drift * t + self.x * (cosine - 1) + self.v * (sine / rate)
+        return wide(q), wide(m * (self.drift + self.v * cosine - self.x * self.w * sine))
+
+    def doubt(self, t: np.longdouble) -> States:
+        m, time, speed = wide(self.system.m), np.abs(t), np.abs(self.drift)
+        turned = self.reach * (2 + self.w * time)
+        q = LAST * (np.abs(self.system.q) + speed * time + turned)
+        return wide(q), wide(LAST * m * (speed + self.w * turned))
 
 
-def _turning(system: System[Any]) -> _Turning | None:
-    """None where some rods are no flat rigid body that turns about an axis across it."""
-    rods, places, n = system.rods, system.scene.all_places, system.scene.particles
-    assert rods is not None
-    of, at = _bodies(rods, n), np.zeros(system.n)
-    if of is None:
-        return None
-    for term in system.terms:
-        if term.origin:
-            at[term.particles[0]] = getattr(term, term.origin)
-    held = np.isin(np.arange(n), [ends[0] for ends in rods.ends if len(ends) == 1])[:, None]
+class TurningWallRods(TurningRods):
+    """The same of rods to fixed points."""
 
-    def by_axes(values: Any) -> Any:
-        out = np.zeros((n, 3), values.dtype)
-        out.reshape(-1)[places] = values
-        return out
-
-    def summed(values: Wide) -> Wide:
-        out = exactly(np.zeros_like(values, np.float64))
-        np.add.at(out, of, values)
-        return out[of]
-
-    # in more digits: a body may be small beside where it is, and turn slowly beside how it moves
-    with digits():
-        q, p, m = (exactly(by_axes(x)) for x in (system.q, system.p, system.m))
-        q, m = q - exactly(by_axes(at)), np.max(m, axis=1, keepdims=True)
-        drift, centre = (np.where(held, 0 * x, summed(x) / summed(m)) for x in (p, m * q))
-        x = q - centre
-        square = np.sum(x * x, axis=1, keepdims=True)
-        turn = summed(np.cross(x, p)) / summed(m * square)
-        v, w = np.cross(turn, x), np.sqrt(np.sum(turn * turn, axis=1, keepdims=True)) + 0 * x
-        found = [extended(y).reshape(-1)[places] for y in (x, v, np.sqrt(square) + 0 * x, w, drift)]
-    if rods.share:
-        # momenta are those of such a turn
-        off = rods.projected(wide(system.q), wide(system.p)) / system.m - found[4] - found[1]
-        body, speed = of[places // 3], found[2] * found[3]
-        if any(np.max(np.abs(off[body == b])) > UNTRUE / 2 * np.max(speed[body == b]) for b in set(body)):
-            return None
-    return _Turning(*found)
+    key = "wall-rod"
+    terms = frozenset({"wall-rod"})
 
 
 def _bodies(rods: Rods, particles: int) -> Integers | None:
@@ -84,25 +103,3 @@ def _bodies(rods: Rods, particles: int) -> Integers | None:
         for one, count in joined.items()
     )
     return of if rigid else None
-
-
-def _turned(system: System[Any], found: _Turning, t: Extended) -> States:
-    turn, m = found.w * t, wide(system.m)
-    sine, cosine = np.sin(turn), np.cos(turn)
-    rate = np.where(found.w > 0, found.w, 1)
-    q = system.q + found.drift * t + found.x * (cosine - 1) + found.v * (sine / rate)
-    return wide(q), wide(m * (found.drift + found.v * cosine - found.x * found.w * sine))
-
-
-def _doubt(system: System[Any], found: _Turning, t: np.longdouble) -> States:
-    m, time, speed = wide(system.m), np.abs(t), np.abs(found.drift)
-    turned = found.reach * (2 + found.w * time)
-    return wide(LAST * (np.abs(system.q) + speed * time + turned)), wide(
-        LAST * m * (speed + found.w * turned)
-    )
-
-
-ROD, WALL_ROD = (
-    Well(key=key, terms=frozenset({key}), prepare=_turning, motion=_turned, doubt=_doubt)
-    for key in ("rod", "wall-rod")
-)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
@@ -204,17 +205,24 @@ def _chain(table: Any) -> Scene:
 
 
 def _terms(table: Any, bodies: _Bodies) -> Iterator[Term]:
+    """Terms of what moves, and of all other rows by their kinds, fast or not."""
     yield from bodies.terms
-    yield from _of_rows(_springs(table.spring, bodies))
-    yield from _of_rows(_capacitors(table, bodies))
-    for key, (term, _) in tables.of_terms().items():
-        yield from _by_columns(term, getattr(table, tables.identifier(key)), bodies)
-    for read in (_rods(table.rod, bodies), _bonds(table.bond, bodies), _magnetic(table.magnetic, bodies)):
-        yield from _of_rows(read)
-    yield from _of_rows(
-        (Damping, False, (bodies.number(row.loop, f"resistor[{j}].loop"), row.resistance))
-        for j, row in enumerate(table.resistor)
+    rows = itertools.chain(
+        _springs(table.spring, bodies),
+        _capacitors(table, bodies),
+        *(_by_columns(x, getattr(table, tables.identifier(x.key)), bodies) for x in tables.of_terms()),
+        _rods(table.rod, bodies),
+        _bonds(table.bond, bodies),
+        _magnetic(table.magnetic, bodies),
+        _resistors(table.resistor, bodies),
     )
+    found: dict[tuple[type[Term], bool], list[tuple[float, ...]]] = {}
+    for term, fast, row in rows:
+        found.setdefault((term, fast), []).append(row)
+    for (term, fast), several in found.items():
+        names = (*term.ends, *(column.field for column in term.columns))
+        fields: Any = dict(zip(names, map(np.array, zip(*several, strict=True)), strict=True))
+        yield term(**fields, **({"fast": True} if fast else {}))
 
 
 _Rows: TypeAlias = Iterator[tuple[type[Term], bool, tuple[float, ...]]]
@@ -223,21 +231,11 @@ _Rows: TypeAlias = Iterator[tuple[type[Term], bool, tuple[float, ...]]]
 
 def _springs(springs: Sequence[Any], bodies: _Bodies) -> _Rows:
     for j, spring in enumerate(springs):
-        field = f"spring[{j}].ends"
-        numbers = [bodies.number(end, field) for end in spring.ends if end != "wall"]
-        match spring.ends:
-            case ("wall", "wall"):
-                raise MistakeError(f"{field}: a spring between two walls moves nothing")
-            case ("wall", int()):
-                rest = spring.wall + spring.rest
-            case (int(), "wall"):
-                rest = spring.wall - spring.rest
-            case (int(one), int(other)):
-                _two_ends(one, other, field)
-                if spring.wall:
-                    raise MistakeError(f"spring[{j}].wall is given, but no end of it is a wall")
-                rest = spring.rest
-        ends = bodies.along(field, spring.axis, *numbers)
+        numbers = _loose_ends("spring", j, spring, bodies, "moves")
+        rest = spring.rest
+        if len(numbers) == 1:
+            rest = spring.wall + rest if spring.ends[0] == "wall" else spring.wall - rest
+        ends = bodies.along(f"spring[{j}].ends", spring.axis, *numbers)
         _one_axis(f"spring[{j}]", {"rest": spring.rest, "wall": spring.wall}, ends)
         for at in ends:
             yield WallSpring if len(at) == 1 else Spring, spring.fast, (*at, spring.stiffness, rest)
@@ -246,17 +244,10 @@ def _springs(springs: Sequence[Any], bodies: _Bodies) -> _Rows:
 def _rods(rods: Sequence[Any], bodies: _Bodies) -> _Rows:
     """A row for each axis of what a rod joins, and its length at the start where none is given."""
     for j, rod in enumerate(rods):
-        field = f"rod[{j}].ends"
         if bodies.name not in ("particle", "chain"):
             raise MistakeError(f"rod[{j}]: a rod joins particles")
-        numbers = [bodies.number(end, field) for end in rod.ends if end != "wall"]
-        if not numbers:
-            raise MistakeError(f"{field}: a rod between two walls holds nothing")
-        if len(numbers) == 2:
-            _two_ends(numbers[0], numbers[1], field)
-            if rod.wall:
-                raise MistakeError(f"rod[{j}].wall is given, but no end of it is a wall")
-        ends = bodies.along(field, None, *numbers)
+        numbers = _loose_ends("rod", j, rod, bodies, "holds")
+        ends = bodies.along(f"rod[{j}].ends", None, *numbers)
         wall = rod.wall if isinstance(rod.wall, tuple) else (rod.wall,) * (1 if rod.wall else len(ends))
         if len(wall) != len(ends):
             raise MistakeError(f"rod[{j}].wall: {len(ends)} for its axes are needed, not {len(wall)}")
@@ -267,6 +258,19 @@ def _rods(rods: Sequence[Any], bodies: _Bodies) -> _Rows:
             raise MistakeError(f"rod[{j}]: its ends are at one place, and a rod has a length")
         for at, x in zip(ends, wall, strict=True):
             yield (WallRod, False, (*at, length, x)) if len(at) == 1 else (Rod, False, (*at, length))
+
+
+def _loose_ends(kind: str, j: int, row: Any, bodies: _Bodies, does: str) -> list[int]:
+    """The ends of a spring or rod that are no wall, one or two bodies.  MistakeError."""
+    field = f"{kind}[{j}].ends"
+    numbers = [bodies.number(end, field) for end in row.ends if end != "wall"]
+    if not numbers:
+        raise MistakeError(f"{field}: a {kind} between two walls {does} nothing")
+    if len(numbers) == 2:
+        _two_ends(numbers[0], numbers[1], field)
+        if row.wall:
+            raise MistakeError(f"{kind}[{j}].wall is given, but no end of it is a wall")
+    return numbers
 
 
 def _bonds(bonds: Sequence[Any], bodies: _Bodies) -> _Rows:
@@ -303,17 +307,6 @@ def _one_axis(row: str, places: Mapping[str, float], ends: Sequence[tuple[int, .
             )
 
 
-def _of_rows(rows: _Rows) -> Iterator[Term]:
-    """Terms, fast or not, of rows of their ends and columns."""
-    found: dict[tuple[type[Term], bool], list[tuple[float, ...]]] = {}
-    for term, fast, row in rows:
-        found.setdefault((term, fast), []).append(row)
-    for (term, fast), several in found.items():
-        names = (*term.ends, *(column.field for column in term.columns))
-        fields: Any = dict(zip(names, map(np.array, zip(*several, strict=True)), strict=True))
-        yield term(**fields, **({"fast": True} if fast else {}))
-
-
 def _two_ends(one: int, other: int, field: str) -> None:
     if one == other:
         raise MistakeError(f"{field} = [{one}, {other}]: the two ends are the same particle")
@@ -330,39 +323,34 @@ def _capacitors(table: Any, bodies: _Bodies) -> _Rows:
         yield WallSpring if len(loops) == 1 else Spring, False, (*loops, 1 / capacitor.capacitance, 0.0)
 
 
-def _by_columns(term: Any, rows: Sequence[Any], bodies: _Bodies) -> Iterator[Term]:
-    """A term of the rows of its table, if any: what it acts on, and an array for each column."""
-    if not rows:
-        return
-    fields = {}
-    for column in term.columns:
-        if column.inverse:
-            values = [_inverse(term, column, j, row) for j, row in enumerate(rows)]
-        else:
-            values = [getattr(row, tables.identifier(column.name)) for row in rows]
-        fields[column.field] = np.array(values)
-    ends: list[tuple[int, ...]] = []
-    given: list[int] = []
+def _resistors(resistors: Sequence[Any], bodies: _Bodies) -> _Rows:
+    for j, resistor in enumerate(resistors):
+        yield Damping, False, (bodies.number(resistor.loop, f"resistor[{j}].loop"), resistor.resistance)
+
+
+def _by_columns(term: Any, rows: Sequence[Any], bodies: _Bodies) -> _Rows:
+    """Rows of a term: what each acts on, and a number for each column."""
+    origin = next((column.name for column in term.columns if column.field == term.origin), "")
     for j, row in enumerate(rows):
-        where = f"{term.key}[{j}]"
+        where, values = f"{term.key}[{j}]", [_value(term, column, j, row) for column in term.columns]
         if len(term.ends) == 1:
             found = bodies.along(f"{where}.particle", row.axis, row.particle)
-            origin = next((c.name for c in term.columns if c.field == term.origin), None)
             _one_axis(where, {origin: getattr(row, tables.identifier(origin))} if origin else {}, found)
         else:
             found = bodies.along(f"{where}.ends", row.axis, *row.ends)
             _two_ends(row.ends[0], row.ends[1], f"{where}.ends")
             if len(found) > 1:
                 raise MistakeError(f"{where}: its law holds along a line; say which by axis")
-        ends += found
-        given += [j] * len(found)
-    fields = {name: values[given] for name, values in fields.items()}
-    yield term(**dict(zip(term.ends, map(np.array, zip(*ends, strict=True)), strict=True)), **fields)
+        for at in found:
+            yield term, False, (*at, *values)
 
 
-def _inverse(term: Any, column: Column, j: int, row: Any) -> float:
-    """What the field of an inverse column holds: given as such, or as the inverse of what is given."""
-    given, inverse = getattr(row, tables.identifier(column.name)), getattr(row, column.field)
+def _value(term: Any, column: Column, j: int, row: Any) -> float:
+    """What the field of a column holds: given as such, or as the inverse of what is given."""
+    given = getattr(row, tables.identifier(column.name))
+    if not column.inverse:
+        return float(given)
+    inverse = getattr(row, column.field)
     if given is not None and inverse is not None:
         raise MistakeError(f"{term.key}[{j}]: {column.name} and its inverse {column.field} are both given")
     if inverse is not None:

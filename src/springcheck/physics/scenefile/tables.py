@@ -234,30 +234,25 @@ OTHERWISE = ("wall-spring", "spring", "magnetic", "wall-rod", "rod", "bond")
 """Terms that have tables of their own."""
 
 
-def of_terms() -> dict[str, tuple[Any, type[SceneTable]]]:
-    """The terms that are read by their columns alone, with their tables."""
-    return _of_terms(tuple(terms.known().values()))
-
-
-@lru_cache(maxsize=8)
-def _of_terms(known: tuple[type[terms.Term], ...]) -> dict[str, tuple[Any, type[SceneTable]]]:
-    return {term.key: (term, _of_term(term)) for term in known if term.key not in OTHERWISE}
+def of_terms() -> tuple[Any, ...]:
+    """The terms that are read by their columns alone."""
+    return tuple(term for key, term in terms.known().items() if key not in OTHERWISE)
 
 
 def scene_table() -> Any:
     """The struct of a whole scene file, with a table for every term that is known by now."""
-    return _scene_table(tuple(terms.known().values()))
+    return _scene_table(of_terms())
 
 
 @lru_cache(maxsize=8)
-def _scene_table(known: tuple[type[terms.Term], ...]) -> Any:
+def _scene_table(several: tuple[Any, ...]) -> Any:
     return msgspec.defstruct(
         "SceneTable",
-        [(identifier(key), tuple[table, ...], ()) for key, (_, table) in _of_terms(known).items()],  # type: ignore[valid-type]
+        [(identifier(term.key), tuple[_of_term(term), ...], ()) for term in several],  # type: ignore[misc]
         bases=(SceneBase,),
         frozen=True,
         kw_only=True,
-        rename={identifier(key): key for key in _of_terms(known)},
+        rename={identifier(term.key): term.key for term in several},
     )
 
 
@@ -272,11 +267,8 @@ CHOICES: dict[str, tuple[str, ...]] = {
 
 def named(name: str) -> Any:
     """The table of a name, for messages that say which fields it has; None for a name that has none."""
-    given = (
-        ParticleTable, RotorTable, InductorTable, CapacitorTable, ResistorTable, ChainTable, SpringTable,
-        RodTable, BondTable, MagneticTable, BoxTable, BathTable, TimeTable, MethodsTable,
-        RecordTable,
-    )  # fmt: skip
-    found: dict[str, Any] = {kind.__name__.removesuffix("Table").lower(): kind for kind in given}
-    found |= {key: table for key, (_, table) in of_terms().items()}
-    return scene_table() if name == "" else found.get(name)
+    if not name:
+        return scene_table()
+    kind = next((x.type for x in msgspec.structs.fields(scene_table()) if x.encode_name == name), None)
+    parts = (part for part in (kind, *get_args(kind)) if isinstance(part, type))
+    return next((part for part in parts if issubclass(part, SceneTable)), None)

@@ -114,12 +114,13 @@ def _rows(scene: SceneFields, term: Term) -> Iterator[str]:
     elif isinstance(term, WallSpring | Spring) and scene.kind == "circuit" and _are_capacitors(term):
         for *loops, k, _ in term.rows():
             yield _table("[[capacitor]]", [("loops", loops), ("capacitance", 1 / k)])
-    elif isinstance(term, WallSpring):
-        for i, k, at in term.rows():
-            yield _spring(scene, ["wall"], [i], k, 0.0, at, fast=term.fast)
-    elif isinstance(term, Spring):
-        for a, b, k, rest in term.rows():
-            yield _spring(scene, [], [a, b], k, rest, 0.0, fast=term.fast)
+    elif isinstance(term, WallSpring | Spring):
+        for *at, k, rest in term.rows():
+            ends, axis = _ends(scene, at)
+            row: dict[str, Any] = {"ends": ["wall", *ends][-2:], "stiffness": k, **axis}
+            # the name of what it is at rest by: wall or rest
+            row |= {term.columns[1].name: rest} if rest else {}
+            yield _table("[[spring]]", (row | ({"fast": True} if term.fast else {})).items())
     elif isinstance(term, Magnetic):
         assert scene.places is not None
         for a, b, strength in term.rows():
@@ -133,11 +134,11 @@ def _rows(scene: SceneFields, term: Term) -> Iterator[str]:
     elif isinstance(term, Rod | WallRod):
         rods = rods_of(scene.m, scene.places, (term,))
         assert rods is not None
-        for ends, length, point in rods.joints():
+        for particles, length, point in rods.joints():
             places = scene.places
-            along = [0] if places is None else places[places // 3 == ends[0]] % 3
+            along = [0] if places is None else places[places // 3 == particles[0]] % 3
             wall: dict[str, Any] = {} if point is None else {"wall": point[along].tolist()}
-            yield _table("[[rod]]", ({"ends": ["wall", *ends][-2:], "length": length} | wall).items())
+            yield _table("[[rod]]", ({"ends": ["wall", *particles][-2:], "length": length} | wall).items())
     else:
         yield from _by_columns(scene, term)
 
@@ -156,23 +157,6 @@ def _are_capacitors(term: WallSpring | Spring) -> bool:
         capacitance = 1 / term.k
         exact = (term.k > 0) & (capacitance > 0) & np.isfinite(capacitance) & (1 / capacitance == term.k)
     return bool(np.all(exact)) and not (term.fast or np.any(getattr(term, term.origin)))
-
-
-def _spring(
-    scene: SceneFields,
-    walls: Sequence[str],
-    at: Sequence[int],
-    k: float,
-    rest: float,
-    wall: float,
-    *,
-    fast: bool,
-) -> str:
-    ends, axis = _ends(scene, at)
-    row: dict[str, Any] = {"ends": [*walls, *ends], "stiffness": k, **axis}
-    row |= {"rest": rest} if rest else {}
-    row |= {"wall": wall} if wall else {}
-    return _table("[[spring]]", (row | ({"fast": True} if fast else {})).items())
 
 
 def _by_columns(scene: SceneFields, term: Term) -> Iterator[str]:
