@@ -7,7 +7,8 @@ import numpy as np
 from springcheck.checks.case import REPEATED, Case
 from springcheck.checks.check import Finding, check
 from springcheck.physics import exact
-from springcheck.physics.arrays import AS_WRITTEN, Arithmetic
+from springcheck.physics.arrays import AS_WRITTEN
+from springcheck.physics.trajectory import Trajectory
 from springcheck.text.wording import count
 
 
@@ -43,7 +44,7 @@ def grid(case: Case) -> Finding:
         wrong.append(f"the tolerance is {run.tolerance} instead of {scene.tolerance:g}")
     if run.energy is None and "energy" in scene.quantities:
         wrong.append("there are no energies")
-    wrong += beyond(run.arithmetic)
+    wrong += beyond(run)
     if run.outcome.status == "continued" and not case.piece:
         wrong.append("it is a piece of a run that goes on")
     last, asked = int(case.steps[-1]), (scene.frames - 1) * scene.every
@@ -71,12 +72,18 @@ MOST_DECLARED = {
 """The coarsest arithmetic that an engine may declare, and why: the bounds of all checks follow what it
 declares, and more would excuse any force."""
 
+MOST_REBUILT = (2.0**-24, "single precision is the coarsest known to rebuild velocities")
+"""The same for `state` where velocities are differences of positions, which have their roundings over h."""
 
-def beyond(how: Arithmetic) -> list[str]:
+
+def beyond(run: Trajectory) -> list[str]:
     """The parts of a declared arithmetic that are coarser than any known one."""
+    how, most_declared = run.arithmetic, MOST_DECLARED
+    if run.rebuilds_velocity and not how.keeps_displacement:
+        most_declared = most_declared | {"state": MOST_REBUILT}
     return [
         f"the engine declares {name} = {value:.3g} of its arithmetic, and at most {most:.3g} is taken: {why}"
-        for name, (most, why) in MOST_DECLARED.items()
+        for name, (most, why) in most_declared.items()
         # decimals of a file are read off it, and not declared
         if not 0 <= (value := getattr(how, name)) <= most and (name, how.name) != ("state", AS_WRITTEN)
     ]

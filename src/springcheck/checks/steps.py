@@ -60,7 +60,7 @@ def _step_defect(case: Case) -> Finding | str:
         first = case.steps[int(np.argmin(told)) + 1]
         frames = count(int(np.count_nonzero(~told)), "frame")
         why += f"; {frames}, from step {first} on, where one may grow to all of it"
-    why = _beyond_range(case, off) or why + _where(case, off)
+    why = _beyond_range(case, off) or why + _where(case, off) + _without_length(case, off)
     value, most = seen[worst], bound[worst]
     if not np.any(off) and (slow := drag(case, told)) and not slow[0] <= slow[1]:
         value, most, why = slow
@@ -279,6 +279,21 @@ def _beyond_range(case: Case, off: NDArray[np.bool_]) -> str:
     return (
         f"the engine's limit: {overflows(how)}, and step {case.steps[first + 1]}, the first that is off, "
         f"has a force of {case.strongest[first]:.3g}"
+    )
+
+
+SHORTEST = float(np.sqrt(np.finfo(np.float64).smallest_normal))
+"""Length below which the square of a length underflows."""
+
+
+def _without_length(case: Case, off: NDArray[np.bool_]) -> str:
+    """Why steps (f-1,) may be off where all positions are too small to be squared, or nothing."""
+    largest = float(np.max(np.abs(case.trajectory.q[:-1][off]), initial=0.0))
+    if not 0 < largest < SHORTEST:
+        return ""
+    return (
+        f"; positions up to {largest:.3g} have squares that underflow: an engine that takes forces from the "
+        "lengths of bonds has none there"
     )
 
 
