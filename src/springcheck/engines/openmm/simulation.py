@@ -39,7 +39,7 @@ from springcheck.errors import MethodError
 from springcheck.physics.arrays import Floats
 from springcheck.physics.driven import timed
 from springcheck.physics.scene import Scene
-from springcheck.physics.terms import Morse, RadialSpring, Spring, WallSpring
+from springcheck.physics.terms import Morse, WallSpring
 
 CUSTOM_TERMS: dict[str, tuple[str, tuple[str, ...]]] = {
     "wall-spring": ("0.5*k*(x-at)^2", ("k", "at")),
@@ -98,30 +98,23 @@ def _system(scene: Scene, origins: Floats) -> tuple[mm.System, Floats]:
         for group in (fast, slow):
             group.setUsesPeriodicBoundaryConditions(True)
     for term in scene.terms:
-        group = fast if term.fast else slow
-        if isinstance(term, WallSpring):
-            anchors: dict[Any, int] = {}
-            try:
-                joints = bonds.joints(scene, term, origins)
-            except MethodError:
-                if scene.box is not None:
-                    raise
-                # unlike along its axes: no bond, but a potential of each coordinate
-                for force in _custom(scene, term, origins):
-                    force.setForceGroup(int(term.fast))
-                    system.addForce(force)
-                continue
-            for (i,), k, at in joints:
-                if at not in anchors:
-                    anchors[at] = system.addParticle(0.0)
-                    fixed.append(at)
-                group.addBond(anchors[at], i, 0.0, k)
-        elif isinstance(term, Spring):
-            for (a, b), k, length in bonds.joints(scene, term, origins):
-                group.addBond(a, b, length, k)
-        elif isinstance(term, RadialSpring):
-            for (a, b), k, length in bonds.in_space(scene, term):
-                group.addBond(a, b, length, k)
+        try:
+            joints = bonds.joints(scene, term, origins)
+        except MethodError:
+            if scene.box is not None or not isinstance(term, WallSpring):
+                raise
+            # unlike along its axes: no bond, but a potential of each coordinate
+            for force in _custom(scene, term, origins):
+                force.setForceGroup(int(term.fast))
+                system.addForce(force)
+            continue
+        anchors: dict[Any, int] = {}
+        for ends, k, length, at in joints:
+            if at is not None and at not in anchors:
+                anchors[at] = system.addParticle(0.0)
+                fixed.append(at)
+            first = () if at is None else (anchors[at],)
+            (fast if term.fast else slow).addBond(*first, *ends, length, k)
     for group in (slow, fast):
         if group.getNumBonds():
             system.addForce(group)
