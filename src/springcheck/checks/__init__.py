@@ -108,6 +108,7 @@ def summary(verdicts: Sequence[Verdict]) -> str:
     return f"{len(failed)} of {judged} failed: {', '.join(names[:MOST_NAMED])}{more}{beside}"
 
 
+@np.errstate(all="ignore")
 def explained(
     scene: Scene,
     run: Trajectory,

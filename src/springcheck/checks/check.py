@@ -105,7 +105,9 @@ class Check:
 
     def __call__(self, subject: Any) -> Verdict:
         try:
-            found = missing(subject, self.requires) or self.judge(subject)
+            # numbers that are none are judged as what they are, without a warning
+            with np.errstate(all="ignore"):
+                found = missing(subject, self.requires) or self.judge(subject)
         except MethodError as error:
             # an experiment that the method cannot serve does not apply
             found = str(error)
