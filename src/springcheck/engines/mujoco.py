@@ -150,6 +150,7 @@ class _Steps:
         dropped = data.warning[self._bad_control :]
         with np.errstate(over="ignore", invalid="ignore"):
             for row in range(len(q)):
+                self.force_calls += every * self._each
                 if self._force is None:
                     step(model, data, every)
                 else:
@@ -162,7 +163,6 @@ class _Steps:
                 q[row] = q_now
                 p[row] = v_now
             p *= self._m
-        self.force_calls += every * len(q) * self._each
 
 
 def arithmetic(label: Label) -> Arithmetic:
