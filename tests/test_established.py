@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -323,3 +324,27 @@ def test_dart_prints_nothing_of_numbers_that_are_not_finite(
     scene = replace(load_scene("spring-uneven"), step=6.0, steps=2000, every=10)
     assert run(scene, "dart:force").outcome.status == "diverged"
     assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("label", ["box2d:distance-joint", "rapier:spring-joint", "dart:joint-spring"])
+def test_a_spring_of_stiffness_0_is_no_rigid_joint(label: str, need: Need) -> None:
+    need(label)
+    scene = load_scene("spring-uneven")
+    loose = replace(scene, terms=(WallSpring(i=[0], k=[0.0], at=[0.0]),), steps=100)
+    assert failed(loose, run(loose, label)) == []
+
+
+@pytest.mark.parametrize(
+    ("label", "changes", "said"),
+    [
+        ("mujoco:joint-spring", {"m": [1e-20]}, "MuJoCo takes no mass below 1e-15, and one is 1e-20"),
+        ("mujoco:motor", {"m": [1e-20]}, "MuJoCo takes no mass below 1e-15, and one is 1e-20"),
+        ("lammps:bond", {"q": [1e200]}, "ERROR on proc 0: Bond atoms 2 1 missing"),
+    ],
+)
+def test_what_a_library_does_not_take_is_refused_in_its_words(
+    label: str, changes: dict[str, Any], said: str, need: Need
+) -> None:
+    need(label)
+    with pytest.raises(MethodError, match=f"^{label}: {said}"):
+        run(replace(load_scene("spring-uneven"), **changes), label)

@@ -57,7 +57,7 @@ def grid(case: Case) -> Finding:
         and not (_gives_up(case) or _explodes(case))
     ):
         wrong.append(f"{status} after {last} of {count(asked, 'step')} for no reason that is known here")
-        if run.outcome.message:
+        if status == "stopped" and run.outcome.message:
             wrong[-1] += f"; the engine says: {run.outcome.message}"
     why = "; ".join(wrong) or "every fact of the grid is the scene's own"
     return Finding(len(wrong), 0.0, "facts", why)

@@ -32,6 +32,7 @@ Bond: TypeAlias = tuple[int, int, float, float, tuple[float, ...] | None]
 """Both ends, k, rest length, and where an end that is an anchor stands."""
 
 
+@np.errstate(over="ignore")
 def origins(scene: Scene, scheme_name: str) -> Floats:
     """Where each particle's coordinate in such a program is counted from, (n,) [L].
 
@@ -45,9 +46,8 @@ def origins(scene: Scene, scheme_name: str) -> Floats:
     pairs = [term for term in scene.terms if isinstance(term, Spring)]
     springs = [t for t in scene.terms if isinstance(t, WallSpring | Spring)]
     of_length = [t for t in scene.terms if isinstance(t, WallSpring | Spring | RadialSpring)]
-    with np.errstate(over="ignore"):
-        # Gershgorin's bound of the squared frequencies
-        w2 = np.max(scene.derived(terms=tuple(of_length)).system.gershgorin(scene.q) / scene.m)
+    # Gershgorin's bound of the squared frequencies
+    w2 = np.max(scene.derived(terms=tuple(of_length)).system.gershgorin(scene.q) / scene.m)
     hw = abs(scene.step) * float(np.sqrt(w2))
     bounded = scheme(scheme_name).has("symplectic") and hw < 2 and all(np.all(t.k >= 0) for t in of_length)
     group = graph.lowest_joined(scene.n, scene.terms)
@@ -284,7 +284,8 @@ def hinges(scene: Scene, label: Label) -> Iterator[tuple[int, float, tuple[float
 def walls(scene: Scene, label: Label) -> Iterator[tuple[int, float, float]]:
     """Particle, stiffness [M/T2] and rest position [L] of each wall spring, for joints that have one spring.
 
-    Raises MethodError where a particle has two, or a stiffness is negative.
+    Springs of stiffness 0 are left out: their joints would be rigid.  Raises MethodError where a particle has
+    two, or a stiffness is negative.
     """
     taken: set[int] = set()
     for term in scene.terms:
@@ -295,4 +296,5 @@ def walls(scene: Scene, label: Label) -> Iterator[tuple[int, float, float]]:
                         f"{label}: a joint has one spring, of stiffness 0 or more; particle {i}"
                     )
                 taken.add(i)
-                yield i, k, at
+                if k:
+                    yield i, k, at

