@@ -6,8 +6,6 @@ DART takes joint springs and joint damping implicitly, whatever is asked of them
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from springcheck.engines import quiet
@@ -50,11 +48,8 @@ class _World:
         # gravity is the world's own, and all else is ours
         pulled = scene.system.without("cosine") if hinge else scene.system
         self._force = None if springs else pulled.force
-        if springs:
-            self._add_springs(joints, scene, label)
-
-    @staticmethod
-    def _add_springs(joints: list[Any], scene: Scene, label: Label) -> None:
+        if not springs:
+            return
         for i, k, at in walls(scene, label):
             joints[i].setSpringStiffness(0, k)
             joints[i].setRestPosition(0, at)

@@ -287,19 +287,17 @@ def _borders(box: tuple[float, ...] | None) -> dict[str, Any]:
 def _thermostat(scene: Scene, method: Method, seed: int) -> list[str]:
     """The fixes that move atoms with noise; in units lj the Boltzmann constant is 1."""
     assert scene.bath is not None
-    given = f"{scene.thermal!r} {scene.thermal!r} {1 / scene.bath.friction!r} {seed}"
+    heat, time = f"{scene.thermal!r} {scene.thermal!r}", 1 / scene.bath.friction
+    given = f"{heat} {time!r} {seed}"
+    # LAMMPS counts three degrees of freedom for each atom, less three; along some axes nothing moves
+    none = f"extra/dof {3 * scene.particles - scene.n}"
     if method.scheme == "lammps-langevin":
         return ["fix move mobile nve", f"fix bath mobile langevin {given}"]
     if method.name == "csvr":
-        # LAMMPS counts three degrees of freedom for each atom, less three; along some axes nothing moves
-        given = f"{scene.thermal!r} {scene.thermal!r} {1 / (2 * scene.bath.friction)!r} {seed}"
-        none = 3 * scene.particles - scene.n
-        modified = f"compute_modify bath_temp extra/dof {none}"
-        return ["fix move mobile nve", f"fix bath mobile temp/csvr {given}", modified]
+        bath = f"fix bath mobile temp/csvr {heat} {time / 2!r} {seed}"
+        return ["fix move mobile nve", bath, f"compute_modify bath_temp {none}"]
     if method.name == "nvt":
-        given = f"{scene.thermal!r} {scene.thermal!r} {1 / scene.bath.friction!r}"
-        none = 3 * scene.particles - scene.n
-        return [f"fix move mobile nvt temp {given}", f"compute_modify move_temp extra/dof {none}"]
+        return [f"fix move mobile nvt temp {heat} {time!r}", f"compute_modify move_temp {none}"]
     _, number, *half = method.scheme.split("-")
     more = ""
     if number == "vii":
@@ -330,11 +328,9 @@ def _bonds(scene: Scene, tied: list[Term], origins: Floats) -> Iterator[bonds.Bo
             anchors += 1
 
 
-def _layered(
-    scene: Scene, terms: list[WallSpring], origins: Floats
-) -> list[dict[int, tuple[float, tuple[float, ...] | None]]]:
+def _layered(scene: Scene, terms: list[WallSpring], origins: Floats) -> list[dict[int, Any]]:
     """Springs to walls as k and rest point by particle, one of each particle in a layer."""
-    layers: list[dict[int, tuple[float, tuple[float, ...] | None]]] = []
+    layers: list[dict[int, Any]] = []
     for (i,), k, _, at in (one for term in terms for one in bonds.joints(scene, term, origins)):
         free = next((layer for layer in layers if i not in layer), None)
         if free is None:

@@ -193,17 +193,11 @@ ENGINE = Engine(
         by_name("joint-spring-rk4", "rk4", "joint stiffness and damping, RK4", DAMPED),
         by_name("joint-damping", IMPLICIT_FRICTION, "joint damping, integrator Euler", DAMPED, Need.DAMPING),
         by_name(
-            "joint-damping-implicitfast",
-            IMPLICIT_FRICTION,
-            "joint damping, implicitfast",
-            DAMPED,
+            "joint-damping-implicitfast", IMPLICIT_FRICTION, "joint damping, implicitfast", DAMPED,
             Need.DAMPING,
         ),
         by_name(
-            "joint-damping-explicit",
-            "semi-implicit-euler",
-            "joint damping, eulerdamp off",
-            DAMPED,
+            "joint-damping-explicit", "semi-implicit-euler", "joint damping, eulerdamp off", DAMPED,
             Need.DAMPING,
         ),
         by_name(

@@ -65,7 +65,7 @@ SHIFTED = frozenset(
 """Methods whose stored velocity is half a kick behind the position, and is synchronised here."""
 
 
-INNER = {"mts": 8} | {f"mts-langevin-{n}": n for n in (2, 3, 4)}
+FAST_STEPS = {"mts": 8} | {f"mts-langevin-{n}": n for n in (2, 3, 4)}
 """Evaluations of the fast springs in a step, beside one of the others, by method."""
 
 ATTENTIVE = 500
@@ -206,7 +206,7 @@ def _integrator(scene: Scene, name: str, step: float) -> mm.Integrator:
     if name == "variable-verlet":
         return mm.VariableVerletIntegrator(scene.tolerance)
     if name == "mts":
-        return mm.MTSIntegrator(step, [(0, 1), (1, INNER[name])])
+        return mm.MTSIntegrator(step, [(0, 1), (1, FAST_STEPS[name])])
     if name == "nose-hoover":
         return mm.NoseHooverIntegrator(step)
     if name in ("langevin", "langevin-middle"):
@@ -313,7 +313,7 @@ class _Context:
         # a thermostat's momenta are read as they are stored
         self._rods = None if method.generator else scene.system.rods
         self._on_a_line = not method.generator
-        self._each = 1 + INNER.get(method.name, 0)
+        self._each = 1 + FAST_STEPS.get(method.name, 0)
         self._half_kick = 0.5 * step if method.name in SHIFTED else 0.0
         self._m = np.copysign(scene.m, step)
         self._where, self._elsewhere = scene.where, scene.elsewhere
