@@ -178,6 +178,8 @@ def _untrue(
         pushes, steps_before = (np.maximum(push - off, 0), push + off), (before - of_h, before + of_h)
         sides = [rule(float(x), float(y), allow) for x in pushes for y in steps_before]
         of_h = np.max(np.abs(np.array(sides) - longest)) + 2 * state * longest
+        # roundings as large as the force allow any step, and later ones are not known
+        of_h = of_h if np.isfinite(of_h) else np.longdouble(np.inf)
         clock, before = clock + abs(length), longest
         of_t += state * clock
     number, amiss, excess = _roundings(case), abs(clock - abs(times[1])), abs(steps[-1].h) - longest
