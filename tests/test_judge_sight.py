@@ -84,7 +84,7 @@ def test_a_spring_whose_effect_drowns_in_the_references_rounding_has_its_own_lim
 
 @pytest.mark.campaign
 @pytest.mark.parametrize("experiment", detection.EXPERIMENTS, ids=lambda experiment: experiment.name)
-def test_the_limits_of_experiments_hold_likewise(experiment: checks.Experiment) -> None:
+def test_the_limits_of_experiments_hold_likewise(experiment: checks.Check) -> None:
     cases = [("h w = 0.3", "semi-implicit-euler")]
     if experiment.family == "map":
         cases += [("h w = 1.9", "implicit-midpoint"), ("free chain", "forest-ruth")]

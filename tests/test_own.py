@@ -683,4 +683,4 @@ def test_what_the_engine_says_of_itself_is_its_method_table() -> None:
     assert ENGINE.arithmetic(parse("own:euler")).state == 2.0**-53
     assert simulation.version()["numpy"] == np.__version__
     assert {forces.indexed, forces.force_at, updates.kick, updates.solve} < set(compiled.HELPERS)
-    assert kernels.splitting not in compiled.HELPERS
+    assert kernels.many not in compiled.HELPERS

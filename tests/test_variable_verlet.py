@@ -460,3 +460,25 @@ def test_a_replay_says_how_far_a_momentum_may_be_off_and_sees_it_from_there_on(
     least = float(why.split("a momentum off by ")[1].split()[0])
     assert {off(sign * 1.1 * least, i).passed for i in range(1, steps + 1) for sign in (1, -1)} == {False}
     assert off(least / 100, steps // 2).passed is True
+
+
+def test_a_step_is_not_blamed_where_roundings_have_grown_beyond_all_forces() -> None:
+    # two particles that nothing joins: no stiffness times an unknown time is no number
+    springs = WallSpring(i=[0, 1], k=[1.3, 2.9], at=[0.0, 0.1])
+    scene = Scene(
+        name="two", m=[1.0, 3.0], q=[0.3, 0.7], p=[0.2, -0.4], terms=(springs,), step=0.1, steps=40, every=20,
+        tolerance=1e-3,
+    )  # fmt: skip
+    run = springcheck.simulate(scene, "openmm:variable-verlet")
+    assert run.last_step is not None
+    case = checks.Case(trajectory=run, scene=scene)
+    times, last = (0.0, float(case.steps[1] * run.step)), float(run.last_step[1])
+    start = np.asarray(scene.q, np.longdouble), np.asarray(scene.p, np.longdouble)
+    by = {"before": 0.0, "times": times, "tolerance": allowed(scene), "last": last}
+    steps = list(taken(case.scheme, scene, start, **by))
+    for size, known in ((1e-16, True), (1e200, False)):
+        bound = np.full(2, size, np.longdouble)
+        with np.errstate(all="ignore"):
+            untrue, _ = replayed._untrue(case, steps, [(bound, bound)] * (len(steps) + 1), 0.0, times)
+        assert np.isfinite(untrue)
+        assert (untrue > 0) is known

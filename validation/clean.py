@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 
 from springcheck import checks, driver, engines, schemes
-from springcheck.checks import Experiment, Run
+from springcheck.checks import Check, Run
 from springcheck.checks.seeds import SEEDED
 from springcheck.errors import MethodError
 from springcheck.physics.arrays import Floats
@@ -185,7 +185,7 @@ def _plain(scheme: schemes.Scheme) -> Run:
     return run
 
 
-def _judged(where: Scene, label: str, run: Run, seed: int, experiments: tuple[Experiment, ...]) -> Clean:
+def _judged(where: Scene, label: str, run: Run, seed: int, experiments: tuple[Check, ...]) -> Clean:
     try:
         verdicts = checks.judge(where, run(where, label))
     except MethodError:

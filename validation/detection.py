@@ -117,7 +117,7 @@ def of_order(scene: Scene, scheme: schemes.Scheme, name: str = "", x: float = 0.
 
 
 Planted: TypeAlias = Callable[[Scene, schemes.Scheme, str, float], Trajectory]
-EXPERIMENTS: dict[checks.Experiment, Planted] = {
+EXPERIMENTS: dict[checks.Check, Planted] = {
     experiments.determinant: planted,
     experiments.symplecticity: planted,
     experiments.reversibility: planted,
@@ -146,9 +146,7 @@ def wrong(
     return tried, out
 
 
-def wrong_experiment(
-    experiment: checks.Experiment, scene: Scene, scheme: schemes.Scheme
-) -> tuple[int, list[str]]:
+def wrong_experiment(experiment: checks.Check, scene: Scene, scheme: schemes.Scheme) -> tuple[int, list[str]]:
     """The same of one experiment."""
 
     def verdict(name: str = "", x: float = 0.0) -> Verdict:

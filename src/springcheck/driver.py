@@ -6,7 +6,7 @@ The engine only moves.  Clock, chunks, energies, progress and divergence are kep
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from time import perf_counter
 from typing import Any, Literal, NamedTuple, Protocol
@@ -124,7 +124,9 @@ def play(
 
     rows = max(1, min(CHUNK // scene.n, scene.frames))
     piece = scene.every if method.adaptive else min(scene.every, PIECE, WORK // scene.n or 1)
-    ready = min(rows, FIRST, WORK // (piece * scene.n) or 1)
+    whole = piece == scene.every
+    # frames further apart than a piece are filled one by one
+    ready = min(rows, FIRST, WORK // (piece * scene.n) or 1) if whole else 1
     # an engine that fills nothing must not pass for one that has
     q, p = np.full((2, rows, scene.n), UNTOUCHED)
     told = hasattr(simulation, "last_steps")
@@ -134,24 +136,26 @@ def play(
     frame = 1
     while frame < scene.frames:
         f = min(ready, scene.frames - frame)
-        part = _Part(label, simulation, scene.every, piece, progress)
         q[f - 1], p[f - 1] = UNTOUCHED, UNTOUCHED
-        status, good, message, seconds = part.advance(q[:f], p[:f])
+        status, good, message, seconds = _advance(
+            label, simulation, scene.every, piece, q[:f], p[:f], progress
+        )
         run_seconds += seconds
-        ready = min(rows, 4 * ready) if seconds < QUICK else ready
+        ready = min(rows, 4 * ready) if whole and seconds < QUICK else ready
         if good:
             last = None
             if told:
                 last = _said(label, simulation, "last_steps", f"{good} lengths", partial(_rows, good))
             _hand_over(scene, sink, frame, q[:good], p[:good], last)
         frame += good
-        if progress:
-            progress(good * scene.every - part.told)
         if status != "complete":
             outcome = Outcome(status=status, step=(frame - 1) * scene.every, message=message)
             break
         if 0 < max(np.max(np.abs(q[f - 1])), np.max(np.abs(p[f - 1]))) < TINY:
             outcome = Outcome(status="complete", step=scene.steps, message=SUBNORMAL)
+    off_axis = None
+    if getattr(simulation, "off_axis", None) is not None:
+        off_axis = _said(label, simulation, "off_axis", "a number", float)
     return Trajectory(
         label=str(label),
         scheme=method.scheme,
@@ -166,9 +170,7 @@ def play(
         force_calls=_said(label, simulation, "force_calls", CALLS, _count),
         arithmetic=how,
         rebuilds_velocity=method.rebuilds_velocity,
-        off_axis=_said(label, simulation, "off_axis", "a number", float)
-        if getattr(simulation, "off_axis", None) is not None
-        else None,
+        off_axis=off_axis,
         origin=origin,
     )
 
@@ -199,64 +201,50 @@ def _count(said: Any) -> int:
 Ending = Literal["complete", "diverged", "stopped"]
 
 
-@dataclass(slots=True)
-class _Part:
-    """One chunk of a run on its way."""
+def _advance(
+    label: Label,
+    simulation: Simulation,
+    every: int,
+    piece: int,
+    q: Floats,
+    p: Floats,
+    progress: Progress | None,
+) -> tuple[Ending, int, str, float]:
+    """Fill q and p (f, n): how it ended, how many rows are good, why no more, and the seconds it took.
 
-    label: Label
-    simulation: Simulation
-    every: int
-    piece: int
-    progress: Progress | None
-    told: int = 0
-    """Steps within frames that were reported to `progress`."""
-
-    def advance(self, q: Floats, p: Floats) -> tuple[Ending, int, str, float]:
-        """Fill q and p (f, n): how it ended, how many rows are good, why, and the seconds it took."""
-        status: Ending = "complete"
-        good, message = len(q), ""
-        began = perf_counter()
-        try:
-            if self.piece == self.every:
-                self._advance(self.every, q, p)
-            else:
-                self._in_pieces(q, p)
-        except Stopped as stop:
-            status, good, message = "stopped", stop.rows, str(stop)
-            if good not in range(len(q) + 1):
-                raise MethodError(f"{self.label}: Stopped after {good!r} rows of {len(q)}") from stop
-        seconds = perf_counter() - began
-        finite = np.isfinite(q[:good]).all(axis=1) & np.isfinite(p[:good]).all(axis=1)
-        if not finite.all():
-            good = int(np.argmin(finite))
-            untouched = UNTOUCHED.tobytes() * q.shape[1]
-            if left := [name for name, x in (("q", q), ("p", p)) if x[good].tobytes() == untouched]:
-                raise MethodError(
-                    f"{self.label} failed: its advance(every, q, p) has left row {good} of "
-                    f"{' and '.join(left)} as it was; it writes every row into these arrays: q[row] = ..."
-                )
-            status, message = "diverged", "not finite from the next frame on"
-        elif status == "stopped" and "nan" in message.lower():
-            status = "diverged"
-        return status, good, message, seconds
-
-    def _advance(self, steps: int, q: Floats, p: Floats) -> None:
-        advance = self.simulation.advance
-        engines.guarded(self.label, advance, steps, q, p, form="advance(every, q, p)")
-
-    def _in_pieces(self, q: Floats, p: Floats) -> None:
-        for row in range(len(q)):
-            left = self.every
-            while left:
-                steps = min(left, self.piece)
-                try:
-                    self._advance(steps, q[row : row + 1], p[row : row + 1])
-                except Stopped as stop:
-                    raise Stopped(row, str(stop)) from stop
-                left -= steps
-                if self.progress and left:
-                    self.progress(steps)
-                    self.told += steps
+    Where a call takes fewer steps than lie between frames there is one row; `progress` is told of each call.
+    """
+    status: Ending = "complete"
+    good, message, told = len(q), "", 0
+    began = perf_counter()
+    try:
+        for left in range(every, 0, -piece):
+            steps = min(left, piece)
+            engines.guarded(label, simulation.advance, steps, q, p, form="advance(every, q, p)")
+            if progress and left > piece:
+                progress(steps)
+                told += steps
+    except Stopped as stop:
+        if stop.rows not in range(len(q) + 1):
+            raise MethodError(f"{label}: Stopped after {stop.rows!r} rows of {len(q)}") from stop
+        # a row that is filled before its last piece is no frame
+        status, good, message = "stopped", stop.rows if left <= piece else 0, str(stop)
+    seconds = perf_counter() - began
+    finite = np.isfinite(q[:good]).all(axis=1) & np.isfinite(p[:good]).all(axis=1)
+    if not finite.all():
+        good = int(np.argmin(finite))
+        untouched = UNTOUCHED.tobytes() * q.shape[1]
+        if unfilled := [name for name, x in (("q", q), ("p", p)) if x[good].tobytes() == untouched]:
+            raise MethodError(
+                f"{label} failed: its advance(every, q, p) has left row {good} of "
+                f"{' and '.join(unfilled)} as it was; it writes every row into these arrays: q[row] = ..."
+            )
+        status, message = "diverged", "not finite from the next frame on"
+    elif status == "stopped" and "nan" in message.lower():
+        status = "diverged"
+    if progress:
+        progress(good * every - told)
+    return status, good, message, seconds
 
 
 def _hand_over(scene: Scene, sink: Sink, frame: int, q: Floats, p: Floats, last: Floats | None) -> None:
@@ -341,22 +329,17 @@ def bare(scene: Scene, label: Label, *, copies: int = 1, read: bool = False, pla
     began = perf_counter()
     simulations = [engines.start(ahead, label, 1) for _ in range(copies)]
     start_seconds = perf_counter() - began
-    every = 1 if read else scene.steps
-    rows = min(CHUNK // scene.n or 1, scene.steps // every)
+    rows = min(CHUNK // scene.n or 1, scene.steps) if read else 1
     q, p = np.empty((rows, scene.n)), np.empty((rows, scene.n))
-    whole, rest = divmod(scene.steps // every, rows)
-    piece = scene.steps if method.adaptive else PIECE
 
     def timed() -> float:
         began = perf_counter()
         for simulation in simulations:
-            if not read:
-                _advance(simulation, scene.steps, min(piece, scene.steps), q, p)
-                continue
-            for _ in range(whole):
-                simulation.advance(every, q, p)
-            if rest:
-                simulation.advance(every, q[:rest], p[:rest])
+            if read:
+                for left in range(scene.steps, 0, -rows):
+                    simulation.advance(1, q[:left], p[:left])
+            else:
+                _advance_unread(simulation, scene.steps, scene.steps if method.adaptive else PIECE, q, p)
         return perf_counter() - began
 
     run_seconds = engines.guarded(label, timed)
@@ -366,11 +349,12 @@ def bare(scene: Scene, label: Label, *, copies: int = 1, read: bool = False, pla
     )
 
 
-def _advance(simulation: Simulation, steps: int, piece: int, q: Floats, p: Floats) -> None:
+def _advance_unread(simulation: Simulation, steps: int, piece: int, q: Floats, p: Floats) -> None:
     """All steps and one row, in as few calls as Ctrl-C allows: one takes at most about `UNHEARD` seconds."""
     while steps:
         began = perf_counter()
-        simulation.advance(min(piece, steps), q, p)
-        steps -= min(piece, steps)
+        some = min(piece, steps)
+        simulation.advance(some, q, p)
+        steps -= some
         if perf_counter() - began < UNHEARD / 4:
             piece *= 4

@@ -18,14 +18,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal
 
 import numpy as np
 
-from springcheck.checks import check, experiments, laws, thermal
+from springcheck.checks import experiments, laws, thermal
 from springcheck.checks.bench import Bench, Run
 from springcheck.checks.case import Case
-from springcheck.checks.check import shared
+from springcheck.checks.check import DECADES, Check, shared
 from springcheck.checks.motion import (
     angular_momentum,
     closed_form,
@@ -46,14 +46,11 @@ from springcheck.text.wording import STATES_SHOW
 
 __all__ = [
     "ALL", "BLIND", "CHECKS", "CONTRACTED", "RANDOM", "SPECIAL", "STATES_SHOW", "TELLING", "THOROUGH",
-    "Bench", "Case", "Check", "Experiment", "Run", "angular_momentum", "arithmetic", "bridges",
+    "Bench", "Case", "Check", "Run", "angular_momentum", "arithmetic", "bridges",
     "closed_form", "energies", "experiments_of", "first_off", "frequency", "judge", "judge_thoroughly",
     "momentum", "not_judged", "shadow_energy", "shared", "start", "status", "step_defect", "summary",
     "tolerance", "tolerance_bound", "worst",
 ]  # fmt: skip
-
-Check: TypeAlias = check.Check[Case]
-Experiment: TypeAlias = check.Check[Bench]
 
 CHECKS: tuple[Check, ...] = (
     start, times, grid, line, step_defect, arithmetic, closed_form, shadow_energy, frequency, momentum,
@@ -61,13 +58,13 @@ CHECKS: tuple[Check, ...] = (
     energy_gain,
 )  # fmt: skip
 
-THOROUGH: tuple[Experiment, ...] = (
+THOROUGH: tuple[Check, ...] = (
     experiments.propagator, experiments.determinant, experiments.symplecticity, experiments.reversibility,
     experiments.mirror, experiments.orientation, experiments.repeatability, experiments.company, laws.order,
     laws.order_anharmonic, laws.rounding_bias, laws.rounding_growth, laws.convergence,
 )  # fmt: skip
 
-ALL: tuple[check.Check[Any], ...] = (*CHECKS, *THOROUGH)
+ALL: tuple[Check, ...] = (*CHECKS, *THOROUGH)
 
 RANDOM: tuple[Check, ...] = (start, times, grid, energies, *thermal.DRAWN, rod_length, rod_velocity)
 """Checks of a trajectory of a thermostat, which no law of a deterministic motion holds for."""
@@ -111,6 +108,7 @@ def summary(verdicts: Sequence[Verdict]) -> str:
     return f"{len(failed)} of {judged} failed: {', '.join(names[:MOST_NAMED])}{more}{beside}"
 
 
+@np.errstate(all="ignore")
 def explained(
     scene: Scene,
     run: Trajectory,
@@ -133,7 +131,7 @@ def explained(
     return [replace(v, why=why) if v is first else v for v in verdicts]
 
 
-def experiments_of(scene: Scene) -> tuple[check.Check[Any], ...]:
+def experiments_of(scene: Scene) -> tuple[Check, ...]:
     """The experiments with a method of this scene: in a bath those with the seeds of a random one."""
     if not scene.bath:
         return THOROUGH
@@ -146,7 +144,7 @@ def judge_thoroughly(
     scene: Scene,
     label: str,
     run: Callable[..., Trajectory],
-    experiments: Sequence[check.Check[Any]] | None = None,
+    experiments: Sequence[Check] | None = None,
     *,
     seed: int = 0,
     progress: Callable[[int], None] | None = None,
@@ -225,7 +223,7 @@ def worst(pieces: Sequence[Sequence[Verdict]]) -> list[Verdict]:
         if len(failed) > 1:
             # frames that are off were counted in the first alone
             why += f"; of {len(judged)} pieces of the run {len(failed)} fail"
-        if verdict.unit == check.DECADES:
+        if verdict.unit == DECADES:
             # the worst of several is as bad as this so many times as often
             verdict = replace(verdict, value=verdict.value - float(np.log10(len(judged))))
         out.append(replace(verdict, why=why, sees=sees))

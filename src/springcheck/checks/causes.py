@@ -50,28 +50,27 @@ def _of_rods(case: Case) -> str:
     scene = case.judged
     free = scene.derived(terms=tuple(x for x in scene.terms if x.kind != "constraint"))
     q, p = (x[:-1].astype(np.longdouble) for x in (run.q, run.p))
-    with np.errstate(all="ignore"):
-        loose = Case(trajectory=run, scene=free).step(q, p)[0]
-        push, noise = run.q[1:] - loose, 2.0**-53 * (np.abs(run.q[1:]) + np.abs(loose))
-        moved = rods.apart(push)
-        allowed = PUSH_ROUNDINGS * rods.spans(noise)
+    loose = Case(trajectory=run, scene=free).step(q, p)[0]
+    push, noise = run.q[1:] - loose, 2.0**-53 * (np.abs(run.q[1:]) + np.abs(loose))
+    moved = rods.apart(push)
+    allowed = PUSH_ROUNDINGS * rods.spans(noise)
 
-        def along(way: Reals) -> bool:
-            part = rods.each(rods.dot(moved, way) / rods.dot(way, way)) * way
-            off = np.sqrt(rods.dot(moved - part, moved - part))
-            return bool(np.all(off[1:] <= allowed[1:]))
+    def along(way: Reals) -> bool:
+        part = rods.each(rods.dot(moved, way) / rods.dot(way, way)) * way
+        off = np.sqrt(rods.dot(moved - part, moved - part))
+        return bool(np.all(off[1:] <= allowed[1:]))
 
-        ways = rods.ways(q)
-        if np.all(np.sqrt(rods.dot(moved, moved)) <= allowed) or along(ways):
-            return ""
-        title = case.scheme.title
-        if along(rods.ways(loose)):
-            return (
-                "SHAKE pushes the ends of a rod along it as it lies after the drift, where "
-                f"{title} takes it as it lay before"
-            )
-        if along(np.concatenate([ways[:1], ways[:-1]])):
-            return "SHAKE pushes the ends of a rod along it as it lay a step before"
+    ways = rods.ways(q)
+    if np.all(np.sqrt(rods.dot(moved, moved)) <= allowed) or along(ways):
+        return ""
+    title = case.scheme.title
+    if along(rods.ways(loose)):
+        return (
+            "SHAKE pushes the ends of a rod along it as it lies after the drift, where "
+            f"{title} takes it as it lay before"
+        )
+    if along(np.concatenate([ways[:1], ways[:-1]])):
+        return "SHAKE pushes the ends of a rod along it as it lay a step before"
     return ""
 
 

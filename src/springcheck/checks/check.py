@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
-from typing import Generic, Literal, NamedTuple, Protocol, TypeAlias, TypeVar
+from typing import Any, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -21,17 +21,6 @@ def largest(values: Reals) -> tuple[np.intp, ...]:
     """Where the largest of them is; what is no number is larger than all."""
     return np.unravel_index(np.argmax(np.where(np.isfinite(values), values, np.inf)), values.shape)
 
-
-class Subject(Protocol):
-    """What is judged: a `Case`, or a `Bench`."""
-
-    @property
-    def label(self) -> str:
-        """The label of the method."""
-        ...
-
-
-Subject_contra = TypeVar("Subject_contra", bound=Subject, contravariant=True)
 
 Family: TypeAlias = Literal["record", "motion", "repeat", "map", "law", "noise"]
 """Facts of the record, to the bit; the recorded motion; two runs against each other, to the bit; the one-step
@@ -85,9 +74,16 @@ def shared(verdicts: Sequence[Verdict], false_alarms: float = FALSE_ALARMS) -> l
     ]
 
 
+Judge: TypeAlias = Callable[[Any], Finding | Chance | str]
+"""What a check finds of its subject, or the reason why the measurement decides nothing."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Check(Generic[Subject_contra]):
-    """One check: call it with a `Case`, or an experiment with a `Bench`, and it returns its verdict."""
+class Check:
+    """One check: call it with its subject, and it returns its verdict.
+
+    The subject is a `Case`, of an experiment a `Bench`, and of one with a thermostat a `Seeded`.
+    """
 
     name: str
     short: str
@@ -97,8 +93,7 @@ class Check(Generic[Subject_contra]):
     """What must be there for it to apply, by the names of `requires.REQUIREMENTS`."""
     sentence: str
     """What holds where it passes."""
-    judge: Callable[[Subject_contra], Finding | Chance | str]
-    """Its finding, or the reason why the measurement decides nothing."""
+    judge: Judge
     telling: bool
     """Whether a pass tells the scheme that a method claims from another one."""
 
@@ -108,9 +103,11 @@ class Check(Generic[Subject_contra]):
         words = [one.word for one in REQUIREMENTS.values() if one.name in self.requires]
         return ", ".join(words) or "every run"
 
-    def __call__(self, subject: Subject_contra) -> Verdict:
+    def __call__(self, subject: Any) -> Verdict:
         try:
-            found = missing(subject, self.requires) or self.judge(subject)
+            # numbers that are none are judged as what they are, without a warning
+            with np.errstate(all="ignore"):
+                found = missing(subject, self.requires) or self.judge(subject)
         except MethodError as error:
             # an experiment that the method cannot serve does not apply
             found = str(error)
@@ -123,7 +120,7 @@ def check(
     family: Family,
     requires: Collection[str] = (),
     telling: bool | None = None,
-) -> Callable[[Callable[[Subject_contra], Finding | Chance | str]], Check[Subject_contra]]:
+) -> Callable[[Judge], Check]:
     """Make a check of a function: its name and the first sentence of its docstring are the check's own.
 
     Where `telling` is left out, every check tells one scheme from another but those of facts and repetitions.
@@ -134,7 +131,7 @@ def check(
             f"no requirement is called {' or '.join(unknown)}; known are {', '.join(REQUIREMENTS)}"
         )
 
-    def made(judge: Callable[[Subject_contra], Finding | Chance | str]) -> Check[Subject_contra]:
+    def made(judge: Judge) -> Check:
         return Check(
             name=judge.__name__.replace("_", "-"),
             short=short,

@@ -59,6 +59,7 @@ def merge(comparisons: Sequence[Comparison]) -> Comparison:
     return Comparison(labels=comparisons[0].labels, max_difference=np.asarray(worst))
 
 
+@np.errstate(all="ignore")
 def allowed(scene: Scene, trajectory: Trajectory) -> float:
     """How far rounding, or the tolerance, may take a trajectory from the motion that it stands for."""
     case = Case(trajectory=trajectory, scene=scene)
@@ -69,9 +70,8 @@ def allowed(scene: Scene, trajectory: Trajectory) -> float:
     if case.linear:
         bound, unit = case.growth
         # before the first step there is nothing to round
-        with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
-            sizes = np.asarray(unit / case.system.norm.unit, np.float64)
-            return float(np.max((bound * sizes)[case.steps > 0], initial=0.0))
+        sizes = np.asarray(unit / case.system.norm.unit, np.float64)
+        return float(np.max((bound * sizes)[case.steps > 0], initial=0.0))
     # roundings shift the energy, and with it the frequency of an anharmonic motion: as random ones do where
     # roundings of states walk at random; those of coefficients, made once, shift the phase at each step alike
     steps = float(case.steps[-1])

@@ -42,13 +42,12 @@ def drag(case: Case, told: NDArray[np.bool_]) -> tuple[float, float, str] | None
     p = run.p[:-1][told].astype(np.longdouble)
     lacks = (run.p[1:].astype(np.longdouble) - ahead.end[1])[told] * p
     size, unit = p * p, np.sum(np.abs(p) * plain.last[1][told], axis=0)
-    with np.errstate(all="ignore"):
-        rate = np.sum(lacks, axis=0) / np.sum(size, axis=0)
-        # a friction that is the same everywhere explains the parts; the rest is noise
-        rest = [np.sum(part, axis=0) for part in np.array_split(lacks - rate * size, BLOCKS)]
-        error: Extended = np.sqrt(np.sum(np.square(rest), axis=0) * BLOCKS / (BLOCKS - 1))
-        value, bound = np.abs(np.sum(lacks, axis=0)) / unit, case.roundings + T_FIFTEEN * error / unit
-        known = np.isfinite(value) & np.isfinite(bound) & _is_irregular(case, len(p) // BLOCKS)
+    rate = np.sum(lacks, axis=0) / np.sum(size, axis=0)
+    # a friction that is the same everywhere explains the parts; the rest is noise
+    rest = [np.sum(part, axis=0) for part in np.array_split(lacks - rate * size, BLOCKS)]
+    error: Extended = np.sqrt(np.sum(np.square(rest), axis=0) * BLOCKS / (BLOCKS - 1))
+    value, bound = np.abs(np.sum(lacks, axis=0)) / unit, case.roundings + T_FIFTEEN * error / unit
+    known = np.isfinite(value) & np.isfinite(bound) & _is_irregular(case, len(p) // BLOCKS)
     if not np.any(known):
         return None
     worst = int(np.argmax(np.where(known, value / bound, -1)))

@@ -89,8 +89,7 @@ def _off(case: Case, clock: _Clock) -> Extended:
 
 def _fits(case: Case, clock: _Clock) -> bool:
     allowed = np.stack(case.allowance)[..., :-1] * case.roundings * SLACK
-    with np.errstate(all="ignore"):
-        return bool(np.all(np.abs(_off(case, clock)) <= allowed))
+    return bool(np.all(np.abs(_off(case, clock)) <= allowed))
 
 
 def _later(case: Case) -> float:
@@ -104,12 +103,11 @@ def _later(case: Case) -> float:
 def _delay(case: Case, later: float = 0.0) -> tuple[float, float]:
     """Further delay of the drive's time, in steps, by linear least squares, and what rounding makes of it."""
     unit, change = np.stack(case.allowance)[..., :-1], 1e-6
-    with np.errstate(all="ignore"):
-        off, moved = (_off(case, _Clock(later=at)) / unit for at in (later, later + change))
-        slope = np.where(unit > 0, (moved - off) / change, 0)
-        weight = np.sum(slope * slope)
-        more = -np.sum(np.where(unit > 0, off, 0) * slope) / weight
-        return float(more), float(case.roundings * np.sum(np.abs(slope)) / weight)
+    off, moved = (_off(case, _Clock(later=at)) / unit for at in (later, later + change))
+    slope = np.where(unit > 0, (moved - off) / change, 0)
+    weight = np.sum(slope * slope)
+    more = -np.sum(np.where(unit > 0, off, 0) * slope) / weight
+    return float(more), float(case.roundings * np.sum(np.abs(slope)) / weight)
 
 
 def time_taken(case: Case) -> Finding | str:

@@ -124,9 +124,8 @@ def symplecticity(bench: Bench) -> Finding | str:
     off = np.abs(one - one.T + departure.T @ form @ departure)
     half = np.abs(ideal).T @ np.abs(form) @ allowed
     limit = half + half.T
-    with np.errstate(over="ignore"):
-        # coordinates that nothing joins are allowed next to nothing
-        ratio = off / np.where(limit > 0, limit, 1)
+    # coordinates that nothing joins are allowed next to nothing
+    ratio = off / np.where(limit > 0, limit, 1)
     worst = largest(ratio)
     if ratio[worst] <= 1 and not np.any(limit[form != 0] < 1):
         return "rounding of the entries may be as large as the form"

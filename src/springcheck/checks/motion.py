@@ -30,8 +30,7 @@ def closed_form(case: Case) -> Finding | str:
     bound, unit = case.growth
     late = (case.steps > 0) & ~_beyond(case, bound * unit, distance)
     allowed = np.where(late, bound * unit, 1)
-    with np.errstate(over="ignore"):
-        ratio = np.where(late, distance / allowed, 0)
+    ratio = np.where(late, distance / allowed, 0)
     (worst,) = largest(ratio)
     if ratio[worst] <= 1 and np.any(moved > 0) and not np.any(late & (moved > allowed)):
         return f"{STILL} the motion"
@@ -86,10 +85,9 @@ def shadow_energy(case: Case) -> Finding | str:
     factor = np.ones_like(turn.determinant) if case.area_preserving else turn.determinant
     (u0, v0), rest = case.mode_start, np.asarray(case.system.modes.rest, np.float64)
     first = form[:, 0] * u0 * u0 + form[:, 1] * u0 * v0 + form[:, 2] * v0 * v0
-    with np.errstate(over="ignore", invalid="ignore"):
-        u, v = case.system.modes.about_centres(run.q, run.p)
-        stored = form[:, 0] * u * u + form[:, 1] * u * v + form[:, 2] * v * v
-        expected = first * factor ** case.steps[:, None].astype(np.longdouble)
+    u, v = case.system.modes.about_centres(run.q, run.p)
+    stored = form[:, 0] * u * u + form[:, 1] * u * v + form[:, 2] * v * v
+    expected = first * factor ** case.steps[:, None].astype(np.longdouble)
     # |dE| <= 2 |z| |dz| in the form's own norm, whose size beside the energy's is `shape`
     shape = np.max(np.abs(form[:, 0]) / case.w**2 + np.abs(form[:, 1]) / case.w + np.abs(form[:, 2]))
     _, unit = case.growth
@@ -97,17 +95,14 @@ def shadow_energy(case: Case) -> Finding | str:
     if case.steps[0] != 0:
         most_q, most_p = case.envelope
         size = np.maximum(size, case.system.norm.size(most_q - np.abs(rest), most_p))
-    with np.errstate(over="ignore", invalid="ignore"):
-        scale = 2 * shape * size * unit
-        off = np.max(np.abs(stored - expected), axis=1)
-        late = (case.steps > 0) & ~_beyond(case, scale, shape * size * size, np.max(np.abs(expected), axis=1))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        seen = np.where(late & (off != 0), off / scale, 0)
+    scale = 2 * shape * size * unit
+    off = np.max(np.abs(stored - expected), axis=1)
+    late = (case.steps > 0) & ~_beyond(case, scale, shape * size * size, np.max(np.abs(expected), axis=1))
+    seen = np.where(late & (off != 0), off / scale, 0)
     limit = np.where(late, np.minimum(case.roundings * case.steps, case.walk(case.steps)), 1)
     worst = int(np.argmax(np.where(np.isfinite(seen), seen / limit, np.inf)))
     energy = np.max(np.abs(expected), axis=1)
-    with np.errstate(over="ignore", invalid="ignore"):
-        drowned = energy <= limit * scale
+    drowned = energy <= limit * scale
     if seen[worst] <= limit[worst] and np.any(energy > 0) and not np.any(late & ~drowned):
         return "rounding may be as large as the energy"
 
@@ -219,8 +214,7 @@ def momentum(case: Case) -> Finding | str:
     total = summed(run.p.astype(np.longdouble))
     steps, first = case.steps, case.scene.p.astype(np.longdouble)
     # at both ends of each stretch between frames, for a motion that grows along it
-    with np.errstate(over="ignore", invalid="ignore"):
-        _, of_p = case.allowance_at(run.q, run.p, paired=True)
+    _, of_p = case.allowance_at(run.q, run.p, paired=True)
     unit = np.maximum.accumulate(summed(of_p))[1:]
     if steps[0] != 0 and case.linear:
         unit = np.maximum(unit, summed(case.allowance_at(*case.envelope)[1]))
@@ -260,12 +254,11 @@ def angular_momentum(case: Case) -> Finding | str:
     # det A, or not at all where A is symplectic: Hairer, Lubich & Wanner, chapter VI.2
     run, steps = case.trajectory, case.steps
     start = case.scene.q.astype(np.longdouble), case.scene.p.astype(np.longdouble)
-    with np.errstate(over="ignore", invalid="ignore"):
-        noise = case.allowance_at(run.q, run.p, paired=True)
-        if steps[0] != 0:
-            # nothing bounds the motion before this piece: it is judged from its own first frame on
-            steps, start = steps - steps[0], (run.q[0].astype(np.longdouble), run.p[0].astype(np.longdouble))
-        parts = [_areas(case, pair, (run.q, run.p), start, noise, steps) for pair in case.scene.system.alike]
+    noise = case.allowance_at(run.q, run.p, paired=True)
+    if steps[0] != 0:
+        # nothing bounds the motion before this piece: it is judged from its own first frame on
+        steps, start = steps - steps[0], (run.q[0].astype(np.longdouble), run.p[0].astype(np.longdouble))
+    parts = [_areas(case, pair, (run.q, run.p), start, noise, steps) for pair in case.scene.system.alike]
     off, unit, size = (np.concatenate(x) for x in zip(*parts, strict=True))
     limit = np.tile(case.roundings * np.maximum(steps[1:], 1).astype(np.float64), len(parts))
     seen = np.asarray(off / np.where(unit > 0, unit, 1), np.float64)
@@ -317,24 +310,22 @@ def gyration(case: Case) -> Finding | str:
     at = [kind.evaluates for kind in scheme.kinds].index("magnetic")
     undone = tuple((name, -Fraction(c)) for name, c in reversed(scheme.stages[at + 1 :]))
     q, p = (x.astype(np.longdouble) for x in (timed.trajectory.q, timed.trajectory.p))
-    with np.errstate(all="ignore"):
-        parts = (replace(scheme, stages=scheme.stages[:at]), q[:-1], p[:-1]), (
-            replace(scheme, stages=undone), q[1:], p[1:])  # fmt: skip
-        met, left = (replace(timed.law, scheme=part).step(*state)[1] for part, *state in parts)
-        of_q, of_p = (one[:, :n] for one in timed.allowance)
-        of_p = of_p + abs(case.trajectory.step) * case.system.rigidity * of_q
+    parts = (replace(scheme, stages=scheme.stages[:at]), q[:-1], p[:-1]), (
+        replace(scheme, stages=undone), q[1:], p[1:])  # fmt: skip
+    met, left = (replace(timed.law, scheme=part).step(*state)[1] for part, *state in parts)
+    of_q, of_p = (one[:, :n] for one in timed.allowance)
+    of_p = of_p + abs(case.trajectory.step) * case.system.rigidity * of_q
     rows = [(a, b, w / case.judged.m[a]) for term in case.law.fields[0] for a, b, w in term.rows()]
     a, b = (np.array([row[i] for row in rows]) for i in (0, 1))
     half = np.array([row[2] for row in rows], np.longdouble) * case.trajectory.step / 2
     before, after = met[:, a] + 1j * met[:, b], left[:, a] + 1j * left[:, b]
     # (1 - i t)/(1 + i t) turns by -2 atan(t), without functions
-    with np.errstate(all="ignore"):
-        off, unit = np.abs(after - before * (1 - 1j * half) / (1 + 1j * half)), of_p[:, a] + of_p[:, b]
-        seen, limit = off / unit, case.roundings * unit / np.abs(before)
-        ratio, right = after / before, 2 * np.arctan(half)
-        # a step longer by x turns by sin(2 atan(h W/2)) x more, where there is a field
-        felt = np.sin(right) != 0
-        longer = np.min(limit[:, felt] / np.abs(np.sin(right[felt])), initial=np.inf)
+    off, unit = np.abs(after - before * (1 - 1j * half) / (1 + 1j * half)), of_p[:, a] + of_p[:, b]
+    seen, limit = off / unit, case.roundings * unit / np.abs(before)
+    ratio, right = after / before, 2 * np.arctan(half)
+    # a step longer by x turns by sin(2 atan(h W/2)) x more, where there is a field
+    felt = np.sin(right) != 0
+    longer = np.min(limit[:, felt] / np.abs(np.sin(right[felt])), initial=np.inf)
     worst = largest(seen)
     if seen[worst] <= case.roundings and not np.any(limit < 1):
         return "rounding may be as large as the velocity"

@@ -7,7 +7,8 @@ import numpy as np
 from springcheck.checks.case import REPEATED, Case
 from springcheck.checks.check import Finding, check
 from springcheck.physics import exact
-from springcheck.physics.arrays import AS_WRITTEN, Arithmetic
+from springcheck.physics.arrays import AS_WRITTEN
+from springcheck.physics.trajectory import Trajectory
 from springcheck.text.wording import count
 
 
@@ -43,7 +44,7 @@ def grid(case: Case) -> Finding:
         wrong.append(f"the tolerance is {run.tolerance} instead of {scene.tolerance:g}")
     if run.energy is None and "energy" in scene.quantities:
         wrong.append("there are no energies")
-    wrong += beyond(run.arithmetic)
+    wrong += beyond(run)
     if run.outcome.status == "continued" and not case.piece:
         wrong.append("it is a piece of a run that goes on")
     last, asked = int(case.steps[-1]), (scene.frames - 1) * scene.every
@@ -56,6 +57,8 @@ def grid(case: Case) -> Finding:
         and not (_gives_up(case) or _explodes(case))
     ):
         wrong.append(f"{status} after {last} of {count(asked, 'step')} for no reason that is known here")
+        if status == "stopped" and run.outcome.message:
+            wrong[-1] += f"; the engine says: {run.outcome.message}"
     why = "; ".join(wrong) or "every fact of the grid is the scene's own"
     return Finding(len(wrong), 0.0, "facts", why)
 
@@ -71,12 +74,18 @@ MOST_DECLARED = {
 """The coarsest arithmetic that an engine may declare, and why: the bounds of all checks follow what it
 declares, and more would excuse any force."""
 
+MOST_REBUILT = (2.0**-24, "single precision is the coarsest known to rebuild velocities")
+"""The same for `state` where velocities are differences of positions, which have their roundings over h."""
 
-def beyond(how: Arithmetic) -> list[str]:
+
+def beyond(run: Trajectory) -> list[str]:
     """The parts of a declared arithmetic that are coarser than any known one."""
+    how, most_declared = run.arithmetic, MOST_DECLARED
+    if run.rebuilds_velocity and not how.keeps_displacement:
+        most_declared = most_declared | {"state": MOST_REBUILT}
     return [
         f"the engine declares {name} = {value:.3g} of its arithmetic, and at most {most:.3g} is taken: {why}"
-        for name, (most, why) in MOST_DECLARED.items()
+        for name, (most, why) in most_declared.items()
         # decimals of a file are read off it, and not declared
         if not 0 <= (value := getattr(how, name)) <= most and (name, how.name) != ("state", AS_WRITTEN)
     ]
@@ -103,19 +112,18 @@ def _explodes(case: Case) -> bool:
     q, p = (x[-1:].astype(np.longdouble) for x in (run.q, run.p))
     limit = SINGLE_RANGE if run.arithmetic.force >= np.finfo(np.float32).eps / 2 else HALF_RANGE
     limit = min(limit, run.arithmetic.overflow)
-    with np.errstate(all="ignore"):
-        if not case.law.has("one-step"):
-            if not exact.has_true_motion(case.scene):
-                return True
-            ends = exact.true_motion(case.scene, case.steps[-1:] + run.every, run.step)
-            return not max(float(np.max(np.abs(x))) for x in (*ends, q, p)) <= limit
+    if not case.law.has("one-step"):
+        if not exact.has_true_motion(case.scene):
+            return True
+        ends = exact.true_motion(case.scene, case.steps[-1:] + run.every, run.step)
+        return not max(float(np.max(np.abs(x))) for x in (*ends, q, p)) <= limit
+    sizes = scene.system.magnitude(None if case.system.is_linear else q)
+    for _ in range(min(run.every, REPEATED) + 1):
+        largest = max(float(np.max(np.abs(x))) for x in (q, p, p / scene.m, sizes(np.abs(q), np.abs(p))))
+        if not largest <= limit:
+            return True
+        q, p = case.step(q, p)
         sizes = scene.system.magnitude(None if case.system.is_linear else q)
-        for _ in range(min(run.every, REPEATED) + 1):
-            largest = max(float(np.max(np.abs(x))) for x in (q, p, p / scene.m, sizes(np.abs(q), np.abs(p))))
-            if not largest <= limit:
-                return True
-            q, p = case.step(q, p)
-            sizes = scene.system.magnitude(None if case.system.is_linear else q)
     return False
 
 
@@ -136,8 +144,7 @@ def energies(case: Case) -> Finding:
     """Stored energies are those of the stored states, bit for bit."""
     run = case.trajectory
     assert run.energy is not None
-    with np.errstate(over="ignore", invalid="ignore", under="ignore"):
-        again = np.asarray(case.scene.system.energy(run.q, run.p), np.float64)
+    again = np.asarray(case.scene.system.energy(run.q, run.p), np.float64)
     stored = np.asarray(run.energy, np.float64)
     same = (again == stored) | (np.isnan(again) & np.isnan(stored))
     # the energy of finite states may overflow; states that are no numbers have none

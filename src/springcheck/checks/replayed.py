@@ -178,6 +178,8 @@ def _untrue(
         pushes, steps_before = (np.maximum(push - off, 0), push + off), (before - of_h, before + of_h)
         sides = [rule(float(x), float(y), allow) for x in pushes for y in steps_before]
         of_h = np.max(np.abs(np.array(sides) - longest)) + 2 * state * longest
+        # roundings as large as the force allow any step, and later ones are not known
+        of_h = of_h if np.isfinite(of_h) else np.longdouble(np.inf)
         clock, before = clock + abs(length), longest
         of_t += state * clock
     number, amiss, excess = _roundings(case), abs(clock - abs(times[1])), abs(steps[-1].h) - longest
@@ -231,20 +233,19 @@ def _hidden(case: Case, found: _Replayed) -> str:
 @check("replay", family="motion", requires={"rule", "two-frames"})
 def replay(case: Case) -> Finding | str:
     """Each step between two frames is that of a fixed-step scheme, as long as the solver's rule says."""
-    with np.errstate(all="ignore"):
-        found = case.once(_follow)
-        if isinstance(found, str):
-            return found
-        run, number = case.trajectory, _roundings(case)
-        ratios, still = [], []
-        for at, end, one, late in zip((run.q, run.p), found.ends, found.bounds, found.late, strict=True):
-            unit = one + late / number
-            ratios.append(np.max(np.abs(at[1 : len(end) + 1] - end) / unit, axis=1))
-            still.append(np.max(np.abs(at[: len(end)] - end) / unit, axis=1))
-        seen = np.max([*ratios, found.untrue], axis=0)
-        (worst,) = largest(seen)
-        if seen[worst] <= number and not np.any(np.max(still, axis=0) > number):
-            return "rounding may be as large as the way from frame to frame"
+    found = case.once(_follow)
+    if isinstance(found, str):
+        return found
+    run, number = case.trajectory, _roundings(case)
+    ratios, still = [], []
+    for at, end, one, late in zip((run.q, run.p), found.ends, found.bounds, found.late, strict=True):
+        unit = one + late / number
+        ratios.append(np.max(np.abs(at[1 : len(end) + 1] - end) / unit, axis=1))
+        still.append(np.max(np.abs(at[: len(end)] - end) / unit, axis=1))
+    seen = np.max([*ratios, found.untrue], axis=0)
+    (worst,) = largest(seen)
+    if seen[worst] <= number and not np.any(np.max(still, axis=0) > number):
+        return "rounding may be as large as the way from frame to frame"
     lengths = np.abs(np.diff(run.t[: len(seen) + 1])) / found.counts
     return Finding(
         seen[worst],
@@ -260,38 +261,34 @@ def replay(case: Case) -> Finding | str:
 @check("gain", family="motion", requires={"rule", "two-frames", "linear"})
 def energy_gain(case: Case) -> Finding | str:
     """The energy changes by what the lengths of the steps make of it, and by nothing else."""
-    with np.errstate(all="ignore"):
-        found = case.once(_follow)
-        if isinstance(found, str):
-            return found
-        run, number, held = case.trajectory, _roundings(case), slice(len(found.gains) + 1)
-        q, p = (x[held].astype(np.longdouble) for x in (run.q, run.p))
-        energy = case.judged.system.energy(q, p).astype(np.longdouble)
-        size = energy[0]
-        if not size > 0:
-            # hilltops and weights: what moves has either part of it somewhere
-            moves = np.sum(p * p / 2 / case.judged.m, axis=1)
-            size = np.max(moves + np.abs(energy - moves))
-        if size == 0:
-            return "nothing moves"
-        force = case.system.force(q, p)
-        of_q, of_p = (number * one + late for one, late in zip(found.bounds, found.late, strict=True))
-        each = (
-            np.sum(np.abs(force[1:]) * of_q + (np.abs(p[1:]) + of_p) / case.judged.m * of_p, axis=1)
-            + found.loose
-        )
-        law = np.cumsum(found.gains)
-        off, bound = np.abs(energy[1:] - energy[0] - law), np.cumsum(each)
-        ratio = off / bound
-        (worst,) = largest(ratio)
-        drowned = ~(np.abs(law) > bound)
-        if ratio[worst] <= 1 and np.all(drowned):
-            return "rounding may be as large as all that the steps add"
-        told = ""
-        if bound[-1] > np.max(np.abs(law)):
-            told = (
-                f"; a step of {np.min(found.shortest):.1e} leaves a velocity rebuilt from positions no digit"
-            )
+    found = case.once(_follow)
+    if isinstance(found, str):
+        return found
+    run, number, held = case.trajectory, _roundings(case), slice(len(found.gains) + 1)
+    q, p = (x[held].astype(np.longdouble) for x in (run.q, run.p))
+    energy = case.judged.system.energy(q, p).astype(np.longdouble)
+    size = energy[0]
+    if not size > 0:
+        # hilltops and weights: what moves has either part of it somewhere
+        moves = np.sum(p * p / 2 / case.judged.m, axis=1)
+        size = np.max(moves + np.abs(energy - moves))
+    if size == 0:
+        return "nothing moves"
+    force = case.system.force(q, p)
+    of_q, of_p = (number * one + late for one, late in zip(found.bounds, found.late, strict=True))
+    each = (
+        np.sum(np.abs(force[1:]) * of_q + (np.abs(p[1:]) + of_p) / case.judged.m * of_p, axis=1) + found.loose
+    )
+    law = np.cumsum(found.gains)
+    off, bound = np.abs(energy[1:] - energy[0] - law), np.cumsum(each)
+    ratio = off / bound
+    (worst,) = largest(ratio)
+    drowned = ~(np.abs(law) > bound)
+    if ratio[worst] <= 1 and np.all(drowned):
+        return "rounding may be as large as all that the steps add"
+    told = ""
+    if bound[-1] > np.max(np.abs(law)):
+        told = f"; a step of {np.min(found.shortest):.1e} leaves a velocity rebuilt from positions no digit"
     turns = abs(float(run.t[held][-1])) * float(np.sqrt(np.max(np.abs(case.system.modes.w2)))) / (2 * np.pi)
     span = "a period of the fastest mode" if turns > 0 else "the run"
     grown, said = (float(x / size / (turns or 1)) for x in (energy[-1] - energy[0], law[-1]))

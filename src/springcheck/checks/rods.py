@@ -34,10 +34,9 @@ def rod_length(case: Case) -> Finding:
     q = case.trajectory.q[1:].astype(np.longdouble)
     heated = case.law.has("random")
     roundings = thermal.draws.roundings_of(thermostat(case), case.judged) if heated else case.roundings
-    with np.errstate(all="ignore"):
-        off = np.abs(rods.strain(q))
-        bound = roundings * how.state * (1 + rods.magnitude(q)) + how.lengths
-        worst = largest(off / bound)
+    off = np.abs(rods.strain(q))
+    bound = roundings * how.state * (1 + rods.magnitude(q)) + how.lengths
+    worst = largest(off / bound)
     why = f"roundings along one step of {case.scheme.title}, of lengths and of positions"
     if how.lengths:
         why += f", and the tolerance {how.lengths:g} of the engine's solver, which is not its error"
@@ -75,14 +74,13 @@ def rod_velocity(case: Case) -> Finding | str:
     else:
         roundings, of_p = case.roundings, case.allowance[1]
     q, p = (x[-len(of_p) :].astype(np.longdouble) for x in (case.trajectory.q, case.trajectory.p))
-    with np.errstate(all="ignore"):
-        r, m = rods.ways(q), case.judged.m
-        off = np.abs(rods.dot(r, rods.apart(p / m)))
-        unit = rods.sum_of_sizes(r, of_p / m)
-        # where a step has no solution nothing is known of its momenta
-        if not np.any(np.isfinite(unit)):
-            return "no step has a solution whose rounding is known"
-        seen = np.where((off == 0) | ~np.isfinite(unit), 0, off / unit)
+    r, m = rods.ways(q), case.judged.m
+    off = np.abs(rods.dot(r, rods.apart(p / m)))
+    unit = rods.sum_of_sizes(r, of_p / m)
+    # where a step has no solution nothing is known of its momenta
+    if not np.any(np.isfinite(unit)):
+        return "no step has a solution whose rounding is known"
+    seen = np.where((off == 0) | ~np.isfinite(unit), 0, off / unit)
     worst = largest(seen)
     why = f"roundings along one step of {case.scheme.title}; does not grow with the run"
     return Finding(seen[worst], roundings, "roundings", why)
@@ -114,13 +112,12 @@ def turn(case: Case) -> Finding | str:
     angle = np.arctan2(rods.dot(r, across) / np.where(w > 0, w, 1), rods.dot(r, first))
     off = angle - n * each
     off = np.abs(off - 2 * PI * np.round(off / (2 * PI)))[1:]
-    with np.errstate(all="ignore"):
-        square = rods.length**2
-        of_q, of_p = (np.maximum.accumulate(one) for one in case.allowance)
-        of_angle = rods.sum_of_sizes(r[1:], of_q) / square
-        of_rate = rods.spans(of_p / m) / rods.length
-        bound = case.roundings * (n[1:] * of_angle + n[1:] * (n[1:] + 1) / 2 * of_rate * steeper)
-        ratio = np.where(w > 0, off / bound, 0)
+    square = rods.length**2
+    of_q, of_p = (np.maximum.accumulate(one) for one in case.allowance)
+    of_angle = rods.sum_of_sizes(r[1:], of_q) / square
+    of_rate = rods.spans(of_p / m) / rods.length
+    bound = case.roundings * (n[1:] * of_angle + n[1:] * (n[1:] + 1) / 2 * of_rate * steeper)
+    ratio = np.where(w > 0, off / bound, 0)
     worst = largest(ratio)
     whole = n[1:] * np.abs(each)
     if ratio[worst] <= 1 and not np.any(whole > bound):

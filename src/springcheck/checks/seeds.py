@@ -273,8 +273,7 @@ def seeds_apart(subject: Seeded) -> Chance | str:
     if not all(one.known for one in both):
         return HIDDEN
     x, y = (one.draws for one in both)
-    with np.errstate(all="ignore"):
-        found = chance.crossed(x.ravel(), y.ravel())
+    found = chance.crossed(x.ravel(), y.ravel())
     return Chance(found, f"largest correlation of {x.size} draws of each")
 
 

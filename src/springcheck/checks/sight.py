@@ -79,20 +79,19 @@ def limits(
     def effects(wrong: Sequence[States]) -> list[float]:
         return [_largest(part((q - right[0], p - right[1]))) for q, p in wrong]
 
-    with np.errstate(all="ignore"):
-        unknown = _largest(part((np.abs(right[0]) * ROUNDING, np.abs(right[1]) * ROUNDING)))
-        for name in NAMES:
-            sizes = effects(motions(name))
-            least = [change / size for size in sizes if size > 8 * unknown]
-            if coarse is not None and len(least) < len(sizes):
-                # a whole bound is far above what a reference rounds, even where it is no wider than an engine
-                least += [
-                    COARSER * change / more
-                    for size, more in zip(sizes, effects(coarse(name)), strict=True)
-                    if size <= 8 * unknown and more > min(8 * unknown, 1)
-                ]
-            found[name] = max((x for x in least if x < LARGEST), default=None)
-            hidden += sum(not x < LARGEST for x in least)
+    unknown = _largest(part((np.abs(right[0]) * ROUNDING, np.abs(right[1]) * ROUNDING)))
+    for name in NAMES:
+        sizes = effects(motions(name))
+        least = [change / size for size in sizes if size > 8 * unknown]
+        if coarse is not None and len(least) < len(sizes):
+            # a whole bound is far above what a reference rounds, even where it is no wider than an engine
+            least += [
+                COARSER * change / more
+                for size, more in zip(sizes, effects(coarse(name)), strict=True)
+                if size <= 8 * unknown and more > min(8 * unknown, 1)
+            ]
+        found[name] = max((x for x in least if x < LARGEST), default=None)
+        hidden += sum(not x < LARGEST for x in least)
     return Limits(**found), hidden
 
 
@@ -169,14 +168,13 @@ def _weakest(case: Case, every: list[Rows], at: Integers) -> list[Rows]:
     q, p = (x[at].astype(np.longdouble) for x in (case.trajectory.q, case.trajectory.p))
     _, allowed = (x[np.minimum(at, len(x) - 1)] for x in case.allowance)
     sizes: dict[int, Extended] = {}
-    with np.errstate(all="ignore"):
-        for number in {number for number, _ in every}:
-            term = case.judged.terms[number]
-            pull = np.abs(
-                term.parameters[0] * p[:, term.particles[0]] if term.kind == "friction" else term.pull(q)
-            )
-            most = [np.max(pull / allowed[:, index], axis=0) for index in term.particles]
-            sizes[number] = np.max(most, axis=0)
+    for number in {number for number, _ in every}:
+        term = case.judged.terms[number]
+        pull = np.abs(
+            term.parameters[0] * p[:, term.particles[0]] if term.kind == "friction" else term.pull(q)
+        )
+        most = [np.max(pull / allowed[:, index], axis=0) for index in term.particles]
+        sizes[number] = np.max(most, axis=0)
     effect = [float(np.max(sizes[number][chosen])) for number, chosen in every]
     moving = [j for j in np.argsort(effect).tolist() if effect[j] > 0]
     return [every[j] for j in moving[:MOST_ROWS]]
@@ -268,18 +266,17 @@ def _mode_motions(case: Case) -> tuple[Integers, float, States, dict[str, list[S
     def states(matrices: Extended) -> States:
         return schemes.propagate(matrices, *case.mode_start, steps, area_preserving=case.area_preserving)
 
-    with np.errstate(all="ignore"):
-        found = ((name, changed_matrices(case, name, change)) for name in NAMES[:3])
-        # near a step without a solution the changed map may reverse orientation
-        # the modes of several springs change otherwise with each of them
-        motions = {
-            name: [states(matrices)]
-            for name, matrices in found
-            if matrices is not None
-            and np.all(schemes.rotation(matrices).determinant > 0)
-            and (name == "step" or len(every_row(case, name)) <= 1)
-        }
-        return at, change, states(case.matrices), motions
+    found = ((name, changed_matrices(case, name, change)) for name in NAMES[:3])
+    # near a step without a solution the changed map may reverse orientation
+    # the modes of several springs change otherwise with each of them
+    motions = {
+        name: [states(matrices)]
+        for name, matrices in found
+        if matrices is not None
+        and np.all(schemes.rotation(matrices).determinant > 0)
+        and (name == "step" or len(every_row(case, name)) <= 1)
+    }
+    return at, change, states(case.matrices), motions
 
 
 def changed_matrices(case: Case, name: str, change: float) -> Extended | None:

@@ -45,6 +45,7 @@ def tolerance(case: Case) -> Finding | str:
     )
 
 
+@np.errstate(all="ignore")
 def tolerance_bound(case: Case) -> float:
     """What an adaptive solver's errors may add up to, relative to the initial energy norm.
 
@@ -57,8 +58,7 @@ def tolerance_bound(case: Case) -> float:
         # an error made later grows for a shorter time: state and growth are both taken from the start
         states = (case.scene.q[None], case.scene.p[None]) if np.any(case.system.modes.w2 < 0) else states
     local = _worst_local_error(case, *states)
-    with np.errstate(over="ignore"):
-        return float((case.trajectory.tolerance or 0.0) * most_steps(case) * local * flow_growth(case))
+    return float((case.trajectory.tolerance or 0.0) * most_steps(case) * local * flow_growth(case))
 
 
 def most_steps(case: Case) -> float:
@@ -101,14 +101,13 @@ def _rebuilt(case: Case, q: Floats, p: Floats) -> float:
     run, scene, rule = case.trajectory, case.judged, case.scheme.rule
     if rule is None or not run.rebuilds_velocity:
         return 0.0
-    with np.errstate(all="ignore"):
-        force = scene.system.force(q, p)
-        most = force[np.argmax(np.sum((force / scene.m) ** 2, axis=1))]
-        shortest = rule(float(push_of(scene, most)), 0.0, allowed(case.scene)) / HELD_BY_A_RULE
-        cut = 0.0 if run.last_step is None else float(np.sum(2 / run.last_step[run.last_step > 0]))
-        reach = 2 * np.max(np.abs(q), axis=0) + case.origins + 2 * case.scene.periods
-        each = run.arithmetic.state * scene.m * reach * (most_steps(case) / shortest + cut)
-        return float(case.system.norm(0 * reach, each))
+    force = scene.system.force(q, p)
+    most = force[np.argmax(np.sum((force / scene.m) ** 2, axis=1))]
+    shortest = rule(float(push_of(scene, most)), 0.0, allowed(case.scene)) / HELD_BY_A_RULE
+    cut = 0.0 if run.last_step is None else float(np.sum(2 / run.last_step[run.last_step > 0]))
+    reach = 2 * np.max(np.abs(q), axis=0) + case.origins + 2 * case.scene.periods
+    each = run.arithmetic.state * scene.m * reach * (most_steps(case) / shortest + cut)
+    return float(case.system.norm(0 * reach, each))
 
 
 HELD_BY_A_RULE = 1.2
@@ -161,8 +160,7 @@ def flow_growth(case: Case) -> float:
         if not (case.linear and np.any(case.system.modes.w2 < 0)):
             return 1.0
         turn = float(np.sqrt(np.max(-case.system.modes.w2)) * duration)
-        with np.errstate(over="ignore"):
-            return float(np.exp(turn) * max(turn, 1.0))
+        return float(np.exp(turn) * max(turn, 1.0))
     if duration == 0:
         return 1.0
     if scene.system.solution and (grown := scene.system.solution.growth):
@@ -170,16 +168,15 @@ def flow_growth(case: Case) -> float:
     maps = _flow_maps(case, duration)
     if maps is None:
         return 1.0 + fastest(case) * duration / 2
-    with np.errstate(all="ignore"):
-        try:
-            back = np.linalg.inv(maps)
-            # from every time to every later one
-            found = max(
-                float(np.max(np.linalg.norm(maps[j:] @ back[j], 2, axis=(-2, -1)))) for j in range(len(maps))
-            )
-        except np.linalg.LinAlgError:
-            # the flow leaves the range of numbers
-            return np.inf
+    try:
+        back = np.linalg.inv(maps)
+        # from every time to every later one
+        found = max(
+            float(np.max(np.linalg.norm(maps[j:] @ back[j], 2, axis=(-2, -1)))) for j in range(len(maps))
+        )
+    except np.linalg.LinAlgError:
+        # the flow leaves the range of numbers
+        return np.inf
     return max(1.0, found) if np.isfinite(found) else np.inf
 
 
@@ -207,8 +204,7 @@ def _flow_maps(case: Case, duration: float) -> Floats | None:
         one, other = (np.stack(exact.true_motion(start, steps, h), axis=1) for start in scenes)
         # by what the doubles really differ
         change = (moved[0] - moved[1]) / unit
-        with np.errstate(divide="ignore", invalid="ignore"):
-            columns.append((one - other) / (unit * np.sum(change, axis=0 if separate else None)))
+        columns.append((one - other) / (unit * np.sum(change, axis=0 if separate else None)))
     # (d, f, 2, n): which column, time, q or p, particle
     table = np.stack(columns).astype(np.float64)
     if separate:
@@ -250,5 +246,4 @@ def _worst_local_error(case: Case, q: Floats, p: Floats) -> np.longdouble:
     largest = np.max(np.maximum(_stiff(case) * weight_q**2, weight_p**2 / scene.m)) / 2
     if largest == 0:
         return np.longdouble(0)
-    with np.errstate(divide="ignore"):
-        return np.longdouble(np.sqrt(2 * scene.n * largest) / case.system.norm.unit)
+    return np.longdouble(np.sqrt(2 * scene.n * largest) / case.system.norm.unit)

@@ -60,7 +60,7 @@ def _step_defect(case: Case) -> Finding | str:
         first = case.steps[int(np.argmin(told)) + 1]
         frames = count(int(np.count_nonzero(~told)), "frame")
         why += f"; {frames}, from step {first} on, where one may grow to all of it"
-    why = _beyond_range(case, off) or why + _where(case, off)
+    why = _beyond_range(case, off) or why + _where(case, off) + _without_length(case, off)
     value, most = seen[worst], bound[worst]
     if not np.any(off) and (slow := drag(case, told)) and not slow[0] <= slow[1]:
         value, most, why = slow
@@ -82,10 +82,9 @@ def border(case: Case) -> Finding | str:
                 "is as long as half of the box, and another image of its end is nearer; take a longer box"
             )
             return Finding(longest, float(np.nextafter(1, 0)), "of half of the box", why)
-    with np.errstate(all="ignore"):
-        seen = _in_roundings(case, run.q[1:], run.p[1:])
-        image = np.floor(run.q / box)
-        moved = (image[1:] != image[:-1]) | (np.abs(np.diff(run.q, axis=0)) > box / 2)
+    seen = _in_roundings(case, run.q[1:], run.p[1:])
+    image = np.floor(run.q / box)
+    moved = (image[1:] != image[:-1]) | (np.abs(np.diff(run.q, axis=0)) > box / 2)
     apart = np.zeros(len(run.q), np.bool_)
     for term in case.scene.terms:
         if term.bodies == 2:
@@ -149,18 +148,17 @@ def _blind(case: Case, told: NDArray[np.bool_], *, passed: bool) -> str:
     if ahead is None:
         return ""
     states, most = np.stack([run.q, run.p]), case.roundings * ahead.allowance[:, told]
-    with np.errstate(all="ignore"):
-        moves = np.abs(ahead.end - states[:, :-1])[:, told]
-        hidden = ~np.any(moves > most, axis=1) & np.any(moves > 0, axis=1)
-        worst = np.max(most, axis=1)
-        digits, way = np.max(np.abs(states), axis=1), np.ptp(states, axis=1)
-        known = (worst <= OF_DIGITS * run.arithmetic.state * digits) & (worst <= OF_WAY * way)
-        if passed:
-            ends = states[:, 1:]
-            off = np.max(np.abs(ahead.end - ends)[:, told], axis=1)
-            coarser = run.arithmetic.state / Arithmetic().state
-            known &= off <= OF_RECORDING * coarser * np.spacing(np.max(np.abs(ends), axis=1)) / 2
-        coarse = (way > 0) & ~hidden & ~known
+    moves = np.abs(ahead.end - states[:, :-1])[:, told]
+    hidden = ~np.any(moves > most, axis=1) & np.any(moves > 0, axis=1)
+    worst = np.max(most, axis=1)
+    digits, way = np.max(np.abs(states), axis=1), np.ptp(states, axis=1)
+    known = (worst <= OF_DIGITS * run.arithmetic.state * digits) & (worst <= OF_WAY * way)
+    if passed:
+        ends = states[:, 1:]
+        off = np.max(np.abs(ahead.end - ends)[:, told], axis=1)
+        coarser = run.arithmetic.state / Arithmetic().state
+        known &= off <= OF_RECORDING * coarser * np.spacing(np.max(np.abs(ends), axis=1)) / 2
+    coarse = (way > 0) & ~hidden & ~known
     return _list(case, hidden, BLIND) + _list(case, coarse, NO_BETTER, worst)
 
 
@@ -234,14 +232,12 @@ STILL = "standing still would pass: rounding may be as large as"
 def _in_roundings(case: Case, to_q: Floats, to_p: Floats) -> Reals:
     """How far states are from the scheme's own after each frame but the last (f-1,), in roundings."""
     if case.ahead is not None:
-        with np.errstate(all="ignore"):
-            off = to_q - case.ahead.end[0], to_p - case.ahead.end[1]
+        off = to_q - case.ahead.end[0], to_p - case.ahead.end[1]
         left = np.max(_left(case, *off), axis=1)
         return np.asarray(np.maximum(_off(case.ahead, to_q, to_p), left))
     q, p = case.next_states
-    with np.errstate(all="ignore"):
-        size = case.system.norm.size(q - to_q, p - to_p)
-        return np.asarray(size / case.allowance_of_stretches)
+    size = case.system.norm.size(q - to_q, p - to_p)
+    return np.asarray(size / case.allowance_of_stretches)
 
 
 def _left(case: Case, off_q: Reals, off_p: Reals, at: Integers | slice = slice(None)) -> Reals:
@@ -250,16 +246,14 @@ def _left(case: Case, off_q: Reals, off_p: Reals, at: Integers | slice = slice(N
     if case.residual is None:
         return np.zeros_like(off_q)
     way, added = case.residual
-    with np.errstate(all="ignore"):
-        return np.asarray(np.abs(off_q - way * off_p) / added[at], dtype=np.longdouble)
+    return np.asarray(np.abs(off_q - way * off_p) / added[at], dtype=np.longdouble)
 
 
 def _off(ahead: Stretch, to_q: Floats, to_p: Floats) -> Reals:
     """Distance of states from the ends of stretches, in allowances of the degree of freedom farthest off."""
-    with np.errstate(all="ignore"):
-        off = np.abs(ahead.end - np.stack([to_q, to_p]))
-        # where nothing rounds nothing may be off: 0 of 0 is 0
-        return np.asarray(np.max(np.where(off == 0, 0, off / ahead.allowance), axis=(0, 2)))
+    off = np.abs(ahead.end - np.stack([to_q, to_p]))
+    # where nothing rounds nothing may be off: 0 of 0 is 0
+    return np.asarray(np.max(np.where(off == 0, 0, off / ahead.allowance), axis=(0, 2)))
 
 
 def _beyond_range(case: Case, off: NDArray[np.bool_]) -> str:
@@ -279,6 +273,21 @@ def _beyond_range(case: Case, off: NDArray[np.bool_]) -> str:
     return (
         f"the engine's limit: {overflows(how)}, and step {case.steps[first + 1]}, the first that is off, "
         f"has a force of {case.strongest[first]:.3g}"
+    )
+
+
+SHORTEST = float(np.sqrt(np.finfo(np.float64).smallest_normal))
+"""Length below which the square of a length underflows."""
+
+
+def _without_length(case: Case, off: NDArray[np.bool_]) -> str:
+    """Why steps (f-1,) may be off where all positions are too small to be squared, or nothing."""
+    largest = float(np.max(np.abs(case.trajectory.q[:-1][off]), initial=0.0))
+    if not 0 < largest < SHORTEST:
+        return ""
+    return (
+        f"; positions up to {largest:.3g} have squares that underflow: an engine that takes forces from the "
+        "lengths of bonds has none there"
     )
 
 

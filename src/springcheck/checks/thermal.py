@@ -50,9 +50,8 @@ def _reading(case: Case) -> Reading:
 
 def _read(case: Case, q: Floats, p: Floats) -> Reading:
     run, scheme = case.trajectory, thermostat(case)
-    with np.errstate(all="ignore"):
-        by = thermal.rigid.read if case.judged.system.rods else thermal.draws.read
-        return by(scheme, case.judged, q, p, how=run.arithmetic, rebuilt=run.rebuilds_velocity)
+    by = thermal.rigid.read if case.judged.system.rods else thermal.draws.read
+    return by(scheme, case.judged, q, p, how=run.arithmetic, rebuilt=run.rebuilds_velocity)
 
 
 def _unread(case: Case) -> int:
@@ -123,9 +122,8 @@ def _of(case: Case, probability: Callable[[Floats], float], value: Callable[[Flo
         return found
     x, read = found
     x = x if read.hits is None else x[read.hits][:, None]
-    with np.errstate(all="ignore"):
-        # draws that nothing has are infinite
-        return Chance(probability(x), f"{value(x)}, of {count(x.size, 'draw')}")
+    # draws that nothing has are infinite
+    return Chance(probability(x), f"{value(x)}, of {count(x.size, 'draw')}")
 
 
 @check("mean", family="noise", requires={"every-step"})
@@ -206,9 +204,8 @@ def draws_state(case: Case) -> Chance | str:
     x = x.reshape(len(q), -1, x.shape[1]).transpose(1, 0, 2)
     if read.hits is not None:
         x, y = np.where(read.hits, x, 0), np.where(read.hits, y, 0)
-    with np.errstate(all="ignore"):
-        likely = thermal.chance.foretold(x, y)
-        each = np.einsum("usn,ksn->uk", x, y) / np.sqrt(np.sum(x * x) / len(x) * np.sum(y * y, axis=(1, 2)))
+    likely = thermal.chance.foretold(x, y)
+    each = np.einsum("usn,ksn->uk", x, y) / np.sqrt(np.sum(x * x) / len(x) * np.sum(y * y, axis=(1, 2)))
     u, i = largest(np.abs(each))
     return Chance(
         likely, f"correlation {each[u, i]:+.2e} with {list(known)[i]} before, of {count(x.size, 'draw')}"

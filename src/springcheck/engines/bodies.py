@@ -94,6 +94,7 @@ class Bodies(ABC):
         x, y, v = (attrgetter(name) for name in (self.x, self.y, self.v))
         with np.errstate(over="ignore", invalid="ignore"):
             for row in range(len(q)):
+                self.force_calls += every
                 for _ in range(every):
                     if force is not None:
                         here, there = (np.array([of(body) for body in bodies], np.float64) for of in (x, v))
@@ -103,4 +104,3 @@ class Bodies(ABC):
                 q[row] = [x(body) for body in bodies]
                 p[row] = [v(body) for body in bodies] * self.m
             self.off_axis = max(self.off_axis, *(abs(y(body)) for body in bodies))
-        self.force_calls += every * len(q)

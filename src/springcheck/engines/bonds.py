@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,10 +25,14 @@ ANCHOR_MASS = 2.0**100
 Joint: TypeAlias = tuple[tuple[int, ...], float, Floats | None]
 """A rod: its particles, its length, and where a fixed end stands."""
 
+Tie: TypeAlias = tuple[tuple[int, ...], float, float, tuple[float, ...] | None]
+"""A spring: its particle or both, k [M/T2], rest length [L], and where the wall of one stands [L]."""
+
 Bond: TypeAlias = tuple[int, int, float, float, tuple[float, ...] | None]
 """Both ends, k, rest length, and where an end that is an anchor stands."""
 
 
+@np.errstate(over="ignore")
 def origins(scene: Scene, scheme_name: str) -> Floats:
     """Where each particle's coordinate in such a program is counted from, (n,) [L].
 
@@ -42,9 +46,8 @@ def origins(scene: Scene, scheme_name: str) -> Floats:
     pairs = [term for term in scene.terms if isinstance(term, Spring)]
     springs = [t for t in scene.terms if isinstance(t, WallSpring | Spring)]
     of_length = [t for t in scene.terms if isinstance(t, WallSpring | Spring | RadialSpring)]
-    with np.errstate(over="ignore"):
-        # Gershgorin's bound of the squared frequencies
-        w2 = np.max(scene.derived(terms=tuple(of_length)).system.gershgorin(scene.q) / scene.m)
+    # Gershgorin's bound of the squared frequencies
+    w2 = np.max(scene.derived(terms=tuple(of_length)).system.gershgorin(scene.q) / scene.m)
     hw = abs(scene.step) * float(np.sqrt(w2))
     bounded = scheme(scheme_name).has("symplectic") and hw < 2 and all(np.all(t.k >= 0) for t in of_length)
     group = graph.lowest_joined(scene.n, scene.terms)
@@ -156,35 +159,39 @@ def _energies(scene: Scene, group: Integers) -> Floats:
     return found
 
 
-def joints(
-    scene: Scene, term: WallSpring | Spring, origins: Floats
-) -> list[tuple[tuple[int, ...], float, Any]]:
-    """Springs as programs have them, which pull alike along every axis: the particle or the two, k [M/T2],
-    and the rest point (x, y, z) [L], or of two particles the rest length [L].
+def joints(scene: Scene, term: Term, origins: Floats) -> list[Tie]:
+    """A term's springs as programs have them, which pull alike along every axis; none of another term.
 
     Raises MethodError where a spring does not act alike along all axes of its particles, or where a bond
     between particles of several axes has a rest length: such a bond is no spring along each.
     """
+    of, axis = (x.tolist() for x in np.divmod(scene.all_places, 3))
+    if isinstance(term, RadialSpring):
+        # a row for each axis of one bond, which has one number
+        each = {number: row for *row, number in term.rows()}.values()
+        return [((of[a], of[b]), k, rest, None) for a, b, k, rest in each]
+    if not isinstance(term, WallSpring | Spring):
+        return []
     at = lengths(term, origins) if isinstance(term, Spring) else term.at - origins[term.i]
     rows = zip(*(index.tolist() for index in term.particles), term.k.tolist(), at.tolist(), strict=True)
     if scene.places is None:
-        return [(tuple(i), k, x if term.bodies == 2 else (x, 0.0, 0.0)) for *i, k, x in rows]
-    of, axis = (x.tolist() for x in np.divmod(scene.places, 3))
+        return [(tuple(i), k, x, None) if term.bodies == 2 else (tuple(i), k, 0.0, (x, 0.0, 0.0))
+                for *i, k, x in rows]  # fmt: skip
     axes = [{a for i, a in zip(of, axis, strict=True) if i == one} for one in range(scene.particles)]
-    found = []
+    found: list[Tie] = []
     begun: dict[tuple[int, ...], dict[int, tuple[float, float]]] = {}
     for *coordinates, k, x in rows:
         key, along = tuple(of[j] for j in coordinates), axis[coordinates[0]]
-        each = begun.setdefault(key, {})
-        if along in each:
+        each_axis = begun.setdefault(key, {})
+        if along in each_axis:
             break
-        each[along] = k, x
-        if all(set(each) == axes[i] for i in key):
-            point = tuple(each.get(a, (0.0, 0.0))[1] for a in range(3))
-            if len({k for k, _ in each.values()}) > 1 or (term.bodies == 2 and any(point)):
+        each_axis[along] = k, x
+        if all(set(each_axis) == axes[i] for i in key):
+            point = tuple(each_axis.get(a, (0.0, 0.0))[1] for a in range(3))
+            if len({k for k, _ in each_axis.values()}) > 1 or (term.bodies == 2 and any(point)):
                 break
             del begun[key]
-            found.append((key, k, 0.0 if term.bodies == 2 else point))
+            found.append((key, k, 0.0, None if term.bodies == 2 else point))
     if begun:
         which = " and ".join(map(str, next(iter(begun))))
         raise MethodError(
@@ -192,13 +199,6 @@ def joints(
             f"particle {which} does not"
         )
     return found
-
-
-def in_space(scene: Scene, term: RadialSpring) -> Iterator[tuple[tuple[int, int], float, float]]:
-    """Bonds that know their length, as programs have them: the particles, k [M/T2], rest length [L]."""
-    of = scene.all_places // 3
-    for a, b, k, rest in {number: row for *row, number in term.rows()}.values():
-        yield (int(of[a]), int(of[b])), k, rest
 
 
 def in_all_of_space(scene: Scene, label: Label) -> None:
@@ -284,7 +284,8 @@ def hinges(scene: Scene, label: Label) -> Iterator[tuple[int, float, tuple[float
 def walls(scene: Scene, label: Label) -> Iterator[tuple[int, float, float]]:
     """Particle, stiffness [M/T2] and rest position [L] of each wall spring, for joints that have one spring.
 
-    Raises MethodError where a particle has two, or a stiffness is negative.
+    Springs of stiffness 0 are left out: their joints would be rigid.  Raises MethodError where a particle has
+    two, or a stiffness is negative.
     """
     taken: set[int] = set()
     for term in scene.terms:
@@ -295,4 +296,5 @@ def walls(scene: Scene, label: Label) -> Iterator[tuple[int, float, float]]:
                         f"{label}: a joint has one spring, of stiffness 0 or more; particle {i}"
                     )
                 taken.add(i)
-                yield i, k, at
+                if k:
+                    yield i, k, at

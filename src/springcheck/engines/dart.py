@@ -6,10 +6,9 @@ DART takes joint springs and joint damping implicitly, whatever is asked of them
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from springcheck.engines import quiet
 from springcheck.engines.bonds import hinges, walls
 from springcheck.engines.contract import EVERY_FORCE, Engine, Label, Method, by_name, named, version_of
 from springcheck.errors import MethodError
@@ -49,11 +48,8 @@ class _World:
         # gravity is the world's own, and all else is ours
         pulled = scene.system.without("cosine") if hinge else scene.system
         self._force = None if springs else pulled.force
-        if springs:
-            self._add_springs(joints, scene, label)
-
-    @staticmethod
-    def _add_springs(joints: list[Any], scene: Scene, label: Label) -> None:
+        if not springs:
+            return
         for i, k, at in walls(scene, label):
             joints[i].setSpringStiffness(0, k)
             joints[i].setRestPosition(0, at)
@@ -64,7 +60,8 @@ class _World:
 
     def advance(self, every: int, q: Floats, p: Floats) -> None:
         world, skeleton, force = self._world, self._skeleton, self._force
-        with np.errstate(over="ignore", invalid="ignore"):
+        # DART warns on standard error at every step of numbers that are not finite: the states show them
+        with np.errstate(over="ignore", invalid="ignore"), quiet.caught(2):
             for row in range(len(q)):
                 for _ in range(every):
                     if force is not None:

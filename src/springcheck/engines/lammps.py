@@ -40,7 +40,7 @@ from springcheck.physics.arrays import Arithmetic, Floats
 from springcheck.physics.driven import timed
 from springcheck.physics.scene import Scene
 from springcheck.physics.term import Term
-from springcheck.physics.terms import RadialSpring, Spring, WallSpring
+from springcheck.physics.terms import Spring, WallSpring
 from springcheck.thermal.decays import GJ
 
 INNER = 8
@@ -116,7 +116,7 @@ class _Run:
             self._origins = bonds.rests(scene, label)
         else:
             self._origins = np.zeros(scene.n) if ours else bonds.origins(scene, method.scheme)
-        self._each = 0 if ours else INNER if method.name == "respa" else 1
+        self._each = 0 if ours else 1 + INNER if method.name == "respa" else 1
         x = self._build(scene, "external" if ours else method.name, rods)
         if ours:
             self._pull(scene, step)
@@ -130,10 +130,7 @@ class _Run:
         ):
             self._lammps.command(line)
         if rods:
-            try:
-                self._lammps.command(_constraint(method.name, rods))
-            except Exception as error:
-                raise MethodError(f"{label}: {' '.join(str(error).split())}") from error
+            self._begin(label, _constraint(method.name, rods))
         self._go_on = "run {} pre no post no"
         if method.name == "respa":
             self._go_on = "run {} post no"
@@ -146,8 +143,15 @@ class _Run:
         flags.reshape(-1)[self._where] += cells.astype(np.int64)
         self._array("image")[:] = np.sum(flags << IMAGES, axis=1)
         self._array("v").reshape(-1)[self._where] = scene.p / scene.m
-        self._lammps.command("run 0 post no")
+        self._begin(label, "run 0 post no")
         self._on_a_line = not method.generator
+
+    def _begin(self, label: Label, command: str) -> None:
+        """Give a command that looks at the scene; MethodError, in LAMMPS' words, where it fails."""
+        try:
+            self._lammps.command(command)
+        except Exception as error:
+            raise MethodError(f"{label}: {' '.join(str(error).split())}") from error
 
     def _array(self, name: str) -> Any:
         return self._lammps.numpy.extract_atom(name)
@@ -174,7 +178,7 @@ class _Run:
         more = f"angle/types {len(angles)} extra/angle/per/atom 1 extra/special/per/atom 8" if rods else ""
         command(f"create_box 1 all bond/types {max(len(springs), 1)} extra/bond/per/atom {most} {more}")
         command("mass 1 1.0")
-        atoms = n + len(anchors)
+        self._atoms = atoms = n + len(anchors)
         self._lammps.create_atoms(atoms, list(range(1, atoms + 1)), [1] * atoms, [0.0] * (3 * atoms))
         command(f"group mobile id 1:{atoms if rods else n}")
         command("fix masses all property/atom rmass" + "".join(f" d_k{i}" for i in range(len(layers))))
@@ -216,6 +220,8 @@ class _Run:
 
         def pull(_: Any, step: int, atoms: int, tags: Any, x: Floats, f: Floats) -> None:
             self.force_calls += 1
+            if atoms < self._atoms:
+                return
             f.reshape(-1)[where] = force(step * h, x.reshape(-1)[where] + self._crossed(), still)
 
         self._lammps.command("fix pull mobile external pf/callback 1 1")
@@ -232,6 +238,10 @@ class _Run:
                         command(call)
                 except Exception as error:
                     raise Stopped(row, " ".join(str(error).split())) from error
+                if self._lammps.extract_global("nlocal") < self._atoms:
+                    far = "by more than a box in a step" if self._boxed else "beyond its numbers"
+                    raise Stopped(row, f"LAMMPS has lost atoms that moved {far}")
+                self.force_calls += every * self._each
                 # lists that are built again may move the arrays
                 x, v = self._array("x").reshape(-1), self._array("v").reshape(-1)
                 q[row] = x[where] + self._origins + self._crossed()
@@ -241,7 +251,6 @@ class _Run:
         if self._on_a_line:
             x = self._array("x").reshape(-1)
             self.off_axis = max(self.off_axis, bonds.off_axis(x, self._elsewhere))
-        self.force_calls += every * len(q) * self._each
 
 
 def _constraint(name: str, rods: list[bonds.Joint]) -> str:
@@ -278,19 +287,17 @@ def _borders(box: tuple[float, ...] | None) -> dict[str, Any]:
 def _thermostat(scene: Scene, method: Method, seed: int) -> list[str]:
     """The fixes that move atoms with noise; in units lj the Boltzmann constant is 1."""
     assert scene.bath is not None
-    given = f"{scene.thermal!r} {scene.thermal!r} {1 / scene.bath.friction!r} {seed}"
+    heat, time = f"{scene.thermal!r} {scene.thermal!r}", 1 / scene.bath.friction
+    given = f"{heat} {time!r} {seed}"
+    # LAMMPS counts three degrees of freedom for each atom, less three; along some axes nothing moves
+    none = f"extra/dof {3 * scene.particles - scene.n}"
     if method.scheme == "lammps-langevin":
         return ["fix move mobile nve", f"fix bath mobile langevin {given}"]
     if method.name == "csvr":
-        # LAMMPS counts three degrees of freedom for each atom, less three; along some axes nothing moves
-        given = f"{scene.thermal!r} {scene.thermal!r} {1 / (2 * scene.bath.friction)!r} {seed}"
-        none = 3 * scene.particles - scene.n
-        modified = f"compute_modify bath_temp extra/dof {none}"
-        return ["fix move mobile nve", f"fix bath mobile temp/csvr {given}", modified]
+        bath = f"fix bath mobile temp/csvr {heat} {time / 2!r} {seed}"
+        return ["fix move mobile nve", bath, f"compute_modify bath_temp {none}"]
     if method.name == "nvt":
-        given = f"{scene.thermal!r} {scene.thermal!r} {1 / scene.bath.friction!r}"
-        none = 3 * scene.particles - scene.n
-        return [f"fix move mobile nvt temp {given}", f"compute_modify move_temp extra/dof {none}"]
+        return [f"fix move mobile nvt temp {heat} {time!r}", f"compute_modify move_temp {none}"]
     _, number, *half = method.scheme.split("-")
     more = ""
     if number == "vii":
@@ -313,30 +320,22 @@ def _shared_out(scene: Scene, method: str) -> tuple[list[Term], list[Term]]:
 def _bonds(scene: Scene, tied: list[Term], origins: Floats) -> Iterator[bonds.Bond]:
     """Springs as bonds."""
     anchors = scene.particles
-    for term in tied:
-        if isinstance(term, WallSpring):
-            for (i,), k, at in bonds.joints(scene, term, origins):
-                yield anchors, i, k, 0.0, at
-                anchors += 1
-        elif isinstance(term, Spring):
-            for (a, b), k, length in bonds.joints(scene, term, origins):
-                yield a, b, k, length, None
-        elif isinstance(term, RadialSpring):
-            for (a, b), k, length in bonds.in_space(scene, term):
-                yield a, b, k, length, None
+    for ends, k, rest, at in (one for term in tied for one in bonds.joints(scene, term, origins)):
+        if at is None:
+            yield ends[0], ends[1], k, rest, None
+        else:
+            yield anchors, ends[0], k, rest, at
+            anchors += 1
 
 
-def _layered(
-    scene: Scene, terms: list[WallSpring], origins: Floats
-) -> list[dict[int, tuple[float, tuple[float, ...]]]]:
+def _layered(scene: Scene, terms: list[WallSpring], origins: Floats) -> list[dict[int, Any]]:
     """Springs to walls as k and rest point by particle, one of each particle in a layer."""
-    layers: list[dict[int, tuple[float, tuple[float, ...]]]] = []
-    for term in terms:
-        for (i,), k, at in bonds.joints(scene, term, origins):
-            free = next((layer for layer in layers if i not in layer), None)
-            if free is None:
-                layers.append(free := {})
-            free[i] = (k, at)
+    layers: list[dict[int, Any]] = []
+    for (i,), k, _, at in (one for term in terms for one in bonds.joints(scene, term, origins)):
+        free = next((layer for layer in layers if i not in layer), None)
+        if free is None:
+            layers.append(free := {})
+        free[i] = (k, at)
     return layers
 
 

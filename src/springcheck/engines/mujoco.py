@@ -28,6 +28,7 @@ from springcheck.engines.contract import (
     named,
     version_of,
 )
+from springcheck.errors import MethodError
 from springcheck.physics.arrays import Arithmetic, Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Damping, Spring, WallSpring
@@ -131,6 +132,10 @@ class _Steps:
         import mujoco
 
         how = HOW[method.name]
+        if (least := float(np.min(scene.m))) < mujoco.mjMINVAL:
+            raise MethodError(
+                f"{label}: MuJoCo takes no mass below {mujoco.mjMINVAL:g}, and one is {least:g}"
+            )
         self.force_calls = 0
         self._step = mujoco.mj_step
         # MuJoCo would write its warnings to a file in the current folder
@@ -150,6 +155,7 @@ class _Steps:
         dropped = data.warning[self._bad_control :]
         with np.errstate(over="ignore", invalid="ignore"):
             for row in range(len(q)):
+                self.force_calls += every * self._each
                 if self._force is None:
                     step(model, data, every)
                 else:
@@ -162,7 +168,6 @@ class _Steps:
                 q[row] = q_now
                 p[row] = v_now
             p *= self._m
-        self.force_calls += every * len(q) * self._each
 
 
 def arithmetic(label: Label) -> Arithmetic:
@@ -188,17 +193,11 @@ ENGINE = Engine(
         by_name("joint-spring-rk4", "rk4", "joint stiffness and damping, RK4", DAMPED),
         by_name("joint-damping", IMPLICIT_FRICTION, "joint damping, integrator Euler", DAMPED, Need.DAMPING),
         by_name(
-            "joint-damping-implicitfast",
-            IMPLICIT_FRICTION,
-            "joint damping, implicitfast",
-            DAMPED,
+            "joint-damping-implicitfast", IMPLICIT_FRICTION, "joint damping, implicitfast", DAMPED,
             Need.DAMPING,
         ),
         by_name(
-            "joint-damping-explicit",
-            "semi-implicit-euler",
-            "joint damping, eulerdamp off",
-            DAMPED,
+            "joint-damping-explicit", "semi-implicit-euler", "joint damping, eulerdamp off", DAMPED,
             Need.DAMPING,
         ),
         by_name(

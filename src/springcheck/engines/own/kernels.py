@@ -4,10 +4,9 @@ Interpreted, rows of numbers are lists (Python's floats neither warn nor raise w
 compiled, they are arrays.  So no loop may contain what rounds or fails differently there: + - * / in a
 fixed order, no division by what may be 0, and the C library's sine and exponential within their range.
 
-A step is a list of operations (see `operations`).  `splitting` carries out any such list and `tableau`
-any explicit Runge-Kutta tableau, by any force; `one_splitting` and `one_tableau` do the same for a single
-particle on one spring at rest in 0, whose state stays in two registers.  Every kernel fills row after row
-of qs and ps (f, n) with the state `every` steps later.
+A step is a list of operations, or an explicit tableau (see `operations`).  `many` carries out any of them by
+any force; `single` does so for one particle on one spring at rest in 0, whose state stays in two registers,
+eight times as fast.  Both fill row after row of qs and ps (f, n) with the state `every` steps later.
 """
 
 from __future__ import annotations
@@ -44,7 +43,7 @@ FRICTION    p *= decay
 """
 
 
-def splitting(
+def many(
     every: int,
     code: Numbers,
     slot: Numbers,
@@ -52,12 +51,14 @@ def splitting(
     y: Numbers,
     damped: Numbers,
     decay: Rows,
+    a: Rows,
     one: Slot,
     two: Slot,
     solver: Solver,
     m: Numbers,
-    f_one: Numbers,
-    f_two: Numbers,
+    v: Rows,
+    f: Rows,
+    stage: Rows,
     t: Numbers,
     stale: Numbers,
     q: Numbers,
@@ -66,13 +67,18 @@ def splitting(
     qs: Rows,
     ps: Rows,
 ) -> None:
-    """Any list of operations; operation s kicks by the force of slot[s], with coefficients x[s] and y[s].
+    """Operation s kicks by the force of slot[s], with coefficients x[s] and y[s].
 
-    A force is evaluated again only when the state that it belongs to has moved: `damped` says of each
-    slot whether it depends on p, `stale` carries this over from call to call.  Rows of the result leave
-    out the first `skip` particles.
+    A force f[slot] is evaluated again only when the state that it belongs to has moved: `damped` says of each
+    slot whether it depends on p, `stale` carries this over from call to call.
+
+    Of a tableau the rows of `a` are coefficients times the step, the weights last, v and f (s, n) velocities
+    and forces of the stages (q + sum a v, p + sum a f), and `stage` is the one that is being formed.
+
+    Rows of the result leave out the first `skip` particles.
     """
     n = len(m)
+    stages, f_one, f_two = len(v), f[0], f[1]
     # for a simple row the loops are called from here: passing a whole force on costs as much as 100 particles
     indices, _, (k_held, at_held), (k, rest, ends), (c, _) = one
     divisors, factors, _ = solver
@@ -124,73 +130,47 @@ def splitting(
                             force_at(one, q, p, t, f_one)
                     elif where == 1 and stale[1]:
                         force_at(two, q, p, t, f_two)
-                    f = f_one if where == 0 else f_two
+                    pull = f_one if where == 0 else f_two
                     if what == KICK:
-                        kick(xs, f, p)
+                        kick(xs, pull, p)
                     elif what == KICK_DRIFT:
-                        kick_drift(xs, ys, f, m, q, p)
+                        kick_drift(xs, ys, pull, m, q, p)
                     else:
-                        euler(xs, ys, f, m, q, p)
+                        euler(xs, ys, pull, m, q, p)
                     stale[where] = False
                 moved = what not in (KICK, FRICTION)
                 stale[0] = stale[0] or moved or damped[0]
                 stale[1] = stale[1] or moved or damped[1]
+            if stages:
+                u, w = stage[0], stage[1]
+                for s in range(stages):
+                    for i in range(n):
+                        u[i] = q[i]
+                        w[i] = p[i]
+                    for r in range(s):
+                        add(a[s][r], v[r], u)
+                        add(a[s][r], f[r], w)
+                    force_at(one, u, w, t, f[s])
+                    velocity = v[s]
+                    for i in range(n):
+                        velocity[i] = w[i] / m[i]
+                for s in range(stages):
+                    add(a[stages][s], v[s], q)
+                    add(a[stages][s], f[s], p)
         out_q, out_p = qs[row], ps[row]
         for i in range(len(out_q)):
             out_q[i] = q[skip + i]
             out_p[i] = p[skip + i]
 
 
-def tableau(
-    every: int,
-    a: Rows,
-    b: Numbers,
-    one: Slot,
-    m: Numbers,
-    v: Rows,
-    f: Rows,
-    u: Numbers,
-    w: Numbers,
-    t: Numbers,
-    q: Numbers,
-    p: Numbers,
-    skip: int,
-    qs: Rows,
-    ps: Rows,
-) -> None:
-    """Any explicit tableau: stages (q + sum a v, p + sum a f), then the same sums by the weights b.
-
-    a (s, s) and b (s,) hold coefficients times the step; v, f (s, n) velocities and forces of the stages,
-    u and w (n,) the stage that is being formed.
-    """
-    n = len(m)
-    for row in range(len(qs)):
-        for _ in range(every):
-            for s in range(len(b)):
-                for i in range(n):
-                    u[i] = q[i]
-                    w[i] = p[i]
-                for r in range(s):
-                    add(a[s][r], v[r], u)
-                    add(a[s][r], f[r], w)
-                force_at(one, u, w, t, f[s])
-                velocity = v[s]
-                for i in range(n):
-                    velocity[i] = w[i] / m[i]
-            for s in range(len(b)):
-                add(b[s], v[s], q)
-                add(b[s], f[s], p)
-        out_q, out_p = qs[row], ps[row]
-        for i in range(len(out_q)):
-            out_q[i] = q[skip + i]
-            out_p[i] = p[skip + i]
-
-
-def one_splitting(
+def single(
     every: int,
     code: Numbers,
     x: Numbers,
     y: Numbers,
+    a: Rows,
+    v: Numbers,
+    f: Numbers,
     divisor: float,
     m: float,
     k: float,
@@ -199,7 +179,8 @@ def one_splitting(
     qs: Rows,
     ps: Rows,
 ) -> tuple[float, float]:
-    """`splitting` of one particle on one spring; returns its last state."""
+    """`many` of one particle on one spring; returns its last state."""
+    stages = len(v)
     for row in range(len(qs)):
         for _ in range(every):
             for s in range(len(code)):
@@ -221,40 +202,21 @@ def one_splitting(
                     p = (p + (-k * q) * x[s]) * divisor
                     q = q + (p / m) * y[s]
                     p = p + (p - old)
-        qs[row, 0] = q
-        ps[row, 0] = p
-    return q, p
-
-
-def one_tableau(
-    every: int,
-    a: Rows,
-    b: Numbers,
-    v: Numbers,
-    f: Numbers,
-    m: float,
-    k: float,
-    q: float,
-    p: float,
-    qs: Rows,
-    ps: Rows,
-) -> tuple[float, float]:
-    """`tableau` of one particle on one spring, eight times as fast; returns its last state."""
-    for row in range(len(qs)):
-        for _ in range(every):
-            for s in range(len(b)):
-                u, w = q, p
-                for r in range(s):
-                    c = a[s][r]
+            if stages:
+                for s in range(stages):
+                    u, w = q, p
+                    for r in range(s):
+                        c = a[s][r]
+                        if c != 0.0:
+                            u = u + c * v[r]
+                            w = w + c * f[r]
+                    v[s] = w / m
+                    f[s] = -k * u
+                for s in range(stages):
+                    c = a[stages][s]
                     if c != 0.0:
-                        u = u + c * v[r]
-                        w = w + c * f[r]
-                v[s] = w / m
-                f[s] = -k * u
-            for s in range(len(b)):
-                if b[s] != 0.0:
-                    q = q + b[s] * v[s]
-                    p = p + b[s] * f[s]
+                        q = q + c * v[s]
+                        p = p + c * f[s]
         qs[row, 0] = q
         ps[row, 0] = p
     return q, p

@@ -1,7 +1,8 @@
 """A scheme as the list of operations that the kernels carry out.
 
 A splitting is such a list already: neighbouring kicks and drifts are joined.  Explicit Euler is one
-operation.  A tableau with one implicit stage is a step of implicit Euler before or after an explicit one:
+operation; any other explicit tableau is carried out as it is, and has none.  A tableau with one implicit
+stage is a step of implicit Euler before or after an explicit one:
 
 * implicit Euler: IMPLICIT(h);
 * the trapezoidal rule: EULER(h/2), IMPLICIT(h/2), because its last stage is its result;
@@ -11,12 +12,20 @@ operation.  A tableau with one implicit stage is a step of implicit Euler before
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 
-from springcheck.engines.own.kernels import DRIFT, EULER, FRICTION, IMPLICIT, KICK, KICK_DRIFT, MIDPOINT
+from springcheck.engines.own.kernels import (
+    DRIFT,
+    EULER,
+    FRICTION,
+    IMPLICIT,
+    KICK,
+    KICK_DRIFT,
+    MIDPOINT,
+)
 from springcheck.errors import MethodError
 from springcheck.physics.arrays import Floats, Integers
 from springcheck.physics.scene import Scene
@@ -41,14 +50,19 @@ class Operation(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Program:
-    """A step as operations, or as an explicit tableau (`a`, `b`, times the step) by all terms."""
+    """A step as operations, or as an explicit tableau by all terms."""
 
     operations: tuple[Operation, ...] = ()
-    a: Floats | None = None
-    b: Floats | None = None
+    a: Floats = field(default_factory=lambda: np.empty((0, 0)))
+    """Rows of the tableau times the step, the weights last; none where there is no tableau."""
     forces: tuple[str, ...] = (ALL,)
     damped: tuple[bool, ...] = (False, False)
     """Whether each force depends on the momenta."""
+
+    @property
+    def stages(self) -> int:
+        """Stages of the tableau, or operations: what the time of a step is proportional to."""
+        return self.a.shape[1] or len(self.operations)
 
     @property
     def implicit_step(self) -> float:
@@ -79,8 +93,8 @@ class Program:
     @property
     def evaluations(self) -> tuple[int, int]:
         """Evaluations of the force in the first step, and in each later one: none where the state stayed."""
-        if self.b is not None:
-            return len(self.b), len(self.b)
+        if len(self.a):
+            return self.stages, self.stages
         stale, counts = [True, True], [0, 0]
         for cycle in range(2):
             for o, slot in zip(self.operations, self.slots, strict=True):
@@ -108,10 +122,11 @@ def program(scheme: Scheme, scene: Scene, h: float) -> Program:
     elif len(scheme.b) == 1:
         found = (Operation(code=EULER, x=h, y=h, force=ALL),)
     else:
-        a = np.zeros((len(scheme.b), len(scheme.b)))
-        for i, row in enumerate(scheme.a):
+        s = len(scheme.b)
+        a = np.zeros((s + 1, s))
+        for i, row in enumerate((*scheme.a, scheme.b)):
             a[i, : len(row)] = [float(number(c, np.float64) * h) for c in row]
-        return Program(a=a, b=np.array([float(number(c, np.float64) * h) for c in scheme.b]))
+        return Program(a=a)
     damped = scene.system.is_damped
     if not damped:
         whole = {ALL: POTENTIAL}

@@ -116,19 +116,11 @@ def _one(plan: Program, scene: Scene) -> tiles.Job | None:
     if any(o.force not in ("", "all", "potential") for o in plan.operations):
         return None
     k, m, q, p = (float(x[0]) for x in (walls[0].k, scene.m, scene.q, scene.p))
-    if plan.b is not None:
-        room = np.zeros((2, len(plan.b)))
-        return tiles.Job(
-            kernel=kernels.one_tableau,
-            head=(plan.a, plan.b, room[0], room[1], m, k),
-            state=(q, p),
-            n=1,
-            work=len(plan.b),
-        )
     divisor = float(solver.factors(scene, plan.implicit_step)[0][0])
     code, _, x, y = plan.arrays
-    head = code, x, y, divisor, m, k
-    return tiles.Job(kernel=kernels.one_splitting, head=head, state=(q, p), n=1, work=len(code))
+    v, f = np.zeros((2, plan.a.shape[1]))
+    head = code, x, y, plan.a, v, f, divisor, m, k
+    return tiles.Job(kernel=kernels.single, head=head, state=(q, p), n=1, work=plan.stages)
 
 
 def _many(plan: Program, scene: Scene) -> tiles.Job:
@@ -140,19 +132,6 @@ def _many(plan: Program, scene: Scene) -> tiles.Job:
     joined = any(len(k) for *_, (k, _, _), _ in slots)
     m, q, p = (np.array(x, dtype=np.float64) for x in (scene.m, scene.q, scene.p))
     reach = 0 if slots[0][0] else max(plan.evaluations)
-    if plan.b is not None:
-        return tiles.Job(
-            kernel=kernels.tableau,
-            head=(plan.a, plan.b, slots[0]),
-            m=m,
-            state=(q, p),
-            stages=len(plan.b),
-            n=n,
-            work=work * len(plan.b),
-            joined=joined,
-            reach=reach,
-        )
-    code, slot, x, y = plan.arrays
     solved = solver.NONE
     if plan.implicit_step:
         solved = solver.factors(scene, plan.implicit_step)
@@ -160,12 +139,13 @@ def _many(plan: Program, scene: Scene) -> tiles.Job:
     rates = scene.system.friction_rates.astype(np.float64)
     decays = np.array([np.exp(-x * rates) for x in plan.decays] or np.empty((0, n)))
     return tiles.Job(
-        kernel=kernels.splitting,
-        head=(code, slot, x, y, np.array(plan.damped), decays, *(slots * 2)[:2], solved),
+        kernel=kernels.many,
+        head=(*plan.arrays, np.array(plan.damped), decays, plan.a, *(slots * 2)[:2], solved),
         m=m,
         state=(q, p),
+        stages=plan.a.shape[1],
         n=n,
-        work=work * len(code),
+        work=work * plan.stages,
         joined=joined,
         reach=reach,
     )

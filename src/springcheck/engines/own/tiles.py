@@ -52,7 +52,7 @@ class Job:
     m: Floats | None = None
     """Masses (n,); None for the kernels of a single particle."""
     stages: int = 0
-    """Stages of a tableau, 0 for a splitting."""
+    """Stages of a tableau, 0 where there is none."""
     reach: int = 0
     """Over how many neighbours a step of joined particles reaches; 0 where all must go together."""
     joined: bool = False
@@ -60,11 +60,9 @@ class Job:
 
     def room(self, n: int) -> tuple[Any, ...]:
         """Work arrays of the kernel for n particles."""
-        t = np.zeros(n + 1)
         s = self.stages
-        if s:
-            return np.zeros((s, n)), np.zeros((s, n)), np.zeros(n), np.zeros(n), t
-        return np.zeros(n), np.zeros(n), t, np.ones(2, bool)
+        v, f, stage = np.zeros((s, n)), np.zeros((max(s, 2), n)), np.zeros((2, n if s else 0))
+        return v, f, stage, np.zeros(n + 1), np.ones(2, bool)
 
     def arguments(self, head: tuple[Any, ...], m: Floats, q: Floats, p: Floats, skip: int) -> tuple[Any, ...]:
         """All of the kernel's arguments but `every` and the rows to fill."""
@@ -193,12 +191,9 @@ class Tiled:
 
 def cut(head: tuple[Any, ...], lo: int, hi: int) -> tuple[Any, ...]:
     """The part of a kernel's constants that belongs to the particles lo to hi."""
-    if len(head) == 3:
-        a, b, slot = head
-        return a, b, layout.cut(slot, lo, hi)
-    code, slot, x, y, damped, decays, one, two, (divisors, *rest) = head
+    *step, decays, a, one, two, (divisors, *rest) = head
     slots = layout.cut(one, lo, hi), layout.cut(two, lo, hi)
-    return code, slot, x, y, damped, np.ascontiguousarray(decays[:, lo:hi]), *slots, (divisors[lo:hi], *rest)
+    return *step, np.ascontiguousarray(decays[:, lo:hi]), a, *slots, (divisors[lo:hi], *rest)
 
 
 def staggered(rows: Any) -> list[Floats]:
