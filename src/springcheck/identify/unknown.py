@@ -147,9 +147,10 @@ def memory(e: Evidence) -> list[Explanation]:
     What one map misses stands in the first frames then, and not in the first pair alone.
     """
     size, off = np.max(np.abs(e.states[1:]), axis=1), np.max(np.abs(e.misses), axis=1)
-    with np.errstate(all="ignore"):
-        relative, rounding = off / size, LEFT_BY_ROUNDING * float(np.max(e.unit / size))
-    if len(e.states) < FEWEST_WITH_MEMORY or not np.max(relative[1:]) >= rounding:
+    if len(e.states) < FEWEST_WITH_MEMORY or np.min(size) < 1e-100 * np.max(size):
+        return []
+    relative, rounding = off / size, LEFT_BY_ROUNDING * float(np.max(e.unit / size))
+    if np.max(relative[1:]) < rounding:
         return []
     found, twice = regression(e, TWO_STEPS), np.linalg.matrix_power(e.found.entries.astype(np.float64), 2)
     # maps that alternate have nearly the state of two steps ago in them as well, turned by two frames
@@ -163,7 +164,7 @@ def memory(e: Evidence) -> list[Explanation]:
     # the first frames alone show the other map, but for which all follow one
     later = fit(e.record, e.j, kept=np.arange(e.pairs) >= e.pairs // 2)
     start = np.max(np.abs(later.misses(e.found)), axis=1)
-    before, weighted = float(np.max(start / size)), float(np.max(e.weight * start))
+    before, weighted = (float(np.max(x[1:])) for x in (start / size, e.weight * start))
     if before < rounding or weighted < FALLS * found.worst:
         return []
     whose = either(_remembered(e, later))
