@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+import pytest
 
 from springcheck.identify import identify
 
@@ -99,3 +100,35 @@ def test_coarse_velocities_of_the_other_sign_name_no_scheme_on_a_stiffer_spring(
             right = identify(t, text[:, 0], v=-text[:, 1], mass=a)
             assert not any("wrong sign" in x.cause for x in right.explanations)
     assert seen >= 2
+
+
+@pytest.mark.parametrize("step", [verlet, heun])
+@pytest.mark.parametrize(("share", "frames", "every"), [(3e-4, 120, 1), (0.02, 60, 1), (0.03, 40, 2)])
+def test_dry_friction_is_told_with_its_force(step: Any, share: float, frames: int, every: int) -> None:
+    """A memory, few frames, a thermostat of Andersen's were seen in it."""
+    m, k = 2.3, 1.7
+    dry = share * k
+
+    def force(q: Any, v: Any, t: float) -> Any:
+        return (-k * q - dry * np.sign(v)) / m
+
+    t, q, v = march(step, 1.1, 0.4, force, frames, every)
+    found = identify(t, q, v=v, mass=m, stiffness=k)
+    assert (found.scheme, found.fits) == (None, False)
+    assert found.statement.startswith("Dry (Coulomb) friction acts")
+    said = float(found.statement.split("one size, ")[1].split()[0])
+    assert np.isclose(said, dry, rtol=1e-2 if step is verlet else 0.1)
+
+
+def test_a_repeated_frame_of_a_motion_with_quadratic_drag_names_no_scheme_of_the_rest() -> None:
+    """What the drag leaves over makes the map of the other frames so uncertain that others fit it."""
+
+    def explicit(q: Any, v: Any, t: float, force: Force) -> tuple[Any, Any]:
+        return q + H * v, v + H * force(q, v, t)
+
+    def force(q: Any, v: Any, t: float) -> Any:
+        return -0.66 * q - 0.68 * np.abs(v) * v
+
+    t, q, v = march(explicit, 0.7, 0.2, force, 201)
+    q, v = (np.insert(x, 131, x[131])[:201] for x in (q, v))
+    assert identify(t, q, v=v).statement.startswith("The motion stands still for a step: it is repeated at")

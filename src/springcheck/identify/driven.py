@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,54 +20,35 @@ from springcheck.identify.compare import compare
 from springcheck.identify.evidence import Evidence
 from springcheck.identify.fit import fit
 from springcheck.identify.hypothesis import FEW, Match, distinct
-from springcheck.physics.arrays import Extended, Floats, Reals
+from springcheck.physics.arrays import Extended, Floats
 from springcheck.physics.driven import CLOCK
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Damping, Drive, WallSpring
 from springcheck.schemes import Law, scheme, title
 
-LONG = 50_000
-"""Frames of which waves of 41 frequencies take 32 MiB."""
 
-Complexes: TypeAlias = NDArray[np.complex128]
-
-
-def frequency(linear: list[Floats], missing: Floats, weight: Floats, carrier: Floats) -> float:
-    """Angular frequency, per frame, of the sine and cosine times a carrier that explain most of the
-    residuals (f, 2) beside the `linear` columns."""
-    n, frames, pull = np.arange(len(carrier)), len(carrier), weight * carrier
-    across = np.linalg.qr(np.stack(linear, axis=1) * weight[:, None])[0]
-    wanted = missing * weight[:, None]
-    wanted = wanted - across @ (across.T @ wanted)
-    summed, square = np.concatenate([wanted, across], axis=1).T * pull, pull**2
-    total = float(np.sum(square))
-
-    def best(w: Reals, waves: Complexes, double: Complexes) -> float:
-        """Which of frequencies (c,) explains most, from the sums (4, c) and (c,) with exp(i w n) and its
-        square."""
-        c, s = waves.real, waves.imag
-        cc = (total + double.real) / 2 - np.sum(c[2:] ** 2, axis=0)
-        ss = (total - double.real) / 2 - np.sum(s[2:] ** 2, axis=0)
-        cs = double.imag / 2 - np.sum(c[2:] * s[2:], axis=0)
-        det = np.maximum(cc * ss - cs * cs, 1e-9 * total * total + 1e-300)
-        x, y = c[:2], s[:2]
-        return float(w[np.argmax(np.sum((x * x * ss - 2 * x * y * cs + y * y * cc) / det, axis=0))])
-
+def frequency(e: Evidence, carrier: Floats) -> float:
+    """Angular frequency, per frame, of the sine and cosine times a carrier (f - 1,) that explain most of what
+    the map misses, beside what it takes up itself."""
+    frames, pull = e.pairs, e.weight * carrier
+    linear = np.stack(e.linear, axis=1) * e.weight[:, None]
+    across, missing = np.linalg.qr(linear)[0], e.misses * e.weight[:, None]
+    missing = missing - across @ (across.T @ missing)
+    columns = np.concatenate([missing, across], axis=1).T * pull
     size = 1 << (8 * frames - 1).bit_length()
     at = np.arange(size // (4 * frames), size // 2 + 1)
-    apart = 2 * np.pi / size
-    waves, double = np.fft.fft(summed, size).conj(), np.fft.fft(square, size // 2).conj()
-    found = best(apart * at, waves[:, at], double[at % (size // 2)])
-    for room in (apart, apart / 20):
-        w = found + room * np.linspace(-1, 1, 41)
-        # two rows of squares: of one and a matrix BLAS makes a product in threads, which cost more than it
-        parts = [
-            (summed @ x, (np.stack([square, square]) @ x**2)[0])
-            for x in (np.exp(1j * np.outer(n, y)) for y in np.array_split(w, 1 + frames // LONG))
-        ]
-        waves, double = (np.concatenate(x, axis=-1) for x in zip(*parts, strict=True))
-        found = best(w, waves, double)
-    return found
+    waves = np.fft.fft(columns, size).conj()[:, at]
+    double = np.fft.fft(pull**2, size // 2).conj()[at % (size // 2)]
+    # the normal equations of a cosine and a sine beside the map's own columns, at every frequency
+    c, s, total = waves.real, waves.imag, float(np.sum(pull**2))
+    cc = (total + double.real) / 2 - np.sum(c[2:] ** 2, axis=0)
+    ss = (total - double.real) / 2 - np.sum(s[2:] ** 2, axis=0)
+    cs = double.imag / 2 - np.sum(c[2:] * s[2:], axis=0)
+    det = np.maximum(cc * ss - cs * cs, 1e-9 * total * total + 1e-300)
+    x, y = c[:2], s[:2]
+    gain = np.sum((x * x * ss - 2 * x * y * cs + y * y * cc) / det, axis=0)
+    turn = 2 * np.pi / size * float(at[np.argmax(gain)])
+    return _tuned(linear, missing, pull, turn)[0]
 
 
 def waves(carrier: Floats, turn: float) -> list[Floats]:
@@ -93,26 +74,28 @@ AGREES = 1e-6
 
 
 def _best(z: Floats, carrier: Floats, turn: float) -> tuple[float, Floats]:
-    """The best of `_tuned` from some starts around: near a resonance the drive beats with the motion."""
+    """The turn in a frame, and the rows (5, 2) of z, 1, carrier cos and carrier sin, that explain the states
+    z best, from some starts around: near a resonance the drive beats with the motion."""
     apart = np.pi / (2 * len(z)) if len(z) <= FEW_FRAMES else 0.0
+    columns = np.stack([*z[:-1].T, np.ones(len(z) - 1)], axis=1)
     found = []
     for away in sorted(range(-STARTS_BESIDE, STARTS_BESIDE + 1) if apart else (0,), key=abs):
-        found.append(_tuned(z, carrier, abs(turn + away * apart)))
+        found.append(_tuned(columns, z[1:], carrier, abs(turn + away * apart)))
         if found[-1][2] <= AGREES**2:
             break
     return min(found, key=lambda one: one[2])[:2]
 
 
-def _tuned(z: Floats, carrier: Floats, turn: float) -> tuple[float, Floats, float]:
-    """The turn in a frame, by least squares, the rows (5, 2) of z, 1, carrier cos and carrier sin, and the
-    largest residual."""
-    n, ends = np.arange(len(z) - 1), z[1:]
-    rows, worst = np.empty((5, 2)), np.inf
+def _tuned(linear: Floats, ends: Floats, carrier: Floats, turn: float) -> tuple[float, Floats, float]:
+    """The turn in a frame at which `linear` columns (f, n), carrier cos and carrier sin explain `ends` (f, 2)
+    best, the coefficients (n + 2, 2), and the largest residual."""
+    n = np.arange(len(ends))
+    rows, worst = np.empty((linear.shape[1] + 2, 2)), np.inf
     for _ in range(TUNING_STEPS):
-        cosine, sine = np.cos(turn * n), np.sin(turn * n)
-        columns = np.stack([*z[:-1].T, np.ones(len(n)), carrier * cosine, carrier * sine], axis=1)
+        c, s = waves(carrier, turn)
+        columns = np.concatenate([linear, c[:, None], s[:, None]], axis=1)
         rows = np.linalg.lstsq(columns, ends)[0]
-        slope = (n * carrier)[:, None] * (cosine[:, None] * rows[4] - sine[:, None] * rows[3])
+        slope = n[:, None] * (c[:, None] * rows[-1] - s[:, None] * rows[-2])
         # what of the slope the other columns do not take up
         slope -= columns @ np.linalg.lstsq(columns, slope)[0]
         left = ends - columns @ rows

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -18,6 +19,11 @@ from springcheck.physics.arrays import Floats
 FALLS = 12.0
 """Factor by which an explanation must bring the misfit down."""
 
+LEFT_BY_ROUNDING = 64
+"""Roundings of a state that arithmetic may leave over of a step; more have another cause."""
+
+FIXED = LEFT_BY_ROUNDING * 2.0**-52
+"""Residual of a map, relative to the states, that is still rounding."""
 
 SINGLE_ROOM = 8 * 2.0**-24
 """Relative difference of stiffnesses that a step, a mass and a stiffness in single precision may make."""
@@ -53,7 +59,10 @@ class Measured:
         """What there is of one oscillator."""
         j = self.moving[i]
         stiffness = None if self.stiffness is None else float(self.stiffness[j])
-        return Evidence(record=self.record, j=j, found=self.maps[i], terms=self.terms[i], stiffness=stiffness)
+        return Evidence(
+            record=self.record, j=j, found=self.maps[i], terms=self.terms[i], stiffness=stiffness,
+            others=tuple(self.maps[:i] + self.maps[i + 1 :]),
+        )  # fmt: skip
 
     def numbers(
         self, chosen: Joint, law: str = ""
@@ -104,15 +113,17 @@ class Measured:
         return out
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Evidence:
-    """The data of an explanation: the worst oscillator's map, and what was stated of it."""
+    """What one map of the worst oscillator leaves over, and what was stated of that oscillator."""
 
     record: Record
     j: int
     found: Map
     terms: Terms
     stiffness: float | None
+    others: tuple[Map, ...] = ()
+    """Maps of the other oscillators."""
 
     @property
     def stated(self) -> float | None:
@@ -125,15 +136,41 @@ class Evidence:
     def pairs(self) -> int:
         return len(self.found.z) - 1
 
+    @cached_property
+    def states(self) -> Floats:
+        """States (f, 2) in units of their size, about the equilibrium."""
+        return self.found.z.astype(np.float64)
+
     @property
+    def q(self) -> Floats:
+        """Positions (f - 1,) at the beginning of each pair."""
+        return np.asarray(self.states[:-1, 0])
+
+    @property
+    def v(self) -> Floats:
+        """Velocities (f - 1,) at the beginning of each pair."""
+        return np.asarray(self.states[:-1, 1])
+
+    @property
+    def size(self) -> float:
+        """What the map leaves over in a frame, as a share of the state's size."""
+        return float(np.max(self.found.residual))
+
+    @cached_property
     def misses(self) -> Floats:
         """What the map leaves over in each pair (f - 1, 2), in units of the states' size."""
         return self.found.misses()
 
-    @property
+    @cached_property
+    def weight(self) -> Floats:
+        """Weight (f - 1,) of each pair: 1 over its size, so that a motion that grows or decays is not judged
+        by its largest states alone."""
+        return np.asarray(self.found.weight / np.max(self.found.weight))
+
+    @cached_property
     def unit(self) -> Floats:
         """Rounding of each state (f - 1,): a few units in the last place, and half a quantum of the file."""
-        z = np.abs(self.found.z.astype(np.float64))
+        z = np.abs(self.states)
         quanta = self.record.quanta(self.j) / self.found.size.astype(np.float64)
         size = (
             z[1:].max(axis=1)
@@ -143,6 +180,21 @@ class Evidence:
         # at rest in 0 nothing is rounded
         size = 8 * ROUNDING * size + quanta[1:].max(axis=1) + quanta[:-1].max(axis=1)
         return np.asarray(np.maximum(size, np.finfo(np.float64).tiny))
+
+    @property
+    def excess(self) -> Floats:
+        """What each pair misses (f - 1,), in roundings."""
+        return np.asarray(np.max(np.abs(self.misses), axis=1) / self.unit)
+
+    @property
+    def turns(self) -> float:
+        """Turns of the motion in all frames."""
+        return self.pairs * float(self.found.turn.angle[0]) / (2 * math.pi)
+
+    @cached_property
+    def linear(self) -> list[Floats]:
+        """Columns that the map itself takes up: position, velocity, and the constant that was fitted."""
+        return [*self.states[:-1].T, *([np.ones(self.pairs)] if np.any(self.found.centre) else [])]
 
 
 def matched(found: Map, terms: Terms) -> list[Match]:

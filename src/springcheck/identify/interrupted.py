@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from springcheck.identify.coarse import irregular
 from springcheck.identify.compare import compare
-from springcheck.identify.evidence import FALLS, Evidence, Measured, matched
+from springcheck.identify.evidence import FALLS, LEFT_BY_ROUNDING, SINGLE_ROOM, Evidence, Measured, matched
 from springcheck.identify.families import FAMILIES, OF_HALF_A_STEP_AGO, VERLET, title
 from springcheck.identify.fit import Map, fit
 from springcheck.identify.hypothesis import FEW, Joint, distinct
@@ -39,9 +40,6 @@ FEWEST_PAIRS = 8
 
 SCHEMES_SAID = 2
 """How many of the schemes that fit the rest of the motion a sentence names."""
-
-START_OFF = 64.0
-"""Roundings that each step may leave over of a start that is predicted."""
 
 
 def remembered(seen: Measured) -> tuple[Measured, list[Joint]]:
@@ -76,7 +74,7 @@ def _begins(seen: Measured, maps: list[Map], joint: Joint) -> bool:
         step = record.interval / part.stride
         z = np.stack([record.q[:2, j] - found.centre[0], record.v[:2, j] * step], axis=1)
         size = np.abs(z[0]) @ np.abs(b.T) + np.abs(z[1]) + abs(found.centre[0])
-        if np.any(np.abs(z[1] - z[0] @ b.T) > START_OFF * part.stride * ROUNDING * np.max(size)):
+        if np.any(np.abs(z[1] - z[0] @ b.T) > LEFT_BY_ROUNDING * part.stride * ROUNDING * np.max(size)):
             return False
     return True
 
@@ -99,22 +97,25 @@ def few_bad_frames(e: Evidence) -> list[Explanation]:
     if float(np.min(off[bad])) < APART * float(np.max(off[kept])):
         # what falls off from frame to frame has no few bad ones
         return []
-    # where the motion decays or grows, each frame is weighted by its size
-    weight = e.found.weight[:, None] / np.max(e.found.weight)
-    before = float(np.max(weight * np.abs(e.misses)))
-    after = float(np.sqrt(np.mean((weight * found.misses(e.found))[kept] ** 2)))
+    before = float(np.max(e.weight[:, None] * np.abs(e.misses)))
+    rest = (e.weight[:, None] * found.misses(e.found))[kept]
+    after = float(np.sqrt(np.mean(rest**2)))
     if before < FALLS * after:
         return []
     fitting = matched(found, e.terms)
-    if not fitting and after > 8 * float(np.median(weight[:, 0] * e.unit)):
+    size = np.sqrt(np.sum(np.square(found.z[:-1].astype(np.float64)), axis=1))
+    rough = after > 8 * float(np.median(e.weight * e.unit))
+    if rough and not fitting:
         # the rest is no single motion either, as a solver's that begins with small steps
         return []
-    size = np.sqrt(np.sum(np.square(found.z[:-1].astype(np.float64)), axis=1))
     middle = float(np.median(size))
     if float(np.max(size[bad])) < min(2 * float(np.min(size[kept])), middle / LARGER):
         # an error of one size shows where a motion that grows or dies is smallest
         return []
     names = list(dict.fromkeys(title(x.scheme) for x in fitting))
+    if rough and not (after < SINGLE_ROOM * float(np.median(e.weight * size)) and irregular(rest)):
+        # what is left of the rest is no arithmetic's, and makes its map so uncertain that wrong schemes fit
+        names = []
     whose = f" of {either(names)}" if 0 < len(names) <= SCHEMES_SAID else "" if fitting else _damped(found, e)
     runs = np.split(bad, np.flatnonzero(np.diff(bad) > 1) + 1)
     spacing = set(np.diff([run[0] for run in runs]).tolist())

@@ -12,20 +12,17 @@ from itertools import combinations
 
 import numpy as np
 
-from springcheck.identify.evidence import FALLS, Evidence
+from springcheck.identify.evidence import FALLS, FIXED, Evidence
 from springcheck.identify.fit import fit
 from springcheck.identify.record import Record
 from springcheck.identify.result import Explanation
-from springcheck.physics.arrays import Floats, Integers
+from springcheck.physics.arrays import Extended, Floats
 
 LEAPS = 4.0
 """Times the usual way between two frames from which a position leaps."""
 
 AGAINST = 0.3
 """Share of the way between frames by which it may differ from that of the velocities, turned over."""
-
-PLACED = 2.0**-46
-"""Largest residual of numbers in their place, relative to them: 64 units in the last place."""
 
 MOST_COMPARED = 12
 """Coordinates of which every two are compared."""
@@ -60,26 +57,33 @@ def _left(record: Record, j: int) -> float:
     return float(np.max(found.residual))
 
 
+def _ways(record: Record, columns: list[int]) -> tuple[Floats, Floats]:
+    """How far positions move between frames (f - 1, n), and how far the mean of their velocities would."""
+    mean = (record.v[1:, columns] + record.v[:-1, columns]) / 2 * record.interval
+    return np.diff(record.q[:, columns], axis=0).astype(np.float64), mean.astype(np.float64)
+
+
 def _wrapped(record: Record, j: int) -> Iterator[Repair]:
     """Positions in a box: leaps of one length."""
-    q, v = (x[:, j].astype(np.float64) for x in (record.q, record.v))
-    way = np.diff(q) - (v[1:] + v[:-1]) / 2 * float(record.interval)
-    usual = float(np.median(np.abs(np.diff(q))))
+    (moved,), (mean,) = (x.T for x in _ways(record, [j]))
+    way, usual = moved - mean, float(np.median(np.abs(moved)))
     leaps = np.abs(way) > LEAPS * max(usual, 1e-300)
     if not np.any(leaps):
         return
     box = float(np.median(np.abs(way[leaps])))
     times = np.rint(way / box)
-    if not LEAPS * usual < box > np.ptp(q) - usual or np.any(np.abs(way - times * box) > LEAPS * usual):
+    if not LEAPS * usual < box > np.ptp(record.q[:, j]) - usual or np.any(
+        np.abs(way - times * box) > LEAPS * usual
+    ):
         return
     # a box edge is a number of few digits; its estimate from the states is exact only to their rounding
     short = next((x for n in range(1, 17) if abs((x := float(f"{box:.{n}g}")) - box) < usual), box)
     shift = np.concatenate([[0.0], np.cumsum(times)]) * short
-    moved = record.q.copy()
-    moved[:, j] -= shift
+    unwrapped = record.q.copy()
+    unwrapped[:, j] -= shift
     first = int(np.flatnonzero(times)[0]) + 1
     yield (
-        replace(record, q=moved),
+        replace(record, q=unwrapped),
         f"The positions of coordinate {j} are wrapped into a box of {short:.6g}, first at frame {first}",
         "write unwrapped positions, or unwrap them by the length of the box",
     )
@@ -90,15 +94,14 @@ def unsorted(record: Record) -> list[Explanation]:
     each = np.flatnonzero(np.ptp(record.q, axis=0) + np.ptp(record.v, axis=0) > 0)
     if not 1 < len(each) <= MOST_COMPARED:
         return []
-    way = np.diff(record.q[:, each], axis=0).astype(np.float64)
-    mean = ((record.v[1:, each] + record.v[:-1, each]) / 2 * record.interval).astype(np.float64)
+    way, mean = _ways(record, each.tolist())
     off = np.sum(way**2, axis=0)[:, None] + np.sum(mean**2, axis=0) - 2 * way.T @ mean
     of = each[np.argmin(off, axis=1)]
     others = np.flatnonzero((of != each) & (FALLS * np.min(off, axis=1) < np.diag(off)))
     put = replace(record, v=record.v.copy())
     put.v[:, each] = record.v[:, of]
     sure = others.size and len(set(of)) == len(of) and others.size == np.count_nonzero(of != each)
-    if not sure or any(_left(put, j) > max(_left(record, j) / FALLS, PLACED) for j in each[others].tolist()):
+    if not sure or any(_left(put, j) > max(_left(record, j) / FALLS, FIXED) for j in each[others].tolist()):
         return []
     where = ", ".join(f"of coordinate {each[i]} in column {of[i]}" for i in others)
     cause = f"The velocities stand in other columns than the positions, in every frame: those {where}"
@@ -108,12 +111,9 @@ def unsorted(record: Record) -> list[Explanation]:
 
 def turned(record: Record, moving: list[int]) -> list[Explanation]:
     """Velocities of the other sign: positions move against them, in frames so close that this shows."""
-    against = []
-    for j in moving:
-        way = np.diff(record.q[:, j]).astype(np.float64)
-        mean = ((record.v[1:, j] + record.v[:-1, j]) / 2 * record.interval).astype(np.float64)
-        if float(np.sum((way + mean) ** 2)) < AGAINST**2 * float(np.sum(way**2)):
-            against.append(j)
+    way, mean = _ways(record, moving)
+    turn = np.sum((way + mean) ** 2, axis=0) < AGAINST**2 * np.sum(way**2, axis=0)
+    against = [j for j, turns in zip(moving, turn, strict=True) if turns]
     if not against:
         return []
     whose = "all coordinates" if against == moving else f"coordinate {', '.join(map(str, against))}"
@@ -130,56 +130,46 @@ def _exchanged(record: Record, j: int) -> Iterator[Repair]:
     n = record.q.shape[1]
     if not 1 < n <= MOST_COMPARED:
         return
-    h = float(record.interval)
-    q, v = record.q.astype(np.float64), record.v.astype(np.float64)
-    for pair in combinations(range(n), 2):
-        if j not in pair:
-            continue
+    h = record.interval
+    for pair in (x for x in combinations(range(n), 2) if j in x):
         two = list(pair)
-        for what, whose in (
-            ("particles", (True, True)),
-            ("velocities", (False, True)),
-            ("positions", (True, False)),
-        ):
-            x, u = q[:, two].copy(), v[:, two].copy()
-            swapped = np.zeros(len(x), dtype=bool)
-            begin = what == "velocities" and _nearer(q[:, two], v[:, two], h)
-            for i in range(len(x)):
-                other = (x[i, ::-1] if whose[0] else x[i], u[i, ::-1] if whose[1] else u[i])
-                last = x[i - 1], u[i - 1]
-                if begin if i == 0 else _off(*last, *other, h) < _off(*last, x[i], u[i], h):
-                    x[i], u[i] = other
-                    swapped[i] = True
-            if not np.any(swapped):
+        for what, of_q, of_v in (
+            ("particles", True, True), ("velocities", False, True), ("positions", True, False),
+        ):  # fmt: skip
+            q, v, at = record.q[:, two].copy(), record.v[:, two].copy(), []
+            begin = what == "velocities" and _nearer(q, v, h)
+            for i in range(len(q)):
+                x, u = q[i, ::-1] if of_q else q[i], v[i, ::-1] if of_v else v[i]
+                last = q[i - 1], v[i - 1]
+                if begin if i == 0 else _off(*last, x, u, h) < _off(*last, q[i], v[i], h):
+                    q[i], v[i] = x, u
+                    at.append(i)
+            if not at:
                 continue
-            qs, vs = record.q.copy(), record.v.copy()
-            at = np.flatnonzero(swapped)
-            here, there = (np.ix_(at, np.array(columns)) for columns in (two, two[::-1]))
-            for column, moved in zip((qs, vs), whose, strict=True):
-                column[here] = column[there] if moved else column[here]
+            right = replace(record, q=record.q.copy(), v=record.v.copy())
+            right.q[:, two], right.v[:, two] = q, v
             yield (
-                replace(record, q=qs, v=vs),
-                f"The {what} of coordinates {pair[0]} and {pair[1]} have changed places {_where(at, len(x))}",
+                right,
+                f"The {what} of coordinates {pair[0]} and {pair[1]} have changed places {_where(at, len(q))}",
                 "sort the particles by their number before they are written, positions and velocities alike",
             )
 
 
-def _off(q: Floats, v: Floats, x: Floats, u: Floats, h: float) -> float:
+def _off(q: Extended, v: Extended, x: Extended, u: Extended, h: np.longdouble) -> float:
     """Squared distance of a frame from the one before, moved on by the mean of the velocities."""
     return float(np.sum((x - q - h * (u + v) / 2) ** 2) + np.sum((h * (u - v)) ** 2))
 
 
-def _nearer(q: Floats, v: Floats, h: float) -> bool:
+def _nearer(q: Extended, v: Extended, h: np.longdouble) -> bool:
     """Whether the first velocities are each other's."""
     way = q[1] - q[0]
     return float(np.sum((way - h * v[0, ::-1]) ** 2)) < float(np.sum((way - h * v[0]) ** 2))
 
 
-def _where(frames: Integers, of: int) -> str:
-    if len(frames) == of - int(frames[0]):
-        return f"from frame {int(frames[0])} on"
-    shown = ", ".join(str(int(i)) for i in frames[:4])
-    return f"in {len(frames)} of {of} frames: {shown}{', ...' if len(frames) > 4 else ''}"
+def _where(frames: list[int], of: int) -> str:
+    if len(frames) == of - frames[0]:
+        return f"from frame {frames[0]} on"
+    return f"in {len(frames)} of {of} frames: {', '.join(map(str, frames[:4]))}{', ...' * (len(frames) > 4)}"
 
 
 LOOKS: tuple[Callable[[Record, int], Iterator[Repair]], ...] = (_wrapped, _exchanged)

@@ -100,6 +100,23 @@ def _spring(k: float) -> Callable[..., Any]:
     return lambda q, p=0.0: -k * q
 
 
+def _identified(
+    step: Stepper, spring: tuple[float, ...] = SPRINGS[0], frames: int = FRAMES, way: int = 1, clock: int = 1
+) -> Identification:
+    """The scheme of a stepper on a spring (m, k, h) whose steps go this way, and the clock that way."""
+    m, k, h = spring
+    t, q, p = _run(step, _spring(k), m, way * h, (1.3, 0.7 * m), frames)
+    return identify_arrays(way * clock * t, q, p, mass=m, stiffness=k, step=clock * h)
+
+
+def _step(
+    step: Stepper, h: float | None = None, force: Callable[..., Any] | None = None
+) -> tuple[float, float]:
+    """One step on the first spring."""
+    m, k, long = SPRINGS[0]
+    return _one(step, 1.3, 0.7 * m, h or long, force or _spring(k), m)
+
+
 def identify_stepper(step: Stepper) -> Identification:
     """Which scheme a callable ``step(q, p, h, force, mass) -> (q, p)`` is, and what is wrong with it.
 
@@ -110,45 +127,20 @@ def identify_stepper(step: Stepper) -> Identification:
 
     Raises MethodError where the callable fails or returns no pair of finite numbers.
     """
-    results = []
-    for m, k, h in SPRINGS:
-        t, q, p = _run(step, _spring(k), m, h, (1.3, 0.7 * m), FRAMES)
+    results: list[Identification] = []
+    for spring in SPRINGS:
         try:
-            results.append(identify_arrays(t, q, p, mass=m, stiffness=k, step=h))
+            results.append(_identified(step, spring))
         except IdentificationError as error:
             if _draws(step):
-                return _in_a_bath(step)
+                return _identified(step, frames=BATH_FRAMES)
             raise MethodError(f"the stepper does not move a spring as a scheme would: {error}") from error
         if not results[0].fits:
             break
     found = results[0]
     if not found.fits and _draws(step):
-        return _in_a_bath(step)
-    notes = list(dict.fromkeys(note for x in results for note in x.notes))
-    wrong: list[Explanation] = []
-    schemes = {x.scheme for x in results}
-    if found.fits and len(schemes) > 1:
-        named = "; ".join(
-            f"{x.scheme or 'none that is known'} at m={m}, k={k}, h={h}"
-            for x, (m, k, h) in zip(results, SPRINGS, strict=False)
-        )
-        wrong.append(
-            Explanation(
-                cause=f"The stepper looks like different schemes on different springs: {named}",
-                remedy="look for numbers that are written into it",
-            )
-        )
-    elif found.fits and any(not x.fits for x in results):
-        wrong += next(x for x in results if not x.fits).explanations
-    if any(x.law for x in found.candidates):
-        rates = ", ".join(f"{x.friction[0]:.4g} by {x.law}" for x in found.candidates[:3])
-        wrong.append(
-            Explanation(
-                cause=f"{title(found.candidates[0].scheme)} with a friction that the force has not: c/m is "
-                f"{rates}",
-                remedy="set the damping to 0, which many engines do not by default",
-            )
-        )
+        return _identified(step, frames=BATH_FRAMES)
+    wrong = [*_on_springs(results), *_unasked_friction(found)]
     if any(x.cause.startswith(ONE_MAP) for x in found.explanations[:1]):
         wrong += _short(step)
     if found.scheme and not wrong:
@@ -157,84 +149,88 @@ def identify_stepper(step: Stepper) -> Identification:
         # more stages than the scheme needs: a fault of the same map has them
         wrong += [Explanation(cause=one.cause, remedy=one.remedy) for one in faults_like(found.scheme)]
     slope, deviation = _order(step)
+    order = f"order {slope:.2f} +- {deviation:.2f} on a quartic well"
     if math.isnan(slope):
-        notes.append("its error on a quartic well does not fall as a power of the step: no order is seen")
-    else:
-        notes.append(f"order {slope:.2f} +- {deviation:.2f} on a quartic well")
-        known = SCHEMES.get(str(found.scheme)) or ELSEWHERE.get(str(found.scheme))
-        order = known.order if known else 0
-        if order and slope < order - max(5 * deviation, 0.25):
-            wrong.append(
-                Explanation(
-                    cause=f"On a spring it is {found.scheme}, of order {order}, but not on forces that are "
-                    "not linear",
-                    remedy="look for a force that is evaluated at the wrong place",
-                )
-            )
-    fits = found.fits and not wrong
-    explanations = (*wrong, *found.explanations)
+        order = "its error on a quartic well does not fall as a power of the step: no order is seen"
+    known = SCHEMES.get(str(found.scheme)) or ELSEWHERE.get(str(found.scheme))
+    if known and known.order and slope < known.order - max(5 * deviation, 0.25):
+        cause = (
+            f"On a spring it is {found.scheme}, of order {known.order}, but not on forces that are not linear"
+        )
+        wrong.append(Explanation(cause=cause, remedy="look for a force that is evaluated at the wrong place"))
     return replace(
         found,
-        fits=fits,
+        fits=found.fits and not wrong,
         statement=wrong[0].cause if wrong else found.statement,
-        explanations=explanations,
-        notes=tuple(dict.fromkeys(notes)),
+        explanations=(*wrong, *found.explanations),
+        notes=tuple(dict.fromkeys([*(note for x in results for note in x.notes), order])),
         defect_ulp=max(x.defect_ulp for x in results),
     )
 
 
+def _on_springs(results: list[Identification]) -> list[Explanation]:
+    """What the springs after the first show of a scheme that fits on it."""
+    if not results[0].fits:
+        return []
+    if len({x.scheme for x in results}) == 1:
+        return list(next((x.explanations for x in results if not x.fits), ()))
+    named = "; ".join(
+        f"{x.scheme or 'none that is known'} at m={m}, k={k}, h={h}"
+        for x, (m, k, h) in zip(results, SPRINGS, strict=False)
+    )
+    cause = f"The stepper looks like different schemes on different springs: {named}"
+    return [Explanation(cause=cause, remedy="look for numbers that are written into it")]
+
+
+def _unasked_friction(found: Identification) -> list[Explanation]:
+    rates = ", ".join(f"{x.friction[0]:.4g} by {x.law}" for x in found.candidates[:3])
+    if not any(x.law for x in found.candidates):
+        return []
+    whose = title(found.candidates[0].scheme)
+    cause = f"{whose} with a friction that the force has not: c/m is {rates}"
+    return [Explanation(cause=cause, remedy="set the damping to 0, which many engines do not by default")]
+
+
 def _draws(step: Stepper) -> bool:
     """Whether a third call from one state still gives another result than the second."""
-    m, k, h = SPRINGS[0]
-    _, one, other = (_one(step, 1.3, 0.7 * m, h, _spring(k), m) for _ in range(3))
+    _, one, other = (_step(step) for _ in range(3))
     return one != other
-
-
-def _in_a_bath(step: Stepper) -> Identification:
-    """Which thermostat a stepper that draws random numbers is, on the first spring."""
-    m, k, h = SPRINGS[0]
-    states = _run(step, _spring(k), m, h, (1.3, 0.7 * m), BATH_FRAMES)
-    return identify_arrays(*states, mass=m, stiffness=k, step=h)
 
 
 def _short(step: Stepper) -> list[Explanation]:
     """Terms linear in h whose weights do not add up to 1: no scheme, whatever its order."""
-    (m, k, _), (h, off) = SPRINGS[0], TINY_STEP
-    q, p = 1.3, 0.7 * m
-    new_q, new_p = _one(step, q, p, h, _spring(k), m)
-    drift, kick = (new_q - q) / (h * p / m), (new_p - p) / (-h * k * q)
-    if max(abs(drift - 1), abs(kick - 1)) < off:
+    (m, k, _), (h, most) = SPRINGS[0], TINY_STEP
+    q, p = _step(step, h)
+    drift, kick = (q - 1.3) / (h * 0.7), (p - 0.7 * m) / (-h * k * 1.3)
+    off = max(abs(drift - 1), abs(kick - 1))
+    if off < most:
         return []
     cause = (
         f"Over a short step the momentum changes by {kick:.5g} h F and the position by {drift:.5g} h p/m, "
         "where a scheme of any order has 1 and 1"
     )
     remedy = "add up the lengths of its kicks and of its drifts, or the weights of its stages: each sum is 1"
-    return [Explanation(cause=cause, remedy=remedy, misfit=max(abs(drift - 1), abs(kick - 1)))]
+    return [Explanation(cause=cause, remedy=remedy, misfit=off)]
 
 
 def _calls(step: Stepper) -> int:
     """Evaluations of the force in a step."""
-    m, k, h = SPRINGS[0]
-    calls = [0]
+    calls: list[Any] = []
 
     def force(q: Any, p: Any = 0.0) -> Any:
-        calls[0] += 1
-        return -k * q
+        calls.append(q)
+        return -SPRINGS[0][1] * q
 
-    _one(step, 1.3, 0.7 * m, h, force, m)
-    return calls[0]
+    _step(step, force=force)
+    return len(calls)
 
 
 def _backwards(step: Stepper, found: Identification) -> list[Explanation]:
     """Test a negative step: explanations where it does not go backwards by the same scheme."""
-    m, k, h = SPRINGS[0]
-    t, q, p = _run(step, _spring(k), m, -h, (1.3, 0.7 * m), FRAMES)
-    back = identify_arrays(t, q, p, mass=m, stiffness=k, step=-h)
+    back = _identified(step, way=-1, clock=-1)
     if back.scheme == found.scheme:
         return []
-    forward = identify_arrays(-t, q, p, mass=m, stiffness=k, step=h)
-    if forward.scheme == found.scheme:
+    if _identified(step, way=-1).scheme == found.scheme:
         cause = f"{title(str(found.scheme))}, but a negative step goes forwards: the sign of the step is lost"
         return [Explanation(cause=cause, remedy="take the step with its sign")]
     cause = f"A negative step is not {found.scheme} backwards but {back.scheme}"

@@ -10,10 +10,11 @@ from functools import partial
 import numpy as np
 
 from springcheck.identify.compare import nearest
-from springcheck.identify.evidence import FALLS, Evidence, distance
+from springcheck.identify.evidence import FALLS, LEFT_BY_ROUNDING, Evidence, distance
 from springcheck.identify.families import title
-from springcheck.identify.fit import fit
+from springcheck.identify.fit import Map, fit
 from springcheck.identify.hypothesis import STRIDES, SURE, distinct
+from springcheck.identify.laws import Cause, explained_by, regression
 from springcheck.identify.result import Explanation
 from springcheck.physics.arrays import Floats
 from springcheck.text.wording import either
@@ -34,6 +35,9 @@ READ, CHOSEN = 1e-6, 1200
 ONE_MAP = "One linear map explains the states"
 MAP_OF = "if every step was recorded, it is that of a one-step method, "
 UNKNOWN_METHOD = "a one-step method that is not known here, which"
+
+AS_IT_WAS = 0.1
+"""Share of a frame's turn by which the state of two frames ago may differ from that in the next."""
 
 FEWEST_WITH_MEMORY = 12
 """Frames from which a map of two states is told from chance."""
@@ -128,58 +132,52 @@ def _class(e: Evidence) -> str:
     )
 
 
+TWO_STEPS = Cause(
+    kind="is remembered", columns=lambda e: [*np.vstack([[math.nan] * 2, e.states[:-2]]).T],
+    cause="Each state is the last but one and a linear map of the last: the leapfrog of two steps, "
+    "z[n+1] = z[n-1] + 2 h f(z[n]), whose even and odd frames part",
+    remedy="judge it as a scheme of two steps; a first step of second order parts them less",
+)  # fmt: skip
+"""The state before the last."""
+
+
 def memory(e: Evidence) -> list[Explanation]:
     """Two states that together give the next, where one does not: a scheme of two steps, whose memory dies.
 
     What one map misses stands in the first frames then, and not in the first pair alone.
     """
-    z = e.found.z.astype(np.float64)
-    size = np.sqrt(np.sum(z**2, axis=1))
-    if len(z) < FEWEST_WITH_MEMORY or np.min(size) < 1e-100 * np.max(size):
+    size, off = np.max(np.abs(e.states[1:]), axis=1), np.max(np.abs(e.misses), axis=1)
+    if len(e.states) < FEWEST_WITH_MEMORY or np.min(size) < 1e-100 * np.max(size):
         return []
-    # where the motion decays or grows, each frame is weighted by its size
-    unit = float(np.max(e.unit / size[1:]))
-    off = np.max(np.abs(e.misses), axis=1) / size[1:]
-    if np.max(off[1:]) < 64 * unit:
+    relative, rounding = off / size, LEFT_BY_ROUNDING * float(np.max(e.unit / size))
+    if np.max(relative[1:]) < rounding:
         return []
-    now, old, new = z[1:-1] / size[2:, None], z[:-2] / size[2:, None], z[2:] / size[2:, None]
-    leap = new - old
-    after = float(np.max(np.abs(leap - now @ np.linalg.lstsq(now, leap, rcond=None)[0])))
-    # maps that alternate a little leave their difference times the turn of a frame
-    if after < 64 * unit < np.max(off) * float(e.found.turn.angle[0]):
-        return [
-            Explanation(
-                cause="Each state is the last but one and a linear map of the last: the leapfrog of two "
-                "steps, z[n+1] = z[n-1] + 2 h f(z[n]), whose even and odd frames part",
-                remedy="judge it as a scheme of two steps; a first step of second order parts them less",
-                misfit=after,
-                local=True,
-            )
-        ]
+    found, twice = regression(e, TWO_STEPS), np.linalg.matrix_power(e.found.entries.astype(np.float64), 2)
+    # maps that alternate have nearly the state of two steps ago in them as well, turned by two frames
+    off_by = AS_IT_WAS * np.max(np.abs(twice - np.eye(2)))
+    if found.exact and np.max(np.abs(found.x[-2:] - np.eye(2))) < off_by:
+        return [explained_by(e, found)]
     # where the motion grows, a lasting disturbance falls relative to it too: its own size has to fall
-    alone = np.maximum(np.max(np.abs(e.misses), axis=1) - 8 * e.unit, 0.0)
-    if any(np.max(y[len(off) // 4 :]) > FORGOTTEN * np.max(y) for y in (off, alone)):
+    fading = relative, np.maximum(off - 8 * e.unit, 0)
+    if any(x[e.pairs // 4 :].max() > FORGOTTEN * x.max() for x in fading):
         return []
-    columns = np.concatenate([now, old], axis=1)
-    left = new - columns @ np.linalg.lstsq(columns, new, rcond=None)[0]
     # the first frames alone show the other map, but for which all follow one
-    later = len(new) // 2
-    one = new - now @ np.linalg.lstsq(now[later:], new[later:], rcond=None)[0]
-    before, after = (float(np.max(np.abs(y))) for y in (one, left))
-    if before < FALLS * after or before < 64 * unit:
+    later = fit(e.record, e.j, kept=np.arange(e.pairs) >= e.pairs // 2)
+    start = np.max(np.abs(later.misses(e.found)), axis=1)
+    before, weighted = (float(np.max(x[1:])) for x in (start / size, e.weight * start))
+    if before < rounding or weighted < FALLS * found.worst:
         return []
-    whose = _remembering(e)
+    whose = either(_remembered(e, later))
     kind = "two steps or with an acceleration of its own (Adams-Bashforth, BDF2, generalised alpha)"
-    several = "the two" if after < 64 * unit else "several"
+    several = "the two" if found.exact else "several"
     return [
         Explanation(
             cause=f"Each state follows from {several} before it, and not from one: a scheme with memory, "
             f"of {whose or kind}, whose start differs from one map by {before:.1e} of the state's size",
             remedy="leave the first frames out, and judge it as a scheme of as many steps",
-            misfit=after / before,
-            local=after < 64 * unit,
+            misfit=found.worst / weighted, local=found.exact,
         )
-    ]
+    ]  # fmt: skip
 
 
 def _many_steps(rho: list[float], sigma: list[float], x: Floats) -> Floats:
@@ -226,26 +224,24 @@ PARAMETERS = 0.05, 0.3, 0.6, 0.9
 """Values of a parameter from which it is looked for."""
 
 
-def _remembering(e: Evidence) -> str:
-    """The schemes with memory that the later half of the frames is of; "" where none is known."""
+def _remembered(e: Evidence, found: Map) -> list[str]:
+    """The schemes with memory that a map, of frames whose start is forgotten, is of."""
     from scipy.optimize import least_squares
 
-    if e.terms.mass_unknown or not e.record.fine:
-        return ""
-    found = fit(e.record, e.j, kept=np.arange(e.pairs) >= e.pairs // 2)
     entries, error = found.unscaled.astype(np.float64).ravel(), np.sqrt(np.diag(found.covariance))
+    turn, stated, out = -entries[2] / entries[1] if entries[1] else -1.0, e.stated, []
+    if e.terms.mass_unknown or not e.record.fine or turn <= 0:
+        return []
     ratio = float(found.size[1] / found.size[0])
     error = SURE * error * [1, 1 / ratio, ratio, 1] + 1e-14
-    turn, stated, out = -entries[2] / entries[1] if entries[1] else -1.0, e.stated, []
     for name, entries_of in WITH_MEMORY.items():
-        starts = [[1.0, y] for y in PARAMETERS] if "{" in name else [[1.0]]
 
         def left(x: Floats, of: Callable[[Floats], Floats] = entries_of) -> Floats:
             # beyond the parameters that a scheme can have
             with np.errstate(all="ignore"):
                 return np.asarray((of(np.array([turn, 1.0])[: len(x)] * x) - entries) / error)
 
-        for start in starts if turn > 0 else []:
+        for start in [[1.0, y] for y in PARAMETERS] if "{" in name else [[1.0]]:
             if not np.all(np.isfinite(left(np.array(start)))):
                 continue
             best = least_squares(left, start, x_scale="jac", xtol=1e-15, ftol=1e-15, gtol=1e-15)
@@ -256,4 +252,4 @@ def _remembering(e: Evidence) -> str:
             if all(0 <= y <= 1 for y in known):
                 out.append(name.format(*known))
                 break
-    return either(out)
+    return out

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from springcheck.identify.compare import compare
 from springcheck.identify.evidence import Evidence, Measured, matched
 from springcheck.identify.families import FAMILIES, FAULTS, G_ROUNDING, SUBTRACTED, Family, title
-from springcheck.identify.hypothesis import SURE, Joint, Terms, distinct, same_map
+from springcheck.identify.hypothesis import SURE, Joint, distinct, same_map
 from springcheck.identify.record import ROUNDING
 from springcheck.identify.result import Explanation
 from springcheck.identify.unknown import misfit
@@ -77,12 +78,9 @@ def _found(cause: str, remedy: str, joint: Joint) -> Explanation:
 
 
 def _negative_friction(e: Evidence) -> list[Explanation]:
-    growing = Terms(
-        mass_unknown=e.terms.mass_unknown, rounding=e.terms.rounding, jitter=e.terms.jitter, growing=True
-    )
     joints = [
         x
-        for x in compare([e.found], [growing], distinct(damped=True), range(1, 3))
+        for x in compare([e.found], [replace(e.terms, growing=True)], distinct(damped=True), range(1, 3))
         if x.parts[0].g < -SURE * (x.parts[0].g_error + G_ROUNDING)
     ]
     if not joints:
@@ -99,18 +97,21 @@ UNSCALED = 1e-6
 SHOWN = 4
 """How many of the schemes that would fit at another scale a sentence names."""
 
-ASE, AKMA = 10.180505710759414, 48.88821290839616
-"""Units of time [fs] of A sqrt(u/eV), and of A sqrt(u mol/kcal)."""
+
+def _either_way(factor: float, meaning: str) -> tuple[tuple[float, str], tuple[float, str]]:
+    return (factor, meaning), (1 / factor, meaning)
+
+
+MIXED = "kcal and kJ are mixed up"
 
 CONSTANTS = (
     (math.degrees(1), "positions are in degrees, velocities in radians"),
     (math.radians(1), "positions are in radians, velocities in degrees"),
-    (ASE, "1 unit of time of ASE is 10.1805 fs"), (1 / ASE, "1 unit of time of ASE is 10.1805 fs"),
-    (AKMA, "1 unit of time of CHARMM (AKMA) is 48.888 fs"),
-    (1 / AKMA, "1 unit of time of CHARMM (AKMA) is 48.888 fs"),
-    (4.184, "kcal and kJ are mixed up"), (1 / 4.184, "kcal and kJ are mixed up"),
-    (math.sqrt(4.184), "kcal and kJ are mixed up"), (1 / math.sqrt(4.184), "kcal and kJ are mixed up"),
-    (2 * math.pi, "a factor 2 pi"), (1 / (2 * math.pi), "a factor 2 pi"),
+    # times [fs] of A sqrt(u/eV), and of A sqrt(u mol/kcal)
+    *_either_way(10.180505710759414, "1 unit of time of ASE is 10.1805 fs"),
+    *_either_way(48.88821290839616, "1 unit of time of CHARMM (AKMA) is 48.888 fs"),
+    *_either_way(4.184, MIXED), *_either_way(math.sqrt(4.184), MIXED),
+    *_either_way(2 * math.pi, "a factor 2 pi"),
     *((10.0**n, f"a factor {10.0**n:g}, as between two units") for n in (-6, -3, -2, -1, 1, 2, 3, 6)),
     (2.0, "a factor 2"), (0.5, "a factor 1/2"),
 )  # fmt: skip
@@ -122,8 +123,7 @@ def _scales(e: Evidence) -> tuple[list[Explanation], bool]:
     known factor, or that of the stated stiffness."""
     if e.terms.mass_unknown:
         return [], False
-    free = Terms(mass_unknown=True, rounding=e.terms.rounding, jitter=e.terms.jitter)
-    fitting = compare([e.found], [free], distinct(damped=False), range(1, 4))
+    fitting = compare([e.found], [replace(e.terms, mass_unknown=True)], distinct(damped=False), range(1, 4))
     fitting = [x for x in fitting if abs(x.parts[0].log_mass) > 6 * x.parts[0].mass_error + 4 * ROUNDING]
     of_stated = [x for x in fitting if e.stated is not None and _rank(e, x) == 0]
     fitting = of_stated or fitting
@@ -212,8 +212,7 @@ def stiffness_ratio(ratio: float, mass: float | None) -> str:
     """Meaning of a stiffness that is `ratio` times the stated one; "" where there is none."""
     known = [
         (1 / 4.184, "kcal taken for kJ"), (4.184, "kJ taken for kcal"),
-        (4.814 / 4.184, "4.814 kJ to a kcal instead of 4.184"),
-        (4.184 / 4.814, "4.814 kJ to a kcal instead of 4.184"),
+        *_either_way(4.814 / 4.184, "4.814 kJ to a kcal instead of 4.184"),
         (2.0, "k q**2 taken for k/2 q**2"), (0.5, "k/2 q**2 taken for k q**2"),
         *((10.0**n, "another unit of length or energy") for n in (-6, -4, -3, -2, -1, 1, 2, 3, 4, 6)),
     ]  # fmt: skip
