@@ -845,7 +845,7 @@ def experiments(seed: int, counts: Counts) -> None:
     _legal(counts, checks.judge_thoroughly(scene, str(label), driver.run), what)
 
 
-steps.MOST_NAMED = 10**6
+steps.MOST_LISTED = 10**6
 """Every name is told, not the first few."""
 
 BLOCK = 50

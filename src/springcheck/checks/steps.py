@@ -178,11 +178,11 @@ def _list(case: Case, which: NDArray[np.bool_], said: str, size: Reals | None = 
         f"{'qp'[i]}{along[j]} of particle {of[j]}" + ("" if size is None else f" ({float(size[i, j]):.1e})")
         for i, j in np.argwhere(which)
     ]
-    more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
-    return f"; {', '.join(names[:MOST_NAMED])}{more} {said}" if names else ""
+    more = f" and {len(names) - MOST_LISTED} more" if len(names) > MOST_LISTED else ""
+    return f"; {', '.join(names[:MOST_LISTED])}{more} {said}" if names else ""
 
 
-MOST_NAMED = 4
+MOST_LISTED = 4
 
 
 def _sees(case: Case, bound: Floats, told: NDArray[np.bool_]) -> tuple[Limits, str]:
