@@ -8,8 +8,9 @@ from collections.abc import Iterable
 import numpy as np
 
 from springcheck import checks, thermal
+from springcheck.checks import compare
 from springcheck.physics import exact
-from springcheck.physics.arrays import Floats, Reals
+from springcheck.physics.arrays import Extended, Floats, Reals
 from springcheck.physics.scene import Scene
 from springcheck.physics.system import MOST_DENSE
 from springcheck.physics.trajectory import Trajectory
@@ -171,20 +172,22 @@ class Tally:
         self.doubt = 0.0
         self.drift: float = 0.0
 
-    def add(self, piece: Trajectory) -> None:
-        """Take a piece into account."""
+    def add(self, piece: Trajectory, known: tuple[Extended, Extended] | None = None) -> None:
+        """Take a piece into account; `known` is the exact solution from its first frame on, or further."""
         scene, right = self._scene, self._start
         if scene.bath:
             self.heat.add(piece)
         if self._known:
-            steps = checks.Case(trajectory=piece, scene=scene).steps
-            q, p = exact.true_motion(scene, steps, piece.step)
+            known = known or compare.solution(scene, [piece])
+            assert known is not None
+            q, p = (x[: len(piece.t)] for x in known)
             if not scene.system.keeps_energy:
                 right = self._energy(q, p)
             # not max(), which leaves out what is no number
             here = np.max(self._norm(piece.q - q, piece.p - p))
             self.error = float(np.maximum(self.error, here))
-            self.doubt = max(self.doubt, exact.uncertainty(scene, float(steps[-1]) * piece.step))
+            last = int(checks.Case(trajectory=piece, scene=scene).steps[-1])
+            self.doubt = max(self.doubt, exact.uncertainty(scene, float(last) * piece.step))
         with np.errstate(over="ignore", invalid="ignore"):
             off = self._energy(piece.q, piece.p) - right
             worst = float(off[np.argmax(np.abs(off))] / (abs(self._start) or 1.0))
