@@ -130,7 +130,10 @@ def smallest(passed: Passed, check: str, size: float) -> float | None:
 RECORDED = {check.name for check in (*checks.CHECKS, *checks.RANDOM)}
 """Names of the checks of recorded states."""
 
-EXPERIMENTS: dict[str, Any] = {check.name: check for check in (*checks.THOROUGH, *SEEDED)}
+EXPERIMENTS: dict[str, Any] = {
+    **{check.name: check for check in checks.THOROUGH},
+    **{check.name: check for check in SEEDED},
+}
 
 
 def examine(fault: Fault, *, limits: bool = True) -> Result:

@@ -56,8 +56,10 @@ class FaultReport(Studied):
         """The smallest size of each fault that each check rejects, for readers of the file."""
         rows = [(x.name, check, size) for x in self.results for check, size in x.limits.items()]
         fault, check, size = zip(*rows, strict=True) if rows else ((), (), ())
-        columns = {"fault": list(fault), "check": list(check), "size": np.array(size, np.float64)}
-        return Table(name="faults/limits", columns=columns)
+        sizes = np.array(size, np.float64)
+        return Table(
+            name="faults/limits", columns={"fault": list(fault), "check": list(check), "size": sizes}
+        )
 
 
 RESULTS: Documents[Result] = Documents(kind=Result, beginning="faults/results/", named="", joined=True)

@@ -132,8 +132,8 @@ def run(
     )
     broke: dict[str, str] = {}
     bar = _Bar(progress, len(labels) * (1 + thorough))
-    more = [f"{x.label}, {x.about}" for x in wrong] + ([] if seed is None else [f"seed {seed}"])
-    command = keeper.command("run", labels, scene.digest, *more)
+    options = [f"{x.label}, {x.about}" for x in wrong] + ([] if seed is None else [f"seed {seed}"])
+    command = keeper.command("run", labels, scene.digest, *options)
     with keeper.open_new(path, command, force=force) as journal:
         resumed = journal.finished()
         keeper.need_space(journal.path, keeper.size(scene) * (len(labels) + len(wrong) - len(resumed)))

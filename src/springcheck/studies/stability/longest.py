@@ -209,10 +209,10 @@ def grows(scheme: Scheme, of: Linear, h: Floats) -> np.ndarray:
 
 @lru_cache(maxsize=64)
 def limit_of(scheme: Scheme) -> float:
-    """The largest h w of a scheme on a spring: by the catalogue, of another by its own map, as it may state a
-    wrong one."""
+    """The largest h w of a scheme on a spring: by the catalogue; of another by its own map, as it may state a
+    wrong one, unless its step has more than one map (multiple time steps) or none."""
     ours = scheme in (schemes.SCHEMES.get(scheme.name), schemes.ATTACHED.get(scheme.name))
-    if ours or scheme.has("random") or not scheme.has("one-step"):
+    if ours or scheme.has("random") or scheme.has("mixes") or not scheme.has("one-step"):
         return scheme.limit
     return _first(scheme, Linear.of_modes(np.ones(1), np.zeros(1)), 1.0)
 
