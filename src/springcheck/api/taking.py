@@ -52,13 +52,8 @@ def spoken() -> Iterator[None]:
 
 
 @contextmanager
-def taken(
-    methods: str | Step | Sequence[str | Step] = (), force: bool = False, workers: int = 1
-) -> Iterator[tuple[list[str], How]]:
-    """Labels of these methods for a study, and how it is measured.
-
-    A function of this process is not known to others.
-    """
+def taken(methods: Any, force: bool, workers: int) -> Iterator[tuple[list[str], How]]:
+    """Labels of these methods for a study, and how it is measured: functions of yours by this process."""
     from springcheck.studies.team import Processes
 
     several = [methods] if isinstance(methods, str) or callable(methods) else methods

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Literal, NamedTuple
@@ -33,27 +33,15 @@ class Same:
     """Origin of the allowed difference: rounding alone, or the tolerance of some adaptive solver."""
 
 
-def solution(scene: Scene, pieces: Iterable[Trajectory]) -> tuple[Extended, Extended] | None:
-    """The exact solution q, p (f, n) at the frames of the longest of these pieces; None where not known."""
-    longest = max(pieces, key=lambda piece: len(piece.t), default=None)
-    if longest is None or not exact.has_true_motion(scene):
-        return None
-    return exact.true_motion(scene, Case(trajectory=longest, scene=scene).steps, longest.step)
-
-
-def compare(
-    scene: Scene, pieces: Mapping[str, Trajectory], known: tuple[Extended, Extended] | None = None
-) -> Comparison:
-    """Compare trajectories, or pieces of them over the same frames, with each other and the exact one.
-
-    `known` is their `solution`, where the caller has it already.
-    """
+def compare(scene: Scene, pieces: Mapping[str, Trajectory]) -> Comparison:
+    """Compare trajectories, or pieces of them over the same frames, with each other and the exact one."""
     norm = scene.system.norm
     states: dict[str, tuple[Extended | Floats, Extended | Floats]] = {}
-    known = known or solution(scene, pieces.values())
-    if known is not None:
-        states[EXACT] = known
-    frames = max((len(piece.t) for piece in pieces.values()), default=0)
+    longest = max(pieces.values(), key=lambda piece: len(piece.t), default=None)
+    if longest is not None and exact.has_true_motion(scene):
+        steps = Case(trajectory=longest, scene=scene).steps
+        states[EXACT] = exact.true_motion(scene, steps, longest.step)
+    frames = len(longest.t) if longest is not None else 0
     states.update((label, (piece.q, piece.p)) for label, piece in pieces.items())
     labels = tuple(states)
     out = np.zeros((len(labels), len(labels)))

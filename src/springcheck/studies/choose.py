@@ -23,10 +23,8 @@ class LeftOut:
 def sorted_out(
     labels: Iterable[Label], reason: Callable[[Label], str | None], needed: str = ""
 ) -> tuple[list[Label], list[LeftOut]]:
-    """Methods for which `reason` is None, and the others with their reasons.
-
-    MethodError where all are left out of a study that needs one, for what is `needed` of it.
-    """
+    """Methods for which `reason` is None, and the others with their reasons.  MethodError where there is none
+    of the former and something is `needed` of them."""
     reasons = {label: reason(label) for label in labels}
     left = [LeftOut(method=str(label), reason=why) for label, why in reasons.items() if why]
     usable = [label for label, why in reasons.items() if not why]

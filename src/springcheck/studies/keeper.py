@@ -192,23 +192,17 @@ def how(options: Namespace, progress: Progress | None) -> How:
 
 
 @contextmanager
-def kept(
-    path: str | Path | None,
-    command: str,
-    *,
-    force: bool = False,
-    progress: Progress | None = None,
-    team: Team = ALONE,
-) -> Iterator[Keeper]:
+def kept(path: str | Path | None, command: str, **how: Unpack[How]) -> Iterator[Keeper]:
     """A study that is kept in a store; an unfinished one of the same command is resumed.  Without a path
     nothing is kept.
 
     Raises StoreError, before anything is measured, when the file exists or cannot be written.
     """
+    progress, team = how.get("progress"), how.get("team", ALONE)
     if path is None:
         yield Keeper(None, progress, team)
         return
-    with open_new(path, command, force=force) as journal:
+    with open_new(path, command, force=how.get("force", False)) as journal:
         yield Keeper(journal, progress, team, Path(path))
 
 
@@ -218,11 +212,10 @@ def study(
 ) -> T:  # fmt: skip
     """A study of these methods as `measure` makes it, kept in a store (see `kept`); `options` are all else
     that decides its numbers beside the scene."""
-    of_scene = () if scene is None else (scene.digest,)
-    with kept(path, command(name, labels, *of_scene, *options), **how) as keeper:
-        found: Any = measure(keeper)
-        found = replace(found, resumed=keeper.resumed, path=keeper.path)
-        keeper.commit(name, found.kept_document(keeper.names), scene)
+    more = options if scene is None else (scene.digest, *options)
+    with kept(path, command(name, labels, *more), **how) as keeper:
+        found: Any = replace(measure(keeper), resumed=keeper.resumed, path=keeper.path)  # type: ignore[type-var]
+        keeper.commit(name, found.document(), scene)
     return found  # type: ignore[no-any-return]
 
 

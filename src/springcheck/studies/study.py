@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import gc
 from argparse import Namespace
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
 from importlib.util import find_spec
@@ -82,10 +82,6 @@ class Studied(StudyResult):
     """Pieces that an interrupted call had finished."""
     path: Path | None = None
     """Where it was stored."""
-
-    def kept_document(self, tables: Sequence[str]) -> dict[str, Any]:
-        """The document in a store that has these tables of its pieces."""
-        return self.document()
 
 
 def study_of(found: object) -> Study:

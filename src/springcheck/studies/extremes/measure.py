@@ -55,8 +55,11 @@ def record(
             "double on this machine: run it on Linux on x86-64"
         )
     labels = engines.match(tuple(methods) or everything())
-    measuring = partial(measure, labels, quick=quick)
-    return keeper.study("extremes", path, labels, measuring, "quick" if quick else "whole", **how)
+    command = keeper.command("extremes", labels, "quick" if quick else "whole")
+    with keeper.kept(path, command, **how) as kept:
+        atlas = replace(measure(labels, kept, quick=quick), resumed=kept.resumed, path=kept.path)
+        kept.commit("extremes", atlas.kept_document(kept.names))
+    return atlas
 
 
 def measure(labels: Sequence[Label], kept: Keeper, *, quick: bool = False) -> Atlas:

@@ -17,14 +17,14 @@ from springcheck import checks, driver, engines, interrupts
 from springcheck.checks import compare
 from springcheck.engines.contract import Label
 from springcheck.errors import MethodError, SpringcheckError, StoreError
-from springcheck.physics import memory, scenefile
+from springcheck.physics import exact, memory, scenefile
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import NOT_KNOWN, Comparison, Trajectory, Verdict
 from springcheck.studies import keeper
 from springcheck.studies.arguments import Progress
 from springcheck.studies.choose import LeftOut, choose
 from springcheck.studies.run.result import FAULT, Repeat, Repeats, Report, Stored
-from springcheck.studies.run.tally import Tally, line
+from springcheck.studies.run.tally import Tally, line, solution
 
 if TYPE_CHECKING:
     from springcheck.studies.ensemble.result import Ensemble
@@ -216,7 +216,7 @@ def judge(
     streams = {name: keeper.windows(source, name, rows, stride) for name, source in sources.items()}
     for pieces in _together(streams):
         judged_frames += max(len(piece.t) for piece in pieces.values())
-        known = compare.solution(scene, pieces.values())
+        known = solution(scene, pieces.values()) if exact.has_true_motion(scene) else None
         for name, piece in pieces.items():
             verdicts[name].append(checks.judge(scene, piece, piece=True))
             if any(v.passed is False and v.check in checks.TELLING for v in verdicts[name][-1]):
@@ -224,7 +224,7 @@ def judge(
             tallies[name].add(piece, known)
             last[name] = piece
         if len(pieces) == len(sources):
-            parts.append(compare.compare(scene, pieces, known))
+            parts.append(compare.compare(scene, pieces))
         else:
             # where some run has ended early nothing more can be said of the pairs
             nothing = np.full_like(parts[-1].max_difference, np.nan)

@@ -3,12 +3,11 @@ those of its scheme."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 
 import numpy as np
 
 from springcheck import checks, thermal
-from springcheck.checks import compare
 from springcheck.physics import exact
 from springcheck.physics.arrays import Extended, Floats, Reals
 from springcheck.physics.scene import Scene
@@ -157,6 +156,12 @@ FAINTEST_ENERGY = np.finfo(np.float64).tiny / np.finfo(np.float64).eps
 """Initial energy below which energies in double precision are subnormal and lose digits."""
 
 
+def solution(scene: Scene, pieces: Collection[Trajectory]) -> tuple[Extended, Extended]:
+    """The exact solution q, p (f, n) at the frames of the longest of these pieces, where it is known."""
+    longest = max(pieces, key=lambda piece: len(piece.t))
+    return exact.true_motion(scene, checks.Case(trajectory=longest, scene=scene).steps, longest.step)
+
+
 class Tally:
     """Error and energy over all pieces of a trajectory."""
 
@@ -178,9 +183,7 @@ class Tally:
         if scene.bath:
             self.heat.add(piece)
         if self._known:
-            known = known or compare.solution(scene, [piece])
-            assert known is not None
-            q, p = (x[: len(piece.t)] for x in known)
+            q, p = (x[: len(piece.t)] for x in known or solution(scene, [piece]))
             if not scene.system.keeps_energy:
                 right = self._energy(q, p)
             # not max(), which leaves out what is no number
