@@ -45,7 +45,7 @@ pytestmark = [
 @pytest.mark.parametrize("name", [*METHODS, *GPU])
 def test_no_cell_is_silently_wrong(name: str, need: Need) -> None:
     need(name)
-    atlas = extremes.measure([name], quick=True)
+    atlas = extremes.record(None, [name], quick=True)
     assert not atlas.wrong, atlas.wrong[:3]
     assert len(atlas.cells) >= 100
     assert atlas.counts()["right"] >= 20
@@ -72,14 +72,14 @@ def test_no_cell_of_a_solver_is_silently_wrong(name: str, need: Need) -> None:
 
 
 def test_a_solver_has_no_cells_in_the_atlas_and_it_is_said_why() -> None:
-    atlas = extremes.measure(["own:euler", "sundials:bdf"], quick=True)
+    atlas = extremes.record(None, ["own:euler", "sundials:bdf"], quick=True)
     assert {cell.method for cell in atlas.cells} == {"own:euler"}
     assert "it chooses its own steps" in atlas.left_out[0].reason
 
 
 def test_cells_of_a_solver_in_a_store_are_no_map(need: Need) -> None:
     need("sundials:bdf")
-    atlas = extremes.measure(["own:euler"], quick=True)
+    atlas = extremes.record(None, ["own:euler"], quick=True)
     solved = [solver_cells.solve(engines.parse("sundials:bdf"), spec) for spec in solver_cells.specs()[:65:5]]
     (bank,) = page.banks(replace(atlas, cells=(*atlas.cells, *solved)))
     assert {cell.block for cell in solved} == {"force"}
@@ -171,7 +171,7 @@ def test_bad_input_is_refused_with_a_reason() -> None:
 
 
 def test_the_document_has_the_promised_fields() -> None:
-    atlas = extremes.measure(["own:implicit-euler"], quick=True)
+    atlas = extremes.record(None, ["own:implicit-euler"], quick=True)
     found = json.loads(json.dumps(atlas.document(), allow_nan=False))
     fields = {"method", "parameters", "outcome", "reason", "value", "bound"}
     assert all(fields <= set(cell) for cell in found["cells"])
@@ -201,7 +201,7 @@ def test_the_atlas_is_stored_whole_and_drawn(tmp_path: Path) -> None:
 
 
 def test_a_cell_that_could_not_be_measured_has_a_shade_of_its_own() -> None:
-    atlas = extremes.measure(["own:semi-implicit-euler"], quick=True)
+    atlas = extremes.record(None, ["own:semi-implicit-euler"], quick=True)
     untold = next(cell for cell in atlas.cells if cell.block == "force")
     cells = tuple(replace(cell, outcome="not measured") if cell is untold else cell for cell in atlas.cells)
     for shown, count in ((atlas, 0), (replace(atlas, cells=cells), 1)):
@@ -220,7 +220,7 @@ def test_a_finer_atlas_has_every_decade_of_force_at_more_steps(
     for name, value in few.items():
         monkeypatch.setattr(grid, name, value)
     monkeypatch.setattr(finer_atlas, "EVERY_DECADE", range(-20, 21))
-    base = extremes.measure(["own:implicit-euler"])
+    base = extremes.record(None, ["own:implicit-euler"])
     method, path = ["own:implicit-euler"], tmp_path / "fine.h5"
     fine = finer_atlas.record(path, method, 800)
     assert 800 <= len(fine.cells) < 800 + 41

@@ -17,7 +17,6 @@ import springcheck
 from springcheck import checks, driver, store
 from springcheck.errors import SceneError
 from springcheck.physics import scenefile as scenes
-from springcheck.studies import keeper
 from springcheck.studies.faults import baths
 from springcheck.studies.faults import measure as trial
 from springcheck.studies.faults.measure import examine
@@ -169,10 +168,9 @@ def test_faults_of_the_command_line_print_one_document_and_are_kept(
         if done == 1:
             raise KeyboardInterrupt
 
-    with pytest.raises(KeyboardInterrupt), keeper.kept("g.h5", "faults", progress=interrupt) as kept:
-        trial.study(kept=kept)
-    with keeper.kept("g.h5", "faults") as kept:
-        again = trial.study(kept=kept)
+    with pytest.raises(KeyboardInterrupt):
+        trial.record("g.h5", progress=interrupt)
+    again = trial.record("g.h5")
     assert again.resumed == 1
     assert again.document() == document
 

@@ -36,7 +36,7 @@ for size in (1e200, 1e-200):
         print(error)
 measure.WIDE = False
 try:
-    measure.measure(quick=True)
+    measure.record(quick=True)
 except SpringcheckError as error:
     print(error)
 """

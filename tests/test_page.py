@@ -294,7 +294,7 @@ def studies(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
         found = tuple(
             replace(faults.examine(fault, limits=False), limits={"step-defect": 5e-15}) for fault in FEW
         )
-        faults.keep(kept, FaultReport(results=found))
+        kept.commit("faults", FaultReport(results=found).document())
     return {name: folder / f"{name}.h5" for name in NAMES}
 
 

@@ -237,7 +237,7 @@ def test_a_sweep_begins_just_below_the_limit_of_stability() -> None:
 def test_the_same_study_twice_gives_the_same_errors_and_force_calls() -> None:
     scene = scenes.load_scene("spring-uneven")
     labels = list(engines.match(("own:*", "sundials:adams")))
-    one, other = (precision.study(scene, labels, budget=0.5) for _ in range(2))
+    one, other = (precision.record(scene, labels, budget=0.5) for _ in range(2))
     assert len(one.points) > 20
     compared = 0
     known = {(p.method, p.step, p.tolerance): p for p in other.points if p.complete}
@@ -254,7 +254,7 @@ def test_what_fails_stays_in_with_its_reason(need: Callable[[str], None]) -> Non
     need("openmm:verlet")
     scene = replace(scenes.load_scene("spring-uneven"), steps=40_000, kind="particles")
     labels = [engines.parse("own:euler"), engines.parse("openmm:verlet@CUDA-double")]
-    found = precision.study(scene, labels, budget=2.0)
+    found = precision.record(scene, labels, budget=2.0)
     worst = found.of("own:euler")[0]
     # h w = 1 grows by sqrt(2) a step, past the largest double after 2048 steps
     assert worst.outcome == "diverged"
@@ -272,7 +272,7 @@ def test_what_fails_stays_in_with_its_reason(need: Callable[[str], None]) -> Non
 
 def test_a_method_that_cannot_serve_the_scene_is_a_row() -> None:
     scene = replace(scenes.load_scene("spring"), kind="circuit", units="si")
-    found = precision.study(scene, [engines.parse("ase:velocity-verlet")], budget=1.0)
+    found = precision.record(scene, [engines.parse("ase:velocity-verlet")], budget=1.0)
     (point,) = found.points
     assert point.outcome == "cannot run"
     assert "circuit" in point.message
@@ -280,7 +280,7 @@ def test_a_method_that_cannot_serve_the_scene_is_a_row() -> None:
 
 def test_a_budget_that_ends_is_said() -> None:
     scene = scenes.load_scene("spring-uneven")
-    found = precision.study(scene, [engines.parse("own:semi-implicit-euler")], budget=0.5)
+    found = precision.record(scene, [engines.parse("own:semi-implicit-euler")], budget=0.5)
     last = found.points[-1]
     assert last.outcome == "cut off"
     assert "budget of 0.5 s" in last.message
@@ -333,7 +333,7 @@ def test_a_study_is_stored_and_read_back(tmp_path: Path) -> None:
 
 def test_the_document_has_the_fields_that_it_promises() -> None:
     scene = scenes.load_scene("spring-uneven")
-    found = precision.study(scene, [engines.parse("own:euler")], budget=0.5).document()
+    found = precision.record(scene, [engines.parse("own:euler")], budget=0.5).document()
     point = found["points"][3]
     for name in ("step", "steps", "max_error", "end_error", "phase_error", "energy_error", "run_seconds",
                  "start_seconds", "read_seconds", "force_calls"):  # fmt: skip
@@ -356,13 +356,13 @@ def test_several_short_runs_in_one_timing_count_as_one() -> None:
 
 def test_a_scene_in_a_bath_is_told_that_the_bath_is_in_the_way() -> None:
     with pytest.raises(SceneError, match=r"none of its errors is.*and no bath"):
-        precision.study(scenes.load_scene("bath-spring"), [engines.parse("own:euler")])
+        precision.record(scenes.load_scene("bath-spring"), [engines.parse("own:euler")])
 
 
 def test_a_scene_at_rest_has_no_error_to_measure() -> None:
     scene = scenes.load_scene("spring")
     with pytest.raises(SceneError, match="rests in equilibrium"):
-        precision.study(replace(scene, p=np.zeros(1)), [engines.parse("own:euler")])
+        precision.record(replace(scene, p=np.zeros(1)), [engines.parse("own:euler")])
 
 
 @pytest.mark.parametrize("order", [1.0, 2.0, 4.0])

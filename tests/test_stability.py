@@ -22,12 +22,14 @@ from springcheck.physics import scenefile as scenes
 from springcheck.physics.arrays import Extended
 from springcheck.physics.terms import Damping
 from springcheck.studies.choose import LeftOut
+from springcheck.studies.run import measure as session
+from springcheck.studies.run import text as run_text
 from springcheck.studies.stability import STUDY, limits, propagators, regions, resonance
 from springcheck.studies.stability import measure as stability
 from springcheck.studies.stability.longest import longest
 from springcheck.studies.stability.propagators import Springs
 from springcheck.studies.text import left_out
-from springcheck.text.lines import Text
+from springcheck.text.lines import Text, as_text
 
 pytestmark = pytest.mark.slow
 
@@ -123,7 +125,7 @@ def test_bdf_leaves_the_stiff_mode_behind_where_adams_cannot(need: Need) -> None
 
 def test_the_document_has_the_promised_fields(need: Need) -> None:
     need("own:euler")
-    study = stability.measure(scenes.load_scene("overdamped"), ["own:*"])
+    study = stability.record(scenes.load_scene("overdamped"), None, ["own:*"])
     found = json.loads(json.dumps(study.document(), allow_nan=False))
     assert study.passed
     for method in found["methods"]:
@@ -134,7 +136,7 @@ def test_the_document_has_the_promised_fields(need: Need) -> None:
 
 def test_a_wrong_growth_fails_the_study(need: Need) -> None:
     need("own:euler")
-    study = stability.measure(scenes.load_scene("spring"), ["own:semi-implicit-euler"])
+    study = stability.record(scenes.load_scene("spring"), None, ["own:semi-implicit-euler"])
     assert study.passed
     (limit,) = study.limits
     wrong = replace(study, limits=(replace(limit, growth_above=limit.growth_above * (1 + 1e-4)),))
@@ -144,25 +146,30 @@ def test_a_wrong_growth_fails_the_study(need: Need) -> None:
 
 @pytest.mark.parametrize("stated", [0.0, 1.5, 2.6, np.inf])
 def test_a_scheme_that_states_a_wrong_limit_fails_and_the_largest_step_is_by_what_was_measured(
-    stated: float,
+    stated: float, tmp_path: Path
 ) -> None:
     scheme = replace(schemes.scheme("velocity-verlet"), name=f"stated:{stated}", limit=stated)
     method = replace(engines.method(engines.parse("own:velocity-verlet")), scheme=scheme.name)
     own = engines.engine("own")
     wrong = replace(own, name="stated", methods={method.name: method}, thermostats={}, schemes=(scheme,))
     with engines.while_here(wrong, "here", "1"):
-        study = stability.measure(scenes.load_scene("spring"), ["stated:velocity-verlet"])
+        study = stability.record(scenes.load_scene("spring"), None, ["stated:velocity-verlet"])
         assert study.status == 1
         assert "whose stated limit is wrong" in study.failures[0]
         assert study.largest(study.limits[0]) == pytest.approx(2.0, rel=1e-9)
+        # so does the report of a run beyond it
+        scene = scenes.load_scene("spring").derived(step=2.3, steps=20)
+        report = session.run(scene, tmp_path / "r.h5", methods=["stated:velocity-verlet"])
+        said = as_text(run_text.lines(report))
+        assert "h = 2.3 is beyond the limit of velocity Verlet here, 2: stated:velocity-verlet" in said
 
 
 def test_every_figure_of_stability_is_drawn(tmp_path: Path, need: Need) -> None:
     need("openmm:mts")
-    study = stability.measure(
-        scenes.load_scene("multiple-time-steps"), ["own:semi-implicit-euler", "openmm:mts"]
+    study = stability.record(
+        scenes.load_scene("multiple-time-steps"), None, ["own:semi-implicit-euler", "openmm:mts"]
     )
-    damped = stability.measure(scenes.load_scene("overdamped"), ["own:implicit-euler"])
+    damped = stability.record(scenes.load_scene("overdamped"), None, ["own:implicit-euler"])
     written = [path.name for one in (study, damped) for path in STUDY.draw(one, tmp_path)]
     costs = stiffness_costs.study("overdamped", ["own:implicit-euler"])
     written += [path.name for path in stiffness_costs.draw(costs, tmp_path)]
@@ -230,7 +237,7 @@ def test_of_joined_masses_with_unlike_friction_the_weakest_decay_sets_explicit_e
 )
 def test_a_study_prints_the_limits_of_the_scene(name: str, method: str, said: str, need: Need) -> None:
     need(method)
-    study = stability.measure(scenes.load_scene(name), [method])
+    study = stability.record(scenes.load_scene(name), None, [method])
     text = "\n".join(str(line) for line in STUDY.lines(study) if isinstance(line, Text))
     text += f"{study.largest(study.limits[0]):.4g}"
     assert said in text
@@ -241,7 +248,7 @@ def test_a_study_prints_the_limits_of_the_scene(name: str, method: str, said: st
 
 def test_a_method_that_cannot_serve_the_scene_has_no_largest_step_there(need: Need) -> None:
     need("own:respa8")
-    study = stability.measure(scenes.load_scene("spring"), ["own:respa8", "own:velocity-verlet"])
+    study = stability.record(scenes.load_scene("spring"), None, ["own:respa8", "own:velocity-verlet"])
     assert [study.largest(x) for x in study.limits] == pytest.approx([np.nan, 2.0], nan_ok=True)
 
 

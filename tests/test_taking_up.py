@@ -111,7 +111,7 @@ def test_a_killed_study_of_precision_keeps_its_points(
 
 def test_points_are_read_back_as_they_were() -> None:
     scene = scenes.load_scene("anharmonic")
-    found = precision.study(scene, [engines.parse(name) for name in OWN[::2]], budget=0.4)
+    found = precision.record(scene, [engines.parse(name) for name in OWN[::2]], budget=0.4)
     assert len(found.methods) == len(OWN[::2])
     for method in found.methods:
         points = found.of(method.method)

@@ -103,7 +103,7 @@ def test_every_word_of_a_study_of_precision_is_on_every_terminal(
     from springcheck.studies.precision import text
 
     scene = scenefile.load_scene("spring-uneven")
-    found = precision.study(scene, list(engines.match(("own:euler", "own:semi-implicit-euler"))), budget=0.5)
+    found = precision.record(scene, list(engines.match(("own:euler", "own:semi-implicit-euler"))), budget=0.5)
 
     on_terminals(text.lines(found, Namespace(points=True)), monkeypatch, capsys)
 

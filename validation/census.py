@@ -38,7 +38,7 @@ from springcheck.cli import main as springcheck
 from springcheck.engines import Label, registry
 from springcheck.figures.looks import title
 from springcheck.physics.scenefile import load_scene
-from springcheck.studies.census.measure import agrees, measure
+from springcheck.studies.census.measure import agrees, record
 from springcheck.studies.census.result import Census
 
 MEASURED = {
@@ -335,7 +335,7 @@ def main() -> int:
     given = arguments(__doc__, what=("compare", "table", "states"), methods=[])
     if given.what in ("table", "states"):
         return everything(given.methods) if given.what == "table" else states()
-    found = measure()
+    found = record()
     for line in table(found):
         print(line)
     wrong = differences(found)

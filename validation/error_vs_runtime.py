@@ -59,9 +59,11 @@ def failures(study: PrecisionStudy) -> list[str]:
     out = []
     for method in study.methods:
         scheme = SCHEMES[engines.method(engines.parse(method.method)).scheme]
-        order, error = method.order, method.order_standard_error
-        if order is not None and error is not None and not (abs(order - scheme.order) < 0.02 > 2 * error):
-            out.append(f"{study.scene.name} {method.method}: order {order:.4f} +- {error:.4f}")
+        fit = method.fit
+        if fit and not (abs(fit.order - scheme.order) < 0.02 > 2 * fit.standard_error):
+            out.append(
+                f"{study.scene.name} {method.method}: order {fit.order:.4f} +- {fit.standard_error:.4f}"
+            )
         ratio = method.floor_ratio
         if ratio is not None and not 0.1 < ratio < 10:
             out.append(f"{study.scene.name} {method.method}: floor {ratio:.2g} times its condition")
@@ -76,7 +78,7 @@ def main() -> int:
     for name in SCENES:
         scene = scenes.load_scene(name)
         labels, _, _ = choose(scene, ())
-        study = precision.study(scene, labels, budget=budget)
+        study = precision.record(scene, labels, budget=budget)
         print(as_text(text.lines(study)))
         for path in STUDY.draw(study, folder / name):
             print(str(path))

@@ -143,7 +143,7 @@ def main() -> int:
     """Print counts, reasons and windows, and draw the atlas; 1 where a cell is silently wrong."""
     folder = arguments(__doc__, folder=Path("figures")).folder
     began = time.perf_counter()
-    atlas = extremes.measure()
+    atlas = extremes.record()
     every = (*atlas.cells, *solver_cells.cells(), *long_cells.cells())
     atlas = replace(atlas, cells=every, windows=tuple(extremes.windows(every)))
     print(f"{len(atlas.cells)} cells in {time.perf_counter() - began:.0f} s: {dict(atlas.counts())}")

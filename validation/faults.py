@@ -17,9 +17,8 @@ Expected (smallest relative size that any check sees on one spring, h w = 0.09, 
 
 import clean
 from arguments import arguments, script
-from springcheck.studies.faults.measure import study
+from springcheck.studies.faults.measure import record
 from springcheck.studies.faults.result import FaultReport
-from springcheck.studies.keeper import Keeper
 from springcheck.studies.team import Processes
 
 SHARPEST = 5
@@ -41,7 +40,7 @@ def main() -> int:
     """Print the table; the exit status says whether the claim holds."""
     arguments(__doc__)
     team = Processes(2)
-    found = study(kept=Keeper(team=team))
+    found = record(team=team)
     right = clean.together([one for _, one in team.carried_out(clean.parts())])
     for line in table(found):
         print(line)

@@ -79,12 +79,12 @@ def record(path: str | Path | None, methods: Sequence[str], cells: int) -> Atlas
     """The atlas of these labels or globs with about so many cells, kept in a store as it goes."""
     labels = engines.match(tuple(methods) or measure.everything())
     with keeper.kept(path, keeper.command("extremes", labels, f"{cells} cells")) as kept:
-        usual = measure.measure(methods, kept=kept)
+        usual = measure.measure(labels, kept)
         here = [engines.parse(name) for name in dict.fromkeys(cell.method for cell in usual.cells)]
         found = [cell for part in kept.results(pieces(here, cells - len(usual.cells))) for cell in part]
         every = (*usual.cells, *found)
         atlas = replace(usual, cells=every, windows=tuple(measure.windows(every)))
-        kept.commit("extremes", {"tables": kept.names, **atlas.document(cells=False)})
+        kept.commit("extremes", atlas.kept_document(kept.names))
     return atlas
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from arguments import arguments, script
 from springcheck import load_scene
 from springcheck.studies.census import STUDY as CENSUS
-from springcheck.studies.census.measure import measure
+from springcheck.studies.census.measure import record
 from springcheck.studies.run import STUDY as RUN
 from springcheck.studies.run.measure import run, stored
 
@@ -27,7 +27,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as name:
         path = Path(name, "spring.h5")
         report = run(load_scene("spring"), path)
-        census = measure()
+        census = record()
         drawn = RUN.draw(stored(path), Path(name)) + CENSUS.draw(census, Path(name))
         for path in drawn:
             if path.name in NAMES:

@@ -52,7 +52,7 @@ def main() -> int:
     folder = arguments(__doc__, folder=Path("figures")).folder
     passed = True
     for name in SCENES:
-        study = stability.measure(scenes.load_scene(name))
+        study = stability.record(scenes.load_scene(name))
         passed &= study.passed
         print(f"## {name}")
         if name == SCENES[0]:

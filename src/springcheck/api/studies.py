@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from springcheck.api.showing import Said, Shelf
-from springcheck.api.taking import Step, how, labels_of, scene_of, spoken
+from springcheck.api.taking import Step, scene_of, spoken, taken
 from springcheck.errors import SpringcheckError
 from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
@@ -35,14 +34,13 @@ def precision(
     from springcheck.studies.precision import measure
 
     found = scene_of(scene)
-    with spoken(), labels_of(methods) as named:
+    with taken(methods, force, workers) as (named, how):
         if not 0 < budget < math.inf:
             raise SpringcheckError(f"budget={budget}: a number of seconds above 0 is needed")
         from springcheck.studies.choose import choose
 
         labels, left, _ = choose(found, named)
-        done = measure.record(found, labels, path, budget=budget, **how(methods, force, workers))
-    return replace(done, left_out=tuple(left))
+        return measure.record(found, labels, path, budget=budget, left=left, **how)
 
 
 def stability(
@@ -53,8 +51,8 @@ def stability(
     the largest step [T] on this scene."""
     from springcheck.studies.stability import measure
 
-    with spoken(), labels_of(methods) as named:
-        return measure.record(scene_of(scene), path, named, **how(methods, force, workers))
+    with taken(methods, force, workers) as (named, how):
+        return measure.record(scene_of(scene), path, named, **how)
 
 
 def extremes(
@@ -67,16 +65,16 @@ def extremes(
     """
     from springcheck.studies.extremes import measure
 
-    with spoken(), labels_of(methods) as named:
-        return measure.record(path, named, quick=quick, **how(methods, force, workers))
+    with taken(methods, force, workers) as (named, how):
+        return measure.record(path, named, quick=quick, **how)
 
 
 def faults(*, path: str | Path | None = None, force: bool = False, workers: int = 1) -> FaultReport:
     """Engines broken on purpose: which checks see each, and down to which size.  It takes minutes."""
     from springcheck.studies.faults import measure
 
-    with spoken():
-        return measure.record(path, **how((), force, workers))
+    with taken((), force, workers) as (_, how):
+        return measure.record(path, **how)
 
 
 def census(
@@ -89,8 +87,8 @@ def census(
     """
     from springcheck.studies.census import measure
 
-    with spoken(), labels_of(methods) as named:
-        return measure.record(path, named, thermostats=thermostats, **how(methods, force, workers))
+    with taken(methods, force, workers) as (named, how):
+        return measure.record(path, named, thermostats=thermostats, **how)
 
 
 def sampling(
@@ -100,8 +98,8 @@ def sampling(
     """How well thermostats sample a spring: temperatures, precision and limits, each beside its law."""
     from springcheck.studies.sampling import measure
 
-    with spoken(), labels_of(methods) as named:
-        return measure.record(path, named, **how(methods, force, workers))
+    with taken(methods, force, workers) as (named, how):
+        return measure.record(path, named, **how)
 
 
 def ensemble(
@@ -123,10 +121,10 @@ def ensemble(
         f"{field}={values if isinstance(values, str) else ','.join(repr(float(x)) for x in values)}"
         for field, values in vary.items()
     ]
-    with spoken(), labels_of(methods) as named:
+    with taken(methods, force, workers) as (named, how):
         text = found.to_toml() if isinstance(scene, Scene) else scenefile.text_of(scene)
         cells = plan(given, samples, seed, text=text)
-        return measure.record(found, cells, path, named, **how(methods, force, workers))
+        return measure.record(found, cells, path, named, **how)
 
 
 def methods(scene: Scene | str | Path | None = None) -> Shelf:

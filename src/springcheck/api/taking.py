@@ -38,16 +38,6 @@ def labels_of(methods: str | Step | Sequence[str | Step], scheme: str = "") -> I
         yield [one if isinstance(one, str) else next(named) for one in several]
 
 
-def how(methods: Any, force: bool, workers: int) -> How:
-    """How a study is measured.  A function of this process is not known to others."""
-    several = [methods] if isinstance(methods, str) or callable(methods) else methods
-    if workers > 1 and any(callable(one) for one in several):
-        raise SpringcheckError("workers: a function of yours is known to this process alone; leave it out")
-    from springcheck.studies.team import Processes
-
-    return {"force": force, "progress": None, "team": Processes(workers)}
-
-
 @contextmanager
 def spoken() -> Iterator[None]:
     """Messages that name options of the command name the arguments of the call instead."""
@@ -59,6 +49,18 @@ def spoken() -> Iterator[None]:
         if said != str(error):
             raise type(error)(said) from error
         raise
+
+
+@contextmanager
+def taken(methods: Any, force: bool, workers: int) -> Iterator[tuple[list[str], How]]:
+    """Labels of these methods for a study, and how it is measured: functions of yours by this process."""
+    from springcheck.studies.team import Processes
+
+    several = [methods] if isinstance(methods, str) or callable(methods) else methods
+    if workers > 1 and any(callable(one) for one in several):
+        raise SpringcheckError("workers: a function of yours is known to this process alone; leave it out")
+    with spoken(), labels_of(methods) as named:
+        yield named, {"force": force, "progress": None, "team": Processes(workers)}
 
 
 def scene_of(scene: Scene | str | Path) -> Scene:

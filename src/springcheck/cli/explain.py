@@ -113,7 +113,7 @@ def _seen(check: Any) -> Iterator[str]:
 
     if check.name not in measure.RECORDED:
         return
-    passed = [fault.name for fault in FAULTS if measure.passes(fault, check.name)]
+    passed = [fault.name for fault in FAULTS if measure.probe(fault)(check.name, fault.size)]
     if passed:
         yield _line(f"Does not see, at the sizes of `springcheck faults`: {', '.join(passed)}")
 

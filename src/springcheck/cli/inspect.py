@@ -11,12 +11,12 @@ from springcheck import engines, schemes, store
 from springcheck.errors import SpringcheckError
 from springcheck.physics.trajectory import Trajectory
 from springcheck.studies import STUDIES, keeper
-from springcheck.studies.study import Result, Study
+from springcheck.studies.study import Study, StudyResult
 from springcheck.text.lines import Lines, TextTable, plain, table
 from springcheck.text.wording import ordinal
 
 
-def held(summary: store.Summary) -> Iterator[tuple[Study, Result]]:
+def held(summary: store.Summary) -> Iterator[tuple[Study, StudyResult]]:
     """The studies of a store, each with its result.  StoreError where one of them cannot be read."""
     learn(summary)
     for study in STUDIES:

@@ -6,7 +6,7 @@ from argparse import Namespace
 from typing import Any, Protocol
 
 Argument = tuple[tuple[str, ...], dict[str, Any]]
-"""An argument of a command: its names, and what argparse is told of it."""
+"""An argument of a command: its names, and the keywords of argparse's `add_argument`."""
 
 
 class Progress(Protocol):

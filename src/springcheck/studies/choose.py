@@ -1,4 +1,4 @@
-"""Which methods a study of a scene takes, and why it leaves the others out."""
+"""Selection of the methods of a study, with the reason for each that is left out."""
 
 from __future__ import annotations
 
@@ -21,12 +21,17 @@ class LeftOut:
 
 
 def sorted_out(
-    labels: Iterable[Label], reason: Callable[[Label], str | None]
+    labels: Iterable[Label], reason: Callable[[Label], str | None], needed: str = ""
 ) -> tuple[list[Label], list[LeftOut]]:
-    """Methods for which `reason` is None, and the others with their reasons."""
+    """Methods for which `reason` is None, and the others with their reasons.  MethodError where there is none
+    of the former and something is `needed` of them."""
     reasons = {label: reason(label) for label in labels}
     left = [LeftOut(method=str(label), reason=why) for label, why in reasons.items() if why]
-    return [label for label, why in reasons.items() if not why], left
+    usable = [label for label, why in reasons.items() if not why]
+    if needed and not usable:
+        whys = "; ".join(f"{one.method}: {one.reason}" for one in left)
+        raise MethodError(f"none of these methods {needed}: {whys}")
+    return usable, left
 
 
 ALL = "*:?*"

@@ -89,21 +89,18 @@ class Cluster:
                 stack.callback(logger.setLevel, logger.level)
                 logger.setLevel(logging.CRITICAL)
             try:
+                said = "no scheduler answers: {}"
                 client = distributed.Client(self._address, timeout=WAITING, set_as_default=False)
-            except (OSError, ValueError, TimeoutError) as error:
-                raise SpringcheckError(f"--cluster {self.place}: no scheduler answers: {error}") from error
-            stack.callback(client.close, timeout=1)
-            try:
+                stack.callback(client.close, timeout=1)
+                said = "the scheduler has no worker"
                 client.wait_for_workers(1, timeout=WAITING)
-            except (TimeoutError, OSError) as error:
-                raise SpringcheckError(f"--cluster {self.place}: the scheduler has no worker") from error
-            try:
                 # the scheduler unpacks what passes through it
+                said = "springcheck is not installed where the scheduler runs: {}"
                 _on_scheduler(client, provenance.versions)
+            except SpringcheckError:
+                raise
             except Exception as error:
-                raise SpringcheckError(
-                    f"--cluster {self.place}: springcheck is not installed where the scheduler runs: {error}"
-                ) from error
+                raise SpringcheckError(f"--cluster {self.place}: {said.format(error)}") from error
             yield client
 
 

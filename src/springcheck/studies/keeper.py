@@ -6,10 +6,10 @@ import json
 from argparse import Namespace
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, partial, wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypedDict, TypeVar
+from typing import TYPE_CHECKING, Any, TypedDict, TypeVar, Unpack
 
 import msgspec
 import numpy as np
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Draft", "Keeper", "Kept", "Piece", "Table", "command", "each", "kept", "origin", "plain", "read",
-    "restoring",
+    "restoring", "study",
 ]  # fmt: skip
 
 T = TypeVar("T")
@@ -72,7 +72,7 @@ def each(
 
 
 class Keeper:
-    """What an earlier call has finished, and where this one keeps what it finishes.
+    """Access to the pieces that an earlier call has finished, and the place where this call saves its own.
 
     Without a journal nothing was finished and nothing is kept.
     """
@@ -107,10 +107,10 @@ class Keeper:
     def keep(
         self, form: Form[Any], key: str, found: Any, by: Mapping[str, str] | None = None, **attributes: Any
     ) -> None:
-        """Keep a result, in the place of an earlier one of its key: from here on it outlives crashes.
+        """Save a result under its key, replacing an earlier one; from here on it survives a crash.
 
-        `by` is the worker that measured it, this process where it is left out; with those of what it replaces
-        it is kept beside it.
+        `by` identifies the worker that measured it (default: this process).  The workers of a result that is
+        replaced stay recorded with it.
         """
         if self._journal is None:
             return
@@ -136,7 +136,7 @@ class Keeper:
         return [found[piece.name] for piece in pieces]
 
     def stream(self, pieces: Sequence[Piece]) -> Iterator[tuple[Piece, Any]]:
-        """Pieces and results as they come, none of them held in memory: those of earlier calls first."""
+        """Pieces with their results as they finish, those of earlier calls first; none is held in memory."""
         self.names += [piece.name for piece in pieces]
         left = []
         for piece in pieces:
@@ -179,7 +179,7 @@ class Keeper:
 
 
 class How(TypedDict, total=False):
-    """Whether an existing store is written anew, who is told of the progress, and who measures."""
+    """How a study is run: whether an existing store is overwritten, the progress callback, the executor."""
 
     force: bool
     progress: Progress | None
@@ -192,24 +192,31 @@ def how(options: Namespace, progress: Progress | None) -> How:
 
 
 @contextmanager
-def kept(
-    path: str | Path | None,
-    command: str,
-    *,
-    force: bool = False,
-    progress: Progress | None = None,
-    team: Team = ALONE,
-) -> Iterator[Keeper]:
+def kept(path: str | Path | None, command: str, **how: Unpack[How]) -> Iterator[Keeper]:
     """A study that is kept in a store; an unfinished one of the same command is resumed.  Without a path
     nothing is kept.
 
     Raises StoreError, before anything is measured, when the file exists or cannot be written.
     """
+    progress, team = how.get("progress"), how.get("team", ALONE)
     if path is None:
         yield Keeper(None, progress, team)
         return
-    with open_new(path, command, force=force) as journal:
+    with open_new(path, command, force=how.get("force", False)) as journal:
         yield Keeper(journal, progress, team, Path(path))
+
+
+def study(
+    name: str, path: str | Path | None, labels: Sequence[Label], measure: Callable[[Keeper], T],
+    *options: str, scene: Scene | None = None, **how: Unpack[How],
+) -> T:  # fmt: skip
+    """A study of these methods as `measure` makes it, kept in a store (see `kept`); `options` are all else
+    that decides its numbers beside the scene."""
+    more = options if scene is None else (scene.digest, *options)
+    with kept(path, command(name, labels, *more), **how) as keeper:
+        found: Any = replace(measure(keeper), resumed=keeper.resumed, path=keeper.path)  # type: ignore[type-var]
+        keeper.commit(name, found.document(), scene)
+    return found  # type: ignore[no-any-return]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from springcheck.studies.arguments import Argument, Progress
 
@@ -25,21 +25,8 @@ if TYPE_CHECKING:
     from springcheck.text.lines import Lines
 
 
-class Result(Protocol):
-    """What a study has found."""
-
-    @property
-    def status(self) -> int:
-        """Exit status: 0 passed, 1 a verdict or a control failed, 2 nothing was measured."""
-        ...
-
-    def document(self) -> dict[str, Any]:
-        """Plain data for JSON; what is not a finite number is None."""
-        ...
-
-
-class Shown:
-    """How what a study has found shows itself in Python: in a line, as the command's text, as a table.
+class StudyResult:
+    """What a study has found, and how that shows itself in Python: in a line, as the command's text, a table.
 
     Its class stands beside the `STUDY` of its package.
     """
@@ -48,19 +35,28 @@ class Shown:
     table_of: ClassVar[str] = ""
     """The key of its document under which the rows of its table stand."""
 
+    @property
+    def status(self) -> int:
+        """Exit status: 0 passed, 1 a verdict or a control failed, 2 nothing was measured."""
+        raise NotImplementedError
+
+    def document(self) -> dict[str, Any]:
+        """Plain data for JSON; what is not a finite number is None."""
+        raise NotImplementedError
+
     def __str__(self) -> str:
         from springcheck.text.lines import as_text
 
-        return as_text(study_of(self).lines(self))  # type: ignore[arg-type]
+        return as_text(study_of(self).lines(self))
 
     def _repr_html_(self) -> str:
         from springcheck.text.lines import as_html
 
-        return as_html(study_of(self).lines(self))  # type: ignore[arg-type]
+        return as_html(study_of(self).lines(self))
 
     def rows(self) -> list[dict[str, Any]]:
         """The rows of its table as plain data; numbers that are not known are None."""
-        found: list[dict[str, Any]] = self.document()[self.table_of]  # type: ignore[attr-defined]
+        found: list[dict[str, Any]] = self.document()[self.table_of]
         return found
 
     def to_dataframe(self) -> Any:
@@ -74,12 +70,12 @@ class Shown:
         from springcheck.figures.style import style
 
         with style():
-            return study_of(self).pictures(self)  # type: ignore[arg-type]
+            return study_of(self).pictures(self)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Studied(Shown):
-    """What every study says that is kept as a document."""
+class Studied(StudyResult):
+    """What every study says that is kept in a store by its document and tables."""
 
     left_out: tuple[LeftOut, ...] = ()
     resumed: int = 0
@@ -112,7 +108,7 @@ class Study:
     package: str = ""
     """Where its parts are; left out: in the folder of its name."""
 
-    def perform(self, options: Namespace, progress: Progress | None) -> Result:
+    def perform(self, options: Namespace, progress: Progress | None) -> StudyResult:
         """Measure what the command line asks for; SpringcheckError for what a user can mend."""
         # first, while the stack is short: beyond a chunk of it Python 3.11 maps memory for every call, and to
         # make the terms' classes takes hundreds
@@ -122,10 +118,10 @@ class Study:
             # the program has switched it off for its imports: what was imported stays, and is not searched
             gc.freeze()
             gc.enable()
-        found: Result = measure.perform(options, progress)
+        found: StudyResult = measure.perform(options, progress)
         return found
 
-    def lines(self, found: Result, options: Namespace | None = None, path: Path | None = None) -> Lines:
+    def lines(self, found: StudyResult, options: Namespace | None = None, path: Path | None = None) -> Lines:
         """The report as text; with the `path` of its store the one that `inspect` shows."""
         lines: Lines = self._part("text").lines(found, options)
         where: Path | None = path or getattr(found, "path", None)
@@ -141,12 +137,12 @@ class Study:
         """Whether a store holds a study of this kind."""
         return bool(summary.runs) if self.trajectories else self.name in summary.documents
 
-    def stored(self, path: Path) -> Result:
+    def stored(self, path: Path) -> StudyResult:
         """What a store holds of this study.  StoreError where it cannot be read."""
-        found: Result = self._part("measure").stored(path)
+        found: StudyResult = self._part("measure").stored(path)
         return found
 
-    def draw(self, found: Result, folder: Path, **chosen: Any) -> list[Path]:
+    def draw(self, found: StudyResult, folder: Path, **chosen: Any) -> list[Path]:
         """Draw a stored or a fresh result into a folder, as it is `chosen`; returns the files."""
         from springcheck.figures.style import save, style
 
@@ -154,7 +150,7 @@ class Study:
             pictures = self.pictures(found, **chosen)
             return [path for name, picture in pictures.items() for path in save(picture, folder, name)]
 
-    def pictures(self, found: Result, **chosen: Any) -> dict[str, Any]:
+    def pictures(self, found: StudyResult, **chosen: Any) -> dict[str, Any]:
         """Its figures as matplotlib's, by name."""
         if self._has("figure"):
             drawn: dict[str, Any] = self._part("figure").pictures(found, **chosen)
@@ -163,7 +159,7 @@ class Study:
 
         return {bank.name: render.picture(bank) for bank in self.banks(found, **chosen) if bank.name}
 
-    def banks(self, found: Result, **chosen: Any) -> list[Bank]:
+    def banks(self, found: StudyResult, **chosen: Any) -> list[Bank]:
         """Its charts in figures and in the report page; none where it has no such part."""
         if not self._has("page"):
             return []

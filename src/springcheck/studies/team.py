@@ -1,4 +1,4 @@
-"""Who measures the pieces of a study: this process, processes beside it, or the workers of a cluster.
+"""Executors of the pieces of a study: this process, processes beside it, or the workers of a cluster.
 
 The parent alone writes.  A piece is a function that another process can import, and what it returns travels
 back; so the numbers are the same whoever measures them.
@@ -10,7 +10,7 @@ from argparse import ArgumentTypeError, Namespace
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from springcheck.studies.arguments import Argument, argument
 
@@ -45,18 +45,13 @@ class Processes:
         """Numbers and results of the parts, as they finish."""
         from springcheck.studies.workers import carried_out
 
-        numbered = [partial(_numbered, i, part) for i, part in enumerate(parts)]
         if self.workers > 1 and self.brought is not None:
-            numbered = [partial(_after, self.brought, part) for part in numbered]
-        return carried_out(numbered, self.workers)
-
-
-def _numbered(i: int, part: Callable[[], Any]) -> tuple[int, Any]:
-    return i, part()
+            parts = [partial(_after, self.brought, part) for part in parts]
+        return carried_out(parts, self.workers)
 
 
 def _after(brought: Brought, part: Callable[[], T]) -> T:
-    """A part that runs what a call has brought, in a process that may not have it yet."""
+    """Run a part in a process that may not yet know the engines that the call has brought."""
     from springcheck import doors
 
     doors.bring_once(brought)

@@ -22,19 +22,19 @@ from springcheck.errors import SpringcheckError
 T = TypeVar("T")
 
 
-def carried_out(parts: Sequence[Callable[[], T]], workers: int) -> Generator[T, None, None]:
-    """What the parts return, as they finish; with one worker here, else in so many processes.
+def carried_out(parts: Sequence[Callable[[], T]], workers: int) -> Generator[tuple[int, T], None, None]:
+    """Numbers and results of the parts, as they finish; with one worker here, else in so many processes.
 
     Parts must be functions that another process can import.  Close the iterator where it is left early.
     An exception of a part is raised here.  SpringcheckError: a process cannot be started, or has ended
     without an answer.
     """
     if workers <= 1:
-        for part in parts:
-            yield part()
+        for i, part in enumerate(parts):
+            yield i, part()
         return
     _is_a_file(sys.modules["__main__"])
-    ahead = list(reversed(parts))
+    ahead = [*enumerate(parts)][::-1]
     team: dict[Any, Any] = {}
     try:
         for _ in range(min(workers, len(parts))):
@@ -73,21 +73,21 @@ def _is_a_file(main: Any) -> None:
         )
 
 
-def _send(part: Any, ours: Any, team: dict[Any, Any]) -> None:
+def _send(numbered: Any, ours: Any, team: dict[Any, Any]) -> None:
     try:
-        ours.send(part)
+        ours.send(numbered)
     except OSError:
         raise _gone(team[ours]) from None
 
 
 def _answer(ours: Any, team: dict[Any, Any]) -> Any:
     try:
-        good, found = ours.recv()
+        i, good, found = ours.recv()
     except (EOFError, OSError):
         raise _gone(team[ours]) from None
     if not good:
         raise found
-    return found
+    return i, found
 
 
 def _gone(process: Any) -> SpringcheckError:
@@ -104,7 +104,7 @@ def _ended(process: Any) -> None:
 
 @contextmanager
 def _deaf() -> Iterator[None]:
-    """Processes that are started in here do not hear Ctrl-C: their parent stops them."""
+    """Block SIGINT in processes started within this context: Ctrl-C reaches the parent, which stops them."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
@@ -116,17 +116,17 @@ def _deaf() -> Iterator[None]:
 
 
 def _work(theirs: Connection) -> None:
-    """A worker: parts in, answers out, until there are no more or the parent has gone."""
+    """The loop of a worker: receive parts and send results until there are no more or the parent has died."""
     threading.Thread(target=_end_with_parent, daemon=True).start()
     while True:
         try:
-            part = theirs.recv()
+            i, part = theirs.recv()
         except EOFError:
             return
         try:
-            answer = True, part()
+            answer = i, True, part()
         except Exception as error:
-            answer = False, error
+            answer = i, False, error
         theirs.send(answer)
 
 

@@ -37,14 +37,23 @@ BLOG, UNEVEN = "spring", "spring-uneven"
 REPEATS = 2
 
 MOST_SUBSTEPS = 64
-"""Most substeps over which a force is said to be held; over more it is held for good."""
+"""Most substeps over which a held force is named as such; beyond, it counts as never renewed."""
 
 
-def measure(methods: Sequence[str] = (), *, thermostats: bool = False, kept: Keeper | None = None) -> Census:
+def record(
+    path: str | Path | None = None, methods: Sequence[str] = (), *, thermostats: bool = False,
+    **how: Unpack[How],
+) -> Census:  # fmt: skip
     """Run and name every method that these labels or globs name, all that are here when none is given.
 
-    With `thermostats` globs name those too.  Raises MethodError where none of them can be run.
+    With `thermostats` globs name those too.  An unfinished census of the same command is resumed.  Raises
+    MethodError where none of them can be run.
     """
+    labels = engines.match(tuple(methods) or (EVERY,), bath=None if thermostats else False)
+    return keeper.study("census", path, labels, partial(_measure, labels), **how)
+
+
+def _measure(labels: Sequence[Label], kept: Keeper) -> Census:
     scenes = load_scene(BLOG), load_scene(UNEVEN)
 
     def why(label: Label) -> str | None:
@@ -53,19 +62,14 @@ def measure(methods: Sequence[str] = (), *, thermostats: bool = False, kept: Kee
         return next(filter(None, reasons), None) or _absence(label)
 
     broken = [LeftOut(method=name, reason=reason) for name, reason in engines.unusable().items()]
-    usable, left = sorted_out(_labels(methods, thermostats), why)
+    usable, left = sorted_out(labels, why)
     left = [*broken, *left]
     if not usable:
         raise MethodError(f"none of these methods moves a spring: {left[0].method}: {left[0].reason}")
-    kept = kept or Keeper()
     found = kept.results(each(usable, "", lambda label: partial(entry, label), ENTRIES))
     # workers have ended: nothing of ours runs beside what is timed
     entries = [_timed(label, one, kept) for label, one in zip(usable, found, strict=True)]
-    return Census(entries=tuple(entries), left_out=tuple(left), resumed=kept.resumed, path=kept.path)
-
-
-def _labels(methods: Sequence[str], thermostats: bool) -> tuple[Label, ...]:
-    return engines.match(tuple(methods) or (EVERY,), bath=None if thermostats else False)
+    return Census(entries=tuple(entries), left_out=tuple(left))
 
 
 def _timed(label: Label, one: Entry, kept: Keeper) -> Entry:
@@ -85,17 +89,6 @@ def _absence(label: Label) -> str | None:
     except MethodError as error:
         return str(error)
     return None
-
-
-def record(
-    path: str | Path | None, methods: Sequence[str] = (), *, thermostats: bool = False, **how: Unpack[How]
-) -> Census:
-    """Like `measure`, kept in a store; an unfinished census of the same command is resumed."""
-    labels = _labels(methods, thermostats)
-    with keeper.kept(path, keeper.command("census", labels), **how) as kept:
-        census = measure(methods, thermostats=thermostats, kept=kept)
-        kept.commit("census", census.document())
-    return census
 
 
 def perform(options: Namespace, progress: Progress | None) -> Census:
@@ -153,7 +146,6 @@ def entry(label: Label) -> Entry:
         constraint=rigid.constraint(label),
         amplitude=float(np.hypot(orbit.q[-1, 0], orbit.p[-1, 0])),
         force_calls=run.force_calls / steps,
-        seconds=np.nan,
         digest=hashlib.sha256(states.tobytes()).hexdigest()[:16],
         q=orbit.q[:, 0].copy(),
         p=orbit.p[:, 0].copy(),

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from math import nan
 from typing import Any, ClassVar
+
+import numpy as np
 
 from springcheck.physics.arrays import Floats
 from springcheck.studies import keeper
@@ -32,18 +34,18 @@ class Entry:
     """Whether the two have the same map; True where nothing can be compared."""
     substeps: int
     """Steps of the found scheme from one state to the next; 0 where none was found."""
-    velocity_offset: float
+    velocity_offset: float = nan
     """Time of the velocities after that of the positions, in steps."""
-    area: float
+    area: float = nan
     """Determinant of the measured map of one step less 1: 0 for a step that keeps area."""
     trace: float = nan
     """Its trace: with the determinant all that a map shows whatever the units and the time of velocities."""
-    friction: float
+    friction: float = nan
     """Friction c/m that nobody asked for, with the stiffness as stated [1/T]."""
     precision: str
-    limit: float
+    limit: float = nan
     """The least h omega at which the measured map grows; 0: it always does; NaN: not known, or adaptive."""
-    bounded: bool
+    bounded: bool = False
     """Whether no map up to h omega = 4 grows; `limit` is infinity then."""
     thermostat: str = ""
     """The heat bath that is on, as its scheme's title; "" where none is."""
@@ -58,17 +60,17 @@ class Entry:
     kinetic: float = nan
     """m <v**2>/kT where a thermostat is on."""
     kinetic_error: float = nan
-    amplitude: float
+    amplitude: float = nan
     """Amplitude of the blog's spring after its 200 steps; 1 is exact."""
     force_calls: float
     """A step, counted by us."""
-    seconds: float
+    seconds: float = nan
     """A step, on `spring-uneven`, every state read; with nothing of ours beside it."""
     digest: str
     """Digest of the states of the blog's spring: equal for engines that agree bit for bit."""
-    q: Floats
+    q: Floats = field(default_factory=lambda: np.empty(0))
     """The orbit of the blog's spring (f,)."""
-    p: Floats
+    p: Floats = field(default_factory=lambda: np.empty(0))
 
 
 ENTRIES: RecordForm[Entry] = RecordForm(kind=Entry, beginning="census/", signal="p", axes=("q",))
@@ -118,7 +120,7 @@ class Census(Studied):
 
     def document(self) -> dict[str, Any]:
         """Plain data for JSON; the orbits are in the tables of the store."""
-        names = [field.name for field in fields(Entry) if field.name not in ("q", "p")]
+        names = [one.name for one in fields(Entry) if one.name not in ("q", "p")]
         partners = self.partners
         rows = [
             {**{name: getattr(x, name) for name in names}, "partners": partners[x.method]}

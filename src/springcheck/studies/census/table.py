@@ -53,8 +53,8 @@ WATCHED: Mapping[str, tuple[str, Callable[[Mapping[str, Any]], str]]] = {
     ),
     "amplitude": ("amplitude of the blog's spring (exact: 1)", lambda x: number(x["amplitude"], ".4f")),
 }
-"""Columns of which a change is said: their titles, and their texts of an entry of the document.  Versions are
-named beside it."""
+"""Columns whose changes are reported: their titles, and their texts of an entry of the document.  Versions
+are named beside them."""
 
 
 def rows(document: Mapping[str, Any]) -> Cells:

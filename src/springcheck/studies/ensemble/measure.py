@@ -8,7 +8,7 @@ kept, so neither the file nor memory holds trajectories, however many cells ther
 from __future__ import annotations
 
 from argparse import Namespace
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, Unpack
@@ -19,15 +19,15 @@ from springcheck import engines
 from springcheck.engines.contract import Label
 from springcheck.errors import MethodError, SceneError
 from springcheck.physics import exact, scenefile
-from springcheck.physics.arrays import Floats, Reals
+from springcheck.physics.arrays import Extended, Floats, Integers, Reals
 from springcheck.physics.scene import Scene
 from springcheck.studies import keeper
 from springcheck.studies.arguments import Progress
-from springcheck.studies.choose import choose
+from springcheck.studies.choose import LeftOut, choose
 from springcheck.studies.ensemble.result import CELLS, Columns, Ensemble, Tally
-from springcheck.studies.ensemble.vary import GRID, Plan, Varied, plan, together
+from springcheck.studies.ensemble.vary import CHUNK, GRID, Plan, Varied, plan, together
 from springcheck.studies.extremes.running import raw
-from springcheck.studies.keeper import How, Piece
+from springcheck.studies.keeper import How, Keeper, Piece
 
 NUMBERS = 1 << 17
 """Numbers per array of a run: memory does not grow with the number of cells."""
@@ -54,40 +54,40 @@ def record(
     if scene.bath:
         raise SceneError(f"scene {scene.name} has a bath: cells of an ensemble are of motion without noise")
     labels, left, _ = choose(scene, methods)
-    fields = tuple(axis.field for axis in cells.axes)
     varied, first = Varied(scene, cells), cells.values(0)
     varied.check(first, varied.substitutions(first))
-    command = keeper.command("ensemble", labels, scene.digest, repr(cells))
-    with keeper.kept(path, command, **how) as kept:
-        tallies = {str(label): Tally(method=str(label), smallest={}, largest={}) for label in labels}
-        pieces = [
-            Piece(
-                key=f"{label}/{chunk:06d}",
-                what=f"{label}, cells from {chunk * len(cells.values(0)[fields[0]])}",
-                measure=partial(measure, scene, cells, chunk, label),
-                form=CELLS,
-            )
-            for label in labels
-            for chunk in cells.chunks
-        ]
-        held: dict[str, Columns] = {}
-        for piece, found in kept.stream(pieces):
-            name = piece.key.rpartition("/")[0]
-            tallies[name] = tallies[name].plus(found)
-            if path is None:
-                held[piece.key] = found
-        ensemble = Ensemble(
-            scene=scene,
-            fields=fields,
-            grid=cells.samples is None,
-            tallies=tuple(tallies.values()),
-            left_out=tuple(left),
-            resumed=kept.resumed,
-            path=kept.path,
-            columns=_joined(held),
+    measure = partial(_measure, scene, cells, labels, left)
+    return keeper.study("ensemble", path, labels, measure, repr(cells), scene=scene, **how)
+
+
+def _measure(
+    scene: Scene, cells: Plan, labels: Sequence[Label], left: Sequence[LeftOut], kept: Keeper
+) -> Ensemble:
+    tallies = {str(label): Tally(method=str(label), smallest={}, largest={}) for label in labels}
+    pieces = [
+        Piece(
+            key=f"{label}/{chunk:06d}",
+            what=f"{label}, cells from {chunk * CHUNK}",
+            measure=partial(measure, scene, cells, chunk, label),
+            form=CELLS,
         )
-        kept.commit("ensemble", ensemble.document(), scene)
-    return ensemble
+        for label in labels
+        for chunk in cells.chunks
+    ]
+    held: dict[str, Columns] = {}
+    for piece, found in kept.stream(pieces):
+        name = piece.key.rpartition("/")[0]
+        tallies[name] = tallies[name].plus(found)
+        if kept.path is None:
+            held[piece.key] = found
+    return Ensemble(
+        scene=scene,
+        fields=tuple(axis.field for axis in cells.axes),
+        grid=cells.samples is None,
+        tallies=tuple(tallies.values()),
+        left_out=tuple(left),
+        columns=_joined(held),
+    )
 
 
 def _joined(chunks: Mapping[str, Columns]) -> dict[str, Columns]:
@@ -188,6 +188,16 @@ def _energies(many: Scene, q: Reals, p: Reals, copies: int) -> Reals:
     return energy
 
 
+def _solved(
+    scene: Scene, changes: Any, chosen: np.ndarray, steps: Integers
+) -> Iterator[tuple[int, Scene, Extended, Extended]]:
+    """The copies whose exact solution is known by itself: number, scene, q and p (f, n)."""
+    for j in range(len(chosen)):
+        one = together(scene, changes, chosen[j : j + 1])
+        if exact.has_true_motion(one):
+            yield j, one, *exact.true_motion(one, steps, one.step)
+
+
 def _drifts(scene: Scene, changes: Any, chosen: np.ndarray, many: Scene, q: Floats, p: Floats) -> Floats:
     """(H - H0) / |H0| of each copy, absolute where H0 is 0 (f, copies).
 
@@ -207,10 +217,8 @@ def _drifts(scene: Scene, changes: Any, chosen: np.ndarray, many: Scene, q: Floa
                 _energies(many, *exact.true_motion(many, steps, many.step), copies), np.float64
             )
         else:
-            for j in range(copies):
-                one = together(scene, changes, chosen[j : j + 1])
-                if exact.has_true_motion(one):
-                    right[:, j] = one.system.energy(*exact.true_motion(one, steps, one.step))
+            for j, one, q_j, p_j in _solved(scene, changes, chosen, steps):
+                right[:, j] = one.system.energy(q_j, p_j)
     start = np.abs(energy[0])
     return np.asarray((energy - right) / np.where(start > 0, start, 1.0), np.float64)
 
@@ -222,13 +230,10 @@ def _errors(scene: Scene, changes: Any, chosen: np.ndarray, many: Scene, q: Floa
     system = many.system
     if not (system.is_separate and system.is_linear) or system.free_groups:
         error = np.full((frames, copies), np.nan)
-        for j in range(copies):
-            one = together(scene, changes, chosen[j : j + 1])
-            if exact.has_true_motion(one):
-                true_q, true_p = exact.true_motion(one, steps, one.step)
-                here = slice(j * one.n, (j + 1) * one.n)
-                off = one.system.norm(q[:, here] - true_q, p[:, here] - true_p)
-                error[:, j] = np.maximum(off, exact.uncertainty(one, float(steps[-1]) * one.step))
+        for j, one, true_q, true_p in _solved(scene, changes, chosen, steps):
+            here = slice(j * one.n, (j + 1) * one.n)
+            off = one.system.norm(q[:, here] - true_q, p[:, here] - true_p)
+            error[:, j] = np.maximum(off, exact.uncertainty(one, float(steps[-1]) * one.step))
         return error
     true_q, true_p = exact.true_motion(many, steps, many.step)
     solution, m = many.system.solution, many.m.astype(np.longdouble)

@@ -153,7 +153,7 @@ def judge(label: Label, specs: Sequence[Spec], scene: Scene, q: Floats, p: Float
                 reason = f"fixed-point forces: a quantum of {how.quantum:.1e} leaves too few digits"
         else:
             j = int(np.argmax(bad))
-            named = _reason(label, how, scene.step, spec, inside, i, np.flatnonzero(bad), low, high)
+            named = _reason(how, spec, inside, i, np.flatnonzero(bad), low, high)
             if named is None:
                 outcome, reason = (
                     "silently wrong",
@@ -168,15 +168,7 @@ def judge(label: Label, specs: Sequence[Spec], scene: Scene, q: Floats, p: Float
 
 
 def _reason(
-    label: Label,
-    how: Arithmetic,
-    step: float,
-    spec: Spec,
-    inside: Sizes,
-    i: int,
-    bad: np.ndarray,
-    low: float,
-    high: float,
+    how: Arithmetic, spec: Spec, inside: Sizes, i: int, bad: np.ndarray, low: float, high: float
 ) -> str | None:
     """A reason that holds at every step that is off, or None."""
     if how.parameters == "single":

@@ -16,7 +16,7 @@ from typing import Unpack
 
 from springcheck import engines
 from springcheck.engines.contract import Label
-from springcheck.errors import MethodError, SpringcheckError
+from springcheck.errors import SpringcheckError
 from springcheck.physics.arrays import WIDE
 from springcheck.studies import keeper
 from springcheck.studies.arguments import Progress
@@ -38,10 +38,12 @@ CALM = (0.01, 1.9)
 """h w that count for a window: below, amplitudes decide and hardly any force shows; beyond, stability."""
 
 
-def measure(methods: Sequence[str] = (), *, quick: bool = False, kept: Keeper | None = None) -> Atlas:
+def record(
+    path: str | Path | None = None, methods: Sequence[str] = (), *, quick: bool = False, **how: Unpack[How]
+) -> Atlas:
     """Run the atlas for these labels or globs; left out: every method, and OpenMM's platforms.
 
-    What an earlier call has finished (`kept`) is reused.
+    A store has a table for each method, and the document (see `keeper.kept`).
 
     Raises:
         MethodError: a label names nothing, or none of the methods is here.
@@ -52,25 +54,21 @@ def measure(methods: Sequence[str] = (), *, quick: bool = False, kept: Keeper | 
             "extremes judges numbers from 1e-300 to 1e300 by wider ones, and long double is no wider than "
             "double on this machine: run it on Linux on x86-64"
         )
-    usable, left_out = sorted_out(engines.match(tuple(methods) or everything()), absence)
-    if not usable:
-        reasons = "; ".join(f"{one.method}: {one.reason}" for one in left_out)
-        raise MethodError(f"none of these methods has extreme cases here: {reasons}")
-    work = [
-        replace(piece, cost=_cost(label))
-        for label, piece in zip(
-            usable, each(usable, "", lambda label: partial(of_method, label, quick=quick), CELLS), strict=True
-        )
-    ]
-    kept = kept or Keeper()
+    labels = engines.match(tuple(methods) or everything())
+    command = keeper.command("extremes", labels, "quick" if quick else "whole")
+    with keeper.kept(path, command, **how) as kept:
+        atlas = replace(measure(labels, kept, quick=quick), resumed=kept.resumed, path=kept.path)
+        kept.commit("extremes", atlas.kept_document(kept.names))
+    return atlas
+
+
+def measure(labels: Sequence[Label], kept: Keeper, *, quick: bool = False) -> Atlas:
+    """The cells of these methods, as far as no earlier call has kept them."""
+    usable, left_out = sorted_out(labels, absence, "has extreme cases here")
+    pieces = each(usable, "", lambda label: partial(of_method, label, quick=quick), CELLS)
+    work = [replace(piece, cost=_cost(label)) for label, piece in zip(usable, pieces, strict=True)]
     found = [cell for piece in kept.results(work) for cell in piece]
-    return Atlas(
-        cells=tuple(found),
-        windows=tuple(windows(found)),
-        left_out=tuple(left_out),
-        resumed=kept.resumed,
-        path=kept.path,
-    )
+    return Atlas(cells=tuple(found), windows=tuple(windows(found)), left_out=tuple(left_out))
 
 
 def _cost(label: Label) -> float:
@@ -88,30 +86,10 @@ def absence(label: Label) -> str | None:
     return engines.absence(label.engine) or propagators.absence(label)
 
 
-def record(
-    path: str | Path | None,
-    methods: Sequence[str] = (),
-    *,
-    quick: bool = False,
-    **how: Unpack[How],
-) -> Atlas:
-    """Like `measure`, kept in a store (see `keeper.kept`): a table for each method, and the document."""
-    labels = engines.match(tuple(methods) or everything())
-    command = keeper.command("extremes", labels, "quick" if quick else "whole")
-    with keeper.kept(path, command, **how) as kept:
-        atlas = measure(methods, quick=quick, kept=kept)
-        kept.commit("extremes", {"tables": kept.names, **atlas.document(cells=False)})
-    return atlas
-
-
 def perform(options: Namespace, progress: Progress | None) -> Atlas:
     """What `springcheck extremes` does."""
-    return record(
-        options.output or "extremes.h5",
-        options.method,
-        quick=options.quick,
-        **keeper.how(options, progress),
-    )
+    how = keeper.how(options, progress)
+    return record(options.output or "extremes.h5", options.method, quick=options.quick, **how)
 
 
 @keeper.restoring("extremes")

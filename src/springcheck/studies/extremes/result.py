@@ -56,15 +56,16 @@ class Atlas(Studied):
         """Exit status: 0 where `passed`."""
         return 0 if self.passed else 1
 
-    def document(self, *, cells: bool = True) -> dict[str, Any]:
-        """Plain data for JSON; in a store the tables hold the cells, and hold them exactly."""
+    def document(self) -> dict[str, Any]:
+        """Plain data for JSON."""
         return document(
-            passed=self.passed,
-            counts=self.counts(),
-            **({"cells": self.cells} if cells else {}),
-            windows=self.windows,
+            passed=self.passed, counts=self.counts(), cells=self.cells, windows=self.windows,
             left_out=self.left_out,
-        )
+        )  # fmt: skip
+
+    def kept_document(self, tables: Sequence[str]) -> dict[str, Any]:
+        """The tables in place of the cells, which they hold exactly."""
+        return {"tables": tables, **{key: x for key, x in self.document().items() if key != "cells"}}
 
 
 def _for_viewers(cells: Sequence[Cell]) -> dict[str, np.ndarray]:

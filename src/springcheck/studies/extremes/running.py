@@ -17,7 +17,7 @@ from springcheck.studies.extremes.judging import Cell
 
 
 def raw(scene: Scene, label: Label) -> tuple[Floats, Floats, str]:
-    """Every frame as the engine leaves it, the start first, finite or not, and what it said if it stopped.
+    """Every frame as the engine leaves it, the start first, finite or not, and its message if it stopped.
 
     The driver ends a run at the first number that is not finite; here that is one cell among many.
     """

@@ -20,7 +20,7 @@ from springcheck.physics.term import Term
 from springcheck.physics.terms import WallSpring
 from springcheck.physics.trajectory import Trajectory
 from springcheck.studies.faults.seeded import Case, Fault
-from springcheck.studies.faults.steppers import trajectory
+from springcheck.studies.faults.steppers import State, record
 from springcheck.thermal import THERMOSTATS, Stepper
 from springcheck.thermal.catalogue import Act
 from springcheck.thermal.stepper import forces
@@ -88,19 +88,15 @@ def played(
         right = scene.system.force_of(terms)
         return lambda q, p: np.asarray(right(q, p) * k)
 
-    force = forces(of, scene.system, stiffer)
-    q, p = np.empty((2, scene.frames, scene.n))
-    a, b = q[0], p[0] = scene.q, scene.p
-    carried = some(of.carried)
-    with np.errstate(all="ignore"):
-        for i in range(1, scene.steps + 1):
-            taken = [*carried, *some(of.fresh)]
-            hit = rng.random(scene.n) < collision * stepper.collision if of.collides else None
-            a, b = stepper(a, b, force, taken, hit)  # type: ignore[assignment]
-            carried = taken[len(taken) - of.carried :]
-            if i % scene.every == 0:
-                q[i // scene.every], p[i // scene.every] = a, b
-    return trajectory(scene, c.scheme, q, p)
+    force, carried = forces(of, scene.system, stiffer), some(of.carried)
+
+    def one(i: int, q: Floats, p: Floats) -> State:
+        taken = [*carried, *some(of.fresh)]
+        hit = rng.random(scene.n) < collision * stepper.collision if of.collides else None
+        carried[:] = taken[len(taken) - of.carried :]
+        return stepper(q, p, force, taken, hit)  # type: ignore[return-value]
+
+    return record(scene, c.scheme, one)
 
 
 def by(factor: Any) -> Draws:

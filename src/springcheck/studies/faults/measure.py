@@ -21,7 +21,7 @@ from springcheck.physics.terms import Drive, Spring
 from springcheck.studies import keeper
 from springcheck.studies.arguments import Progress
 from springcheck.studies.faults import baths
-from springcheck.studies.faults.result import RESULTS, SEEN, FaultReport, Result, seen
+from springcheck.studies.faults.result import RESULTS, FaultReport, Result
 from springcheck.studies.faults.seeded import Fault
 from springcheck.studies.faults.table import FAULTS
 from springcheck.studies.keeper import How, Keeper, Piece
@@ -100,19 +100,11 @@ def probe(fault: Fault) -> Passed:
 
     @cache
     def passed(check: str, size: float | None) -> bool | None:
-        if check in RECORDED:
-            return recorded(size).get(check)
-        return _EXPERIMENTS[check](subject(size)).passed if check in checks_of(fault) else None
+        if check not in checks_of(fault):
+            return None
+        return recorded(size).get(check) if check in RECORDED else EXPERIMENTS[check](subject(size)).passed
 
     return passed
-
-
-def passes(fault: Fault, check: str) -> bool | None:
-    """Whether a check of recorded states passes a fault of its size; None where it does not apply."""
-    known = checks.RANDOM if fault.random else checks.CHECKS
-    if check not in {one.name for one in known}:
-        return None
-    return probe(fault)(check, fault.size)
 
 
 def smallest(passed: Passed, check: str, size: float) -> float | None:
@@ -135,8 +127,10 @@ def smallest(passed: Passed, check: str, size: float) -> float | None:
     return high
 
 
-RECORDED = {check.name: check for check in (*checks.CHECKS, *checks.RANDOM)}
-_EXPERIMENTS: dict[str, Any] = {
+RECORDED = {check.name for check in (*checks.CHECKS, *checks.RANDOM)}
+"""Names of the checks of recorded states."""
+
+EXPERIMENTS: dict[str, Any] = {
     **{check.name: check for check in checks.THOROUGH},
     **{check.name: check for check in SEEDED},
 }
@@ -169,18 +163,19 @@ def perform(options: Namespace, progress: Progress | None) -> FaultReport:
     return record(options.output, **keeper.how(options, progress))
 
 
-def record(path: str | Path | None, **how: Unpack[How]) -> FaultReport:
-    """The whole study, kept in a store where there is a path."""
-    with keeper.kept(path, keeper.command("faults", ()), **how) as kept:
-        found = study(kept=kept)
-        keep(kept, found)
-    return found
+def record(path: str | Path | None = None, **how: Unpack[How]) -> FaultReport:
+    """All faults and their limits, kept in a store where there is a path."""
+    pieces = [
+        Piece(key=one.name, what=one.name, measure=partial(_examine, one.name), form=RESULTS)
+        for one in FAULTS
+    ]
 
+    def measure(kept: Keeper) -> FaultReport:
+        found = FaultReport(results=tuple(kept.results(pieces)))
+        kept.add(found.limits())
+        return found
 
-def keep(kept: Keeper, found: FaultReport) -> None:
-    """Keep a study in a store."""
-    kept.keep(SEEN, "limits", seen(found))
-    kept.commit("faults", found.document())
+    return keeper.study("faults", path, (), measure, **how)
 
 
 @keeper.restoring("faults")
@@ -190,16 +185,6 @@ def stored(kept: keeper.Kept) -> FaultReport:
     limits = known["limits"]
     results = tuple(Result(**one, limits=limits.get(one["name"], {})) for one in known["faults"])
     return FaultReport(results=results, path=kept.path)
-
-
-def study(*, kept: Keeper | None = None) -> FaultReport:
-    """All faults and their limits."""
-    kept = kept or Keeper()
-    pieces = [
-        Piece(key=one.name, what=one.name, measure=partial(_examine, one.name), form=RESULTS)
-        for one in FAULTS
-    ]
-    return FaultReport(results=tuple(kept.results(pieces)), resumed=kept.resumed, path=kept.path)
 
 
 def _examine(name: str) -> Result:

@@ -5,9 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
-from springcheck.studies.keeper import document
+import numpy as np
+
+from springcheck.studies.keeper import Table, document
 from springcheck.studies.study import Studied
-from springcheck.studies.tables import Documents, Rows
+from springcheck.studies.tables import Documents
 from springcheck.text.wording import count
 
 
@@ -50,24 +52,14 @@ class FaultReport(Studied):
             limits={result.name: result.limits for result in self.results if result.limits},
         )
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Seen:
-    """The smallest size of a fault that a check rejects, for viewers of the file."""
-
-    fault: str
-    check: str
-    size: float
+    def limits(self) -> Table:
+        """The smallest size of each fault that each check rejects, for readers of the file."""
+        rows = [(x.name, check, size) for x in self.results for check, size in x.limits.items()]
+        fault, check, size = zip(*rows, strict=True) if rows else ((), (), ())
+        sizes = np.array(size, np.float64)
+        return Table(
+            name="faults/limits", columns={"fault": list(fault), "check": list(check), "size": sizes}
+        )
 
 
 RESULTS: Documents[Result] = Documents(kind=Result, beginning="faults/results/", named="", joined=True)
-SEEN: Rows[Seen] = Rows(kind=Seen, beginning="faults/", named="")
-
-
-def seen(report: FaultReport) -> list[Seen]:
-    """All detection limits."""
-    return [
-        Seen(fault=result.name, check=check, size=size)
-        for result in report.results
-        for check, size in result.limits.items()
-    ]

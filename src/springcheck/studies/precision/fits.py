@@ -1,12 +1,12 @@
-"""Points of a study of precision, each one method at one step or tolerance, and what those of a sweep say:
-order, rounding floor, the front of best methods, the cheapest way."""
+"""Points of a study of precision, each one method at one step or tolerance, and the quantities fitted to a
+sweep of them: order, rounding floor, Pareto front, cheapest way to an error."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from itertools import pairwise
-from typing import Any, Literal
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
@@ -148,10 +148,8 @@ class Fit:
 
 
 def turned(errors: Sequence[float], *, by: int = 1) -> int | None:
-    """Index of the smallest of errors by ever finer steps, once `by` finer steps have not improved on it."""
-    if not errors:
-        return None
-    if np.all(np.isnan(errors)):
+    """Index of the smallest error of a sweep from coarse to fine; None until `by` finer ones follow."""
+    if not errors or np.all(np.isnan(errors)):
         return None
     best = int(np.nanargmin(errors))
     return best if best < len(errors) - by and errors[best] < ASYMPTOTIC else None
@@ -165,11 +163,7 @@ def order(points: Sequence[Point]) -> Fit | None:
         point
         for point in points[: None if best is None else best]
         if 0 < point.error <= ASYMPTOTIC
-        and (
-            point.error >= ABOVE_FLOOR * floor
-            if point.rounding is None
-            else point.error >= ABOVE_FLOOR * point.rounding
-        )
+        and point.error >= ABOVE_FLOOR * (floor if point.rounding is None else point.rounding)
     ][-FITTED:]
     if len(chosen) < FEWEST_FITTED:
         return None
@@ -182,11 +176,19 @@ def order(points: Sequence[Point]) -> Fit | None:
     )
 
 
+Growth: TypeAlias = Literal["sqrt(N)", "N", "N**1.5/(w T)", "w T"]
+
+POWERS: Mapping[Growth, tuple[float, float]] = {
+    "sqrt(N)": (0.5, 0), "N": (1, 0), "N**1.5/(w T)": (1.5, -1), "w T": (0, 1),
+}  # fmt: skip
+"""Powers of the number of steps and of w T."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Condition:
     """Final error by one rounding a step: eps times `value(steps)`, with its name and reason."""
 
-    name: Literal["sqrt(N)", "N", "N**1.5/(w T)", "w T"]
+    name: Growth
     why: str
     eps: float
     """Relative spacing of the numbers that are rounded."""
@@ -195,15 +197,8 @@ class Condition:
 
     def value(self, steps: float) -> float:
         """The condition of a run of so many steps."""
-        match self.name:
-            case "sqrt(N)":
-                return float(np.sqrt(steps))
-            case "N":
-                return float(steps)
-            case "N**1.5/(w T)":
-                return float(steps**1.5 / self.angle)
-            case "w T":
-                return self.angle
+        of_steps, of_angle = POWERS[self.name]
+        return float(steps**of_steps * self.angle**of_angle)
 
 
 def condition(method: Method, arithmetic: Arithmetic, angle: float) -> Condition | None:
@@ -218,19 +213,17 @@ def condition(method: Method, arithmetic: Arithmetic, angle: float) -> Condition
     scheme = schemes.scheme(method.scheme)
     if not scheme.has("one-step") or angle <= 0:
         return None
+    name: Growth = "sqrt(N)"
     eps = 2 * max(arithmetic.state, 2.0**-53)
-    if arithmetic.parameters == "single" and arithmetic.force < 2.0**-24:
-        return Condition(
-            name="w T", why="parameters kept in single precision detune it", eps=2.0**-23, angle=angle
-        )
-    if method.rebuilds_velocity:
-        why = "each step rounds the position, and the velocity is rebuilt from it over h"
-        return Condition(name="N**1.5/(w T)", why=why, eps=eps, angle=angle)
-    if scheme.has("implicit"):
-        why = "one rounded divisor is used in every step"
-        return Condition(name="N", why=why, eps=eps, angle=angle)
     why = "each step rounds the state once, up or down: a random walk"
-    return Condition(name="sqrt(N)", why=why, eps=eps, angle=angle)
+    if arithmetic.parameters == "single" and arithmetic.force < 2.0**-24:
+        eps, name, why = 2.0**-23, "w T", "parameters kept in single precision detune it"
+    elif method.rebuilds_velocity:
+        name = "N**1.5/(w T)"
+        why = "each step rounds the position, and the velocity is rebuilt from it over h"
+    elif scheme.has("implicit"):
+        name, why = "N", "one rounded divisor is used in every step"
+    return Condition(name=name, why=why, eps=eps, angle=angle)
 
 
 TYPICAL = 0.25
@@ -246,18 +239,16 @@ def expected_floor(points: Sequence[Point], fit: Fit, how: Condition, duration: 
         if point.rounding and point.steps
     ]
     per = how.eps * (float(np.median(seen)) if seen else TYPICAL)
-    low, high = 0.0, np.log(1e18)
-    while high - low > 1e-9:
-        middle = (low + high) / 2
-        steps = float(np.exp(middle))
-        over = fit.constant * (abs(duration) / steps) ** fit.order > per * how.value(steps)
-        low, high = (middle, high) if over else (low, middle)
-    steps = float(np.exp(low))
+    # both are powers of the number of steps
+    of_steps, _ = POWERS[how.name]
+    ratio, power = fit.constant * abs(duration) ** fit.order / (per * how.value(1)), fit.order + of_steps
+    with np.errstate(over="ignore", divide="ignore"):
+        steps = float(np.clip(ratio ** (np.float64(1) / power), 1, 1e18))
     return steps, 2 * per * how.value(steps)
 
 
 def front(points: Sequence[Point]) -> list[Point]:
-    """The points that no other beats in both error and time, from the fastest to the most accurate."""
+    """The Pareto front of error and time, from the fastest point to the most accurate."""
     best: list[Point] = []
     known = [point for point in points if not np.isnan(point.error) and not np.isnan(point.seconds)]
     for point in sorted(known, key=lambda point: (point.seconds, point.error)):
@@ -300,8 +291,6 @@ def _between(before: Point, after: Point, target: float) -> Point:
         step=None if after.step is None else after.step * after.steps / steps,
         force_calls=round(calls),
         run_seconds_repeats=(before.seconds * (after.seconds / before.seconds) ** share,),
-        accuracy=Accuracy(
-            max_error=target, end_error=np.nan, phase_error=None, energy_error=np.nan, rounding_error=None
-        ),
+        accuracy=Accuracy(max_error=target),
         message=f"between {before.steps} and {after.steps} steps",
     )

@@ -19,11 +19,11 @@ from functools import partial
 from math import isfinite
 from pathlib import Path
 from time import perf_counter
-from typing import Any, Unpack
+from typing import Unpack
 
 import numpy as np
 
-from springcheck import driver, engines
+from springcheck import driver
 from springcheck.engines.contract import Label
 from springcheck.errors import SpringcheckError
 from springcheck.physics import scenefile
@@ -31,48 +31,57 @@ from springcheck.physics.scene import Scene
 from springcheck.schemes import scheme
 from springcheck.studies import keeper
 from springcheck.studies.arguments import Progress
-from springcheck.studies.choose import choose
+from springcheck.studies.choose import LeftOut, choose
 from springcheck.studies.keeper import How, Keeper
 from springcheck.studies.precision import fits
 from springcheck.studies.precision.accuracy import Errors, Truth, truth
-from springcheck.studies.precision.fits import POINTS, Place, Point, points_of
-from springcheck.studies.precision.result import Answer, MethodSummary, PrecisionStudy
+from springcheck.studies.precision.fits import POINTS, Point, points_of
+from springcheck.studies.precision.result import MethodSummary, PrecisionStudy
 from springcheck.studies.precision.sweeps import PLANNED, Sweep, affordable, begin, blank, take, to_time
 from springcheck.studies.precision.timing import Clock, take_turns, tick
 from springcheck.text.wording import count
 
 BUDGET = 75.0
-"""Seconds that a study takes unless it is told otherwise."""
-
-TARGETS = (1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
-"""Errors for which the cheapest way is looked up."""
+"""Default budget of a study [s]."""
 
 CUT_OFF = "cut off"
 """Outcome of the first point that a study did not come to."""
 
 
-def study(
-    scene: Scene, labels: Sequence[Label], *, budget: float = BUDGET, kept: Keeper | None = None
+def record(
+    scene: Scene,
+    labels: Sequence[Label],
+    path: str | Path | None = None,
+    *,
+    budget: float = BUDGET,
+    left: Sequence[LeftOut] = (),
+    **how: Unpack[How],
 ) -> PrecisionStudy:
     """Measure these methods on a scene within about `budget` seconds, not counting imports and compilation.
 
     A method that cannot run, a run that diverges and a sweep that the budget cuts off are points with
-    their reason.  Points that an earlier call has finished (`kept`) are reused, and what they took counts
-    for the budget.
+    their reason; methods that were `left` out are named beside them.  A store has a table
+    /precision/<label> for each method, kept point by point.  Points that an earlier call has finished are
+    reused, and the time that they took counts for the budget.
 
     Raises:
         SceneError: the exact solution of the scene is not known, or nothing moves in it.
     """
-    known = truth(scene)
+    measure = partial(_measure, scene, labels, budget, left)
+    return keeper.study("precision", path, labels, measure, scene=scene, **how)
+
+
+def _measure(
+    scene: Scene, labels: Sequence[Label], budget: float, left: Sequence[LeftOut], kept: Keeper
+) -> PrecisionStudy:
+    known, form = truth(scene), points_of(scene)
     sweeps = [begin(scene, label, known) for label in labels]
-    kept = kept or Keeper()
     able = _open(sweeps)
-    ahead: Ahead = {}
-    before = [_take_up(sweep, kept, ahead) for sweep in able]
-    resumed = sum(len(sweep.points) for sweep in able)
+    before = [_resume(sweep, kept) for sweep in able]
+    kept.resumed = sum(len(sweep.points) for sweep in able)
     spent = max(before, default=0.0)
     if kept.team.workers > 1:
-        spent += _errors_first(scene, able, kept, ahead, budget, spent)
+        spent += _errors_first(scene, able, kept, budget, spent)
     # imports and compilation are paid once, by the first method that needs them, and charged to none
     began = perf_counter() - spent
 
@@ -82,51 +91,53 @@ def study(
 
     while ready := affordable(_open(sweeps), known, budget - (perf_counter() - began)):
         now = perf_counter()
-        _level(ready, known, tell, ahead)
+        _level(ready, known, tell)
         if perf_counter() < now:
             raise SpringcheckError("the clock of this machine runs backwards: nothing can be timed by it")
         for sweep in ready:
-            form = points_of(scene)
             kept.keep(form, str(sweep.label), sweep.points, study_seconds=perf_counter() - began)
     for sweep in _open(sweeps):
-        while (point := ahead.get(blank(sweep, "").place)) is not None and sweep.scene is not None:
-            # its errors are known, its time could not be measured
-            take(sweep, point)
+        while sweep.scene is not None and sweep.known is not None:
+            # its time could not be measured
+            take(sweep, sweep.known)
     for sweep in _open(sweeps):
         sweep.points.append(blank(sweep, CUT_OFF, f"the budget of {budget:g} s ends before it"))
-    return _put_together(
-        scene,
-        [point for sweep in sweeps for point in sweep.points],
-        [_summary(scene, x.label, x.points, x.condition, x.first_start) for x in sweeps],
+    seconds = perf_counter() - began
+    for sweep in sweeps:
+        kept.keep(form, str(sweep.label), sweep.points, study_seconds=seconds)
+    found = PrecisionStudy(
+        scene=scene,
+        methods=tuple(
+            MethodSummary(
+                method=str(x.label), points=tuple(x.points), duration=known.duration,
+                condition=x.condition, first_start_seconds=x.first_start,
+            )
+            for x in sweeps
+        ),
         budget=budget,
-        seconds=perf_counter() - began,
+        seconds=seconds,
         machine=keeper.origin([sweep.label for sweep in sweeps]),
         tick=tick(),
-        resumed=resumed,
-        path=kept.path,
-    )
+        left_out=tuple(left),
+    )  # fmt: skip
+    kept.add(found.summary())
+    return found
 
 
-Ahead = dict[Place, Point]
-"""Points whose errors were measured before their turn to be timed."""
-
-
-def _errors_first(
-    scene: Scene, sweeps: list[Sweep], kept: Keeper, ahead: Ahead, budget: float, before: float
-) -> float:
+def _errors_first(scene: Scene, sweeps: list[Sweep], kept: Keeper, budget: float, before: float) -> float:
     """Measure the errors of these sweeps on the workers, within half of the budget -> seconds that each took.
 
     Workers measure no run times.  They have ended when this returns: times are measured with no other process
     of ours at work.
     """
-    left = [x for x in sweeps if x.scene is not None and ahead.get(blank(x, "").place) is None]
+    left = [x for x in sweeps if x.scene is not None and x.known is None]
     share = budget / 2 * kept.team.workers / max(1, len(left))
     spent = 0.0
     parts = [partial(errors_ahead, scene, sweep.label, sweep.points, share) for sweep in left]
     with closing(kept.carried_out(parts)) as measured:
         for j, points, by in measured:
             sweep = left[j]
-            ahead.update({x.place: x for x in points})
+            sweep.ahead.update({x.place: x for x in points})
             spent += sum(point.spent_seconds for point in points) / kept.team.workers
             both, took = [*sweep.points, *points], before + spent
             kept.keep(points_of(scene), str(sweep.label), both, by, study_seconds=took)
@@ -156,41 +167,18 @@ def errors_ahead(scene: Scene, label: Label, done: Sequence[Point], seconds: flo
     return found
 
 
-def _take_up(sweep: Sweep, kept: Keeper, ahead: Ahead) -> float:
-    """Go on where an earlier call ended -> the seconds that it had taken."""
+def _resume(sweep: Sweep, kept: Keeper) -> float:
+    """Resume a sweep from the points of an earlier call -> the seconds that this had taken."""
     points = kept.finished(POINTS, str(sweep.label))
     if points is None:
         return 0.0
     for point in points:
         if point.complete and not point.run_seconds_repeats:
-            ahead[point.place] = point
+            sweep.ahead[point.place] = point
         # points that the end of that call cut off are measured by this one
         elif point.outcome != CUT_OFF:
             take(sweep, point)
     return float(kept.attribute(POINTS, str(sweep.label), "study_seconds"))
-
-
-def record(
-    scene: Scene,
-    labels: Sequence[Label],
-    path: str | Path | None,
-    *,
-    budget: float = BUDGET,
-    **how: Unpack[How],
-) -> PrecisionStudy:
-    """Like `study`, kept in a store: a table /precision/<label> for each method, and the document.
-
-    Points are kept as they are finished (see `keeper.kept`).
-    """
-    command = keeper.command("precision", labels, scene.digest)
-    with keeper.kept(path, command, **how) as kept:
-        found = study(scene, labels, budget=budget, kept=kept)
-        for summary in found.methods:
-            form = points_of(scene)
-            kept.keep(form, summary.method, found.of(summary.method), study_seconds=found.seconds)
-        kept.add(found.summary())
-        kept.commit("precision", found.document(), scene)
-    return found
 
 
 def perform(options: Namespace, progress: Progress | None) -> PrecisionStudy:
@@ -201,22 +189,21 @@ def perform(options: Namespace, progress: Progress | None) -> PrecisionStudy:
     scene = scenefile.load_scene(options.scene)
     labels, left, _ = choose(scene, options.method)
     path = options.output or f"{scene.name}-precision.h5"
-    found = record(scene, labels, path, budget=budget, **keeper.how(options, progress))
-    return replace(found, left_out=tuple(left))
+    return record(scene, labels, path, budget=budget, left=left, **keeper.how(options, progress))
 
 
 def _open(sweeps: list[Sweep]) -> list[Sweep]:
     return [sweep for sweep in sweeps if sweep.scene is not None]
 
 
-def _level(sweeps: list[Sweep], known: Truth, tell: Callable[[str], None], ahead: Ahead) -> None:
+def _level(sweeps: list[Sweep], known: Truth, tell: Callable[[str], None]) -> None:
     """The next point of each of these sweeps: errors one by one, then timings in turn."""
     points: list[Point] = []
     spent: list[float] = []
     for sweep in sweeps:
         tell(f"{sweep.label}, errors")
         began = perf_counter()
-        points.append(ahead.get(blank(sweep, "").place) or _errors(sweep, known))
+        points.append(sweep.known or _errors(sweep, known))
         spent.append(perf_counter() - began)
     tell(f"timing {count(len(sweeps), 'method')} in turn")
     clocks = [
@@ -233,7 +220,7 @@ def _level(sweeps: list[Sweep], known: Truth, tell: Callable[[str], None], ahead
 
 
 def _errors(sweep: Sweep, known: Truth) -> Point:
-    """Run for the errors."""
+    """Measure the errors of the next point."""
     scene = sweep.scene
     assert scene is not None
     errors = Errors(
@@ -258,77 +245,21 @@ def _errors(sweep: Sweep, known: Truth) -> Point:
 def stored(kept: keeper.Kept) -> PrecisionStudy:
     """The study that `record` has kept.  StoreError where the file holds none."""
     scene, known = kept.scene, kept.document
-    points: list[Point] = []
-    methods = []
-    for one in known["methods"]:
-        own = kept.found(POINTS, one["method"])
-        how = one["floor_condition"]
-        condition = fits.Condition(**how) if how else None
-        points += own
-        methods.append(
-            _summary(scene, engines.parse(one["method"]), own, condition, one["first_start_seconds"])
+    methods = [
+        MethodSummary(
+            method=one["method"],
+            points=tuple(kept.found(POINTS, one["method"])),
+            duration=scene.step * scene.steps,
+            condition=fits.Condition(**how) if (how := one["floor_condition"]) else None,
+            first_start_seconds=one["first_start_seconds"],
         )
-    return _put_together(
-        scene,
-        points,
-        methods,
+        for one in known["methods"]
+    ]
+    return PrecisionStudy(
+        scene=scene,
+        methods=tuple(methods),
         budget=known["budget_seconds"],
         seconds=known["seconds"],
         machine=known["machine"],
         tick=known["clock_seconds"],
-    )
-
-
-def _put_together(
-    scene: Scene, points: Sequence[Point], methods: Sequence[MethodSummary], **rest: Any
-) -> PrecisionStudy:
-    """The study, with what follows from its points."""
-    timed = [point for point in points if point.complete and point.run_seconds_repeats]
-    return PrecisionStudy(
-        scene=scene,
-        points=tuple(points),
-        methods=tuple(methods),
-        front=tuple(fits.front(timed)),
-        cheapest=tuple(Answer(target=target, point=fits.cheapest(timed, target)) for target in TARGETS),
-        **rest,
-    )
-
-
-def _summary(
-    scene: Scene,
-    label: Label,
-    points: Sequence[Point],
-    condition: fits.Condition | None,
-    first_start: float | None,
-) -> MethodSummary:
-    """Summary of the points of a method."""
-    points = [point for point in points if point.complete]
-    timed = [point for point in points if point.run_seconds_repeats]
-    read = [point for point in timed if point.read_seconds_repeats]
-    started = [point for point in timed if point.start_seconds_repeats]
-    adaptive = engines.method(label).adaptive
-    fit = None if adaptive else fits.order(points)
-    # an adaptive solver's error does not fall smoothly: its floor is one that a decade has not improved
-    best = fits.turned([point.error for point in points], by=2 if adaptive else 1)
-    expected = None
-    if best is None and fit and condition:
-        expected = fits.expected_floor(points, fit, condition, scene.step * scene.steps)
-    return MethodSummary(
-        method=str(label),
-        order=fit.order if fit else None,
-        order_standard_error=fit.standard_error if fit else None,
-        order_points=fit.points if fit else 0,
-        constant=fit.constant if fit else None,
-        floor=points[best].error if best is not None else None,
-        floor_steps=points[best].steps if best is not None else None,
-        condition=condition,
-        expected_floor=expected,
-        # the overhead of a call only lengthens short runs, so the minimum is the step's own time
-        seconds_per_step=min((p.seconds / p.steps for p in timed if p.steps), default=None),
-        seconds_per_force_call=min((p.seconds / p.force_calls for p in timed if p.force_calls), default=None),
-        read_seconds_per_step=min(
-            (min(p.read_seconds_repeats) / p.steps for p in read if p.steps), default=None
-        ),
-        start_seconds=min((min(p.start_seconds_repeats) for p in started), default=None),
-        first_start_seconds=first_start,
     )

@@ -18,6 +18,13 @@ MOST_SHOWN = 30.0
 """Errors above this are out of the picture at first: nothing is read off them."""
 
 
+WAYS: tuple[tuple[str, str, Callable[[Point], float]], ...] = (
+    ("run time [s]", "the run time of the engine alone, its smallest of several", lambda x: x.seconds),
+    (FORCE_CALLS, "force calls, which any machine counts alike", lambda x: float(x.force_calls or 0)),
+)
+"""Costs: the name of the axis, the title, and the cost of a point."""
+
+
 def banks(study: PrecisionStudy) -> list[Bank]:
     """Two charts of all points."""
     points = [x for x in study.points if x.complete and x.error > 0]
@@ -29,44 +36,25 @@ def banks(study: PrecisionStudy) -> list[Bank]:
         log=True,
         shown=(10.0 ** math.floor(math.log10(least)), min(MOST_SHOWN, 2 * max(x.error for x in points))),
     )
-    time = "the run time of the engine alone, its smallest of several"
-    calls = "force calls, which any machine counts alike"
-    ways: tuple[tuple[str, str, Callable[[Point], float]], ...] = (
-        (time, "run time [s]", lambda x: x.seconds),
-        (calls, FORCE_CALLS, lambda x: float(x.force_calls or 0)),
-    )
-    charts = [
-        Chart(
-            title=f"Error against {title}.",
-            short=f"against {name}",
-            x=Scale(name=name, log=True),
-            y=error,
-            curves=[
-                *_curves(study, known, cost),
-                *(_slopes(study, known, cost) if name == FORCE_CALLS else ()),
-            ],
-            rules=_floors(study),
-        )
-        for title, name, cost in ways
-        if (known := [x for x in points if cost(x) > 0])
-    ]
-    return (
-        [
-            Bank(
-                name="precision",
-                heading=_heading(study),
-                title="Methods drawn",
-                charts=[*map(labelled, charts)],
-            )
-        ]
-        if charts
-        else []
-    )
+    charts = []
+    for name, title, cost in WAYS:
+        known = [x for x in points if cost(x) > 0]
+        curves = _curves(study, known, cost) if known else []
+        if known and name == FORCE_CALLS:
+            curves += _slopes(study, known, cost)
+        if known:
+            charts.append(labelled(Chart(
+                title=f"Error against {title}.", short=f"against {name}", x=Scale(name=name, log=True),
+                y=error, curves=curves, rules=_floors(study),
+            )))  # fmt: skip
+    if not charts:
+        return []
+    return [Bank(name="precision", heading=_heading(study), title="Methods drawn", charts=charts)]
 
 
 def _heading(study: PrecisionStudy) -> str:
     """The cheapest way to the smallest error that somebody reached."""
-    reached = [(x.target, x.point) for x in study.cheapest if x.point is not None]
+    reached = [(target, point) for target, point in study.cheapest if point is not None]
     if not reached:
         return f"{study.scene.name}: error against cost, to the same final time"
     target, point = min(reached, key=lambda x: x[0])
@@ -89,7 +77,7 @@ def _floors(study: PrecisionStudy) -> list[Rule]:
 
 def _slopes(study: PrecisionStudy, points: Sequence[Point], cost: Callable[[Point], float]) -> list[Curve]:
     """Guides with the slopes of the orders found, from one point at the left, clear of all curves."""
-    orders = sorted({round(x.order) for x in study.methods if x.order is not None})
+    orders = sorted({round(x.fit.order) for x in study.methods if x.fit})
     left, errors = min(map(cost, points)), [math.log10(x.error) for x in points]
     start = 10 ** (min(errors) + 0.35 * (min(1.5, max(errors)) - min(errors)))
     return [
@@ -99,21 +87,13 @@ def _slopes(study: PrecisionStudy, points: Sequence[Point], cost: Callable[[Poin
 
 
 def _curves(study: PrecisionStudy, points: Sequence[Point], cost: Callable[[Point], float]) -> list[Curve]:
+    floors = {x.method: x.floor for x in study.methods}
     found = []
     for method in dict.fromkeys(x.method for x in points):
         mine = [x for x in points if x.method == method]
-        known = next((x for x in study.methods if x.method == method), None)
-        floor = known.floor if known else None
-        found.append(
-            Curve(
-                name=method,
-                group=scheme_of(method),
-                x=[cost(x) for x in mine],
-                y=[x.error for x in mine],
-                marks=True,
-                notes=[_said(x, floor) for x in mine],
-            )
-        )
+        notes = [_said(x, floors[method]) for x in mine]
+        x, y = [cost(x) for x in mine], [x.error for x in mine]
+        found.append(Curve(name=method, group=scheme_of(method), x=x, y=y, marks=True, notes=notes))
     return found
 
 

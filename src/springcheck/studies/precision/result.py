@@ -2,61 +2,106 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, ClassVar, Literal
 
 import numpy as np
 
 from springcheck.physics.scene import Scene
 from springcheck.studies.keeper import Table, document
-from springcheck.studies.precision.fits import Condition, Point
+from springcheck.studies.precision import fits
+from springcheck.studies.precision.fits import Condition, Fit, Point
 from springcheck.studies.study import Studied
 from springcheck.text.wording import count
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class MethodSummary:
-    """Summary of the points of one method."""
+    """The points of one method, coarse to fine, and the numbers that follow from them; None: not known."""
 
     method: str
-    order: float | None
-    """Signed slope of log error over log step; None for adaptive solvers and with too few points."""
-    order_standard_error: float | None
-    order_points: int
-    constant: float | None
-    """Error = constant * step**order."""
-    floor: float | None
-    """The smallest error, where a finer step has made it larger again; None where none has."""
-    floor_steps: int | None
+    points: tuple[Point, ...]
+    duration: float
+    """Time from the first frame to the last [T]."""
     condition: Condition | None
     """How rounding adds up in this method."""
-    expected_floor: tuple[float, float] | None
-    """Where the floor would be, (steps, error), from the fit and the rounding so far; None if reached."""
-    seconds_per_step: float | None
-    seconds_per_force_call: float | None
-    read_seconds_per_step: float | None
-    """Seconds per step when every step is read."""
-    start_seconds: float | None
     first_start_seconds: float | None
     """The first start in this process and its first short run, with import and compilation [s]."""
+
+    @cached_property
+    def complete(self) -> list[Point]:
+        """The points that have errors."""
+        return [point for point in self.points if point.complete]
+
+    @property
+    def is_adaptive(self) -> bool:
+        """Whether the method follows a tolerance, and has no step to fit an order to."""
+        return any(point.tolerance is not None for point in self.complete)
+
+    @cached_property
+    def fit(self) -> Fit | None:
+        """Error = constant * step**order; None with too few points as well."""
+        return None if self.is_adaptive else fits.order(self.complete)
+
+    @cached_property
+    def lowest(self) -> Point | None:
+        """The point of the smallest error, where a finer step has made it larger again."""
+        # an adaptive solver's error does not fall smoothly: its floor is one that a decade has not improved
+        best = fits.turned([point.error for point in self.complete], by=2 if self.is_adaptive else 1)
+        return None if best is None else self.complete[best]
+
+    @property
+    def floor(self) -> float | None:
+        """The error of the `lowest` point."""
+        return self.lowest.error if self.lowest else None
 
     @property
     def floor_ratio(self) -> float | None:
         """The floor over eps times the condition there."""
-        if self.floor is None or self.condition is None or self.floor_steps is None:
+        if self.lowest is None or self.condition is None or self.lowest.steps is None:
             return None
-        return self.floor / (self.condition.eps * self.condition.value(self.floor_steps))
+        return self.lowest.error / (self.condition.eps * self.condition.value(self.lowest.steps))
+
+    @cached_property
+    def expected_floor(self) -> tuple[float, float] | None:
+        """Where the floor would be, (steps, error), from the fit and the rounding so far; None if reached."""
+        if self.lowest or not (self.fit and self.condition):
+            return None
+        return fits.expected_floor(self.complete, self.fit, self.condition, self.duration)
+
+    def least(self, seconds: str, over: str = "") -> float | None:
+        """The smallest of these repeated timings over all points, each `over` this count of its run.
+
+        The overhead of a call only lengthens short runs, so the minimum is the step's own time.
+        """
+        costs = ((getattr(x, f"{seconds}_seconds_repeats"), getattr(x, over) if over else 1)
+                 for x in self.complete if x.run_seconds_repeats)  # fmt: skip
+        return min((min(repeats) / count for repeats, count in costs if repeats and count), default=None)
+
+    def document(self) -> dict[str, Any]:
+        """For JSON."""
+        fit, expected = self.fit, self.expected_floor
+        return {
+            "method": self.method,
+            "order": fit and fit.order,
+            "order_standard_error": fit and fit.standard_error,
+            "order_points": fit.points if fit else 0,
+            "constant": fit and fit.constant,
+            "floor": self.floor,
+            "floor_steps": self.lowest and self.lowest.steps,
+            "seconds_per_step": self.least("run", "steps"),
+            "seconds_per_force_call": self.least("run", "force_calls"),
+            "read_seconds_per_step": self.least("read", "steps"),
+            "start_seconds": self.least("start"),
+            "first_start_seconds": self.first_start_seconds,
+            "floor_condition": self.condition,
+            "floor_expected": {"steps": expected[0], "error": expected[1]} if expected else None,
+        }
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Answer:
-    """The cheapest way to an error, or None where no method reaches it.
-
-    Its message says between which numbers of steps it is interpolated; it has none where it was measured.
-    """
-
-    target: float
-    point: Point | None
+TARGETS = (1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
+"""Errors for which the cheapest way is looked up."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
@@ -68,11 +113,7 @@ class PrecisionStudy(Studied):
     scene: Scene
     budget: float
     seconds: float
-    points: tuple[Point, ...]
     methods: tuple[MethodSummary, ...]
-    front: tuple[Point, ...]
-    """Points that no other beats in both error and run time, the fastest first."""
-    cheapest: tuple[Answer, ...]
     machine: dict[str, str]
     tick: float
     """The smallest difference that the clock shows [s]."""
@@ -81,6 +122,29 @@ class PrecisionStudy(Studied):
         best = min((p.error for p in self.points if p.error > 0), default=np.nan)
         done = f"{count(len(self.methods), 'method')}, {count(len(self.points), 'point')}"
         return f"PrecisionStudy({self.scene.name!r}, {done}, smallest error {best:.1e})"
+
+    @property
+    def points(self) -> tuple[Point, ...]:
+        """The points of all methods."""
+        return tuple(point for method in self.methods for point in method.points)
+
+    @property
+    def timed(self) -> list[Point]:
+        """Those that have both an error and a run time."""
+        return [point for point in self.points if point.complete and point.run_seconds_repeats]
+
+    @property
+    def front(self) -> list[Point]:
+        """Points that no other beats in both error and run time, the fastest first."""
+        return fits.front(self.timed)
+
+    @property
+    def cheapest(self) -> list[tuple[float, Point | None]]:
+        """The cheapest way to each of the `TARGETS`, None where no method reaches it.
+
+        Its message says between which numbers of steps it is interpolated; it has none where it was measured.
+        """
+        return [(target, fits.cheapest(self.timed, target)) for target in TARGETS]
 
     @property
     def status(self) -> Literal[0, 2]:
@@ -100,21 +164,22 @@ class PrecisionStudy(Studied):
             machine=self.machine,
             clock_seconds=self.tick,
             points=[point.document() for point in self.points],
-            methods=[_method(method) for method in self.methods],
+            methods=[method.document() for method in self.methods],
             front=[{"method": p.method, "step": p.step, "tolerance": p.tolerance} for p in self.front],
-            cheapest=[_answer(answer) for answer in self.cheapest],
+            cheapest=[_answer(*one) for one in self.cheapest],
         )
 
     def summary(self) -> Table:
         """The table of the methods, for readers of the file."""
-        numbers = ("order", "order_standard_error", "floor", "constant")
-        names = [name for name in _METHOD if "seconds" in name or name in numbers]
+        rows = [method.document() for method in self.methods]
+        numbers = ("order", "order_standard_error", "constant", "floor")
+        names = [name for name in rows[0] if name in numbers or "seconds" in name]
         return Table(
             name="precision/methods",
             columns={
                 "method": [m.method for m in self.methods],
                 "condition": [m.condition.name if m.condition else "" for m in self.methods],
-                **{name: np.array([getattr(m, name) for m in self.methods], np.float64) for name in names},
+                **{name: np.array([row[name] for row in rows], np.float64) for name in names},
             },
             units={name: "s" for name in names if "seconds" in name},
             attributes={
@@ -125,20 +190,8 @@ class PrecisionStudy(Studied):
         )
 
 
-_METHOD = tuple(one.name for one in fields(MethodSummary) if one.name not in ("condition", "expected_floor"))
-
-
-def _method(method: MethodSummary) -> dict[str, Any]:
-    expected = method.expected_floor
-    return {
-        **{name: getattr(method, name) for name in _METHOD},
-        "floor_condition": method.condition,
-        "floor_expected": {"steps": expected[0], "error": expected[1]} if expected else None,
-    }
-
-
-def _answer(answer: Answer) -> dict[str, Any]:
+def _answer(target: float, point: Point | None) -> dict[str, Any]:
     names = ("method", "step", "tolerance", "steps", "max_error", "run_seconds", "force_calls")
-    known = answer.point.document() if answer.point else {}
-    found = {"error": answer.target, **{name: known.get(name) for name in names}}
-    return found | {"interpolated": (answer.point.message or None) if answer.point else None}
+    known = point.document() if point else {}
+    found = {"error": target, **{name: known.get(name) for name in names}}
+    return found | {"interpolated": (point.message or None) if point else None}

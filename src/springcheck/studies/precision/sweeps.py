@@ -1,9 +1,9 @@
-"""One method on its way from coarse to fine, and whose turn it is: a budget of seconds shared fairly."""
+"""A sweep of one method from coarse to fine steps, and the scheduler that shares a budget of seconds."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import ceil, floor
 from time import perf_counter
 
@@ -16,7 +16,7 @@ from springcheck.physics.arrays import Arithmetic
 from springcheck.physics.scene import Scene
 from springcheck.studies.precision import fits
 from springcheck.studies.precision.accuracy import FRAMES, Truth
-from springcheck.studies.precision.fits import Point
+from springcheck.studies.precision.fits import Place, Point
 
 TOLERANCES = (1e-3, *(float(f"{mantissa}e-{e}") for e in range(4, 17) for mantissa in (3, 1)))
 """Relative tolerances of adaptive solvers, two a decade, from 1e-3 to 1e-16, which is beyond double
@@ -31,7 +31,7 @@ PLANNED = 1_000_000_000
 
 @dataclass(kw_only=True, eq=False)
 class Sweep:
-    """One method on its way from coarse to fine; the only state that changes while a study runs."""
+    """The sweep of one method from coarse to fine; the only state that changes while a study runs."""
 
     label: Label
     scenes: Iterator[Scene]
@@ -53,6 +53,13 @@ class Sweep:
     read: float = 0.0
     """Seconds of the last run with every step read."""
     first_start: float | None = None
+    ahead: dict[Place, Point] = field(default_factory=dict)
+    """Points whose errors were measured before their turn to be timed."""
+
+    @property
+    def known(self) -> Point | None:
+        """The next point, where its errors are known."""
+        return self.ahead.get(blank(self, "").place)
 
     @property
     def method(self) -> Method:
@@ -109,7 +116,7 @@ def begin(scene: Scene, label: Label, known: Truth) -> Sweep:
 
 
 def take(sweep: Sweep, point: Point) -> None:
-    """The next point of a sweep: what it cost foretells the one after it."""
+    """Append a measured point, estimate the cost of the next one from it, and advance to that."""
     sweep.points.append(point)
     if point.run_seconds_repeats:
         before, sweep.cost = sweep.cost, min(point.run_seconds_repeats)
@@ -123,7 +130,8 @@ def take(sweep: Sweep, point: Point) -> None:
 
 
 def coarsest(known: Truth, limit: float) -> int:
-    """The fewest steps worth taking: the first below the limit of stability, or h w = 1 without one."""
+    """Number of steps of the coarsest point: the least with h w below the limit of stability, or without one
+    with h w <= 1."""
     if 0 < limit < np.inf:
         return max(1, floor(known.angle / limit) + 1)
     return max(1, ceil(known.angle))
@@ -147,10 +155,10 @@ def by_tolerance(scene: Scene) -> Iterator[Scene]:
 
 
 def affordable(sweeps: list[Sweep], known: Truth, left: float) -> list[Sweep]:
-    """The sweeps whose turn it is with so many seconds left; where there is none, the cheapest that fits.
+    """The sweeps whose next point fits into the seconds left; where none does, the cheapest that still fits.
 
-    What the methods need that can reach their floor is set aside for them; the others share the rest
-    equally.  A method that waits loses nothing: when others have finished, it goes on.
+    Seconds are reserved for the methods that can reach their floor; the others share the rest equally.  A
+    sweep that waits goes on when others have finished.
     """
     needs = sorted((_need(sweep, known.duration), i) for i, sweep in enumerate(sweeps))
     aside, reserved = set(), 0.0

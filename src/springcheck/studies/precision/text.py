@@ -6,7 +6,7 @@ from argparse import Namespace
 from collections.abc import Sequence
 
 from springcheck.studies.precision.fits import Point
-from springcheck.studies.precision.result import Answer, MethodSummary, PrecisionStudy
+from springcheck.studies.precision.result import MethodSummary, PrecisionStudy
 from springcheck.studies.text import left_out, resumed
 from springcheck.text.lines import Lines, Row, TextTable, plain, table
 from springcheck.text.wording import count, duration, number, seconds
@@ -27,9 +27,8 @@ def lines(study: PrecisionStudy, options: Namespace | None = None) -> Lines:
         expected = method.expected_floor
         if expected and method.condition:
             steps, error = expected
-            longer = (
-                "" if method.seconds_per_step is None else f", {duration(steps * method.seconds_per_step)}"
-            )
+            each = method.least("run", "steps")
+            longer = "" if each is None else f", {duration(steps * each)}"
             out.append(
                 plain(f"  {method.method}: floor expected near {error:.0e}, {steps:.0e} steps{longer} a run")
             )
@@ -55,30 +54,21 @@ def _methods(methods: Sequence[MethodSummary]) -> TextTable:
     rows = [
         (
             m.method,
-            "-" if m.order is None else f"{m.order:.4f}({m.order_standard_error:.0e})",
+            "-" if m.fit is None else f"{m.fit.order:.4f}({m.fit.standard_error:.0e})",
             number(m.floor, ".1e"),
             number(m.floor_ratio, ".2g"),
-            *map(seconds, (m.seconds_per_step, m.read_seconds_per_step, m.start_seconds)),
+            *map(seconds, (m.least("run", "steps"), m.least("read", "steps"), m.least("start"))),
         )
         for m in methods
     ]
     return table(("method", "order", "floor", "/eps*cond", "step", "step, read", "start"), rows)
 
 
-def _cheapest(answers: Sequence[Answer]) -> TextTable:
-    rows = [
-        (f"{answer.target:.0e}", "none reaches it")
-        if answer.point is None
-        else (
-            f"{answer.target:.0e}",
-            answer.point.method,
-            _where(answer.point),
-            seconds(answer.point.seconds),
-            str(answer.point.force_calls),
-            answer.point.message,
-        )
-        for answer in answers
-    ]
+def _cheapest(answers: Sequence[tuple[float, Point | None]]) -> TextTable:
+    rows = []
+    for target, x in answers:
+        cells = (x.method, _where(x), seconds(x.seconds), str(x.force_calls), x.message) if x else ()
+        rows.append((f"{target:.0e}", *(cells or ("none reaches it",))))
     return table(("error", "method", "at", "run", "force calls", "interpolated"), rows)
 
 

@@ -11,37 +11,57 @@ from springcheck.errors import SpringcheckError
 from springcheck.physics import builders, scenefile
 from springcheck.physics.bath import KELVIN, Bath
 from springcheck.physics.scene import Scene
+from springcheck.studies.ensemble.vary import Axis, Plan, Varied, fields
 
 
 def changed(options: Namespace) -> Scene:
-    """The scene that the options name, with their changes, which its title tells.
+    """The scene that the options name, with their changes, which its title lists.
 
     SpringcheckError where a field is none of the scene's, or its value makes no sense.
     """
-    scene = scenefile.load_scene(options.scene)
+    scene, text = scenefile.load_scene(options.scene), scenefile.text_of(options.scene)
+    named = [(f"--set {one}", *one.partition("=")[::2]) for one in options.set]
+    named += [
+        (f"--{name}", f"time.{name}", getattr(options, name))
+        for name in ("step", "steps")
+        if getattr(options, name) is not None
+    ]
     given: dict[str, float] = {}
-    for text in options.set:
-        field, _, value = text.partition("=")
-        whole = _whole(field, options.scene)
-        if whole and field and "." not in field:
-            raise SpringcheckError(f"--set {text}: which one? {whole}")
-        _put(given, field, value, f"--set {text}: FIELD=NUMBER is needed, as spring.0.stiffness=2")
-    for name, field in (("step", "time.step"), ("steps", "time.steps")):
-        if getattr(options, name) is not None:
-            _put(given, field, getattr(options, name), f"--{name}: a number is needed")
+    for option, field, value in named:
+        if "." not in field and (
+            whole := [x for x in fields(tomllib.loads(text)) if x.endswith(f".{field}")]
+        ):
+            raise SpringcheckError(f"{option}: which one? {' or '.join(whole)}")
+        if field in given:
+            raise SpringcheckError(f"{field} is set twice")
+        given[field] = _number(option, field, str(value))
     if not given:
         return bathed(scene, options)
-    from springcheck.studies.ensemble.vary import Axis, Plan, Varied
-
     plan = Plan(
         axes=tuple(Axis(field=field, values=(value,)) for field, value in given.items()),
-        samples=None,
-        seed=0,
-        text=scenefile.text_of(options.scene),
-    )
+        samples=None, seed=0, text=text,
+    )  # fmt: skip
     found = Varied(scene, plan, option="--set").whole(given)
     said = ", ".join(f"{field} = {value:g}" for field, value in given.items())
     return bathed(replace(found, title=f"{scene.title}, with {said}"), options)
+
+
+def _number(option: str, field: str, value: str) -> float:
+    """The number that an option gives a field."""
+    needed = f"{option}: FIELD=NUMBER is needed, as spring.0.stiffness=2"
+    if field and (found := _float(value)) is not None:
+        return found
+    first, *rest = value.split() or [""]
+    if rest and _float(first) is not None:
+        needed = f"{option}: a number alone is needed, in the scene's unit, as {first}"
+    raise SpringcheckError(needed)
+
+
+def _float(text: str) -> float | None:
+    try:
+        return float(text)
+    except ValueError:
+        return None
 
 
 MEMORY = 0.1
@@ -62,10 +82,9 @@ def bathed(scene: Scene, options: Namespace) -> Scene:
         raise SpringcheckError("--friction goes with --temperature, or with a scene that has a bath")
     if text is not None:
         kelvin = text.strip().endswith("K")
-        try:
-            temperature = float(text.strip().removesuffix("K"))
-        except ValueError:
-            raise SpringcheckError(f"--temperature {text}: a number is needed, such as 300K") from None
+        temperature = _float(text.strip().removesuffix("K"))
+        if temperature is None:
+            raise SpringcheckError(f"--temperature {text}: a number is needed, such as 300K")
         if not 0 <= temperature < math.inf:
             raise SpringcheckError(
                 f"--temperature {text}: a finite number >= 0 is needed, such as 300K; 0 is friction without "
@@ -82,33 +101,3 @@ def bathed(scene: Scene, options: Namespace) -> Scene:
         return builders.cold(replace(scene, bath=None), friction)
     made = Bath(temperature=temperature, friction=friction)
     return replace(scene, bath=made, title=f"{scene.title}, at temperature {text}, friction {friction:g}")
-
-
-def _put(given: dict[str, float], field: str, value: object, needed: str) -> None:
-    if field in given:
-        raise SpringcheckError(f"{field} is set twice")
-    try:
-        given[field] = float(str(value))
-    except ValueError:
-        first, *rest = str(value).split() or [""]
-        if rest and _is_number(first):
-            needed = f"{needed.partition(': ')[0]}: a number alone is needed, in the scene's unit, as {first}"
-        raise SpringcheckError(needed) from None
-    if not field:
-        raise SpringcheckError(needed)
-
-
-def _whole(field: str, scene: str) -> str:
-    """The fields of a scene whose last part this is, in full."""
-    from springcheck.studies.ensemble.vary import fields
-
-    found = (x for x in fields(tomllib.loads(scenefile.text_of(scene))) if x.endswith(f".{field}"))
-    return " or ".join(found)
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True

@@ -40,23 +40,20 @@ class Broken:
 
     def play(self, scene: Scene, draft: Draft, seed: int | None = None) -> None:
         """Record it; `seed` is that of a run in a bath.  MethodError where it makes no sense of the scene."""
+        option = f"--fault {self.fault.name}"
         if self.fault.random != (scene.bath is not None):
             needed = "a bath: --temperature or [bath] gives one" if self.fault.random else "no bath"
-            raise MethodError(f"--fault {self.fault.name}: it needs a scene with {needed}")
+            raise MethodError(f"{option}: it needs a scene with {needed}")
         if scene.steps * scene.n > MOST_NUMBERS:
-            raise MethodError(f"--fault {self.fault.name}: {scene.steps} steps are too many for it")
+            raise MethodError(f"{option}: {scene.steps} steps are too many for it")
         try:
             made = self.fault.run(scene, self.label, size=self.size, seed=seed)
         except (ArithmeticError, LookupError, TypeError, ValueError) as error:
-            raise MethodError(
-                f"--fault {self.fault.name}: it cannot be had on scene {scene.name}, only on a "
-                f"{self.fault.scene} such as that of `springcheck faults` ({error})"
-            ) from error
+            only = f"only on a {self.fault.scene} such as that of `springcheck faults` ({error})"
+            raise MethodError(f"{option}: it cannot be had on scene {scene.name}, {only}") from error
         if self._is_right(scene, made):
-            raise MethodError(
-                f"--fault {self.fault.name}: nothing on scene {scene.name} shows it; `springcheck faults` "
-                f"judges it on a scene of its own ({self.fault.scene})"
-            )
+            where = f"`springcheck faults` judges it on a scene of its own ({self.fault.scene})"
+            raise MethodError(f"{option}: nothing on scene {scene.name} shows it; {where}")
         energy = made.energy if "energy" in scene.quantities else None
         draft.append(made.t, made.q, made.p, energy, made.last_step)
         origin = {"engine": "broken on purpose", "method": self.about, "velocity": "as it says"}

@@ -17,14 +17,14 @@ from springcheck import checks, driver, engines, interrupts
 from springcheck.checks import compare
 from springcheck.engines.contract import Label
 from springcheck.errors import MethodError, SpringcheckError, StoreError
-from springcheck.physics import memory, scenefile
+from springcheck.physics import exact, memory, scenefile
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import NOT_KNOWN, Comparison, Trajectory, Verdict
 from springcheck.studies import keeper
 from springcheck.studies.arguments import Progress
 from springcheck.studies.choose import LeftOut, choose
 from springcheck.studies.run.result import FAULT, Repeat, Repeats, Report, Stored
-from springcheck.studies.run.tally import Tally, line
+from springcheck.studies.run.tally import Tally, line, solution
 
 if TYPE_CHECKING:
     from springcheck.studies.ensemble.result import Ensemble
@@ -132,13 +132,8 @@ def run(
     )
     broke: dict[str, str] = {}
     bar = _Bar(progress, len(labels) * (1 + thorough))
-    command = keeper.command(
-        "run",
-        labels,
-        scene.digest,
-        *(f"{x.label}, {x.about}" for x in wrong),
-        *(() if seed is None else (f"seed {seed}",)),
-    )
+    options = [f"{x.label}, {x.about}" for x in wrong] + ([] if seed is None else [f"seed {seed}"])
+    command = keeper.command("run", labels, scene.digest, *options)
     with keeper.open_new(path, command, force=force) as journal:
         resumed = journal.finished()
         keeper.need_space(journal.path, keeper.size(scene) * (len(labels) + len(wrong) - len(resumed)))
@@ -217,18 +212,16 @@ def judge(
     verdicts: dict[str, list[list[Verdict]]] = {name: [] for name in sources}
     tallies = {name: Tally(scene) for name in sources}
     parts: list[Comparison] = []
-    last: dict[str, Trajectory] = {}
-    failed: dict[str, Trajectory] = {}
+    last, failed = dict[str, Trajectory](), dict[str, Trajectory]()
     streams = {name: keeper.windows(source, name, rows, stride) for name, source in sources.items()}
     for pieces in _together(streams):
         judged_frames += max(len(piece.t) for piece in pieces.values())
+        known = solution(scene, pieces.values()) if exact.has_true_motion(scene) else None
         for name, piece in pieces.items():
             verdicts[name].append(checks.judge(scene, piece, piece=True))
-            if name not in failed and any(
-                v.passed is False and v.check in checks.TELLING for v in verdicts[name][-1]
-            ):
-                failed[name] = piece
-            tallies[name].add(piece)
+            if any(v.passed is False and v.check in checks.TELLING for v in verdicts[name][-1]):
+                failed.setdefault(name, piece)
+            tallies[name].add(piece, known)
             last[name] = piece
         if len(pieces) == len(sources):
             parts.append(compare.compare(scene, pieces))
@@ -241,14 +234,12 @@ def judge(
     worst = {name: checks.worst(verdicts[name]) for name in sources}
     if stride > 1:
         worst = {name: _bridged(mine, verdicts[name], judged_frames) for name, mine in worst.items()}
-    if scene.bath:
-        # states are explained for deterministic motion only
-        failed = {}
-    if failed:
+    # states are explained for deterministic motion only
+    if failed and not scene.bath:
         from springcheck.identify import files
 
-    for name, piece in failed.items():
-        worst[name] = checks.explained(scene, piece, worst[name], files.shown)
+        for name, piece in failed.items():
+            worst[name] = checks.explained(scene, piece, worst[name], files.shown)
     return Report(
         scene=scene,
         path=path,
@@ -313,7 +304,6 @@ def repeat(path: Path, *, methods: Sequence[str] = (), progress: Progress | None
 
     `methods` are globs of labels.  Raises SpringcheckError where the file or an engine cannot be used.
     """
-
     known = {run.label: run for run in keeper.summary(path).runs}
     chosen = [label for label in known if not methods or any(fnmatchcase(label, m) for m in methods)]
     if not known:
@@ -322,10 +312,8 @@ def repeat(path: Path, *, methods: Sequence[str] = (), progress: Progress | None
         raise StoreError(f"{path}: holds no trajectory {' or '.join(methods)}; it has {', '.join(known)}")
     for name in chosen:
         if name.startswith(f"{FAULT}:"):
-            raise StoreError(
-                f"{path}: {name} is of an engine broken on purpose, which --from does not run; "
-                "name the others with --method"
-            )
+            why = "is of an engine broken on purpose, which --from does not run"
+            raise StoreError(f"{path}: {name} {why}; name the others with --method")
     scene = keeper.stored_scene(path)
     found = []
     beside = path.absolute().parent
@@ -356,9 +344,9 @@ def repeat(path: Path, *, methods: Sequence[str] = (), progress: Progress | None
                         as_written=digest == before["sha256"],
                         difference=_difference(scene, path, source, name),
                         changed=tuple(
-                            f"{key} {before.get('origin.' + key)} -> {value}"
+                            f"{key} {was} -> {value}"
                             for key, value in record.origin.items()
-                            if before.get("origin." + key) != value
+                            if (was := before.get("origin." + key)) != value
                         ),
                     )
                 )

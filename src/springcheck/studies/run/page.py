@@ -98,57 +98,41 @@ def _temperatures(runs: Runs, heated: Sequence[Heated]) -> list[Bank]:
     found = [one for one in heated[::-1] if np.isfinite(one.kinetic)]
     if not found:
         return []
-    charts = []
-    for name, what in (
-        ("configurational", "configurational temperature"),
-        ("kinetic", "kinetic temperature"),
-    ):
-        values, errors, laws = (
-            np.array([getattr(one, f"{name}{end}") for one in found]) for end in ("", "_error", "_law")
-        )
-        places = np.arange(float(len(found)))
-        good = np.isfinite(values)
-        if not good.any():
-            continue
-        marks, bars = [], []
-        for j, one in enumerate(found):
-            own: dict[str, Any] = {"group": one.scheme, "title": looks.title(one.scheme)}
-            if np.isfinite(errors[j]):
-                ends = [values[j] - 2 * errors[j], values[j] + 2 * errors[j]]
-                bars.append(Curve(name=TWO_ERRORS, x=ends, y=[float(j)] * 2, **own))
-            if good[j]:
-                marks.append(
-                    Curve(name=one.method, x=[values[j]], y=[float(j)], line=False, marks=True, **own)
-                )
-        some = np.isfinite(laws)
-        law = Curve(
-            name="exact law of its scheme",
-            group="exact",
-            x=laws[some],
-            y=places[some],
-            line=False,
-            marks=True,
-        )
-        every = np.concatenate([values[good], laws[some], [1.0]])
-        middle = every[np.abs(every - np.median(every)) <= 1.0]
-        room = 0.1 * float(np.ptp(middle)) + 0.02
-        charts.append(
-            Chart(
-                title=f"{what.capitalize()}, two standard errors to either side.",
-                short=what,
-                x=Scale(
-                    name=f"{what} / that of the bath",
-                    shown=(float(np.min(middle)) - room, float(np.max(middle)) + room),
-                ),
-                # the name of the rule has a row of its own
-                y=Scale(name="method", names=[one.method for one in found], shown=(-0.6, len(found) + 0.1)),
-                curves=[*bars, *marks, law],
-                rules=[Rule(axis="x", at=1.0, name="the bath", look="here")],
-            )
-        )
+    kinds = ("configurational", "kinetic")
+    charts = [_of_kind(kind, found) for kind in kinds if np.isfinite([getattr(x, kind) for x in found]).any()]
     heading = f"{runs.scene.title}: {_farthest(found)}"
-    many = len(charts)
-    return [Bank(name="temperature", title="Methods drawn", charts=charts, heading=heading, columns=many)]
+    return [
+        Bank(name="temperature", title="Methods drawn", charts=charts, heading=heading, columns=len(charts))
+    ]
+
+
+def _of_kind(kind: str, found: Sequence[Heated]) -> Chart:
+    """One of the two temperatures: a row a method, with two standard errors, and that of its law."""
+    bars, marks, every = [], [], [1.0]
+    for j, one in enumerate(found):
+        value, error = getattr(one, kind), getattr(one, f"{kind}_error")
+        own: dict[str, Any] = {"group": one.scheme, "title": looks.title(one.scheme)}
+        if np.isfinite(error):
+            ends = [value - 2 * error, value + 2 * error]
+            bars.append(Curve(name=TWO_ERRORS, x=ends, y=[float(j)] * 2, **own))
+        if np.isfinite(value):
+            marks.append(Curve(name=one.method, x=[value], y=[float(j)], line=False, marks=True, **own))
+            every.append(value)
+    laws = np.array([getattr(one, f"{kind}_law") for one in found])
+    known = np.flatnonzero(np.isfinite(laws))
+    law = Curve(name="exact law of its scheme", group="exact", x=laws[known], y=known.astype(np.float64),
+                line=False, marks=True)  # fmt: skip
+    numbers = np.array([*every, *laws[known]])
+    middle = numbers[np.abs(numbers - np.median(numbers)) <= 1.0]
+    low, high, room = float(np.min(middle)), float(np.max(middle)), 0.1 * float(np.ptp(middle)) + 0.02
+    name = f"{kind} temperature"
+    return Chart(
+        title=f"{name.capitalize()}, two standard errors to either side.", short=name,
+        x=Scale(name=f"{name} / that of the bath", shown=(low - room, high + room)),
+        # the name of the rule has a row of its own
+        y=Scale(name="method", names=[one.method for one in found], shown=(-0.6, len(found) + 0.1)),
+        curves=[*bars, *marks, law], rules=[Rule(axis="x", at=1.0, name="the bath", look="here")],
+    )  # fmt: skip
 
 
 def _farthest(found: Sequence[Heated]) -> str:

@@ -14,7 +14,7 @@ from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Comparison, Trajectory, Verdict
 from springcheck.studies.choose import LeftOut
 from springcheck.studies.keeper import document, read
-from springcheck.studies.study import Shown
+from springcheck.studies.study import StudyResult
 from springcheck.text.wording import count
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ class Heated:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
-class Report(Shown):
+class Report(StudyResult):
     """Everything that `springcheck run` says."""
 
     table_of: ClassVar[str] = "runs"
@@ -157,7 +157,7 @@ class Repeat:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Repeats:
+class Repeats(StudyResult):
     """Everything that `springcheck run --from` says."""
 
     repeats: tuple[Repeat, ...]
@@ -173,7 +173,7 @@ class Repeats:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Stored:
+class Stored(StudyResult):
     """The stored data of a run."""
 
     path: Path

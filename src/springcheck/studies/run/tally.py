@@ -3,13 +3,13 @@ those of its scheme."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 
 import numpy as np
 
 from springcheck import checks, thermal
 from springcheck.physics import exact
-from springcheck.physics.arrays import Floats, Reals
+from springcheck.physics.arrays import Extended, Floats, Reals
 from springcheck.physics.scene import Scene
 from springcheck.physics.system import MOST_DENSE
 from springcheck.physics.trajectory import Trajectory
@@ -156,6 +156,12 @@ FAINTEST_ENERGY = np.finfo(np.float64).tiny / np.finfo(np.float64).eps
 """Initial energy below which energies in double precision are subnormal and lose digits."""
 
 
+def solution(scene: Scene, pieces: Collection[Trajectory]) -> tuple[Extended, Extended]:
+    """The exact solution q, p (f, n) at the frames of the longest of these pieces, where it is known."""
+    longest = max(pieces, key=lambda piece: len(piece.t))
+    return exact.true_motion(scene, checks.Case(trajectory=longest, scene=scene).steps, longest.step)
+
+
 class Tally:
     """Error and energy over all pieces of a trajectory."""
 
@@ -171,20 +177,20 @@ class Tally:
         self.doubt = 0.0
         self.drift: float = 0.0
 
-    def add(self, piece: Trajectory) -> None:
-        """Take a piece into account."""
+    def add(self, piece: Trajectory, known: tuple[Extended, Extended] | None = None) -> None:
+        """Take a piece into account; `known` is the exact solution from its first frame on, or further."""
         scene, right = self._scene, self._start
         if scene.bath:
             self.heat.add(piece)
         if self._known:
-            steps = checks.Case(trajectory=piece, scene=scene).steps
-            q, p = exact.true_motion(scene, steps, piece.step)
+            q, p = (x[: len(piece.t)] for x in known or solution(scene, [piece]))
             if not scene.system.keeps_energy:
                 right = self._energy(q, p)
             # not max(), which leaves out what is no number
             here = np.max(self._norm(piece.q - q, piece.p - p))
             self.error = float(np.maximum(self.error, here))
-            self.doubt = max(self.doubt, exact.uncertainty(scene, float(steps[-1]) * piece.step))
+            last = int(checks.Case(trajectory=piece, scene=scene).steps[-1])
+            self.doubt = max(self.doubt, exact.uncertainty(scene, float(last) * piece.step))
         with np.errstate(over="ignore", invalid="ignore"):
             off = self._energy(piece.q, piece.p) - right
             worst = float(off[np.argmax(np.abs(off))] / (abs(self._start) or 1.0))

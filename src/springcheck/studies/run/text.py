@@ -73,37 +73,32 @@ def _report(report: Report) -> Lines:
         others = few(report.others, 8)
         out.append(plain(f"Left out {others}: not among the default methods; --all runs every one"))
     if report.judged_frames < report.scene.frames:
-        share = f"{report.judged_frames} of {report.scene.frames} frames"
-        out.append(
-            plain(
-                f"Judged on {share}: pieces at equal distances, the first and the last; error, energy and "
-                "same motion are of these"
-            )
+        which = (
+            "pieces at equal distances, the first and the last; error, energy and same motion are of these"
         )
+        out.append(plain(f"Judged on {report.judged_frames} of {report.scene.frames} frames: {which}"))
     out += [plain(), *unjudged(report.verdicts, report.path), *_summary(report)]
     return out
 
 
 def _beyond(report: Report) -> Lines:
     """The methods for which the step is too long: their motion grows without bound, whoever runs them."""
+    from springcheck.studies.stability.longest import limit_of, too_long
+
     system, h, known = report.scene.system, abs(report.scene.step), schemes.known()
     ran = [known[name] for name in {run.scheme for run in report.runs} if name in known]
     if system.has_modes and not system.is_damped and not any(one.has("mixes") for one in ran):
-        # no scan is needed: the catalogue's limits are those of springs without friction, 0 where it has none
-        least = min((one.limit for one in ran if one.limit), default=np.inf)
+        # no scan is needed: these limits are those of springs without friction, 0 where a scheme has none
+        least = min(filter(None, map(limit_of, ran)), default=np.inf)
         if h * np.sqrt(np.max(np.abs(system.modes.w2))) < least:
             return []
-    from springcheck.studies.stability.longest import too_long
-
     out: Lines = []
     for scheme in dict.fromkeys(run.scheme for run in report.runs):
         limit = too_long(scheme, report.scene)
         if limit is not None:
             names = ", ".join(run.method for run in report.runs if run.scheme == scheme)
-            said = (
-                f"h = {report.scene.step:g} is beyond the limit of {schemes.title(scheme)} here, {limit:.4g}"
-            )
-            out.append(plain(f"{said}: {names}", "bold yellow"))
+            said = f"is beyond the limit of {schemes.title(scheme)} here, {limit:.4g}: {names}"
+            out.append(plain(f"h = {report.scene.step:g} {said}", "bold yellow"))
     return [plain(), *out] if out else []
 
 
@@ -323,26 +318,20 @@ def _repeat(one: Repeat) -> Text:
 
 def _summary(report: Report) -> Lines:
     """How many verdicts passed, where the store is, and what to do with it."""
-    failed = any(v.passed is False for v in report.verdicts)
-    taken = f"; resumed from an interrupted run: {', '.join(report.resumed)}" if report.resumed else ""
-    name = shlex.quote(str(report.path))
-    look = "bold red" if failed else "bold yellow" if report.not_judged else "bold green"
     if report.broke:
         # why stands in the message
         names = " and ".join(report.broke)
         return [plain(f"{report.counts}; nothing is stored: {names} did not run", "bold red")]
-    return [
-        *(hanging("", left) if not failed and (left := checks.not_exercised(report.scene)) else []),
-        plain(f"{report.counts}{taken}", look),
-        *(
-            []
-            if report.path is None
-            else [
-                plain(f"Stored in {report.path}", look),
-                plain(f"next: springcheck plot {name}, or springcheck report {name}", "dim"),
-            ]
-        ),
-    ]
+    failed, left = any(v.passed is False for v in report.verdicts), checks.not_exercised(report.scene)
+    out: Lines = [*hanging("", left)] if left and not failed else []
+    taken = f"; resumed from an interrupted run: {', '.join(report.resumed)}" if report.resumed else ""
+    look = "bold red" if failed else "bold yellow" if report.not_judged else "bold green"
+    out.append(plain(f"{report.counts}{taken}", look))
+    if report.path is not None:
+        name = shlex.quote(str(report.path))
+        out.append(plain(f"Stored in {report.path}", look))
+        out.append(plain(f"next: springcheck plot {name}, or springcheck report {name}", "dim"))
+    return out
 
 
 def _comparison(comparison: Comparison) -> TextTable:

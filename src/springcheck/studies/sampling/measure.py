@@ -8,7 +8,7 @@ from dataclasses import replace
 from functools import partial
 from math import nan
 from pathlib import Path
-from typing import Any, Unpack
+from typing import Unpack
 
 import numpy as np
 
@@ -165,20 +165,15 @@ def _last_stable(radius: Callable[[float], float]) -> float:
     return (low + high) / 2 if high > 1e-3 else 0.0
 
 
-def measure(labels: Sequence[Label], *, kept: Keeper | None = None, left: Sequence[Any] = ()) -> Sampling:
-    """Every thermostat of these."""
-    kept = kept or Keeper()
-    found = kept.results(each(labels, "", lambda label: partial(measured, label), SAMPLED))
-    return Sampling(methods=tuple(found), left_out=tuple(left), resumed=kept.resumed, path=kept.path)
-
-
 def record(path: str | Path | None, methods: Sequence[str] = (), **how: Unpack[How]) -> Sampling:
-    """Like `measure`, of these labels or globs, kept in a store; the default thermostats where left out."""
+    """Measure thermostats, of these labels or globs, the default ones where left out; kept in a store."""
     labels, left, _ = choose(replace(springs(1, 1), include=("*",)), methods)
-    with keeper.kept(path, keeper.command("sampling", labels), **how) as kept:
-        found = measure(labels, kept=kept, left=left)
-        kept.commit("sampling", found.document())
-    return found
+    pieces = each(labels, "", lambda label: partial(measured, label), SAMPLED)
+
+    def measure(kept: Keeper) -> Sampling:
+        return Sampling(methods=tuple(kept.results(pieces)), left_out=tuple(left))
+
+    return keeper.study("sampling", path, labels, measure, **how)
 
 
 def perform(options: Namespace, progress: Progress | None) -> Sampling:

@@ -13,7 +13,7 @@ from springcheck.engines.contract import Label
 from springcheck.physics.arrays import Extended, Floats
 from springcheck.physics.trajectory import Trajectory
 from springcheck.studies.stability import propagators
-from springcheck.studies.stability.propagators import STEP, Springs
+from springcheck.studies.stability.propagators import STEP, Springs, first
 
 FIRST, LAST, COARSE = 1e-9, 1e6, 4096
 """The scan: h w from FIRST to LAST in COARSE springs, 1.008 from one to the next."""
@@ -114,24 +114,15 @@ def measure(label: Label) -> Limit:
 def first_exit(label: Label, matrices: Callable[[Springs], Floats | Extended], times: float = 1) -> float:
     """Where the propagator first stops being bounded, to a part in 1e10, at so many `times` the rounding of
     the engine; infinity where it does not."""
-    grid = np.geomspace(FIRST, LAST, COARSE)
     rounding = times * propagators.noise(label)
-    for _ in range(5):
-        springs = Springs(label=label, turn=grid)
-        inside = propagators.bounded(matrices(springs), rounding)
-        turn = np.asarray(springs.true_turn, np.float64)
-        if inside.all():
-            return float("inf")
-        j = int(np.argmin(inside))
-        if j == 0:
-            return 0.0
-        low, high = turn[j - 1], turn[j]
-        if high - low <= 1e-10 * high:
-            break
-        if springs.single and high - low <= 2.0**-22 * high:
-            break
-        grid = np.linspace(low, high, FINE)
-    return float((low + high) / 2)
+
+    def grows(turn: Floats) -> tuple[np.ndarray, Floats]:
+        springs = Springs(label=label, turn=turn)
+        wild = ~propagators.bounded(matrices(springs), rounding)
+        return wild, np.asarray(springs.true_turn, np.float64)
+
+    single = engines.arithmetic(label).parameters == "single"
+    return first(grows, np.geomspace(FIRST, LAST, COARSE), FINE, 5, 2.0**-22 if single else 1e-10)
 
 
 def _points(theory: float) -> Floats:

@@ -123,8 +123,11 @@ def fastest(scene: Scene) -> float:
 
 
 def linear(scene: Scene, scheme: Scheme) -> Linear | None:
-    """What decides a scheme's stability on a scene; None for more coupled particles than are looked at, and
-    in a magnetic field, which is no stiffness, and where friction that depends on positions joins them."""
+    """The linearised motion that decides a scheme's stability on a scene.
+
+    None for more coupled particles than are looked at, in a magnetic field, which is no stiffness, and where
+    friction that depends on positions joins them.
+    """
     system = _at_its_stiffest(scene).system
     if "magnetic" in system.acting or (system.brakes_by_place and not system.is_separate):
         return None
@@ -177,7 +180,8 @@ def _oscillators(w2: Floats, modes: Floats, rate: Floats) -> Linear:
 
 
 def grows(scheme: Scheme, of: Linear, h: Floats) -> np.ndarray:
-    """Whether one step of h (j,) [T] grows in some mode that does not fall off a barrier by itself."""
+    """Whether a step of h (j,) [T] makes some mode grow; modes on a barrier (A < 0) grow by themselves and do
+    not count."""
     g, n = of.rate.shape
     # in units of each step: A h**2 and r h
     t = np.asarray(h, np.longdouble)[:, None, None, None]
@@ -203,12 +207,24 @@ def grows(scheme: Scheme, of: Linear, h: Floats) -> np.ndarray:
     return np.asarray(np.any(~finite | (np.max(np.abs(values), axis=-1) > 1 + GROWTH), axis=-1))
 
 
-def longest(scheme: Scheme, scene: Scene) -> float:
+@lru_cache(maxsize=64)
+def limit_of(scheme: Scheme) -> float:
+    """The largest h w of a scheme on a spring: by the catalogue; of another by its own map, as it may state a
+    wrong one, unless its step has more than one map (multiple time steps) or none."""
+    ours = scheme in (schemes.SCHEMES.get(scheme.name), schemes.ATTACHED.get(scheme.name))
+    if ours or scheme.has("random") or scheme.has("mixes") or not scheme.has("one-step"):
+        return scheme.limit
+    return _first(scheme, Linear.of_modes(np.ones(1), np.zeros(1)), 1.0)
+
+
+def longest(scheme: Scheme, scene: Scene, limit: float | None = None) -> float:
     """The largest h [T] up to which every step is bounded: 0 none is, infinity all are, NaN not known here.
 
-    For a scheme of multiple time steps that is where its first resonance begins.
+    For a scheme of multiple time steps that is where its first resonance begins.  `limit` is that of an
+    engine that leaves its scheme's map.
     """
-    if not scheme.has("one-step") or np.isinf(scheme.limit):
+    limit = limit_of(scheme) if limit is None else limit
+    if not scheme.has("one-step") or np.isinf(limit):
         # a scheme that is bounded on every spring is bounded with friction too
         return np.inf
     of = linear(scene, scheme)
@@ -222,7 +238,7 @@ def longest(scheme: Scheme, scene: Scene) -> float:
         alone = (w2[:, 0] > 0) & (of.rate[:, 0] == 0)
         if np.any(alone):
             # without friction the catalogue knows, in digits that a scan has not
-            known = scheme.limit / float(np.sqrt(np.max(w2[alone])))
+            known = limit / float(np.sqrt(np.max(w2[alone])))
         of = Linear(slow=of.slow[~alone], fast=of.fast[~alone], rate=of.rate[~alone])
         w2 = w2[~alone]
     scale = max(float(np.sqrt(np.max(w2, initial=0.0))), float(np.max(of.rate, initial=0.0)))
@@ -233,11 +249,11 @@ def too_long(name: str, scene: Scene) -> float | None:
     """The largest step of a scheme where that of the scene is longer, None where it is not; nor for a scheme
     that has none at all, as explicit Euler without friction, or whose map is not known."""
     scheme = schemes.known().get(name)
-    if scheme is None or not scheme.has("one-step") or scheme.has("random") or np.isinf(scheme.limit):
+    if scheme is None or not scheme.has("one-step") or scheme.has("random"):
         return None
     h = np.array([abs(scene.step)])
     with np.errstate(all="ignore"):
-        of = linear(scene, scheme)
+        of = None if np.isinf(limit_of(scheme)) else linear(scene, scheme)
         if of is None or not np.isfinite(of.slow + of.fast).all() or not grows(scheme, of, h)[0]:
             return None
         limit = longest(scheme, scene)
@@ -250,16 +266,5 @@ def _first(scheme: Scheme, of: Linear, scale: float) -> float:
     if scheme.has("mixes"):
         # a resonance may be narrow: up to the limit of the fast springs alone at even distances
         h = np.linspace(0, scheme.limit, NEIGHBOURS + 1)[1:] / scale
-    for _ in range(6):
-        with np.errstate(all="ignore"):
-            wild = grows(scheme, of, h)
-        if not wild.any():
-            return np.inf
-        j = int(np.argmax(wild))
-        if j == 0:
-            return 0.0
-        low, high = h[j - 1], h[j]
-        if high - low <= 1e-10 * high:
-            break
-        h = np.linspace(low, high, FINE)
-    return float((low + high) / 2)
+    with np.errstate(all="ignore"):
+        return propagators.first(lambda h: (grows(scheme, of, h), h), h, FINE, 6)

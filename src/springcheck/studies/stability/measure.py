@@ -17,7 +17,7 @@ import numpy as np
 
 from springcheck import engines
 from springcheck.engines.contract import Label
-from springcheck.errors import MethodError, SceneError
+from springcheck.errors import SceneError
 from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
 from springcheck.schemes import scheme
@@ -31,10 +31,12 @@ from springcheck.studies.stability.result import LIMITS, MULTIPLIERS, REGIONS, R
 from springcheck.studies.tables import Form
 
 
-def measure(scene: Scene, methods: Sequence[str] = (), *, kept: Keeper | None = None) -> Stability:
+def record(
+    scene: Scene, path: str | Path | None = None, methods: Sequence[str] = (), **how: Unpack[How]
+) -> Stability:
     """Measure the methods that these labels or globs name (all when none is given).
 
-    What an earlier call has finished (`kept`) is reused.
+    A store has tables under /stability, and the document (see `keeper.kept`).
 
     Raises:
         MethodError: a label names nothing, or none of the methods can be measured.
@@ -47,8 +49,11 @@ def measure(scene: Scene, methods: Sequence[str] = (), *, kept: Keeper | None = 
             f"a step below h w = 1, here h < {1 / rate if rate else np.inf:.6g}, and none beyond"
         )
     fastest(scene)
-    chosen = engines.match(tuple(methods) or ("*",))
+    labels = engines.match(tuple(methods) or ("*",))
+    return keeper.study("stability", path, labels, partial(_measure, scene, labels), scene=scene, **how)
 
+
+def _measure(scene: Scene, labels: Sequence[Label], kept: Keeper) -> Stability:
     def why(label: Label) -> str | None:
         absent = engines.absence(label.engine)
         if absent or propagators.has_one_step(label):
@@ -56,10 +61,7 @@ def measure(scene: Scene, methods: Sequence[str] = (), *, kept: Keeper | None = 
         adaptive = not scheme(engines.method(label).scheme).has("one-step")
         return "it has no fixed step and no limit" if adaptive else "it moves no springs"
 
-    usable, left_out = sorted_out(chosen, why)
-    if not usable:
-        reasons = "; ".join(f"{one.method}: {one.reason}" for one in left_out)
-        raise MethodError(f"none of these methods has a limit to measure: {reasons}")
+    usable, left_out = sorted_out(labels, why, "has a limit to measure")
     braked = [label for label in usable if "damping" in engines.method(label).terms]
     damped = braked if scene.system.is_damped else []
     resonant = [label for label in usable if resonance.serves(scene, label)]
@@ -72,7 +74,6 @@ def measure(scene: Scene, methods: Sequence[str] = (), *, kept: Keeper | None = 
             modulated, "multiplier of", lambda label: partial(multipliers.measure, scene, label), MULTIPLIERS
         ),
     ]
-    kept = kept or Keeper()
     found = iter(kept.results([piece for part in plan for piece in part]))
     of_limits, of_regions, of_resonances, of_multipliers = ([next(found) for _ in part] for part in plan)
     return Stability(
@@ -82,21 +83,7 @@ def measure(scene: Scene, methods: Sequence[str] = (), *, kept: Keeper | None = 
         resonances=tuple(of_resonances),
         multipliers=tuple(x for x in of_multipliers if not x.why),
         left_out=(*left_out, *(LeftOut(method=x.method, reason=x.why) for x in of_multipliers if x.why)),
-        resumed=kept.resumed,
-        path=kept.path,
     )
-
-
-def record(
-    scene: Scene, path: str | Path | None, methods: Sequence[str] = (), **how: Unpack[How]
-) -> Stability:
-    """Like `measure`, kept in a store (see `keeper.kept`): tables under /stability, and the document."""
-    labels = engines.match(tuple(methods) or ("*",))
-    command = keeper.command("stability", labels, scene.digest)
-    with keeper.kept(path, command, **how) as kept:
-        study = measure(scene, methods, kept=kept)
-        kept.commit("stability", study.document(), scene)
-    return study
 
 
 def perform(options: Namespace, progress: Progress | None) -> Stability:

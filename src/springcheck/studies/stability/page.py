@@ -18,35 +18,32 @@ from springcheck.studies.stability.result import Stability
 TURN = "step times frequency, h \N{GREEK SMALL LETTER OMEGA}"
 
 
+LEAST_SHOWN = 0.05
+"""h w of a scene below which its line would stand left of the curves."""
+
+
 def banks(study: Stability) -> list[Bank]:
     """What was measured."""
     found = []
     if study.limits:
-        chart = _limits(study.limits, abs(study.scene.step) * fastest(study.scene))
+        here = abs(study.scene.step) * fastest(study.scene)
         found.append(
-            Bank(
-                name="stability-limits",
-                title="Schemes (lines) and methods (marks)",
-                heading=_limits_said(study.limits),
-                charts=[chart],
-            )
-        )
+            Bank(name="stability-limits", title="Schemes (lines) and methods (marks)",
+                 heading=_limits_said(study.limits), charts=[_limits(study.limits, here)])
+        )  # fmt: skip
     if study.regions:
         of = f"{study.regions[0].points:,} points each"
         wrong = sum(x.wrong for x in study.regions)
+        heading = f"Damped springs, {of}: {wrong} against theory.  The line is critical damping"
         found.append(
-            Bank(
-                name="stability-regions",
-                title="Damped springs: where a method is stable",
-                heading=f"Damped springs, {of}: {wrong} against theory.  The line is critical damping",
-                charts=[_region(x) for x in study.regions],
-            )
-        )
+            Bank(name="stability-regions", title="Damped springs: where a method is stable", heading=heading,
+                 charts=[*map(_region, study.regions)])
+        )  # fmt: skip
     if study.resonances:
-        charts = [_resonance(x) for x in study.resonances]
         found.append(
-            Bank(name="stability-resonances", title="Multiple time steps: where they resonate", charts=charts)
-        )
+            Bank(name="stability-resonances", title="Multiple time steps: where they resonate",
+                 charts=[*map(_resonance, study.resonances)])
+        )  # fmt: skip
     return found
 
 
@@ -66,33 +63,24 @@ def _limits(limits: Sequence[Limit], here: float) -> Chart:
     theories: dict[str, Curve] = {}
     measured = []
     for x in limits:
-        group = scheme_of(x.method)
-        theories.setdefault(
-            x.scheme, Curve(name=x.scheme.partition(":")[0], group=group, x=x.h_w, y=x.radius_predicted)
-        )
+        group, name = scheme_of(x.method), x.scheme.partition(":")[0]
+        theories.setdefault(x.scheme, Curve(name=name, group=group, x=x.h_w, y=x.radius_predicted))
         note = f"limit {x.limit:.9g}, theory {x.theory:.9g}"
         notes = [f"theory {y!r}; {note}" for y in x.radius_predicted.tolist()]
         measured.append(
             Curve(name=x.method, group=group, x=x.h_w, y=x.radius, line=False, marks=True, notes=notes)
         )
     edges = sorted({x.theory for x in limits if 0 < x.theory < np.inf})
-    return labelled(
-        Chart(
-            title="Spectral radius of one step, measured on engines' own propagators; bounded up to 1.",
-            x=Scale(name=TURN, log=True),
-            y=Scale(name="spectral radius of one step", log=True, shown=(0.1, 100.0)),
-            curves=[*theories.values(), *measured],
-            rules=[
-                Rule(axis="y", at=1.0, look="one"),
-                *(Rule(axis="x", at=x, name=f"limit {x:.4g}") for x in edges),
-                *(
-                    [Rule(axis="x", at=here, name=f"this scene: {here:.3g}", look="here")]
-                    if here > 0.05
-                    else []
-                ),
-            ],
-        )
-    )
+    rules = [Rule(axis="y", at=1.0, look="one")]
+    rules += [Rule(axis="x", at=x, name=f"limit {x:.4g}") for x in edges]
+    if here > LEAST_SHOWN:
+        rules.append(Rule(axis="x", at=here, name=f"this scene: {here:.3g}", look="here"))
+    return labelled(Chart(
+        title="Spectral radius of one step, measured on engines' own propagators; bounded up to 1.",
+        x=Scale(name=TURN, log=True),
+        y=Scale(name="spectral radius of one step", log=True, shown=(0.1, 100.0)),
+        curves=[*theories.values(), *measured], rules=rules,
+    ))  # fmt: skip
 
 
 KINDS = (

@@ -170,6 +170,28 @@ def bounded(matrices: Floats | Extended, rounding: float) -> np.ndarray:
         return np.asarray(found <= 1 + np.where(np.isfinite(moved), np.minimum(moved, 1), 0))
 
 
+def first(
+    grows: Callable[[Floats], tuple[np.ndarray, Floats]], grid: Floats, fine: int, rounds: int,
+    enough: float = 1e-10,
+) -> float:  # fmt: skip
+    """Where growth begins on a grid (j,), refined `rounds` times by so many points to a part `enough`.
+
+    `grows` says at which points, and where these really are.  0: at the first; infinity: nowhere.
+    """
+    for _ in range(rounds):
+        wild, at = grows(grid)
+        if not wild.any():
+            return float("inf")
+        j = int(np.argmax(wild))
+        if j == 0:
+            return 0.0
+        low, high = at[j - 1], at[j]
+        if high - low <= enough * high:
+            break
+        grid = np.linspace(low, high, fine)
+    return float((low + high) / 2)
+
+
 def has_one_step(label: Label) -> bool:
     """Whether a method has a one-step map and moves particles on springs."""
     method = engines.method(label)

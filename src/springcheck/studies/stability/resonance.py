@@ -15,7 +15,7 @@ import numpy as np
 from springcheck import engines, schemes
 from springcheck.engines.contract import Label, Need
 from springcheck.errors import SceneError
-from springcheck.physics.arrays import Extended, Floats
+from springcheck.physics.arrays import Floats, Reals
 from springcheck.physics.scene import Scene
 from springcheck.studies.stability import propagators
 from springcheck.studies.stability.propagators import Stepper, by_engine
@@ -96,17 +96,9 @@ def radii(scene: Scene, label: Label, turn: Floats, step: Stepper) -> Floats:
     return np.asarray(np.max(np.abs(np.linalg.eigvals(matrices)), axis=-1))
 
 
-def _by_scheme(scene: Scene, label: Label) -> tuple[Extended, Extended]:
-    q, p = schemes.step(
-        schemes.scheme(engines.method(label).scheme),
-        scene.q.astype(np.longdouble),
-        scene.p.astype(np.longdouble),
-        h=scene.step,
-        m=scene.m,
-        force=scene.system.force,
-        parts=scene.system.parts,
-    )
-    return np.asarray(q, np.longdouble), np.asarray(p, np.longdouble)
+def _by_scheme(scene: Scene, label: Label) -> tuple[Reals, Reals]:
+    law = schemes.Law(scheme=schemes.scheme(engines.method(label).scheme), scene=scene, h=scene.step)
+    return law.step(scene.q.astype(np.longdouble), scene.p.astype(np.longdouble))
 
 
 def _bands(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -72,19 +72,13 @@ class Stability(Studied):
                     )
             if np.isfinite(x.growth_below) and not x.growth_below <= max(x.growth_below_predicted, 0) + 1e-4:
                 out.append(f"{x.method}: grows by {x.growth_below:.3g} a step below its limit")
-        out += [
-            f"{x.method}: {count(x.wrong, 'point')} of the damped plane against theory"
-            for x in self.regions
-            if x.wrong
-        ]
-        for y in self.resonances:
-            if y.bands != y.bands_predicted and not _apart(y) <= 1e-6:
-                out.append(f"{y.method}: bands {y.bands}, the exact map's {y.bands_predicted}")
-        out += [
-            f"{z.method}: Floquet multiplier off by {z.off:.1e} from its scheme's, allowed {z.bound:.1e}"
-            for z in self.multipliers
-            if not z.off <= z.bound
-        ]
+        wrong = (x for x in self.regions if x.wrong)
+        out += [f"{x.method}: {count(x.wrong, 'point')} of the damped plane against theory" for x in wrong]
+        apart = (y for y in self.resonances if y.bands != y.bands_predicted and not _apart(y) <= 1e-6)
+        out += [f"{y.method}: bands {y.bands}, the exact map's {y.bands_predicted}" for y in apart]
+        strayed = (z for z in self.multipliers if not z.off <= z.bound)
+        said = "Floquet multiplier off by {:.1e} from its scheme's, allowed {:.1e}"
+        out += [f"{z.method}: {said.format(z.off, z.bound)}" for z in strayed]
         return out
 
     def largest(self, found: Limit) -> float:
@@ -101,7 +95,7 @@ class Stability(Studied):
         # by what was measured: of an engine that leaves its scheme's own map, as much less as there
         own = limits.first_exit(label, propagators.theory)
         own = own if 0 < own < np.inf else found.limit
-        here = longest(replace(scheme, limit=own), self.scene)
+        here = longest(scheme, self.scene, own)
         return here if own == found.limit else here * found.limit / own
 
     @property
@@ -125,35 +119,31 @@ class Stability(Studied):
             passed=self.passed,
             fastest=fastest(self.scene),
             h_w=abs(self.scene.step) * fastest(self.scene),
-            methods=[_limit(x) | {"largest_step": self.largest(x)} for x in self.limits],
+            methods=[
+                _named(x, "method", "scheme", "limit", "theory", "bound", "agrees", "growth_above",
+                       "growth_predicted", "growth_below")
+                | {"points": _points(x), "largest_step": self.largest(x)}
+                for x in self.limits
+            ],
             regions=[
-                {
-                    "stable": np.count_nonzero(x.stable),
-                    **_named(x, "method", "points", "wrong", "undecided", "off"),
-                }
+                {"stable": np.count_nonzero(x.stable)}
+                | _named(x, "method", "points", "wrong", "undecided", "off")
                 for x in self.regions
             ],
             resonances=[_named(x, "method", "bands", "bands_predicted") for x in self.resonances],
             multipliers=self.multipliers,
             left_out=self.left_out,
             failures=self.failures,
-        )
+        )  # fmt: skip
 
 
 def _named(found: Any, *names: str) -> dict[str, Any]:
     return {name: getattr(found, name) for name in names}
 
 
-def _limit(x: Limit) -> dict[str, Any]:
-    names = (
-        "method", "scheme", "limit", "theory", "bound", "agrees",
-        "growth_above", "growth_predicted", "growth_below",
-    )  # fmt: skip
+def _points(x: Limit) -> list[dict[str, float]]:
     points = zip(x.h_w, x.radius, x.radius_predicted, strict=True)
-    return {
-        **_named(x, *names),
-        "points": [{"h_w": a, "radius": b, "radius_predicted": c} for a, b, c in points],
-    }
+    return [{"h_w": a, "radius": b, "radius_predicted": c} for a, b, c in points]
 
 
 def growth_allowed(limit: Limit) -> float:

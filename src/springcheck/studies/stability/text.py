@@ -12,6 +12,7 @@ from springcheck.studies.stability.longest import fastest
 from springcheck.studies.stability.result import Stability
 from springcheck.studies.text import left_out, resumed
 from springcheck.text.lines import Lines, plain, table
+from springcheck.text.wording import number
 
 
 def lines(study: Stability, options: Namespace | None = None) -> Lines:
@@ -26,13 +27,12 @@ def lines(study: Stability, options: Namespace | None = None) -> Lines:
         rows = []
         for x in study.limits:
             off = 0.0 if x.limit == x.theory else abs(x.limit - x.theory)
-            places = [("none" if np.isinf(y) else f"{y:.9f}") for y in (x.limit, x.theory)]
-            grown = [
-                "-" if np.isnan(x.growth_above) else f"{y:.7f}" for y in (x.growth_above, x.growth_predicted)
-            ]
-            style = "" if x.agrees else "bold red"
-            cells = (x.method, *places, f"{off:.0e}", *grown, _largest_step(study.largest(x)))
-            rows.append([plain(cell, style) for cell in cells])
+            predicted = np.nan if np.isnan(x.growth_above) else x.growth_predicted
+            cells = (
+                x.method, *(number(y, ".9f", "none") for y in (x.limit, x.theory)), f"{off:.0e}",
+                *(number(y, ".7f") for y in (x.growth_above, predicted)), _step(study.largest(x)),
+            )  # fmt: skip
+            rows.append([plain(cell, "" if x.agrees else "bold red") for cell in cells])
         titles = ("method", "limit h w", "theory", "off", "growth above", "predicted", "largest h here")
         out += [table(titles, rows), plain()]
     if study.multipliers and (exact := floquet(study.scene.system)):
@@ -58,12 +58,8 @@ def _of_scene(study: Stability) -> Lines:
     if where and not has_true_motion(scene):
         where = ", at its start"
     friction = ", without its friction" if scene.system.is_damped else ""
-    out: Lines = [
-        plain(
-            f"  fastest angular frequency of this scene{where}{friction}: w = {w:.6g}; "
-            f"its step h = {scene.step:g} makes h w = {abs(scene.step) * w:.4g}"
-        )
-    ]
+    here = f"its step h = {scene.step:g} makes h w = {abs(scene.step) * w:.4g}"
+    out: Lines = [plain(f"  fastest angular frequency of this scene{where}{friction}: w = {w:.6g}; {here}")]
     beyond = [x.method for x in study.limits if study.largest(x) < abs(scene.step)]
     if beyond:
         out.append(plain(f"  beyond the limit there: {', '.join(beyond)}", "bold yellow"))
@@ -72,17 +68,13 @@ def _of_scene(study: Stability) -> Lines:
     if modulated := floquet(scene.system):
         grown, period, _ = modulated
         bounded = "stays bounded" if grown == 1 else f"grows by a factor of {grown:.6g}"
-        out.append(
-            plain(f"  in each period of its modulation, {period:.4g}, the exact motion {bounded} (Floquet)")
-        )
+        said = f"the exact motion {bounded} (Floquet)"
+        out.append(plain(f"  in each period of its modulation, {period:.4g}, {said}"))
     elif not scene.system.is_linear:
-        out.append(
-            plain("  limits of small oscillations there; an anharmonic motion may be lost below them", "dim")
-        )
+        said = "limits of small oscillations there; an anharmonic motion may be lost below them"
+        out.append(plain(f"  {said}", "dim"))
     return out
 
 
-def _largest_step(h: float) -> str:
-    if np.isnan(h):
-        return "-"
-    return "none" if h == 0 else "any" if np.isinf(h) else f"{h:.4g}"
+def _step(h: float) -> str:
+    return "none" if h == 0 else number(h, ".4g", "any")
