@@ -447,6 +447,20 @@ def test_a_coarse_force_is_certain_many_steps_apart_too(force, precision: str, e
     assert not found.undecided
 
 
+def test_a_fixed_point_force_finer_than_the_forces_that_are_read_is_redone() -> None:
+    # forces read off these states would show single precision, and do not show quanta of 2**-32
+    m, k, h = 1.444, 4840.8626488727405, 0.0051632965040869575
+    q, v, rows = -0.05, 6.0, []
+    for _ in range(101):
+        rows.append((q, v))
+        v += h / 2 * (np.rint(-k * q * 2**32) / 2**32) / m
+        q += h * v
+        v += h / 2 * (np.rint(-k * q * 2**32) / 2**32) / m
+    positions, velocities = np.array(rows).T
+    found = identify(h * np.arange(101), positions, v=velocities, mass=m, stiffness=k)
+    assert (found.scheme, found.precision, found.fits) == ("velocity-verlet", "fixed-point force", True)
+
+
 @pytest.mark.parametrize("m", [1e-50, 1e-20, 1e-12, 1e42])
 def test_noise_of_a_force_far_below_a_quantum_is_no_arithmetic(m: float) -> None:
     rng = np.random.default_rng(1)

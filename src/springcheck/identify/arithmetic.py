@@ -333,14 +333,14 @@ def _defects(
 
 def _coarse(record: Record, j: int, found: Map, match: Match, signed: Floats) -> tuple[str, str, bool]:
     """Precision of coarse forces, a note, and whether it is certain; "" where none explains the misses."""
-    seen = coarse.kinematic(record, j, found, match)
-    if seen is not None:
-        return *seen, record.mass is not None
     name, note = coarse.sized(record, j, found, match, signed)
     names = quantised.FORCES if name == "mixed" else [name] if name else []
     for each in names:
         if quantised.reproduced(record, j, found, match, each, coarse.QUANTUM, coarse.EXCESS):
             return each, "states are double, and the steps redone with such forces are those recorded", True
+    seen = coarse.kinematic(record, j, found, match)
+    if seen is not None:
+        return *seen, record.mass is not None
     return (name, note, False) if name and coarse.white(found, match, signed) else ("", "", True)
 
 
