@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -177,33 +178,28 @@ def solved(
 
 
 def compare(
-    maps: list[Map], terms: list[Terms], families: tuple[Family, ...], strides: Iterable[int]
+    maps: list[Map],
+    terms: list[Terms],
+    families: tuple[Family, ...],
+    strides: Iterable[int],
+    *,
+    far: bool = False,
 ) -> list[Joint]:
-    """Families and strides that all oscillators may be of, the plainest first; what fails one is not tried on
-    the others."""
+    """Families and strides that all oscillators may be of, the plainest first, and with `far` all others at
+    their best; what fails one oscillator is not tried on the others."""
     steps = list(strides)
     parts: list[dict[tuple[str, int], Match]] = []
     for found, what in zip(maps, terms, strict=True):
-        fitting = {(x.family, x.stride): x for x in matches(found, what, families, steps)}
+        fitting = {(x.family, x.stride): x for x in matches(found, what, families, steps, far=far)}
         parts.append(fitting)
         families = tuple(f for f in families if any(f.name == name for name, _ in fitting))
         steps = sorted({s for _, s in fitting})
         if not families:
             return []
-    return sorted(_joints(parts), key=lambda x: x.plainness)
-
-
-def _joints(parts: list[dict[tuple[str, int], Match]]) -> list[Joint]:
-    """Hypotheses of which every oscillator has a match."""
     shared = (key for key in parts[0] if all(key in x for x in parts))
-    return [Joint(family=key[0], stride=key[1], parts=tuple(x[key] for x in parts)) for key in shared]
+    joints = [Joint(family=key[0], stride=key[1], parts=tuple(x[key] for x in parts)) for key in shared]
+    return sorted(joints, key=lambda x: x.plainness)
 
 
-def nearest(
-    maps: list[Map], terms: list[Terms], families: tuple[Family, ...], strides: Iterable[int]
-) -> list[Joint]:
-    """Families and strides at their best, whether or not they may be accepted."""
-    steps = list(strides)
-    both = zip(maps, terms, strict=True)
-    every = (matches(found, what, families, steps, far=True) for found, what in both)
-    return _joints([{(x.family, x.stride): x for x in found} for found in every])
+nearest = partial(compare, far=True)
+"""Families and strides at their best, whether or not they may be accepted."""

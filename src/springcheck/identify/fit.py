@@ -180,7 +180,8 @@ def _minimum(
     best: _Solution | None = None
     noise = Noise(np.eye(2), 0 * sigma, process) if not np.any(sigma) else None
     for _ in range(MOST_ROUNDS):
-        entries, centre = x[:4].reshape(2, 2), np.append(x[4:n], np.zeros(2 - centred))
+        entries, centre = x[:4].reshape(2, 2), np.zeros(2, np.longdouble)
+        centre[:centred] = x[4:n]
         state = z - centre
         left = state[1:] - state[:-1] @ entries.T
         if slipping is not None:

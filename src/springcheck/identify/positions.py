@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from springcheck.errors import IdentificationError
 from springcheck.identify.candidates import (
@@ -18,10 +19,9 @@ from springcheck.identify.candidates import (
 from springcheck.identify.evidence import SINGLE_ROOM, Measured
 from springcheck.identify.families import FAMILIES, HELD, Family, title
 from springcheck.identify.hypothesis import FEW, SURE, Joint, Match, distinct
-from springcheck.identify.record import SIZES, Record
+from springcheck.identify.record import SIZES, Record, of_size, stated_stride
 from springcheck.identify.recurrence import FEWEST_FRAMES, Recurrence, classes, matches, recurrence
 from springcheck.identify.result import Explanation, Identification, nothing
-from springcheck.physics.arrays import Floats
 from springcheck.text.wording import either
 
 CERTAIN_CHANGE = 1e8
@@ -34,10 +34,16 @@ ALONE = (
 
 
 def identify_positions(
-    record: Record, stated: Floats | None, stride: int | None, friction: float | None, notes: list[str]
+    record: Record, stiffness: ArrayLike | None, friction: float | None, step: float | None
 ) -> Identification:
     """The schemes that may have made these positions.  Raises IdentificationError where they show none."""
-    notes = [*notes, ALONE]
+    stated = of_size("stiffness", stiffness, record.q.shape[1], zero=True)
+    of_size("friction", friction, zero=True)
+    notes: list[str] = []
+    if stated is not None and record.mass is None:
+        notes.append("the stiffness says nothing of positions without the mass; give the mass as well")
+    stride = stated_stride(record, step, notes)
+    notes.append(ALONE)
     moving = np.flatnonzero(np.ptp(record.q, axis=0) > SIZES[0]).tolist()
     if not moving:
         raise IdentificationError("nothing moves: at rest all schemes agree; start away from rest")

@@ -18,7 +18,7 @@ from springcheck.identify.misplaced import turned
 from springcheck.identify.named import determinants, difference, named
 from springcheck.identify.notes import of_few
 from springcheck.identify.positions import identify_positions
-from springcheck.identify.record import Record, of_size, read, stated_stride
+from springcheck.identify.record import Record, read
 from springcheck.identify.result import Identification, nothing
 from springcheck.identify.search import accounted
 from springcheck.identify.thermal import explained, of_bath
@@ -48,8 +48,7 @@ def identify_arrays(
     times, or not spanning the plane.
     """
     if p is None and v is None:
-        alone = read(t, q, None, np.zeros(np.shape(q)), mass)
-        return _of_positions(alone, stiffness, step, friction)
+        return identify_positions(read(t, q, None, np.zeros(np.shape(q)), mass), stiffness, friction, step)
     stated: dict[str, Any] = {"mass": mass, "stiffness": stiffness, "friction": friction, "step": step}
     times = np.asarray(t, dtype=np.float64)
     if not (times.ndim == 1 and len(times) > 1 and times[-1] < times[0]):
@@ -99,21 +98,9 @@ def _of_coordinates(
         return _unknown(seen, range(1, 2))
     way, left, fitting = accounted(seen)
     if not left:
-        # of what fits no number of steps the nearest may be of several
+        # where nothing fits, the nearest scheme may take several steps to a frame
         return _unknown(seen, range(1, 2) if fitting else FEW)
     return named(way, left, step)
-
-
-def _of_positions(
-    record: Record, stiffness: ArrayLike | None, step: float | None, friction: float | None
-) -> Identification:
-    notes: list[str] = []
-    stated = of_size("stiffness", stiffness, record.q.shape[1], zero=True)
-    of_size("friction", friction, zero=True)
-    if stated is not None and record.mass is None:
-        notes.append("the stiffness says nothing of positions without the mass; give the mass as well")
-    stride = stated_stride(record, step, notes)
-    return identify_positions(record, stated, stride, friction, notes)
 
 
 def _unknown(seen: Measured, strides: range) -> Identification:
