@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cache, partial
+from functools import cache, lru_cache, partial
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -87,28 +87,29 @@ class MapTable:
         """One-step matrices (c, 2, 2), a and g (c,), in their width."""
         out = np.zeros((2, 2, len(a)), a.dtype)
         out[0, 0] = out[1, 1] = 1
-        present = np.flatnonzero(np.bincount(which, minlength=len(self.families)))
-        n: Selected = int(present[0]) if len(present) == 1 else which
-        for kind, members in self.kinds:
-            if np.all(members[present]):
+        present = np.zeros(len(self.families), dtype=bool)
+        present[which] = True
+        one, kinds, slots = _used(self, present.tobytes())
+        n: Selected = which if one is None else one
+        for kind, members in kinds:
+            if members is None:
                 out[:] = self._special(kind, n, a, g)
-            elif np.any(members[present]):
+            else:
                 at = np.flatnonzero(members[which])
                 out[:, :, at] = self._special(kind, which[at], a[at], g[at])
         q, v = out
         damped = bool(np.any(g))
-        slots = self.slots[a.dtype]
-        for slot, used in zip(slots, np.any(slots[:, :, present], axis=2).tolist(), strict=True):
-            e, i, x, b, d = slot
-            if damped and used[0]:
+        for k, (with_e, with_i, with_x, with_b, with_d) in slots:
+            e, i, x, b, d = self.slots[a.dtype][k]
+            if damped and with_e:
                 v *= 1 - e[n] * g
-            if used[3]:
+            if with_b:
                 v -= b[n] * a * q
-            if damped and used[1]:
+            if damped and with_i:
                 v /= 1 + i[n] * g
-            if damped and used[2]:
+            if damped and with_x:
                 v *= np.exp(-x[n] * g)
-            if used[4]:
+            if with_d:
                 q += d[n] * v
         return out.transpose(2, 0, 1)
 
@@ -158,6 +159,20 @@ class MapTable:
             out = power(out, s)
         up = np.exp(-log_mass) / s.astype(a.dtype) * ratio.astype(a.dtype)
         return np.stack([out[:, 0, 0], out[:, 0, 1] * up, out[:, 1, 0] / up, out[:, 1, 1]])
+
+
+@lru_cache(maxsize=1000)
+def _used(
+    every: MapTable, present: bytes
+) -> tuple[int | None, list[tuple[str, NDArray[np.bool_] | None]], list[tuple[int, list[bool]]]]:
+    """What the families of this mask use: the family's number, where it is one alone; kinds of map other than
+    stages, and whose they are, None where all are of it; slots, and which of their numbers are not 0."""
+    those = np.frombuffer(present, dtype=bool)
+    at = np.flatnonzero(those)
+    kinds = [(kind, None if np.all(of[at]) else of) for kind, of in every.kinds if np.any(of[at])]
+    used = np.any(every.slots[WIDTHS[1]][:, :, at] != 0, axis=2)
+    slots = [(int(k), used[k].tolist()) for k in np.flatnonzero(np.any(used, axis=1))]
+    return int(at[0]) if len(at) == 1 else None, kinds, slots
 
 
 @cache

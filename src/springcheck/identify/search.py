@@ -233,17 +233,11 @@ def find(seen: Measured) -> tuple[list[Joint], Measured]:
 def explained(seen: Measured, accepted: list[Joint]) -> Explained:
     """The schemes of which a known arithmetic explains every step, with the defects of their steps."""
     left = [x for x in accepted if not FAMILIES[x.family].held or x.substeps[0]]
-    # on springs of two stiffnesses two schemes may have one map, which is no other
-    alone = all(
-        (x.scheme, x.stride) == (accepted[0].scheme, accepted[0].stride)
-        or identical(accepted[0], x, free_scale=seen.record.momenta)
-        for x in accepted
-    )
     defects: list[list[arithmetic.Defect]] = [[] for _ in left]
     for i, (j, found, what) in enumerate(zip(seen.moving, seen.maps, seen.terms, strict=True)):
         if not left:
             break
-        shows = partial(visible, found, what, damped=left[0].damped) if alone else bool
+        shows = partial(_stands_out, seen, accepted, found, what, damped=left[0].damped)
         new = arithmetic.defects(seen.record, j, found, [x.parts[i] for x in left], shows)
         # what explains one scheme's misses does not exclude the others, which miss the states by no more
         good = [x for x in new if x.precision]
@@ -254,6 +248,17 @@ def explained(seen: Measured, accepted: list[Joint]) -> Explained:
         defects = [[*defects[k], new[k]] for k in kept]
         left = [left[k] for k in kept]
     return dict(zip(left, defects, strict=True))
+
+
+def _stands_out(seen: Measured, accepted: list[Joint], found: Map, terms: Terms, *, damped: bool) -> bool:
+    """Whether no other map fits, and the error of this one's step is visible; on springs of two stiffnesses
+    two schemes may have one map."""
+    one = accepted[0]
+    alone = all(
+        (x.scheme, x.stride) == (one.scheme, one.stride) or identical(one, x, free_scale=seen.record.momenta)
+        for x in accepted
+    )
+    return alone and visible(found, terms, damped=damped)
 
 
 def _plan(seen: Measured) -> list[list[Room]]:
