@@ -9,15 +9,12 @@ from typing import Any
 import numpy as np
 
 from springcheck.identify import coarse, quantised
-from springcheck.identify.coarse import QUANTUM
 from springcheck.identify.families import FAMILIES, G_ROUNDING, substeps
 from springcheck.identify.fit import Map
 from springcheck.identify.hypothesis import SURE, Match
 from springcheck.identify.maps import MapTable, power, powers, table, unit
 from springcheck.identify.record import Record
 from springcheck.physics.arrays import Extended, Floats, Integers
-
-__all__ = ["QUANTUM", "Defect", "defects"]
 
 REBUILT = 1 / 32, 1.0
 """Range of the root mean square of a rebuilt velocity's error in units of what a step adds to it."""

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from springcheck.identify import arithmetic
+from springcheck.identify.coarse import QUANTUM
 from springcheck.identify.evidence import SINGLE_ROOM, Measured
 from springcheck.identify.families import FAMILIES, title
 from springcheck.identify.hypothesis import Joint, aliases, frictionless
@@ -69,7 +69,7 @@ def stated_stiffness(
     seen: Measured, plainest: Joint, precision: str, stated: Floats
 ) -> tuple[list[Explanation], list[str]]:
     """Explanations of a stated stiffness that is not that of the states, and notes on it."""
-    quantum = arithmetic.QUANTUM if precision in SINGLE_CONSTANTS else 0.0
+    quantum = QUANTUM if precision in SINGLE_CONSTANTS else 0.0
     against = seen.disagreements(plainest)
     if not against or (quantum and not seen.disagreements(plainest, quantum=quantum)):
         return [], []

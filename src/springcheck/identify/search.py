@@ -10,8 +10,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from springcheck.identify import arithmetic
-from springcheck.identify.arithmetic import SINGLE
+from springcheck.identify.arithmetic import SINGLE, Defect, defects
 from springcheck.identify.coarse import over_single
 from springcheck.identify.compare import nearest
 from springcheck.identify.evidence import Measured
@@ -56,7 +55,7 @@ SAME_MAP = 1e-12
 """Distance of the entries of two steps that are the same, in double precision."""
 
 
-Explained: TypeAlias = dict[Joint, list[arithmetic.Defect]]
+Explained: TypeAlias = dict[Joint, list[Defect]]
 """Hypotheses, the plainest first, and the defects of their steps, which a known arithmetic explains."""
 
 
@@ -233,21 +232,21 @@ def find(seen: Measured) -> tuple[list[Joint], Measured]:
 def explained(seen: Measured, accepted: list[Joint]) -> Explained:
     """The schemes of which a known arithmetic explains every step, with the defects of their steps."""
     left = [x for x in accepted if not FAMILIES[x.family].held or x.substeps[0]]
-    defects: list[list[arithmetic.Defect]] = [[] for _ in left]
+    of_each: list[list[Defect]] = [[] for _ in left]
     for i, (j, found, what) in enumerate(zip(seen.moving, seen.maps, seen.terms, strict=True)):
         if not left:
             break
         shows = partial(_stands_out, seen, accepted, found, what, damped=left[0].damped)
-        new = arithmetic.defects(seen.record, j, found, [x.parts[i] for x in left], shows)
+        new = defects(seen.record, j, found, [x.parts[i] for x in left], shows)
         # what explains one scheme's misses does not exclude the others, which miss the states by no more
         good = [x for x in new if x.precision]
         new = [
             next((y for y in good if x.miss <= AS_NEAR * y.miss), x) if not x.precision else x for x in new
         ]
         kept = [k for k, x in enumerate(new) if x.precision]
-        defects = [[*defects[k], new[k]] for k in kept]
+        of_each = [[*of_each[k], new[k]] for k in kept]
         left = [left[k] for k in kept]
-    return dict(zip(left, defects, strict=True))
+    return dict(zip(left, of_each, strict=True))
 
 
 def _stands_out(seen: Measured, accepted: list[Joint], found: Map, terms: Terms, *, damped: bool) -> bool:
