@@ -447,6 +447,39 @@ def test_a_coarse_force_is_certain_many_steps_apart_too(force, precision: str, e
     assert not found.undecided
 
 
+def test_a_fixed_point_force_finer_than_the_forces_that_are_read_is_redone() -> None:
+    # forces read off these states would show single precision, and do not show quanta of 2**-32
+    m, k, h = 1.444, 4840.8626488727405, 0.0051632965040869575
+    q, v, rows = -0.05, 6.0, []
+    for _ in range(101):
+        rows.append((q, v))
+        v += h / 2 * (np.rint(-k * q * 2**32) / 2**32) / m
+        q += h * v
+        v += h / 2 * (np.rint(-k * q * 2**32) / 2**32) / m
+    positions, velocities = np.array(rows).T
+    found = identify(h * np.arange(101), positions, v=velocities, mass=m, stiffness=k)
+    assert (found.scheme, found.precision, found.fits) == ("velocity-verlet", "fixed-point force", True)
+
+
+@pytest.mark.parametrize("every", [1, 3])
+@pytest.mark.parametrize(("force", "precision"), [(cut_off, "fixed-point force"), (in_single, "mixed")])
+def test_a_coarse_force_of_position_verlet_is_no_noise(force, precision: str, every: int) -> None:
+    # the implicit midpoint rule has the same map on a spring of another stiffness
+    q, p, rows = 0.3, 0.2 * M, []
+    for i in range(303):
+        rows.append((q, p))
+        q += H / 2 * p / M
+        p += H * force(i, q, p)
+        q += H / 2 * p / M
+    t, (q_, p_) = H * np.arange(0, 303, every), np.array(rows[::every]).T
+    found = identify(t, q_, p_, **STATED)
+    assert (found.scheme, found.stride, found.precision, found.fits) == (
+        "position-verlet", every, precision, True,
+    )  # fmt: skip
+    unstated = identify(t, q_, p_, mass=M)
+    assert {x.scheme for x in unstated.candidates} == {"position-verlet", "implicit-midpoint"}
+
+
 @pytest.mark.parametrize("m", [1e-50, 1e-20, 1e-12, 1e42])
 def test_noise_of_a_force_far_below_a_quantum_is_no_arithmetic(m: float) -> None:
     rng = np.random.default_rng(1)

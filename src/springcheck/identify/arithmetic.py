@@ -9,15 +9,12 @@ from typing import Any
 import numpy as np
 
 from springcheck.identify import coarse, quantised
-from springcheck.identify.coarse import QUANTUM
 from springcheck.identify.families import FAMILIES, G_ROUNDING, substeps
 from springcheck.identify.fit import Map
 from springcheck.identify.hypothesis import SURE, Match
 from springcheck.identify.maps import MapTable, power, powers, table, unit
 from springcheck.identify.record import Record
 from springcheck.physics.arrays import Extended, Floats, Integers
-
-__all__ = ["QUANTUM", "Defect", "defects"]
 
 REBUILT = 1 / 32, 1.0
 """Range of the root mean square of a rebuilt velocity's error in units of what a step adds to it."""
@@ -27,9 +24,13 @@ REBUILT_NOTE = (
     "stiff spring's force"
 )
 
-STORED = "double, stored in single"
-EITHER = "single, or double stored in single"
-"""Where the states are too few to tell an orbit that was rounded once from one rounded in every step."""
+STORED_IN_SINGLE = {
+    True: "double, stored in single", False: "single", None: "single, or double stored in single",
+}  # fmt: skip
+"""The arithmetic of single-precision states, by whether they were rounded once; None: too few show it."""
+
+EPSILON, SINGLE = 2.0**-52, 2.0**-24
+"""Unit in the last place of double precision, and unit roundoff of single."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,14 +51,45 @@ def _predicted(matches: list[Match]) -> Extended:
     return np.array([match.predicted for match in matches]).reshape(-1, 2, 2)
 
 
+def _numbers(matches: list[Match], kind: type[Any]) -> tuple[MapTable, Integers, Any]:
+    """The table of the matches' families, the number of each one's, and a, g, log of the mass and strides."""
+    families = tuple(FAMILIES[x] for x in dict.fromkeys(match.family for match in matches))
+    which = np.array([families.index(FAMILIES[match.family]) for match in matches])
+    rows = [(match.a, match.g, match.log_mass, match.stride) for match in matches]
+    return table(families), which, np.array(rows, kind).T
+
+
+def _maps(
+    matches: list[Match], found: Map, *, between: bool, longer: Any = 0.0, a: Any = 0.0, g: Any = 0.0
+) -> Extended:
+    """The maps (c, 2, 2) that matches predict `between` frames, or for one step, for steps `longer` by a
+    share, and for more of a or g."""
+    every, which, (own_a, own_g, log_mass, stride) = _numbers(matches, np.longdouble)
+    own_g = own_g + g
+    out = every.frame(
+        which,
+        (own_a + a) * (1 + longer) ** 2,
+        np.where(every.held[which], own_g, own_g * (1 + longer)),
+        log_mass - np.log1p(longer) + (0 if between else np.log(stride)),
+        stride.astype(np.float64) if between else np.ones(len(matches)),
+        found.size[1] / found.size[0] * np.ones(len(matches), np.longdouble),
+    )
+    return np.asarray(out.T.reshape(-1, 2, 2))
+
+
+def _derivative(matches: list[Match], found: Map, name: str, *, between: bool = True) -> Extended:
+    """Derivatives (c, 2, 2) of `_maps` by one of its numbers."""
+    d = np.array([1e-7 * (abs(match.a) if name == "a" else 1.0) for match in matches], np.longdouble)
+    up, down = (_maps(matches, found, between=between, **{name: x}) for x in (d, -d))
+    return np.asarray((up - down) / (2 * d)[:, None, None])
+
+
 def _misses(matches: list[Match], found: Map, slips: Extended | None) -> Extended:
     """Difference (c, f - 1, 2) between each frame and the predicted step from the frame before, in the
     units of `found`; steps follow the clock's `slips`."""
-    b = _predicted(matches)
-    out = found.z[1:] - found.z[:-1] @ np.swapaxes(b, 1, 2)
+    out = found.z[1:] - found.z[:-1] @ np.swapaxes(_predicted(matches), 1, 2)
     if slips is not None:
-        d = np.longdouble(1e-7)
-        change = (_slipped(matches, found, d) - _slipped(matches, found, -d)) / (2 * d)
+        change = _derivative(matches, found, "longer")
         out = out - slips[:, None] * (found.z[:-1] @ np.swapaxes(change, 1, 2))
     return np.asarray(out)
 
@@ -89,11 +121,8 @@ def _refitted(
         largest = np.max(np.abs(away), axis=(1, 2), keepdims=True)
         columns.append(FREE * np.max(np.abs(signed)) * (away / largest + 0 * signed))
     for name in ("a", "g") if numbers else ():
-        errors = np.array([getattr(match, f"{name}_error") for match in matches])
-        moved = 1e-7 * np.array([abs(match.a) if name == "a" else 1.0 for match in matches])
-        up, down = (_slipped(matches, found, 0.0, more={name: x}) for x in (moved, -moved))
-        share = SURE * errors / (2 * moved)
-        slope = share[:, None, None] * (up - down).astype(np.float64)
+        room = SURE * np.array([getattr(match, f"{name}_error") for match in matches])
+        slope = room[:, None, None] * _derivative(matches, found, name).astype(np.float64)
         columns.append(z @ np.swapaxes(slope, 1, 2))
     if not columns:
         return signed
@@ -104,38 +133,6 @@ def _refitted(
     wanted = np.swapaxes(flat, 1, 2) @ (signed * weight).reshape(len(matches), -1, 1)
     shift = np.clip(np.linalg.solve(square, wanted), -1, 1)
     return np.asarray(signed - (rows @ shift[:, None])[..., 0])
-
-
-def _numbers(matches: list[Match], kind: type[Any]) -> tuple[MapTable, Integers, Any]:
-    """The table of the matches' families, the number of each one's, and a, g, log of the mass and strides."""
-    families = tuple(FAMILIES[x] for x in dict.fromkeys(match.family for match in matches))
-    which = np.array([families.index(FAMILIES[match.family]) for match in matches])
-    rows = [(match.a, match.g, match.log_mass, match.stride) for match in matches]
-    return table(families), which, np.array(rows, kind).T
-
-
-def _slipped(
-    matches: list[Match],
-    found: Map,
-    slip: np.longdouble | float,
-    *,
-    between: bool = True,
-    more: dict[str, Floats] | None = None,
-) -> Extended:
-    """The maps (c, 2, 2) that matches predict `between` frames, or for one step, for steps longer by the
-    share `slip`, and for `more` of a or g."""
-    every, which, (a, g, log_mass, stride) = _numbers(matches, np.longdouble)
-    a, g = (x + (more or {}).get(name, 0.0) for name, x in (("a", a), ("g", g)))
-    held = every.held[which]
-    out = every.frame(
-        which,
-        a * (1 + slip) ** 2,
-        np.where(held, g, g * (1 + slip)),
-        log_mass - np.log1p(slip) + (0 if between else np.log(stride)),
-        stride.astype(np.float64) if between else np.ones(len(matches)),
-        found.size[1] / found.size[0] * np.ones(len(matches), np.longdouble),
-    )
-    return np.asarray(out.T.reshape(-1, 2, 2))
 
 
 def _sums(matches: list[Match], found: Map) -> tuple[Floats, Floats]:
@@ -166,9 +163,8 @@ def _unlike(record: Record, found: Map, matches: list[Match]) -> Floats:
     A step that is longer by the share d does d M**(s - 1 - i) M' M**i to the map of s steps; what the steps'
     sum does is known, so the departures of these from their mean are left, times the rounding of a step.
     """
-    d = 1e-6
-    one = _slipped(matches, found, 0.0, between=False).astype(np.float64)
-    change = _slipped(matches, found, d, between=False) - _slipped(matches, found, -d, between=False)
+    one = _maps(matches, found, between=False).astype(np.float64)
+    change = _derivative(matches, found, "longer", between=False).astype(np.float64)
     lengths = np.sqrt(np.sum(found.z[:-1].astype(np.float64) ** 2, axis=1))
     out = np.zeros((len(matches), len(lengths), 2))
     steps = {stride: float(record.interval) / stride for stride in {match.stride for match in matches}}
@@ -178,7 +174,7 @@ def _unlike(record: Record, found: Map, matches: list[Match]) -> Floats:
         if match.stride in even:
             continue
         ways = powers(one[i], match.stride).astype(np.float64)
-        each = ways[::-1] @ (change[i] / (2 * d)).astype(np.float64) @ ways
+        each = ways[::-1] @ change[i] @ ways
         apart = np.sum(np.abs(each - np.mean(each, axis=0)), axis=(0, 2))
         # where steps differ alike in every frame another stiffness takes a part of it, and is off by as much
         out[i] = match.stride * record.clock * lengths[:, None] * apart
@@ -192,9 +188,8 @@ to i h halves the last step, or adds one of a rounding, and its clock rounds eac
 
 def _stepped_to(record: Record, found: Map, matches: list[Match], signed: Floats, unit: Floats) -> Floats:
     """Residuals (c, f - 1, 2), of errors `unit`, less the part that rounding of the clock explains."""
-    d = 1e-6
-    change = _slipped(matches, found, d) - _slipped(matches, found, -d)
-    way = found.z[:-1].astype(np.float64) @ np.swapaxes(change.astype(np.float64) / (2 * d), 1, 2)
+    change = _derivative(matches, found, "longer").astype(np.float64)
+    way = found.z[:-1].astype(np.float64) @ np.swapaxes(change, 1, 2)
     weight = way / np.maximum(unit, 1e-30 * np.max(unit)) ** 2
     longer = np.sum(weight * signed, axis=2) / np.maximum(np.sum(weight * way, axis=2), 1e-300)
     room = CLOCK_ROUNDINGS * record.clock
@@ -219,17 +214,27 @@ def defects(
         return [x for chunk in chunks for x in _defects(record, j, found, chunk, visible)]
 
 
-def _defects(
-    record: Record, j: int, found: Map, matches: list[Match], visible: Callable[[], bool]
-) -> list[Defect]:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Roundings:
+    """Sizes that the roundings of each match (c,) are relative to, and how many there are in a frame."""
+
+    size: Floats
+    """Sums (c, f - 1, 2) of the absolute values of all that is added up on the way to a frame."""
+    difference: Floats
+    """What is added to that of a velocity that is a difference of positions over the step."""
+    stride: Floats
+    path: Floats
+    usual: Floats
+    """Roundings that add up at random stay far below the sum of all; what comes near it stands out."""
+
+
+def _roundings(record: Record, j: int, found: Map, matches: list[Match]) -> Roundings:
     schemes = [FAMILIES[match.family] for match in matches]
     z, centre = found.z.astype(np.float64), np.abs(found.centre / found.size).astype(np.float64)
-    b = np.abs(_predicted(matches)).astype(np.float64)
     step, first = _sums(matches, found)
     stride = np.array([float(match.stride) for match in matches])
     # a force is that of the whole position, whose rounding it carries into the velocity
     at = centre + np.maximum(step, first) @ centre
-    # sums of absolute values: a rounding of either term is relative to them
     size = np.abs(z[:-1]) @ np.swapaxes(first, 1, 2) + np.abs(z[1:]) + 2 * at[:, None, :]
     # states between two frames lie on the same orbit: either component may be as large as the whole, and a
     # frame's last step rounds by what it adds up
@@ -237,7 +242,7 @@ def _defects(
     later = np.abs(z[1:]) @ np.swapaxes(step, 1, 2) + (lengths[:-1] + lengths[1:])[:, None]
     size += np.where(stride > 1, 1.0, 0.0)[:, None, None] * later
     # a solution is evaluated at times, and their rounding turns the phase
-    turned = np.sqrt([abs(match.a) for match in matches]) * record.clock * stride / 2.0**-52
+    turned = np.sqrt([abs(match.a) for match in matches]) * record.clock * stride / EPSILON
     flow = np.array([scheme.flow for scheme in schemes])
     size += np.where(flow, turned, 0.0)[:, None, None] * np.max(lengths)
     position = np.abs(z[1:, 0] + float(found.centre[0] / found.size[0]))
@@ -247,20 +252,62 @@ def _defects(
         )
         size += 2 * (summed[1:] + summed[:-1]) / found.size.astype(np.float64)
         position = summed[1:, 0] / float(found.size[0])
-    # a velocity that is a difference of positions over the step carries their rounding, eps q / h
-    ratio = float(found.size[0] / found.size[1]) * stride
     difference = np.zeros_like(size)
-    difference[:, :, 1] = 2 * ratio[:, None] * position
+    difference[:, :, 1] = 2 * (float(found.size[0] / found.size[1]) * stride)[:, None] * position
     # substeps of one force round alike
     parts = np.array([_substeps(match) for match in matches])
-    path = stride * parts * [4 if scheme.flow else scheme.path for scheme in schemes]
+    return Roundings(
+        size=size, difference=difference, stride=stride, usual=4 + 2 * np.sqrt(stride) * parts,
+        path=stride * parts * [4 if scheme.flow else scheme.path for scheme in schemes],
+    )  # fmt: skip
+
+
+def _defects(
+    record: Record, j: int, found: Map, matches: list[Match], visible: Callable[[], bool]
+) -> list[Defect]:
+    sizes = _roundings(record, j, found, matches)
+    ulp, plain, signed = _in_double(record, found, matches, sizes)
+    stored = single = np.zeros(len(matches), dtype=bool)
+    if not record.fine:
+        signed, stored, single = _in_file(record, j, found, matches, sizes, signed)
+    missing = np.abs(signed)
+    lengths = np.sqrt(np.sum(found.z[:-1].astype(np.float64) ** 2, axis=1))
+    share = _largest(missing, np.repeat(lengths[None, :, None], 2, axis=2))
+    texts = [s.name for s in (record.q_storage, record.v_storage) if s.name.startswith("text")]
+    out = []
+    for i, match in enumerate(matches):
+        precision, note, certain = "", "", True
+        if plain[i]:
+            precision, note = "double", _written(record)
+        elif _is_rebuilt(match, missing[i], sizes.size[i], sizes.difference[i]):
+            precision, note = "double", REBUILT_NOTE
+        elif record.fine:
+            if visible() and not FAMILIES[match.family].flow:
+                # forces may lie beyond the range of single precision
+                with np.errstate(over="ignore", invalid="ignore"):
+                    precision, note, certain = quantised.coarse_forces(record, j, found, match, signed[i])
+        elif stored[i]:
+            precision = " and ".join(dict.fromkeys(texts)) or STORED_IN_SINGLE[found.once]
+        elif single[i]:
+            # an orbit that was rounded once has no larger errors: single-precision steps are excluded
+            precision = texts[0] if texts else "" if found.once else "single"
+        miss = float(share[i])
+        out.append(Defect(ulp=float(ulp[i]), precision=precision, note=note, miss=miss, certain=certain))
+    return out
+
+
+def _in_double(
+    record: Record, found: Map, matches: list[Match], sizes: Roundings
+) -> tuple[Floats, Any, Floats]:
+    """Largest residuals (c,) in units in the last place, whether roundings of double precision, those of the
+    clock among them, explain all, and the residuals (c, f - 1, 2)."""
+    stride, unit = sizes.stride, EPSILON * sizes.size
 
     def missed(slips: Extended | None) -> Floats:
-        signed = _misses(matches, found, slips).astype(np.float64)
-        return _refitted(record, found, matches, signed, 2.0**-52 * size)
+        return _refitted(record, found, matches, _misses(matches, found, slips).astype(np.float64), unit)
 
     def ulps(x: Floats, slack: Floats | float = 0.0) -> Floats:
-        return _largest(np.maximum(np.abs(x) - slack, 0), 2.0**-52 * size)
+        return _largest(np.maximum(np.abs(x) - slack, 0), unit)
 
     signed = other = missed(found.slips)
     ulp = ulps(signed)
@@ -271,77 +318,45 @@ def _defects(
         follows = ulps(other) < 0.7 * ulp
         signed = np.where(follows[:, None, None], other, signed)
         ulp = ulps(signed)
-    missing = np.abs(signed)
-    # what rounds at random stays far below the sum of all roundings; what comes near it must stand out
-    usual = 4 + 2 * np.sqrt(stride) * parts
-    # those of an uneven clock follow its times
-    most_ulp = np.where(follows, path, np.minimum(path, usual))
-    rounded, slack = ulp, np.zeros_like(missing)
+    # roundings of an uneven clock follow its times
+    most_ulp = np.where(follows, sizes.path, np.minimum(sizes.path, sizes.usual))
+    rounded, slack = ulp, np.zeros_like(signed)
     if record.slips is not None and np.any((stride == 1) & (ulp > most_ulp)):
-        rounded = np.where(stride == 1, ulps(_stepped_to(record, found, matches, signed, size)), ulp)
-    if np.any((stride > 1) & (ulp > usual)):
+        rounded = np.where(stride == 1, ulps(_stepped_to(record, found, matches, signed, sizes.size)), ulp)
+    if np.any((stride > 1) & (ulp > sizes.usual)):
         slack = np.where((stride > 1)[:, None, None], _unlike(record, found, matches), 0.0)
         rounded = np.where(stride > 1, ulps(signed, slack), rounded)
     plain = rounded <= most_ulp
     if record.fine and not np.all(plain):
         for way in (signed, other)[: 1 + (other is not signed)]:
-            again = _refitted(record, found, matches, way, 2.0**-52 * size, numbers=True)
-            plain |= ulps(again, slack) <= most_ulp
-    stored = coarse_file = np.zeros(len(matches), dtype=bool)
-    if not record.fine:
-        quanta = record.quanta(j) / found.size.astype(np.float64)
-        half = (quanta[1:] + quanta[:-1] @ np.swapaxes(b, 1, 2)) / 2
-        signed = _refitted(record, found, matches, signed, half)
-        missing = np.abs(signed)
-        # roundings of many steps are random
-        most = np.minimum(path, usual)[:, None, None]
-        # the map is known from rounded states that move, to a few parts in sqrt(pairs) of their rounding
-        moving = np.count_nonzero(np.all(np.diff(z, axis=0) != 0, axis=1)) + 1
-        half = (1 + 10 / np.sqrt(moving)) * half
-        stored = _largest(missing, half + 2.0**-52 * size * most) <= 1
-        coarse_file = _largest(missing, half + 2.0**-24 * size * most) <= 1
-        # velocities are differences of positions in some schemes alone, and their roundings are irregular
-        differs = _largest(missing, half + 2.0**-24 * (size + difference) * most) <= 1
-        # what shows roundings of single precision has none that hide
-        coarse_file &= not record.deep
-        for i in np.flatnonzero(differs & ~coarse_file & (not record.deep)).tolist():
-            coarse_file[i] = _differences(matches[i]) and coarse.irregular(signed[i])
-    share = _largest(missing, np.repeat(lengths[None, :-1, None], 2, axis=2))
-    out = []
-    for i, match in enumerate(matches):
-        precision, note, certain = "", "", True
-        if plain[i]:
-            precision, note = "double", _written(record)
-        elif _is_rebuilt(match, missing[i], size[i], difference[i]):
-            precision = "double"
-            note = REBUILT_NOTE
-        elif record.fine:
-            if visible() and not schemes[i].flow:
-                # forces may lie beyond the range of single precision
-                with np.errstate(over="ignore", invalid="ignore"):
-                    precision, note, certain = _coarse(record, j, found, match, signed[i])
-        elif stored[i]:
-            precision = _stored(record, found)
-        elif coarse_file[i]:
-            texts = [s.name for s in (record.q_storage, record.v_storage) if s.name.startswith("text")]
-            # an orbit that was rounded once has no larger errors: single-precision steps are excluded
-            precision = texts[0] if texts else "" if found.once else "single"
-        miss = float(share[i])
-        out.append(Defect(ulp=float(ulp[i]), precision=precision, note=note, miss=miss, certain=certain))
-    return out
+            plain |= ulps(_refitted(record, found, matches, way, unit, numbers=True), slack) <= most_ulp
+    return ulp, plain, signed
 
 
-def _coarse(record: Record, j: int, found: Map, match: Match, signed: Floats) -> tuple[str, str, bool]:
-    """Precision of coarse forces, a note, and whether it is certain; "" where none explains the misses."""
-    seen = coarse.kinematic(record, j, found, match)
-    if seen is not None:
-        return *seen, record.mass is not None
-    name, note = coarse.sized(record, j, found, match, signed)
-    names = quantised.FORCES if name == "mixed" else [name] if name else []
-    for each in names:
-        if quantised.reproduced(record, j, found, match, each, coarse.QUANTUM, coarse.EXCESS):
-            return each, "states are double, and the steps redone with such forces are those recorded", True
-    return (name, note, False) if name and coarse.white(found, match, signed) else ("", "", True)
+def _in_file(
+    record: Record, j: int, found: Map, matches: list[Match], sizes: Roundings, signed: Floats
+) -> tuple[Floats, Any, Any]:
+    """Residuals (c, f - 1, 2) by the quanta of the file, and whether these explain them (c,) beside roundings
+    of double precision, or of single."""
+    b = np.abs(_predicted(matches)).astype(np.float64)
+    quanta = record.quanta(j) / found.size.astype(np.float64)
+    half = (quanta[1:] + quanta[:-1] @ np.swapaxes(b, 1, 2)) / 2
+    signed = _refitted(record, found, matches, signed, half)
+    # the map is known from rounded states that move, to a few parts in sqrt(pairs) of their rounding
+    moving = np.count_nonzero(np.all(np.diff(found.z.astype(np.float64), axis=0) != 0, axis=1)) + 1
+    half = (1 + 10 / np.sqrt(moving)) * half
+    most = np.minimum(sizes.path, sizes.usual)[:, None, None]
+
+    def explained(rounding: float, size: Floats) -> Any:
+        return _largest(np.abs(signed), half + rounding * size * most) <= 1
+
+    # what shows roundings of single precision has none that hide
+    single = explained(SINGLE, sizes.size) & (not record.deep)
+    # velocities are differences of positions in some schemes alone, and their roundings are irregular
+    differs = explained(SINGLE, sizes.size + sizes.difference) & ~single & (not record.deep)
+    for i in np.flatnonzero(differs).tolist():
+        single[i] = _differences(matches[i]) and coarse.irregular(signed[i])
+    return signed, explained(EPSILON, sizes.size), single
 
 
 def _is_rebuilt(match: Match, missing: Floats, size: Floats, difference: Floats) -> bool:
@@ -351,10 +366,10 @@ def _is_rebuilt(match: Match, missing: Floats, size: Floats, difference: Floats)
     it walks at random, with the root of the steps and their power of 3/2.
     """
     steps = np.sqrt(match.stride)
-    if np.any(missing[:, 0] > 2.0**-52 * (4 + 2 * steps**3) * size[:, 0]):
+    if np.any(missing[:, 0] > EPSILON * (4 + 2 * steps**3) * size[:, 0]):
         return False
-    unit = 2.0**-52 * steps * difference[:, 1]
-    if np.any(missing[:, 1] > 2.0**-52 * (4 + 2 * steps) * size[:, 1] + 4 * unit):
+    unit = EPSILON * steps * difference[:, 1]
+    if np.any(missing[:, 1] > EPSILON * (4 + 2 * steps) * size[:, 1] + 4 * unit):
         return False
     least, most = REBUILT
     share = float(np.sqrt(np.mean(missing[:, 1] ** 2) / np.mean(unit**2)))
@@ -377,11 +392,3 @@ def _largest(missing: Floats, unit: Floats) -> Floats:
 def _written(record: Record) -> str:
     short = {s.name for s in (record.q_storage, record.v_storage)} - {"double"}
     return f"the numbers happen to be exact as {' and '.join(sorted(short))}" if short else ""
-
-
-def _stored(record: Record, found: Map) -> str:
-    """The storage's name; for single precision, whether the arithmetic was finer than the file."""
-    texts = [s.name for s in (record.q_storage, record.v_storage) if s.name.startswith("text")]
-    if texts:
-        return texts[0] if len(set(texts)) == 1 else " and ".join(dict.fromkeys(texts))
-    return {True: STORED, False: "single", None: EITHER}[found.once]

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from springcheck.identify import arithmetic
+from springcheck.identify.coarse import QUANTUM
 from springcheck.identify.evidence import SINGLE_ROOM, Measured
 from springcheck.identify.families import FAMILIES, title
 from springcheck.identify.hypothesis import Joint, aliases, frictionless
@@ -30,45 +30,50 @@ SINGLE_CONSTANTS = ("fixed-point force", "mixed", "single")
 """Precisions of GPU-type platforms, which keep force constants in single precision in every mode."""
 
 
-def said_of(candidates: tuple[Candidate, ...], scheme: str | None, damped: bool, n: int) -> dict[str, Any]:
+def shared(candidates: tuple[Candidate, ...], n: int, *, named: bool = True) -> dict[str, Any]:
     """Fields of the `Identification` of n oscillators that come from its candidates: the scheme, if it is one
-    alone, and the numbers that all of them share."""
-    unknown = (math.nan,) * n
-    known = candidates[0].stiffness is not None
+    alone and may be `named`, and the numbers that all of them share."""
+    scheme = common([x.scheme for x in candidates]) if named else None
+    # without friction a scheme has the names of others that have none then
+    law = next((x for x in candidates if x.law), candidates[0])
+    unknown, known = (math.nan,) * n, candidates[0].stiffness is not None
     return {
         "verdict": "named" if scheme else "not told apart",
         "scheme": scheme,
         "nearest": scheme,
-        "aliases": other_names(scheme, damped=damped) if scheme else (),
+        "aliases": law.aliases if scheme else (),
         "candidates": candidates,
-        "omega": _shared([x.omega for x in candidates]) or unknown,
-        "stiffness": _shared([x.stiffness or () for x in candidates]) if known else None,
-        "friction": _shared([x.friction for x in candidates]) or unknown,
+        "step": common([x.step for x in candidates]) or math.nan,
+        "stride": common([x.stride for x in candidates]),
+        "omega": _alike([x.omega for x in candidates]) or unknown,
+        "stiffness": _alike([x.stiffness or () for x in candidates]) if known else None,
+        "friction": _alike([x.friction for x in candidates]) or unknown,
     }
 
 
-def _shared(rows: list[tuple[float, ...]]) -> tuple[float, ...] | None:
+def _alike(rows: list[tuple[float, ...]]) -> tuple[float, ...] | None:
     """The numbers that all candidates share, to 1e-9, or None."""
     if len({len(row) for row in rows}) > 1:
         return None
-    first = rows[0]
-    same = all(
-        x == y or abs(x - y) <= 1e-9 * abs(y) or (math.isnan(x) and math.isnan(y))
-        for row in rows[1:]
-        for x, y in zip(row, first, strict=True)
-    )
-    return first if same else None
+    return rows[0] if np.allclose(rows, rows[0], rtol=1e-9, atol=0, equal_nan=True) else None
+
+
+def steps_between(stride: int | None) -> str:
+    """The number of steps from frame to frame, in a sentence."""
+    if stride is None:
+        return ", in an unknown number of steps"
+    return "" if stride == 1 else f", {stride} steps to a frame"
 
 
 def stated_stiffness(
     seen: Measured, plainest: Joint, precision: str, stated: Floats
 ) -> tuple[list[Explanation], list[str]]:
     """Explanations of a stated stiffness that is not that of the states, and notes on it."""
-    quantum = arithmetic.QUANTUM if precision in SINGLE_CONSTANTS else 0.0
+    quantum = QUANTUM if precision in SINGLE_CONSTANTS else 0.0
     against = seen.disagreements(plainest)
     if not against or (quantum and not seen.disagreements(plainest, quantum=quantum)):
         return [], []
-    room = max(6 * part.a_error / abs(part.a) for part in plainest.parts)
+    room = max(part.a_room for part in plainest.parts)
     for what, other, of_force in _single_constants(seen.record, stated, plainest.stride):
         if seen.disagreements(plainest, other, quantum if of_force else 0.0):
             continue
@@ -116,7 +121,7 @@ def nearest_stiffness(seen: Measured, joints: list[Joint], stated: Floats) -> li
         _, stiffness, _ = seen.numbers(joint)
         known = zip(seen.moving, stiffness or (), strict=False)
         off[joint] = max((abs(k / float(stated[j]) - 1) for j, k in known if stated[j]), default=0.0)
-        room[joint] = SINGLE_ROOM + max(6 * part.a_error / abs(part.a) for part in joint.parts)
+        room[joint] = SINGLE_ROOM + max(part.a_room for part in joint.parts)
     least = min(off.values())
     return [joint for joint in joints if off[joint] <= 2 * least + room[joint]]
 
@@ -174,10 +179,8 @@ def either_way(ways: list[Identification]) -> Identification:
     candidates = tuple(x for one in fitting for x in one.candidates)
     return replace(
         fitting[0],
-        **said_of(candidates, None, False, len(fitting[0].omega)),
+        **shared(candidates, len(fitting[0].omega), named=False),
         statement=f"Times fall: steps of {back} back in time, or frames of {turned} in reverse order",
-        step=math.nan,
-        stride=common([x.stride for x in candidates]),
         velocity_offset=math.nan,
         notes=(*fitting[0].notes, "what would tell the two apart: the step, with its sign"),
     )

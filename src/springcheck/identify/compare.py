@@ -10,21 +10,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from springcheck.identify.families import Family
 from springcheck.identify.fit import Map
-from springcheck.identify.guesses import (
-    FLOW_TURNS,
-    Guesses,
-    Roots,
-    first,
-    least_squares,
-    polished,
-    roots_of_map,
-)
+from springcheck.identify.guesses import Guesses, Roots, first, least_squares, polished, roots_of_map
 from springcheck.identify.hypothesis import Joint, Match, Terms, most
 from springcheck.identify.maps import MapTable, table
 from springcheck.physics.arrays import Floats, Reals
@@ -69,71 +62,6 @@ class Target:
         return np.asarray(every.frame(x.which, a, g, log_mass, s, np.full(len(s), self.ratio, values.dtype)))
 
 
-class PositionTarget(Target):
-    """The recurrence of positions alone: 1 + det - trace and 1 - det of a map, with their covariance."""
-
-    def __init__(self, numbers: tuple[np.longdouble, np.longdouble], covariance: Floats) -> None:
-        self.terms = Terms()
-        self.observed = np.array(numbers)
-        # two numbers of very unlike size: eigenvectors of double precision do not part them
-        size = np.sqrt(np.diag(covariance))
-        values, axes = np.linalg.eigh(covariance / size[:, None] / size)
-        self.axes, self.variance = axes / size[:, None], values
-
-    def weight(self, every: MapTable, x: Guesses, s: Floats) -> Floats:
-        return np.asarray(1 / np.sqrt(self.variance[:, None]) * np.ones(len(s)))
-
-    def entries(self, every: MapTable, x: Guesses, s: Floats, values: Reals) -> Reals:
-        ones = np.ones(len(s), np.longdouble)
-        out = every.frame(x.which, values[0], values[1], 0 * ones, s, ones)
-        return np.stack(recurrence_of(out.T.reshape(-1, 2, 2)))
-
-
-def recurrence_of(m: Reals) -> tuple[Reals, Reals]:
-    """1 + det - trace and 1 - det of maps (c, 2, 2)."""
-    # (1 - M11)(1 - M22) - M12 M21 is 1 + det - trace without the cancellation
-    one, other, product = 1 - m[:, 0, 0], 1 - m[:, 1, 1], m[:, 0, 1] * m[:, 1, 0]
-    alpha = one * other - product
-    return alpha, one + other - alpha
-
-
-def of_positions(
-    numbers: tuple[np.longdouble, np.longdouble],
-    covariance: Floats,
-    phase: float,
-    log_det: float,
-    families: tuple[Family, ...],
-    strides: Iterable[int],
-) -> list[Match]:
-    """Families whose positions obey q[n+1] - T q[n] + D q[n-1] = c, `numbers` being 1 + D - T and 1 - D, each
-    number of steps and of unseen turns, and each spring of these: without velocities turns to the left and to
-    the right look alike.
-    """
-    every = table(families)
-    ways = [(s, i) for s in strides for i in range(max(s, FLOW_TURNS if s == 1 else 1) + 1)]
-    s, i = np.array(ways, np.float64).T
-    turns = (i + 1) // 2
-    phases = (np.where(i % 2, -1.0, 1.0) * phase + 2 * np.pi * turns) / s
-    keep = (phases > 0) & ((phases <= np.pi) | (s == 1))
-    s, turns, phases = s[keep], turns[keep], phases[keep]
-    each = log_det / s
-    det, trace = np.exp(each), 2 * np.exp(each / 2) * np.cos(phases)
-    ones = np.ones_like(s)
-    step = np.stack([trace - 1, ones, trace - 1 - det, ones], axis=1).reshape(-1, 2, 2)
-    roots = Roots(s, turns, phases, each, step, 0.0, {})
-    with np.errstate(all="ignore"):
-        x = first(every, roots, growing=False, free_scale=True, far=True)
-        if not every.damped:
-            # the area of a frame is known, and that of a scheme without friction beside it
-            own = np.log(np.abs(np.linalg.det(every.unit(x.which, x.a, x.g)))) * s[x.root]
-            room = 0.02 * np.abs(own) + 1e-4 + 100 * math.sqrt(covariance[1, 1])
-            near = np.flatnonzero(np.abs(own - log_det) <= room)
-            x = x[near]
-        if not len(x.a):
-            return []
-        return _matched(every, PositionTarget(numbers, covariance), roots, x, far=False, every_turn=True)
-
-
 def matches(
     found: Map, terms: Terms, families: tuple[Family, ...], strides: Iterable[int], *, far: bool = False
 ) -> list[Match]:
@@ -161,12 +89,14 @@ def matches(
         )
         if not len(x.a):
             return []
-        return _matched(every, Target(found, terms), roots, x, far=far)
+        return solved(every, Target(found, terms), roots, x, far=far)
 
 
-def _matched(
-    every: MapTable, target: Target, roots: Roots, x: Guesses, *, far: bool, every_turn: bool = False
+def solved(
+    every: MapTable, target: Target, roots: Roots, x: Guesses, *, far: bool = False, every_turn: bool = False
 ) -> list[Match]:
+    """The best of these guesses of each family and stride, of those that may be accepted (`far`: of all);
+    of each number of turns and each spring of it where `every_turn` is asked for."""
     terms = target.terms
     free = [0, 1] if every.damped else [0]
     if terms.mass_unknown and terms.log_stiffness is None:
@@ -248,33 +178,28 @@ def _matched(
 
 
 def compare(
-    maps: list[Map], terms: list[Terms], families: tuple[Family, ...], strides: Iterable[int]
+    maps: list[Map],
+    terms: list[Terms],
+    families: tuple[Family, ...],
+    strides: Iterable[int],
+    *,
+    far: bool = False,
 ) -> list[Joint]:
-    """Families and strides that all oscillators may be of, the plainest first; what fails one is not tried on
-    the others."""
+    """Families and strides that all oscillators may be of, the plainest first, and with `far` all others at
+    their best; what fails one oscillator is not tried on the others."""
     steps = list(strides)
     parts: list[dict[tuple[str, int], Match]] = []
     for found, what in zip(maps, terms, strict=True):
-        fitting = {(x.family, x.stride): x for x in matches(found, what, families, steps)}
+        fitting = {(x.family, x.stride): x for x in matches(found, what, families, steps, far=far)}
         parts.append(fitting)
         families = tuple(f for f in families if any(f.name == name for name, _ in fitting))
         steps = sorted({s for _, s in fitting})
         if not families:
             return []
-    return sorted(_joints(parts), key=lambda x: x.plainness)
-
-
-def _joints(parts: list[dict[tuple[str, int], Match]]) -> list[Joint]:
-    """Hypotheses of which every oscillator has a match."""
     shared = (key for key in parts[0] if all(key in x for x in parts))
-    return [Joint(family=key[0], stride=key[1], parts=tuple(x[key] for x in parts)) for key in shared]
+    joints = [Joint(family=key[0], stride=key[1], parts=tuple(x[key] for x in parts)) for key in shared]
+    return sorted(joints, key=lambda x: x.plainness)
 
 
-def nearest(
-    maps: list[Map], terms: list[Terms], families: tuple[Family, ...], strides: Iterable[int]
-) -> list[Joint]:
-    """Families and strides at their best, whether or not they may be accepted."""
-    steps = list(strides)
-    both = zip(maps, terms, strict=True)
-    every = (matches(found, what, families, steps, far=True) for found, what in both)
-    return _joints([{(x.family, x.stride): x for x in found} for found in every])
+nearest = partial(compare, far=True)
+"""Families and strides at their best, whether or not they may be accepted."""

@@ -281,7 +281,7 @@ def identify_file(
             with np.errstate(all="ignore"):
                 rod = None if fits and "stiffness" in given else rod_of(states.whole, fits=fits)
             if rod and rod.or_springs:
-                found[states.label] = replace(told, notes=(*told.notes, rod.statement))
+                found[states.label] = told.noting(rod.statement)
             elif rod:
                 raise IdentificationError(
                     f"{rod.statement}; schemes are told by springs: judge it, with a --scene that has the "

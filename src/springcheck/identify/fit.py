@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from springcheck.errors import IdentificationError
+from springcheck.identify.hypothesis import ERRORS
 from springcheck.identify.noise import Noise
 from springcheck.identify.record import ROUNDING, Record
 from springcheck.physics.arrays import Extended, Floats
@@ -60,9 +61,6 @@ KURTOSIS = 0.8
 
 CHANCE = 1e-6
 """Probability of accepting a constant where there is none."""
-
-ERRORS = 5.0
-"""Standard errors that chance does not exceed: 6e-7."""
 
 UNKNOWN = 1e6
 """Share of a state that may change between two frames of which nothing is known."""
@@ -155,11 +153,10 @@ def _sizes(z: Extended) -> Extended:
 
 @dataclass(slots=True, eq=False)
 class _Solution:
-    """A minimum: unknowns, their covariance, what is left over of it, and its noise."""
+    """A minimum: entries and centre, the covariance of all unknowns, what is left over, and its noise."""
 
     entries: Extended
     centre: Extended
-    slope: Extended
     inverse: Floats
     chi2: float
     noise: Noise
@@ -174,87 +171,65 @@ def _minimum(
     z: Extended, sigma: Floats, process: Floats, start: _Solution | None, centred: int, slips: Extended | None
 ) -> _Solution:
     """Gauss-Newton for the map, a constant part (`centred`: 0 none, 1 an equilibrium at rest, 2 any), and
-    what the clock's slips do to a step."""
-    unknowns = _Unknowns(z, process, centred, slips)
-    state = unknowns.start(start)
+    what the clock's slips do to a step (4 further entries)."""
+    n = 4 + centred
+    x = np.zeros(n if slips is None else n + 4, np.longdouble)
+    x[:n] = _first_guess(z, process, start, centred)
+    # of size 1, as everything else
+    slipping = None if slips is None else (slips / np.max(np.abs(slips)))[:, None]
     best: _Solution | None = None
     noise = Noise(np.eye(2), 0 * sigma, process) if not np.any(sigma) else None
     for _ in range(MOST_ROUNDS):
-        now = noise or Noise(state[0].astype(np.float64), sigma, process)
-        r = unknowns.left(*state)
+        entries, centre = x[:4].reshape(2, 2), np.zeros(2, np.longdouble)
+        centre[:centred] = x[4:n]
+        state = z - centre
+        left = state[1:] - state[:-1] @ entries.T
+        if slipping is not None:
+            left = left - slipping * (state[:-1] @ x[n:].reshape(2, 2).T)
+        r = np.asarray(left, np.float64)
+        now = noise or Noise(entries.astype(np.float64), sigma, process)
         weighted = now.solve(r[:, :, None])
         chi2 = float(np.sum(r * weighted[:, :, 0]))
         if best is not None and not chi2 + now.log_det < best.cost:
             break
-        seen = (z - state[1]).astype(np.float64)
+        seen = state.astype(np.float64)
         if noise is None and chi2 < 100 * r.size:
             seen = seen - now.errors(weighted[:, :, 0])
-        columns = unknowns.columns(seen, state[0])
+        columns = np.zeros((*r.shape, len(x)))
+        columns[:, 0, :2] = columns[:, 1, 2:4] = seen[:-1]
+        columns[:, :, 4:n] = (np.eye(2) - entries.astype(np.float64))[None, :, :centred]
+        if slipping is not None:
+            columns[:, 0, -4:-2] = columns[:, 1, -2:] = slipping.astype(np.float64) * seen[:-1]
         flat = columns.reshape(r.size, -1)
         square = flat.T @ now.solve(columns).reshape(flat.shape)
         size = np.sqrt(np.maximum(np.diag(square), 1e-300))
         inverse = np.linalg.pinv(square / size[:, None] / size, rcond=1e-14, hermitian=True)
         inverse = inverse / size[:, None] / size
         gradient = flat.T @ weighted.reshape(-1)
-        best = _Solution(*state, inverse, chi2, now)
+        best = _Solution(entries, centre, inverse, chi2, now)
         change = inverse @ gradient
         if gradient @ change <= SETTLED * max(1.0, chi2 / r.size):
             break
-        state = unknowns.changed(*state, change)
+        x = x + change
     assert best is not None
     return best
 
 
-class _Unknowns:
-    """Unknowns of the fit: entries, a constant part, and the response to the clock's slips."""
-
-    def __init__(self, z: Extended, process: Floats, centred: int, slips: Extended | None) -> None:
-        self.z, self.process, self.pairs, self.centred = z, process, len(process), centred
-        self.own = slice(4, 4 + centred)
-        # of size 1, as everything else
-        self.slips = None if slips is None else slips / np.max(np.abs(slips))
-
-    def start(self, of: _Solution | None) -> tuple[Extended, Extended, Extended]:
-        slope = np.zeros((2, 2), np.longdouble)
-        if not self.centred:
-            entries = np.eye(2, dtype=np.longdouble) if of is None else of.entries
-            return entries, np.zeros(2, np.longdouble), slope
-        if of is not None and np.any(of.centre):
-            return of.entries, of.centre, slope
-        # any constant is linear in the states; the equilibrium follows from it
-        z = self.z.astype(np.float64)
-        weight = 1 / self.process[:, None]
-        columns = np.concatenate([z[:-1], np.ones((self.pairs, 1))], axis=1) * weight
-        size = np.sqrt(np.sum(columns**2, axis=0))
-        size = np.where(size > 0, size, 1)
-        x = np.linalg.lstsq(columns / size, z[1:] * weight, rcond=None)[0] / size[:, None]
-        gap = np.eye(2) - x[:2].T
-        centre = np.linalg.pinv(gap[:, : self.centred]) @ x[2]
-        at = np.concatenate([centre, np.zeros(2 - self.centred)])
-        return x[:2].T.astype(np.longdouble), at.astype(np.longdouble), slope
-
-    def left(self, entries: Extended, centre: Extended, slope: Extended) -> Floats:
-        state = self.z - centre
-        r = state[1:] - state[:-1] @ entries.T
-        if self.slips is not None:
-            r = r - self.slips[:, None] * (state[:-1] @ slope.T)
-        return np.asarray(r, np.float64)
-
-    def columns(self, seen: Floats, entries: Extended) -> Floats:
-        out = np.zeros((self.pairs, 2, 4 + self.centred + (4 if self.slips is not None else 0)))
-        out[:, 0, :2] = out[:, 1, 2:4] = seen[:-1]
-        out[:, :, self.own] = (np.eye(2) - entries.astype(np.float64))[None, :, : self.centred]
-        if self.slips is not None:
-            out[:, 0, -4:-2] = out[:, 1, -2:] = self.slips.astype(np.float64)[:, None] * seen[:-1]
-        return out
-
-    def changed(
-        self, entries: Extended, centre: Extended, slope: Extended, change: Floats
-    ) -> tuple[Extended, Extended, Extended]:
-        if self.slips is not None:
-            slope = slope + change[-4:].reshape(2, 2)
-        moved = np.concatenate([change[self.own], np.zeros(2 - self.centred)])
-        return entries + change[:4].reshape(2, 2), centre + moved, slope
+def _first_guess(z: Extended, process: Floats, of: _Solution | None, centred: int) -> Extended:
+    """Entries and constant part (4 + `centred`,) of another solution, or where it has no constant part by
+    linear least squares."""
+    if of is not None and (not centred or np.any(of.centre)):
+        return np.concatenate([of.entries.ravel(), of.centre[:centred]])
+    if not centred:
+        return np.eye(2, dtype=np.longdouble).ravel()
+    # any constant is linear in the states; the equilibrium follows from it
+    states, weight = z.astype(np.float64), 1 / process[:, None]
+    columns = np.concatenate([states[:-1], np.ones((len(process), 1))], axis=1) * weight
+    size = np.sqrt(np.sum(columns**2, axis=0))
+    size = np.where(size > 0, size, 1)
+    x = np.linalg.lstsq(columns / size, states[1:] * weight, rcond=None)[0] / size[:, None]
+    centre = np.linalg.pinv((np.eye(2) - x[:2].T)[:, :centred]) @ x[2]
+    return np.concatenate([x[:2].T.ravel(), centre]).astype(np.longdouble)
 
 
 def fit(record: Record, j: int, *, kept: NDArray[np.bool_] | None = None, constant: bool = False) -> Map:

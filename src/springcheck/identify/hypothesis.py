@@ -13,14 +13,17 @@ from springcheck.identify.record import ROUNDING
 from springcheck.physics.arrays import Reals
 from springcheck.schemes import SCHEMES
 
+ERRORS = 5.0
+"""Standard errors that chance does not exceed: 6e-7."""
+
 CHANCE = 1e-7
 """Probability with which a right hypothesis may be refused: five standard errors."""
 
 SOLVED = 1e-4
 """Chi-squared of unknowns that solve as many equations: Gauss-Newton's rest."""
 
-EXCLUDED = 25.0
-"""Excess of chi-squared over the best hypothesis' that excludes another: five standard errors."""
+EXCLUDED = ERRORS**2
+"""Excess of chi-squared over the best hypothesis' that excludes another."""
 
 SURE = 6.0
 """Standard errors by which a number differs from another for certain, and within which it may be off."""
@@ -74,12 +77,13 @@ class Match:
     """The four entries, in the frame of the map."""
 
     @property
-    def accepted(self) -> bool:
-        return self.chi2 <= most(self.freedom)
-
-    @property
     def scheme(self) -> str:
         return FAMILIES[self.family].scheme
+
+    @property
+    def a_room(self) -> float:
+        """Relative difference from another a within which it may be that one."""
+        return SURE * self.a_error / abs(self.a)
 
     @property
     def friction(self) -> float:

@@ -11,6 +11,7 @@ from springcheck.errors import IdentificationError
 from springcheck.identify import coupled
 from springcheck.identify.evidence import Measured
 from springcheck.identify.fit import Map, fit
+from springcheck.identify.hypothesis import SURE
 from springcheck.identify.record import ROUNDING, SIZES, Record, of_size, stated_stride
 from springcheck.identify.search import COARSE, terms_of
 
@@ -124,7 +125,7 @@ def _straight(record: Record, j: int) -> bool:
 
 
 def _forced(found: Map) -> bool:
-    return abs(float(found.entries[1, 0])) >= 6 * math.sqrt(found.covariance[2, 2])
+    return abs(float(found.entries[1, 0])) >= SURE * math.sqrt(found.covariance[2, 2])
 
 
 def _uncoupled(record: Record, maps: dict[int, Map]) -> tuple[tuple[Record, list[int]] | None, list[str]]:

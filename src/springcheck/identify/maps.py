@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass
 from fractions import Fraction
-from functools import cache, partial
+from functools import cache, lru_cache, partial
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -27,13 +27,14 @@ KINDS: dict[str, tuple[float, float, float]] = {
 
 Selected: TypeAlias = Integers | int
 
-MANY = 1000
-"""Plans of a table that are kept."""
-
 WIDTHS = np.dtype(np.float64), np.dtype(np.longdouble)
 
-Columns: TypeAlias = Mapping[np.dtype[Any], tuple[Reals, ...]]
-"""Numbers of every family, in double and in extended precision."""
+Columns: TypeAlias = dict[np.dtype[Any], Reals]
+"""Numbers of every family in the last axis, in double and in extended precision."""
+
+
+def _in_both_widths(x: Extended) -> Columns:
+    return {width: x.astype(width) for width in WIDTHS}
 
 
 def _slots(families: tuple[Family, ...]) -> Extended:
@@ -64,42 +65,33 @@ def _pairs(stages: tuple[Stage, ...]) -> list[Extended]:
     return out
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Plan:
-    """Evaluation plan for some of a table's families: the number of `one`, where it is one alone; kinds of
-    map other than stages, and whose they are, None where they are all; slots that are not 0."""
-
-    one: int | None
-    kinds: tuple[tuple[str, NDArray[np.bool_] | None], ...]
-    slots: dict[np.dtype[Any], list[tuple[Reals | None, ...]]]
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class MapTable:
     """Families whose maps are evaluated together; `which` is the index of each candidate's family."""
 
     families: tuple[Family, ...]
-    slots: tuple[Columns, ...]
+    slots: Columns
     """Kicks with the drift after each, as in `_slots`."""
-    flags: NDArray[np.bool_]
-    """Mask (slots, 5, F) of the coefficients that are not 0."""
-    rational: Columns
-    """Numerator and denominator (degree, F) of stability functions; whether friction is inside (F,)."""
-    kinds: tuple[tuple[str, Any], ...]
+    over: Columns
+    under: Columns
+    """Numerator and denominator (degree, F) of stability functions."""
+    inside: Columns
+    """1 (F,) where friction is inside the stability function, 0 where stages have it."""
+    kinds: tuple[tuple[str, NDArray[np.bool_]], ...]
     """Kinds of map other than stages, and which families are of it (F,)."""
     path: Floats
     held: NDArray[np.bool_]
     damped: bool
-    plans: dict[bytes, Plan] = field(default_factory=dict)
-    """Evaluation plans, by the set of families."""
 
     def unit(self, which: Integers, a: Reals, g: Reals) -> Reals:
         """One-step matrices (c, 2, 2), a and g (c,), in their width."""
         out = np.zeros((2, 2, len(a)), a.dtype)
         out[0, 0] = out[1, 1] = 1
-        plan = self._plan(which)
-        n: Selected = which if plan.one is None else plan.one
-        for kind, members in plan.kinds:
+        present = np.zeros(len(self.families), dtype=bool)
+        present[which] = True
+        one, kinds, slots = _used(self, present.tobytes())
+        n: Selected = which if one is None else one
+        for kind, members in kinds:
             if members is None:
                 out[:] = self._special(kind, n, a, g)
             else:
@@ -107,43 +99,19 @@ class MapTable:
                 out[:, :, at] = self._special(kind, which[at], a[at], g[at])
         q, v = out
         damped = bool(np.any(g))
-        for e, i, x, b, d in plan.slots[a.dtype]:
-            if damped and e is not None:
+        for k, (with_e, with_i, with_x, with_b, with_d) in slots:
+            e, i, x, b, d = self.slots[a.dtype][k]
+            if damped and with_e:
                 v *= 1 - e[n] * g
-            if b is not None:
+            if with_b:
                 v -= b[n] * a * q
-            if damped and i is not None:
+            if damped and with_i:
                 v /= 1 + i[n] * g
-            if damped and x is not None:
+            if damped and with_x:
                 v *= np.exp(-x[n] * g)
-            if d is not None:
+            if with_d:
                 q += d[n] * v
         return out.transpose(2, 0, 1)
-
-    def _plan(self, which: Integers) -> Plan:
-        """What is to be done for the families of these candidates."""
-        present = np.zeros(len(self.families), dtype=bool)
-        present[which] = True
-        key = present.tobytes()
-        if key not in self.plans:
-            if len(self.plans) > MANY:
-                self.plans.clear()
-            kinds = [(kind, None if np.all(those[present]) else those) for kind, those in self.kinds
-                     if np.any(those[present])]  # fmt: skip
-            used = np.any(self.flags[:, :, present], axis=2)
-            self.plans[key] = Plan(
-                one=int(which[0]) if np.count_nonzero(present) == 1 else None,
-                kinds=tuple(kinds),
-                slots={
-                    x: [
-                        tuple(y if z else None for y, z in zip(slot[x], row, strict=True))
-                        for slot, row in zip(self.slots, used, strict=True)
-                        if np.any(row)
-                    ]
-                    for x in WIDTHS
-                },
-            )
-        return self.plans[key]
 
     def _special(self, kind: str, n: Selected, a: Reals, g: Reals) -> Reals:
         if kind == "held":
@@ -156,7 +124,7 @@ class MapTable:
                 at = n == i if np.ndim(n) else slice(None)
                 out[:, :, at] = _formula(self.families[i].formula)(a[at])
             return out
-        over, under, inside = (x[..., n] for x in self.rational[a.dtype])
+        over, under, inside = (x[a.dtype][..., n] for x in (self.over, self.under, self.inside))
         return _rational(over, under, a, g * inside)
 
     def sums(self, which: Integers, a: Reals, g: Reals) -> Reals:
@@ -170,14 +138,13 @@ class MapTable:
                 size = np.abs(self._special(kind, n, x, y))
                 size[0, 0] = 1 + np.abs(x * y) if kind == "held" else size[0, 0]
             else:
-                over, under, inside = (part[..., n] for part in self.rational[a.dtype])
+                over, under, inside = (part[a.dtype][..., n] for part in (self.over, self.under, self.inside))
                 one = np.ones((2, len(n))) * [[1.0], [0.0]]
                 terms = _rational(np.abs(over), one, -np.abs(x), -np.abs(y * inside))
                 size = np.einsum("ijc,jkc->ikc", np.abs(_rational(one, under, x, y * inside)), terms)
             out[:, :, at] = size
         q, v = out
-        for slot in self.slots:
-            e, i, x, b, d = (part[which] for part in slot[a.dtype])
+        for e, i, x, b, d in self.slots[a.dtype][:, :, which]:
             v *= 1 + np.abs(e * g)
             v += np.abs(b * a) * q
             v /= np.abs(1 + i * g)
@@ -194,6 +161,20 @@ class MapTable:
         return np.stack([out[:, 0, 0], out[:, 0, 1] * up, out[:, 1, 0] / up, out[:, 1, 1]])
 
 
+@lru_cache(maxsize=1000)
+def _used(
+    every: MapTable, present: bytes
+) -> tuple[int | None, list[tuple[str, NDArray[np.bool_] | None]], list[tuple[int, list[bool]]]]:
+    """What the families of this mask use: the family's number, where it is one alone; kinds of map other than
+    stages, and whose they are, None where all are of it; slots, and which of their numbers are not 0."""
+    those = np.frombuffer(present, dtype=bool)
+    at = np.flatnonzero(those)
+    kinds = [(kind, None if np.all(of[at]) else of) for kind, of in every.kinds if np.any(of[at])]
+    used = np.any(every.slots[WIDTHS[1]][:, :, at] != 0, axis=2)
+    slots = [(int(k), used[k].tolist()) for k in np.flatnonzero(np.any(used, axis=1))]
+    return int(at[0]) if len(at) == 1 else None, kinds, slots
+
+
 @cache
 def table(families: tuple[Family, ...]) -> MapTable:
     """The families' coefficients."""
@@ -203,25 +184,22 @@ def table(families: tuple[Family, ...]) -> MapTable:
         values = [np.longdouble(number(x, np.longdouble)) for x in row]
         return values + [np.longdouble(0)] * (degree - len(row))
 
-    one: tuple[Fraction | str, ...] = (Fraction(1),)
-    parts = [
-        np.array([coefficients(family.stability[i] or one) for family in families], np.longdouble).T
+    over, under = (
+        np.array([coefficients(family.stability[i] or (Fraction(1),)) for family in families]).T
         for i in (0, 1)
-    ]
-    inside = np.array([0 if family.stages else 1 for family in families], np.longdouble)
+    )
     kinds = {
         "held": [family.held for family in families],
         "flow": [family.flow for family in families],
         "formula": [bool(family.formula) for family in families],
         "rational": [bool(family.stability[0]) for family in families],
     }
-    slots = _slots(families)
-    under = max([2, *(len(family.stability[1]) for family in families)])
     return MapTable(
         families=families,
-        slots=tuple({x: tuple(row.astype(x)) for x in WIDTHS} for row in slots),
-        flags=slots != 0,
-        rational={x: tuple(y.astype(x) for y in (parts[0], parts[1][:under], inside)) for x in WIDTHS},
+        slots=_in_both_widths(_slots(families)),
+        over=_in_both_widths(over),
+        under=_in_both_widths(under[: max([2, *(len(family.stability[1]) for family in families)])]),
+        inside=_in_both_widths(np.array([not family.stages for family in families])),
         kinds=tuple((name, np.array(members)) for name, members in kinds.items() if any(members)),
         path=np.array([family.path for family in families], np.float64),
         held=np.array(kinds["held"]),

@@ -13,12 +13,10 @@ from springcheck.identify.compare import compare
 from springcheck.identify.evidence import Measured
 from springcheck.identify.families import FAMILIES, title
 from springcheck.identify.fit import Map
-from springcheck.identify.guesses import roots_of
-from springcheck.identify.hypothesis import Joint, Terms
-from springcheck.identify.maps import unit
+from springcheck.identify.hypothesis import ERRORS, SURE, Joint, Terms
 from springcheck.identify.record import DEEP, Record
 from springcheck.identify.result import OR_UNKNOWN, Explanation, Identification
-from springcheck.identify.search import SAME_MAP, coincident
+from springcheck.identify.search import coincident, identical
 from springcheck.text.wording import count, either
 
 APART = 10.0
@@ -81,10 +79,7 @@ def of_few(record: Record, found: Identification) -> Identification:
             f"no known scheme fits, but {frames} frames{of_text} that show the motion exclude none: {more}"
         )
     said = f"{frames} frames{of_text} that show the motion exclude no scheme; what fits: {found.statement}"
-    return replace(
-        found, verdict="not told apart", scheme=None, aliases=(), fits=False, undecided=True, explanations=(),
-        statement=said, notes=(*found.notes, f"what would tell: {more}"),
-    )  # fmt: skip
+    return found.doubted(said, f"what would tell: {more}")
 
 
 def beside_unknown(record: Record, found: Identification, *, stated: bool, seen: bool) -> Identification:
@@ -103,7 +98,7 @@ def beside_unknown(record: Record, found: Identification, *, stated: bool, seen:
         return found
     more = "more digits" if near else "the step, stated"
     tells = [f"what would tell: {more}"] if found.scheme or not near else []
-    out = replace(found, statement=found.statement + OR_UNKNOWN, notes=(*found.notes, *tells))
+    out = replace(found.noting(*tells), statement=found.statement + OR_UNKNOWN)
     if found.scheme in (None, "exact") or min(x.stride for x in found.candidates) <= CERTAIN_STEPS:
         return out
     return replace(out, verdict="not told apart", scheme=None, aliases=())
@@ -117,10 +112,7 @@ def of_either_sign(found: Identification, against: list[Explanation]) -> Identif
         return found
     cause = f"{against[0].cause}; or the motion nearly comes round between two frames: {found.statement}"
     remedy = f"{against[0].remedy}; if they are right, state the stiffness, which tells the two apart"
-    return replace(
-        found, verdict="not told apart", scheme=None, aliases=(), fits=False, undecided=True, statement=cause,
-        explanations=(Explanation(cause=cause, remedy=remedy, local=True),),
-    )  # fmt: skip
+    return found.doubted(cause, because=(Explanation(cause=cause, remedy=remedy, local=True),))
 
 
 def of_stated_friction(found: Identification, stated: float, mass: float) -> Identification:
@@ -136,10 +128,11 @@ def of_stated_friction(found: Identification, stated: float, mass: float) -> Ide
         share = _between(*sorted((low / stated, high / stated)))
         cause = f"{whose}, but with a friction {share} times the stated"
     remedy = "look at the unit of the friction, c or c/m, and at how often a step applies it"
-    wrong = Explanation(cause=cause, remedy=remedy)
-    notes = (*found.notes, "the stated friction does not fit by any of the laws that are known")
-    statement = found.statement if found.explanations else cause
-    return replace(found, statement=statement, explanations=(*found.explanations, wrong), notes=notes)
+    return replace(
+        found.noting("the stated friction does not fit by any of the laws that are known"),
+        statement=found.statement if found.explanations else cause,
+        explanations=(*found.explanations, Explanation(cause=cause, remedy=remedy)),
+    )
 
 
 def _between(low: float, high: float) -> str:
@@ -172,20 +165,17 @@ def of_unasked_friction(found: Identification) -> Identification:
                 f"as {part}: the mark of a scheme that is written down wrongly, or of an implicit one; state "
                 "the friction if not"
             )
-            wrong = Explanation(cause=cause, remedy="compare the factors 1/2 of the step with the scheme's")
-            return replace(
-                found, verdict="none", scheme=None, aliases=(), candidates=(), statement=cause, fits=False,
-                explanations=(wrong,),
-            )  # fmt: skip
+            remedy = "compare the factors 1/2 of the step with the scheme's"
+            return found.refuted(cause, Explanation(cause=cause, remedy=remedy))
     return found
 
 
 def hidden_friction(record: Record, found: Map) -> float:
-    """Largest rate c/m [1/T] that the map's determinant leaves room for: five standard errors of it."""
+    """Largest rate c/m [1/T] that the map's determinant leaves room for, by chance."""
     gradient = np.linalg.inv(found.entries.astype(np.float64)).T.reshape(4)
     error = math.sqrt(float(gradient @ found.covariance @ gradient))
     loss = abs(math.log(abs(float(np.linalg.det(found.entries.astype(np.float64))))))
-    return (loss + 5 * error) / abs(float(record.interval))
+    return (loss + ERRORS * error) / abs(float(record.interval))
 
 
 def same_maps(seen: Measured, joint: Joint) -> list[str]:
@@ -218,7 +208,7 @@ def untold(seen: Measured, joints: list[Joint]) -> list[str]:
         least, nearest = min(apart, key=lambda pair: pair[0])
         digits = math.ceil(math.log10(APART / least)) if least > 0 else MOST_DIGITS + 1
         pair = f"the data cannot tell these apart: the maps of {plainest} and {nearest}"
-        if digits > MOST_DIGITS or _identical(plainest, nearest, free_scale=record.momenta):
+        if digits > MOST_DIGITS or identical(plainest, nearest, free_scale=record.momenta):
             other = "mass" if record.momenta else "stiffness"
             friction = " and friction" if plainest.damped or nearest.damped else ""
             why, told = f"{pair} are the same, on springs of different {other}{friction}", []
@@ -233,22 +223,10 @@ def untold(seen: Measured, joints: list[Joint]) -> list[str]:
     return [why, *([f"what would tell them apart: {either(told)}"] if told else [])]
 
 
-def _identical(one: Joint, other: Joint, *, free_scale: bool) -> bool:
-    """Whether two families have the same step, at the unknowns of each: an identity, which no digits undo."""
-    if one.stride != other.stride:
-        return False
-    both = FAMILIES[one.family], FAMILIES[other.family]
-    wanted = np.concatenate(
-        [unit(both[0], np.array([x.a]), np.array([x.g])).astype(np.float64) for x in one.parts]
-    )
-    roots = roots_of(both[1:], wanted, SAME_MAP, free_scale=free_scale)[1]
-    return len(set(roots.tolist())) == len(wanted)
-
-
 def _stiffer(one: Joint, other: Joint) -> bool:
-    """Whether a spring differs in stiffness between two schemes by more than six standard errors."""
+    """Whether a spring differs in stiffness between two schemes for certain."""
     return any(
         abs(a.a * one.stride**2 - b.a * other.stride**2)
-        > 6 * (a.a_error * one.stride**2 + b.a_error * other.stride**2)
+        > SURE * (a.a_error * one.stride**2 + b.a_error * other.stride**2)
         for a, b in zip(one.parts, other.parts, strict=True)
     )

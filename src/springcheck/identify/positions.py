@@ -3,22 +3,28 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from springcheck.errors import IdentificationError
-from springcheck.identify.candidates import candidates_of, common, held_over, law_assumed, said_of
+from springcheck.identify.candidates import (
+    candidates_of,
+    common,
+    held_over,
+    law_assumed,
+    shared,
+    steps_between,
+)
 from springcheck.identify.evidence import SINGLE_ROOM, Measured
 from springcheck.identify.families import FAMILIES, HELD, Family, title
-from springcheck.identify.hypothesis import FEW, Joint, Match, distinct
-from springcheck.identify.record import SIZES, Record
+from springcheck.identify.hypothesis import FEW, SURE, Joint, Match, distinct
+from springcheck.identify.record import SIZES, Record, of_size, stated_stride
 from springcheck.identify.recurrence import FEWEST_FRAMES, Recurrence, classes, matches, recurrence
 from springcheck.identify.result import Explanation, Identification, nothing
-from springcheck.physics.arrays import Floats
 from springcheck.text.wording import either
 
-CERTAIN = 1e8
+CERTAIN_CHANGE = 1e8
 """Standard errors of a change of areas from which no friction meets that of a scheme by chance."""
 
 ALONE = (
@@ -28,10 +34,16 @@ ALONE = (
 
 
 def identify_positions(
-    record: Record, stated: Floats | None, stride: int | None, friction: float | None, notes: list[str]
+    record: Record, stiffness: ArrayLike | None, friction: float | None, step: float | None
 ) -> Identification:
     """The schemes that may have made these positions.  Raises IdentificationError where they show none."""
-    notes = [*notes, ALONE]
+    stated = of_size("stiffness", stiffness, record.q.shape[1], zero=True)
+    of_size("friction", friction, zero=True)
+    notes: list[str] = []
+    if stated is not None and record.mass is None:
+        notes.append("the stiffness says nothing of positions without the mass; give the mass as well")
+    stride = stated_stride(record, step, notes)
+    notes.append(ALONE)
     moving = np.flatnonzero(np.ptp(record.q, axis=0) > SIZES[0]).tolist()
     if not moving:
         raise IdentificationError("nothing moves: at rest all schemes agree; start away from rest")
@@ -54,46 +66,38 @@ def identify_positions(
         raise IdentificationError(
             "the motion does not turn: without velocities one that dies or grows alone shows no scheme"
         )
-    worst = max(found, key=lambda x: x.residual)
+    seen = Measured(
+        record=record, moving=moving, maps=[], terms=[], stiffness=stated, friction=friction or None,
+        stride=stride, notes=tuple(notes),
+    )  # fmt: skip
     if any(not x.precision for x in found):
-        return _none(found, notes, *_misfit(worst))
+        return _none(seen, found, [])
     known = stated is not None and record.mass is not None
     wanted = [0.0 for _ in moving]
     if stated is not None and record.mass is not None:
         wanted = [float(stated[j] / record.mass[j] * record.interval**2) for j in moving]
     plain = tuple(x[0] for x in classes())
-    seen = Measured(
-        record=record, moving=moving, maps=[], terms=[], stiffness=stated, friction=friction or None,
-        stride=stride, notes=tuple(notes),
-    )  # fmt: skip
     every_stride = known or not _all_preserve(found)
     joints = (_joined if every_stride else _first)(found, plain, strides, wanted)
-    joints += [x for x in _joined(found, (HELD,), strides, wanted) if _may_hold(x)]
-    seen, fitting = _stated(seen, joints) if known else (seen, joints)
-    kept = fitting
-    sure = _all_preserve(found) or _certain(found)
-    if friction or (friction is None and not (fitting and sure)):
-        families = distinct(damped=True)
-        damped = (_joined if known else _first)(found, families, strides, wanted)
+    joints += [x for x in _joined(found, (HELD,), strides, wanted) if x.endless or x.substeps[0]]
+    seen, kept = _stated(seen, joints) if known else (seen, joints)
+    # a change of areas so well known meets that of a scheme without friction by no chance
+    sure = _all_preserve(found) or any(
+        abs(float(x.beta)) > CERTAIN_CHANGE * math.sqrt(x.covariance[1, 1]) for x in found
+    )
+    if friction or (friction is None and not (kept and sure)):
+        damped = (_joined if known else _first)(found, distinct(damped=True), strides, wanted)
         seen, damped = _stated(seen, damped) if known else (seen, damped)
-        kept = damped if friction else kept + damped
-    if friction:
-        kept = [x for x in kept if candidates_of(seen, x)]
-    if not kept:
-        return _none(found, seen.notes, *_unfitting(seen, found, joints))
-    return _known(seen, found, kept, known)
+        kept = [x for x in damped if candidates_of(seen, x)] if friction else kept + damped
+    return _known(seen, found, kept, known) if kept else _none(seen, found, joints)
 
 
 def _forced(x: Recurrence) -> bool:
-    return float(x.alpha) > 6 * math.sqrt(x.covariance[0, 0])
+    return float(x.alpha) > SURE * math.sqrt(x.covariance[0, 0])
 
 
 def _all_preserve(found: list[Recurrence]) -> bool:
     return all(x.preserving for x in found)
-
-
-def _certain(found: list[Recurrence]) -> bool:
-    return any(abs(float(x.beta)) > CERTAIN * math.sqrt(x.covariance[1, 1]) for x in found)
 
 
 def _joined(
@@ -132,11 +136,6 @@ def _first(
     return out
 
 
-def _may_hold(joint: Joint) -> bool:
-    """Whether the force may be held over some whole number of substeps, or no end of them."""
-    return joint.endless or bool(joint.substeps[0])
-
-
 def _stated(seen: Measured, joints: list[Joint]) -> tuple[Measured, list[Joint]]:
     """Hypotheses of the stated stiffness, or where none is, of it with a number in single precision, which
     is noted."""
@@ -165,47 +164,39 @@ def _known(seen: Measured, found: list[Recurrence], kept: list[Joint], known: bo
     record, notes, joints = seen.record, list(seen.notes), _members(kept)
     candidates = tuple(x for joint in joints for x in candidates_of(seen, joint))
     names = list(dict.fromkeys(x.scheme for x in candidates))
-    damped = any(joint.damped for joint in joints)
+    preserving, damped = _all_preserve(found), [joint.damped for joint in joints]
     # the number of steps does not show where areas are kept and the stiffness is not known
-    steps = common([x.stride for x in candidates])
-    if not known and seen.stride is None and _all_preserve(found):
-        steps = None
+    hidden = preserving and not known and seen.stride is None
+    stride = None if hidden else common([x.stride for x in candidates])
     # several friction laws, or places of it, of one scheme are no other scheme
-    scheme = names[0] if len(names) == 1 and steps is not None else None
-    precision = common([x.precision for x in found]) or "cannot tell"
-    frames = (
-        "" if steps == 1 else f", {steps} steps to a frame" if steps else ", in an unknown number of steps"
-    )
+    fields = shared(candidates, len(found), named=stride is not None)
+    fields |= {} if stride else {"step": math.nan, "stride": None}
+    scheme, precision = fields["scheme"], common([x.precision for x in found]) or "cannot tell"
+    frames = steps_between(stride)
     if scheme:
         said = common([x.law for x in candidates])
-        law = f" with {said}" if said else " with friction" if all(x.damped for x in joints) else ""
-        notes += law_assumed(candidates) if all(x.damped for x in joints) else []
-        whose = title(scheme)
-        if scheme == HELD.scheme:
-            whose = held_over(joints[0])
+        law = f" with {said}" if said else " with friction" if all(damped) else ""
+        notes += law_assumed(candidates) if all(damped) else []
+        whose = held_over(joints[0]) if scheme == HELD.scheme else title(scheme)
         statement = f"{whose}{law}{frames}, by positions alone: {precision} arithmetic explains them"
     else:
         listed = names[:6] + ([f"{len(names) - 6} more"] if len(names) > 6 else [])
-        what = f"areas {'shrink' if float(found[0].beta) > 0 else 'grow'}"
-        what = "areas are kept" if _all_preserve(found) else what
-        statement = f"Positions alone: {what}, and they are those of {either(listed)}{frames}"
+        change = "are kept" if preserving else "shrink" if float(found[0].beta) > 0 else "grow"
+        statement = f"Positions alone: areas {change}, and they are those of {either(listed)}{frames}"
     if not known:
         told = "mass and stiffness" if record.mass is None else "the stiffness"
         notes.append(f"what would tell more: {told}, where known, the friction, or velocities")
-    if damped and seen.friction is None:
+    if any(damped) and seen.friction is None:
         notes.append(
             "with friction every scheme has a spring that fits; a stated friction of 0 leaves it out"
         )
     elif scheme and float(found[0].beta) > 0 and not known:
         notes.append("a damped spring of another stiffness may have the same positions")
-    unknown = tuple(math.nan for _ in found)
-    share = 1 / (steps or 1)
+    share = 1 / stride if stride else math.nan
     return Identification(
-        **said_of(candidates, scheme, damped, len(found)),
+        **fields,
         statement=statement,
-        step=float(record.interval) * share if steps else math.nan,
-        stride=steps,
-        determinant=tuple(math.exp(x.log_det * share) for x in found) if steps else unknown,
+        determinant=tuple(math.exp(x.log_det * share) for x in found),
         symplectic_defect=max(abs(float(x.beta)) for x in found),
         defect_ulp=max(x.ulp for x in found),
         precision=precision,
@@ -214,38 +205,30 @@ def _known(seen: Measured, found: list[Recurrence], kept: list[Joint], known: bo
     )
 
 
-def _misfit(worst: Recurrence) -> tuple[str, str]:
-    return (
-        "The positions are not those of one linear scheme: its recurrence leaves over "
-        f"{worst.residual:.1e} of their size, {worst.ulp:.2g} units in the last place",
-        "look for a force that is not linear, coupled coordinates, a restart or noise; velocities show more",
-    )
-
-
-def _unfitting(seen: Measured, found: list[Recurrence], joints: list[Joint]) -> tuple[str, str]:
-    if joints and seen.stiffness is not None:
-        x = joints[0]
-        shown = [*seen.disagreements(x), "it has another friction"][0]
-        return (
-            f"The positions may be those of {title(FAMILIES[x.family].scheme)}, but of another "
-            f"spring: {shown}",
-            "look at the units of the force constant and of the times, and at the mass",
-        )
-    change = math.exp(found[0].log_det) - 1
-    return (
-        f"One linear map explains the positions, but it is none of the known schemes': areas change by "
-        f"{change:+.2e} in each frame",
-        "compare the order of its stages and their coefficients with the scheme's; velocities show more",
-    )
-
-
-def _none(found: list[Recurrence], notes: Sequence[str], cause: str, remedy: str) -> Identification:
-    """No scheme, and why."""
+def _none(seen: Measured, found: list[Recurrence], joints: list[Joint]) -> Identification:
+    """No scheme, and why; `joints` fit but for what is stated."""
     worst = max(found, key=lambda x: x.residual)
+    remedy = "compare the order of its stages and their coefficients with the scheme's; velocities show more"
+    if any(not x.precision for x in found):
+        cause = (
+            "The positions are not those of one linear scheme: its recurrence leaves over "
+            f"{worst.residual:.1e} of their size, {worst.ulp:.2g} units in the last place"
+        )
+        remedy = "look for a force that is not linear, coupled coordinates, a restart or noise; "
+        remedy += "velocities show more"
+    elif joints and seen.stiffness is not None:
+        shown = [*seen.disagreements(joints[0]), "it has another friction"][0]
+        cause = f"The positions may be those of {title(joints[0].scheme)}, but of another spring: {shown}"
+        remedy = "look at the units of the force constant and of the times, and at the mass"
+    else:
+        cause = (
+            "One linear map explains the positions, but it is none of the known schemes': areas change by "
+            f"{math.exp(found[0].log_det) - 1:+.2e} in each frame"
+        )
     return nothing(
         (Explanation(cause=cause, remedy=remedy, misfit=worst.residual),),
         determinant=tuple(math.exp(x.log_det) for x in found),
         symplectic_defect=max(abs(float(x.beta)) for x in found),
         defect_ulp=max(x.ulp for x in found),
-        notes=notes,
+        notes=seen.notes,
     )

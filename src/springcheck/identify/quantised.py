@@ -13,7 +13,8 @@ from typing import TypeAlias
 
 import numpy as np
 
-from springcheck.identify.coarse import CHANCE, over_single
+from springcheck.identify import coarse
+from springcheck.identify.coarse import CHANCE, EXCESS, QUANTUM, over_single
 from springcheck.identify.families import FAMILIES, Family
 from springcheck.identify.fit import Map
 from springcheck.identify.hypothesis import Match
@@ -66,11 +67,21 @@ FORCES: dict[str, tuple[Force, ...]] = {
 }
 
 
-def reproduced(
-    record: Record, j: int, found: Map, match: Match, precision: str, quantum: float, excess: float
-) -> bool:
-    """Whether forces of a precision, carried out, explain what frames miss.  `quantum` is that of sums in
-    fixed point [force], which may be too large by the share `excess`."""
+def coarse_forces(record: Record, j: int, found: Map, match: Match, signed: Floats) -> tuple[str, str, bool]:
+    """Precision of forces that leave these misses (f - 1, 2), a note, and whether it is certain; "" where
+    none explains them."""
+    name, note = coarse.sized(record, j, found, match, signed)
+    for each in FORCES if name == "mixed" else [name] if name else []:
+        if _reproduced(record, j, found, match, each):
+            return each, "states are double, and the steps redone with such forces are those recorded", True
+    seen = coarse.kinematic(record, j, found, match)
+    if seen is not None:
+        return *seen, record.mass is not None
+    return (name, note, False) if name and coarse.white(found, match, signed) else ("", "", True)
+
+
+def _reproduced(record: Record, j: int, found: Map, match: Match, precision: str) -> bool:
+    """Whether forces of a precision, carried out, explain what frames miss."""
     family = FAMILIES[match.family]
     if record.mass is None or found.slips is not None or family.held or family.flow:
         return False
@@ -80,7 +91,7 @@ def reproduced(
     # about the equilibrium; velocities as lengths
     q = (found.z[:, 0] * found.size[0]).astype(np.float64)
     v = (found.z[:, 1] * found.size[1] / record.interval).astype(np.float64) * h
-    kick = h * h / mass * quantum
+    kick = h * h / mass * QUANTUM
 
     def missed(values: Floats, pull: Pull, *, leaps: bool = False) -> Floats:
         """What frames miss (c, 2 f - 2) where steps have these a and g (c, 2)."""
@@ -126,7 +137,7 @@ def reproduced(
         return False
     most = min(EXPLAINED, CHANCE ** (1 / counted))
     single = float(over_single(mass))
-    factors = [x * y for x in (1.0, 1.0 + excess) for y in dict.fromkeys((1.0, single))]
+    factors = [x * y for x in (1.0, 1.0 + EXCESS) for y in dict.fromkeys((1.0, single))]
     quanta = kick * np.array(factors)[:, None]
     forces, n = FORCES[precision], len(factors)
 

@@ -15,11 +15,12 @@ from functools import cache
 import numpy as np
 
 from springcheck.identify.coarse import irregular
-from springcheck.identify.compare import of_positions, recurrence_of
+from springcheck.identify.compare import Target, solved
 from springcheck.identify.coupled import least_squares
 from springcheck.identify.families import Family
-from springcheck.identify.hypothesis import Match, distinct
-from springcheck.identify.maps import unit
+from springcheck.identify.guesses import FLOW_TURNS, Guesses, Roots, first
+from springcheck.identify.hypothesis import ERRORS, Match, Terms, distinct
+from springcheck.identify.maps import MapTable, table, unit
 from springcheck.identify.record import ROUNDING, Record
 from springcheck.physics.arrays import Extended, Floats, Reals
 
@@ -28,9 +29,6 @@ FEWEST_FRAMES = 9
 
 UNUSUAL = 2.5
 """Largest irregular residual of a frame, in units of its usual rounding error, 4 + 2 sqrt(steps)."""
-
-ERRORS = 5.0
-"""Standard errors within which a number is no other."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -203,6 +201,14 @@ def _orbit(
 # families ------------------------------------------------------------------------------------------------
 
 
+def recurrence_of(m: Reals) -> tuple[Reals, Reals]:
+    """1 + det - trace and 1 - det of maps (c, 2, 2)."""
+    # (1 - M11)(1 - M22) - M12 M21 is 1 + det - trace without the cancellation
+    one, other, product = 1 - m[:, 0, 0], 1 - m[:, 1, 1], m[:, 0, 1] * m[:, 1, 0]
+    alpha = one * other - product
+    return alpha, one + other - alpha
+
+
 @cache
 def classes() -> tuple[tuple[Family, ...], ...]:
     """Schemes without friction whose positions agree for every step, together."""
@@ -222,9 +228,50 @@ def _shape(family: Family) -> Reals:
     return np.stack(recurrence_of(unit(family, a, np.zeros(3))))
 
 
+class PositionTarget(Target):
+    """The recurrence of positions alone: 1 + det - trace and 1 - det of a map, with their covariance."""
+
+    def __init__(self, found: Recurrence) -> None:
+        self.terms = Terms()
+        self.observed = np.array([found.alpha, found.beta])
+        # two numbers of very unlike size: eigenvectors of double precision do not part them
+        size = np.sqrt(np.diag(found.covariance))
+        values, axes = np.linalg.eigh(found.covariance / size[:, None] / size)
+        self.axes, self.variance = axes / size[:, None], values
+
+    def weight(self, every: MapTable, x: Guesses, s: Floats) -> Floats:
+        return np.asarray(1 / np.sqrt(self.variance[:, None]) * np.ones(len(s)))
+
+    def entries(self, every: MapTable, x: Guesses, s: Floats, values: Reals) -> Reals:
+        ones = np.ones(len(s), np.longdouble)
+        out = every.frame(x.which, values[0], values[1], 0 * ones, s, ones)
+        return np.stack(recurrence_of(out.T.reshape(-1, 2, 2)))
+
+
 def matches(found: Recurrence, families: tuple[Family, ...], strides: range) -> list[Match]:
     """Families (one of each class without friction; any with it) whose recurrence this may be, each number of
-    steps and of unseen turns."""
-    return of_positions(
-        (found.alpha, found.beta), found.covariance, found.phase, found.log_det, families, strides
-    )
+    steps and of unseen turns, and each spring of these: without velocities turns to the left and to the right
+    look alike."""
+    every = table(families)
+    ways = [(s, i) for s in strides for i in range(max(s, FLOW_TURNS if s == 1 else 1) + 1)]
+    s, i = np.array(ways, np.float64).T
+    turns = (i + 1) // 2
+    phases = (np.where(i % 2, -1.0, 1.0) * found.phase + 2 * np.pi * turns) / s
+    keep = (phases > 0) & ((phases <= np.pi) | (s == 1))
+    s, turns, phases = s[keep], turns[keep], phases[keep]
+    each = found.log_det / s
+    det, trace = np.exp(each), 2 * np.exp(each / 2) * np.cos(phases)
+    ones = np.ones_like(s)
+    step = np.stack([trace - 1, ones, trace - 1 - det, ones], axis=1).reshape(-1, 2, 2)
+    roots = Roots(s, turns, phases, each, step, 0.0, {})
+    with np.errstate(all="ignore"):
+        x = first(every, roots, growing=False, free_scale=True, far=True)
+        if not every.damped:
+            # the area of a frame is known, and that of a scheme without friction beside it
+            own = np.log(np.abs(np.linalg.det(every.unit(x.which, x.a, x.g)))) * s[x.root]
+            room = 0.02 * np.abs(own) + 1e-4 + 100 * math.sqrt(found.covariance[1, 1])
+            near = np.flatnonzero(np.abs(own - found.log_det) <= room)
+            x = x[near]
+        if not len(x.a):
+            return []
+        return solved(every, PositionTarget(found), roots, x, every_turn=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import textwrap
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import numpy as np
@@ -127,6 +127,24 @@ class Identification:
             often = "" if found == {1} else f", {_ranges(sorted(found))} steps a frame"
             alike.setdefault((stem, often), []).extend([number] if number else [])
         return [f"{stem}{_ranges(sorted(counts))}{often}" for (stem, often), counts in alike.items()]
+
+    def noting(self, *more: str) -> Identification:
+        """Copy with more remarks."""
+        return replace(self, notes=(*self.notes, *more))
+
+    def doubted(self, statement: str, *more: str, because: tuple[Explanation, ...] = ()) -> Identification:
+        """Copy that names none of its candidates: something else may have made the states as well."""
+        return replace(
+            self.noting(*more), verdict="not told apart", scheme=None, aliases=(), fits=False, undecided=True,
+            statement=statement, explanations=because,
+        )  # fmt: skip
+
+    def refuted(self, statement: str, *because: Explanation) -> Identification:
+        """Copy without candidates: something else made the states."""
+        return replace(
+            self, verdict="none", scheme=None, aliases=(), candidates=(), fits=False, statement=statement,
+            explanations=because,
+        )  # fmt: skip
 
     def document(self) -> dict[str, Any]:
         """For JSON: numbers for one oscillator, lists for several, null for what is not known."""

@@ -1,17 +1,21 @@
-"""The search: which hypotheses are tried in turn, and which of them the states do not exclude."""
+"""The search: which hypotheses are tried in turn, which of them the states do not exclude, and of which a
+known arithmetic explains every step."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
+from typing import TypeAlias
 
 import numpy as np
 
+from springcheck.identify.arithmetic import SINGLE, Defect, defects
+from springcheck.identify.coarse import over_single
 from springcheck.identify.compare import nearest
 from springcheck.identify.evidence import Measured
-from springcheck.identify.families import FAMILIES, HELD, Family
-from springcheck.identify.fit import Map
+from springcheck.identify.families import DAMPED_ELSEWHERE, FAMILIES, HELD, KNOWN_ELSEWHERE, Family
+from springcheck.identify.fit import Map, fit
 from springcheck.identify.guesses import roots_of
 from springcheck.identify.hypothesis import (
     EXCLUDED,
@@ -19,11 +23,11 @@ from springcheck.identify.hypothesis import (
     MANY,
     STRIDES,
     Joint,
-    Match,
     Terms,
     distinct,
     likely,
 )
+from springcheck.identify.interrupted import remembered
 from springcheck.identify.maps import unit
 from springcheck.identify.record import ROUNDING, Record
 from springcheck.physics.arrays import Floats
@@ -31,9 +35,6 @@ from springcheck.physics.arrays import Floats
 BIAS = 3.0
 """Residuals that a coarse arithmetic may bias an entry by.  Cutting off has a mean of half a unit in the
 last place and a deviation of 0.29; the rest of the factor is for roundings that repeat with the motion."""
-
-SINGLE = 2.0**-24
-"""Unit roundoff of single precision."""
 
 COARSE = 2.0**-46
 """Residual above which it is no double-precision rounding: 64 units in the last place."""
@@ -47,8 +48,15 @@ ONE_MORE = 4.0
 PLAIN = 30.0
 """Residuals by which the exact flow must miss where a scheme is named in spite of coarse numbers."""
 
+AS_NEAR = 1.5
+"""Factor by which the residual of one scheme may exceed that of another for which a cause was found."""
+
 SAME_MAP = 1e-12
 """Distance of the entries of two steps that are the same, in double precision."""
+
+
+Explained: TypeAlias = dict[Joint, list[Defect]]
+"""Hypotheses, the plainest first, and the defects of their steps, which a known arithmetic explains."""
 
 
 @cache
@@ -63,6 +71,18 @@ def coincident(name: str) -> tuple[str, ...]:
     return tuple(f.name for i, f in enumerate(every) if all((i, j) in good for j in range(3)))
 
 
+def identical(one: Joint, other: Joint, *, free_scale: bool) -> bool:
+    """Whether two families have the same step, at the unknowns of each: an identity, which no digits undo."""
+    if one.stride != other.stride:
+        return False
+    both = FAMILIES[one.family], FAMILIES[other.family]
+    wanted = np.concatenate(
+        [unit(both[0], np.array([x.a]), np.array([x.g])).astype(np.float64) for x in one.parts]
+    )
+    roots = roots_of(both[1:], wanted, SAME_MAP, free_scale=free_scale)[1]
+    return len(set(roots.tolist())) == len(wanted)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Room:
     """Tolerance beside the numbers' own uncertainty, and the strides looked at, in turn."""
@@ -75,6 +95,112 @@ class Room:
     @property
     def families(self) -> tuple[Family, ...]:
         return (*distinct(damped=True), HELD) if self.damped else distinct(damped=False)
+
+
+def accounted(seen: Measured) -> tuple[Measured, Explained, bool]:
+    """The hypotheses of which a known arithmetic explains every step, on the terms on which they fit; and
+    whether any fits, explained or not.
+
+    Tried in turn: the schemes of the catalogue, where digits are few about an equilibrium that does not show
+    as well; the one that begins by another step; of a stated stiffness those that have it; schemes
+    elsewhere; numbers in single precision.
+    """
+    fine = seen.record.fine
+    joints, wide = find(seen)
+    way, found, fitting = seen, explained(wide, joints), bool(joints)
+    apart = seen
+    if not (fine or any(_agrees(seen, x) for x in found)):
+        # an equilibrium beside 0 that a short or coarse file does not show may still be there
+        each = zip(seen.moving, seen.maps, strict=True)
+        apart = replace(
+            seen, maps=[x if np.any(x.centre) else fit(seen.record, j, constant=True) for j, x in each]
+        )
+    if not (found or fine):
+        joints, wide = find(apart)
+        found = explained(wide, joints)
+        way = apart if found else seen
+    if not found:
+        later, joints = remembered(seen)
+        if found := explained(later, joints):
+            way = later.noting(
+                "the first step has the friction of the first velocity: none is half a step old"
+            )
+    if found and seen.stiffness is not None and not (fine or any(_agrees(way, x) for x in found)):
+        # friction, or an equilibrium beside 0, is as plain as another spring than the stated one
+        ways = ((x, damped) for x in (way, apart) for damped in (False, True))
+        for other, damped in ways:
+            of_stated = (x for x in other.compare(distinct(damped=damped), FEW) if _agrees(other, x))
+            if more := explained(other, likely(list(of_stated))):
+                way, found = other, more
+                break
+    found = _or_elsewhere(way, found)
+    if not _of_few_steps(found):
+        # few steps, one of them rounded, are plainer than many
+        joints, remark = _single_parameters(way)
+        if rounded := explained(way, joints):
+            way, found = way.noting(remark), rounded
+    return way, found, fitting
+
+
+def _agrees(seen: Measured, x: Joint) -> bool:
+    """Whether a hypothesis has the stated step and stiffness."""
+    return seen.stride in (None, x.stride) and (seen.stiffness is None or not seen.disagreements(x))
+
+
+def _of_few_steps(found: Explained) -> bool:
+    return any(x.stride in FEW for x in found)
+
+
+def _or_elsewhere(seen: Measured, found: Explained) -> Explained:
+    """Schemes that springcheck does not run beside those that it does, where these leave room for them."""
+
+    def elsewhere(strides: range) -> Explained:
+        joints = seen.compare(KNOWN_ELSEWHERE, strides) or seen.compare(DAMPED_ELSEWHERE, strides)
+        return explained(seen, likely(joints))
+
+    if not _of_few_steps(found):
+        # of many steps, which a numerous family has, nothing is plainer than few of a scheme elsewhere
+        return {**elsewhere(FEW), **found}
+    if seen.stride is not None or seen.stiffness is not None:
+        right = {x.scheme for x in found if _agrees(seen, x)}
+        if right and (seen.record.fine or (seen.stride is None and len(right - {"exact"}) == 1)):
+            return found
+        # what is stated tells more than that the step is a simple one
+        others = elsewhere(FEW if seen.stride is None else range(seen.stride, seen.stride + 1))
+        others = {x: ds for x, ds in others.items() if _agrees(seen, x)}
+        return {**(found if right or not others else {}), **others}
+    if seen.record.fine:
+        return found
+    # what coarse numbers do not tell apart they do not tell from a scheme elsewhere either
+    alone = len({(x.scheme, x.stride) for x in found}) == 1
+    strides = range(1, min(x.stride for x in found)) if alone else FEW
+    others = {**found, **(elsewhere(strides) if strides else {})}
+    return {x: others[x] for x in likely(list(others))}
+
+
+def _single_parameters(seen: Measured) -> tuple[list[Joint], str]:
+    """Schemes that fit if the step or the mass is the stated one in single precision, and which of them."""
+    record, stride = seen.record, seen.stride
+    if record.momenta:
+        return [], ""
+    masses = [1.0 if record.mass is None else float(record.mass[j]) for j in seen.moving]
+    heavier = [_shortened(m) for m in masses]
+    strides = range(stride, stride + 1) if stride is not None and stride > 0 else FEW
+    longer = [0.0, *(_shortened(record.interval / s) for s in range(1, strides.stop))]
+    for families in (distinct(damped=False), (*distinct(damped=True), HELD)):
+        for what, of_mass, of_step in (("step", 0, 1), ("mass", 1, 0), ("step and the mass", 1, 1)):
+            scales = [tuple(of_mass * m - of_step * h for h in longer) for m in heavier]
+            if not any(any(row[1:]) for row in scales):
+                continue
+            loose = [replace(x, scales=row) for x, row in zip(seen.terms, scales, strict=True)]
+            if joints := replace(seen, terms=loose).compare(families, strides):
+                return joints, f"the {what} was rounded to single precision in double arithmetic"
+    return [], ""
+
+
+def _shortened(x: np.longdouble | float) -> float:
+    """Log of a number in single precision over the number."""
+    return -float(np.log(over_single(x)))
 
 
 def find(seen: Measured) -> tuple[list[Joint], Measured]:
@@ -101,6 +227,37 @@ def find(seen: Measured) -> tuple[list[Joint], Measured]:
         if accepted:
             return likely(accepted), wide
     return [], seen
+
+
+def explained(seen: Measured, accepted: list[Joint]) -> Explained:
+    """The schemes of which a known arithmetic explains every step, with the defects of their steps."""
+    left = [x for x in accepted if not FAMILIES[x.family].held or x.substeps[0]]
+    of_each: list[list[Defect]] = [[] for _ in left]
+    for i, (j, found, what) in enumerate(zip(seen.moving, seen.maps, seen.terms, strict=True)):
+        if not left:
+            break
+        shows = partial(_stands_out, seen, accepted, found, what, damped=left[0].damped)
+        new = defects(seen.record, j, found, [x.parts[i] for x in left], shows)
+        # what explains one scheme's misses does not exclude the others, which miss the states by no more
+        good = [x for x in new if x.precision]
+        new = [
+            next((y for y in good if x.miss <= AS_NEAR * y.miss), x) if not x.precision else x for x in new
+        ]
+        kept = [k for k, x in enumerate(new) if x.precision]
+        of_each = [[*of_each[k], new[k]] for k in kept]
+        left = [left[k] for k in kept]
+    return dict(zip(left, of_each, strict=True))
+
+
+def _stands_out(seen: Measured, accepted: list[Joint], found: Map, terms: Terms, *, damped: bool) -> bool:
+    """Whether no other map fits, and the error of this one's step is visible; on springs of two stiffnesses
+    two schemes may have one map."""
+    one = accepted[0]
+    alone = all(
+        (x.scheme, x.stride) == (one.scheme, one.stride) or identical(one, x, free_scale=seen.record.momenta)
+        for x in accepted
+    )
+    return alone and visible(found, terms, damped=damped)
 
 
 def _plan(seen: Measured) -> list[list[Room]]:
@@ -176,13 +333,6 @@ def visible(found: Map, terms: Terms, *, damped: bool) -> bool:
     return bool(found.found[asked])
 
 
-def difference(found: Map, part: Match) -> tuple[float, ...]:
-    """Measured less predicted entries on (q, v T)."""
-    off = found.entries.reshape(4) - np.array(part.predicted, dtype=np.longdouble)
-    ratio = float(found.size[0] / found.size[1])
-    return tuple(float(x) * y for x, y in zip(off, (1, ratio, 1 / ratio, 1), strict=True))
-
-
 def terms_of(record: Record, j: int, stated: Floats | None) -> Terms:
     """On what terms the map of oscillator j of a record is compared."""
     log_stiffness = None
@@ -191,10 +341,3 @@ def terms_of(record: Record, j: int, stated: Floats | None) -> Terms:
     # in a coarse file a step or a mass may be in single precision as well
     jitter = math.hypot(record.jitter, 0.0 if record.deep else SINGLE)
     return Terms(mass_unknown=record.momenta, jitter=jitter, log_stiffness=log_stiffness)
-
-
-def determinants(maps: list[Map], stride: int) -> tuple[tuple[float, ...], float]:
-    """Determinants of one step of each map, and the largest |det - 1| of a map between frames."""
-    between = [float(x.entries[0, 0] * x.entries[1, 1] - x.entries[0, 1] * x.entries[1, 0]) for x in maps]
-    each = tuple(math.copysign(abs(d) ** (1 / stride), d) for d in between)
-    return each, max(abs(d - 1) for d in between)

@@ -131,7 +131,6 @@ def _said(
     schemes = [name for name in names if all(name in [y.scheme for y in one.candidates] for one in found)]
     best = schemes[0] if schemes else None
     named = best is not None and all(one.named and one.candidates[0].scheme == best for one in found)
-    verdict: Any = "named" if named else "not told apart" if best else "none"
     rows = {name: [next(y for y in one.candidates if y.scheme == name) for one in found] for name in schemes}
     kept = [name for name in schemes if all(y.nats < math.inf for y in rows[name])]
     every = {name: rows[name][0].strides[0] for name in kept}
@@ -150,7 +149,6 @@ def _said(
     if agreeing and agreeing != kept:
         kept, best = agreeing, agreeing[0]
         named = len(kept) == 1 and all(one.known and rows[best][0].strides == (1,) for one in found)
-        verdict = "named" if named else verdict
     several = len(kept) > 1
     candidates = tuple(
         Candidate(
@@ -206,7 +204,8 @@ def _said(
         statement = f"{statement}, but of {', '.join(against)}"
     only = candidates[0] if named else None
     return Identification(
-        verdict=verdict, statement=statement, scheme=best if named else None, candidates=candidates,
+        verdict="named" if named else "not told apart" if best else "none", statement=statement,
+        scheme=best if named else None, candidates=candidates,
         step=h, stride=1 if named else None, omega=only.omega if only else unknown,
         stiffness=only.stiffness if only else None, friction=only.friction if only else unknown,
         velocity_offset=math.nan if not only else 0.0 if THERMOSTATS[only.scheme].synchronised else -0.5,

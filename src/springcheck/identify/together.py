@@ -61,7 +61,7 @@ def at_rest(record: Record, found: Identification) -> Identification:
         return found
     stiffness = float(np.median(np.array(found.stiffness) / each[moving]))
     bond = f"{BOUND}, at rest as a whole: their bond has the stiffness {stiffness:.9g}"
-    return replace(found, notes=(*found.notes, bond))
+    return found.noting(bond)
 
 
 WANDERS = 1e-3
@@ -80,7 +80,7 @@ def of_a_pair(record: Record, found: Identification) -> Identification:
         moving = np.flatnonzero(np.ptp(record.q, axis=0) > 0)
         reduced = 1 / (1 / record.mass[moving[0]] + 1 / record.mass[moving[-1]])
         note += f"; their bond has the stiffness {reduced * found.omega[0] ** 2:.9g}"
-    return replace(found, notes=(*found.notes, note))
+    return found.noting(note)
 
 
 def distance(record: Record) -> Record | None:
@@ -133,12 +133,12 @@ def of_rotation(record: Record, found: Identification) -> Identification:
     i, j, factor = pair
     grows = abs(abs(factor) - 1) > LEFT_BY_ROUNDING * ROUNDING
     how = f"turns and grows by {abs(factor) - 1:+.3g} in each frame" if grows else "only turns"
-    return replace(
-        found, verdict="not told apart", scheme=None, aliases=(), fits=False, undecided=True,
-        statement=f"{ONLY_TURNS}{i} and {j} {how}: a rotation, as of a charge in a magnetic "
-        f"field{'' if grows else ' (Boris)'}, or a circular orbit on springs: {found.statement}",
-        notes=(*found.notes, "what would tell: the stiffness, or an orbit that is no circle"),
-    )  # fmt: skip
+    field = "" if grows else " (Boris)"
+    return found.doubted(
+        f"{ONLY_TURNS}{i} and {j} {how}: a rotation, as of a charge in a magnetic field{field}, or a "
+        f"circular orbit on springs: {found.statement}",
+        "what would tell: the stiffness, or an orbit that is no circle",
+    )
 
 
 def _turning(record: Record) -> tuple[int, int, complex] | None:
