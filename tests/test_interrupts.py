@@ -620,12 +620,7 @@ def test_an_interrupted_command_leaves_nothing(
             folder.mkdir()
             shutil.copy(uneven, folder)
             trial = interrupting.interrupted(
-                LIMITED[name],
-                folder,
-                moment,
-                number=signal.SIGINT,
-                again=again,
-                start=partial(at_work, start),
+                LIMITED[name], folder, moment, number=signal.SIGINT, again=again, start=begin
             )
             if not trial.too_late:
                 break
