@@ -19,6 +19,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+import browser
+import forked
 from springcheck import driver, engines
 from springcheck.figures import style
 from springcheck.store import apart, trust
@@ -124,10 +126,32 @@ def _platform_absence(label: str) -> str | None:
     return None if platform in here else f"OpenMM has no platform {platform} here"
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def whole(request: pytest.FixtureRequest) -> bool:
     """Whether a campaign within one test is to try all that it can."""
     return bool(request.config.getoption("--whole"))
+
+
+@pytest.fixture(scope="session")
+def server() -> Iterator[forked.Warm]:
+    """A process that forks one for each command, which then neither starts Python nor imports anything."""
+    begun = forked.Warm()
+    yield begun
+    begun.close()
+
+
+@pytest.fixture
+def program(server: forked.Warm, tmp_path: Path) -> Callable[..., forked.Result]:
+    """Carry a command out as a program of its own, in the folder of the test."""
+    return lambda *words: server(words, tmp_path, str(tmp_path)).results()[0]
+
+
+@pytest.fixture(scope="session")
+def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[browser.Browser]:
+    """A browser for all pages; `open` begins anew."""
+    found = browser.start(tmp_path_factory.mktemp("chromium"))
+    yield found
+    found.close()
 
 
 @pytest.fixture

@@ -301,14 +301,17 @@ def test_a_user_whose_name_is_no_text_has_stores_and_figures_without_a_window() 
     assert limited("run", "spring", "--method", "own:euler", "--quiet", "-o", "s.h5", **odd).stderr == ""
     done = limited("plot", "s.h5", "--quiet", **odd)
     assert (done.returncode, done.stderr) == (0, "")
-    assert limited("check", "s.h5").returncode == 0
+    assert main(["check", "s.h5"]) == 0
 
 
-@pytest.mark.slow
-def test_who_wants_no_colours_gets_none_whatever_else_is_said() -> None:
-    words = ("run", "spring", "--method", "own:euler", "--force", "-o", "s.h5")
-    assert "\x1b[" in limited(*words, FORCE_COLOR="1").stdout
-    assert "\x1b[" not in limited(*words, FORCE_COLOR="1", NO_COLOR="1").stdout
+def test_who_wants_no_colours_gets_none_whatever_else_is_said(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["run", "spring", "--method", "own:euler", "--force", "-o", "s.h5"]
+    for name, coloured in (("FORCE_COLOR", True), ("NO_COLOR", False)):
+        monkeypatch.setenv(name, "1")
+        assert main(words) == 0
+        assert ("\x1b[" in capsys.readouterr().out) == coloured
 
 
 @pytest.mark.parametrize("name", ["run-own%3Aeuler.h5", "table-x.h5", "lock", "command", "undo", ""])

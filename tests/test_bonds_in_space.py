@@ -59,6 +59,9 @@ def test_one_particle_that_swings_along_a_diagonal_is_no_pair(tmp_path: Path) ->
     v = np.outer(-np.sin(t), [0.3, -0.3, 0.0])
     np.savez(tmp_path / "a.npz", t=t, q=q, v=v, m=np.array([3.7]))
     found = bonds_in_space.told("identify", str(tmp_path / "a.npz"))
+    # a pair of that mass would have half of it in its bond
+    assert found["stiffness"] == pytest.approx([3.7, 3.7])
+    assert found["notes"]
     assert not any("their bond" in note for note in found["notes"])
 
 

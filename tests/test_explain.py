@@ -95,9 +95,12 @@ def test_findings_of_identify_have_their_words() -> None:
     assert "a check of the map" in said
 
 
-@pytest.mark.parametrize("name", ["rk5", "own:rk5", "nothing:euler", ""])
-def test_a_name_of_nothing_is_one_line(name: str, capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SpringcheckError):
+@pytest.mark.parametrize(
+    ("name", "unknown"),
+    [("rk5", "'rk5'"), ("own:rk5", "method 'own:rk5'"), ("nothing:euler", "engine 'nothing'"), ("", "''")],
+)
+def test_a_name_of_nothing_is_one_line(name: str, unknown: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SpringcheckError, match=unknown):
         list(explain.lines(name))
     assert main(["explain", name]) == 2
     assert capsys.readouterr().err.count("\n") == 1

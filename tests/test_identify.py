@@ -509,7 +509,7 @@ def test_the_document_is_json_with_the_fields_of_the_command() -> None:
     wanted |= {"symplectic_defect", "defect_ulp", "precision", "fits", "nearest", "notes"}
     assert wanted <= set(document)
     assert document["stiffness"] == pytest.approx(float(made.k[0]))
-    with pytest.raises(IdentificationError):
+    with pytest.raises(IdentificationError, match="mass -1: one number of a size from"):
         identify(made.t, made.q, made.p, mass=-1.0)
 
 

@@ -113,4 +113,5 @@ def test_a_pair_whose_line_turns_is_not_named_by_its_distance() -> None:
     t, q, v = swing()
     v = v + 0.05 * np.array([0, 1, 1, 0, -1, -1]) / np.array([3.7] * 3 + [1.9] * 3)
     found = named(t, q, v, step=H)
+    assert found.scheme is None
     assert not any("their distance is judged" in note for note in found.notes)

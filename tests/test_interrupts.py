@@ -13,7 +13,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
@@ -24,6 +24,7 @@ import h5py
 import numpy as np
 import pytest
 
+import forked
 import springcheck
 from springcheck import checks, cli, driver, engines, interrupts, store
 from springcheck.cli import listing
@@ -592,29 +593,38 @@ def uneven(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-class Begun(interrupting.Fresh):  # type: ignore[misc, name-defined]
+def at_work(start: Callable[..., Any], *given: Any) -> Any:
     """A command that has forked the process which does its work: from there on each signal is ours."""
-
-    def __init__(self, *given: Any) -> None:
-        super().__init__(*given)
-        while not (self.ended() or Path(f"/proc/{self.pid}/task/{self.pid}/children").read_text()):
-            time.sleep(0.001)
+    command = start(*given)
+    while not (command.ended() or Path(f"/proc/{command.pid}/task/{command.pid}/children").read_text()):
+        time.sleep(0.001)
+    return command
 
 
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="no /proc to look for processes in")
 @pytest.mark.parametrize("name", LIMITED)
-def test_an_interrupted_command_leaves_nothing(name: str, tmp_path: Path, uneven: Path, whole: bool) -> None:
+def test_an_interrupted_command_leaves_nothing(
+    name: str, tmp_path: Path, uneven: Path, server: forked.Warm, whole: bool
+) -> None:
     """Everything but the two seconds, which a loaded machine may not have."""
     rng = random.Random(f"{name} 20261121")
-    # every second command gets a second signal
-    for again in (0.0, 0.1) if whole else (0.1 * (list(LIMITED).index(name) % 2),):
-        # a signal that came too late has left a whole store, which is refused
-        folder = tmp_path / f"{again}"
-        folder.mkdir()
-        shutil.copy(uneven, folder)
-        trial = interrupting.interrupted(
-            LIMITED[name], folder, rng.uniform(0.2, 1.2), number=signal.SIGINT, again=again, start=Begun
-        )
+    # every third command imports what it needs as it goes, every second gets a second signal
+    number = list(LIMITED).index(name)
+    start, latest = (server, 0.6) if number % 3 else (interrupting.Fresh, 1.2)
+    begin = partial(at_work, start)
+    for again in (0.0, 0.1) if whole else (0.1 * (number % 2),):
+        moment = rng.uniform(latest / 6, latest)
+        # a signal that came too late has interrupted nothing
+        while True:
+            folder = tmp_path / f"{again} {moment}"
+            folder.mkdir()
+            shutil.copy(uneven, folder)
+            trial = interrupting.interrupted(
+                LIMITED[name], folder, moment, number=signal.SIGINT, again=again, start=begin
+            )
+            if not trial.too_late:
+                break
+            moment /= 2
         assert not trial.before, (trial.status, trial.err)
         assert [what for what in trial.wrong if not what.endswith(" s")] == []
 

@@ -29,54 +29,75 @@ ENGINES = {"openmm", "ase", "sksundae"}
 HEAVY = {"numba", "matplotlib", "scipy"}
 
 
-def imported(folder: Path, command: str, *more: str, also: str = "sys") -> set[str]:
-    """Modules that commands, and one module more, have imported when the last ends, in one interpreter."""
+def imported(folder: Path, *calls: str) -> list[set[str]]:
+    """Modules that are there after each of these commands and imports, carried out in one interpreter."""
     code = (
-        f"import sys, {also}; from springcheck.cli import main; "
-        "status = max(main(x.split()) for x in sys.argv[1:]); "
-        "print(*sys.modules, file=sys.stderr); sys.exit(status)"
+        "import sys; from springcheck.cli import main\n"
+        "for call in sys.argv[1:]:\n"
+        "    if call.startswith('import '): exec(call)\n"
+        "    elif status := main(call.split()): sys.exit(status)\n"
+        "    print('modules:', *sys.modules, file=sys.stderr)\n"
     )
     done = subprocess.run(
-        [sys.executable, "-c", code, command, *more], cwd=folder, capture_output=True, text=True, check=False
+        [sys.executable, "-c", code, *calls], cwd=folder, capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stderr
-    return set(done.stderr.splitlines()[-1].split())
+    # scenes have their notes beside
+    return [set(line.split()[1:]) for line in done.stderr.splitlines() if line.startswith("modules: ")]
 
 
-def test_own_methods_import_no_engine_and_nothing_heavy(tmp_path: Path, whole: bool) -> None:
+@pytest.fixture(scope="module")
+def after(tmp_path_factory: pytest.TempPathFactory, whole: bool) -> dict[str, set[str]]:
+    """What is imported after kinds of runs, one kind after another in one interpreter."""
     # in a bath thermostats move, and draw numbers
     short = [name for name in scenes.names() if name != "long-chain" and scenes.load_scene(name).bath is None]
-    found = imported(
-        tmp_path,
-        *(f"run {name} --method own:*semi* --quiet" for name in short[:: 1 if whole else 4]),
-        # what every worker imports where a call brings a function or an engine
-        also="springcheck.doors",
+    calls = {
+        "a small run in a pipe": ["run spring --method own:euler --force"],
+        "own methods": [
+            *(f"run {name} --method own:*semi* --force --quiet" for name in short[:: 1 if whole else 4]),
+            # what every worker imports where a call brings a function or an engine
+            "import springcheck.doors",
+        ],
+        "a circuit": ["run lc-circuit --force --quiet"],
+        "every engine": ["run spring --force --quiet"],
+    }
+    found = iter(
+        imported(tmp_path_factory.mktemp("runs"), *(call for some in calls.values() for call in some))
     )
-    assert not found & (ENGINES | HEAVY)
-    assert "h5py" in found
+    return {kind: [next(found) for _ in some][-1] for kind, some in calls.items()}
+
+
+def test_own_methods_import_no_engine_and_nothing_heavy(after: dict[str, set[str]]) -> None:
+    assert not after["own methods"] & (ENGINES | HEAVY)
+    assert "h5py" in after["own methods"]
 
 
 def test_enough_spring_steps_for_compiling_to_pay_import_the_compiler_and_no_engine(tmp_path: Path) -> None:
     text = scenes.text_of("spring").replace("steps = 200", f"steps = {own.WORTH}")
     (tmp_path / "long.toml").write_text(f"{text}\n[record]\nevery = {own.WORTH // 100}\n")
-    found = imported(tmp_path, "run long.toml --method own:semi-implicit-euler --quiet")
+    (found,) = imported(tmp_path, "run long.toml --method own:semi-implicit-euler --quiet")
     assert "numba" in found
     assert not found & (ENGINES | {"matplotlib"})
 
 
-def test_a_circuit_starts_no_particle_engine(tmp_path: Path, need: Need) -> None:
+def test_a_circuit_starts_no_particle_engine(after: dict[str, set[str]], need: Need) -> None:
     need("sundials:bdf")
-    found = imported(tmp_path, "run lc-circuit --quiet")
-    assert "sksundae" in found
-    assert not found & {"openmm", "ase", "numba", "matplotlib"}
+    assert "sksundae" in after["a circuit"]
+    assert not after["a circuit"] & {"openmm", "ase", "numba", "matplotlib"}
 
 
-def test_two_hundred_steps_of_a_spring_compile_and_draw_nothing(tmp_path: Path) -> None:
-    assert not imported(tmp_path, "run spring --quiet") & {"numba", "matplotlib"}
+def test_two_hundred_steps_of_a_spring_compile_and_draw_nothing(
+    after: dict[str, set[str]], need: Need
+) -> None:
+    assert not after["every engine"] & {"numba", "matplotlib"}
+    need("ase:velocity-verlet")
+    assert "ase" in after["every engine"]
 
 
-def test_a_run_in_a_pipe_draws_no_text_and_a_small_one_imports_what_it_needs(tmp_path: Path) -> None:
-    found = imported(tmp_path, "run spring --method own:euler --force")
+def test_a_run_in_a_pipe_draws_no_text_and_a_small_one_imports_what_it_needs(
+    after: dict[str, set[str]],
+) -> None:
+    found = after["a small run in a pipe"]
     # numpy.unique imports masked arrays, 8 ms
     assert not found & {"rich", "numpy.ma"}
     ours = {name.removeprefix("springcheck.") for name in found}

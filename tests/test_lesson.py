@@ -148,7 +148,12 @@ def test_a_hint_names_the_slip_and_only_where_it_is_asked_for(
     status, out = graded(tmp_path, VERLET % returned, capsys, "--hint")
     assert said in out
     assert "answer" not in out
-    status, out = graded(tmp_path, VERLET % returned, capsys, "--answer")
+
+
+def test_the_answer_is_given_to_who_asks_for_it_and_what_is_right_passes(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    _, out = graded(tmp_path, VERLET % "q, p + h / 3 * force(q)", capsys, "--answer")
     assert "answer: The second half kick took the force of the first" in out
     assert graded(tmp_path, VERLET % "q, p + h / 2 * force(q)", capsys)[0] == 0
 
@@ -156,7 +161,7 @@ def test_a_hint_names_the_slip_and_only_where_it_is_asked_for(
 def test_an_implicit_step_is_told_to_iterate_further(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    text = (LESSON / "exercises.py").read_text()
+    text = re.sub(r'    "(one|two|four|five|six)": .*\n', "", (LESSON / "exercises.py").read_text())
     out = graded(tmp_path, text, capsys, "--hint")[1].splitlines()
     third = next(i for i, line in enumerate(out) if line.startswith("three"))
     assert "iterate further" in out[third + 1]

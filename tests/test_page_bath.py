@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-import browser
+from browser import Browser
 from springcheck.cli import page
 from springcheck.cli.page.given import bath
 from springcheck.physics import scenefile as scenes
@@ -67,13 +67,11 @@ def test_a_scene_without_a_bath_or_of_several_particles_has_no_ellipse() -> None
 
 
 @pytest.fixture(scope="module")
-def opened(tmp_path_factory: pytest.TempPathFactory, content: page.Content) -> Any:
-    home = tmp_path_factory.mktemp("chromium")
-    found = browser.start(home / "profile")
-    (home / "page.html").write_text(page.html(content))
-    found.open(home / "page.html")
-    yield found
-    found.close()
+def opened(tmp_path_factory: pytest.TempPathFactory, content: page.Content, chromium: Browser) -> Browser:
+    file = tmp_path_factory.mktemp("page") / "page.html"
+    file.write_text(page.html(content))
+    chromium.open(file)
+    return chromium
 
 
 def test_the_browser_has_the_covariances_of_python_and_moves_their_ellipse(opened: Any) -> None:

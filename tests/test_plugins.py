@@ -8,12 +8,13 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import forked
 from springcheck import engines
 from springcheck.cli import main
 from springcheck.errors import MethodError
@@ -30,7 +31,7 @@ def _nothing_left_over() -> Iterator[None]:
     engines.registry._loaded.cache_clear()
 
 
-def springcheck(folder: Path, *arguments: str, path: str = "") -> subprocess.CompletedProcess[str]:
+def springcheck(folder: Path, *arguments: str, path: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [sys.executable, "-m", "springcheck", *arguments],
         cwd=folder,
@@ -65,7 +66,7 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_an_installed_package_is_found_run_stored_and_still_readable_when_it_is_gone(
-    installed: Path, tmp_path: Path
+    installed: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     site = str(shutil.copytree(installed, tmp_path / "site"))
     listed = springcheck(tmp_path, "list", path=site).stdout
@@ -82,13 +83,14 @@ def test_an_installed_package_is_found_run_stored_and_still_readable_when_it_is_
         for name in ("step-defect", "closed-form", "shadow-energy", "frequency", "order", "mirror")
     )
     shutil.rmtree(site)
-    assert "PEFRL" not in springcheck(tmp_path, "list").stdout
+    # in this process, which knows nothing of the package
     for command in ("inspect", "check", "plot", "identify"):
-        # in this process, which knows nothing of the package either
         assert main([command, "spring-uneven.h5"]) in (0, 1), command
-    again = springcheck(tmp_path, "run", "spring-uneven", "--method", "pefrl:pefrl")
-    assert again.returncode == 2
-    assert again.stderr.startswith("springcheck: unknown engine 'pefrl'")
+    capsys.readouterr()
+    assert main(["list"]) == 0
+    assert "PEFRL" not in capsys.readouterr().out
+    assert main(["run", "spring-uneven", "--method", "pefrl:pefrl"]) == 2
+    assert capsys.readouterr().err.startswith("springcheck: unknown engine 'pefrl'")
 
 
 def test_a_scheme_of_its_own_is_carried_out_wrongly_and_the_verdicts_say_so(tmp_path: Path) -> None:
@@ -235,14 +237,14 @@ def harmful(path: Path, where: str, act: str) -> Path:
 
 @pytest.mark.parametrize("act", ENDS)
 def test_an_engine_that_ends_the_program_is_named_and_what_others_finished_is_kept(
-    act: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    act: str, tmp_path: Path, program: Callable[..., forked.Result], capsys: pytest.CaptureFixture[str]
 ) -> None:
     where, said = ENDS[act]
     harmful(tmp_path / "bad.py", where, act)
     command = ["run", "spring", "--engine", "bad.py", "--method", "own:euler", "-o", "s.h5"]
     if act.startswith("os."):
-        done = springcheck(tmp_path, *command)
-        status, out, err = done.returncode, done.stdout, done.stderr
+        done = program(*command)
+        status, out, err = done.status, done.out, done.err
     else:
         # an exception leaves this process as it is
         status, (out, err) = main(command), capsys.readouterr()
@@ -269,16 +271,15 @@ def test_an_engine_that_ends_the_program_is_named_and_what_others_finished_is_ke
     ],
 )
 def test_nothing_that_an_engine_does_to_the_program_stands_in_its_document(
-    where: str, act: str, tmp_path: Path
+    where: str, act: str, tmp_path: Path, program: Callable[..., forked.Result]
 ) -> None:
     harmful(tmp_path / "bad.py", where, act)
-    command = ["run", "spring", "--engine", "bad.py", "--method", "own:euler", "--json", "-o", "s.h5"]
-    done = springcheck(tmp_path, *command)
+    done = program("run", "spring", "--engine", "bad.py", "--method", "own:euler", "--json", "-o", "s.h5")
     # it stands still, and fails for it
-    assert done.returncode == 1, done.stderr
-    assert [run["method"] for run in json.loads(done.stdout)["runs"]] == ["own:euler", "bad:m"]
-    assert "noise" in done.stderr or "noise" not in act
-    assert "springcheck:" not in done.stderr
+    assert done.status == 1, done.err
+    assert [run["method"] for run in json.loads(done.out)["runs"]] == ["own:euler", "bad:m"]
+    assert "noise" in done.err or "noise" not in act
+    assert "springcheck:" not in done.err
 
 
 def test_a_missing_file_is_answered_in_one_line(capsys: pytest.CaptureFixture[str]) -> None:

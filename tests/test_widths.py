@@ -204,7 +204,9 @@ def test_any_table_fits_any_terminal_with_all_its_cells(seed: int) -> None:
 def test_a_column_without_a_title_is_broken_nowhere() -> None:
     rows = [("8 openmm:semi-implicit-euler", *("6e-15" for _ in range(12)))]
     made = table(["", *map(str, range(12))], rows, left=("",))
-    assert all(line.startswith("8 openmm:semi-implicit-euler  6e-15") for line in rendered(made, 80)[1::3])
+    named = rendered(made, 80)[1::3]
+    assert named
+    assert all(line.startswith("8 openmm:semi-implicit-euler  6e-15") for line in named)
 
 
 def test_a_store_is_named_as_it_is(folder: Path) -> None:

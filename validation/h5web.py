@@ -24,6 +24,7 @@ import sys
 import tempfile
 import time
 import urllib.request
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -161,16 +162,18 @@ def _asked(where: str, node: Any) -> list[tuple[str, Any]]:
 def main() -> int:
     """Make the stores, serve them, look at them."""
     pictures = arguments(__doc__, folder=Path).folder
+    programs = {name: shutil.which(name) or "" for name in ("chromium", "chromedriver")}
+    absent = [name for name in ("jupyterlab_h5web", "selenium") if not find_spec(name)]
+    absent += [name for name, path in programs.items() if not path]
+    if absent:
+        raise SpringcheckError(f"this needs {', '.join(absent)}: see --help")
     from selenium import webdriver
 
     with socket.create_server(("127.0.0.1", 0)) as free:
         port = free.getsockname()[1]
     address = f"http://127.0.0.1:{port}"
-    programs = [shutil.which(name) or "" for name in ("chromium", "chromedriver")]
-    if not all(programs):
-        raise SpringcheckError("this needs chromium and chromedriver")
     options = webdriver.ChromeOptions()
-    options.binary_location = programs[0]
+    options.binary_location = programs["chromium"]
     with tempfile.TemporaryDirectory() as kept, tempfile.TemporaryDirectory() as home:
         for argument in (*BROWSER, f"--user-data-dir={home}/chromium"):
             options.add_argument(argument)
@@ -184,7 +187,9 @@ def main() -> int:
         )  # fmt: skip
         try:
             _await(f"{address}/api")
-            driver = webdriver.Chrome(options=options, service=webdriver.ChromeService(programs[1]))
+            driver = webdriver.Chrome(
+                options=options, service=webdriver.ChromeService(programs["chromedriver"])
+            )
             try:
                 looked, missing = 0, list[str]()
                 for name in STORES:
