@@ -13,10 +13,12 @@ from springcheck.errors import IdentificationError, MethodError, told
 from springcheck.identify.families import title
 from springcheck.identify.report import identify_arrays
 from springcheck.identify.result import Explanation, Identification
-from springcheck.identify.unknown import ONE_MAP
+from springcheck.identify.unknown import MAP_OF, ONE_MAP
 from springcheck.identify.wrong import faults_like
 from springcheck.physics.arrays import Floats
-from springcheck.schemes import SCHEMES
+from springcheck.physics.scene import Scene
+from springcheck.physics.terms import Quartic
+from springcheck.schemes import SCHEMES, Law
 from springcheck.schemes.elsewhere import ELSEWHERE
 
 Stepper: TypeAlias = Callable[..., Any]
@@ -34,6 +36,13 @@ TINY_STEP = 1e-6, 1e-3
 
 RUNAWAY = 1e5
 """Growth of a state at which a run ends."""
+
+LONG = 16
+"""Part of the time on the well that one step takes by which schemes of one map on a spring are told apart."""
+
+OF_ERROR = 1e-3
+"""Distance from a scheme's step, over the error of that step, up to which a stepper takes the same one: what
+its own solver of implicit steps leaves.  Other schemes are off by about as much as the error."""
 
 WELL = (1.3, 2.1, 1.1, 0.4, 2.0)
 """m, b, q0, p0 and duration on V = b/4 q**4, a quarter of whose time scale passes in a unit of time."""
@@ -140,7 +149,7 @@ def identify_stepper(step: Stepper) -> Identification:
     found = results[0]
     if not found.fits and _draws(step):
         return _identified(step, frames=BATH_FRAMES)
-    wrong = [*_on_springs(results), *_unasked_friction(found)]
+    wrong = [*_on_springs(step, results), *_unasked_friction(found)]
     if any(x.cause.startswith(ONE_MAP) for x in found.explanations[:1]):
         wrong += _short(step)
     if found.scheme and not wrong:
@@ -148,12 +157,14 @@ def identify_stepper(step: Stepper) -> Identification:
     if found.scheme in ELSEWHERE and _calls(step) > len(ELSEWHERE[found.scheme].over) - 1 > 0:
         # more stages than the scheme needs: a fault of the same map has them
         wrong += [Explanation(cause=one.cause, remedy=one.remedy) for one in faults_like(found.scheme)]
+    if found.scheme and found.fits and not wrong:
+        found = _on_a_well(step, found)
     slope, deviation = _order(step)
     order = f"order {slope:.2f} +- {deviation:.2f} on a quartic well"
     if math.isnan(slope):
         order = "its error on a quartic well does not fall as a power of the step: no order is seen"
     known = SCHEMES.get(str(found.scheme)) or ELSEWHERE.get(str(found.scheme))
-    if known and known.order and slope < known.order - max(5 * deviation, 0.25):
+    if not wrong and known and known.order and slope < known.order - max(5 * deviation, 0.25):
         cause = (
             f"On a spring it is {found.scheme}, of order {known.order}, but not on forces that are not linear"
         )
@@ -162,24 +173,86 @@ def identify_stepper(step: Stepper) -> Identification:
         found,
         fits=found.fits and not wrong,
         statement=wrong[0].cause if wrong else found.statement,
-        explanations=(*wrong, *found.explanations),
+        # what the other springs refute is no explanation any more
+        explanations=(*wrong, *found.explanations[1 if wrong and _parametric(found) else 0 :]),
         notes=tuple(dict.fromkeys([*(note for x in results for note in x.notes), order])),
         defect_ulp=max(x.defect_ulp for x in results),
     )
 
 
-def _on_springs(results: list[Identification]) -> list[Explanation]:
-    """What the springs after the first show of a scheme that fits on it."""
+def _on_a_well(step: Stepper, found: Identification) -> Identification:
+    """Which of the schemes that have one map on a spring takes the stepper's step in a quartic well: the name
+    is that one's, or nobody's where it is none that is known here."""
+    m, b, q, p, duration = WELL
+    scene = Scene(
+        m=np.array([m]), q=np.array([q]), p=np.array([p]),
+        terms=(Quartic(i=np.array([0]), b=np.array([b]), at=np.zeros(1)),), step=duration / LONG, steps=1,
+    )  # fmt: skip
+    made = np.array(_one(step, q, p, scene.step, lambda x, y=0.0: -b * x**3, m)) / [1, m]
+    names = [str(found.scheme), *found.aliases]
+    known = {name: SCHEMES[name] for name in names if name in SCHEMES and SCHEMES[name].has("one-step")}
+    least = 16 * (2.0**-53 if found.precision == "double" else 2.0**-24)
+    for name, scheme in known.items():
+        whole, half = (Law(scheme=scheme, scene=scene, h=scene.step / n) for n in (1, 2))
+        once, twice = whole.step(scene.q, scene.p), half.step(*half.step(scene.q, scene.p))
+        error = np.abs(np.subtract(once, twice).ravel() / [1, m])
+        if np.all(np.abs(np.ravel(once) / [1, m] - made) <= np.maximum(OF_ERROR * np.max(error), least)):
+            others = tuple(x for x in names if x != name)
+            whose = [title(x) for x in (str(found.scheme), name)]
+            candidates = tuple(replace(x, scheme=name, aliases=others) for x in found.candidates)
+            return replace(
+                found, scheme=name, aliases=others, candidates=candidates, nearest=name,
+                statement=found.statement.replace(*whose, 1),
+            )  # fmt: skip
+    if not known:
+        return found
+    return replace(
+        found, scheme=None, aliases=(), candidates=(), verdict="not told apart",
+        statement=f"{title(names[0])} on a spring, and another scheme on forces that are not linear: another "
+        "member of its class, which is not known here, or a force that is evaluated elsewhere",
+    )  # fmt: skip
+
+
+def _on_springs(step: Stepper, results: list[Identification]) -> list[Explanation]:
+    """What the springs after the first show of a scheme that fits on it, or of a method with parameters."""
     if not results[0].fits:
-        return []
+        return _parameters(step, results[0])
     if len({x.scheme for x in results}) == 1:
         return list(next((x.explanations for x in results if not x.fits), ()))
+    try:
+        same = _identified(step).scheme == results[0].scheme
+    except IdentificationError:
+        same = False
+    if not same:
+        cause = (
+            f"{title(str(results[0].scheme))} in a first run, and not in a later one from the same start: "
+            "the stepper keeps a force or a state of the run before"
+        )
+        remedy = "make each step follow from its arguments, or begin each run with a stepper of its own"
+        return [Explanation(cause=cause, remedy=remedy)]
     named = "; ".join(
         f"{x.scheme or 'none that is known'} at m={m}, k={k}, h={h}"
         for x, (m, k, h) in zip(results, SPRINGS, strict=False)
     )
     cause = f"The stepper looks like different schemes on different springs: {named}"
     return [Explanation(cause=cause, remedy="look for numbers that are written into it")]
+
+
+def _parameters(step: Stepper, found: Identification) -> list[Explanation]:
+    """Refute a method whose parameters, read from the first spring, are others on the next ones."""
+    others = SPRINGS[1:] if _parametric(found) else ()
+    read = [_parametric(found), *(_parametric(_identified(step, spring)) for spring in others)]
+    if len(set(read)) == 1:
+        return []
+    each = "; ".join(x or "another" for x in read)
+    cause = f"A one-step method that is not known here: on three springs it would be {each}"
+    return [Explanation(cause=cause, remedy=found.explanations[0].remedy)]
+
+
+def _parametric(found: Identification) -> str:
+    """The method with parameters of which a map would be; "" where it is of none."""
+    cause = found.explanations[0].cause if found.explanations else ""
+    return cause.partition(MAP_OF)[2].partition(";")[0]
 
 
 def _unasked_friction(found: Identification) -> list[Explanation]:

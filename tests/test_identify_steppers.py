@@ -1,0 +1,128 @@
+"""Steppers that a spring does not tell apart: schemes of one map there, parameters that are none, memory.
+
+On a linear force every explicit two-stage method of second order is one map, as is every four-stage one of
+fourth; a step on another force tells them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+import springcheck
+from springcheck import doors
+from springcheck.doors.function import UNKNOWN
+from springcheck.identify import identify_stepper
+
+Force = Callable[..., Any]
+
+
+def heun(q: Any, p: Any, h: float, force: Force, m: Any) -> tuple[Any, Any]:
+    q1, p1 = q + h * p / m, p + h * force(q)
+    return q + h / 2 * (p + p1) / m, p + h / 2 * (force(q) + force(q1))
+
+
+def midpoint(q: Any, p: Any, h: float, force: Force, m: Any) -> tuple[Any, Any]:
+    q1, p1 = q + h / 2 * p / m, p + h / 2 * force(q)
+    return q + h * p1 / m, p + h * force(q1)
+
+
+def ralston(q: Any, p: Any, h: float, force: Force, m: Any) -> tuple[Any, Any]:
+    q1, p1 = q + 2 * h / 3 * p / m, p + 2 * h / 3 * force(q)
+    return q + h * (p + 3 * p1) / 4 / m, p + h * (force(q) + 3 * force(q1)) / 4
+
+
+def trapezoidal(q: Any, p: Any, h: float, force: Force, m: Any) -> tuple[Any, Any]:
+    q1, begun = q, q + h * p / m + h * h / 4 * force(q) / m
+    for _ in range(200):
+        q1 = begun + h * h / 4 * force(q1) / m
+    return q1, p + h / 2 * (force(q) + force(q1))
+
+
+def rule_of_three_eighths(q: Any, p: Any, h: float, force: Force, m: Any) -> tuple[Any, Any]:
+    a, b = p / m, force(q)
+    c, d = (p + h * b / 3) / m, force(q + h * a / 3)
+    e, f = (p + h * (d - b / 3)) / m, force(q + h * (c - a / 3))
+    g, i = (p + h * (b - d + f)) / m, force(q + h * (a - c + e))
+    return q + h / 8 * (a + 3 * c + 3 * e + g), p + h / 8 * (b + 3 * d + 3 * f + i)
+
+
+def wrong_nystroem(q: Any, p: Any, h: float, force: Force, m: Any) -> tuple[Any, Any]:
+    """Nystroem's method of fourth order with h**2/4 for h**2/8."""
+    v, a = p / m, force(q) / m
+    b = force(q + h / 2 * v + h * h / 4 * a) / m
+    c = force(q + h * v + h * h / 2 * b) / m
+    return q + h * v + h * h / 6 * (a + 2 * b), m * (v + h / 6 * (a + 4 * b + c))
+
+
+def newmark(q: Any, p: Any, h: float, force: Force, m: Any) -> tuple[Any, Any]:
+    """beta = 1/6, gamma = 1/2: linear acceleration."""
+    a = b = force(q) / m
+    q1 = q
+    for _ in range(200):
+        q1 = q + h * p / m + h * h * (a / 3 + b / 6)
+        b = force(q1) / m
+    return q1, p + h / 2 * m * (a + b)
+
+
+class Cached:
+    """Velocity Verlet that keeps the last force, of whichever run."""
+
+    last: Any = None
+
+    def __call__(self, q: Any, p: Any, h: float, force: Force, m: Any) -> tuple[Any, Any]:
+        p = p + h / 2 * (force(q) if self.last is None else self.last)
+        q = q + h * p / m
+        self.last = force(q)
+        return q, p + h / 2 * self.last
+
+
+@pytest.mark.parametrize(
+    ("stepper", "scheme", "same"),
+    [(heun, "rk2-heun", "rk2-midpoint"), (midpoint, "rk2-midpoint", "rk2-heun"),
+     (trapezoidal, "trapezoidal", "implicit-midpoint")],
+)  # fmt: skip
+def test_a_step_on_a_quartic_well_tells_schemes_of_one_map(stepper: Force, scheme: str, same: str) -> None:
+    found = identify_stepper(stepper)
+    assert (found.scheme, found.fits, found.explanations) == (scheme, True, ())
+    assert same in found.aliases
+    assert [x.scheme for x in found.candidates] == [scheme]
+    assert springcheck.schemes.title(scheme).casefold() in found.statement.casefold()
+
+
+@pytest.mark.parametrize("stepper", [ralston, rule_of_three_eighths])
+def test_another_member_of_a_class_gets_no_name_of_ours(stepper: Force) -> None:
+    found = identify_stepper(stepper)
+    assert (found.verdict, found.scheme, found.fits) == ("not told apart", None, True)
+    assert "another scheme on forces that are not linear" in found.statement
+    assert doors.function.engine([stepper]).methods[stepper.__name__].scheme == UNKNOWN.name
+
+
+@pytest.mark.parametrize("stepper", [heun, trapezoidal, ralston, rule_of_three_eighths])
+def test_none_of_them_fails_on_an_anharmonic_scene(stepper: Force) -> None:
+    scene = springcheck.load_scene("anharmonic")
+    verdicts = springcheck.judge(scene, springcheck.simulate(scene, stepper))
+    assert [f"{v.check}: {v.why}" for v in verdicts if v.passed is False] == []
+    step = {v.check: v.passed for v in verdicts}["step-defect"]
+    assert step is (True if stepper in (heun, trapezoidal) else None)
+
+
+def test_parameters_that_change_from_spring_to_spring_are_none() -> None:
+    found = identify_stepper(wrong_nystroem)
+    assert not found.fits
+    assert found.statement.startswith("A one-step method that is not known here: on three springs it would")
+    assert not any("Newmark's method with" in x.cause for x in found.explanations[1:])
+    known = identify_stepper(newmark).statement
+    assert "Newmark's method with beta = 0.166667, gamma = 0.5" in known
+    assert "three springs" not in known
+
+
+def test_a_force_kept_from_the_run_before_is_no_number_written_into_the_stepper() -> None:
+    found = identify_stepper(Cached())
+    assert found.statement == (
+        "Velocity Verlet in a first run, and not in a later one from the same start: the stepper keeps a "
+        "force or a state of the run before"
+    )
+    assert len(found.explanations) == 1
