@@ -236,7 +236,7 @@ def explained(seen: Measured, accepted: list[Joint]) -> Explained:
     for i, (j, found, what) in enumerate(zip(seen.moving, seen.maps, seen.terms, strict=True)):
         if not left:
             break
-        shows = partial(_stands_out, seen, accepted, found, what, damped=left[0].damped)
+        shows = cache(partial(_stands_out, seen, accepted, found, what, damped=left[0].damped))
         new = defects(seen.record, j, found, [x.parts[i] for x in left], shows)
         # what explains one scheme's misses does not exclude the others, which miss the states by no more
         good = [x for x in new if x.precision]
