@@ -54,3 +54,12 @@ def test_what_nothing_holds_is_not_counted(name: str, bound: int) -> None:
     # places as a bath makes them: no symmetry, and each distance another one
     q = scene.q * (1 + 0.1 * np.random.default_rng(3).standard_normal((9, scene.n))) + 1e-3
     assert bound_freedoms(scene, q) == bound
+
+
+def test_a_start_far_hotter_than_the_bath_is_left_out_until_it_has_decayed() -> None:
+    scene = springcheck.load_scene("bath-spring").derived(steps=4000)
+    hot = scene.derived(q=scene.q * 1e4, p=scene.p * 1e4)
+    for each in (scene, hot):
+        found = heated_of(each, [driver.run(each, "own:obabo", seed=3)])
+        assert abs(found.configurational - found.configurational_law) < 5 * found.configurational_error
+        assert abs(found.kinetic - found.kinetic_law) < 5 * found.kinetic_error < 1

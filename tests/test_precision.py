@@ -374,6 +374,15 @@ def test_a_fit_finds_the_order_of_a_power_law(order: float) -> None:
     assert fit.constant == pytest.approx(0.01, rel=1e-12)
 
 
+@pytest.mark.parametrize(("order", "bend"), [(4, 3.0), (4, -0.6), (2, 0.5), (1, 1.0)])
+def test_a_bend_that_is_left_stands_in_the_standard_error(order: int, bend: float) -> None:
+    # the next term of an error: the slope falls from point to point, all on one side of the order
+    steps = 0.5 ** np.arange(8 if order > 1 else 7)
+    fit = fits.order(made_up([float(0.02 / (1 + bend) * h**order * (1 + bend * h)) for h in steps]))
+    assert fit is not None
+    assert abs(fit.order - order) < 2 * fit.standard_error < 0.3
+
+
 def test_a_fit_leaves_out_what_is_coarse_and_what_is_rounding() -> None:
     errors = [3.0, 0.5, *(0.01 * 0.25**i for i in range(6))]
     plain = fits.order(made_up(errors))

@@ -26,7 +26,7 @@ from springcheck.studies.run import measure as session
 from springcheck.studies.run import text as run_text
 from springcheck.studies.stability import STUDY, limits, propagators, regions, resonance
 from springcheck.studies.stability import measure as stability
-from springcheck.studies.stability.longest import longest
+from springcheck.studies.stability.longest import fastest, longest
 from springcheck.studies.stability.propagators import Springs
 from springcheck.studies.text import left_out
 from springcheck.text.lines import Text, as_text
@@ -264,3 +264,12 @@ def test_what_is_left_out_is_named_once() -> None:
         "Left out own:c, own:d: each is for scenes with rods",
         "Left out own:e: it has no rod term",
     ]
+
+
+def test_the_stiffest_state_of_an_anharmonic_motion_is_that_of_its_amplitude() -> None:
+    scene = scenes.load_scene("anharmonic")
+    spring, quartic = scene.terms
+    k, b, energy = spring.k[0], quartic.b[0], scene.system.energy(scene.q, scene.p)
+    # k/2 A**2 + b/4 A**4 is the energy, and k + 3 b A**2 the curvature there
+    square = (np.sqrt(k * k + 4 * b * energy) - k) / b
+    assert fastest(scene) == pytest.approx(np.sqrt((k + 3 * b * square) / scene.m[0]), rel=1e-8)

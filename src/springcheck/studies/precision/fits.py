@@ -13,7 +13,7 @@ import numpy as np
 from springcheck import schemes
 from springcheck.checks.stats import line
 from springcheck.engines.contract import Method
-from springcheck.physics.arrays import Arithmetic
+from springcheck.physics.arrays import Arithmetic, Floats
 from springcheck.physics.scene import Scene
 from springcheck.studies.precision.accuracy import Accuracy
 from springcheck.studies.tables import Rows
@@ -137,6 +137,10 @@ FEWEST_FITTED = 4
 """Points below which no order is claimed."""
 
 
+BENT = 3.0
+"""Standard errors of a curvature from which the coarsest points are led by more than the first term."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fit:
     """Error = constant * step**order; `order` is a signed slope, with its standard error."""
@@ -167,13 +171,24 @@ def order(points: Sequence[Point]) -> Fit | None:
     ][-FITTED:]
     if len(chosen) < FEWEST_FITTED:
         return None
-    found = line(np.log([abs(x.step or 0.0) for x in chosen]), np.log([x.error for x in chosen]))
+    x, y = np.log([abs(x.step or 0.0) for x in chosen]), np.log([x.error for x in chosen])
+    while len(x) > FEWEST_FITTED and _bent(x, y) > BENT:
+        x, y = x[1:], y[1:]
+    found = line(x, y)
     return Fit(
         order=found.slope,
-        standard_error=found.standard_error,
+        # what is left of the bend is an error that repeats, and no scatter
+        standard_error=max(found.standard_error, abs(found.slope - (y[-1] - y[-2]) / (x[-1] - x[-2]))),
         constant=float(np.exp(found.intercept)),
-        points=len(chosen),
+        points=len(x),
     )
+
+
+def _bent(x: Floats, y: Floats) -> float:
+    """Curvature of y(x) in standard errors of a parabola's; of a few points without scatter it is large."""
+    away = x - np.mean(x)
+    found = line(away**2, y, away)
+    return abs(found.slope) / found.standard_error if found.standard_error else np.inf
 
 
 Growth: TypeAlias = Literal["sqrt(N)", "N", "N**1.5/(w T)", "w T"]

@@ -93,7 +93,7 @@ class Heat:
         assert scene.bath is not None
         self._bound = bound_freedoms(scene, piece.q)
         if scene.system.rods:
-            self._from = round(SETTLED / (scene.bath.friction * piece.step))
+            self._from = round(self._settling(scene.p**2 / scene.m) / (scene.bath.friction * piece.step))
             return
         linear = scene.system.has_modes and bool(np.all(scene.system.modes.w2 >= 0))
         if piece.scheme in THERMOSTATS and linear and not THERMOSTATS[piece.scheme].rescales:
@@ -110,8 +110,16 @@ class Heat:
                 self._law = thermal.draws.law_of(THERMOSTATS[piece.scheme], scene.derived(step=piece.step))
             else:
                 return
-            left = self._law.slowest
-            self._from = round(SETTLED / -np.log(left)) if 0 < left < 1 else 0
+            left, modes = self._law.slowest, scene.system.modes
+            y, v = modes.about_centres(scene.q.astype(np.longdouble), scene.p.astype(np.longdouble))
+            lasts = self._settling(modes.w2 * y * y + v * v)
+            self._from = round(lasts / -np.log(left)) if 0 < left < 1 else 0
+
+    def _settling(self, squares: Reals) -> float:
+        """Times of decay before frames count: more where the squares of the start (n,) are larger than kT,
+        their mean in the bath."""
+        mean, thermal = float(np.mean(squares)), self._scene.thermal
+        return SETTLED + (0.5 * np.log(mean / thermal) if 0 < thermal < mean < np.inf else 0.0)
 
     def line(self, method: str) -> Heated:
         """What was found."""
