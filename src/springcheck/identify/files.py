@@ -16,6 +16,7 @@ from springcheck.formats import columns as columns_of
 from springcheck.identify.record import ROUNDING, of_size
 from springcheck.identify.report import identify_arrays
 from springcheck.identify.result import Identification
+from springcheck.identify.taken import seen_to_take
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.arrays import Floats, Integers
 from springcheck.physics.scene import Scene
@@ -248,9 +249,9 @@ def sentence(run: Trajectory, mass: Floats, stiffness: Floats | None = None, *, 
 
 
 def shown(scene: Scene, run: Trajectory, about: int) -> str:
-    """Identification of a run around a frame, in one sentence; "" where the scene is not of springs."""
+    """Identification of a run around a frame, in one sentence; "" where nothing is known of it."""
     if not scene.system.is_linear:
-        return ""
+        return seen_to_take(scene, run, about)
     springs = scene.system.hessian(scene.q).astype(np.float64) if scene.n <= MOST_OSCILLATORS else None
     alone = springs is not None and not np.any(springs - np.diag(np.diag(springs)))
     return sentence(run, scene.m, np.diag(springs) if springs is not None and alone else None, about=about)

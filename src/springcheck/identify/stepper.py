@@ -13,12 +13,13 @@ from springcheck.errors import IdentificationError, MethodError, told
 from springcheck.identify.families import title
 from springcheck.identify.report import identify_arrays
 from springcheck.identify.result import Explanation, Identification
+from springcheck.identify.taken import takers
 from springcheck.identify.unknown import MAP_OF, ONE_MAP
 from springcheck.identify.wrong import faults_like
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Quartic
-from springcheck.schemes import SCHEMES, Law
+from springcheck.schemes import SCHEMES
 from springcheck.schemes.elsewhere import ELSEWHERE
 
 Stepper: TypeAlias = Callable[..., Any]
@@ -39,10 +40,6 @@ RUNAWAY = 1e5
 
 LONG = 16
 """Part of the time on the well that one step takes by which schemes of one map on a spring are told apart."""
-
-OF_ERROR = 1e-3
-"""Distance from a scheme's step, over the error of that step, up to which a stepper takes the same one: what
-its own solver of implicit steps leaves.  Other schemes are off by about as much as the error."""
 
 WELL = (1.3, 2.1, 1.1, 0.4, 2.0)
 """m, b, q0, p0 and duration on V = b/4 q**4, a quarter of whose time scale passes in a unit of time."""
@@ -188,24 +185,20 @@ def _on_a_well(step: Stepper, found: Identification) -> Identification:
         m=np.array([m]), q=np.array([q]), p=np.array([p]),
         terms=(Quartic(i=np.array([0]), b=np.array([b]), at=np.zeros(1)),), step=duration / LONG, steps=1,
     )  # fmt: skip
-    made = np.array(_one(step, q, p, scene.step, lambda x, y=0.0: -b * x**3, m)) / [1, m]
+    made = _one(step, q, p, scene.step, lambda x, y=0.0: -b * x**3, m)
     names = [str(found.scheme), *found.aliases]
-    known = {name: SCHEMES[name] for name in names if name in SCHEMES and SCHEMES[name].has("one-step")}
-    least = 16 * (2.0**-53 if found.precision == "double" else 2.0**-24)
-    for name, scheme in known.items():
-        whole, half = (Law(scheme=scheme, scene=scene, h=scene.step / n) for n in (1, 2))
-        once, twice = whole.step(scene.q, scene.p), half.step(*half.step(scene.q, scene.p))
-        error = np.abs(np.subtract(once, twice).ravel() / [1, m])
-        if np.all(np.abs(np.ravel(once) / [1, m] - made) <= np.maximum(OF_ERROR * np.max(error), least)):
-            others = tuple(x for x in names if x != name)
-            whose = [title(x) for x in (str(found.scheme), name)]
-            candidates = tuple(replace(x, scheme=name, aliases=others) for x in found.candidates)
-            return replace(
-                found, scheme=name, aliases=others, candidates=candidates, nearest=name,
-                statement=found.statement.replace(*whose, 1),
-            )  # fmt: skip
-    if not known:
+    known = [name for name in names if name in SCHEMES and SCHEMES[name].has("one-step")]
+    least = 2.0 ** (-49 if found.precision == "double" else -20)
+    taking = takers(known, scene, scene.step, *np.array([[q, p], made]).T[..., None], least)
+    if not known or str(found.scheme) in taking:
         return found
+    for name in taking:
+        others = tuple(x for x in names if x != name)
+        candidates = tuple(replace(x, scheme=name, aliases=others) for x in found.candidates)
+        return replace(
+            found, scheme=name, aliases=others, candidates=candidates, nearest=name,
+            statement=found.statement.replace(title(str(found.scheme)), title(name), 1),
+        )  # fmt: skip
     return replace(
         found, scheme=None, aliases=(), candidates=(), verdict="not told apart",
         statement=f"{title(names[0])} on a spring, and another scheme on forces that are not linear: another "
@@ -240,8 +233,12 @@ def _on_springs(step: Stepper, results: list[Identification]) -> list[Explanatio
 
 def _parameters(step: Stepper, found: Identification) -> list[Explanation]:
     """Refute a method whose parameters, read from the first spring, are others on the next ones."""
-    others = SPRINGS[1:] if _parametric(found) else ()
-    read = [_parametric(found), *(_parametric(_identified(step, spring)) for spring in others)]
+    read = [_parametric(found)]
+    for spring in SPRINGS[1:] if read[0] else ():
+        try:
+            read.append(_parametric(_identified(step, spring)))
+        except IdentificationError:
+            read.append("")
     if len(set(read)) == 1:
         return []
     each = "; ".join(x or "another" for x in read)
