@@ -189,7 +189,8 @@ def _on_a_well(step: Stepper, found: Identification) -> Identification:
     names = [str(found.scheme), *found.aliases]
     known = [name for name in names if name in SCHEMES and SCHEMES[name].has("one-step")]
     least = 2.0 ** (-49 if found.precision == "double" else -20)
-    taking = takers(known, scene, scene.step, *np.array([[q, p], made]).T[..., None], least)
+    positions, momenta = np.array([[q, p], made]).T[..., None]
+    taking = takers(known, scene, scene.step, positions, momenta, least)
     if not known or str(found.scheme) in taking:
         return found
     for name in taking:
