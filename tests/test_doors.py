@@ -95,7 +95,7 @@ def test_a_wrong_function_runs_among_the_engines_without_a_name(
     assert all(v["passed"] is not False for v in found["verdicts"])
     assert main(["run", "spring", "--method", "own:euler", "--stepper", "mine.py:leapfrog", "--force"]) == 2
     said = " ".join(capsys.readouterr().out.split())
-    assert "springcheck identify spring.h5 --trajectory stepper:leapfrog looks for it" in said
+    assert "springcheck identify --stepper FILE.py:leapfrog looks for it" in said
     assert main(["plot", "spring-uneven.h5", "--quiet"]) == 0
 
 

@@ -141,3 +141,70 @@ def test_what_does_not_apply_is_said_once_for_each_reason(
     assert "step-defect" in rows
     assert not {"rod-length", "drive", "border"} & set(rows)
     assert f"{len(rows) - 1} verdicts passed" in said[-1] or f"{len(rows)} verdicts passed" in said[-1]
+
+
+H, FORCE = SCENE.step, SCENE.system.force(RUN.q, RUN.p).astype(np.float64)
+M = float(SCENE.m[0])
+T, Q, P = table().T
+
+
+@pytest.mark.parametrize(
+    ("header", "columns", "said"),
+    [
+        ("t,q,v", (T, 100 * Q, 100 * P / M), "positions and velocities are 100 times the scene's"),
+        ("t,q,p", (T, 10 * Q, 1000 * P), "positions are 10 times the scene's, and momenta 1000 times"),
+        ("t,q,p", (T, Q, P / M), "are the scene's divided by the masses: velocities; name their columns v"),
+        ("t,q,v", (T, Q, P), "its velocities are the scene's momenta; name their columns p"),
+        ("t,q,p", (T, Q, M * P), "its momenta are the scene's times the masses"),
+        ("t,q,p", (T, Q, P - H / 2 * FORCE[:, 0]), "its momenta are half a kick before the scene's"),
+        ("t,q,p", (T, Q, P + H / 2 * FORCE[:, 0]), "its momenta are half a kick after the scene's"),
+        ("t,q,p", (T[1:], Q[1:], P[1:]), "the scene's state after 1 step of velocity Verlet; write"),
+        ("t,q,p", (T[7:], Q[7:], P[7:]), "the scene's state after 7 steps of velocity Verlet"),
+        ("t,q,p", (T, Q + 0.01, P), r"q\[0\] is 0.31 there, and 0.3 in the scene"),
+    ],
+)  # fmt: skip
+def test_a_start_that_is_not_the_scenes_is_named(
+    tmp_path: Path, header: str, columns: tuple[Floats, ...], said: str
+) -> None:
+    with pytest.raises(StoreError, match=f"off the start of spring-uneven: .*{said}"):
+        verdicts(tmp_path, np.column_stack(columns), header)
+
+
+def test_momenta_and_velocities_that_contradict_the_mass_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(StoreError, match=r"p/v = 1, and the mass in scene spring-uneven is 3\.7"):
+        verdicts(tmp_path, np.c_[T, Q, P, P], "t,q,v,p")
+    found, _ = verdicts(tmp_path, np.c_[T, Q, P / M, P], "t,q,v,p")
+    assert not [v for v in found.values() if v.passed is False]
+
+
+def test_energies_under_capitals_are_no_times_and_no_velocities(tmp_path: Path) -> None:
+    kinetic, potential = P**2 / 2 / M, 1.45 * Q**2
+    rows = np.c_[T, Q, P, kinetic + potential, kinetic, potential]
+    found, notes = verdicts(tmp_path, rows, "t,q,p,E,T,V")
+    assert not [v for v in found.values() if v.passed is False]
+    assert any(note.startswith("T, V left out") for note in notes)
+    with pytest.raises(StoreError, match=r"columns of times: 2 \(t, time\).*--columns"):
+        verdicts(tmp_path, np.c_[T, T, Q, P], "t,time,q,p")
+
+
+def test_single_precision_in_the_digits_of_double_is_judged_as_single(tmp_path: Path) -> None:
+    rows = np.c_[T, np.float32(Q), np.float32(P)]
+    found, notes = verdicts(tmp_path, rows)
+    assert not [v for v in found.values() if v.passed is False]
+    assert "numbers are written to 6e-08, and judged to that" in notes
+    np.savez(tmp_path / "a.npz", t=T, q=np.float64(np.float32(Q)), p=np.float64(np.float32(P)))
+    assert file.judge(tmp_path / "a.npz", scene=SCENE, scheme="velocity-verlet").status == 0
+    # what is larger than its roundings is seen all the same
+    rows[1:, 1] *= 1 + 1e-5
+    rows[:, 1] = np.float32(rows[:, 1])
+    assert any(v.passed is False for v in verdicts(tmp_path, rows)[0].values())
+
+
+def test_identify_says_which_mass_it_took(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "a.csv"
+    np.savetxt(path, np.c_[T, Q, P, P], fmt="%.17g", delimiter=",", header="t,q,v,p", comments="")
+    main(["identify", str(path)])
+    assert "the mass 1 was taken from momenta over velocities" in " ".join(capsys.readouterr().out.split())
+    main(["identify", str(path), "--mass", "3.7"])
+    said = " ".join(capsys.readouterr().out.split())
+    assert "momenta over velocities are 1, and the mass is stated as 3.7" in said

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from springcheck import checks, schemes, store
+from springcheck.cli import start
 from springcheck.errors import IdentificationError, StoreError
 from springcheck.figures.views import units
 from springcheck.formats import States, is_store, moving, read
@@ -207,6 +208,7 @@ def as_trajectory(
 
     StoreError where they are not of the scene: another number of particles, other times, another start.
     """
+    start.contradicted(path, states, scene)
     notes = [*states.notes]
     q = states.q
     other = states.p if states.p is not None else np.asarray(states.v)
@@ -261,7 +263,8 @@ def as_trajectory(
     rounded = scene.system.norm.most(*(states.roundoff * np.abs(x) for x in (q[0], p[0])))
     if not size <= max(1e-9, 10 * states.roundoff) and not 0 < size * scene.system.norm.unit <= 2 * rounded:
         raise StoreError(
-            f"{path}: its first frame is {float(size):.2g} of the amplitude off the start of {scene.name}"
+            f"{path}: its first frame is {float(size):.2g} of the amplitude off the start of {scene.name}: "
+            + start.differs(scene, scheme, q[0], p[0], velocities=states.p is None)
         )
     if size > 0:
         notes.append(
@@ -279,14 +282,14 @@ def as_trajectory(
         notes.append("velocities are rebuilt from positions, as its run declared, and judged so")
     energy = None if ours is None else ours.energy
     kept = ("q", "p") if energy is None else ("q", "p", "energy")
-    start: dict[str, Any] = {"q": q[0].copy(), "p": p[0].copy()}
+    begun: dict[str, Any] = {"q": q[0].copy(), "p": p[0].copy()}
     grid: dict[str, Any] = {"steps": steps, "every": every, "quantities": kept}
     if scene.system.rods and states.roundoff > 2.0**-53:
         # a start of few digits has rods of the right length only to those digits
-        scene.system.rods.check(start["q"], start["p"], UNTRUE * 2.0**53 * states.roundoff)
-        judged = replace(scene, **grid).derived(**start)
+        scene.system.rods.check(begun["q"], begun["p"], UNTRUE * 2.0**53 * states.roundoff)
+        judged = replace(scene, **grid).derived(**begun)
     else:
-        judged = replace(scene, **start, **grid)
+        judged = replace(scene, **begun, **grid)
     run = Trajectory(
         label=path.name, scheme=scheme, t=t, q=np.ascontiguousarray(q), p=np.ascontiguousarray(p),
         step=scene.step, every=every, outcome=Outcome(status="complete", step=steps),

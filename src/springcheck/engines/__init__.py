@@ -261,7 +261,13 @@ def refusal(scene: Scene, label: Label) -> str | None:
                 "it declares no noise, and the scene has a bath; a thermostat of your own joins by --engine, "
                 "and `springcheck identify` reads friction and kT off its states"
             )
-        return f"{what.scheme} has no noise, and the scene has a bath; its methods are thermostats"
+        own = [parse(f"{label.engine}:{name}") for name in engine(label.engine).thermostats]
+        able = [str(one) for one in own if refusal(scene, one) is None]
+        mine, more = engine(label.engine).title, f" and {len(able) - 3} more" if len(able) > 3 else ""
+        serve = f"{mine} has no thermostat for it"
+        if able:
+            serve = f"the thermostats of {mine} are {', '.join(able[:3])}{more}"
+        return f"{what.scheme} has no noise, and the scene has a bath; {serve}"
     if what.generator and not scene.bath:
         return "it is a thermostat, for scenes with a bath: --temperature or [bath] gives one"
     of_bath = THERMOSTATS[what.scheme] if what.generator else None

@@ -28,6 +28,10 @@ NAMES: dict[Kind, str] = {
 }
 
 
+FEWEST_SINGLE, FEW_ROWS, SHORT = 8, 1000, 0xFFF
+"""Different numbers of single precision that make a table one of it, in so many rows; and the last bits of
+its 24 of which some are set there: none is in numbers that no step rounds, such as 0.75."""
+
 LONGEST_NAME = 200
 """Characters of a column's name; patterns take the square of it."""
 
@@ -81,11 +85,33 @@ def kind(name: str) -> Kind | None:
     return found[0] if found else None
 
 
+def kinds(names: Iterable[str]) -> dict[str, Kind]:
+    """The quantity of each of a table's columns that holds one.
+
+    A capital letter beside a small one of its quantity stands for another: T and V beside t and p, or v, are
+    energies (or a temperature), and P is a pressure.
+    """
+    found = {name: what for name in names if (what := kind(name)) is not None}
+    small = {what for name, what in found.items() if not _is_capital(name)}
+    if small & {"p", "v"}:
+        small |= {"p", "v"}
+    return {name: what for name, what in found.items() if not (_is_capital(name) and what in small)}
+
+
+def _is_capital(name: str) -> bool:
+    bare = _without_unit(name)
+    return len(bare) == 1 and bare.isupper()
+
+
+def _without_unit(name: str) -> str:
+    return re.sub(r"[\[(].*?[\])]", "", name.strip().strip("\"'#")).strip()
+
+
 def _parted(name: str) -> tuple[str, str]:
     """A name without units and case, and the number at its end."""
     if len(name) > LONGEST_NAME:
         return "", ""
-    bare = re.sub(r"[\[(].*?[\])]", "", name.strip().strip("\"'#")).strip().lower()
+    bare = _without_unit(name).lower()
     found = re.search(r"[\s_.]*(\d*)$", bare)
     return (bare[: found.start()], found[1]) if found else (bare, "")
 
@@ -101,11 +127,11 @@ def split(path: Path, columns: Columns, roundoff: float = 2.0**-53) -> States:
     """Named columns as states.  StoreError says which are missing or do not fit together."""
     parts: dict[Kind, list[Floats]] = {}
     places: dict[Kind, list[tuple[str, str]]] = {}
-    for name, values in columns.items():
-        what = kind(name)
-        if what is not None:
-            parts.setdefault(what, []).append(values if values.ndim > 1 else values[:, None])
-            places.setdefault(what, []).append(_place(name))
+    meant = kinds(columns)
+    for name, what in meant.items():
+        values = columns[name]
+        parts.setdefault(what, []).append(values if values.ndim > 1 else values[:, None])
+        places.setdefault(what, []).append(_place(name))
     for what, found in places.items():
         if len({axis for axis, _ in found}) == 1:
             places[what] = [("", number) for _, number in found]
@@ -118,7 +144,11 @@ def split(path: Path, columns: Columns, roundoff: float = 2.0**-53) -> States:
             raise StoreError(f"{path}: no column of {why} among {listed(columns)}; name them, as t,q,v")
     t = np.hstack(parts["t"])
     if t.shape[1] != 1:
-        raise StoreError(f"{path}: columns of times: {t.shape[1]}, and there is one time")
+        times = [name for name, what in meant.items() if what == "t"]
+        raise StoreError(
+            f"{path}: columns of times: {t.shape[1]} ({listed(times)}), and there is one time; name "
+            "all columns anew by --columns, the others of these by words that mean no quantity: t,other,q,v"
+        )
     states = {what: np.hstack(parts[what]) for what in parts if what != "m"}
     n = states["q"].shape[1]
     for what, values in states.items():
@@ -127,6 +157,8 @@ def split(path: Path, columns: Columns, roundoff: float = 2.0**-53) -> States:
         bad = np.flatnonzero(~np.isfinite(values).all(axis=1))
         if len(bad):
             raise StoreError(f"{path}: row {bad[0] + 1} of {what} is not finite")
+    if roundoff == 2.0**-53 and all(is_single(x) for what, x in states.items() if what != "t"):
+        roundoff = 2.0**-24
     mass = np.hstack(parts["m"]) if "m" in parts else None
     if mass is not None and np.any(mass != mass[:1]):
         raise StoreError(f"{path}: the masses change from row to row")
@@ -137,7 +169,26 @@ def split(path: Path, columns: Columns, roundoff: float = 2.0**-53) -> States:
         v=states.get("v"),
         mass=None if mass is None else mass[0],
         roundoff=roundoff,
+        notes=_left_out(columns, meant),
     )
+
+
+def _left_out(columns: Columns, meant: Mapping[str, Kind]) -> tuple[str, ...]:
+    """The note on columns that were left out as capitals beside small letters."""
+    left = [name for name in columns if kind(name) is not None and name not in meant]
+    said = "left out: a capital beside small letters is an energy or another quantity"
+    return (f"{listed(left)} {said}",) if left else ()
+
+
+def is_single(x: Floats) -> bool:
+    """Whether all of these numbers are of single precision, and enough of them need all of its digits."""
+    some = x[:FEW_ROWS]
+    with np.errstate(over="ignore"):
+        short = np.float32(some).view(np.uint32) & SHORT == 0
+        return bool(
+            len(np.unique(some[~short])) >= FEWEST_SINGLE
+            and np.array_equal(np.float32(x).astype(np.float64), x)
+        )
 
 
 def listed(names: Iterable[str]) -> str:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from springcheck.errors import StoreError, nearest, plain
-from springcheck.formats.columns import States, kind, listed, named, split
+from springcheck.formats.columns import States, kind, kinds, listed, named, split
 from springcheck.formats.lines import MOST_NUMBERS
 
 LARGEST = 16 * MOST_NUMBERS
@@ -65,7 +65,8 @@ def states_of(path: Path, arrays: Mapping[str, Any], names: Sequence[str] = ()) 
         and "=" not in "".join(names)
     ):
         return of_table(path, first, names)
-    arrays = {name: a for name, a in _chosen(path, arrays, names).items() if kind(name) is not None}
+    arrays = _chosen(path, arrays, names)
+    arrays = {name: arrays[name] for name in kinds(arrays)}
     numbers = {
         name: a for name, a in arrays.items() if not isinstance(a, StoreError) and a.dtype.kind in "fiu"
     }

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from springcheck.errors import StoreError
-from springcheck.formats.columns import Floats, States, kind, named, split
+from springcheck.formats.columns import Floats, States, kinds, named, split
 from springcheck.formats.lines import Lines, number
 
 SHOWN = 1000
@@ -73,7 +73,8 @@ def of_rows(
     chosen = names or header
     if not chosen:
         raise StoreError(f"{path}: its columns have no names; give all {width}, as --columns t,q,v")
-    states = [i for i, name in enumerate(chosen[:width]) if kind(name) in ("q", "p", "v")]
+    meant = kinds(chosen)
+    states = [i for i, name in enumerate(chosen[:width]) if meant.get(name) in ("q", "p", "v")]
     return split(path, named(path, values, chosen), roundoff(first, states))
 
 

@@ -108,6 +108,7 @@ def of_arrays(name: str, found: formats.States) -> FileStates:
         v=None if v is None else v[kept][:, chosen],
         mass=None if mass is None else mass[chosen],
         notes=remarks,
+        roundoff=found.roundoff,
         whole=found.q[kept],
     )
 
@@ -314,4 +315,21 @@ def identify_states(
     if states.adaptive and found.verdict == "none":
         why = f"made by {states.adaptive}: an adaptive solver has no fixed scheme to find"
         return replace(found, verdict="adaptive", statement=why, explanations=(), notes=(*states.notes, why))
-    return replace(found, notes=(*states.notes, *found.notes))
+    return replace(found, notes=(*states.notes, *_of_the_mass(states, m), *found.notes))
+
+
+def _of_the_mass(states: FileStates, m: Floats | None) -> tuple[str, ...]:
+    """The mass (n,) that momenta over velocities give, and whether it is another than is stated."""
+    if states.p is None or states.v is None or not np.any(states.v):
+        return ()
+    i = int(np.argmax(np.max(np.abs(states.v), axis=0)))
+    p, v = states.p[:, i], states.v[:, i]
+    seen = float(p @ v / (v @ v))
+    if m is None:
+        return (f"the mass {seen:.6g} was taken from momenta over velocities",)
+    if abs(seen - m[i]) <= max(1e-6, 10 * states.roundoff) * abs(m[i]):
+        return ()
+    return (
+        f"momenta over velocities are {seen:.6g}, and the mass is stated as {m[i]:.6g}: the velocities were "
+        "taken, and the momenta left out",
+    )

@@ -117,7 +117,10 @@ def run(
     """
     path = Path(path)
     if seed is not None and not scene.bath:
-        raise SpringcheckError("--seed goes with --vary, or with a scene that has a bath: --temperature")
+        raise SpringcheckError(
+            "--seed goes with --vary, or with a scene that has a bath, which --temperature gives; at 0 K "
+            "there is none, and nothing is drawn"
+        )
     seeds = {"seed": driver.checked_seed(seed)} if scene.bath else {}
     labels, left, others = choose(scene, methods)
     wrong: list[Broken] = []

@@ -285,7 +285,11 @@ def unjudged(verdicts: Sequence[Verdict], store: Path | None) -> Lines:
         line = f"not judged: {', '.join(methods)}: nothing that applied could tell ({reason})"
         if "--scheme NAME states it" in reason:
             name = shlex.quote(str(store)) if store else "FILE"
-            line += f"; springcheck identify {name} --trajectory {methods[0]} looks for it"
+            file = f"{name} --trajectory {methods[0]}"
+            if methods[0].startswith("stepper:"):
+                # a function is tried on springs of its own, whatever the forces of the scene are
+                file = f"--stepper FILE.py:{methods[0].partition(':')[2]}"
+            line += f"; springcheck identify {file} looks for it"
         out.append(plain(line, "bold yellow"))
     return out
 

@@ -1,0 +1,153 @@
+"""What the first frame of a file is that is not the start of its scene, and masses that contradict it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from springcheck import schemes
+from springcheck.errors import SpringcheckError, StoreError
+from springcheck.formats import States
+from springcheck.physics.arrays import Floats, Reals
+from springcheck.physics.scene import Scene
+from springcheck.text.wording import count
+
+CLOSE = 1e-6
+"""Part of the amplitude to which a state is the one that explains a first frame."""
+MOST_STEPS, MOST_PARTICLES = 100, 1000
+"""Steps of the scheme that are tried, of scenes with so many particles."""
+
+
+def contradicted(path: Path, states: States, scene: Scene) -> None:
+    """StoreError where the file's momenta are not its velocities times the scene's masses."""
+    if states.p is None or states.v is None:
+        return
+    axes = states.q.shape[1]
+    m = np.repeat(scene.m, max(1, axes // scene.n))
+    if scene.places is not None and axes == 3 * scene.particles:
+        m = np.zeros(axes)
+        m[scene.where] = scene.m
+    if len(m) != axes:
+        return
+    p, v = states.p[:, m > 0], states.v[:, m > 0]
+    m = m[m > 0]
+    off, size = (
+        np.max(np.abs(p - m * v), axis=0),
+        np.maximum(np.max(np.abs(p), axis=0), np.max(np.abs(m * v), axis=0)),
+    )
+    if not np.any(bad := off > max(1e-9, 10 * states.roundoff) * size):
+        return
+    i = int(np.argmax(bad))
+    seen = float(np.sum(p[:, i] * v[:, i]) / (np.sum(v[:, i] ** 2) or 1.0))
+    raise StoreError(
+        f"{path}: momenta and velocities contradict each other: p/v = {seen:.6g}, and the mass in scene "
+        f"{scene.name} is {m[i]:.6g}; keep one of the two"
+    )
+
+
+def differs(scene: Scene, scheme: str, q: Floats, p: Floats, *, velocities: bool) -> str:
+    """What a first frame (n,) is in place of the scene's start, and what to do; `velocities` says that the
+    file holds these."""
+    with np.errstate(all="ignore"):
+        return (
+            _single(scene, q, p)
+            or _weighted(scene, q, p, velocities)
+            or _kicked(scene, q, p)
+            or _later(scene, scheme, q, p)
+            or _scaled(scene, q, p, velocities)
+            or _largest(scene, q, p)
+        )
+
+
+def _is_at(scene: Scene, q: Floats, p: Floats, there_q: Reals, there_p: Reals) -> bool:
+    return bool(scene.system.norm(q - there_q, p - there_p) <= CLOSE)
+
+
+def _single(scene: Scene, q: Floats, p: Floats) -> str:
+    for state in ((scene.q, scene.p), (scene.q, np.float64(np.float32(scene.p / scene.m)) * scene.m)):
+        if np.array_equal(np.float32(state[0]), q) and np.allclose(
+            np.float32(state[1]), p, rtol=1e-15, atol=0
+        ):
+            return "it is the start in single precision; store the numbers as float32, or to nine digits"
+    return ""
+
+
+def _weighted(scene: Scene, q: Floats, p: Floats, velocities: bool) -> str:
+    if _is_at(scene, q, p * scene.m, scene.q, scene.p):
+        return "its momenta are the scene's divided by the masses: velocities; name their columns v, as t,q,v"
+    if not _is_at(scene, q, p / scene.m, scene.q, scene.p):
+        return ""
+    if velocities:
+        return "its velocities are the scene's momenta; name their columns p, as t,q,p"
+    return "its momenta are the scene's times the masses; divide them by these"
+
+
+def _scaled(scene: Scene, q: Floats, p: Floats, velocities: bool) -> str:
+    of_q, of_p = _ratio(q, scene.q), _ratio(p, scene.p)
+    one = of_q if np.any(scene.q) else of_p
+    what = "velocities" if velocities else "momenta"
+    if _is_at(scene, q / one, p / one, scene.q, scene.p):
+        return (
+            f"positions and {what} are {one:.6g} times the scene's, as in another unit of length; divide "
+            "both by that"
+        )
+    # of one particle any two numbers are multiples of the scene's: powers of ten are units
+    if _is_at(scene, q / _ten(of_q), p / _ten(of_p), scene.q, scene.p):
+        return (
+            f"positions are {_ten(of_q):g} times the scene's, and {what} {_ten(of_p):g} times, as in other "
+            "units; divide by these"
+        )
+    return ""
+
+
+def _ratio(x: Floats, own: Floats) -> float:
+    """x over the scene's own numbers, read where these are largest; 1 where they are 0."""
+    i = int(np.argmax(np.abs(own)))
+    return float(x[i] / own[i]) if own[i] else 1.0
+
+
+def _ten(x: float) -> float:
+    """The power of ten that is nearest to a factor; 1 for none of them."""
+    return float(10.0 ** np.rint(np.log10(x))) if 0 < x < np.inf else 1.0
+
+
+def _kicked(scene: Scene, q: Floats, p: Floats) -> str:
+    kick = scene.step * np.asarray(scene.system.force(scene.q, scene.p), np.float64)
+    for part, name in ((0.5, "half a kick"), (1.0, "a kick")):
+        for side, late, back in ((-1, "before", "add"), (1, "after", "take off")):
+            if _is_at(scene, q, p, scene.q, scene.p + side * part * kick):
+                return (
+                    f"its momenta are {name} {late} the scene's, as leapfrog has them between the times of "
+                    f"the positions; {back} {part:g} h F(q) in every frame, or see what "
+                    "`springcheck identify` reads"
+                )
+    return ""
+
+
+def _later(scene: Scene, scheme: str, q: Floats, p: Floats) -> str:
+    if scene.n > MOST_PARTICLES or scene.bath:
+        return ""
+    law = schemes.Law(scheme=schemes.scheme(scheme), scene=scene, h=scene.step)
+    at: tuple[Reals, Reals] = scene.q.astype(np.longdouble), scene.p.astype(np.longdouble)
+    for done in range(1, min(scene.steps, MOST_STEPS) + 1):
+        try:
+            at = law.step(*at)
+        except (SpringcheckError, ArithmeticError, ValueError):
+            # not every scheme has a step that the forces define
+            return ""
+        if _is_at(scene, q, p, *at):
+            return (
+                f"it is the scene's state after {count(done, 'step')} of {schemes.title(scheme)}; write the "
+                "start as the first frame, or give a scene that starts there"
+            )
+    return ""
+
+
+def _largest(scene: Scene, q: Floats, p: Floats) -> str:
+    parts = [("q", q, scene.q), ("p", p, scene.p)]
+    none = np.zeros_like(q)
+    sizes = [scene.system.norm(q - scene.q, none), scene.system.norm(none, p - scene.p)]
+    name, x, own = parts[int(np.argmax(sizes))]
+    i = int(np.argmax(np.abs(x - own)))
+    return f"{name}[{i}] is {x[i]:.9g} there, and {own[i]:.9g} in the scene; give a scene that starts so"
