@@ -180,7 +180,11 @@ def _unexplained(e: Evidence, counted: float) -> Explanation:
     rows = e.found.residual
     ratio = float(rows[0] / rows[1]) if rows[1] else math.inf
     where = "the velocity" if ratio < 0.2 else "the position" if ratio > 5 else "position and velocity"
-    if not irregular(e.misses * e.weight[:, None]):
+    # what is left of the other number is rounding, which goes with the state
+    left = e.misses[:, rows >= 0.2 * np.max(rows)]
+    # noise of a coarse number is white relative to a motion that grows, and noise of one size beside its map
+    linear = np.column_stack([e.states[:-1], np.ones(e.pairs)])
+    if not (irregular(left * e.weight[:, None]) or irregular(left, linear)):
         return Explanation(
             cause="No known cause alone explains what one map leaves over, and it is no noise: it comes back "
             f"from frame to frame, {e.size:.1e} of the state's size in each, in {where}",

@@ -268,14 +268,13 @@ def _on_curves(
     asked = "curves", tuple(names.tolist()), len(roots.s), len(at)
     if asked not in roots.kept:
         each, all_ = np.arange(len(curves.low))[:, None], np.arange(len(at))
+        bend = curves.rows[each, 4, cell]
         losses = between(1, each, all_) - log_det
-        roots.kept[asked] = losses, np.abs(between(2, each, all_) - first) - curves.rows[each, 4, cell]
-    loss, off = roots.kept[asked]
+        roots.kept[asked] = losses, np.abs(losses) - bend, np.abs(between(2, each, all_) - first) - bend
+    loss, lost, off = roots.kept[asked]
     room = GLANCE + NEAR[1] * roots.error
     beyond = phase - curves.high[:, None]
-    close = (
-        off <= room + DAMPING * np.abs(loss) if every.damped else (off <= room) & (np.abs(loss) <= 2 * room)
-    )
+    close = off <= room + DAMPING * np.abs(loss) if every.damped else (off <= room) & (lost <= 2 * room)
     # friction may exceed the largest phase, and beside it a table says little
     beside = (beyond > -END) & (np.abs(loss) <= 2 if every.damped else True)
     curve, r = np.nonzero(

@@ -116,9 +116,10 @@ def _unknown(seen: Measured, strides: range) -> Identification:
         least = min(map(distance, tried))
         # many schemes and strides come close by chance; the plainest of the close ones is the better guess
         close = min((x for x in tried if distance(x) <= 10 * least), key=lambda x: x.plainness)
-        omega, stiffness, _ = seen.numbers(close)
-        off = difference(maps[0], close.parts[0])
-        near = {"nearest": str(close), "difference": off, "omega": omega, "stiffness": stiffness}
+        near = {"nearest": str(close), "difference": difference(maps[0], close.parts[0])}
+        if not any(part.turns for part in close.parts):
+            # what is near by whole turns that nothing asks for has none of the states' numbers
+            near["omega"], near["stiffness"], _ = seen.numbers(close)
     determinant, symplectic = determinants(maps, 1)
     return nothing(
         explain(seen),

@@ -196,6 +196,11 @@ def _said(
             if name not in every_count[1:]
         ]
         statement = f"{head}, {' or '.join(which)}{'' if first.known else ' or one that is not known here'}"
+    elif all(one.added for one in found):
+        statement = (
+            "each step takes noise, added to the momenta after velocity Verlet, and no friction shows: "
+            "random kicks without one, or a bath that hardly acts in so few frames"
+        )
     else:
         statement = (
             f"{head}, by no scheme known here, or of joined particles, or frames lie several steps apart"

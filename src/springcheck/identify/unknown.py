@@ -100,15 +100,16 @@ def _class(e: Evidence) -> str:
     with np.errstate(divide="ignore", invalid="ignore"):
         a = 2 * (1 - x) / y
         beta, gamma = (1 / y - 1) / a, (1 - u) / (a * y)
-        off = abs(beta - np.rint(CHOSEN * beta) / CHOSEN) * a
-    # any map that keeps areas and is symmetric is one of gamma = 1/2 on some spring
-    own = off < room if stated is None else abs(stated - a) < room
+        chosen = 0 <= beta <= 1 and abs(beta - np.rint(CHOSEN * beta) / CHOSEN) * a < room
+    # any map that keeps areas and is symmetric is one of gamma = 1/2 on some spring, or in some mass
+    other = stated is None or symmetric
+    own = (chosen or not other) and (stated is None or abs(stated - a) < room)
     if own and abs(z + a * (1 - gamma + gamma * x)) < room < READ * a and e.record.fine:
         return f"{MAP_OF}Newmark's method with beta = {beta:.6g}, gamma = {gamma:.6g}"
     keeps = abs(det - 1) <= SURE * float(np.max(error) * max(size, 1 / size)) + 1e-13
     growing = f"multiplies areas by 1 {det - 1:+.2e}"
     if symmetric and keeps:
-        other = "or a known one whose velocities have another scale"
+        other = "or a known one whose velocities have another scale, or whose mass another value"
         return f"{UNKNOWN_METHOD} keeps areas and is symmetric in time, {other}"
     if not symmetric:
         return f"{UNKNOWN_METHOD} {'keeps areas' if keeps else growing}"
@@ -130,6 +131,12 @@ def _class(e: Evidence) -> str:
         f"if every step was recorded, a one-step method of order {n - 1}, whose stability function has "
         f"{should + found[n].real:.3g} z**{n} in place of {should:.3g} z**{n}"
     )
+
+
+def by_parameter(e: Evidence) -> str:
+    """The method with a parameter that has the map of every step; "" where none has."""
+    kind = _class(e)
+    return kind.removeprefix(MAP_OF) if kind.startswith(MAP_OF) else ""
 
 
 TWO_STEPS = Cause(

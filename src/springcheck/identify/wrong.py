@@ -14,7 +14,7 @@ from springcheck.identify.families import FAMILIES, FAULTS, G_ROUNDING, SUBTRACT
 from springcheck.identify.hypothesis import SURE, Joint, distinct, same_map
 from springcheck.identify.record import ROUNDING
 from springcheck.identify.result import Explanation
-from springcheck.identify.unknown import misfit
+from springcheck.identify.unknown import by_parameter, misfit
 from springcheck.text.wording import either
 
 
@@ -47,6 +47,14 @@ def wrong_map(e: Evidence) -> list[Explanation]:
         return own or [_departing(e, title(fitting[0].scheme))]
     ranked += [(2, x) for x in _negative_friction(e)]
     scaled, certain = _scales(e)
+    if certain and (other := by_parameter(e)):
+        # on a spring another mass and the parameter of a method may be one map
+        scaled = [replace(x, cause=f"{other}; or {x.cause}") for x in scaled]
+    if certain and ranked and min(ranked, key=lambda pair: pair[0])[0] == 0:
+        # a drift of half the step, say, is one in twice the mass
+        ranked = [
+            (r, replace(x, cause=f"{x.cause}; or {scaled[0].cause}") if r == 0 else x) for r, x in ranked
+        ]
     # factors that mean nothing, one for each of several schemes, say less than the kind of the map
     ranked += (
         [(1, x) for x in scaled] if certain else [(4, x) for x in (misfit(e), *scaled)] if scaled else []
@@ -118,6 +126,10 @@ CONSTANTS = (
 """Factors between velocities and positions that mean something."""
 
 
+def _times(factor: float) -> str:
+    return f"{factor:.6g}" if abs(factor - 1) > 1e-4 else f"{factor:.12g}"
+
+
 def _scales(e: Evidence) -> tuple[list[Explanation], bool]:
     """Schemes that fit once velocities have another scale, what that scale means, and whether it is one: a
     known factor, or that of the stated stiffness."""
@@ -127,19 +139,29 @@ def _scales(e: Evidence) -> tuple[list[Explanation], bool]:
     fitting = [x for x in fitting if abs(x.parts[0].log_mass) > 6 * x.parts[0].mass_error + 4 * ROUNDING]
     of_stated = [x for x in fitting if e.stated is not None and _rank(e, x) == 0]
     fitting = of_stated or fitting
-    meant = [(x, meaning) for x in fitting if (meaning := _meaning(e, x))]
+    meant = [(x, *meaning) for x in fitting if (meaning := _meaning(e, x))]
+    # a factor that agrees with the stated stiffness says more than one that is well known
+    meant = [x for x in meant if x[1]] or meant
     if meant:
-        x, (cause, remedy) = meant[0]
         # schemes that differ by less than the numbers show would each mean the same
-        names = list(dict.fromkeys(title(y.scheme) for y, _ in meant))
-        return [_found(f"{either(names)}, but {cause}", remedy, x)], True
+        names: dict[str, list[str]] = {}
+        for x, _, meaning, _ in meant:
+            names.setdefault(meaning, []).append(title(x.scheme))
+        x, _, _, remedy = meant[0]
+        cause = "; or ".join(f"{either(list(dict.fromkeys(y)))}{said}" for said, y in names.items())
+        return [_found(cause, remedy, x)], True
     if not fitting:
         return [], False
     x = fitting[0]
     scale = {str(y): math.exp(-y.parts[0].log_mass) for y in fitting}
     one = scale[str(x)]
     larger = f"{one:.6g} times as large" if abs(one - 1) > 1e-5 else f"larger by {one - 1:+.1e} of their size"
-    cause = f"{x} would fit if velocities were {larger}"
+    of_mass = (
+        ""
+        if e.stiffness is not None or e.record.mass is None
+        else f", or if the mass were {_times(1 / one)} times as large"
+    )
+    cause = f"{str(x).replace(x.scheme, title(x.scheme))} would fit if velocities were {larger}{of_mass}"
     if len(fitting) > 1:
         # symmetric schemes have the same map but for the scale, so each has one of its own
         each = "; ".join(f"{name}: {value:.6g}" for name, value in list(scale.items())[:SHOWN])
@@ -148,11 +170,13 @@ def _scales(e: Evidence) -> tuple[list[Explanation], bool]:
             f"Several schemes would fit at a scale of velocities, each at a factor of its own: {each}{more}"
         )
     advice = "look at the mass, at the units of velocities and times, and at whether dq/dt = p/m"
-    return [_found(cause, advice, x)], len(of_stated) == 1 and abs(one - 1) > UNSCALED
+    alone = of_stated if e.stated is not None else fitting if e.record.fine else []
+    return [_found(cause, advice, x)], len(alone) == 1 and abs(one - 1) > UNSCALED
 
 
-def _meaning(e: Evidence, x: Joint) -> tuple[str, str] | None:
-    """Meaning of a scale of the velocities, by the mass, the stated stiffness and well-known factors."""
+def _meaning(e: Evidence, x: Joint) -> tuple[bool, str, str] | None:
+    """Meaning of a scale of the velocities, by the mass, the stated stiffness and well-known factors: whether
+    the stated stiffness agrees with it, what it means, and what to do."""
     part = x.parts[0]
     scale = math.exp(-part.log_mass)
     known = 6 * (part.mass_error + part.a_error / abs(part.a)) + e.record.jitter + 32 * ROUNDING
@@ -163,32 +187,47 @@ def _meaning(e: Evidence, x: Joint) -> tuple[str, str] | None:
     h = float(e.record.interval) / x.stride
     mass = None if e.record.mass is None else float(e.record.mass[e.j])
     stiffer = part.a * x.stride**2 / e.stated if e.stated else None
+    agrees = stiffer is not None and any(is_(stiffer, y, 0.0) for y in (1.0, scale, scale**2))
     if stiffer is not None and is_(stiffer, scale**2, 0.0):
         if is_(scale, 1 / h**2):
-            return "the step taken is 1/h: it divides by the step", "multiply by the step"
+            return agrees, ", but the step taken is 1/h: it divides by the step", "multiply by the step"
         cause = (
-            f"times are {1 / scale:.6g} times what was stepped: the step taken is {scale:.6g} times theirs"
+            f", but times are {1 / scale:.6g} times what was stepped: the step taken is {scale:.6g} times "
+            "theirs"
         )
         if abs(scale - 1) <= 1e-2:
             longer = f"{scale - 1:.3g} of it"
-            cause = f"times are not what was stepped: the step taken is longer than theirs by {longer}"
-        return (
-            cause,
-            "look at how time is counted: the times are wrong by that factor",
-        )
+            cause = f", but times are not what was stepped: the step taken is longer than theirs by {longer}"
+        return agrees, cause, "look at how time is counted: the times are wrong by that factor"
     if mass is not None and is_(scale, mass):
         if stiffer is not None and is_(stiffer, 1.0):
             return (
-                "p is treated as a velocity: dq/dt = p and dp/dt = F/m",
+                agrees,
+                ", but p is treated as a velocity: dq/dt = p and dp/dt = F/m",
                 "divide p by the mass in the drift only",
             )
-        return "the mass is left out: dq/dt = p", "divide the momentum by the mass in the drift"
+        return agrees, ", but the mass is left out: dq/dt = p", "divide the momentum by the mass in the drift"
     if mass is not None and is_(scale, 1 / mass):
-        return "velocities are divided by the mass once more", "divide the momentum by the mass once"
+        return (
+            agrees,
+            ", but velocities are divided by the mass once more",
+            "divide the momentum by the mass once",
+        )
+    if mass is not None and stiffer is not None and is_(stiffer, scale, 0.0):
+        # what divides momenta and forces alike
+        return (
+            agrees,
+            f" in a mass {_times(1 / scale)} times the stated one",
+            "look at the mass and its units: dq/dt = p/m and (h w)**2 = h**2 k/m show the same other one",
+        )
+    of_mass = (
+        "" if mass is None or stiffer is not None else f"; or the mass {_times(1 / scale)} times as large"
+    )
     for factor, meaning in CONSTANTS:
         if is_(scale, factor):
             return (
-                f"velocities would have to be {scale:.6g} times as large: {meaning}",
+                agrees,
+                f", but velocities would have to be {scale:.6g} times as large: {meaning}{of_mass}",
                 "look at the units of positions, velocities and times",
             )
     return None

@@ -15,6 +15,9 @@ import numpy as np
 
 from springcheck.physics.arrays import Floats
 
+FACTOR_LAGS = 20
+"""Steps over which a factor of momenta that is carried on would show."""
+
 
 def of_normal(z: float) -> float:
     """Chance of a standard normal number at least as far from 0."""
@@ -184,3 +187,13 @@ def normal_scores(x: Any) -> Floats:
     # the ends of the range are known to a rounding
     u = np.where((u <= 0) & (u > -1e-9), 1e-12, np.where((u >= 1) & (u < 1 + 1e-9), 1 - 1e-12, u))
     return np.where((u > 0) & (u < 1), ndtri(np.clip(u, 1e-300, 1 - 2.0**-53)), np.inf)
+
+
+def together(x: Floats) -> float:
+    """Chance of the correlations of x (f,) over `FACTOR_LAGS` steps together (Ljung & Box, Biometrika 65
+    (1978) 297)."""
+    from scipy.special import gammaincc
+
+    n, size = len(x), float(x @ x)
+    squares = [float(x[j:] @ x[:-j]) ** 2 / (n - j) for j in range(1, FACTOR_LAGS + 1)]
+    return float(gammaincc(FACTOR_LAGS / 2, n * (n + 2) * sum(squares) / size**2 / 2)) if size else 0.0

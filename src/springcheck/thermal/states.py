@@ -37,8 +37,8 @@ COARSE = 0.01
 EVEN = 1e-4
 """Chance below which what acts on momenta may be a factor, and no draw is told of it."""
 
-FACTOR_LAGS = 20
-"""Steps over which a factor that is carried on would show."""
+UNIT_ROOT = 20.0
+"""Bias and spread of a root that is 1, in units of 1 over the number of frames."""
 
 SPARSE = 0.1
 """Median of the draws, of variance 1, below which most steps have none: 0.67 for normal ones."""
@@ -58,6 +58,8 @@ class Thermal:
     """Whether the draws are uniform rather than normal."""
     known: bool = True
     """Whether what acts is known: one momentum shows no factor, but any change of it that ends a step."""
+    added: bool = False
+    """Whether draws are added to momenta after velocity Verlet, and no friction shows: no scheme's."""
 
     @property
     def named(self) -> bool:
@@ -174,17 +176,8 @@ def _is_added(noisy: Floats, left: Floats, u: Floats, every: int) -> bool:
     large = [np.sign(np.abs(x) - np.median(np.abs(x))) for x in (left, made)]
     after = (np.sign(left * made), left / max(float(np.std(left)), 1e-300))
     chances = [chance.neighbours(x[j::every, None]) for x in after for j in range(every)]
-    chances += [_together(x[j::every]) for x in noisy for j in range(every)]
+    chances += [chance.together(x[j::every]) for x in noisy for j in range(every)]
     return min(chance.mean(large[0] * large[1]), *chances) > EVEN
-
-
-def _together(x: Floats) -> float:
-    """Chance of the correlations of x (f,) over 20 steps together (Ljung & Box, Biometrika 65 (1978) 297)."""
-    from scipy.special import gammaincc
-
-    n, size = len(x), float(x @ x)
-    squares = [float(x[j:] @ x[:-j]) ** 2 / (n - j) for j in range(1, FACTOR_LAGS + 1)]
-    return float(gammaincc(FACTOR_LAGS / 2, n * (n + 2) * sum(squares) / size**2 / 2)) if size else 0.0
 
 
 def _is_white(x: Floats) -> bool:
@@ -211,6 +204,7 @@ def _of_one(
         return bool(abs(value - wanted) <= close * max(abs(wanted), abs(d), h))
 
     found: list[Candidate] = []
+    added = False
     if near(b, d) and near(c, -1):
         half, (decay, slow, error) = near(b, -h / 2), _decay(q, v)
         turn = 4 * (1 + h / (2 * b))
@@ -243,8 +237,11 @@ def _of_one(
         found = [Candidate(scheme=name, **known) for name in names]
         left = np.empty(0)
     elif abs(b) <= close * h and near(d, -h) and -1 < c < 1:
+        # what is no factor of the momenta, and takes nothing from them, is added to them
+        added = even and _decay(q, v)[0] >= 1 - UNIT_ROOT / len(q) and _is_white(left)
         known = {"omega": float(np.sqrt(2 * (1 + c)) / h), "omega_error": 0.0}
-        found, left = [Candidate(scheme="bussi-after", **known)], np.empty(0)
+        found = [] if added else [Candidate(scheme="bussi-after", **known)]
+        left = left if added else np.empty(0)
     elif near(c, -1) and abs(d) <= close * h:
         roots = {n: (lambda x, c2=c2: np.sqrt((1 - c2(x)) / x)) for n, c2 in GJ.items()}
         if near(b, -h):
@@ -281,7 +278,7 @@ def _of_one(
     alike = {x.scheme for x in found} - ({"andersen-leapfrog"} if len(found) > 1 else set())
     return Thermal(
         candidates=tuple(found), free=tuple(map(float, free)), misfit=misfit,
-        uniform=bool(len(left)) and _is_uniform(left),
+        uniform=bool(len(left)) and _is_uniform(left), added=added,
         known=alike not in ({"bussi-after"}, {"gj-iii-half"}) and bool(close <= COARSE),
     )  # fmt: skip
 
@@ -306,13 +303,13 @@ def _rate(of: Callable[[Floats], Floats], wanted: float) -> float | None:
 
 def _decay(q: Floats, v: Floats) -> tuple[float, float, float]:
     """Determinant of the fitted linear map, which is the decay of momenta, (h w)**2 by its trace, and a bound
-    of the error of both: five standard errors, and 20/n for the bias of a root near 1
+    of the error of both: five standard errors, and a share of 1/n for the bias of a root near 1
     (Dickey & Fuller, J. Am. Stat. Assoc. 74 (1979) 427)."""
     # neither is small beside the other
     z = np.stack([(x - np.mean(x)) / np.std(x) for x in (q, v)])
     A, n = np.linalg.lstsq(z[:, :-1].T, z[:, 1:].T, rcond=None)[0], len(q)
     decay = float(np.linalg.det(A))
-    error = 5 * float(np.sqrt(max(1 - decay * decay, 0.0) / n)) + 20 / n
+    error = 5 * float(np.sqrt(max(1 - decay * decay, 0.0) / n)) + UNIT_ROOT / n
     return decay, 2 - 2 * float(np.trace(A)) / (1 + decay), error
 
 
