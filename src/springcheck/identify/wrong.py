@@ -145,8 +145,8 @@ def _scales(e: Evidence) -> tuple[list[Explanation], bool]:
     if meant:
         # schemes that differ by less than the numbers show would each mean the same
         names: dict[str, list[str]] = {}
-        for x, _, meaning, _ in meant:
-            names.setdefault(meaning, []).append(title(x.scheme))
+        for x, _, said, _ in meant:
+            names.setdefault(said, []).append(title(x.scheme))
         x, _, _, remedy = meant[0]
         cause = "; or ".join(f"{either(list(dict.fromkeys(y)))}{said}" for said, y in names.items())
         return [_found(cause, remedy, x)], True
