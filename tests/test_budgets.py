@@ -18,7 +18,7 @@ BUDGETS = {
     ("engines",): 2806,
     ("driver", "conformance", "doors"): 1262,
     ("checks",): 5064,
-    ("identify",): 8659,
+    ("identify",): 8662,
     ("formats", "store"): 5266,
     ("studies",): 1466,
     ("studies/*",): 9965,

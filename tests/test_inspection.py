@@ -353,7 +353,9 @@ def test_a_study_of_precision_is_read_back_with_all_that_follows_from_its_points
     kept = precision.stored(path)
     assert kept.points == fresh.points
     assert kept.methods == fresh.methods
-    assert kept.methods[0].order == pytest.approx(1, abs=0.01)
+    fit = kept.methods[0].fit
+    assert fit is not None
+    assert fit.order == pytest.approx(1, abs=0.01)
     assert (kept.front, kept.cheapest) == (fresh.front, fresh.cheapest)
     assert kept.document() == fresh.document()
     for study in (fresh, kept):

@@ -216,7 +216,7 @@ def test_a_store_is_named_as_it_is(folder: Path) -> None:
 @pytest.mark.parametrize("width", [40, 80])
 def test_explanations_break_between_words(width: int, monkeypatch: Patch, capsys: Captured) -> None:
     # what a check sees of each fault is measured elsewhere
-    monkeypatch.setattr(faults, "passes", lambda fault, check: True)
+    monkeypatch.setattr(faults, "probe", lambda fault: lambda check, size: True)
     whole = shown(["explain", "step-defect"], None, monkeypatch, capsys)
     assert max(map(len, whole.splitlines())) > 200
     folded = shown(["explain", "step-defect"], width, monkeypatch, capsys)

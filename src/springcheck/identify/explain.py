@@ -184,7 +184,7 @@ def _unexplained(e: Evidence, counted: float) -> Explanation:
     left = e.misses[:, rows >= 0.2 * np.max(rows)]
     # noise of a coarse number is white relative to a motion that grows, and noise of one size beside its map
     linear = np.column_stack([e.states[:-1], np.ones(e.pairs)])
-    if not (irregular(left * e.weight[:, None]) or irregular(left, linear)):
+    if not (irregular(left * e.weight[:, None]) or (left.shape[1] == 1 and irregular(left, linear))):
         return Explanation(
             cause="No known cause alone explains what one map leaves over, and it is no noise: it comes back "
             f"from frame to frame, {e.size:.1e} of the state's size in each, in {where}",

@@ -154,8 +154,6 @@ def identify_stepper(step: Stepper) -> Identification:
     if found.scheme in ELSEWHERE and _calls(step) > len(ELSEWHERE[found.scheme].over) - 1 > 0:
         # more stages than the scheme needs: a fault of the same map has them
         wrong += [Explanation(cause=one.cause, remedy=one.remedy) for one in faults_like(found.scheme)]
-    if found.scheme and found.fits and not wrong:
-        found = _on_a_well(step, found)
     slope, deviation = _order(step)
     order = f"order {slope:.2f} +- {deviation:.2f} on a quartic well"
     if math.isnan(slope):
@@ -166,6 +164,8 @@ def identify_stepper(step: Stepper) -> Identification:
             f"On a spring it is {found.scheme}, of order {known.order}, but not on forces that are not linear"
         )
         wrong.append(Explanation(cause=cause, remedy="look for a force that is evaluated at the wrong place"))
+    if found.scheme and found.fits and not wrong:
+        found = _on_a_well(step, found)
     return replace(
         found,
         fits=found.fits and not wrong,

@@ -14,7 +14,7 @@ from springcheck.identify.families import FAMILIES, FAULTS, G_ROUNDING, SUBTRACT
 from springcheck.identify.hypothesis import SURE, Joint, distinct, same_map
 from springcheck.identify.record import ROUNDING
 from springcheck.identify.result import Explanation
-from springcheck.identify.unknown import by_parameter, misfit
+from springcheck.identify.unknown import MAP_OF, ONE_MAP, by_parameter, misfit
 from springcheck.text.wording import either
 
 
@@ -49,7 +49,7 @@ def wrong_map(e: Evidence) -> list[Explanation]:
     scaled, certain = _scales(e)
     if certain and (other := by_parameter(e)):
         # on a spring another mass and the parameter of a method may be one map
-        scaled = [replace(x, cause=f"{other}; or {x.cause}") for x in scaled]
+        scaled = [replace(x, cause=f"{ONE_MAP}: {MAP_OF}{other}; or {x.cause}") for x in scaled]
     if certain and ranked and min(ranked, key=lambda pair: pair[0])[0] == 0:
         # a drift of half the step, say, is one in twice the mass
         ranked = [
@@ -213,6 +213,9 @@ def _meaning(e: Evidence, x: Joint) -> tuple[bool, str, str] | None:
             ", but velocities are divided by the mass once more",
             "divide the momentum by the mass once",
         )
+    if stiffer is not None and is_(stiffer, scale, 0.0) and is_(scale, 1 / h**2):
+        cause = f", but velocities would have to be {scale:.6g} times as large: the drift divides by the step"
+        return agrees, cause, "multiply by the step"
     if mass is not None and stiffer is not None and is_(stiffer, scale, 0.0):
         # what divides momenta and forces alike
         return (
