@@ -9,6 +9,7 @@ import pytest
 
 from springcheck import identify
 from springcheck.identify.result import Identification
+from springcheck.identify.unknown import MAP_OF, ONE_MAP
 
 M, K, H = 3.7, 2.9, 0.1
 
@@ -90,9 +91,8 @@ def test_without_a_stated_stiffness_mass_and_units_are_both_possible() -> None:
 
 def test_newmark_of_a_chosen_beta_is_named_beside_the_mass_that_it_looks_like() -> None:
     statement = told(newmark, stiffness=K).statement
-    assert statement.startswith(
-        "Newmark's method with beta = 0.166667, gamma = 0.5; or Velocity Verlet in a mass"
-    )
+    method = "Newmark's method with beta = 0.166667, gamma = 0.5; or Velocity Verlet in a mass 1.00131 times"
+    assert statement.startswith(f"{ONE_MAP}: {MAP_OF}{method}")
 
 
 def test_a_thousandth_of_the_step_is_no_whole_turn() -> None:
