@@ -1,4 +1,4 @@
-"""Objects of an HDF5 file that anyone may have made: each is looked at before any of it is read.
+"""Guarded access to an HDF5 file of unknown origin: every object is validated before any of it is read.
 
 Only what lies in the file itself is read: external storage, external and soft links and views of other files
 are refused, and so are filters that would load a library.  Sizes, counts, depths and lengths are bounded.
@@ -31,7 +31,7 @@ LONGEST_NAME = 200
 LONGEST_TEXT = LONGEST_SCENE
 """Bytes of all texts of one dataset, and of all attributes of one object."""
 LONGEST_DOCUMENT = 1 << 24
-"""Bytes of a text of JSON: as plain objects it takes some twenty times as much."""
+"""Bytes of a JSON document: parsed into Python objects it takes some twenty times as much memory."""
 LARGEST_TABLE = 1 << 28
 """Bytes of the numbers of a table."""
 MOST_TEXTS = 1 << 21
@@ -40,11 +40,11 @@ MOST_ITEMS = 10_000
 """Items of an attribute."""
 MOST_DIMENSIONS = 4
 MOST_VIEWS = 1_000
-"""Pieces of other datasets that a virtual one is put together of."""
+"""Source datasets of a virtual dataset."""
 LARGEST_CHUNK = 1 << 28
 """Bytes."""
 EXPANSION = 1100
-"""More than deflate can expand (1032): a compressed array that claims more is damaged."""
+"""Ratio of sizes beyond what deflate can reach (1032): an array that claims more is damaged."""
 
 _FILTERS = {h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FLETCHER32, 32000}
 """Built into h5py; 32000 is its LZF."""
@@ -52,13 +52,14 @@ _FILTERS = {h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FL
 
 @contextlib.contextmanager
 def for_reading(path: Path) -> Iterator[Any]:
-    """A file open for reading, whatever it does to libhdf5 (see `trust`).  StoreError where it cannot be."""
+    """Open a file for reading that libhdf5 is known to survive (see `trust`); StoreError where none can
+    be."""
     with files.told(path, "read"), opened(path) as file:
         yield file
 
 
 def opened(path: Path) -> Any:
-    """A file open for reading; what is wrong with it is raised as libhdf5 says it."""
+    """Open a file for reading; errors are libhdf5's own."""
     try:
         return h5py.File(path, "r", locking="best-effort")
     except OSError as error:
@@ -79,7 +80,7 @@ def is_group(node: Any) -> bool:
 
 
 def is_name(name: str) -> bool:
-    """Whether a group or dataset may be called so: printable, not too long, no formula to a figure."""
+    """Whether a group or dataset may have this name: printable, not too long, and no mathtext in a figure."""
     return 0 < len(name) <= LONGEST_NAME and name.isprintable() and "$" not in name
 
 
@@ -95,7 +96,7 @@ def members(group: Any) -> list[str]:
 
 
 def _is_hard(group: Any, name: str) -> bool:
-    """Whether what a group has under this name lies in the file itself."""
+    """Whether a member is a hard link, so that it lies in the file itself."""
     return bool(group.id.links.get_info(name.encode()).type == h5py.h5l.TYPE_HARD)
 
 
@@ -114,12 +115,12 @@ def find(group: Any, path: str) -> Any:
 
 
 def address(node: Any) -> int:
-    """Where an object lies in its file: the same under each of its names."""
+    """Where an object lies in its file: the same for each of its names."""
     return int(h5py.h5o.get_info(node.id).addr)
 
 
 def _has_one_name(node: Any) -> Any:
-    """A group or a column of ours: one with more names would be read as often as it has them."""
+    """The object if it has one hard link, as ours have; an object with more would be read once for each."""
     if h5py.h5o.get_info(node.id).rc > 1:
         raise refuse(node, "has more than one name, as none of ours has")
     return node
@@ -128,10 +129,11 @@ def _has_one_name(node: Any) -> Any:
 def walk(
     group: Any, most: int, deepest: int, into: Callable[[str, Any], bool] = lambda place, node: True
 ) -> Iterator[tuple[str, int, Any]]:
-    """Path, address and object of all that is below a group: of a group once, of a dataset under each of its
-    names, the object at the first of them alone (later None).
+    """Yield path, address and object of everything below a group.
 
-    `into(path, object)` says whether a group is entered.  StoreError where there are more than `most`.
+    A group is visited once.  A dataset is yielded under each of its names, with the object at the first of
+    them alone (later None).  `into(path, object)` decides whether a group is entered.  StoreError where there
+    are more than `most`.
     """
     seen, count = {address(group)}, 0
 
@@ -218,7 +220,7 @@ class StoredAs:
     chunk: tuple[int, ...]
     filters: frozenset[int]
     views: tuple[tuple[str, str], ...]
-    """Files and datasets that a virtual dataset shows; no more than a few."""
+    """File and dataset of each source of a virtual dataset, up to `MOST_VIEWS`."""
 
     @classmethod
     def of(cls, node: Any) -> StoredAs:
@@ -239,7 +241,7 @@ class StoredAs:
 
 
 def _look_at_views(node: Any, shown: tuple[tuple[str, str], ...]) -> None:
-    """StoreError unless a virtual dataset shows plain datasets of its own file alone, as ours do."""
+    """StoreError unless all sources of a virtual dataset are plain datasets of the same file, as ours are."""
     if len(shown) == MOST_VIEWS:
         raise refuse(node, "is put together of more pieces than can be looked at")
     for file, name in shown:
@@ -263,7 +265,8 @@ def array(file: Any, path: str, shape: tuple[int, ...], kinds: str = "f") -> Any
 
 
 def texts(dataset: Any) -> np.ndarray:
-    """The texts of a dataset, their lengths added up before any is read: all may be the same one."""
+    """Strings of a dataset.  Their lengths are summed before any is read: all may refer to one long
+    string."""
     if dataset.ndim > 1:
         raise refuse(dataset, "is no list of texts")
     if dataset.size > MOST_TEXTS or _length(dataset) > LONGEST_TEXT:
@@ -273,7 +276,7 @@ def texts(dataset: Any) -> np.ndarray:
 
 
 def _length(dataset: Any) -> int:
-    """Bytes of all texts of a dataset, from the list of lengths and places that stands in its stead."""
+    """Bytes of all strings of a dataset, from the lengths and heap addresses that are stored in its place."""
     size = dataset.size
     if not size or dataset.dtype.kind != "O":
         return int(size * dataset.dtype.itemsize)
@@ -291,7 +294,7 @@ def _length(dataset: Any) -> int:
 
 
 def text(file: Any, path: str) -> str:
-    """The one text of a dataset."""
+    """The string of a scalar dataset."""
     node = dataset_at(file, path)
     if node.shape != () or h5py.check_string_dtype(node.dtype) is None:
         raise refuse(node, "is no text")
@@ -299,7 +302,7 @@ def text(file: Any, path: str) -> str:
 
 
 def json(text: str, kind: Any = Any) -> Any:
-    """Parse a text of a file as JSON.  ValueError where it is no JSON, or longer than any text of ours."""
+    """Parse a text of a file as JSON. ValueError where it is not JSON, or longer than any text of ours."""
     if len(text) > LONGEST_DOCUMENT:
         raise ValueError(f"has {len(text)} characters, more than any of ours")
     try:
@@ -309,12 +312,13 @@ def json(text: str, kind: Any = Any) -> Any:
 
 
 def is_text(dataset: Any) -> bool:
-    """Whether a column holds texts."""
+    """Whether a column holds strings."""
     return h5py.check_string_dtype(dataset.dtype) is not None
 
 
 def columns(group: Any) -> dict[str, Any]:
-    """The datasets of a table by name, each with one name: all in all no more bytes than a table may have."""
+    """Datasets of a table by name, each with one hard link; StoreError beyond `LARGEST_TABLE` bytes in
+    all."""
     found = {name: _has_one_name(dataset_at(group, name)) for name in members(group)}
     if sum(dataset.size * dataset.dtype.itemsize for dataset in found.values()) > LARGEST_TABLE:
         raise refuse(group, f"has more than {LARGEST_TABLE >> 20} MiB, more than any table of ours")
@@ -322,7 +326,7 @@ def columns(group: Any) -> dict[str, Any]:
 
 
 def column(dataset: Any, rows: Any = ()) -> np.ndarray:
-    """Numbers, truth values or texts of a table's column; of numbers some rows, if told."""
+    """Values of a table's column: numbers, booleans or strings; `rows` selects among numbers."""
     if is_text(dataset):
         return texts(dataset)
     if dataset.dtype.kind not in "fiub":
@@ -331,7 +335,8 @@ def column(dataset: Any, rows: Any = ()) -> np.ndarray:
 
 
 def attributes(node: Any) -> dict[str, Any]:
-    """The attributes of a node: scalars, and lists of them.  What we never write is named by its type."""
+    """The attributes of a node: scalars, and lists of them.  A value of a type that we never write is
+    replaced by the type's name."""
     count = h5py.h5a.get_num_attrs(node.id)
     if count > MOST_ATTRIBUTES:
         raise refuse(node, f"has {count} attributes, more than any of ours")
@@ -377,9 +382,9 @@ def _value(node: Any, known: Any, name: str) -> Any:
 
 @lru_cache(maxsize=64)
 def _types(encoded: bytes) -> tuple[np.dtype, Any]:
-    """A type of HDF5 as numpy's and as one of the memory, which is None where we never write such values.
+    """NumPy dtype and in-memory HDF5 type of an encoded type, the latter None for types that we never write.
 
-    A file has thousands of attributes of a handful of types, and h5py makes each anew.
+    Cached: a file has thousands of attributes of a handful of types, and h5py creates each anew.
     """
     kind = h5py.h5t.decode(encoded).dtype
     if kind.kind not in "fiubSO" or (kind.kind == "O" and h5py.check_string_dtype(kind) is None):

@@ -1,8 +1,8 @@
-"""A long trajectory becomes the collection without being copied: its part is renamed and added to.
+"""The part of a long trajectory becomes the collection in place: it is renamed and added to, without a copy.
 
-The one place where a file that holds reported numbers is opened for writing, so everything in it but the
-recorded arrays, which libhdf5 leaves where they are, is first written into an undo file.  Whoever is
-killed in between has the part put back, byte for byte, by the next writer.
+This is the one place where a file that holds reported numbers is opened for writing, so everything in it but
+the recorded arrays, which libhdf5 leaves where they are, is first written into an undo file.  If the process
+is killed in between, the next writer restores the part byte for byte.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ LARGE = 1 << 28
 
 
 def choice(parts: Sequence[Path]) -> Path | None:
-    """The part worth adopting: the largest, if it is large."""
+    """The part worth adopting: the largest, if it has at least `LARGE` bytes; else None."""
     largest = max(parts, key=lambda part: part.stat().st_size, default=None)
     return largest if largest is not None and largest.stat().st_size >= LARGE else None
 
@@ -42,12 +42,12 @@ def adopt(part: Path, temporary: Path) -> tuple[seal.Extent, ...]:
 
 
 def settled(folder: Path) -> None:
-    """The collection is in its place: forget the undo file."""
+    """Remove the undo file, once the collection is in its place."""
     _undo(folder).unlink(missing_ok=True)
 
 
 def recover(folder: Path, temporary: Path, run: str) -> None:
-    """Put a part of this run back that was adopted and never became the collection."""
+    """Restore a part of this run that was adopted and never became the collection."""
     undo = _undo(folder)
     try:
         with files.own(undo) as kept:

@@ -1,4 +1,4 @@
-"""Files of others, read in a child process with limited memory and time: whatever happens to it, we live.
+"""Files of other programs, read in a child process with limited memory and time, whose end is never ours.
 
 Libraries that read them (libhdf5, pandas, MDAnalysis, ASE ...) crash, hang and fill the memory on files that
 are damaged, or were made to do so.
@@ -25,12 +25,12 @@ REFUSED = b"refused "
 
 
 class EndedError(Exception):
-    """The process has crashed, or took more than it was given: the message says which."""
+    """The child process crashed or exceeded its limits: the message says which."""
 
 
 def read(module: str, function: str, path: Path, *words: str) -> bytes:
-    """What a function of a module returns for a file and words.  StoreError where it raises one, EndedError
-    where it does not end as it should."""
+    """What a module's function returns for a file and further arguments, called in a child process.
+    StoreError where it raises one, EndedError where the process does not end normally."""
     root = str(Path(__file__).parents[2])
     paths = os.pathsep.join(filter(None, [root, os.environ.get("PYTHONPATH")]))
     # BLAS would take memory for a thread of each core
@@ -52,7 +52,7 @@ def read(module: str, function: str, path: Path, *words: str) -> bytes:
 
 
 def answer(module: str, function: str, path: Path, *words: str) -> bytes:
-    """Answer of such a process: its function's result, or its complaint about the file."""
+    """What a child process writes: the function's result, or its complaint about the file."""
     try:
         found: bytes = getattr(import_module(module), function)(path, *words)
     except StoreError as error:
@@ -61,14 +61,14 @@ def answer(module: str, function: str, path: Path, *words: str) -> bytes:
 
 
 def heard(said: bytes) -> bytes:
-    """An answer, or the StoreError that it tells."""
+    """The result that a child process has written; its StoreError is raised again."""
     if said.startswith(REFUSED):
         raise StoreError(said.removeprefix(REFUSED).decode("utf-8", "backslashreplace"))
     return said
 
 
 def perform() -> None:
-    """Be such a process: take no more than its arguments say, and answer on standard output alone."""
+    """Entry point of a child process: apply the limits among its arguments, answer on standard output."""
     seconds, memory, module, function, path, *words = sys.argv[1:]
     out = os.dup(1)
     os.dup2(2, 1)
@@ -82,7 +82,7 @@ def perform() -> None:
 
 
 def _limit(seconds: int, memory: int) -> None:
-    """Take no more time and memory than this [s, B], write no file, and die with the process that asked."""
+    """Limit time and memory of this process [s, B], forbid it to write files, and end it with its parent."""
     try:
         import resource
     except ImportError:

@@ -1,4 +1,4 @@
-"""Is a store what it was when it was written?  Every byte against the seal, then all that it lays out."""
+"""Verification of a store: every byte against the seal, then every object against its digest."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ from springcheck.store.parts import Parts
 NO_STORE = "no store of springcheck"
 MOST_FINDINGS = 1000
 LONGEST_CHECK = 1 << 31
-"""Bytes of a file that a command checks before it shows numbers of it; `check` reads them all."""
+"""Bytes of a file that a command verifies before it shows its numbers; `check` verifies all."""
 
 
 @dataclass(frozen=True, slots=True)
 class Damage:
-    """Something wrong with a store: an HDF5 path or a file, and what is wrong there."""
+    """Damage of a store: an HDF5 path or a file, and what is wrong there."""
 
     place: str
     what: str
 
 
 def check(path: str | Path, *, most: int | None = None) -> list[Damage]:
-    """Everything wrong with a store and its journal; an empty list where all is well.
+    """All damage of a store and its journal; an empty list where there is none.
 
-    Bytes against the seal, then everything that is laid out against its digest.  In a file of more than
-    `most` bytes the recorded arrays are not read, which is a finding.  Raises StoreError when there is
-    nothing to check: no such file, or one that cannot be opened at all.
+    Bytes are held against the seal, then every object against its digest.  In a file of more than `most`
+    bytes the recorded arrays are not read, which is a finding.  Raises StoreError when there is nothing to
+    check: no such file, or one that cannot be opened at all.
     """
     path = Path(path)
     everything = Parts.of(path, None).everything
@@ -91,7 +91,7 @@ def check_file(path: Path, most: int | None = None) -> list[Damage]:
 
 
 def structure(path: Path, *, arrays: bool = True) -> list[Damage]:
-    """What libhdf5 finds: all that is missing, was added, or is another than its digest.
+    """Objects that are missing, were added, or differ from their digest, as libhdf5 finds them.
 
     Without `arrays` the numbers themselves are left to the seal.
     """
@@ -108,10 +108,8 @@ def structure(path: Path, *, arrays: bool = True) -> list[Damage]:
 
 
 def tried(path: Path) -> bytes:
-    """The findings of `structure` as JSON, in a process of its own (see `trust`).
-
-    MemoryError where libhdf5 asked for more than it got: elsewhere it would get it, and fill it.
-    """
+    """The findings of `structure` as JSON, computed in a process of its own (see `trust`).  MemoryError where
+    libhdf5 could not allocate: elsewhere it could, and would fill the memory."""
     said = json.dumps([(finding.place, finding.what) for finding in structure(path)])
     if re.search(r"allocation failed|(unable to|can't) allocate", said):
         raise MemoryError
@@ -148,7 +146,7 @@ def _structure(file: Any, *, arrays: bool) -> Iterator[Damage]:
 
 
 def _before(file: Any, kept: dict[str, str], now: dict[str, str]) -> Iterator[Damage]:
-    """Damage of a store of an earlier format, which lists no arrays, or of a part, which has no list."""
+    """Damage that is known without a list of arrays: of a store of an earlier format, or of a part."""
     for label in access.children(file, "parameters"):
         try:
             reading.arrays_of(file, label, reading.known_of(file, label)[0])

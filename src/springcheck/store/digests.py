@@ -1,11 +1,12 @@
-"""What a collection holds, under sha256: every array, group, table and document, and that none is missing.
+"""The sha256 of every array, group, table and document of a collection, and the list of them.
 
-The seal (see `seal`) ends with the first edit by another program.  These digests stay, and tell what was
-changed and what was not.  Nobody needs a key to write them: they find accidents and careless edits, not
-a forger.
+The seal (see `seal`) ends with the first edit by another program.  These digests stay, and show what was
+changed and what was not.  They can be written without a key: they find accidents and careless edits, not a
+forger.
 
-A recorded array carries the sha256 of its numbers as an attribute, which `Draft` has found as it wrote them
-and the seal repeats; its digest here is of its attributes, shape, type and storage, and so of that one too.
+A recorded array carries the sha256 of its numbers as an attribute, which `Draft` computes while it writes
+them and the seal repeats.  The digest here is of its attributes, shape, type and storage, and so covers that
+one.
 """
 
 from __future__ import annotations
@@ -28,16 +29,17 @@ KEY = "digests"
 """The attribute of the root that keeps the digests."""
 
 LAID_OUT = ("h5md", "observables", "particles")
-"""Groups of the root whose members have a digest each; stores of before list none of them."""
+"""Groups of the root whose members have a digest each; stores of earlier formats list none of them."""
 MOST_OBJECTS = 64 * access.MOST_MEMBERS
 DEEPEST = 4
-"""Most objects below these groups, and levels of them: what the most trajectories of a store need."""
+"""Bounds on the objects below these groups, and on their depth: the needs of a store with the most
+trajectories."""
 
 
 def combined(digests: Mapping[str, str], columns: Mapping[str, Column]) -> str:
-    """The digest of a trajectory: sha256 over the sha256 of its times and quantities, with their shapes.
+    """Digest of a trajectory: sha256 over the sha256 of its times and quantities, with their shapes.
 
-    Little-endian float64, nothing of clock or machine: equal exactly when two runs agree bit for bit.
+    Little-endian float64, without clock or machine: equal exactly when two runs agree bit for bit.
     """
     lines = [
         f"{name} {columns[name].shape} {digests[name]}" for name in ("time", *QUANTITIES) if name in digests
@@ -79,7 +81,7 @@ def blocks(dataset: Any) -> Iterator[np.ndarray]:
 
 
 def of_run(file: Any, label: str) -> str:
-    """sha256 of what is known of a trajectory, the digest of its numbers in it, and of its masses."""
+    """sha256 of everything known of a trajectory: metadata, the digest of its numbers, and its masses."""
     total = hashlib.sha256(_attributes(access.group_at(file, f"parameters/{label}")))
     mass = f"particles/{label}/mass"
     if access.find(file, mass) is not None:
@@ -88,7 +90,7 @@ def of_run(file: Any, label: str) -> str:
 
 
 def contents(file: Any) -> tuple[dict[str, str], list[Extent]]:
-    """Everything in a collection by its place -> sha256; and its recorded arrays, as a seal lists them."""
+    """sha256 of every object of a collection by its path, and its recorded arrays as the seal lists them."""
     found = {"/": hashlib.sha256(_attributes(file, KEY)).hexdigest()}
     extents: list[Extent] = []
     known: dict[int, str] = {}
@@ -113,7 +115,7 @@ def _is_laid_out(place: str) -> bool:
 
 
 def _of_object(place: str, node: Any, extents: list[Extent]) -> str:
-    """The digest of a group or dataset; a recorded array is added to those of a seal."""
+    """The digest of a group or dataset; a recorded array is also appended to `extents`."""
     attributes = access.attributes(node)
     total = hashlib.sha256(_listed(attributes))
     if isinstance(node, h5py.Dataset):

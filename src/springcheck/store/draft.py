@@ -1,6 +1,6 @@
-"""One trajectory on its way to the disk: any length in bounded memory.
+"""A streaming writer of one trajectory: any length in bounded memory.
 
-The arrays are laid out in an HDF5 file first and filled past libhdf5, at their offsets, by a few threads
+The arrays are laid out in an HDF5 file first and then filled past libhdf5, at their offsets, by a few threads
 that hash what they write.  A run that stops early is laid out again at the length that it reached.
 """
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 from contextlib import ExitStack
 
 BUFFER = 1 << 22
-"""Bytes that one array collects before they are written."""
+"""Bytes that are buffered for one array before they are written."""
 
 
 class Draft:
@@ -68,10 +68,10 @@ class Draft:
     def append(
         self, t: Floats, q: Floats, p: Floats, energy: Floats | None = None, last_step: Floats | None = None
     ) -> None:
-        """Add frames: t (f,), q and p (f, n), energy (f,) where the scene keeps energies, and last steps (f,)
-        where the solver tells them: of all frames, or of none.
+        """Append frames: t (f,), q and p (f, n), energy (f,) where the scene records energies, and last steps
+        (f,) where the solver reports them: for all frames, or for none.
 
-        What the scene does not keep is not looked at.  Raises StoreError when the disk is full.
+        Quantities that the scene does not record are ignored.  Raises StoreError when the disk is full.
         """
         given = {"time": t, "q": q, "p": p, "energy": energy, "last_step": last_step}
         if last_step is not None and not self.rows:
@@ -106,7 +106,8 @@ class Draft:
     def finish(self, attributes: Mapping[str, Scalar | None]) -> str:
         """Complete the part and put it into the journal -> the digest of its numbers.
 
-        Once this returns, the trajectory outlives crashes of program and machine.  None is left out.
+        Once this returns, the trajectory survives crashes of program and machine.  An attribute that is None
+        is left out.
         """
         if self.rows == 0:
             raise ValueError(f"{self.label}: a trajectory without frames")
@@ -131,7 +132,7 @@ class Draft:
             self._files[name].seek(offset)
 
     def _flush(self) -> None:
-        """Write what is held: at once where it is all there is, else behind the caller's back."""
+        """Write the buffers: at once where they hold everything, else in the background."""
         if not self._held:
             return
         with files.told(self.path.parent, "write"):
@@ -153,7 +154,7 @@ class Draft:
         self._held = 0
 
     def _wait(self) -> None:
-        """Until the last buffers are written; raises what went wrong there."""
+        """Wait until the last buffers are written; raises the errors of the writing threads."""
         running, self._running = self._running, []
         for done in running:
             done.result()
@@ -163,7 +164,7 @@ class Draft:
         self._put(name, values.data.cast("B"))
 
     def _put(self, name: str, content: memoryview) -> None:
-        """Write all of it: the system may take less at a time."""
+        """Write all of it: one system call may write less."""
         while content:
             content = content[self._files[name].write(content) :]
 

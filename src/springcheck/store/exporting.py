@@ -1,4 +1,4 @@
-"""One trajectory of a store as a file of its own that MDAnalysis and its kin open."""
+"""Export one trajectory of a store to a file of its own, for MDAnalysis and other readers of H5MD."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from springcheck.store.checking import Damage
 def export(path: str | Path, label: str, out: str | Path) -> list[Damage]:
     """Write one trajectory as plain H5MD: one group ``/particles/trajectory``, no virtual datasets.
 
-    MDAnalysis wants that name, and the ending .h5md.  Returns what else of the store cannot be trusted.
-    Raises StoreError for an unknown label, a scene without particles, a path that exists, and a
-    trajectory that is not what was written: a clean file is not made of it.
+    MDAnalysis expects that name, and the ending .h5md.  Returns the damage found elsewhere in the store.
+    Raises StoreError for an unknown label, a scene without particles, a path that exists, and a trajectory
+    that differs from its digest, of which no clean file is made.
     """
     path, out = Path(path), Path(out)
     if os.path.lexists(out):
@@ -92,7 +92,7 @@ def _write(
         layout.write_unit(element["time"], unit["time"])
     if edges is not None:
         layout.write_attributes(group["box"], {"boundary": 3 * ["periodic"]})
-        # of each frame: MDAnalysis asks for them so
+        # a value for each frame, as MDAnalysis expects
         element = group["box"].create_group("edges")
         element["value"] = np.broadcast_to(edges, (len(columns["time"]), 3))
         layout.write_unit(element["value"], unit["q"])
@@ -103,7 +103,7 @@ def _write(
 
 
 def _copy_values(source: Any, target: Any, places: Integers) -> None:
-    """Write (frames, n) as its places of (frames, particles, 3), in pieces; the rest is a fill value."""
+    """Copy (frames, n) to its places in (frames, particles, 3), in pieces; the rest keeps the fill value."""
     frames, particles = source.shape[0], int(np.max(places)) // 3 + 1
     rows = max(1, min(frames, layout.CHUNK // (8 * particles)))
     shape = (frames, particles, 3)

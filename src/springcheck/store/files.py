@@ -1,4 +1,4 @@
-"""Files that are written whole or not at all: locks, free space, fsync, and errors in one line."""
+"""Files written whole or not at all: locks, free space, fsync, and errors in one line."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ JOURNAL = ".parts"
 """Ending of the folder of a store that is being written."""
 
 TEMPORARY = re.compile(r"springcheck-[0-9a-f]{16}\.new")
-"""Names of files that are being written: of a user's files none is called so."""
+"""Names of temporary files: none that a user would choose."""
 
 UNSUPPORTED = {errno.EOPNOTSUPP, errno.ENOTSUP, errno.ENOSYS, errno.EINVAL, errno.ENOLCK, errno.EINTR}
-"""Error numbers of a file system that lacks an operation, or never completes one."""
+"""Error numbers of a file system that lacks an operation, or never completes it."""
 
 INTERRUPTED_FOR = 1.0
-"""How long a system call that was interrupted is retried [s]; Python would retry it for ever."""
+"""How long an interrupted system call is retried [s]; Python itself would retry it forever."""
 
 CAUSES = {
     errno.ENOSPC: "the disk is full",
@@ -72,12 +72,12 @@ def cause(error: BaseException, *, writing: bool = False) -> str:
 
 
 def number_of(error: OSError) -> int:
-    """The number of an error of the system, which libhdf5 has in its text."""
+    """Error number of a system error, which libhdf5 gives within its text."""
     return error.errno or int(next(iter(re.findall(r"errno = (\d+)", str(error))), 0))
 
 
 def shown(path: Path) -> Path:
-    """The name under which a user knows a file: a part of a journal is the store's."""
+    """The name under which a user knows a file: for a part of a journal, the store's."""
     for one in (path, path.parent):
         if one.name.endswith(JOURNAL) and (one / "lock").exists():
             return one.with_name(one.name.removesuffix(JOURNAL))
@@ -130,7 +130,7 @@ def readable(size: float) -> str:
 
 
 def reserve(file: BinaryIO, size: int) -> None:
-    """Take up `size` bytes on the disk now, so that no later write can find it full.
+    """Allocate `size` bytes on the disk now, so that no later write finds it full.
 
     libhdf5 cannot close a file whose last write failed; with the space reserved beforehand none fails.  Where
     the system cannot reserve, zeros are written.
@@ -145,9 +145,9 @@ def reserve(file: BinaryIO, size: int) -> None:
 
 
 def _done(name: str, file: BinaryIO, *given: int) -> bool:
-    """Whether a function of the C library did its work on a file; False where the system does not offer it.
+    """Call a function of the C library on a file; False where the system does not offer it.
 
-    Raises OSError with what else it answers, as a number or by `errno`.
+    OSError for any other failure, which the function returns as a number or leaves in `errno`.
     """
     call, until = _function(name), time.monotonic() + INTERRUPTED_FOR
     while number := call(file.fileno(), *given):
@@ -167,16 +167,14 @@ def _function(name: str) -> Callable[..., int]:
 
 
 def created(path: Path) -> BinaryIO:
-    """A new file, open for reading and writing; FileExistsError where anything has its name, a link too."""
+    """Create a file for reading and writing; FileExistsError where anything has its name, a link too."""
     how = os.O_RDWR | os.O_CREAT | os.O_EXCL | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0)
     return os.fdopen(os.open(path, how, 0o666), "rb+")
 
 
 def own(path: Path, *, create: bool = False) -> BinaryIO:
-    """A file of a journal, open for reading, with `create` for writing as well.
-
-    ValueError where it is no plain file with one name: a link would lead to a file of the user's.
-    """
+    """Open a file of a journal for reading, with `create` for writing as well.  ValueError where it is not a
+    plain file with one name: a link would lead to a file of the user's."""
     how = os.O_RDWR | os.O_CREAT if create else os.O_RDONLY
     for flag in ("O_NOFOLLOW", "O_NONBLOCK", "O_BINARY"):
         how |= getattr(os, flag, 0)
@@ -205,13 +203,14 @@ def sync_folder(folder: Path) -> None:
 
 
 def temporary(path: Path) -> Path:
-    """A name beside `path` for a file that takes its place when it is complete."""
+    """A temporary name beside `path`, for a file that replaces it once complete."""
     return path.with_name(f"springcheck-{os.urandom(8).hex()}.new")
 
 
 @contextlib.contextmanager
 def unfinished(path: Path) -> Iterator[Path]:
-    """A file that is moved to its place when it is complete; nothing else is left of it, by no interrupt."""
+    """A temporary file that is moved to its place when it is complete, and removed otherwise, interrupts
+    included."""
     remove = partial(path.unlink, missing_ok=True)
     interrupts.takes(remove)
     try:
@@ -249,11 +248,11 @@ def put_bytes(content: bytes, path: Path) -> None:
 
 
 class Lock:
-    """One writer at a time.  The lock is the system's, so that it ends with its process, killed or not.
+    """A lock of the operating system, for one writer at a time: it ends with its process, killed or not.
 
-    Where the file system has no locks, the file itself says who writes, and a `StoreWarning` that two
-    writers on two machines would not see each other.  The library filelock (4.2) knows ENOSYS alone of what
-    such file systems answer (`UNSUPPORTED`), and its file does not say who writes.
+    Where the file system has no locks, the file itself says who writes, and a `StoreWarning` says that
+    writers on two machines would not see each other.  The library filelock (4.2) handles ENOSYS alone among
+    the errors of such file systems (`UNSUPPORTED`), and its file does not say who writes.
     """
 
     def __init__(self, path: Path) -> None:
@@ -319,13 +318,13 @@ def _holder(content: bytes) -> dict[str, Any]:
 
 
 def _is_torn(content: bytes) -> bool:
-    """Whether a full disk or a loss of power has left this of a lock file of ours: it is never synced."""
+    """Whether a full disk or a power failure has left this of a lock file of ours, which is never synced."""
     whole, left = b'{"pid": ', content.replace(b"\0", b"")
     return left.startswith(whole) or whole.startswith(left)
 
 
 def _alive(who: dict[str, Any]) -> bool:
-    """Whether a holder still runs, as far as can be known from here."""
+    """Whether the holder of a lock still runs, as far as this machine can tell."""
     if not who:
         return False
     if who["host"] != platform.node():
@@ -340,7 +339,7 @@ def _alive(who: dict[str, Any]) -> bool:
 
 
 def _taken(file: BinaryIO) -> bool | None:
-    """Whether the system gave the lock; None where it has none to give."""
+    """Whether the system granted the lock; None where it offers none."""
     if sys.platform == "win32":
         import msvcrt
 

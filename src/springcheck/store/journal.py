@@ -1,9 +1,9 @@
-"""The journal of a store that is being written: nothing that was reported is ever lost.
+"""The journal of a store that is being written: no reported number is ever lost.
 
 Finished trajectories and tables are files of their own in ``<file>.parts/``, put there by os.replace and
 fsync.  `Journal.commit` writes a collection of all parts, checks the digests, puts it in place by os.replace,
-and only then removes the parts.  No file that holds reported numbers is ever changed.  Whoever is killed
-anywhere in this finds everything on starting again.
+and only then removes the parts.  No file that holds reported numbers is ever changed.  A process that is
+killed at any point finds everything when it is started again.
 """
 
 from __future__ import annotations
@@ -80,11 +80,11 @@ def open_new(path: str | Path, command: str, *, force: bool = False) -> Journal:
 
 
 _NAMES = re.compile(rf"lock|command|undo|collection\.new|(run|table|rows)-.*\.h5|{files.TEMPORARY.pattern}")
-"""Names of the files of a journal: nothing else in its folder is ever touched."""
+"""Names of the files of a journal: no other file of its folder is ever touched."""
 
 
 def _is_free(parts: Path) -> bool:
-    """Whether a journal may be here: there is nothing yet, or it is recognisably one of ours."""
+    """Whether a journal may be created here: the folder is missing, or recognisably one of ours."""
     if not os.path.lexists(parts):
         return True
     if parts.is_symlink() or not parts.is_dir():
@@ -116,7 +116,7 @@ def _is_ours(path: Path) -> bool:
 
 
 def _claim(path: Path, parts: Path, command: str, *, force: bool) -> str:
-    """The run id of the journal that is resumed or started."""
+    """The run id of the journal, resumed or new."""
     known = claim(parts)
     if known is not None and path.is_file() and run_of(path) == known.run:
         # killed as it tidied up: the store is complete
@@ -143,7 +143,7 @@ def _claim(path: Path, parts: Path, command: str, *, force: bool) -> str:
 
 
 def _look_at_parts(parts: Path, run: str) -> None:
-    """Remove the damaged parts of a run, and say so: they alone are measured again."""
+    """Remove the damaged parts of a run, with a warning: they alone are measured again."""
     for part in sorted(filter(_is_plain, parts.glob("*-*.h5"))):
         name = name_of(part)
         known = seal.find(part)
@@ -173,9 +173,9 @@ def _leave(parts: Path) -> None:
 
 
 def _give_up(temporary: Path, run: str) -> None:
-    """After a commit that failed: the adopted part goes back, the disk is free again.
+    """Undo a failed commit: the adopted part is restored, the disk space freed.
 
-    Not while libhdf5 still holds the file, which it might write to later; then the next writer does it.
+    Not while libhdf5 still has the file open, which it might write to later; then the next writer does it.
     """
     held = h5py.h5f.get_obj_ids(h5py.h5f.OBJ_ALL, h5py.h5f.OBJ_FILE)
     if not any(Path(h5py.h5f.get_name(one).decode()) == temporary for one in held):
@@ -185,7 +185,7 @@ def _give_up(temporary: Path, run: str) -> None:
 
 
 class Journal:
-    """The one writer of a store: drafts, tables, commits.  A context that gives its lock back."""
+    """The only writer of a store: drafts, tables, commits.  A context manager that releases the lock."""
 
     def __init__(self, path: Path, run: str, lock: files.Lock) -> None:
         self.path, self.run = path, run
@@ -215,10 +215,10 @@ class Journal:
             return draft.finish(records.attributes(trajectory))
 
     def add(self, table: Table, *, by: Sequence[pieces.Worker] = (), rows: bool = False) -> None:
-        """Store one table; once this returns it outlives crashes.
+        """Store one table; once this returns it survives crashes.  `by` says who measured it.
 
-        `by` says who measured it.  With `rows` it is a piece ``<table>/<piece>`` of a table: the final
-        collection holds the rows of all of them as one, in the order of their names.
+        With `rows` it is a piece ``<table>/<piece>`` of a table: the final collection joins the rows of all
+        pieces into one table, in the order of their names.
         """
         if table.name.split("/")[0] in layout.RESERVED:
             raise ValueError(f"a table cannot be called {table.name!r}")
@@ -227,7 +227,7 @@ class Journal:
             files.put_bytes(image, self._part("rows" if rows else "table", table.name))
 
     def tables(self) -> Mapping[str, Table]:
-        """The finished tables, and pieces of tables, by name; each is read when it is asked for."""
+        """The finished tables, and pieces of tables, by name; each is read on access."""
         return reading.tables_of(self.path, self.run, rows=True)
 
     def measured_by(self, name: str) -> list[dict[str, str]]:
@@ -246,7 +246,7 @@ class Journal:
         verdicts: Sequence[Verdict] = (),
         documents: Mapping[str, str] | None = None,
     ) -> None:
-        """Put a collection that holds everything finished in the place of the store; the journal ends."""
+        """Write a collection of everything finished in the place of the store; the journal ends."""
         extra: list[Table] = []
         if comparison is not None:
             extra.append(tables.of_comparison(comparison))
@@ -257,7 +257,7 @@ class Journal:
             root |= {"scene": scene.to_toml(), "scene_name": scene.name, "units": scene.units}
         found = Parts.of(self.path, self.run)
         temporary = self.folder / COLLECTION
-        # an adopted part is all that there is of it
+        # an adopted part no longer exists on its own
         copied = adopt.choice(found.runs) is None
         with files.told(self.path, "write"), files.unfinished(temporary) if copied else nullcontext():
             try:
@@ -280,7 +280,7 @@ class Journal:
                 interrupts.announce(plain(f"interrupted; {self.path} is complete"))
 
     def _end(self) -> None:
-        """The journal goes: its claim first, so that what a kill leaves is an empty folder."""
+        """Remove the journal: its claim first, so that a kill leaves an empty folder at worst."""
         (self.folder / "command").unlink()
         _remove(self.folder, lambda _: True)
         with contextlib.suppress(OSError):
@@ -291,14 +291,14 @@ class Journal:
         return self.folder / f"{kind}-{quote(name, safe='@-._')}.h5"
 
     def fail(self) -> None:
-        """Note that a method of this command failed: what is finished is resumed by the same command, and
-        gives way to any other, the corrected one."""
+        """Note that a method of this command failed.  The same command resumes what is finished; any other,
+        such as the corrected one, may replace it."""
         if known := claim(self.folder):
             with files.told(self.folder, "write"):
                 msgspec.structs.replace(known, failed=True).write(self.folder)
 
     def close(self) -> None:
-        """Give the lock back; what is finished stays for the next one."""
+        """Release the lock; what is finished stays for the next writer."""
         if self.folder.is_dir():
             with interrupts.held(), contextlib.suppress(OSError):
                 if {entry.name for entry in self.folder.iterdir()} <= {"lock", "command"}:

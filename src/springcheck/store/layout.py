@@ -184,7 +184,7 @@ def begin(file: Any) -> None:
 
 @cache
 def _empty() -> bytes:
-    """An HDF5 file with its format and nothing else: so the format lies in the first bytes of every store."""
+    """An HDF5 file with its format and nothing else, so that every store begins with the same bytes."""
     with h5py.File("empty", "w", driver="core", backing_store=False, libver=LIBVER) as file:
         write_attributes(file, {"format": FORMAT})
         file.flush()
@@ -215,7 +215,7 @@ def reopened(path: Path, size: int) -> Iterator[Any]:
 
 
 def recorded(kind: str, of: str) -> UnitsOf:
-    """Units of /observables: of reduced numbers none, "1", but of the times, which /particles shares."""
+    """Unit of an array of /observables: "1" for reduced numbers, except times, which /particles shares."""
     found = UNITS[kind, of]
     return {name: "1" if of == "reduced" and name != "time" else unit for name, unit in found.items()}
 
@@ -246,7 +246,7 @@ def skeleton(file: Any, label: str, scene: Scene, found: Mapping[str, Column]) -
 
 
 def _named(text: str, unit: str, scene: Scene) -> str:
-    """Axis labels for viewers: H5Web adds no unit to a long_name, and reduced numbers carry none."""
+    """Axis label for viewers: H5Web adds no unit to a long_name, and reduced numbers carry none."""
     return text if scene.units == "reduced" or unit == "1" else f"{text} ({unit})"
 
 
@@ -294,9 +294,10 @@ def write_unit(dataset: Any, unit: str, name: str = "") -> None:
 
 
 def write_box(group: Any, lengths: tuple[float, ...] | None = None) -> None:
-    """The box of a particle group: three dimensions without borders, or periodic ones of these lengths [L].
+    """Write the box of a particle group: three dimensions without borders, or periodic ones of these lengths
+    [L].
 
-    Positions are counted on across its borders, so that H5MD's images are all 0 and left out.
+    Positions are unwrapped, so that H5MD's images are all 0 and left out.
     """
     box = group.create_group("box")
     box.attrs["dimension"] = 3
@@ -307,7 +308,7 @@ def write_box(group: Any, lengths: tuple[float, ...] | None = None) -> None:
 
 @cache
 def machine() -> dict[str, Scalar]:
-    """What ran, and on what."""
+    """Provenance: software, versions and machine."""
     return {
         "springcheck": springcheck.__version__,
         "machine": platform.machine(),

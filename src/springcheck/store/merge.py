@@ -1,4 +1,4 @@
-"""Merge parts into one store: copy object by object, compare digests, seal the result."""
+"""Merge parts into one store: copy every object, compare digests, seal the result."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def _bytes(table: Table) -> int:
 
 
 def _compare(group: Any, table: Table) -> None:
-    """StoreError where a table that was read from a part is not what stands here now."""
+    """StoreError where a table as written differs from the one that was read from a part."""
     for name, dataset in group.items():
         back, values = access.column(dataset), np.asarray(table.columns[name])
         same = back.tolist() == values.tolist() if back.dtype == object else _raw(back) == _raw(values)

@@ -15,11 +15,11 @@ from springcheck.errors import StoreError
 from springcheck.store import access, files, layout, seal, trust
 
 ROWS = "rows-"
-"""Beginning of the names of parts that hold rows of a table; of the others it is run- or table-."""
+"""Prefix of parts that hold rows of a table; others begin with run- or table-."""
 
 
 def name_of(part: Path) -> str:
-    """The label, the table, or the piece of a table, that a part holds."""
+    """The label, table, or piece of a table that a part holds."""
     return unquote(part.stem.partition("-")[2])
 
 
@@ -34,7 +34,7 @@ def parts_folder(path: Path) -> Path:
 
 
 class JournalClaim(msgspec.Struct, frozen=True, kw_only=True):
-    """Run id and command of a journal of ours, whether --force began it and whether a method of it failed."""
+    """Claim on a journal: run id and command, whether --force began it, and whether a method failed."""
 
     format: Literal["springcheck journal 1"] = "springcheck journal 1"
     run: str
@@ -64,7 +64,7 @@ def claim(parts: Path) -> JournalClaim | None:
 class Parts:
     """The files that make up a store: the collection, or the parts of a run that are not yet in one.
 
-    Of these each holds a trajectory (`runs`), or a table or rows of one (`tables`).
+    Each part holds a trajectory (`runs`), or a table or rows of one (`tables`).
     """
 
     collection: Path | None

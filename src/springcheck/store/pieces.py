@@ -1,9 +1,9 @@
 """Pieces of a study in the collection: rows of many pieces as one table, and who measured each piece.
 
-A part ``rows-<table>/<piece>.h5`` holds rows of a table; in the collection they stand below one another, in
-the order of the names of their pieces.  So a store has as many tables whether a thousand pieces or a million
-were measured.  The root of a part says by whom it was measured; the collection has one row for each of those,
-and one for each piece.
+A part ``rows-<table>/<piece>.h5`` holds rows of a table; the collection concatenates them in the order of the
+names of their pieces.  So a store has as many tables whether a thousand pieces or a million were measured.
+The root of a part records the workers that measured it; the collection has one row for each worker, and one
+for each piece.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from springcheck.store.parts import name_of, table_of
 from springcheck.store.tables import Table
 
 BY = "measured_by"
-"""The attribute of a part's root that says by whom: a list of records as JSON."""
+"""Attribute of a part's root that records the workers: a list of records as JSON."""
 
 WORKERS, PIECES = "provenance/workers", "provenance/pieces"
 
@@ -80,10 +80,8 @@ class Provenance:
 
 
 def measured(found: Mapping[str, Table]) -> Iterator[tuple[str, dict[str, str]]]:
-    """Each piece and who measured it, from the tables of a store; nothing where it does not say.
-
-    StoreError where its tables do not fit together.
-    """
+    """Each piece and who measured it, from the tables of a store; empty where they are not recorded.
+    StoreError where its tables contradict each other."""
     if not {WORKERS, PIECES} <= found.keys():
         return
     workers, columns = found[WORKERS].columns, found[PIECES].columns
@@ -97,7 +95,7 @@ def measured(found: Mapping[str, Table]) -> Iterator[tuple[str, dict[str, str]]]
 
 
 def joined(parts: Sequence[Path], provenance: Provenance) -> Iterator[Table]:
-    """The tables that these parts hold, or rows of, one after the other."""
+    """The tables of these parts, rows of one table joined."""
     for name, group in groupby(sorted(parts, key=lambda part: (table_of(part), name_of(part))), key=table_of):
         yield _joined(name, list(group), provenance)
 

@@ -45,14 +45,14 @@ def sources(path: Path, run: str | None = None) -> dict[str, Path]:
 
 
 def _sequence(file: Any, label: str) -> int:
-    """The place of a trajectory among those of its run; 0 where it does not say."""
+    """Position of a trajectory in its run's order; 0 where it is not recorded."""
     group = access.group_at(file, f"parameters/{label}")
     found = None if group is None else access.attribute(group, "sequence")
     return found if isinstance(found, int) else 0
 
 
 def known_of(file: Any, label: str) -> tuple[RunRecord, dict[str, Any]]:
-    """All that is known of a trajectory besides its numbers: with types, and as it stands there."""
+    """Metadata of a trajectory: as a typed record, and as stored."""
     group = access.group_at(file, f"parameters/{label}")
     if group is None:
         raise StoreError(f"{file.filename} holds no trajectory {label!r}")
@@ -61,7 +61,7 @@ def known_of(file: Any, label: str) -> tuple[RunRecord, dict[str, Any]]:
 
 
 def arrays_of(file: Any, label: str, known: RunRecord) -> dict[str, Any]:
-    """The arrays of a trajectory, looked at: time, and of the quantities those that are recorded."""
+    """The arrays of a trajectory, validated: time, and those quantities that are recorded."""
     base = f"observables/{label}"
     found = {"time": access.array(file, f"{base}/{known.kept[0]}/time", (known.frames,))}
     for name in known.kept:
@@ -224,7 +224,7 @@ def summary(path: str | Path) -> Summary:
 
 
 def _is_claimed(path: Path, run: object) -> bool:
-    """Whether the journal of another run than its own stands beside a store: a kill may have left that."""
+    """Whether the journal beside a store belongs to another run than the store: a kill may leave that."""
     try:
         found = claim(parts_folder(path))
         return found is not None and found.run != run
@@ -233,7 +233,7 @@ def _is_claimed(path: Path, run: object) -> bool:
 
 
 def _tables(path: Path, run: str | None = None, *, rows: bool = False) -> dict[str, Path]:
-    """The tables of a collection, and the parts that hold one, or rows of one as well."""
+    """The tables of a collection, and the parts that hold a table or rows of one."""
     found = Parts.of(path, run)
     if found.collection is not None:
         with opened(found.collection) as file:
@@ -267,7 +267,7 @@ class _Tables(Mapping[str, Table]):
 
 
 def tables_of(path: str | Path, run: str | None = None, *, rows: bool = False) -> Mapping[str, Table]:
-    """The tables of a store by name, but for comparison and verdicts; each is read when it is asked for.
+    """The tables of a store by name, without comparison and verdicts; each is read on access.
 
     With `rows` also the pieces of tables that an unfinished store holds.
     """
@@ -302,7 +302,7 @@ def document(path: str | Path, name: str) -> str:
 
 
 def decoded(path: str | Path, name: str) -> Any:
-    """A document of JSON.  StoreError where it is none, or nested deeper than any of ours."""
+    """A JSON document of a store.  StoreError where it is not JSON, or nested deeper than any of ours."""
     try:
         return access.json(document(path, name))
     except ValueError as error:

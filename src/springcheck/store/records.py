@@ -48,11 +48,11 @@ KEPT = {
     "rebuilds_velocity": "rebuilds_velocity",
     "off_axis": "off_axis",
 }
-"""Attributes, and the fields of a trajectory that they keep."""
+"""Attributes, and the fields of a trajectory that they store."""
 
 
 class RunRecord(msgspec.Struct, frozen=True, kw_only=True):
-    """The attributes of /parameters/<label>, but for those that only people read."""
+    """The attributes of /parameters/<label>, without those that only people read."""
 
     scene: str
     scene_name: Name = ""
@@ -98,7 +98,7 @@ class RunRecord(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def record(place: str, known: Mapping[str, Any]) -> RunRecord:
-    """Attributes with their types; StoreError that names the one that has another, or is missing."""
+    """Attributes as a typed record; StoreError that names one that is missing or has another type."""
     try:
         found = msgspec.convert(known, RunRecord)
     except msgspec.ValidationError as error:

@@ -1,11 +1,10 @@
-"""The seal at the end of every file of ours: every byte is accounted for, and checked without libhdf5.
+"""The seal at the end of every file of ours accounts for every byte, and is checked without libhdf5.
 
-A file is HDF5 (libhdf5 ignores what follows its end), then a line of JSON, then a line with
-its length and sha256.
-The JSON lists the recorded arrays, which lie contiguous in the file, as name, offset, length and sha256,
-and the sha256 of all other bytes: groups, attributes, small tables.  So a reader knows within
-milliseconds that the structure of a file of many gigabytes is as it was written, before libhdf5 follows
-any address in it, and which array a flipped byte lies in.
+A file is HDF5 (libhdf5 ignores what follows its end), then a line of JSON, then a line with its length and
+sha256.  The JSON lists the recorded arrays, which lie contiguous in the file, as name, offset, length and
+sha256, and the sha256 of all other bytes: groups, attributes, small tables.  So a reader knows within
+milliseconds that the structure of a file of many gigabytes is as it was written, before libhdf5 follows any
+address in it, and which array a flipped byte lies in.
 """
 
 from __future__ import annotations
@@ -68,7 +67,7 @@ def blocks(file: BinaryIO, start: int, size: int) -> Iterator[bytes]:
 
 
 def gaps(extents: Iterable[Extent], end: int) -> Iterator[tuple[int, int]]:
-    """Offset and size of everything between the arrays."""
+    """Offset and size of the ranges between the arrays."""
     position = 0
     for extent in sorted(extents, key=lambda extent: extent.offset):
         if extent.offset > position:
@@ -104,7 +103,7 @@ def _foot(line: bytes) -> bytes:
 
 
 def find(path: Path) -> Seal | None:
-    """The seal of a file; None where there is none that can be read.  OSError where the file cannot."""
+    """The seal of a file; None where there is none that can be read.  OSError where the file cannot be."""
     with path.open("rb") as file:
         size = file.seek(0, 2)
         if size < _FOOT_SIZE:
@@ -132,7 +131,7 @@ def find(path: Path) -> Seal | None:
 
 
 def is_whole(path: Path, seal: Seal) -> bool:
-    """Whether everything but the arrays is as it was sealed.  Milliseconds, however long the arrays."""
+    """Whether everything but the arrays matches the seal. Takes milliseconds, however long the arrays."""
     if seal.end - sum(extent.size for extent in seal.extents) > LARGEST_REST:
         return False
     with path.open("rb") as file:
@@ -140,6 +139,6 @@ def is_whole(path: Path, seal: Seal) -> bool:
 
 
 def broken(path: Path, extents: Iterable[Extent]) -> list[str]:
-    """Names of the arrays whose bytes are not those of their sha256."""
+    """Names of the arrays whose bytes do not match their sha256."""
     with path.open("rb") as file:
         return [e.name for e in extents if digest(file, (e.offset, e.size)) != e.sha256]

@@ -1,4 +1,4 @@
-"""Where the columns of q and p (frames, n) stand among x, y and z of particles (frames, particles, 3)."""
+"""Mapping from columns of q and p (frames, n) to x, y and z of particles (frames, particles, 3)."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from springcheck.physics.scene import Scene
 
 
 def axes_of(scene: Scene) -> str:
-    """The axes of every particle, or of each, with commas between: "x", "xyz", "xy,xyz"."""
+    """Axes along which particles move, of all or with commas of each: "x", "xyz", "xy,xyz"."""
     if scene.places is None:
         return "x"
     of, axis = np.divmod(scene.places, 3)
@@ -32,7 +32,7 @@ def places_of(axes: str, n: int) -> Integers:
 
 
 def lines(places: Integers) -> Iterator[tuple[slice, slice, int]]:
-    """Columns of (frames, n) and their particles, each evenly spaced, and the axis of all of them."""
+    """Slices of columns of (frames, n) that move along one axis, those of their particles, and the axis."""
     for axis in range(3):
         columns = np.flatnonzero(places % 3 == axis)
         steps = np.diff(np.stack([columns, places[columns] // 3]), axis=1)

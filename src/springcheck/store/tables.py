@@ -21,14 +21,14 @@ _STYLE = "SILX_style"
 DEEPEST = 8
 """Groups that a table lies in."""
 MOST_VERDICTS = 1 << 17
-"""Most verdicts: as many as there are checks of all trajectories that a store may hold."""
+"""Most verdicts in a table: every check of the most trajectories that a store may hold."""
 _PASSED = {None: -1, False: 0, True: 1}
 _VERDICT = {
     "method": "O", "check": "O", "value": "f", "bound": "f", "unit": "O", "passed": "i", "why": "O",
     **{f"sees_{one.name}": "f" for one in fields(Limits)},
 }  # fmt: skip
 _OWN = tuple(name for name in _VERDICT if not name.startswith("sees_"))
-"""Columns of the table of verdicts, and the kinds of what is in them; stores of before have fewer limits."""
+"""Columns of the table of verdicts, and their kinds; stores of earlier formats have fewer limits."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

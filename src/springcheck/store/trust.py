@@ -1,7 +1,7 @@
-"""Whether this process may open a file by libhdf5, which can crash or hang on a damaged one.
+"""Whether this process may open a file with libhdf5, which can crash or hang on a damaged one.
 
 A file that carries our seal is checked against it, in milliseconds.  Any other is first read in a child
-process with limited memory and time, and here only if that one ends normally.
+process with limited memory and time, and here only if that process ends normally.
 """
 
 from __future__ import annotations
@@ -15,13 +15,13 @@ from springcheck.errors import StoreError
 from springcheck.store import apart, files, seal
 
 OURS = "springcheck.store.checking"
-"""The module whose `tried` tries a store of ours."""
+"""The module whose `tried` reads a store of ours on trial."""
 
 
 def trust(path: Path, module: str) -> None:
-    """Return when this process can read a file without harm; raise StoreError otherwise.
+    """Return if this process can read a file without harm; raise StoreError otherwise.
 
-    A file that carries no seal is tried by the function `tried` of a module.
+    A file without a seal is read on trial by the function `tried` of a module.
     """
     with files.told(path, "read"):
         with path.open("rb"):
@@ -33,7 +33,7 @@ def trust(path: Path, module: str) -> None:
 
 @lru_cache(maxsize=4096)
 def _against(path: Path, module: str, state: tuple[int, ...]) -> str:
-    """The reason not to read a file, once for each state of it; "" where it can be read."""
+    """The reason not to read a file, "" where it can be read; computed once for each state of the file."""
     found = seal.find(path)
     if not h5py.is_hdf5(path):
         return "it is no HDF5 file"
@@ -51,10 +51,7 @@ def _state(path: Path) -> tuple[int, ...]:
 
 
 def guarded(path: Path, module: str) -> str:
-    """Read a file in a child process -> its answer.
-
-    Raises StoreError when it crashes, or takes so long that it will never end.
-    """
+    """Read a file in a child process -> its answer; StoreError where that crashes or runs out of time."""
     said, harmless = _tried(path.absolute(), module, _state(path))
     if not harmless:
         raise StoreError(f"cannot read {path}: {said}")
