@@ -1,17 +1,16 @@
-"""The checks: each holds one number against one bound, and gives the bound's reason.
+"""The checks: each holds one number against one bound, and states the reason of the bound.
 
-A check looks at a recorded trajectory, or at a piece of one.  Bounds are formulas: roundings counted along
-one step, times what the map can make of them.  Values and bounds of the rounding checks are in units of one
-rounding of what was added up, so that "4.1 of 19" reads: four roundings were seen where nineteen take
-place.
+A check examines a recorded trajectory, or a piece of one.  Bounds are formulas: roundings counted along one
+step, times their growth under the map.  Values and bounds of the rounding checks are in units of one rounding
+of what was added up, so that "4.1 of 19" reads: four roundings were seen where nineteen take place.
 
 `record`, `steps`, `motion`, `solver` and `replayed` hold the checks of a trajectory, `experiments` and `laws`
-those that need runs of their own; `sight` says of each what it would have seen, `drag` adds up what single
+those that need runs of their own; `sight` derives the limit of detection of each, `drag` adds up what single
 steps hide.  A check is an object (see `Check`); the two lists here are the only ones.
 
-Prior art: the exact discrete solution of one's own solver (Langtangen & Linge, Finite Difference
-Computing with PDEs, 2017); the step defect, taken in extended precision at every step, does not need
-the solution and holds for nonlinear scenes too.
+Prior art: the exact discrete solution of one's own solver (Langtangen & Linge, Finite Difference Computing
+with PDEs, 2017); the step defect, taken in extended precision at every step, does not need the solution and
+holds for nonlinear scenes too.
 """
 
 from __future__ import annotations
@@ -67,21 +66,21 @@ THOROUGH: tuple[Check, ...] = (
 ALL: tuple[Check, ...] = (*CHECKS, *THOROUGH)
 
 RANDOM: tuple[Check, ...] = (start, times, grid, energies, *thermal.DRAWN, rod_length, rod_velocity)
-"""Checks of a trajectory of a thermostat, which no law of a deterministic motion holds for."""
+"""Checks of a thermostat's trajectory, to which no law of deterministic motion applies."""
 
 
 TELLING = frozenset(["identified", *(one.name for one in (*ALL, *thermal.DRAWN) if one.telling)])
-"""Checks that tell the scheme that a method claims from another one; `identified` is of a file's states."""
+"""Checks that distinguish the scheme that a method claims from others; `identified` is of a file's states."""
 
 SPECIAL = frozenset(one.name for one in CHECKS if any(REQUIREMENTS[x].special for x in one.requires))
-"""Checks of what few runs have."""
+"""Checks that apply to few runs."""
 
 MOST_NAMED = 8
-"""Methods or checks that a summary names."""
+"""Most methods or checks that a summary names."""
 
 
 def not_judged(verdicts: Sequence[Verdict]) -> tuple[str, ...]:
-    """Methods of which there are verdicts, but none by a check that tells one scheme from another."""
+    """Methods with verdicts, none of which is by a check that distinguishes schemes."""
     told = {v.method for v in verdicts if v.passed is not None and v.check in TELLING}
     return tuple(dict.fromkeys(v.method for v in verdicts if v.method not in told))
 
@@ -115,9 +114,10 @@ def explained(
     verdicts: Sequence[Verdict],
     shown: Callable[[Scene, Trajectory, int], str],
 ) -> list[Verdict]:
-    """The verdicts on a trajectory, the first that failed with what the states around its first step off are.
+    """The verdicts, the first failed one with its cause appended, as the states around its first step off
+    show.
 
-    `shown(scene, run, frame)` is the sentence, "" where the states show nothing.
+    `shown(scene, run, frame)` is that sentence, "" where the states show nothing.
     """
     first = next((v for v in verdicts if v.passed is False and v.check in TELLING), None)
     if first is None:
@@ -149,7 +149,7 @@ def judge_thoroughly(
     seed: int = 0,
     progress: Callable[[int], None] | None = None,
 ) -> list[Verdict]:
-    """Every experiment with a method, which `run(scene, label)` carries out on scenes made here.
+    """Every experiment with a method, whose runs `run(scene, label)` carries out.
 
     In a bath it is `run(scene, label, seed=)`, with `seed` and others.  `progress(1)` is called after each
     experiment; one that the method cannot serve (MethodError) does not apply.
@@ -171,9 +171,10 @@ def judge_thoroughly(
 def judge(
     scene: Scene, trajectory: Trajectory, checks: Sequence[Check] | None = None, *, piece: bool = False
 ) -> list[Verdict]:
-    """Every check of a trajectory of this scene, or of a piece of one, which may begin after the start.
+    """Verdicts of all checks on a trajectory of this scene, or on a piece that may begin after the start.
 
-    What does not apply is among them, `passed` None.  Left out, the checks are those of the kind of scheme.
+    Checks that do not apply are included, `passed` None.  By default the checks follow from the scheme's
+    kind.
     """
     case = Case(trajectory=trajectory, scene=scene, piece=piece)
     if checks is None:
@@ -182,9 +183,9 @@ def judge(
 
 
 def not_exercised(scene: Scene) -> str:
-    """Features of an engine that this scene does not exercise, and that may be wrong though it passes here.
+    """Features of an engine that this scene does not exercise, so that a pass proves nothing of them.
 
-    Empty of circuits and rotors.
+    Empty for circuits and rotors.
     """
     if scene.kind != "particles":
         return ""
@@ -217,14 +218,14 @@ def worst(pieces: Sequence[Sequence[Verdict]]) -> list[Verdict]:
             continue
         verdict = max(judged, key=_badness)
         sees = Limits.least(one.sees for one in judged)
-        # where it fails first is what is looked for, and how badly at the worst
+        # name the first failure, and the size of the worst
         failed = [one for one in judged if one.passed is False]
         why = (failed or [verdict])[0].why
         if len(failed) > 1:
-            # frames that are off were counted in the first alone
+            # the first sentence counts the frames of its own piece alone
             why += f"; of {len(judged)} pieces of the run {len(failed)} fail"
         if verdict.unit == DECADES:
-            # the worst of several is as bad as this so many times as often
+            # the least of several chances is found so many times as often
             verdict = replace(verdict, value=verdict.value - float(np.log10(len(judged))))
         out.append(replace(verdict, why=why, sees=sees))
     return out

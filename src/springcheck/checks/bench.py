@@ -24,7 +24,7 @@ LARGEST = 8
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Bench:
-    """A method, a scene, and the means to run it.  Runs that serve several experiments are made once."""
+    """A method and a scene, and the runs that several experiments share, each made once."""
 
     scene: Scene
     label: str
@@ -33,7 +33,7 @@ class Bench:
     kept: dict[int, Trajectory] = field(default_factory=dict)
 
     def once(self, scene: Scene) -> Trajectory:
-        """The run of a scene that several experiments ask for; made at the first of them."""
+        """The run of a scene, made when the first experiment asks for it."""
         if id(scene) not in self.kept:
             self.kept[id(scene)] = self.run(scene, self.label)
         return self.kept[id(scene)]
@@ -45,7 +45,7 @@ class Bench:
 
     @property
     def trajectory(self) -> Trajectory:
-        """The same run, under the name by which requirements ask for it."""
+        """The same run, by the name that requirements use."""
         return self.forwards
 
     @property
@@ -60,15 +60,16 @@ class Bench:
 
     @property
     def stiffness(self) -> Floats:
-        """Stiffness that holds each particle (n,) [M/T2]; where none does, that of one radian a step."""
+        """Stiffness that holds each particle (n,) [M/T2]; for one that nothing holds, that of one radian a
+        step."""
         k = np.abs(self.scene.system.hessian_diagonal(self.scene.q)).astype(np.float64)
         return np.where(k > 0, k, self.scene.m / self.scene.step**2)
 
     @cached_property
     def copies(self) -> tuple[Case, Floats]:
-        """One step of 2n+1 copies of the scene side by side, and by how much each was pushed (2n,).
+        """One step of 2n+1 copies of the scene side by side, and the perturbation of each copy (2n,).
 
-        Copy 0 starts in equilibrium; copies 1..n have one position pushed, the rest one momentum.
+        Copy 0 starts in equilibrium; in copies 1..n one position is perturbed, in the rest one momentum.
         """
         scene, n = self.scene, self.scene.n
         unit = float(scene.system.norm.unit) or 1.0

@@ -1,4 +1,4 @@
-"""What the checks of one trajectory share: the scheme's own next states, and what one rounding is worth."""
+"""What the checks of one trajectory share: the scheme's own next states, and the size of one rounding."""
 
 from __future__ import annotations
 
@@ -23,17 +23,17 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Case(Claim):
-    """A claim with what the checks share: computed at most once."""
+    """A claim with the quantities that its checks share, each computed at most once."""
 
     piece: bool = False
-    """Whether the trajectory may begin after the start, as the later pieces of a long one do."""
+    """Whether the trajectory may begin after the start, as later pieces of a long one do."""
 
     @cached_property
     def _made(self) -> dict[Callable[[Case], Any], Any]:
         return {}
 
     def once(self, work: Callable[[Case], T]) -> T:
-        """Result of a function of this case, computed at its first call and kept for other checks."""
+        """Result of a function of this case, computed once and cached."""
         if work not in self._made:
             self._made[work] = work(self)
         return self._made[work]  # type: ignore[no-any-return]
@@ -88,10 +88,8 @@ class Case(Claim):
 
     @cached_property
     def ahead(self) -> Stretch | None:
-        """The scheme's own next frame after each frame but the last, and what rounding may do to it.
-
-        None where so many steps are only judged by the energy norm.
-        """
+        """The scheme's own next frame after each frame but the last, with bounds on the effect of rounding.
+        None where there are so many steps that only the energy norm is judged."""
         every = self.trajectory.every
         if every > REPEATED:
             return None
@@ -151,8 +149,8 @@ class Case(Claim):
     ) -> tuple[Extended, Extended]:
         """One rounding of everything that one step from states (..., n) adds up, (..., n) each.
 
-        `smallest` is what an operation may lose to underflow.  `paired` leaves out the tolerance of rods,
-        whose pushes cancel, and turn nothing, however large they are.
+        `smallest` is the loss of an operation to underflow.  `paired` leaves out the tolerance of rods, whose
+        impulses cancel in pairs and exert no torque, however large they are.
         """
         places: list[Reals] | None = [] if self.placed else None
         if self.placed:
@@ -165,7 +163,7 @@ class Case(Claim):
         """One rounding of what a step adds up on each stretch between frames (f-1,), as `Norm.most`.
 
         The larger of its two ends, the far one being the scheme's own, and no less than on any stretch
-        before: a wrong frame must not enlarge its own bound.
+        before, so that a wrong frame cannot widen its own bound.
         """
         with np.errstate(over="ignore", invalid="ignore"):
             ends = self.allowance, self.allowance_at(*self.next_states)
@@ -182,7 +180,7 @@ class Case(Claim):
         return self.closed_at(self.steps)
 
     def closed_at(self, steps: Integers) -> tuple[Extended, Extended]:
-        """The same after so many steps (f,): the motion without a drive, and what each drive adds from
+        """The same after so many steps (f,): the undriven motion, and the response to each drive from
         rest."""
         alone = self.undriven
         u, v = schemes.propagate(
@@ -202,8 +200,9 @@ class Case(Claim):
     def growth(self) -> tuple[Floats, Extended]:
         """Bound on the distance from the closed form (f,), in units of one rounding, and that unit.
 
-        The roundings of all steps have one sign, and the map enlarges each from its step on; a splitting has
-        the bound of `walk` where that is less.  The unit is a root of an energy: see `Norm.most`.
+        The roundings of all steps are taken with one sign, and the map amplifies each from its step on; a
+        splitting has the bound of `walk` where that is less.  The unit is the root of an energy: see
+        `Norm.most`.
         """
         alone, n = self.undriven, self.scene.n
         total, grown = schemes.amplification(alone.matrices, alone.w, self.steps)
@@ -213,7 +212,7 @@ class Case(Claim):
         if self.steps[0] == 0:
             first = size[0]
         else:
-            # a piece of a long run: what came before it is bounded by the envelope of the motion
+            # a piece of a long run: the envelope of the motion bounds what came before it
             before = self.envelope, (self.scene.q, self.scene.p)
             first = np.max([self.system.norm.most(*self.allowance_at(*x)) for x in before])
         bound = np.asarray(self.roundings * total)
@@ -244,10 +243,8 @@ class Case(Claim):
 
     @cached_property
     def strongest(self) -> Reals:
-        """The largest force on the scheme's way from each frame to the next (f-1,) [M L/T2].
-
-        Of any one spring, or of all on a particle; 0 where modes take many steps at once.
-        """
+        """The largest force on the scheme's way from each frame to the next (f-1,) [M L/T2].  Of any one
+        spring, or of all on a particle; 0 where modes advance many steps at once."""
         peak, system = np.zeros(len(self.trajectory.t) - 1, dtype=np.longdouble), self.system
 
         def watched(terms: Iterable[Term]) -> Force:
@@ -290,18 +287,18 @@ def strongest(parts: tuple[Term, ...], q: Reals) -> Reals:
 
 
 def overflows(how: Arithmetic) -> str:
-    """The reason of steps that are off because their forces leave the range of a fixed-point sum."""
+    """Reason of steps that are off because their forces overflow a fixed-point sum."""
     return f"fixed-point sum of forces overflows beyond 2**{np.log2(how.overflow):g}"
 
 
 def keeps(how: Arithmetic) -> str:
-    """The reason of steps that are off because an engine took a force again that it had computed before."""
+    """Reason of steps that are off because an engine reused a force that it had computed before."""
     return f"forces are kept while no position moves by more than {how.stale:g}"
 
 
 def least_moved(moved: Reals) -> Reals:
-    """The shorter way of each step and the one before (f,): a step starts with the force of the last one's
-    end.
+    """The shorter displacement of each step and the one before (f,): a step starts with the force of the last
+    one's end.
 
     Twice what an engine overlooks bounds it: a position may have come back past where its force was computed.
     """
@@ -309,7 +306,7 @@ def least_moved(moved: Reals) -> Reals:
 
 
 def small_move(run: Trajectory) -> str:
-    """A sentence where some step moves so little that the engine takes a kept force for it; "" elsewhere."""
+    """A sentence where some step moves so little that the engine reuses a kept force; "" elsewhere."""
     how = run.arithmetic
     if how.stale and run.every == 1 and len(run.q) > 1:
         moved = np.max(np.abs(np.diff(run.q, axis=0)), axis=1)
@@ -319,7 +316,7 @@ def small_move(run: Trajectory) -> str:
 
 
 REPEATED = 2000
-"""Steps between two frames that are redone one by one; more are taken at once where modes allow it."""
+"""Steps between two frames that are recomputed one by one; more are taken at once where modes allow it."""
 
 
 def advance(

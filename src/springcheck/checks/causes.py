@@ -1,7 +1,7 @@
-"""What the states of a scene with rods, or in a bath, show where they are not those of the scheme.
+"""Causes that states with rods, or in a bath, show where they are not the scheme's.
 
-A push along a rod is what a step has done beyond the same step without rods: its direction is read off
-the positions.  What a bath did is in the draws that the states must have taken: whose, and of which size.
+The impulse along a rod is the difference of a step from the same step without rods: its direction follows
+from the positions.  The effect of a bath is in the draws that the states imply, and in their size.
 """
 
 from __future__ import annotations
@@ -16,19 +16,19 @@ from springcheck.thermal import THERMOSTATS
 from springcheck.thermal.catalogue import ENERGY_LEFT
 
 PUSH_ROUNDINGS = 64
-"""Roundings of the positions whose difference is a push: of a free step, and of the frame as recorded."""
+"""Roundings of the positions whose difference is an impulse: of a free step, and of the frame as recorded."""
 
 STANDARD_ERRORS = 6.0
-"""Standard errors from which a size is another: a chance of 2e-9 of normal numbers."""
+"""Standard errors by which a size differs from another: a chance of 2e-9 for normal numbers."""
 
 FEWEST_DRAWS = 50
-"""Draws from which sizes are said: their standard error is a tenth."""
+"""Draws from which a size is reported: its standard error is a tenth then."""
 
 FIT_ROUNDS = 20
 """Iterations of a fit whose weights are its own variances."""
 
 SAME_DRAWS = 1e-6
-"""Relative difference up to which two draws are taken for one number."""
+"""Relative difference up to which two draws count as one number."""
 
 
 def found(case: Case) -> str:
@@ -39,8 +39,7 @@ def found(case: Case) -> str:
 
 
 def _of_rods(case: Case) -> str:
-    """The direction in which the ends of rods are pushed, where it is not that of the rods before the
-    drift."""
+    """The direction of the impulses along rods, where it is not that of the rods before the drift."""
     rods, run = case.system.rods, case.trajectory
     if rods is None or rods.share or missing(case, MAP) or run.every > 1 or len(run.t) < 3:
         return ""
@@ -75,7 +74,7 @@ def _of_rods(case: Case) -> str:
 
 
 def _of_bath(case: Case) -> str:
-    """Draws that two coordinates share, or noise of another size than the bath's."""
+    """Draws that two coordinates share, or noise whose size is not the bath's."""
     seen = reading(case)
     if seen.rescaled is not None:
         return _rescaled(case, seen.rescaled)

@@ -14,11 +14,11 @@ from springcheck.physics.arrays import WIDE, Reals
 from springcheck.physics.trajectory import NOT_KNOWN, Limits, Verdict
 
 BEYOND = 2.0**511
-"""Stands for every value that fails and is no number or larger: a verdict and its ratio are numbers."""
+"""Stands for values that fail and are not finite, or larger, so that a verdict and its ratio are finite."""
 
 
 def largest(values: Reals) -> tuple[np.intp, ...]:
-    """Where the largest of them is; what is no number is larger than all."""
+    """Index of the largest value; NaN and infinity count as larger than all."""
     return np.unravel_index(np.argmax(np.where(np.isfinite(values), values, np.inf)), values.shape)
 
 
@@ -28,7 +28,7 @@ map; laws over many runs, which do not look at the scene; the draws of a thermos
 
 
 class Finding(NamedTuple):
-    """A value, the bound that it must keep, their unit, the bound's reason, and what would have been seen."""
+    """A value, the bound that it must keep, their unit, the bound's reason, and the limits of detection."""
 
     value: float | np.number
     bound: float | np.number
@@ -40,7 +40,7 @@ class Finding(NamedTuple):
 
 
 class Chance(NamedTuple):
-    """A finding that only statistics can judge: the probability of a value as bad if all is right."""
+    """A finding that only statistics can judge: the probability of a value as extreme if all is right."""
 
     chance: float
     why: str
@@ -48,21 +48,21 @@ class Chance(NamedTuple):
 
     @property
     def finding(self) -> Finding:
-        """A value and its bound in decades of chance, as of the only random verdict of a command."""
+        """Value and bound in decades of chance, as for the only random verdict of a command."""
         with np.errstate(divide="ignore"):
             value = -np.log10(np.float64(self.chance))
         return Finding(value, -np.log10(FALSE_ALARMS), DECADES, self.why, self.sees)
 
 
 FALSE_ALARMS = 1e-6
-"""Probability with which a command in which all is right reports that something is wrong, by chance."""
+"""Probability of a false alarm of a whole command in which all is right."""
 
 DECADES = "decades of chance"
 """Unit of verdicts on random numbers: a value of 3 comes about by chance once in 1000 times."""
 
 
 def shared(verdicts: Sequence[Verdict], false_alarms: float = FALSE_ALARMS) -> list[Verdict]:
-    """The verdicts of one command, its false alarms shared out evenly over those on random numbers.
+    """The verdicts of one command, with its probability of a false alarm shared evenly among the random ones.
 
     The sum of their chances is that of the command, however they depend on each other (Bonferroni).
     """
@@ -75,14 +75,14 @@ def shared(verdicts: Sequence[Verdict], false_alarms: float = FALSE_ALARMS) -> l
 
 
 Judge: TypeAlias = Callable[[Any], Finding | Chance | str]
-"""What a check finds of its subject, or the reason why the measurement decides nothing."""
+"""What a check finds of its subject, or the reason why the measurement is inconclusive."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Check:
-    """One check: call it with its subject, and it returns its verdict.
+    """One check: called with its subject, it returns a verdict.
 
-    The subject is a `Case`, of an experiment a `Bench`, and of one with a thermostat a `Seeded`.
+    The subject is a `Case`, for an experiment a `Bench`, and for one with a thermostat a `Seeded`.
     """
 
     name: str
@@ -90,22 +90,22 @@ class Check:
     """Its name in a narrow column."""
     family: Family
     requires: frozenset[str]
-    """What must be there for it to apply, by the names of `requires.REQUIREMENTS`."""
+    """Names of the requirements (`requires.REQUIREMENTS`) that a subject must meet for it to apply."""
     sentence: str
-    """What holds where it passes."""
+    """The statement that holds where it passes."""
     judge: Judge
     telling: bool
-    """Whether a pass tells the scheme that a method claims from another one."""
+    """Whether a pass distinguishes the scheme that a method claims from others."""
 
     @property
     def needs(self) -> str:
-        """What must be there for it to apply, in words."""
+        """Its requirements, in words."""
         words = [one.word for one in REQUIREMENTS.values() if one.name in self.requires]
         return ", ".join(words) or "every run"
 
     def __call__(self, subject: Any) -> Verdict:
         try:
-            # numbers that are none are judged as what they are, without a warning
+            # NaN and infinity are judged like any value, without a warning
             with np.errstate(all="ignore"):
                 found = missing(subject, self.requires) or self.judge(subject)
         except MethodError as error:
@@ -121,10 +121,10 @@ def check(
     requires: Collection[str] = (),
     telling: bool | None = None,
 ) -> Callable[[Judge], Check]:
-    """Make a check of a function: its name and the first sentence of its docstring are the check's own.
+    """Make a check of a function, with its name and the first sentence of its docstring.
 
-    Where `telling` is left out, every check tells one scheme from another but those of facts and repetitions.
-    ValueError for a requirement that is not in the table.
+    Without `telling`, every check distinguishes schemes except those of facts and repetitions.  ValueError
+    for a requirement that is not in the table.
     """
     if unknown := sorted(set(requires) - set(REQUIREMENTS)):
         raise ValueError(
@@ -149,10 +149,10 @@ def check(
 
 
 def verdict(method: str, check: str, found: Finding | Chance | str) -> Verdict:
-    """Passed only if the value is a number within the bound.  A bound that is infinite says nothing, and a
-    reason why the check does not apply is reported as such, never as passed.
+    """Passed only if the value is a number within the bound.
 
-    The verdict's value and bound are finite numbers: `BEYOND` stands for a value that is none, and fails.
+    An infinite bound is inconclusive, and a reason why the check does not apply is reported as such, never as
+    passed.  The verdict's value and bound are finite: `BEYOND` stands for a value that is not, and fails.
     """
     if isinstance(found, Chance):
         found = found.finding

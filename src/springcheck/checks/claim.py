@@ -1,4 +1,4 @@
-"""The claim on a trajectory: the scene and the scheme that made it, and the law that follows."""
+"""A claim: a trajectory, the scene and the scheme that it is said to come from, and the law that follows."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Claim:
 
     @property
     def system(self) -> SolvedSystem[Scene]:
-        """What follows from that scene."""
+        """Quantities derived from that scene."""
         return self.judged.system
 
     @cached_property
@@ -51,18 +51,15 @@ class Claim:
         return Law(scheme=self.scheme, scene=self.judged, h=self.trajectory.step)
 
     def step(self, q: Extended, p: Extended, **how: Any) -> tuple[Extended, Extended]:
-        """One step of the scheme from states (..., n), in extended precision: see `Law.step`.
-
-        `near` is where an engine came to: of several solutions of an implicit step, the one there is the
-        scheme's.
-        """
+        """One step of the scheme from states (..., n), in extended precision: see `Law.step`.  `near` is the
+        engine's own result: of several solutions of an implicit step, the one there is taken."""
         with np.errstate(all="ignore"):
             a, b = self.law.step(q, p, **how)
         return np.asarray(a, np.longdouble), np.asarray(b, np.longdouble)
 
     @property
     def placed(self) -> bool:
-        """Whether it matters for rounding at which positions a step evaluates the force."""
+        """Whether rounding depends on the positions at which a step evaluates the force."""
         return not self.law.has("linear") or self.law.has("implicit")
 
     @cached_property

@@ -1,4 +1,4 @@
-"""Which trajectories are the same motion, and how closely: differences of every pair, over all frames."""
+"""Differences of every pair of trajectories over all frames, and which of them are the same motion."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ EXACT = "exact"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Same:
-    """Trajectories that are one motion: no two of them differ by more than `allowed`."""
+    """Trajectories of one motion: no two of them differ by more than `allowed`."""
 
     labels: tuple[str, ...]
     difference: float
@@ -61,7 +61,7 @@ def merge(comparisons: Sequence[Comparison]) -> Comparison:
 
 @np.errstate(all="ignore")
 def allowed(scene: Scene, trajectory: Trajectory) -> float:
-    """How far rounding, or the tolerance, may take a trajectory from the motion that it stands for."""
+    """How far rounding, or the tolerance, may take a trajectory from the motion that it represents."""
     case = Case(trajectory=trajectory, scene=scene)
     if not case.scheme.has("one-step"):
         return tolerance_bound(case)
@@ -82,7 +82,7 @@ def allowed(scene: Scene, trajectory: Trajectory) -> float:
 
 
 class _Motion(NamedTuple):
-    """A trajectory, and how far it may be from the motion that it stands for."""
+    """A trajectory, and its largest allowed distance from the motion that it represents."""
 
     case: Case
     limit: float
@@ -98,14 +98,14 @@ class _Motion(NamedTuple):
     def could_be(self, other: _Motion) -> bool:
         """Whether its steps are those of another's scheme, to rounding."""
         run, scheme = self.case.trajectory, other.case.trajectory.scheme
-        # the exact solution has no steps of its own; the other way round says it all
+        # the exact solution has no steps: the comparison the other way round decides
         if other.is_exact or run.scheme == scheme or self.is_adaptive or other.is_adaptive:
             return True
         return step_defect(replace(self.case, trajectory=replace(run, scheme=scheme))).passed is True
 
 
 def _motion(scene: Scene, run: Trajectory) -> _Motion:
-    """Its limit is NaN where it is no small part of the motion: then the two cannot be compared."""
+    """A trajectory with its limit, NaN where that is no small part of the motion and cannot be compared."""
     limit = allowed(scene, run)
     with np.errstate(over="ignore", invalid="ignore"):
         size = np.max(scene.system.norm(run.q - scene.q, run.p - scene.p))

@@ -1,12 +1,12 @@
 """Friction, or its opposite, below the noise of velocities that are rebuilt from positions.
 
 An engine that takes its velocity from (x' - x)/h rounds it by eps x/h, which hides a friction of that size in
-every single step.  The noise is as good as random and a friction is not: what each step lacks is summed up
-along the momenta, sum d p, where a friction c adds -c h p**2 at every step and the noise its standard error.
+every single step.  The noise is as good as random and a friction is not: the residuals of the steps are
+summed along the momenta, sum d p, where a friction c adds -c h p**2 at every step and the noise its standard
+error.
 
 Not so where positions are solved for, as implicit schemes do: the factors of the solver are rounded once, and
-what they take from x' they take at every step alike, eps x'/h of the velocity, which no sum tells from a
-friction.
+take eps x'/h from the velocity at every step alike, which no sum distinguishes from a friction.
 """
 
 from __future__ import annotations
@@ -20,18 +20,18 @@ from springcheck.checks.case import Case
 from springcheck.physics.arrays import Extended
 
 BLOCKS = 16
-"""Parts of a run whose sums tell the standard error: noise may be alike in steps that follow each other."""
+"""Blocks of a run whose sums give the standard error: the noise of consecutive steps may be correlated."""
 
 T_FIFTEEN = 7.98
 """Student's t of 15 degrees of freedom, two-sided 1e-6."""
 
 FEWEST_STEPS = 8
-"""Steps of a part, and periods in it of a rounding that comes back after so many steps."""
+"""Steps in a block, and periods in it of a rounding that recurs after a number of steps."""
 
 
 def drag(case: Case, told: NDArray[np.bool_]) -> tuple[float, float, str] | None:
-    """Sum of what the steps lack along the momenta, in allowances without rebuilt velocities, its bound, and
-    both in words, of the particle farthest off; None where velocities are not rebuilt, or steps are few."""
+    """Sum of the residuals along the momenta, in allowances without rebuilt velocities, its bound, and both
+    in words, for the particle farthest off; None where velocities are not rebuilt, or steps are few."""
     run, ahead = case.trajectory, case.ahead
     rebuilds = run.rebuilds_velocity and not run.arithmetic.keeps_displacement
     rebuilds = rebuilds and case.law.has("explicit")
@@ -43,7 +43,7 @@ def drag(case: Case, told: NDArray[np.bool_]) -> tuple[float, float, str] | None
     lacks = (run.p[1:].astype(np.longdouble) - ahead.end[1])[told] * p
     size, unit = p * p, np.sum(np.abs(p) * plain.last[1][told], axis=0)
     rate = np.sum(lacks, axis=0) / np.sum(size, axis=0)
-    # a friction that is the same everywhere explains the parts; the rest is noise
+    # a uniform friction explains the blocks; the rest is noise
     rest = [np.sum(part, axis=0) for part in np.array_split(lacks - rate * size, BLOCKS)]
     error: Extended = np.sqrt(np.sum(np.square(rest), axis=0) * BLOCKS / (BLOCKS - 1))
     value, bound = np.abs(np.sum(lacks, axis=0)) / unit, case.roundings + T_FIFTEEN * error / unit

@@ -1,7 +1,7 @@
-"""What the states of a driven scene show where they are not those of its scheme: the time, or the drive.
+"""Causes that a driven scene shows where its states are not the scheme's: the time, or the drive.
 
-Each hypothesis is the scheme's own step with another clock, or another drive; the one that leaves no more
-than rounding is what happened.
+Each hypothesis is the scheme's own step with another clock, or another drive; the one whose residual is
+rounding alone is the cause.
 """
 
 from __future__ import annotations
@@ -21,18 +21,18 @@ from springcheck.physics.scene import Scene
 
 PARTS = {-1.0: "the start of the step before", 0.0: "the start", 0.5: "the middle", 1.0: "the end",
          2.0: "the end of the next step"}  # fmt: skip
-"""Places within a step, in words."""
+"""Times within a step, in words."""
 
 SLACK = 4.0
 """Multiple of the scheme's own bound within which the residuals of a right hypothesis stay."""
 
 NEWTON_STEPS = 4
-"""Newton steps of the search for a time: the force is linear in a small shift but for its curvature."""
+"""Newton steps of the search for a time: the force is linear in a small shift up to its curvature."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Clock:
-    """Where in a step the time is taken: later by a part of it, and held over the stages, or not."""
+    """Where in a step the time is taken: later by a fraction of it, and held over the stages or not."""
 
     later: float = 0.0
     held: bool = False
@@ -69,7 +69,7 @@ def _words(places: set[float]) -> str:
 
 
 def _abscissae(case: Case) -> set[float]:
-    """Where within its step, from 0 to 1, the scheme evaluates the force."""
+    """Fractions of the step at which the scheme evaluates the force."""
     met: list[Reals] = []
     start = (x[:1].astype(np.longdouble) for x in (case.trajectory.q, case.trajectory.p))
     case.step(*start, met=met)
@@ -78,7 +78,7 @@ def _abscissae(case: Case) -> set[float]:
 
 
 def _off(case: Case, clock: _Clock) -> Extended:
-    """How far the particles are from the scheme's step by this clock (2, f-1, n)."""
+    """Distance of the particles from the scheme's step by this clock (2, f-1, n)."""
     run = case.trajectory
     q, p = (x[:-1].astype(np.longdouble) for x in (run.q, run.p))
     q[:, -1] += clock.later * np.longdouble(run.step)
@@ -101,7 +101,7 @@ def _later(case: Case) -> float:
 
 
 def _delay(case: Case, later: float = 0.0) -> tuple[float, float]:
-    """Further delay of the drive's time, in steps, by linear least squares, and what rounding makes of it."""
+    """Further delay of the drive's time, in steps, by linear least squares, and its rounding."""
     unit, change = np.stack(case.allowance)[..., :-1], 1e-6
     off, moved = (_off(case, _Clock(later=at)) / unit for at in (later, later + change))
     slope = np.where(unit > 0, (moved - off) / change, 0)
@@ -113,8 +113,8 @@ def _delay(case: Case, later: float = 0.0) -> tuple[float, float]:
 def time_taken(case: Case) -> Finding | str:
     """Delay of all drives, in steps, by linear least squares over all steps.
 
-    Each residual may be off by the scheme's roundings: they are added up with their signs in the worst way.
-    Where no time and no other drive explains the states, the cause is not the drive.
+    Each residual may be off by the scheme's roundings, which are added up with the worst signs.  Where no
+    time and no other drive explains the states, the cause is not the drive.
     """
     later, bound = _delay(case.clocked)
     if not bound < 1:
@@ -147,7 +147,7 @@ OTHER_DRIVES: tuple[tuple[str, str, Callable[[Any, Any], Any]], ...] = (
 
 
 def _other_drives(scene: Scene) -> Iterator[tuple[str, Scene]]:
-    """Scenes with another drive, and what that is."""
+    """Scenes with another drive, and its name."""
     for words, name, change in OTHER_DRIVES:
         terms: list[Any] = list(scene.terms)
         for number, term in enumerate(terms):

@@ -1,4 +1,4 @@
-"""Checks of the one-step map that need runs of their own: what it is, what it keeps, how it turns back."""
+"""Checks of the one-step map that need runs of their own: its matrix, its invariants, its reversibility."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from springcheck.physics.trajectory import NOT_KNOWN, Limits
 from springcheck.text.wording import count
 
 MATRIX = frozenset({"named", "one-step", "linear", "modes", "few", "resolved"})
-"""What it takes to recover a one-step matrix."""
+"""Requirements of the recovery of a one-step matrix."""
 
 
 @check("matrix", family="map", requires=MATRIX)
@@ -50,7 +50,7 @@ ENDED = "the engine made no step that ends in finite numbers"
 
 
 def _no_step(case: Case) -> str | None:
-    """Why an engine's single steps of all pushes cannot be looked at, or None."""
+    """Why single steps of the perturbed copies cannot be evaluated, or None."""
     run, scene = case.trajectory, case.scene
     if len(run.t) < 2 or not np.isfinite([run.q, run.p]).all():
         return ENDED
@@ -124,7 +124,7 @@ def symplecticity(bench: Bench) -> Finding | str:
     off = np.abs(one - one.T + departure.T @ form @ departure)
     half = np.abs(ideal).T @ np.abs(form) @ allowed
     limit = half + half.T
-    # coordinates that nothing joins are allowed next to nothing
+    # next to nothing is allowed between coordinates that are not coupled
     ratio = off / np.where(limit > 0, limit, 1)
     worst = largest(ratio)
     if ratio[worst] <= 1 and not np.any(limit[form != 0] < 1):
@@ -180,7 +180,7 @@ def reversibility(bench: Bench) -> Finding | str:
     if two_stage:
         end = _shifted(case.judged, scheme, end, 1)
     off = case.system.norm.size(end[0] - bench.scene.q, end[1] + bench.scene.p)
-    # a motion that stood still after its turning point would end there, with the momenta flipped
+    # a motion that stands still after its turning point would end there, with the momenta flipped
     moved = case.system.norm.size(out.q - bench.scene.q, bench.scene.p - out.p)
     if off <= bound * size and moved[-1] <= bound * size and np.any(moved > 0):
         return "standing still on the way back would pass"
@@ -194,7 +194,7 @@ def reversibility(bench: Bench) -> Finding | str:
 
 
 SMALL_PART = 2.0**-10
-"""Largest change, relative to the initial energy norm, whose effect is taken to be linear in it."""
+"""Largest change, relative to the initial energy norm, whose effect is taken to be linear."""
 
 
 def _sees(case: Case, steps: int, allowed: np.floating) -> Limits:
@@ -216,11 +216,11 @@ def _sees(case: Case, steps: int, allowed: np.floating) -> Limits:
 
 
 def _enlarged(case: Case, steps: int, turned: tuple[Floats, Floats], size: np.floating) -> float | None:
-    """What becomes of one rounding in each of so many steps out and back, in roundings of this size; None
-    where that is not known.
+    """Amplification of one rounding in each of so many steps out and back, in roundings of this size, or
+    None.
 
-    A rounding on the way out is carried by all of the way back from where it was made, and so counts like
-    one that is made there on the way back.
+    A rounding on the way out is carried by all of the way back from where it was made, and so counts like one
+    that is made there on the way back.
     """
     if case.linear:
         total, grown = schemes.amplification(case.matrices, case.w, np.array([2 * steps + 2]))

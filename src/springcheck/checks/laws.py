@@ -1,8 +1,8 @@
 """Checks of laws that show only over many runs: order, rounding over long times, tolerance.
 
-Order is fitted on the spring and on an anharmonic well: on the spring alone it can lie.  A scheme's
-error is C h**r (1 + c h + ...), the second term c h**2 where the scheme is symmetric; both are fitted,
-so that what is left over tells how well the slope is known.
+Order is fitted on the spring and on a quartic potential: on the spring alone it can mislead.  A scheme's
+error is C h**r (1 + c h + ...), the second term c h**2 where the scheme is symmetric; both are fitted, so
+that the residual gives the error of the slope.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ HALVINGS = 6
 CHANCE = 1e-3
 """Probability with which a right order or exponent may be refused, by Student's t, two-sided."""
 UNRESOLVED = 0.125
-"""Orders are whole numbers; a slope that is not known to an eighth does not name one."""
+"""Orders are whole numbers; a slope with an uncertainty above an eighth does not determine one."""
 COARSEST = 16
 """Steps of the coarsest run over 2.5 radians: h w = 0.16, where the second term of the error is small."""
 
@@ -100,7 +100,7 @@ def fitted(
 
 @cache
 def exact_end(where: str) -> tuple[Extended, Extended]:
-    """Where the motion on the spring or in the quartic potential comes to, (n,) and (n,)."""
+    """Exact state of the spring or of the quartic potential after `DURATION`, (n,) and (n,)."""
     if where == "spring":
         q, p = exact.true_motion(replace(SPRING, step=DURATION), np.array([1]), DURATION)
         return q[0], p[0]
@@ -134,7 +134,7 @@ def extrapolated(scene: Scene, duration: float) -> tuple[Extended, Extended]:
 
 @cache
 def ensemble(h: float) -> Scene:
-    """256 springs of one kind with random starts: the random walks of their rounding are independent."""
+    """256 equal springs with random starts, so that the random walks of their rounding are independent."""
     rng = np.random.default_rng(20260101)
     amplitude, phase = rng.uniform(1, 2, MEMBERS), rng.uniform(0, 2 * np.pi, MEMBERS)
     q, p = amplitude * np.cos(phase), amplitude * np.sin(phase) * np.sqrt(3.7 * 2.9)
@@ -202,7 +202,7 @@ def rounding_bias(bench: Bench) -> Finding | str:
 SHORT = "a run of it ended early"
 
 ROUNDED_MATRIX = 2.0**-52
-"""Largest error of the determinant of a one-step matrix whose elements near 1 are rounded."""
+"""Largest error of the determinant of a one-step matrix near 1 whose elements are rounded."""
 
 
 def _is_short(bench: Bench, h: float) -> bool:
@@ -261,8 +261,8 @@ def _growth(steps: Floats, change: Floats) -> tuple[float, float]:
 
 
 def _seen_bias(steps: Floats, change: Floats) -> float | None:
-    """The least bias a step, of tenths of a decade, that would raise the exponent of a walk beyond its bound,
-    of either sign."""
+    """The least bias a step, to a tenth of a decade, of either sign, that raises a walk's exponent beyond its
+    bound."""
     for bias in 10.0 ** np.arange(-20, -10, 0.1):
         found = (_growth(steps, change + sign * bias * steps[:, None]) for sign in (1, -1))
         if all(slope > 0.5 + SIGMAS * se for slope, se in found):

@@ -1,4 +1,4 @@
-"""The recorded motion as a whole: closed form, shadow energy, frequency, momentum, turns in a field."""
+"""The recorded motion as a whole: closed form, shadow energy, frequency, momentum, rotation in a field."""
 
 from __future__ import annotations
 
@@ -56,9 +56,9 @@ def _how(case: Case) -> str:
 
 
 def _beyond(case: Case, allowed: Extended, *sizes: Extended) -> NDArray[np.bool_]:
-    """At which frames (f,) finite states have no reference in the range of numbers.
+    """Frames (f,) at which finite states have no reference in the range of numbers.
 
-    That is where what rounding may do, `allowed`, leaves it; where a reference has an engine's range
+    That is where `allowed`, the effect of rounding, leaves it; where a reference has the engine's own range
     also where one of these sizes does.
     """
     finite = np.isfinite(case.trajectory.q).all(axis=1) & np.isfinite(case.trajectory.p).all(axis=1)
@@ -69,7 +69,7 @@ def _beyond(case: Case, allowed: Extended, *sizes: Extended) -> NDArray[np.bool_
 
 
 def _untold(case: Case, drowned: NDArray[np.bool_], what: str) -> str:
-    """From where on a check says nothing any more because its bound is as large as what it looks at."""
+    """From where on a check is inconclusive, its bound being as large as the quantity itself, in words."""
     late = np.flatnonzero(~drowned)
     if not len(late) or late[-1] == len(drowned) - 1:
         return ""
@@ -141,14 +141,14 @@ def frequency(case: Case) -> Finding | str:
         return "nothing has moved yet"
     # in the coordinates of the invariant form a step is a plain rotation by -angle
     phase = _phase(form, u[j], v[j]) - _phase(form, u0[j], v0[j])
-    # on an inverted spring a scheme that goes back on part of its way can turn the other way
+    # on an inverted spring a scheme with a backward substep can rotate the other way
     backwards = np.sign(case.matrices[j, 0, 1])
     expected = backwards * turn.angle[j] * np.longdouble(steps)
     off = phase - expected
     off -= 2 * np.pi * np.round(off / (2 * np.pi)) if np.isfinite(off) else 0
     off -= _LOW_TWO_PI * np.round((phase - expected) / (2 * np.pi))
     bound, unit = case.growth
-    # where the mode ought to be: one that has come to nothing would excuse any phase
+    # the size of the right mode: a mode that has vanished would excuse any phase
     own_y, own_v = case.closed_states
     # extended: a motion that spirals out is squared here, up to the end of double's range
     mode = np.abs(np.hypot(case.w[j] * own_y[-1, j], own_v[-1, j]))
@@ -165,7 +165,7 @@ def frequency(case: Case) -> Finding | str:
     limit = float(angle / abs(expected))
 
     def part(at: Integers, right: sight.States, change: sight.States) -> Reals:
-        # the change of the last frame's phase, at right angles to its place on the ellipse
+        # the component of the last frame's change at right angles to its place on the ellipse
         (u, v), (du, dv) = ((x[-1, j], y[-1, j]) for x, y in (right, change))
         x, y = _on_circle(form, u, v)
         dx, dy = _on_circle(form, du, dv)
@@ -205,7 +205,7 @@ def momentum(case: Case) -> Finding | str:
     """Without external forces the total momentum along every axis is conserved."""
     run, places = case.trajectory, case.scene.all_places % 3
     axes = np.unique(places)
-    # along one axis all that there is, in its order: sums round by that
+    # for one axis the coordinates in their own order, on which the rounding of a sum depends
     each: list[Any] = [slice(None)] if len(axes) == 1 else [np.flatnonzero(places == axis) for axis in axes]
 
     def summed(x: Reals) -> Reals:
@@ -213,7 +213,7 @@ def momentum(case: Case) -> Finding | str:
 
     total = summed(run.p.astype(np.longdouble))
     steps, first = case.steps, case.scene.p.astype(np.longdouble)
-    # at both ends of each stretch between frames, for a motion that grows along it
+    # at both ends of each stretch between frames, since the motion may grow along it
     _, of_p = case.allowance_at(run.q, run.p, paired=True)
     unit = np.maximum.accumulate(summed(of_p))[1:]
     if steps[0] != 0 and case.linear:
@@ -223,7 +223,7 @@ def momentum(case: Case) -> Finding | str:
         steps, first = steps - steps[0], run.p[0].astype(np.longdouble)
     off = np.abs(total - summed(first))[1:]
     limit = (case.roundings * steps[1:].astype(np.float64))[:, None]
-    # a step from a state near the end of all numbers may leave even the range of its own bound
+    # a step from a state near the overflow threshold may exceed even its own bound
     finite = np.all(np.isfinite(run.q) & np.isfinite(run.p), axis=1)
     beyond = np.asarray(finite)[1:, None] & ~np.isfinite(unit)
     seen = np.asarray(off / np.where(beyond, np.inf, unit), np.float64)
@@ -284,8 +284,8 @@ def _areas(
     noise: tuple[Extended, Extended],
     steps: Integers,
 ) -> tuple[Extended, Extended, Extended]:
-    """Departure of the angular momentum in the plane of two axes, its largest change in one step by a
-    rounding of each coordinate, and its right size, at every frame but the first, (f-1,) each."""
+    """Error of the angular momentum in the plane of two axes, its largest change in one step by a rounding of
+    each coordinate, and its right size, at every frame but the first, (f-1,) each."""
     x, y = pair
     (q, p), (dq, dp) = (tuple(one.astype(np.longdouble) for one in two) for two in (states, noise))
     factor: Extended | int = 1

@@ -1,4 +1,4 @@
-"""What a trajectory says of itself: the start, the times, the grid and the energies, to the bit."""
+"""Facts of the record, to the bit: the start, the times, the grid and the energies."""
 
 from __future__ import annotations
 
@@ -71,11 +71,11 @@ MOST_DECLARED = {
     "lengths": (1e-4, "the tolerance of SHAKE in GROMACS and in LAMMPS' manual"),
     "cancels": (2, "a difference of 1 and what is itself taken from a difference"),
 }
-"""The coarsest arithmetic that an engine may declare, and why: the bounds of all checks follow what it
-declares, and more would excuse any force."""
+"""The coarsest arithmetic that an engine may declare, and why: bounds follow from it, and a coarser one would
+excuse any force."""
 
 MOST_REBUILT = (2.0**-24, "single precision is the coarsest known to rebuild velocities")
-"""The same for `state` where velocities are differences of positions, which have their roundings over h."""
+"""The same for `state` where velocities are differences of positions, whose roundings they have over h."""
 
 
 def beyond(run: Trajectory) -> list[str]:
@@ -92,8 +92,8 @@ def beyond(run: Trajectory) -> list[str]:
 
 
 def _gives_up(case: Case) -> bool:
-    """Whether the engine may give up by itself, and says why: a solver that cannot hold its tolerance, of a
-    step or of the lengths of rods, which it finds by passes that need not converge where there are such."""
+    """Whether the engine may give up, and says why: a solver that cannot hold its tolerance, of a step or of
+    the lengths of rods, whose iteration need not converge where rods are coupled."""
     outcome, solves = case.trajectory.outcome, not case.law.has("one-step")
     if case.scene.system.rods:
         solves = solves or case.trajectory.arithmetic.lengths > 0
@@ -106,8 +106,7 @@ length of a bond does."""
 
 
 def _explodes(case: Case) -> bool:
-    """Whether the motion itself comes near the end of the engine's numbers between the last frame and the
-    next."""
+    """Whether the motion itself comes near the engine's overflow between the last frame and the next."""
     run, scene = case.trajectory, case.judged
     q, p = (x[-1:].astype(np.longdouble) for x in (run.q, run.p))
     limit = SINGLE_RANGE if run.arithmetic.force >= np.finfo(np.float32).eps / 2 else HALF_RANGE

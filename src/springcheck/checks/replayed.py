@@ -1,9 +1,9 @@
-"""A solver whose steps follow a rule, replayed from the recorded frames: each stretch from its own first one.
+"""A solver whose steps follow a rule, replayed from the recorded frames: each stretch from its own first.
 
-Only the length of the step before goes on from one stretch to the next, known where the engine tells it, as
-the last of a stretch that is replayed where it does not.  Where a step of velocity Verlet of
-length h ends, E' - E = (h**2/8) sum (F'**2 - F**2)/m of linear forces, exactly: it keeps the energy less
-(h**2/8) sum F**2/m, each step with its own h.
+One stretch leaves the length of its last step to the next: as the engine reports it, or else as replayed.
+
+Where a step of velocity Verlet of length h ends, E' - E = (h**2/8) sum (F'**2 - F**2)/m of linear forces,
+exactly: it keeps the energy less (h**2/8) sum F**2/m, each step with its own h.
 """
 
 from __future__ import annotations
@@ -25,20 +25,23 @@ MOST_REPLAYED = 10_000
 """Steps: two seconds."""
 
 LOST = 0.1
-"""Relative uncertainty of the last step before a frame up to which a longer and a shorter one are replayed in
-its stead.  That step is what the others leave of the frame's time: where it is not recorded, its uncertainty
-grows from frame to frame, until the rule takes a step that does not depend on it, or nothing is known of
-it."""
+"""Relative uncertainty of the last step before a frame up to which a longer and a shorter one are replayed
+too.
+
+The last step is the remainder of the frame's time after the others.  Where it is not recorded, its
+uncertainty grows from frame to frame, until the rule takes a step that does not depend on it or nothing is
+known.
+"""
 
 Times: TypeAlias = tuple[float, float]
 
 
 @by_identity
 class _Replayed(NamedTuple):
-    """The first stretches between frames, as far as they are replayed: arrays (f-1, n) and (f-1,)."""
+    """The replayed stretches between frames: arrays (f-1, n) and (f-1,)."""
 
     ends: tuple[Extended, Extended]
-    """Where the steps of each lead (f-1, n)."""
+    """Where the steps of each stretch end (f-1, n)."""
     bounds: tuple[Extended, Extended]
     """One rounding of all that these steps add up (f-1, n)."""
     late: tuple[Extended, Extended]
@@ -51,10 +54,10 @@ class _Replayed(NamedTuple):
     shortest: Extended
     """The shortest step."""
     untrue: Extended
-    """Roundings by which the recorded last step is not what the others leave of the time, or exceeds the
+    """Roundings by which the recorded last step differs from the remainder of the time, or exceeds the
     rule."""
     ended: str
-    """Why the stretches after these are not replayed; "" where there are none."""
+    """Why later stretches are not replayed; "" where there are none."""
 
 
 def _follow(case: Case) -> _Replayed | str:
@@ -86,7 +89,7 @@ def _follow(case: Case) -> _Replayed | str:
             ended = "the last step before the next hangs on roundings alone"
             break
         steps = stretch(before)
-        # the rule jumps where it holds a step: either side may leave it
+        # the rule is discontinuous where it holds a step: take both sides
         sides = (before + unsure, before - unsure) if unsure else ()
         others = [stretch(side) for side in sides if side > 0]
         if not steps:
@@ -101,8 +104,7 @@ def _follow(case: Case) -> _Replayed | str:
             untrue, amiss = _untrue(case, steps, every, before, times)
             if not (told[i + 1] > 0 and (case.steps[i] or told[i] == 0)):
                 untrue = np.inf
-        # the time is a sum of lengths, each rounded: what is left of it is the last step, and the next one
-        # follows from that
+        # the time is a sum of rounded lengths: its remainder is the last step, on which the next one depends
         off = len(steps) * state * abs(np.longdouble(times[1])) + amiss
         late = off * np.abs(end[1] / m), off * np.abs(system.force(*end))
         gain, loose, last = _gain(case, steps), np.longdouble(0), abs(steps[-1].h)
@@ -110,7 +112,7 @@ def _follow(case: Case) -> _Replayed | str:
             apart = [np.max([np.abs(x[-1].end[i] - end[i]) for x in others], axis=0) for i in range(2)]
             late = late[0] + 2 * apart[0], late[1] + 2 * apart[1]
             loose = 2 * np.max([np.abs(_gain(case, x) - gain) for x in others])
-            # a step that is left over differs by all that the steps before it do
+            # the remainder has the differences of all steps before it
             off += 2 * max(abs(abs(x[-1].h) - last) for x in others)
         before, unsure = last, float(off)
         shortest = min(abs(step.h) for step in steps)
@@ -133,13 +135,13 @@ def _gain(case: Case, steps: list[Taken]) -> Extended:
 
 
 def _rounded(case: Case, steps: list[Taken], before: float) -> Iterator[tuple[Extended, Extended]]:
-    """One rounding of all that these steps add up (n,), each carried on by the steps after it: before the
-    first, and after each of them."""
+    """One rounding of all that these steps add up (n,), carried on by the steps after it: before and after
+    each."""
     run, system, m = case.trajectory, case.system, case.judged.m
     state = run.arithmetic.state + ROUNDOFF
     q, p = steps[0].start
     sizes, stiff = system.magnitude(None if system.is_linear else q), np.abs(system.hessian(q))
-    # the momentum was read half a step on
+    # the momentum was read after a half kick
     of_q, of_p = np.zeros_like(q), state * (np.abs(p) + before * sizes(np.abs(q) + case.origins, np.abs(p)))
     yield of_q, of_p
     for length, (q, p), (end, _), _ in steps:
@@ -158,10 +160,11 @@ def _rounded(case: Case, steps: list[Taken], before: float) -> Iterator[tuple[Ex
 def _untrue(
     case: Case, steps: list[Taken], bounds: list[tuple[Extended, Extended]], before: float, times: Times
 ) -> tuple[float, float]:
-    """Roundings by which the recorded last step is not what the others leave of the time, or exceeds the
-    rule; and the first of the two as a time, as far as roundings explain it.
+    """Roundings by which the recorded last step differs from the remainder of the time, or exceeds the rule;
+    and the former as a time, as far as roundings explain it.
 
-    A step is known as the force at its start is: to what rounding has made of positions and of the time.
+    The uncertainty of a step is that of the force at its start: of the roundings of positions and of the
+    time.
     """
     system, m, rule, q = case.system, case.judged.m, case.scheme.rule, steps[0].start[0]
     state, allow = case.trajectory.arithmetic.state + ROUNDOFF, allowed(case.scene)
@@ -174,16 +177,16 @@ def _untrue(
             sizes, stiff = system.magnitude(q), np.abs(system.hessian(q))
         moved = stiff @ (of_q + np.abs(p) / m * of_t) + state * sizes(np.abs(q) + case.origins, np.abs(p))
         push, off = push_of(case.judged, system.force(q, p)), push_of(case.judged, moved)
-        # the rule jumps where it holds a step
+        # the rule is discontinuous where it holds a step
         pushes, steps_before = (np.maximum(push - off, 0), push + off), (before - of_h, before + of_h)
         sides = [rule(float(x), float(y), allow) for x in pushes for y in steps_before]
         of_h = np.max(np.abs(np.array(sides) - longest)) + 2 * state * longest
-        # roundings as large as the force allow any step, and later ones are not known
+        # roundings as large as the force allow any step, and determine no later one
         of_h = of_h if np.isfinite(of_h) else np.longdouble(np.inf)
         clock, before = clock + abs(length), longest
         of_t += state * clock
     number, amiss, excess = _roundings(case), abs(clock - abs(times[1])), abs(steps[-1].h) - longest
-    # without a force a step may be of any length
+    # without a force a step may have any length
     found = amiss / of_t, excess / of_h if excess > 0 else np.longdouble(0)
     return float(np.max(np.array(found))), float(min(amiss, number * of_t))
 
@@ -201,7 +204,7 @@ def _until(case: Case, found: _Replayed) -> str:
 
 
 def _told(case: Case, found: _Replayed) -> str:
-    """Whether the recorded last steps are those of the rule, in words; "" where none are recorded."""
+    """Whether the recorded last steps follow the rule, in words; "" where none are recorded."""
     told, wrong = case.trajectory.last_step, ~(found.untrue <= _roundings(case))
     if told is None:
         return ""
@@ -215,8 +218,8 @@ def _told(case: Case, found: _Replayed) -> str:
 
 
 def _hidden(case: Case, found: _Replayed) -> str:
-    """The part of the largest momentum by which a frame may be off and pass, in words: twice the bound,
-    because roundings may make up for one of the two."""
+    """The fraction of the largest momentum by which a frame may be off and pass, in words: twice the bound,
+    because roundings may compensate one of the two."""
     number, p = _roundings(case), np.abs(case.trajectory.p[: len(found.counts) + 1])
     room = number * found.bounds[1] + found.late[1]
     part = float(2 * np.max(room) / np.max(p))

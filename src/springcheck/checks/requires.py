@@ -1,7 +1,7 @@
-"""What a check may require of its subject, and the sentence that says what is missing: each once.
+"""Requirements of checks, each with the sentence that says what is missing.
 
-A subject is a `Case` or a `Bench`; both have a scene, a scheme and a `law`.  Requirements are looked at in
-the order of this table, so each may rely on those before it that a check requires as well.
+A subject is a `Case` or a `Bench`; both have a scene, a scheme and a `law`.  Requirements are tested in the
+order of this table, so each may rely on those before it that a check requires as well.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ Lacks: TypeAlias = Callable[[Any], str | None]
 
 
 class Requirement(NamedTuple):
-    """One row: its name, how `list` and `explain` call it, and why a subject lacks it."""
+    """One row: its name, its phrase in `list` and `explain`, and why a subject does not meet it."""
 
     name: str
     word: str
     lacks: Lacks
     special: bool = False
-    """Whether few runs have it, so that its lack goes without saying."""
+    """Whether few runs meet it, so that its absence is not worth a line."""
 
 
 def _unless(has: Callable[[Any], bool], otherwise: str) -> Lacks:
@@ -44,7 +44,7 @@ def _trait(name: schemes.Trait, otherwise: str) -> Lacks:
 
 
 def _too_long(subject: Any) -> str | None:
-    """An implicit step so long that neither engine nor reference keep a digit of it."""
+    """An implicit step so long that neither engine nor reference keeps a digit of it."""
     if not subject.scheme.has("implicit"):
         return None
     scene = subject.law.scene
@@ -70,7 +70,7 @@ def _no_phase(case: Any) -> str | None:
 
 
 def _no_answer(case: Any) -> str | None:
-    """Why the discrete answer to driving forces has no closed form here."""
+    """Why the discrete response to driving forces has no closed form here."""
     alone = case.undriven
     if alone is case:
         return None
@@ -171,10 +171,10 @@ _ALL = (
 REQUIREMENTS = {one.name: one for one in _ALL}
 
 MAP = frozenset({"named", "one-step", "two-frames"})
-"""What a check of recorded steps requires."""
+"""Requirements of a check of recorded steps."""
 
 CLOSED = MAP | {"unmixed", "modes", "phase"}
-"""What the closed form of the discrete motion requires."""
+"""Requirements of the closed form of the discrete motion."""
 
 
 def missing(subject: Any, requires: Iterable[str]) -> str | None:

@@ -1,4 +1,4 @@
-"""Rods: their lengths, what moves along them, and how far they turn in a step."""
+"""Checks of rods: lengths, relative velocities along them, and the angle of rotation of a step."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def _rods(case: Case) -> Rods:
 
 
 HELD_RIGID = frozenset({"named", "two-frames", "rods"})
-"""What a check of rods requires."""
+"""Requirements of a check of rods."""
 
 
 @check("length", family="motion", requires=HELD_RIGID, telling=False)
@@ -45,7 +45,7 @@ def rod_length(case: Case) -> Finding:
         step = int(case.steps[int(np.argmax(lost))])
         why += f"; after step {step} a rod turns by h w of 1 or more, and no push along it keeps its length"
     elif heated and np.any(wrong := np.any(~(off <= bound), axis=1)):
-        # rates at the frames beside the step: draws may have turned the rod three times as fast as usual
+        # rates at the frames beside the step: draws may have rotated the rod three times as fast as usual
         i = int(np.argmax(wrong))
         near = rods.rates(case.trajectory.q[i : i + 2], case.trajectory.p[i : i + 2])
         usual = np.sqrt(case.judged.thermal * rods.inverse_mass) / rods.length
@@ -77,7 +77,7 @@ def rod_velocity(case: Case) -> Finding | str:
     r, m = rods.ways(q), case.judged.m
     off = np.abs(rods.dot(r, rods.apart(p / m)))
     unit = rods.sum_of_sizes(r, of_p / m)
-    # where a step has no solution nothing is known of its momenta
+    # where a step has no solution its momenta are not known
     if not np.any(np.isfinite(unit)):
         return "no step has a solution whose rounding is known"
     seen = np.where((off == 0) | ~np.isfinite(unit), 0, off / unit)
@@ -90,8 +90,7 @@ def rod_velocity(case: Case) -> Finding | str:
 def turn(case: Case) -> Finding | str:
     """A rod that turns freely turns by asin(h w) in a drift of h, w that of the start, at every step."""
     # SHAKE pushes along the rod as it lay before the drift, of length l, and the drift moves its ends apart
-    # by h v across it: the rod turns by the angle with the sine h |v| / l = h w.  The projection leaves w as
-    # it was
+    # by h v across it: the rod rotates by the angle with the sine h |v| / l = h w. The projection keeps w
     rods, run, steps = _rods(case), case.trajectory, case.steps
     m = case.judged.m
     q0, p0 = case.scene.q.astype(np.longdouble), case.scene.p.astype(np.longdouble)

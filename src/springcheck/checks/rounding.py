@@ -1,5 +1,4 @@
-"""What rounding may do to one step from given states: a running error bound, each degree of freedom by
-itself."""
+"""Rounding of one step from given states: a running error bound, each degree of freedom by itself."""
 
 from __future__ import annotations
 
@@ -12,8 +11,8 @@ from springcheck.physics.term import Term
 from springcheck.schemes.rounding import Met
 
 SMALLEST = np.longdouble(5e-324 if WIDE else 1e-323)
-"""What an operation can lose to underflow: one unit of a subnormal double, and where the scheme's own step,
-which it is compared with, is no wider, as much there."""
+"""Loss of an operation to underflow: one unit of a subnormal double, and as much again where the reference
+step is no wider than double."""
 
 
 def of_step(
@@ -28,8 +27,8 @@ def of_step(
 ) -> tuple[Extended, Extended]:
     """One rounding of everything that one step from states (..., n) adds up, (..., n) each.
 
-    `places` are the positions at which the scheme evaluates the force on its way: a law that bends is
-    weighed there, and so is the solution of an implicit stage.  `smallest` is what an operation may lose to
+    `places` are the positions at which the scheme evaluates the force on its way: a nonlinear force is
+    bounded there, and so is the solution of an implicit stage.  `smallest` is the loss of an operation to
     underflow.  `recorded` says that the step starts and ends at recorded positions, which are not rounded
     once more.  For `paired` see `Case.allowance_at`.
     """
@@ -49,12 +48,12 @@ def of_step(
         hold=case.system.rods,
         loose=0.0 if paired else how.lengths / (how.state * case.roundings),
     )
-    # the scheme's own step, which it is compared with, rounds as well
+    # the reference step rounds as well
     state = how.state + ROUNDOFF
-    # an engine may count positions from where the springs rest, and so round those
+    # an engine may count positions from the rest points of springs, and so round those
     of_q, of_p = state * (size_q + case.origins), state * size_p
     if run.rebuilds_velocity and not how.keeps_displacement:
-        # in a box, positions that lie in it
+        # in a box, positions are wrapped into it
         of_p = of_p + how.state * m * (np.abs(q) + size_q + 2 * scene.periods) / h
     # a force, its product with the step, and a velocity may each underflow; a solver adds up n products
     lost = smallest * (1 + m + h * scene.system.pulls())
@@ -70,7 +69,7 @@ def _evaluations(case: Claim, places: list[Reals] | None, recorded: bool) -> lis
     found: list[Met] = []
     made: dict[tuple[str, float], Met] = {}
     for number, (terms, part, at_end) in enumerate(scheme.evaluations):
-        # an engine may take a step's kick at once, and what its force lacks with it
+        # an engine may take a step's kick in one piece, with the whole error of its force
         whole = max(1.0, 1 / abs(float(schemes.number(part, np.float64))))
         known = terms, whole
         if places is not None or known not in made:
@@ -94,8 +93,7 @@ def _evaluations(case: Claim, places: list[Reals] | None, recorded: bool) -> lis
 
 
 def _force(case: Claim, terms: tuple[Term, ...], near: Reals | None, whole: float, exact: bool) -> Force:
-    """What bounds the rounding of a force, in roundings of the state: of its sum, its width and its
-    quantum."""
+    """Bound on the rounding of a force, in roundings of the state: of its sum, its width and its quantum."""
     how = case.trajectory.arithmetic
     plain = case.system.magnitude(near, terms, exact=exact)
     count = case.scene.system.pulls(terms)
@@ -114,7 +112,7 @@ def _force(case: Claim, terms: tuple[Term, ...], near: Reals | None, whole: floa
         sizes = plain(q + far, p)
         bound = sizes * more
         if how.quantum:
-            # each term's force on a particle is cut off once in a kick, not once for every rounding, and a
+            # each term's force on a particle is truncated once in a kick, not once for every rounding, and a
             # force below the quantum is lost, no more
             lost = np.minimum(how.quantum * count, sizes)
             bound = bound + whole * lost / (np.longdouble(how.state) * case.roundings)

@@ -1,4 +1,4 @@
-"""Experiments with the seed of a thermostat: what one seed keeps equal is known to rounding."""
+"""Experiments with the seed of a thermostat: runs of one seed share their draws, and differ as is known."""
 
 from __future__ import annotations
 
@@ -26,15 +26,15 @@ FEW = 8
 """Number of particles up to which each is perturbed by itself."""
 
 LONGEST_WAIT, NONE_LEFT = 10_000, 1e-9
-"""Most steps of a run that waits for a collision, and the probability that even so none comes."""
+"""Most steps of a run that waits for a collision, and the probability that none comes in time."""
 
 COLLIDED = 30
-"""Steps of the runs of `noise_size` where noise comes by collisions."""
+"""Steps of the runs of `noise_size` where noise comes from collisions."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Seeded:
-    """A thermostat that is started as often as it takes."""
+    """A random method on a scene, to be run with one seed or another."""
 
     scene: Scene
     label: str
@@ -44,13 +44,13 @@ class Seeded:
 
     @cached_property
     def scheme(self) -> Thermostat:
-        """What it claims to run."""
+        """The scheme that the method claims to run."""
         return THERMOSTATS[
             self.play(replace(self.scene, steps=1, every=1), self.label, seed=self.seed).scheme
         ]
 
     def run(self, scene: Scene, steps: int, seed: Any = None) -> Trajectory:
-        """A run of so many steps, each recorded.  MethodError where it diverges, or takes forces again."""
+        """A run of so many steps, each recorded.  MethodError where it diverges, or reuses forces."""
         run = self.play(replace(scene, steps=steps, every=1), self.label, seed=seed or self.seed)
         if limit := small_move(run):
             raise MethodError(limit)
@@ -59,7 +59,7 @@ class Seeded:
         return run
 
     def at_rest(self) -> Scene:
-        """The scene, every particle at rest in 0."""
+        """The scene with every particle at rest at 0."""
         none = np.zeros(self.scene.n)
         return replace(self.scene, q=none, p=none)
 
@@ -68,7 +68,7 @@ class Seeded:
         return Stepper.of(self.scheme, scene, absolute=absolute)
 
     def allowed(self, run: Trajectory, row: int = 0, factor: Any = True) -> tuple[Extended, Extended]:
-        """Bound on the rounding of a step from a frame; `factor` multiplies all momenta, if any does."""
+        """Bound on the rounding of a step from a frame; `factor` is a thermostat's factor on all momenta."""
         start = run.q[row].astype(np.longdouble), run.p[row].astype(np.longdouble)
         draws = [np.full(self.scene.n, LARGEST_DRAW)] * self.scheme.draws
         met: list[Met] = []
@@ -80,7 +80,7 @@ class Seeded:
             run.rebuilds_velocity, met,
         )  # fmt: skip
         if self.scheme.rescales_after:
-            # the kinetic energy that the factor is of has the roundings of all that came before it
+            # the kinetic energy that determines the factor has the roundings of all steps before it
             of_p = of_p + np.sqrt(self.scene.m * np.sum(of_p**2 / self.scene.m))
         many = roundings_of(self.scheme, self.scene)
         return many * of_q, many * of_p
@@ -114,7 +114,7 @@ def noise_map(subject: Seeded) -> Finding | str:
     for i, push in enumerate(pushes):
         dq, dp = (push, 0 * push) if i < scene.n else (0 * push, push)
         other = subject.run(replace(scene, q=scene.q + dq, p=scene.p + dp), 2)
-        # the second step: the draw of a start that acts again is then in both
+        # the second step: a draw that acts in two steps is then the same in both
         d = [(a - b)[1:].astype(np.longdouble) for a, b in ((other.q, base.q), (other.p, base.p))]
         draws = [none] * scheme.draws
         ideal = subject.stepper(scene)(d[0][0], d[1][0], force, draws)
@@ -137,7 +137,7 @@ def noise_size(subject: Seeded) -> Finding | str:
     if not scene.system.is_linear or np.any(scene.system.potential_force(0 * scene.q, 0 * scene.p)):
         return "a linear scene with its rest in 0 is needed"
     assert scene.bath is not None
-    # collisions come now and then; a factor of 2 is exact over any number of steps
+    # a collision may not occur in a given step; a factor of 2 is exact over any number of steps
     collides = scheme.collides
     steps = COLLIDED if collides else 1
     one = subject.run(scene, steps)
@@ -156,15 +156,14 @@ def noise_size(subject: Seeded) -> Finding | str:
         if collides:
             return f"no collision in {COLLIDED} steps"
         return Finding(np.inf, 1.0, "of what rounding allows", "there is no noise")
-    # where a step takes two draws, its state determines only a sum of them, weighted by friction
+    # where a step takes two draws, its state determines only their sum, weighted by friction
     if not collides and not scheme.rescales and scheme.fresh == 1:
         worst = max(worst, _redrawn(subject, one))
     return Finding(worst, 1.0, "of what rounding allows", "a factor of 2, and the same draws, of both runs")
 
 
 def _redrawn(subject: Seeded, one: Trajectory) -> float:
-    """Difference, over its bound, of the draws of a step from rest from those of the seed at another
-    friction.
+    """Difference, over its bound, of the draws of a step from rest from the same seed's at another friction.
 
     An engine that takes 1 - c**2 from c loses digits at small x = gamma h: 1/2x roundings of the noise, and
     1/x times as many where c is a difference itself, as in LAMMPS' (sqrt(1 + 4x) - 1)/2x.
@@ -181,7 +180,7 @@ def _redrawn(subject: Seeded, one: Trajectory) -> float:
     # a sum of two draws has the roundings of both, however near it is to 0
     size = np.maximum(np.abs(both[0].draws), LARGEST_DRAW * (subject.scheme.carried > 0))
     if both[0].draws.shape != both[1].draws.shape:
-        # friction so small that a state tells fewer draws apart
+        # at so small a friction a state resolves fewer draws
         return 0.0
     lost = one.arithmetic.unit * size / min(1.0, x, factor * x) ** 2
     error = np.sum([y.error for y in both], axis=0).reshape(lost.shape)
@@ -189,13 +188,14 @@ def _redrawn(subject: Seeded, one: Trajectory) -> float:
 
 
 class Script:
-    """A generator that hands out numbers of a list, one for all particles at a time, and then 0."""
+    """A generator that returns the numbers of a list, one for all particles at a time, and then 0."""
 
     def __init__(self, values: Any) -> None:
         self._left = list(values)
 
     def standard_normal(self, size: Any = ()) -> Floats:
-        """The next of the list for each draw of the shape (steps, draws, particles), or one for any other."""
+        """The next number of the list for each draw of a shape (steps, draws, particles), or one for any
+        other."""
         out = np.zeros(size)
         for row in out[0] if out.ndim == 3 else [out]:
             row[...] = self._last = self._left.pop(0) if self._left else 0.0

@@ -1,13 +1,12 @@
-"""What a check would have seen: the least relative change of a stiffness, step or friction beyond its bound.
+"""Limits of detection: the least relative change of a stiffness, step or friction that a check reports.
 
 A run of an engine that is off by a fraction x departs from the right one by x D to first order, D the
 derivative of the scheme's own motion: taken here as the quotient of two such motions in extended precision.
-A check sees it where x D exceeds the bound, so its limit is the least bound/D.  The engine's own
-roundings add to it, and fill a quarter of a bound at most: three limits fail for certain, and a tenth
-of one passes.
+A check sees it where x D exceeds the bound, so its limit is the least bound/D. The engine's own roundings add
+to it, and fill a quarter of a bound at most: three limits fail for certain, and a tenth of one passes.
 
-Of several springs the limit is that of the least visible one among those that show at all: an error of all of
-them at once would be seen long before.
+Of several springs the limit is that of the least visible one among those that are visible at all: an error of
+all of them at once would be seen long before.
 """
 
 from __future__ import annotations
@@ -28,24 +27,24 @@ from springcheck.physics.trajectory import NOT_KNOWN, Limits
 from springcheck.text.wording import count
 
 CHANGE = 2.0**-20
-"""Relative change of which the quotients are taken, over the phase of the motion: what is left out of them is
-this fraction."""
+"""Relative change, over the phase of the motion, of the difference quotients, whose truncation error it
+is."""
 
 ROUNDING = np.longdouble(64 * ROUNDOFF)
-"""Rounding of a motion in extended precision: a change that is not well above it is not known."""
+"""Rounding of a motion in extended precision: a change that is not well above it is not resolved."""
 
 LARGEST = 2.0**-5
-"""Relative change up to which its effect is taken to be proportional to it."""
+"""Relative change up to which the effect is taken to be linear."""
 
 COARSER = LARGEST / CHANGE
-"""Factor to the larger change that is tried where the effect of the first drowns in the reference's
+"""Factor to the larger change that is tried where the effect of the first is below the reference's
 rounding."""
 
 LOOKED_AT = 64
-"""Frames at which a limit is worked out, at equal distances: it is that of all frames or a little more."""
+"""Frames, evenly spaced, at which a limit is computed: it is that of all frames or slightly larger."""
 
 NUMBERS = 1 << 16
-"""Most positions at which a limit is worked out: very many particles take fewer frames."""
+"""Most positions at which a limit is computed: very many particles use fewer frames."""
 
 States: TypeAlias = tuple[Extended, Extended]
 Part: TypeAlias = Callable[[States], Reals | np.floating]
@@ -55,9 +54,9 @@ OF_A_DRIVE = {
     "phase": ("phase",),
     "late": ("phase",),
 }
-"""Limits of a drive, and the fields that hold what is changed: the last is a phase of W h a step."""
+"""Limits of a drive, and the fields that are changed; the last one is a phase of W h a step."""
 NAMES = ("stiffness", "step", "friction", *OF_A_DRIVE)
-"""Limits that are changes of a scene's own numbers, relative but for phases."""
+"""Limits that are changes of a scene's own numbers, relative except for phases."""
 
 
 def limits(
@@ -67,11 +66,11 @@ def limits(
     part: Part,
     coarse: Callable[[str], Sequence[States]] | None = None,
 ) -> tuple[Limits, int]:
-    """The limits of a check, and how many springs and frictions it does not see however far they are off.
+    """The limits of a check, and how many springs and frictions are invisible however far they are off.
 
     `motions(name)` are the right one with a parameter larger by `change`, one for each spring or friction,
-    none where that is not known, and `part` says how many bounds changes (r, n) of it are.  Those whose
-    effect drowns in the reference's own rounding are tried again at `COARSER` times that, if it is known.
+    none where that is not known, and `part` expresses changes (r, n) of it in bounds.  Those whose effect is
+    below the reference's own rounding are tried again at `COARSER` times that, if it is known.
     """
     found: dict[str, float | None] = {}
     hidden = 0
@@ -100,13 +99,12 @@ def _largest(parts: Reals | np.floating) -> float:
 
 
 def change_of(steps: int) -> float:
-    """The relative change whose effect on so many steps is still small."""
+    """The relative change whose effect over so many steps is still small."""
     return CHANGE / max(1.0, 2.0 * steps)
 
 
 def rows(case: Case, total: int, told: NDArray[np.bool_] | None = None) -> Integers:
-    """Indices of some of so many rows, or of the rows that are `told`: evenly spaced, the last one among
-    them."""
+    """Evenly spaced indices of so many rows, or of the rows that are `told`, the last one included."""
     chosen = np.arange(total) if told is None else np.flatnonzero(told)
     most = max(2, min(LOOKED_AT, NUMBERS // case.scene.n))
     if len(chosen) > most:
@@ -115,7 +113,7 @@ def rows(case: Case, total: int, told: NDArray[np.bool_] | None = None) -> Integ
 
 
 MOST_ROWS = 8
-"""Springs whose effects are worked out one by one; of more springs, those with the least effect."""
+"""Springs whose effects are computed one by one; of more springs, those with the least effect."""
 
 
 def changed(case: Case, name: str, change: float, rows: Rows | None = None) -> Case:
@@ -150,7 +148,7 @@ Rows: TypeAlias = tuple[int, slice]
 
 
 def every_row(case: Case, name: str, copies: int = 1) -> list[Rows]:
-    """The springs, or the frictions, of a scene that is so many copies of one side by side, one in each."""
+    """The springs, or frictions, of a scene; of `copies` of a scene side by side, one row in each copy."""
     found: list[Rows] = []
     kind = {"stiffness": "potential", "friction": "friction"}.get(name, "drive")
     for number, term in enumerate(case.judged.terms):
@@ -187,8 +185,8 @@ def of_steps(
     *,
     copies: int = 1,
 ) -> tuple[Limits, str]:
-    """The limits of the steps from each frame to the next, of those that are told (f-1,), and what they do
-    not see, in words.  `copies` of one scene side by side have their springs together."""
+    """Limits of detection of the steps from each frame to the next, of those that are told (f-1,), and what
+    is invisible, in words.  `copies` of one scene side by side have their springs changed together."""
     at = rows(case, len(told), told)
     change = change_of(case.trajectory.every)
 
@@ -243,8 +241,8 @@ def _ends(case: Case, at: Integers) -> States:
 
 
 def of_modes(case: Case, part: Callable[[Integers, States, States], Reals | np.floating]) -> Limits:
-    """The limits of a check of normal modes: `part(rows, right, change)` says how many bounds a change of
-    the closed-form motion about the centres is, in mode coordinates (r, n)."""
+    """Limits of a check of normal modes: `part(rows, right, change)` expresses a change of the closed-form
+    motion about the centres in bounds, in mode coordinates (r, n)."""
     at, change, right, motions = case.once(_mode_motions)
     return limits(right, lambda name: motions.get(name, []), change, lambda off: part(at, right, off))[0]
 

@@ -1,4 +1,4 @@
-"""Adaptive solvers: what their tolerance allows."""
+"""Adaptive solvers: the error that their tolerance allows."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def tolerance(case: Case) -> Finding | str:
     run = case.trajectory
     q, p = exact.true_motion(case.scene, case.steps, run.step)
     value = float(np.max(case.system.norm(run.q - q, run.p - p)))
-    # sizes of the exact solution: those of one that explodes would excuse it
+    # sizes of the exact solution: a diverging one would excuse itself
     true = replace(run, q=np.asarray(q, np.float64), p=np.asarray(p, np.float64))
     known = exact.uncertainty(case.scene, float(case.steps[-1]) * run.step)
     begun, rebuilt = _first_step(case), _rebuilt(case, true.q, true.p)
@@ -62,11 +62,11 @@ def tolerance_bound(case: Case) -> float:
 
 
 def most_steps(case: Case) -> float:
-    """Internal steps that a solver may have made: no more than force calls, and than order 1 asks for.
+    """Internal steps that a solver may have made: no more than force calls, and than order 1 needs.
 
-    At order 1 a step of h leaves h**2 |z''|/2, which is the tolerance of |z| for h = sqrt(2
-    tolerance)/rate; and no more than `A_FRAME` for each frame, or `A_RADIAN` for each radian of the fastest
-    motion if those are more.  A method that says that it has made more of them is not believed.
+    At order 1 a step of h leaves h**2 |z''|/2, which is the tolerance of |z| for h = sqrt(2 tolerance)/rate;
+    and no more than `A_FRAME` for each frame, or `A_RADIAN` for each radian of the fastest motion if those
+    are more.  A method that reports more of them is not believed.
     """
     slowest = _radians(case) / np.sqrt(2 * (case.trajectory.tolerance or 1.0))
     return float(min(case.trajectory.force_calls, max(slowest, STARTING), _believed(case)))
@@ -92,11 +92,11 @@ def _first_step(case: Case) -> float:
 
 
 def _rebuilt(case: Case, q: Floats, p: Floats) -> float:
-    """What velocities rebuilt from positions at every step may add up to, in initial energy norms.
+    """Accumulated rounding of velocities rebuilt from positions at every step, in initial energy norms.
 
     A step of h leaves m eps |q|/h, which steps of nearly one length round to the same side.  The shortest is
-    what the rule allows where the motion (f, n) is pushed most, held up to a fifth below that; after one cut
-    short at a frame each is twice as long as the one before, which all together add 2/h.
+    what the rule allows where the acceleration along the motion (f, n) is largest, held up to a fifth below
+    that; after one cut short at a frame each is twice as long as the one before, which all together add 2/h.
     """
     run, scene, rule = case.trajectory, case.judged, case.scheme.rule
     if rule is None or not run.rebuilds_velocity:
@@ -134,18 +134,18 @@ def _not_believed(case: Case) -> str:
 
 
 STARTING = 100.0
-"""Steps that a solver may take before its step has grown to what the motion asks for."""
+"""Steps that a solver may take before its step has grown to the size that the motion allows."""
 
 A_FRAME, A_RADIAN = 64.0, 500.0
 """Force calls that are believed: a step or two that end at a frame, by the costliest of the known methods
 (IAS15, 38); and steps of order 5, each with six calls, at a tolerance of 1e-10."""
 
 TIMES = 128
-"""Times along the motion between which the exact flow's growth is looked at."""
+"""Times along the motion between which the growth of the exact flow is evaluated."""
 
 CHANGE = np.longdouble(2.0**-24)
-"""Relative change of the start for which the exact solution is worked out again: its second order is 2**-24
-of the first, and its rounding in extended precision 2**-40."""
+"""Relative change of the start for the derivative of the exact solution: its second order is 2**-24 of the
+first, its rounding in extended precision 2**-40."""
 
 
 def flow_growth(case: Case) -> float:
@@ -202,7 +202,7 @@ def _flow_maps(case: Case, duration: float) -> Floats | None:
         if not all(map(exact.has_true_motion, scenes)):
             return None
         one, other = (np.stack(exact.true_motion(start, steps, h), axis=1) for start in scenes)
-        # by what the doubles really differ
+        # by the actual difference of the doubles
         change = (moved[0] - moved[1]) / unit
         columns.append((one - other) / (unit * np.sum(change, axis=0 if separate else None)))
     # (d, f, 2, n): which column, time, q or p, particle
@@ -213,11 +213,11 @@ def _flow_maps(case: Case, duration: float) -> Floats | None:
 
 
 JOINED = 4
-"""Joined particles of an anharmonic scene up to which the exact flow's growth is taken from its solution."""
+"""Joined particles of an anharmonic scene up to which the growth of the exact flow is computed."""
 
 
 def _units(case: Case) -> tuple[Extended, Extended]:
-    """Changes of positions and momenta (n,) that are all as large in the energy norm, and small."""
+    """Small changes of positions and momenta (n,), each of the same size in the energy norm."""
     scene = case.scene
     stiff = _stiff(case)
     fallback = scene.m * np.longdouble(fastest(case)) ** 2

@@ -21,8 +21,8 @@ from springcheck.text.wording import count
 
 
 def bridges(case: Case) -> bool:
-    """Whether the closed form tells of a slip however long ago it was: it has one, and no more than half of
-    the motion decays within the run."""
+    """Whether the closed form reveals an error however long ago it was made: there is one, and at most half
+    of the motion decays within the run."""
     if missing(case, CLOSED):
         return False
     decay = np.log(np.min(schemes.rotation(case.matrices).determinant)) * case.scene.steps / 2
@@ -117,14 +117,12 @@ def drive(case: Case) -> Finding | str:
 
 
 def _allowed(case: Case) -> tuple[Floats, NDArray[np.bool_]]:
-    """Bound in roundings of each frame but the first, and whether it is known there (f-1,).
-
-    Frames very many steps apart are judged in the energy norm over all particles.
-    """
+    """Bound in roundings of each frame but the first, and whether it is known there (f-1,).  Frames very many
+    steps apart are judged in the energy norm over all particles."""
     if case.ahead is not None:
         told = known(case, case.ahead, case.trajectory.every)
         return np.full(len(told), float(case.roundings)), told
-    # growth by the map of one rounding a step, over the steps from frame to frame
+    # amplification of one rounding a step, over the steps from frame to frame
     total, grown = schemes.amplification(case.matrices, case.w, np.array([case.trajectory.every]))
     bound = np.full(len(case.steps) - 1, case.roundings * float(total[0] * grown[0]))
     told = bound * case.trajectory.arithmetic.state < 1
@@ -139,10 +137,10 @@ NO_BETTER = "cannot be judged to better than that here: rounding is as large"
 
 def _blind(case: Case, told: NDArray[np.bool_], *, passed: bool) -> str:
     """Name the positions and momenta that move by no more in any step than rounding may, and the others whose
-    bound exceeds `OF_DIGITS` roundings of their own digits or `OF_WAY` of how far they move.
+    bound exceeds `OF_DIGITS` roundings of their own digits or `OF_WAY` of their range.
 
-    Where the steps pass, also those that are off by more than `OF_RECORDING` times what recording them
-    rounds: those of a right engine may be, and those of a wrong force.
+    Where the steps pass, also those that are off by more than `OF_RECORDING` roundings of the recording: a
+    right engine may be that far off, and so may one with a wrong force.
     """
     ahead, run = case.ahead, case.trajectory
     if ahead is None:
@@ -163,7 +161,7 @@ def _blind(case: Case, told: NDArray[np.bool_], *, passed: bool) -> str:
 
 
 OF_DIGITS, OF_WAY = 512.0, 1e-9
-"""Roundings of a number, and part of its way, above which the verdict says what rounding hides of it."""
+"""Roundings of a number, and fraction of its range, above which the verdict says how much rounding hides."""
 
 OF_RECORDING = 20.0
 """Departure of a number from the scheme's own, in roundings of recording it (half a unit in the last place),
@@ -241,8 +239,8 @@ def _in_roundings(case: Case, to_q: Floats, to_p: Floats) -> Reals:
 
 
 def _left(case: Case, off_q: Reals, off_p: Reals, at: Integers | slice = slice(None)) -> Reals:
-    """Residual of the equation of positions of an implicit step (`Case.residual`) where states are off by so
-    much (r, n) after these frames, in its roundings; 0 for a scheme without such an equation."""
+    """Residual of the equation of positions of an implicit step (`Case.residual`) for errors (r, n) of states
+    after these frames, in its roundings; 0 for a scheme without such an equation."""
     if case.residual is None:
         return np.zeros_like(off_q)
     way, added = case.residual
@@ -257,7 +255,7 @@ def _off(ahead: Stretch, to_q: Floats, to_p: Floats) -> Reals:
 
 
 def _beyond_range(case: Case, off: NDArray[np.bool_]) -> str:
-    """The limit of the engine's arithmetic that explains every step that is off (f-1,), or nothing."""
+    """The limit of the engine's arithmetic that explains all steps that are off (f-1,), or ""."""
     how = case.trajectory.arithmetic
     if how.stale and np.any(off) and case.trajectory.every == 1:
         moved = least_moved(np.max(np.abs(np.diff(case.trajectory.q, axis=0)), axis=1))
@@ -281,7 +279,7 @@ SHORTEST = float(np.sqrt(np.finfo(np.float64).smallest_normal))
 
 
 def _without_length(case: Case, off: NDArray[np.bool_]) -> str:
-    """Why steps (f-1,) may be off where all positions are too small to be squared, or nothing."""
+    """Why steps (f-1,) may be off where all positions are too small to be squared, or ""."""
     largest = float(np.max(np.abs(case.trajectory.q[:-1][off]), initial=0.0))
     if not 0 < largest < SHORTEST:
         return ""
@@ -318,7 +316,7 @@ def arithmetic(case: Case) -> Finding | str:
     seen = case.once(_step_defect)
     if isinstance(seen, str):
         return seen
-    # over many steps the bound is a sum of which roundings that are as good as random fill a part
+    # over many steps the bound is a sum, of which roundings that are as good as random fill a part
     alone = seen.value
     if case.ahead is not None and case.trajectory.every > 1:
         told = known(case, case.ahead, case.trajectory.every)
@@ -336,7 +334,7 @@ def arithmetic(case: Case) -> Finding | str:
 
 
 FLOOR = 2.0**-8
-"""A rounding that is as good as random stays below this fraction of its unit once in 2**8 times."""
+"""A random rounding stays below this fraction of its unit once in 2**8 times."""
 
 
 ENOUGH = 9

@@ -74,11 +74,12 @@ class Stretch:
     reach: Extended
     """The largest |q| and |p| on the way (2, f, n)."""
     turns: Extended
-    """The largest h**2 |K|/m at a force on the way (f,): below 1 an implicit step has one solution."""
+    """The largest h**2 |K|/m at an evaluation of the force (f,): below 1 an implicit step has one
+    solution."""
 
 
 BENT = 0.125
-"""Part of a motion up to which the effect of rounding on it is linear: beyond, the second order counts."""
+"""Fraction of a motion up to which the effect of rounding on it is linear: beyond, second order counts."""
 
 
 def known(case: Claim, ahead: Stretch, steps: int) -> NDArray[np.bool_]:
@@ -105,7 +106,7 @@ def follow(case: Claim, q: Extended, p: Extended, steps: int) -> Stretch:
         implicit, separate = case.law.has("implicit"), case.system.is_separate
         solved = (1 if separate else q.shape[1]) * implicit
         spread = bound * np.sqrt(_walk(case) + _to_one_side(case) ** 2 + (2 + solved) / 3)
-        # stiff bonds carry what a solver leaves along few directions, all of a sign
+        # stiff bonds carry a solver's residual along few directions, with one sign
         random = not implicit or separate or bool(np.max(_turn(case, q)) < 1)
         allowance = _allowed(case, bound, bound, spread, DEVIATIONS, random=random)
         return Stretch(end=end, allowance=allowance, last=bound, reach=reach, turns=turns)
@@ -206,9 +207,9 @@ def _sampled(case: Claim, q: Extended, p: Extended, steps: int) -> Stretch:
 
 
 def _alike(case: Claim, before: Reals, after: Reals) -> Extended:
-    """What a rounding may be step after step, in deviations: to one side, along the state, along its change.
+    """Roundings that recur step after step, in deviations: to one side, along the state, along its change.
 
-    Of those to one side each may be as large as it can; the others are as good as random.
+    Each of those to one side may be as large as possible; the others are as good as random.
     """
     one_side = 0 * before + _to_one_side(case)
     return np.stack([one_side, np.sign(before) / np.sqrt(3), np.sign(after - before) / np.sqrt(3)])
@@ -224,7 +225,7 @@ def _walk(case: Claim) -> float:
 
 
 def _times(case: Claim) -> int:
-    """How often one step rounds numbers as large as the whole position, or the whole momentum."""
+    """How often one step rounds numbers of the size of the whole position, or of the whole momentum."""
     kinds = case.scheme.kinds
     moves = sum(kind.drifts for kind in kinds), sum(not kind.drifts for kind in kinds)
     return max(1, len(case.scheme.b), *moves)
@@ -233,10 +234,10 @@ def _times(case: Claim) -> int:
 def _allowed(
     case: Claim, worst: Extended, last: Extended, spread: Extended, deviations: float, *, random: bool
 ) -> Extended:
-    """What roundings of all steps may be, in those of one: at worst, or so many standard deviations of them
-    and beside them the worst of the last step, or one more where they are as good as `random`."""
+    """Bound on the roundings of all steps, in those of one: the worst case, or so many standard deviations
+    beside the worst of the last step, or beside one more where they are as good as `random`."""
     how = case.trajectory.arithmetic
-    # a solver errs alike at every step, and its whole error is in velocities that are rebuilt from positions
+    # a solver errs alike at every step, with its whole error in velocities that are rebuilt from positions
     alike = case.trajectory.rebuilds_velocity and case.law.has("implicit")
     if not WIDE or how.quantum or how.lengths or how.stale or alike:
         return worst
@@ -249,7 +250,7 @@ def _allowed(
 
 
 def _joined(separate: bool) -> Callable[..., Extended]:
-    """How what belongs to q and to p becomes one: as pairs of single particles, or as a row of all."""
+    """Combine the coordinates of q and p into pairs for each particle, or into one row of all."""
     return np.stack if separate else np.concatenate
 
 

@@ -1,6 +1,6 @@
-"""Checks of random schemes: the map and the direction of their noise to rounding, their draws by chance.
+"""Checks of random schemes: the map and the direction of the noise to rounding, the draws by statistics.
 
-A draw is what a state must have taken to come from the one before it.
+A draw is the random number that a state must have taken to follow from the one before it.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def reading(case: Case) -> Reading:
 
 
 def thermostat(case: Case) -> Thermostat:
-    """Its scheme.  MethodError for a scheme of which it is not known how it holds rods."""
+    """The thermostat of a case.  MethodError where it is not known how it holds rods."""
     scheme = THERMOSTATS[case.trajectory.scheme]
     if case.judged.system.rods and not scheme.held:
         raise MethodError(f"no stages of {scheme.title} with rods are known")
@@ -55,7 +55,7 @@ def _read(case: Case, q: Floats, p: Floats) -> Reading:
 
 
 def _unread(case: Case) -> int:
-    """Frames before the first draw that is read: one that acts in two steps is not in the record at the
+    """Frames before the first draw that can be read: one that acts in two steps is not recorded at the
     start."""
     return int(thermostat(case).carried > 0 and case.steps[0] == 0)
 
@@ -86,7 +86,7 @@ def noise_direction(case: Case) -> Finding | str:
         run = case.trajectory
         liveliest = int(np.argmax(np.sum(np.square(run.p.astype(np.longdouble)) / case.judged.m, axis=1)))
         still = _read(case, *(np.repeat(x[liveliest][None], 4, axis=0) for x in (run.q, run.p))).across
-        # without draws what is at rest stays there by right
+        # without draws a particle at rest stays there
         least = -1.0 if thermostat(case).draws else 0.0
         if still is not None and least < np.max(still) <= found.roundings:
             return f"{STILL} any step"
@@ -122,7 +122,7 @@ def _of(case: Case, probability: Callable[[Floats], float], value: Callable[[Flo
         return found
     x, read = found
     x = x if read.hits is None else x[read.hits][:, None]
-    # draws that nothing has are infinite
+    # draws of an impossible size are infinite
     return Chance(probability(x), f"{value(x)}, of {count(x.size, 'draw')}")
 
 
