@@ -39,12 +39,12 @@ __all__ = ["Check", "assert_right", "checks_of", "parametrize_with_checks", "une
 SEED = 20260101
 
 __tracebackhide__ = True
-"""pytest leaves our frames out, and shows those of the engine and of its test."""
+"""pytest omits our frames from a traceback, and shows those of the engine and of its test."""
 
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """One check of one method; call it.  AssertionError says what is wrong, in words."""
+    """One check of one method, to be called.  AssertionError says what is wrong, in words."""
 
     name: str
     label: Label
@@ -105,7 +105,7 @@ def assert_right(scene: Scene, run: Trajectory) -> None:
 
 
 def _shown(scene: Scene, run: Trajectory, about: int) -> str:
-    """What the states of a run that failed show; where SciPy or h5py is not here, that it would say so."""
+    """Cause that the states of a failed run show; or that SciPy or h5py, which would find it, is missing."""
     try:
         from springcheck.identify import files
     except ModuleNotFoundError as error:
@@ -137,7 +137,7 @@ def uneven_scenes() -> Iterator[Scene]:
             terms.append(Damping(i=i, c=some(0.1, 0.5, n)))
         yield Scene(
             name=f"uneven-{number + 1}", m=m, q=some(-1.2, 1.2, n), p=some(-1.5, 1.5, n), terms=tuple(terms),
-            # at longer steps explicit Euler leaves a quartic for good
+            # at longer steps explicit Euler escapes a quartic
             step=float(rng.uniform(0.02, 0.05 if number == 10 else 0.2)),
             steps=120, every=1 if number % 3 else 3,
         )  # fmt: skip
@@ -191,13 +191,13 @@ def _in_a_bath(scene: Scene) -> Scene:
 
 
 def _in_haste(scene: Scene) -> Scene:
-    """The springs between particles are fast, those to walls are not."""
+    """The springs between particles are fast, those to walls are slow."""
     terms = (replace(term, fast=True) if isinstance(term, Spring) else term for term in scene.terms)
     return replace(scene, terms=tuple(terms))
 
 
 def odd_scenes(label: Label) -> Iterator[Scene]:
-    """Scenes of terms that a method is declared for, as engines come to lose or to change one.
+    """Scenes of the terms that a method declares, with features that engines lose or change.
 
     Particles out of order, two springs to walls of one particle, two between one pair and with ends swapped,
     a rest length below 0, a stiffness below 0, friction on one particle alone.
@@ -246,7 +246,7 @@ def _right(label: Label, scene: Scene) -> None:
     try:
         run = driver.run(scene, label, seed=SEED if scene.bath else None)
     except MethodError as error:
-        # the line of the engine that raised stands in the message
+        # the message contains the line of the engine that raised
         raise AssertionError(f"{label} does not run {scene.name}: {error}") from None
     assert run.outcome.status == "complete", (
         f"{label} {run.outcome.status} on {scene.name}: {run.outcome.message}"

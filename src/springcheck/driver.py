@@ -1,6 +1,6 @@
-"""The driver: one scene by one method, recorded in chunks, timed, its outcome judged.
+"""The driver: run one scene by one method, recorded in chunks, timed, its outcome judged.
 
-The engine only moves.  Clock, chunks, energies, progress and divergence are kept here, alike for all.
+The engine only advances.  Clock, chunks, energies, progress and divergence are kept here, alike for all.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ CHUNK = 1 << 16
 
 FIRST, QUICK = 256, 0.1
 """Rows of the first chunk, and the seconds below which the next one is four times as long: a slow engine
-reports its progress, and hears Ctrl-C, several times a second."""
+reports its progress, and notices Ctrl-C, several times a second."""
 
 PIECE, WORK = 1 << 16, 1 << 22
 """Steps, and steps times particles, that an engine of fixed step takes in one call where frames lie further
@@ -36,15 +36,15 @@ apart: between two calls a run can be interrupted.  Counts, not times: the numbe
 the speed of the machine."""
 
 UNHEARD = 0.25
-"""Longest call of an engine, which nothing interrupts, where its numbers are thrown away [s]."""
+"""Longest call of an engine that cannot be interrupted, where its numbers are discarded [s]."""
 
 
 UNTOUCHED = np.array(0x7FF8_0000_5C5C_5C5C).view(np.float64)
-"""Fill value of rows before an engine writes them: a NaN that no arithmetic makes."""
+"""Fill value of rows before an engine writes them: a NaN that no arithmetic produces."""
 
 
 class Sink(Protocol):
-    """Takes recorded frames: t (f,), q and p (f, n), energy and last steps (f,) or None.  The arrays are
+    """Receives recorded frames: t (f,), q and p (f, n), energy and last steps (f,) or None.  The arrays are
     reused."""
 
     def __call__(
@@ -64,7 +64,7 @@ SUBNORMAL = (
 
 
 MOST_SEED = 900_000_000
-"""Seeds go from 1 to this, which every library takes: LAMMPS has no larger one, and 0 asks OpenMM for any."""
+"""Seeds are 1 to this, which every library accepts: LAMMPS has no larger one, and 0 makes OpenMM draw one."""
 
 
 GIVEN_DRAWS = "none: drawn by a generator that the caller gave"
@@ -72,7 +72,7 @@ GIVEN_DRAWS = "none: drawn by a generator that the caller gave"
 
 
 def checked_seed(seed: int | None) -> int:
-    """The seed that is given, or one that is drawn.  MethodError where it is out of range."""
+    """The given seed, or a random one.  MethodError where it is out of range."""
     if seed is None:
         import secrets
 
@@ -127,7 +127,7 @@ def play(
     whole = piece == scene.every
     # frames further apart than a piece are filled one by one
     ready = min(rows, FIRST, WORK // (piece * scene.n) or 1) if whole else 1
-    # an engine that fills nothing must not pass for one that has
+    # an engine that fills nothing must not be taken for one that has
     q, p = np.full((2, rows, scene.n), UNTOUCHED)
     told = hasattr(simulation, "last_steps")
     _hand_over(scene, sink, 0, scene.q[None], scene.p[None], np.zeros(1) if told else None)
@@ -176,7 +176,7 @@ def play(
 
 
 def _said(label: Label, simulation: Simulation, name: str, what: str, taken: Callable[[Any], Any]) -> Any:
-    """What an engine says of its run, as `taken` takes it.  MethodError where it is no such thing."""
+    """What an engine reports of its run, as `taken` converts it.  MethodError where it cannot."""
     said: Any = engines.guarded(label, lambda: getattr(simulation, name))
     try:
         return taken(said)
@@ -210,9 +210,9 @@ def _advance(
     p: Floats,
     progress: Progress | None,
 ) -> tuple[Ending, int, str, float]:
-    """Fill q and p (f, n): how it ended, how many rows are good, why no more, and the seconds it took.
+    """Fill q and p (f, n): how it ended, the number of good rows, why no more, and the seconds it took.
 
-    Where a call takes fewer steps than lie between frames there is one row; `progress` is told of each call.
+    Where a call takes fewer steps than lie between frames there is one row; `progress` is called after each.
     """
     status: Ending = "complete"
     good, message, told = len(q), "", 0
@@ -306,7 +306,7 @@ def run(
 
 
 class Bare(NamedTuple):
-    """What running an engine alone took, for one run of it: seconds of wall clock and force calls."""
+    """Cost of running an engine alone, for one run of it: seconds of wall clock and force calls."""
 
     timing: Timing
     force_calls: int

@@ -11,7 +11,7 @@ LONGEST_MESSAGE = 480
 """Characters of a message, which is one line: what a file says in it may be longer."""
 
 LONGEST_WORD, MOST_WORDS = 100, 2000
-"""Characters of a word that may be mistyped, and how many it is compared with."""
+"""Characters of a word that may be mistyped, and the number of words it is compared with."""
 
 _STRANGE = ("Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp")
 """Unicode's controls, formats (which turn the direction of writing), surrogates, and ends of lines."""
@@ -37,7 +37,7 @@ def plain(text: object, longest: int | None = None) -> str:
 
 
 class SpringcheckError(Exception):
-    """Something a user can mend.  The command line prints the message alone and exits with 2."""
+    """An error that a user can correct.  The command line prints the message alone and exits with 2."""
 
     def __str__(self) -> str:
         return plain(super().__str__(), LONGEST_MESSAGE)
@@ -60,9 +60,9 @@ class IdentificationError(SpringcheckError):
 
 
 def told(error: BaseException, file: object = "") -> str:
-    """An exception of code that is not ours as one line: its type, its message, and where it was raised.
+    """An exception of foreign code in one line: its type, its message, and where it was raised.
 
-    The place is the deepest line of `file` on the way to it, where there is one, else the deepest of all.
+    The place is the deepest line of `file` in its traceback, where there is one, else the deepest of all.
     """
     if isinstance(error, SyntaxError) and error.filename:
         return f"SyntaxError: {error.msg} ({Path(error.filename).name}, line {error.lineno})"
@@ -82,7 +82,7 @@ def told(error: BaseException, file: object = "") -> str:
 
 
 def nearest(word: str, known: Iterable[str], before: str = "") -> str:
-    """ ", did you mean ...?" where one of the known words is close, else nothing."""
+    """ ", did you mean ...?" where one of the known words is close, else ""."""
     from difflib import get_close_matches
 
     # the time that a comparison takes grows with the square of the lengths
@@ -93,7 +93,7 @@ def nearest(word: str, known: Iterable[str], before: str = "") -> str:
 
 
 class StoreWarning(UserWarning):
-    """A store is written or resumed all the same, but not as it should be."""
+    """A store is written or resumed all the same, but with a limitation."""
 
     def __str__(self) -> str:
         return plain(super().__str__(), LONGEST_MESSAGE)

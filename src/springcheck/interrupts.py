@@ -1,8 +1,8 @@
-"""Ctrl-C and SIGTERM: one KeyboardInterrupt through everything, and an end within two seconds.  A program
-that the code of others ends (`os._exit`, a crash) names it, and has no result.
+"""Ctrl-C and SIGTERM: one KeyboardInterrupt through everything, and an end within two seconds.
 
-Only the program's entry point installs this: a library leaves signals to the program that imports it.
-What is imported here is what the interpreter has loaded by itself, so that no moment is left without it.
+A program that foreign code ends (`os._exit`, a crash) names it, and has no result.  Only the program's entry
+point installs this: a library leaves signals to the program that imports it.  Only modules that the
+interpreter has loaded by itself are imported, so that no moment is left without it.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ if TYPE_CHECKING:
     from typing import Any, ClassVar
 
 STATUS = 130
-"""Exit status of a program that was interrupted, as shells expect it."""
+"""Exit status of an interrupted program, as shells expect it."""
 
 BROKEN_PIPE = 141
-"""Exit status of a program whose output nobody reads any more: 128 + SIGPIPE, as shells have it."""
+"""Exit status of a program whose output nobody reads any more: 128 + SIGPIPE, as in shells."""
 
 GRACE = 1.5
 """Seconds from the signal to the end of the process, whatever it is doing: native code that does not return,
@@ -36,38 +36,38 @@ SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT")
 
 
 class _State:
-    """What this process knows of its signals; they belong to the process, so there is one of it."""
+    """Signal state of this process; signals belong to the process, so there is one of it."""
 
     seen = False
     """A signal has come."""
     raised = False
-    """Its KeyboardInterrupt is on its way; further signals hurry nothing and spoil nothing."""
+    """Its KeyboardInterrupt is on its way; further signals are ignored."""
     held = 0
     message = "interrupted"
     ends: ClassVar[set[Callable[[], object]]] = set()
     """Called as the process ends, wherever it is: to remove temporary folders and end child processes."""
     board: Any = None
-    """Memory shared with the parent process: whether the program has ended by itself, and whom it calls."""
+    """Memory shared with the parent process: whether the program has ended by itself, and what it calls."""
     ended: ClassVar[dict[str, str]] = {}
-    """Code of others that has ended the program before, and how."""
+    """Foreign code that has ended the program before, and how."""
     mask: Any = None
     lifeline = -1
-    """Ends with the parent process."""
+    """File descriptor that closes with the parent process."""
     errors = 2
-    """Standard error as it was: a library's messages may be caught while the signal comes; 2 until `install`
-    keeps another."""
+    """Standard error as it was: a library's messages may be captured while the signal comes; 2 until
+    `install` keeps another."""
 
 
 def install() -> None:
-    """Turn the first signal into a KeyboardInterrupt; ignore the next ones; end the process in time.
+    """Turn the first signal into a KeyboardInterrupt; ignore later ones; end the process in time.
 
-    Standard streams that are closed lead nowhere from here on.
+    Standard streams that are closed are redirected to the null device.
     """
     for stream in (0, 1, 2):
         try:
             os.fstat(stream)
         except OSError:
-            # a file that is opened now would take its place, and get what is printed
+            # a file that is opened later would take its descriptor, and receive what is printed
             os.dup2(os.open(os.devnull, os.O_RDWR), stream)
     _State.errors = os.dup(2)
     sys.excepthook, sys.unraisablehook = _uncaught, _unraisable
@@ -87,16 +87,16 @@ def install() -> None:
 
 
 def _end_with_parent(lifeline: int) -> None:
-    """Kill this process when the one that waits for it is gone: a signal to that one was meant for this."""
+    """Kill this process when its parent is gone, for which the signal was meant."""
     os.read(lifeline, 1)
     os.kill(os.getpid(), signal.SIGKILL)
 
 
 def supervised() -> int | None:
-    """Carry the program out in a process of its own -> its exit status; None in that process.
+    """Run the program in a child process -> its exit status; None in the child.
 
-    What a plug-in or a library does to it (`os._exit`, SIGSEGV, SIGABRT ...) ends that process alone.  Where
-    it is known which of them was called (see `calling`), the program is begun anew: it takes up what was
+    What a plug-in or a library does to it (`os._exit`, SIGSEGV, SIGABRT ...) ends the child alone.  Where it
+    is known which of them was called (see `calling`), the program is started again: it resumes what was
     finished, and refuses those that ended it (see `ended_by`).
     """
     if not hasattr(os, "fork") or os.environ.get("SPRINGCHECK_TRACEBACK"):
@@ -104,7 +104,7 @@ def supervised() -> int | None:
     import mmap
 
     for number in (0, 1, 2):
-        # a standard stream that was closed leads nowhere: no pipe of ours may take its place
+        # a standard stream that is closed is redirected: no pipe of ours may take its descriptor
         with contextlib.suppress(OSError):
             os.fstat(number)
             continue
@@ -129,7 +129,7 @@ def supervised() -> int | None:
         if board[0]:
             return int(board[1])
         if -status in (signal.SIGKILL, *numbers):
-            # somebody has ended it; this one ends in the same way
+            # the child ended by a signal; end in the same way
             os.kill(os.getpid(), -status)
         name = bytes(board[2:]).partition(b"\0")[0].decode("utf-8", "replace")
         how = f"ended the program (exit status {status})"
@@ -142,7 +142,7 @@ def supervised() -> int | None:
 
 
 def _waited_for(child: int, heard: Sequence[int]) -> int:
-    """The exit status of a child, which gets the signals that this process hears."""
+    """The exit status of a child, to which signals of this process are forwarded."""
 
     def forward(number: int, frame: object) -> None:
         _State.seen = True
@@ -153,7 +153,8 @@ def _waited_for(child: int, heard: Sequence[int]) -> int:
         signal.signal(number, forward)
     signal.pthread_sigmask(signal.SIG_SETMASK, _State.mask)
     _, raw = os.waitpid(child, 0)
-    # a program that has ended by itself has its exit status, whatever comes while this interpreter shuts down
+    # a program that has ended by itself keeps its exit status, whatever comes while this interpreter shuts
+    # down
     then = signal.SIG_IGN if _State.board[0] else signal.SIG_DFL
     for number in heard:
         signal.signal(number, then)
@@ -164,14 +165,14 @@ _PAGE = 4096
 
 
 def calling(name: str) -> None:
-    """Code of others of this name is called from here on; "" for none.
+    """Foreign code of this name is called from here on; "" for none.
 
-    Where it has put a handler in C in place of ours, as UCX below MPI does for SIGHUP, ours is back.
+    Where it has replaced our handler in C, as UCX below MPI does for SIGHUP, ours is restored.
     """
     if _State.board is not None:
         _State.board[2:_PAGE] = name.encode("utf-8", "replace")[: _PAGE - 3].ljust(_PAGE - 2, b"\0")
     for number in (getattr(signal, one, None) for one in SIGNALS if not name):
-        # what Python knows of a signal is not what C has made of it; threads may set none
+        # Python does not notice a handler that is set in C; only the main thread may set one
         if number is not None and signal.getsignal(number) is _raise:
             with contextlib.suppress(ValueError):
                 signal.signal(number, _raise)
@@ -190,7 +191,7 @@ def ends(status: int) -> int:
 
 
 def unread() -> int:
-    """Nobody reads the output any more, nor is anything left to say -> `BROKEN_PIPE`."""
+    """The reader of standard output is gone: discard the rest -> `BROKEN_PIPE`."""
     for stream in (1, 2):
         # at shutdown the interpreter would complain that buffered output cannot be written
         os.dup2(os.open(os.devnull, os.O_WRONLY), stream)
@@ -198,10 +199,10 @@ def unread() -> int:
 
 
 def over(status: int) -> int:
-    """End the process that `supervised` has made after what libraries do at exit; the status, in any other.
+    """End the child that `supervised` has started, after libraries' exit handlers; elsewhere, the status.
 
-    The interpreter would take every module apart first, a twentieth of the smallest run's time.  What looks
-    on has something to do yet: a profiler, a debugger, what measures coverage.
+    The interpreter would tear down every module first, a twentieth of the smallest run's time.  Not under a
+    profiler, a debugger or coverage, which have work left to do.
     """
     if _State.board is not None and sys.getprofile() is None and sys.gettrace() is None:
         atexit._run_exitfuncs()
@@ -213,17 +214,17 @@ def over(status: int) -> int:
 
 
 def seen() -> bool:
-    """Whether a signal has come: whatever the program has found since then is no result."""
+    """Whether a signal has come: later findings of the program are no result."""
     return _State.seen
 
 
 def announce(message: str) -> None:
-    """What is said of an interrupt from here on, in one line; nothing once it has been said."""
+    """Set the line that an interrupt prints from here on, unless it has been printed."""
     _State.message = message
 
 
 def say() -> None:
-    """Say once what an interrupt has left, where standard error was before a library's was caught."""
+    """Print once what an interrupt has left behind, to the original standard error."""
     message, _State.message = _State.message, ""
     if not message:
         return
@@ -239,7 +240,7 @@ def say() -> None:
 
 
 def finish() -> None:
-    """Ignore signals while the interpreter shuts down: nothing is left that could be interrupted."""
+    """Ignore signals while the interpreter shuts down: nothing is left to interrupt."""
     for name in SIGNALS:
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.SIG_IGN)
@@ -262,7 +263,7 @@ def leave() -> None:
 
 
 class held:  # noqa: N801  (a context manager reads as a word)
-    """Let an interrupt wait while files are made or removed that must not be left half done; be brief."""
+    """Defer an interrupt while files are made or removed that must not be left half done; be brief."""
 
     def __enter__(self) -> None:
         _State.held += 1
@@ -275,7 +276,7 @@ class held:  # noqa: N801  (a context manager reads as a word)
 
 
 def takes(end: Callable[[], object]) -> None:
-    """Have `end` called when the process is ended by an interrupt; `forget` it where it has been done."""
+    """Call `end` when an interrupt ends the process; `forget` cancels it."""
     _State.ends.add(end)
 
 
@@ -311,7 +312,7 @@ class folder:  # noqa: N801
 
 
 def called(words: Sequence[str], seconds: float, **how: Any) -> subprocess.CompletedProcess[bytes]:
-    """Call a program and catch what it prints; where it is left, it ends with all that it has started.
+    """Run a program and capture its output; on leaving, it ends with all that it has started.
 
     Raises OSError where there is no such program, subprocess.TimeoutExpired after so many seconds.
     """
@@ -354,7 +355,7 @@ def _raise(number: int, frame: object) -> None:
 
 
 def _watch(wakeup: int) -> None:
-    """Wait for a signal in a thread, which native code that has released the interpreter cannot stop."""
+    """Wait for a signal in a thread, which works while native code has released the interpreter lock."""
     numbers = {getattr(signal, name, -1) for name in SIGNALS}
     while os.read(wakeup, 1)[0] not in numbers:
         pass
@@ -363,7 +364,7 @@ def _watch(wakeup: int) -> None:
 
 
 def _uncaught(kind: type[BaseException], error: BaseException, trace: object) -> None:
-    """Cython reports here what it had to swallow in a callback."""
+    """Cython reports here an exception that it had to swallow in a callback."""
     if issubclass(kind, KeyboardInterrupt):
         _again()
     elif not _State.seen:
@@ -371,9 +372,9 @@ def _uncaught(kind: type[BaseException], error: BaseException, trace: object) ->
 
 
 def _unraisable(found: sys.UnraisableHookArgs) -> None:
-    """Where no exception can be raised (callbacks from C, destructors) the interrupt would be lost.
+    """An exception that cannot be raised (callbacks from C, destructors), where the interrupt would be lost.
 
-    Once it has come, destructors meet objects that it has left half made: their errors are nobody's.
+    Once it has come, destructors find objects half made: their errors are ignored.
     """
     if issubclass(found.exc_type, KeyboardInterrupt):
         _again()
@@ -382,7 +383,7 @@ def _unraisable(found: sys.UnraisableHookArgs) -> None:
 
 
 def _again() -> None:
-    """Raise the interrupt once more, outside of the place that has swallowed it."""
+    """Raise the interrupt again, outside of the place that swallowed it."""
     _State.raised = False
     _thread.start_new_thread(_once_more, ())
 

@@ -1,4 +1,4 @@
-"""Engines that a command line brings: files of plug-ins, functions, programs in any language."""
+"""Engines from the command line: plug-in files, functions, programs in any language."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from springcheck.physics import terms
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Brought:
-    """Engines, functions and programs as a call spells them, so that another process can bring them too."""
+    """Engines, functions and programs as a command line gives them, so that another process can load them."""
 
     engines: tuple[str, ...] = ()
     steppers: tuple[str, ...] = ()
@@ -27,7 +27,7 @@ class Brought:
     seconds: float = command.SECONDS
 
     def bring(self) -> list[str]:
-        """Make the engines known -> the labels of their methods.  MethodError where one cannot be used."""
+        """Register the engines -> the labels of their methods.  MethodError where one cannot be used."""
         found = [engines.from_file(Path(text)) for text in self.engines]
         # a file may only register a term
         labels = [
@@ -64,12 +64,12 @@ class Brought:
 
 @cache
 def bring_once(what: Brought) -> None:
-    """Bring them once in this process: a worker carries out many parts."""
+    """Register them once in this process: a worker carries out many parts."""
     what.bring()
 
 
 def bring(options: Namespace) -> None:
-    """Make the engines that the options name known, and have their methods run beside the others.
+    """Register the engines that the options name, so that their methods run beside the others.
 
     `options.brought` hands them on to the processes that a study starts.  Raises MethodError, in one line,
     where one of them cannot be used.
@@ -94,7 +94,7 @@ def bring(options: Namespace) -> None:
             "--workers: a term that a call brings is known to its own process alone; leave it out"
         )
     if labels and hasattr(options, "method"):
-        # where methods are named, those that are brought here are meant as well
+        # where methods are named, those that are brought here are added to them
         options.method = list(dict.fromkeys([*(options.method or [engines.UNNAMED]), *labels]))
 
 
@@ -103,7 +103,7 @@ def _labels(found: engines.Engine) -> list[str]:
 
 
 def _digest(*paths: str) -> str:
-    """What stands for the version of code: runs of an older one are not resumed."""
+    """Stands for the version of code: runs of an older one are not resumed."""
     found = sha256()
     for path in paths:
         if Path(path).is_file():

@@ -87,7 +87,7 @@ def files(text: str) -> list[str]:
 
 
 def as_json(scene: Scene, step: float, every: int) -> dict[str, Any]:
-    """A scene as plain data.  One mass on one spring to a wall stands in four plain numbers beside it."""
+    """A scene as plain data.  One mass on one spring to a wall is also given by four plain numbers."""
     terms: list[dict[str, Any]] = [
         {"key": term.key} | {name: values.tolist() for name, values in term.arrays.items()}
         for term in scene.terms
@@ -105,7 +105,7 @@ def as_json(scene: Scene, step: float, every: int) -> dict[str, Any]:
 
 
 class _Command:
-    """A command that is run once, as the first states are asked for."""
+    """A command that runs once, when the first states are asked for."""
 
     def __init__(self, name: str, words: list[str], scene: Scene, step: float, seconds: float) -> None:
         self.force_calls = 0
@@ -152,7 +152,7 @@ class _Command:
 
     def _read(self, out: Path, every: int) -> tuple[Floats, Floats]:
         try:
-            # a function that is judged needs no reader of files, and so no h5py
+            # imported here: a function under test needs no reader of files, and so no h5py
             from springcheck import formats
 
             states = formats.moving(out, next(iter(formats.read(out).values())))

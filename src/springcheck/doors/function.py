@@ -62,7 +62,7 @@ def load(spec: Spec) -> Callable[..., Any]:
 
 
 def _called(spec: Spec) -> str:
-    """What a function is called in a message."""
+    """Name of a function in messages."""
     return spec if isinstance(spec, str) else str(getattr(spec, "__name__", type(spec).__name__))
 
 
@@ -108,7 +108,7 @@ def while_here(functions: Sequence[Callable[..., Any]], scheme: str = "") -> Ite
     """Labels of functions, which are methods of an engine within this context and not after it."""
     made = engine(functions, lambda name: scheme)
     codes = [getattr(inspect.unwrap(one), "__code__", one) for one in functions]
-    # what stands for the version: runs of another function are not resumed
+    # stands for the version: runs of another function are not resumed
     known = [(x.co_code, x.co_consts, x.co_names) if isinstance(x, CodeType) else x for x in codes]
     with engines.while_here(made, "this call", sha256(repr(known).encode()).hexdigest()[:12]):
         yield [f"{made.name}:{name}" for name in made.methods]
@@ -147,8 +147,7 @@ def engine(specs: Sequence[Spec], stated: Callable[[str], str] = lambda name: ""
 
 
 def _names(specs: Sequence[str]) -> list[str]:
-    """Names of functions, with those of their modules where two are alike.  MethodError where that is not
-    enough."""
+    """Names of functions, with their modules' where two are equal. MethodError where that is not enough."""
     plain = [re.sub(r"[^A-Za-z0-9_-]", "-", spec.rpartition(":")[2]) or "step" for spec in specs]
     whole = [
         re.sub(r"[^A-Za-z0-9_-]", "-", f"{Path(spec.rpartition(':')[0].removesuffix('.py')).name}-{name}")
@@ -166,7 +165,7 @@ def _identified(function: Callable[..., Any]) -> str:
     try:
         found = identify_stepper(function)
     except (MethodError, IdentificationError):
-        # a mistake in the function is shown as it is, when it runs
+        # an error in the function is shown as it is, when it runs
         return UNKNOWN.name
     known = found.fits and found.scheme in schemes.SCHEMES and schemes.SCHEMES[found.scheme].has("one-step")
     return found.scheme if known and found.scheme else UNKNOWN.name
@@ -180,9 +179,9 @@ def _file(function: Callable[..., Any]) -> str:
 
 
 class _Pull:
-    """What a function is given as `force`: force(q, p, t), the last two left out where they are not needed.
+    """The argument `force` of a function: force(q, p, t), the last two optional.
 
-    `t` is the time at which the step starts, at which the force is taken unless the function says a time.
+    `t` is the time at which the step starts, at which the force is taken unless the function gives a time.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -239,7 +238,7 @@ class _Steps:
         try:
             found = self._call(True)
         except (ArithmeticError, TypeError, IndexError, AttributeError, ValueError) as second:
-            # whichever call got further into the function shows its mistake
+            # show the error of whichever call got further into the function
             raise (second if self._line(second) > self._line(first) else first) from None
         self._arrays = True
         return found

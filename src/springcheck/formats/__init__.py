@@ -1,7 +1,7 @@
-"""Trajectories of others, told by what is in them, not by their names.
+"""Trajectories of other programs, recognised by their content, not by their names.
 
-What our own code reads (texts, NPY, NPZ) is bounded as it is read; what a library reads is read by a process
-of its own (see `springcheck.store.apart`).
+What our own code reads (texts, NPY, NPZ) is bounded as it is read; what a library reads is read in a child
+process (see `springcheck.store.apart`).
 """
 
 from __future__ import annotations
@@ -30,18 +30,18 @@ __all__ = ["BY_NAME", "FORMATS", "States", "is_hdf5", "is_store", "moving", "rea
 
 HDF5 = b"\x89HDF\r\n\x1a\n"
 BEGINNING = 1 << 12
-"""Bytes of a file by which its format is recognised."""
+"""Bytes at the beginning of a file by which its format is recognised."""
 
 
 @dataclass(frozen=True, slots=True)
 class Format:
-    """A format: how it is recognised by the beginning of a file, and read."""
+    """A format: how its beginning is recognised, and its reader."""
 
     name: str
     recognise: Callable[[bytes, Path], bool]
     read: Reader
     by: str = ""
-    """LIBRARY, the code of others, in a process of its own; or LINES, line by line, gzipped or not."""
+    """LIBRARY, read by a library in a child process; or LINES, line by line, gzipped or not."""
 
 
 LIBRARY, LINES = "library", "lines"
@@ -80,7 +80,7 @@ FORMATS: tuple[Format, ...] = (
     Format("Octave text", _matches(rb"^# name: .*\n# type: "), octave.read_octave, LINES),
     Format("text tables", lambda head, path: True, tables.read_table, LINES),
 )
-"""In the order in which they are tried; text tables are what nothing else is."""
+"""In the order in which they are tried; a file that no other format matches is a text table."""
 
 BY_NAME = {one.name: one for one in FORMATS}
 KNOWN = f"read are HDF5, {', '.join(BY_NAME)}, texts gzipped too"
@@ -95,7 +95,7 @@ def _beginning(path: Path) -> bytes:
 
 
 def is_hdf5(path: Path) -> bool:
-    """Whether a file begins as HDF5 does, perhaps after a block of another program's, as MATLAB's do."""
+    """Whether a file begins as HDF5 does, perhaps after another program's user block, such as MATLAB's."""
     head = _beginning(path)
     return any(head[at : at + 8] == HDF5 for at in (0, 512, 1024, 2048))
 
@@ -108,10 +108,10 @@ def is_store(path: Path) -> bool:
 def read(
     path: Path, columns: Sequence[str] = (), step: float | None = None, most: int | None = None
 ) -> dict[str, States]:
-    """The trajectories of a file of any program by name: one, but of HDF5 (see `read_hdf5`, for `most` too).
+    """Trajectories of any program's file by name: one, except from HDF5 (see `read_hdf5`, for `most` too).
 
-    `columns` names what has no names, as t, q, v; `step` is the time step of files that count steps alone.
-    Raises StoreError, in one line, where it cannot be read, or lacks times or positions.
+    `columns` names columns without names, as t, q, v; `step` is the time step of files that count steps
+    alone.  Raises StoreError, in one line, where the file cannot be read, or lacks times or positions.
     """
     found = read_hdf5(path, columns, most) if is_hdf5(path) else {path.name: _read(path, list(columns), step)}
     return {name: fitting(path, states) for name, states in found.items()}

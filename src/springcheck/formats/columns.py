@@ -1,4 +1,4 @@
-"""What the columns of a table mean: times, positions, and momenta or velocities, by their names."""
+"""Meaning of a table's columns by their names: times, positions, and momenta or velocities."""
 
 from __future__ import annotations
 
@@ -29,20 +29,20 @@ NAMES: dict[Kind, str] = {
 
 
 FEWEST_SINGLE, FEW_ROWS, SHORT = 8, 1000, 0xFFF
-"""Different numbers of single precision that make a table one of it, in so many rows; and the last bits of
-its 24 of which some are set there: none is in numbers that no step rounds, such as 0.75."""
+"""Evidence that numbers are of single precision: so many different ones in so many rows, and bits among the
+last of the 24 set in some.  None is set in numbers that no step has rounded, such as 0.75."""
 
 LONGEST_NAME = 200
 """Characters of a column's name; patterns take the square of it."""
 
 ALONE = "positions alone are the same for leapfrog, Verlet and semi-implicit Euler: record velocities too"
-"""What is said of a file that could not tell schemes apart, which share one recurrence of the positions."""
+"""Note on a file that cannot distinguish schemes which share one recurrence of the positions."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class States:
-    """Recorded states: t (f,), q and p or v (f, n) or neither, mass (n,) or None, and how finely they were
-    written."""
+    """Recorded states: t (f,), q and p or v (f, n) or neither, mass (n,) or None, and the precision of the
+    numbers."""
 
     t: Floats
     q: Floats
@@ -50,11 +50,11 @@ class States:
     v: Floats | None
     mass: Floats | None
     roundoff: float = 2.0**-53
-    """Unit roundoff of what is written: 2**-24 for single precision, 5e-d for d significant digits."""
+    """Unit roundoff of the numbers: 2**-24 for single precision, 5e-d for d significant digits."""
     units: Mapping[str, str] = field(default_factory=dict)
-    """Units of q, v, t and mass that an H5MD file names."""
+    """Units of q, v, t and mass, as an H5MD file states them."""
     notes: tuple[str, ...] = ()
-    """What of the file was left out."""
+    """Parts of the file that were left out."""
 
 
 Reader: TypeAlias = Callable[[Path, list[str], float | None], States]
@@ -79,17 +79,17 @@ def moving(path: Path, found: States) -> States:
 
 
 def kind(name: str) -> Kind | None:
-    """Quantity that a column of this name holds; units in brackets, numbers and case do not count."""
+    """Quantity that a column of this name holds; units in brackets, numbers and case are ignored."""
     bare, _ = _parted(name)
     found: list[Kind] = [one for one, pattern in NAMES.items() if re.fullmatch(pattern, bare)]
     return found[0] if found else None
 
 
 def kinds(names: Iterable[str]) -> dict[str, Kind]:
-    """The quantity of each of a table's columns that holds one.
+    """The quantity of each column that holds one.
 
-    A capital letter beside a small one of its quantity stands for another: T and V beside t and p, or v, are
-    energies (or a temperature), and P is a pressure.
+    A capital letter beside the small letter of its quantity means something else: beside t and p, or v, T and
+    V are energies (or a temperature), and P is a pressure.
     """
     found = {name: what for name in names if (what := kind(name)) is not None}
     small = {what for name, what in found.items() if not _is_capital(name)}
@@ -108,7 +108,7 @@ def _without_unit(name: str) -> str:
 
 
 def _parted(name: str) -> tuple[str, str]:
-    """A name without units and case, and the number at its end."""
+    """A name without its unit and case, and the number at its end."""
     if len(name) > LONGEST_NAME:
         return "", ""
     bare = _without_unit(name).lower()
@@ -117,14 +117,14 @@ def _parted(name: str) -> tuple[str, str]:
 
 
 def _place(name: str) -> tuple[str, str]:
-    """The axis and the number of what a column holds, as its name says them: ("x", "2") of ``vx2``."""
+    """Axis and number in a column's name: ("x", "2") of ``vx2``."""
     bare, number = _parted(name)
     axis = re.search(r"[xyz](?=$|_?dot|/dt)", bare)
     return axis[0] if axis else "", number
 
 
 def split(path: Path, columns: Columns, roundoff: float = 2.0**-53) -> States:
-    """Named columns as states.  StoreError says which are missing or do not fit together."""
+    """Named columns as states.  StoreError names those that are missing or do not fit together."""
     parts: dict[Kind, list[Floats]] = {}
     places: dict[Kind, list[tuple[str, str]]] = {}
     meant = kinds(columns)
@@ -136,7 +136,7 @@ def split(path: Path, columns: Columns, roundoff: float = 2.0**-53) -> States:
         if len({axis for axis, _ in found}) == 1:
             places[what] = [("", number) for _, number in found]
     for what in places.keys() & {"p", "v"}:
-        # momenta and velocities stand in the order of the positions, where their names say which is which
+        # momenta and velocities take the order of the positions, where their names number them
         if len({*places[what]}) == len(parts[what]) and {*places[what]} == {*places.get("q", ())}:
             parts[what] = [parts[what][places[what].index(place)] for place in places["q"]]
     for what, why in (("t", "times"), ("q", "positions")):
@@ -181,7 +181,7 @@ def _left_out(columns: Columns, meant: Mapping[str, Kind]) -> tuple[str, ...]:
 
 
 def is_single(x: Floats) -> bool:
-    """Whether all of these numbers are of single precision, and enough of them need all of its digits."""
+    """Whether all of these numbers are of single precision, and enough of them use all of its digits."""
     some = x[:FEW_ROWS]
     with np.errstate(over="ignore"):
         short = np.float32(some).view(np.uint32) & SHORT == 0
@@ -192,7 +192,7 @@ def is_single(x: Floats) -> bool:
 
 
 def listed(names: Iterable[str]) -> str:
-    """Names between commas, the first eight of them."""
+    """Names separated by commas, the first eight of them."""
     names = list(names)
     return (
         ", ".join(plain(name, 40) for name in names[:8]) + (" ..." if len(names) > 8 else "")

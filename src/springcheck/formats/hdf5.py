@@ -15,9 +15,9 @@ from springcheck.formats.numbers import states_of
 from springcheck.store import access, layout, trust
 
 MOST_FRAMES = 1 << 21
-"""Frames of one particle group that are looked at, however many it declares."""
+"""Frames of one particle group that are read, however many it declares."""
 DEEPEST = 4
-"""Groups in groups that are looked into."""
+"""Depth of nested groups that are searched."""
 
 
 def is_foreign(path: str | Path) -> bool:
@@ -65,12 +65,12 @@ def read_hdf5(path: Path, columns: Sequence[str] = (), most: int | None = None) 
 
 
 def _name_of(place: str) -> str:
-    """A dataset's place; Octave has each in a group of its name, as ``t/value``."""
+    """Name of the dataset at a path; Octave stores each in a group of its name, as ``t/value``."""
     return place.removesuffix("/value")
 
 
 def tried(path: Path) -> bytes:
-    """Read all that could be read of a file, in a process of its own (see `springcheck.store.trust`)."""
+    """Read everything that `read_hdf5` might, in a child process (see `springcheck.store.trust`)."""
     for _ in arrays(path, lambda place: True):
         pass
     particle_groups(path)
@@ -78,9 +78,9 @@ def tried(path: Path) -> bytes:
 
 
 def arrays(path: Path, wanted: Callable[[str], bool]) -> Iterator[tuple[str, Any]]:
-    """The wanted arrays by their places, one by one: all together as many numbers as one trajectory may have.
+    """The arrays at the wanted paths, one by one: in total no more numbers than one trajectory may have.
 
-    In the place of one that does not lie in the file, is none of numbers or is too large, stands a StoreError
+    In the place of an array that lies in another file, is not numeric or is too large, stands a StoreError
     that says so.
     """
     left = MOST_NUMBERS
@@ -100,7 +100,7 @@ def arrays(path: Path, wanted: Callable[[str], bool]) -> Iterator[tuple[str, Any
 
 
 def _places(file: Any) -> Iterator[str]:
-    """Paths of the datasets of a file, and of the links that lead elsewhere."""
+    """Paths of the datasets of a file, and of the links to other files."""
     groups = [("", file)]
     for place, _, node in access.walk(file, access.MOST_MEMBERS, DEEPEST):
         if access.is_group(node):
@@ -113,10 +113,10 @@ def _places(file: Any) -> Iterator[str]:
 
 
 def particle_groups(path: Path, most: int | None = None) -> dict[str, States]:
-    """The particle groups of an H5MD file that have positions; none without /particles, which is no H5MD.
+    """The particle groups of an H5MD file that have positions; none without /particles, which is not H5MD.
 
-    Frames of as many positions as a trajectory may have are read, at most `most`, from the first on; the rest
-    is left out.  Where positions and velocities are stored at different steps, the common ones are taken.
+    Frames are read from the first on, at most `most`, and as many as one trajectory may have positions.
+    Where positions and velocities are stored at different steps, the common ones are taken.
     """
     with access.for_reading(path) as file:
         particles = access.find(file, "particles")
@@ -173,12 +173,12 @@ def _states(path: Path, group: Any, name: str, most: int | None) -> States | Non
 
 
 def _roundoff(dataset: Any) -> float:
-    """Unit roundoff of numbers as they are stored (6e-8 for single precision), of whole numbers a half."""
+    """Unit roundoff of numbers as stored: 6e-8 for single precision, a half for integers."""
     return max(2.0**-53, float(np.finfo(dataset.dtype).eps) / 2) if dataset.dtype.kind == "f" else 0.5
 
 
 def _beside(path: Path, group: Any, element: str, frames: int, rows: Any) -> Any:
-    """An element beside so many positions: (f, ...) at rows of them, (1, ...) without time, or None."""
+    """An element stored with the positions: (f, ...) at their rows, (1, ...) if it is constant, or None."""
     node = access.find(group, element)
     if not access.is_group(node):
         return None if node is None else np.asarray(_numbers(path, group, element)[()], np.float64)[None]
@@ -189,7 +189,7 @@ def _beside(path: Path, group: Any, element: str, frames: int, rows: Any) -> Any
 
 
 def _crossed(path: Path, group: Any, shape: tuple[int, ...], rows: Any) -> Any:
-    """What borders of a box took off positions: images times its edges, a matrix of rows if triclinic."""
+    """What wrapping took off positions: images times the box's edges, a matrix of rows if triclinic."""
     image = _beside(path, group, "image", shape[0], rows)
     if image is None or not np.any(image):
         return 0.0
@@ -200,7 +200,7 @@ def _crossed(path: Path, group: Any, shape: tuple[int, ...], rows: Any) -> Any:
 
 
 def _order(path: Path, group: Any, shape: tuple[int, ...], rows: Any) -> Any:
-    """Where the particles of the first frame stand in each (f, n), by their ids; None where none moves."""
+    """Index of the first frame's particles in each frame (f, n), by their ids; None where none moves."""
     ids = _beside(path, group, "id", shape[0], rows)
     if ids is None or ids.shape[1:] != shape[1:2] or np.all(ids == ids[:1]):
         return None
@@ -211,13 +211,13 @@ def _order(path: Path, group: Any, shape: tuple[int, ...], rows: Any) -> Any:
 
 
 def _rows(dataset: Any, chosen: Any) -> Floats:
-    """Rows of a dataset, read as one slice: libhdf5 takes minutes for as many one by one."""
+    """Rows of a dataset, read as one slice: libhdf5 takes minutes for single rows."""
     found = np.asarray(dataset[: chosen[-1] + 1], np.float64)
     return found if len(found) == len(chosen) else np.asarray(found[chosen])
 
 
 def _numbers(path: Path, group: Any, name: str) -> Any:
-    """A dataset of numbers; StoreError where it is none, or does not lie in the file."""
+    """A dataset of numbers; StoreError where it is not numeric, or lies in another file."""
     dataset = access.dataset_at(group, name, packed=True)
     if dataset.dtype.kind not in "fiu":
         raise StoreError(f"{path}: {dataset.name} is no array of numbers")

@@ -1,4 +1,4 @@
-"""Files that libraries read: ASE, MDAnalysis, pandas, SciPy.  In a process of their own (see `store.apart`).
+"""Files that libraries read: ASE, MDAnalysis, pandas, SciPy.  In a child process (see `store.apart`).
 
 Each in its own units: ASE's in Angstrom, fs and u, GROMACS' in nm, ps and u, Amber's in Angstrom and ps.
 """
@@ -26,12 +26,12 @@ from springcheck.formats.tables import roundoff
 
 MOST_FRAMES = 1 << 20
 LONGEST_JSON = 1 << 25
-"""Bytes: as plain objects it takes some twenty times as much."""
+"""Bytes of a JSON file: parsed into Python objects it takes some twenty times as much memory."""
 
 
 @contextmanager
 def _library(path: Path, name: str, install: str = "") -> Iterator[None]:
-    """Whatever a library raises as a StoreError of one line that names it, and how it is installed."""
+    """Turn a library's error into a StoreError of one line that names it, or says how to install it."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -47,7 +47,7 @@ def _library(path: Path, name: str, install: str = "") -> Iterator[None]:
 
 
 def read_ase(path: Path, columns: list[str], step: float | None) -> States:
-    """What ASE reads: extended XYZ with velocities or momenta, and .traj."""
+    """Files that ASE reads: extended XYZ with velocities or momenta, and .traj."""
     with _library(path, "ASE", "ase"):
         import ase.io
         from ase import units
@@ -71,7 +71,7 @@ def read_ase(path: Path, columns: list[str], step: float | None) -> States:
 
 
 def _written(lines: list[str]) -> float:
-    """How finely an extended XYZ file is written, whose atoms are rows of a name and numbers."""
+    """Precision of an extended XYZ file, whose atoms are rows of a name and numbers."""
     rows: list[list[str]] = []
     i = 0
     while i < len(lines) and lines[i].strip():
@@ -84,7 +84,7 @@ def _written(lines: list[str]) -> float:
 
 
 def read_xtc(path: Path, columns: list[str], step: float | None) -> States:
-    """A GROMACS .xtc file by MDAnalysis: positions alone [nm], to the decimals that were asked for."""
+    """A GROMACS .xtc file by MDAnalysis: positions alone [nm], rounded to the decimals of the file."""
     with _analysed(path, "lib.formats.libmdaxdr", "XTCFile") as file:
         found = [(frame.time, np.array(frame.x)) for frame in islice(file, MOST_FRAMES)]
     return of_frames(path, [t for t, _ in found], [q for _, q in found], None, None, 2.0**-24)
@@ -138,8 +138,8 @@ def read_mat(path: Path, columns: list[str], step: float | None) -> States:
 
 
 def read_json(path: Path, columns: list[str], step: float | None) -> States:
-    """Lists by name, or their values by row as pandas writes them; or a list of rows, named or not, which may
-    stand one on each line."""
+    """Lists by name, or values by row as pandas writes them; or rows, named or not, in a list or one on each
+    line."""
     if path.stat().st_size > LONGEST_JSON:
         raise StoreError(f"{path}: more than {LONGEST_JSON >> 20} MiB of JSON; store it as NPZ or HDF5")
     with _library(path, "msgspec", "msgspec"):

@@ -1,4 +1,4 @@
-"""Lines of a text file, gzipped or not, one by one: no more of them than a trajectory may have."""
+"""Lines of a text file, gzipped or not, read one by one and bounded by the size of a trajectory."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ LONGEST_LINE = 1 << 24
 MOST_NUMBERS = 1 << 24
 """Numbers of one trajectory."""
 LONGEST_TEXT, MOST_BARE = 1 << 30, 1 << 20
-"""Characters of a text, unpacked, and lines beyond two for each of its numbers: gzip makes gigabytes of a few
-kilobytes of comments."""
+"""Characters of a text, unpacked, and lines beyond two for each of its numbers: a few kilobytes of gzip
+unpack to gigabytes of comments."""
 
 
 class Lines:
@@ -50,7 +50,7 @@ class Lines:
         return StoreError(f"{self.path}, line {self.number}: {what}")
 
     def count(self, numbers: int) -> None:
-        """So many numbers more are read.  StoreError where they are more than a trajectory may have."""
+        """Count numbers that were read.  StoreError where there are more than a trajectory may have."""
         self._numbers += numbers
         if self._numbers > MOST_NUMBERS:
             raise self.wrong(
@@ -67,11 +67,11 @@ class Lines:
 
 
 BARE_EXPONENT = re.compile(r"^([+-]?\d*\.\d*)([+-]\d{3})$")
-"""Fortran leaves out the letter of an exponent of three digits."""
+"""Fortran omits the letter of an exponent of three digits."""
 
 
 def number(cell: str) -> float:
-    """The number in a cell, with Fortran's exponents (1.5D+00, 1.5-100) too.  ValueError where there is
+    """The number in a cell, also with Fortran's exponents (1.5D+00, 1.5-100).  ValueError where there is
     none."""
     if "_" in cell:
         # Python's own way to write a number

@@ -30,7 +30,7 @@ def times(path: Path, steps: Any, step: float | None, unit: str = "") -> Floats:
 
 
 def clock(path: Path, said: Sequence[float | None], step: float | None, unit: str = "") -> Floats:
-    """The times that frames say, or where none says one, those of counted steps."""
+    """The times that the frames state, or where none does, those of counted steps."""
     known = [one for one in said if one is not None]
     if not known:
         return times(path, range(len(said)), step, unit)
@@ -60,7 +60,7 @@ def of_frames(path: Path, t: Any, q: Any, v: Any, mass: Any, roundoff: float = 2
 
 @contextmanager
 def _frames(path: Path, what: str) -> Iterator[Lines]:
-    """The lines of a file of frames; what is wrong in it is said with its line."""
+    """The lines of a file of frames; errors name the line."""
     with Lines(path) as lines:
         try:
             yield lines
@@ -84,7 +84,7 @@ def _atoms(text: str, lines: Lines, before: int | None) -> int:
 
 
 def read_lammps(path: Path, columns: list[str], step: float | None) -> States:
-    """A text dump with id, positions (x or xu) and velocities (vx), and perhaps the mass."""
+    """A text dump with id, positions (x or xu), velocities (vx), and optionally the mass."""
     steps: list[int] = []
     clock: list[float] = []
     numbers = array("d")
@@ -124,7 +124,7 @@ def read_lammps(path: Path, columns: list[str], step: float | None) -> States:
             wrapped = "x" in item.split()[2:] and "xu" not in item.split()[2:]
             if wrapped and tilted:
                 raise lines.wrong("its box is tilted; dump xu yu zu in place of x y z")
-            # where counters of borders are written, or an axis has none, none are looked for
+            # where borders are counted, or an axis has no box, nothing is unwrapped here
             counted = "ix" in wanted or not wrapped
             boxes.append([0.0 if counted or way != "pp" else x for x, way in zip(edges, around, strict=True)])
             for _ in range(announced):
@@ -156,7 +156,7 @@ def read_lammps(path: Path, columns: list[str], step: float | None) -> States:
 
 
 def _crossed(q: Floats, boxes: Floats) -> Floats:
-    """What was taken off positions q (f, n, 3) at borders of periodic boxes (f, 3), 0 along axes without:
+    """What wrapping took off positions q (f, n, 3) at borders of periodic boxes (f, 3), 0 along axes without:
     from frame to frame an atom is where its nearest image was."""
     edges = boxes[1:, None, :]
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -166,7 +166,7 @@ def _crossed(q: Floats, boxes: Floats) -> Floats:
 
 
 def _wanted(path: Path, names: list[str]) -> dict[str, int]:
-    """Where positions, velocities, and, where they are written, masses and numbers of atoms stand."""
+    """Columns of positions, velocities and, where written, masses and numbers of atoms."""
     pairs = ["xu" if "xu" in names else "x", "yu" if "yu" in names else "y", "zu" if "zu" in names else "z"]
     wanted = [*pairs, "vx", "vy", "vz"]
     lacking = [name for name in wanted if name not in names]
@@ -178,9 +178,9 @@ def _wanted(path: Path, names: list[str]) -> dict[str, int]:
 
 
 def read_log(path: Path, columns: list[str], step: float | None) -> States:
-    """The thermodynamic output of a LAMMPS log: Step or Time, v_... .
+    """Thermodynamic output of a LAMMPS log: Step or Time, v_... .
 
-    Of all runs whose columns hold what those of the first one with positions do; the others are noted.
+    Runs whose columns mean what those of the first one with positions do are read, others are noted.
     """
     runs: list[tuple[list[str], array[float], list[list[str]]]] = []
     within = False
@@ -224,12 +224,13 @@ def read_log(path: Path, columns: list[str], step: float | None) -> States:
 
 
 def _bare(name: str) -> str:
-    """A column's name without what LAMMPS writes before that of a variable, a compute or a fix."""
+    """A column's name without LAMMPS' prefix of a variable, a compute or a fix."""
     return re.sub(r"^[vcf]_", "", name)
 
 
 def _read_of(header: list[str], columns: list[str]) -> list[str]:
-    """The columns of a run that are read, all where they were named; none where it has no positions."""
+    """The columns of a run that are read, all of them where they were named; none where it has no
+    positions."""
     kinds = [kind(_bare(name)) for name in header]
     if columns:
         return header if len(columns) == len(header) else []
@@ -237,7 +238,7 @@ def _read_of(header: list[str], columns: list[str]) -> list[str]:
 
 
 def read_gro(path: Path, columns: list[str], step: float | None) -> States:
-    """Frames of a .gro file with velocities; their titles hold the times."""
+    """Frames of a .gro file with velocities; the times are in their titles."""
     t: list[float | None] = []
     numbers = array("d")
     n: int | None = None
@@ -252,7 +253,7 @@ def read_gro(path: Path, columns: list[str], step: float | None) -> States:
             for atom in range(n):
                 row = next(lines)
                 if not (atom or wide):
-                    # columns are as wide as the distance between decimal points
+                    # the distance between decimal points is the width of the columns
                     points = [j for j, c in enumerate(row) if c == "."]
                     if len(points) < 6:
                         raise StoreError(f"{path}: holds no velocities; {ALONE}")
@@ -272,9 +273,9 @@ def read_gro(path: Path, columns: list[str], step: float | None) -> States:
 
 
 COUNT = rb"\A[^\S\n]*\d+[^\S\n]*\n"
-"""How extended and plain .xyz begin: with a line of one number."""
+"""Extended and plain .xyz begin with a line of one number."""
 XYZ = COUNT + rb".*\n[^\S\n]*[A-Za-z]{1,8}\d*[^\S\n]+[-+.\d]"
-"""Plain .xyz goes on with a comment and an atom of a name and numbers."""
+"""Plain .xyz continues with a comment and an atom of a name and numbers."""
 
 
 def read_xyz(path: Path, columns: list[str], step: float | None) -> States:

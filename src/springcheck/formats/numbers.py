@@ -51,9 +51,9 @@ def read_npz(path: Path, columns: list[str], step: float | None) -> States:
 def states_of(path: Path, arrays: Mapping[str, Any], names: Sequence[str] = ()) -> States:
     """Named arrays as states: t (f,), q and p or v (f,), (f, n) or (f, n, 3), and perhaps m (n,).
 
-    Where MATLAB and Octave have written them, times are (1, f) or (f, 1), and rows may be columns.
-    `names` choose among the arrays, and say what one holds whose name does not: ``t=clock,q=x,v=dx``; of an
-    only array they name the columns.
+    From MATLAB and Octave times may be (1, f) or (f, 1), and columns may stand in rows.  `names` select among
+    the arrays, and give the quantity of one whose name does not: ``t=clock,q=x,v=dx``; of a single array they
+    name the columns.
     """
     given = arrays
     first, *more = arrays.values() or [np.empty(0)]
@@ -96,10 +96,10 @@ def states_of(path: Path, arrays: Mapping[str, Any], names: Sequence[str] = ()) 
 
 
 def _may_be_left_out(path: Path, name: str, a: Any, rows: int) -> None:
-    """StoreError where what its name says is a quantity of each frame cannot be read as one: without it, the
-    others would be taken for all that was recorded.
+    """StoreError where an array named as a quantity of each frame cannot be read as one: without it, the
+    others would pass for all that was recorded.
 
-    Masses, and fewer numbers than half of the frames, such as initial values, belong to no frame.
+    Masses, and arrays shorter than half of the frames, such as initial values, belong to no frame.
     """
     if isinstance(a, StoreError):
         raise a
@@ -109,13 +109,13 @@ def _may_be_left_out(path: Path, name: str, a: Any, rows: int) -> None:
 
 
 def shortened(arrays: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Arrays of structs by their own names, ``t`` for ``run.t``, where these differ."""
+    """Arrays of structs by their own names, ``t`` for ``run.t``, where these are unique."""
     own = {name.rpartition(".")[2]: a for name, a in arrays.items()}
     return own if len(own) == len(arrays) else arrays
 
 
 def _turned(a: Any) -> Any:
-    """A row or column of numbers as an array of one dimension."""
+    """A row or column of numbers as a one-dimensional array."""
     return a.ravel() if a.ndim == 2 and 1 in a.shape else a
 
 
@@ -144,7 +144,7 @@ def read_npy(path: Path, columns: list[str], step: float | None) -> States:
 
 
 def of_table(path: Path, found: Any, names: Sequence[str]) -> States:
-    """The states in the columns (f, c) of an array, which have no names but these."""
+    """The states in the unnamed columns (f, c) of an array, named by `names`."""
     if not names:
         raise StoreError(f"{path}: its columns have no names; give all {found.shape[1]}, as --columns t,q,v")
     return split(path, named(path, np.asarray(found, np.float64), names), _roundoff([found]))

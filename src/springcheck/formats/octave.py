@@ -35,7 +35,7 @@ def read_octave(path: Path, names: list[str], step: float | None) -> States:
 
 
 def _variables(lines: Lines) -> Iterator[tuple[str, Any, float]]:
-    """Each variable's name, its numbers, and how finely these are written."""
+    """Each variable's name, its numbers, and their precision."""
     within: list[tuple[str, int]] = []
     for line in lines:
         what, _, name = line.partition(": ")
@@ -67,7 +67,7 @@ def _variables(lines: Lines) -> Iterator[tuple[str, Any, float]]:
                 values = values.reshape(shape[::-1]).T if columns_first else values.reshape(shape)
                 yield name, values, roundoff([[x] for x in cells[:SHOWN]], [0])
         elif "matrix" in kind_:
-            # of other numbers: that they are there is said where they are wanted
+            # other types are reported where they are asked for
             yield name, np.array(_cells(lines)[0], object), 0.0
 
 
@@ -79,7 +79,7 @@ def _integers(lines: Lines, line: str) -> list[int]:
 
 
 def _cells(lines: Lines) -> tuple[list[str], list[int], bool]:
-    """The cells of a variable, which an empty line ends, its shape, and whether they go column by column."""
+    """The cells of a variable, which an empty line ends, its shape, and whether columns come first."""
     shape: list[int] = []
     cells: list[str] = []
     columns_first = False

@@ -1,4 +1,4 @@
-"""Text tables: columns of numbers between commas, semicolons, tabs or blanks, with or without names."""
+"""Text tables: columns of numbers separated by commas, semicolons, tabs or blanks, with or without names."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from springcheck.formats.columns import Floats, States, kinds, named, split
 from springcheck.formats.lines import Lines, number
 
 SHOWN = 1000
-"""Rows whose digits are looked at."""
+"""Rows whose digits are counted."""
 FEWEST_CELLS = 8
-"""Different numbers of nine digits, all of which chance does not round to single precision."""
+"""Different numbers of nine digits, too many to be of single precision by chance."""
 COMMENT = ("#", "%")
-"""What a comment begins with: it may name the columns, and holds no row of numbers."""
+"""Prefix of a comment, which may name the columns and holds no row of numbers."""
 
 
 def read_table(path: Path, columns: list[str], step: float | None) -> States:
@@ -45,7 +45,7 @@ def read_table(path: Path, columns: list[str], step: float | None) -> States:
                 wrong = lines.wrong(f"{bad[0][:40]!r} is no number")
                 if width:
                     raise wrong
-                # the first row, if it is one of as many numbers as follow, or names of columns
+                # the first row: as many numbers as the rows that follow, or names of columns
                 unlike = wrong if not is_comment and 2 * len(bad) <= len(cells) else None
                 header = cells
                 continue
@@ -66,7 +66,7 @@ def read_table(path: Path, columns: list[str], step: float | None) -> States:
 def of_rows(
     path: Path, values: Floats, first: Sequence[Sequence[str]], names: list[str], header: list[str]
 ) -> States:
-    """The states in the rows of a table, whose first ones are also given as they are written."""
+    """The states in the rows of a table, the first of which are also given as text."""
     width = values.shape[1]
     if not names and len(header) == width - 1 and _are_counted(values[:, 0]):
         header = ["", *header]
@@ -84,7 +84,7 @@ def _cells(line: str) -> list[str]:
         # there a comma stands for a decimal point
         parts = [re.sub(r"^([+-]?\d*),(\d+)", r"\1.\2", _bare(x)) for x in re.split(r"[;\t]", text)]
     else:
-        # a name may hold a blank, as in "t [s]", where something else lies between the columns
+        # a name may contain a blank, as in "t [s]", where columns have another separator
         parts = [*map(_bare, text.split(","))] if "," in text else text.split()
     while parts and not parts[-1]:
         parts.pop()
@@ -92,12 +92,12 @@ def _cells(line: str) -> list[str]:
 
 
 def _bare(cell: str) -> str:
-    """A cell without blanks and quotes around it."""
+    """A cell without surrounding blanks and quotes."""
     return cell.strip().removeprefix('"').removesuffix('"').strip()
 
 
 def _plain(line: str) -> list[float] | None:
-    """The numbers of a row that needs no more than `float`, which most do: some four times as fast."""
+    """The numbers of a row that `float` alone can parse, as most are: some four times as fast."""
     if ";" in line or "\t" in line or "_" in line:
         return None
     try:
@@ -107,7 +107,7 @@ def _plain(line: str) -> list[float] | None:
 
 
 def _numbers(cells: Iterable[str]) -> list[float] | None:
-    """The numbers of a row; None where one of its cells is none."""
+    """The numbers of a row; None where one of its cells is not a number."""
     try:
         return [number(cell) for cell in cells]
     except ValueError:
@@ -115,15 +115,15 @@ def _numbers(cells: Iterable[str]) -> list[float] | None:
 
 
 def _are_counted(column: Floats) -> bool:
-    """Whether the first column numbers the rows, as tables do that are written with their index."""
+    """Whether the first column numbers the rows, as in tables that are written with their index."""
     return column[0] in (0, 1) and np.array_equal(column, column[0] + np.arange(len(column)))
 
 
 def roundoff(rows: Sequence[Sequence[str]], columns: Iterable[int]) -> float:
-    """Half a unit of the last digit, relative to the largest number, of the column that is written coarsest.
+    """Half a unit of the last digit, relative to the largest number, of the column with the fewest digits.
 
-    That of a double from 16 digits on, and of single precision at least where all numbers are its own to
-    their digits.  A column that does not change, or is 0, says nothing.
+    That of a double from 16 digits on, and of single precision at least where all numbers equal single ones
+    to their digits.  A column that is constant, or 0, does not count.
     """
     found = 2.0**-53
     for i in columns:

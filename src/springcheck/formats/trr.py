@@ -1,4 +1,4 @@
-"""GROMACS .trr files in the precision that wrote them, of which MDAnalysis reads the single one alone."""
+"""GROMACS .trr files in the precision in which they were written; MDAnalysis reads single precision alone."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ MARK = 1993
 """The first number of every frame."""
 
 KINDS = {4: (">f4", 2.0**-24), 8: (">f8", 2.0**-53)}
-"""Numbers of so many bytes, and how they round."""
+"""Numbers of so many bytes: dtype and unit roundoff."""
 
 
 def read_trr(path: Path, columns: list[str], step: float | None) -> States:
@@ -34,7 +34,7 @@ def read_trr(path: Path, columns: list[str], step: float | None) -> States:
             *sizes, atoms, _, _ = struct.unpack_from(">13i", data, at + 12 + name)
             if magic != MARK or atoms < 1 or min(name, *sizes) < 0 or not any(sizes):
                 raise StoreError(f"{path}: is no .trr file from byte {at} on")
-            # of positions, velocities or forces, or of the box where there are none
+            # bytes of positions, velocities or forces, or of the box where there are none
             width = max(sizes[7:]) // (3 * atoms) or sizes[2] // 9
             kind, coarse = KINDS[width]
             roundoff = max(roundoff, coarse)

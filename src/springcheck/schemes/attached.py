@@ -1,7 +1,7 @@
-"""Schemes that come about by how a spring is attached to an engine, beside the ones that people choose.
+"""Schemes that follow from how a spring is attached to an engine, beside those that people choose.
 
 A force that is set once and held over substeps, friction that is taken implicitly where the force is not, and
-a spring that is solved for in every substep; and Boris' rotation, which is position Verlet where no field is.
+a spring that is solved for in every substep; and Boris' rotation, which is position Verlet without a field.
 """
 
 from __future__ import annotations

@@ -31,10 +31,10 @@ Trait: TypeAlias = Literal[
     "named", "one-step", "flow", "adaptive", "splitting", "explicit", "implicit", "symplectic", "reversible",
     "mixes", "friction", "plain", "random",
 ]  # fmt: skip
-"""What a scheme may be: of a fixed step that is known, the exact flow, or a solver that chooses its steps;
-made of stages; solving no equation, or one; its own adjoint (reversible); taking slow and fast springs at
-different times, so that no normal mode stays by itself; acting by friction alone in some stage; made of kicks
-by all forces and drifts alone (plain); taking draws."""
+"""What a scheme may be: of a known fixed step, the exact flow, or adaptive; made of stages; explicit or
+implicit; its own adjoint (reversible); taking slow and fast springs at different times, so that no normal
+mode stays by itself (mixes); with a stage of friction alone; made of kicks by all forces and drifts alone
+(plain); random."""
 
 Rule: TypeAlias = Callable[[float, float, float], float]
 """(root mean square of the accelerations over x, y and z of all particles [L/T2], length of the step before,
@@ -47,9 +47,9 @@ ONE, HALF = Fraction(1), Fraction(1, 2)
 class Scheme:
     """One-step map of a method: a splitting (`stages`), a tableau (`a`, `b`), or neither.
 
-    `limit` is the largest h w at which the step is bounded on a spring: 0 never, infinity always.
-    A scheme with neither stages nor tableau has no step: an adaptive solver, or the exact flow (`flow`),
-    which has a matrix on linear scenes and nothing else.
+    `limit` is the largest h w at which the step is bounded on a spring: 0 never, infinity always.  A scheme
+    with neither stages nor tableau has no step: an adaptive solver, or the exact flow (`flow`), which has a
+    matrix on linear scenes and nothing else.
     """
 
     name: str
@@ -121,7 +121,8 @@ class Scheme:
 
     @property
     def reach(self) -> int:
-        """How far a force gets within its step: 0 to the momentum, 1 to the position, 2 to a later force."""
+        """How far a force propagates within its step: 0 to the momentum, 1 to the position, 2 to a later
+        force."""
         reach, kicked = 0, False
         for kind in self.kinds:
             if kind.evaluates:
@@ -147,7 +148,7 @@ class Scheme:
         ]
 
     unnamed: bool = False
-    """It stands for whatever somebody brings without a name, whose step is fixed or not."""
+    """It stands for a step, fixed or not, whose scheme nobody has named."""
 
 
 def _mirrored(*half: Stage) -> tuple[Stage, ...]:

@@ -1,14 +1,12 @@
 """Schemes that people run, which springcheck names but does not run: each is its stability function.
 
-A one-step method takes a linear system y' = L y to R(h L) y; R is all that a spring shows of it, so that
-methods of one R are one here.  None is carried out: `own` runs those of `catalogue` alone.
-
-Sources: Butcher, Numerical Methods for Ordinary Differential Equations (2016), chapter 3; Hairer & Wanner,
-Solving Ordinary Differential Equations II (1996), IV.3 and IV.5; Fehlberg, NASA TR R-315 (1969); Dormand and
-Prince, J. Comput. Appl. Math. 6 (1980) 19; Cash & Karp, ACM TOMS 16 (1990) 201; Bank et al., IEEE Trans. CAD
-4 (1985) 436; Alexander, SIAM J. Numer. Anal. 14 (1977) 1006; Verwer et al., SIAM J. Sci. Comput. 20 (1999)
-1456; Omelyan, Mryglod & Folk, Comput. Phys. Commun. 146 (2002) 188; McLachlan, SIAM J. Sci. Comput. 16 (1995)
-151.
+A one-step method takes a linear system y' = L y to R(h L) y; a spring shows nothing but R, so that methods of
+one R are one here.  None is carried out: `own` runs those of `catalogue` alone.  Sources: Butcher, Numerical
+Methods for Ordinary Differential Equations (2016), chapter 3; Hairer & Wanner, Solving Ordinary Differential
+Equations II (1996), IV.3 and IV.5; Fehlberg, NASA TR R-315 (1969); Dormand and Prince, J. Comput.  Appl.
+Math. 6 (1980) 19; Cash & Karp, ACM TOMS 16 (1990) 201; Bank et al., IEEE Trans.  CAD 4 (1985) 436; Alexander,
+SIAM J. Numer.  Anal. 14 (1977) 1006; Verwer et al., SIAM J. Sci.  Comput. 20 (1999) 1456; Omelyan, Mryglod &
+Folk, Comput.  Phys.  Commun. 146 (2002) 188; McLachlan, SIAM J. Sci.  Comput. 16 (1995) 151.
 """
 
 from __future__ import annotations

@@ -27,8 +27,7 @@ Complex = NDArray[np.complexfloating[Any, Any]]
 def answer(
     scheme: Scheme, system: System[Any], modes: Modes, matrices: Extended, *, h: float, steps: Integers
 ) -> tuple[Extended, Extended]:
-    """What the driving forces of a system add to its modes in so many steps (f,) from the start: (f, n)
-    each."""
+    """Contribution of the driving forces of a system to its modes after so many steps (f,): (f, n) each."""
     u, v = np.zeros((2, len(steps), len(modes.w2)), np.longdouble)
     for frequency, phase, push in drives(system, modes):
         gains = gain(scheme, h=h, k=modes.w2, c=modes.rate, frequency=frequency)
@@ -39,7 +38,7 @@ def answer(
 
 
 def gain(scheme: Scheme, *, h: float, k: Extended, c: Extended, frequency: np.longdouble) -> Complex:
-    """What one step from rest, at t = 0, makes of a force exp(i frequency t) on modes k, c (n,): g (n, 2).
+    """Effect of a force exp(i frequency t) on modes k, c (n,) in a step from rest at t = 0: g (n, 2).
 
     The real and the imaginary part are those of the forces cos and sin; each stage reads a clock.
     """
@@ -65,10 +64,10 @@ def gain(scheme: Scheme, *, h: float, k: Extended, c: Extended, frequency: np.lo
 def driven(
     matrices: Extended, gains: Complex, angle: np.longdouble, steps: Integers
 ) -> tuple[Complex, Complex]:
-    """Where modes of these one-step matrices (n, 2, 2), at rest at first, are after j steps (f,): y and v
-    (f, n), whose real parts are those of the force exp(i angle j); NaN for a mode that does not turn."""
+    """States y and v (f, n) of modes of these one-step matrices (n, 2, 2), at rest at first, after j steps
+    (f,), whose real parts are those of the force exp(i angle j); NaN for a mode that does not turn."""
     found = rotation(matrices)
-    # the powers of -A where A is near half a turn, of which its phases would keep no digits
+    # powers of -A where A is near half a turn, whose phases would lose all digits
     sign, pi = found.sign, np.arctan2(np.longdouble(0), np.longdouble(-1))
     less = sign[:, None, None] * matrices - np.eye(2, dtype=np.longdouble)
     a, d = less[:, 0, 0], less[:, 1, 1]

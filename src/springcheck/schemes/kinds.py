@@ -24,8 +24,8 @@ or magnetic fields alone."""
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Setting:
-    """What a stage finds beside the state (..., n): masses and rates of friction (n,), the latter None where
-    nothing is damped, and the force evaluated last (..., n)."""
+    """The setting of a stage beside the state (..., n): masses and rates of friction (n,), the latter None
+    where nothing is damped, and the force evaluated last (..., n)."""
 
     m: Reals
     rate: Reals | None

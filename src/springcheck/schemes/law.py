@@ -1,4 +1,4 @@
-"""What follows from a scheme on a scene: one object to ask, whatever kind of scheme it is.
+"""The law of a scheme on a scene: one object to ask, whatever kind of scheme it is.
 
 A step at any width, the propagator A of the normal modes, z' = A z, and the traits of scheme and scene
 together: code asks for a trait, never for the name of a scheme or the way it is written.
@@ -64,10 +64,12 @@ class Law:
         return self.scene.system.friction_rates if self.scene.system.is_damped else None
 
     def rates(self, *, varied: bool = False) -> Any:
-        """What a step needs of the friction: its rates, or where they depend on the position a function of
-        the end Q and the start q of an implicit stage, (..., n) each.  It gives the rates at Q, their
-        derivatives times Q - q, and what the changes of a motion lose beside the rates, all (..., n) [1/T],
-        [1/T], [L/T]."""
+        """Friction as a step takes it: rates, or where they depend on the position a function of the end Q
+        and the start q of an implicit stage, (..., n) each.
+
+        It gives the rates at Q, their derivatives times Q - q, and what the changes of a motion lose beside
+        the rates, all (..., n) [1/T], [1/T], [L/T].
+        """
         system = self.scene.system
         if not system.brakes_by_place:
             return self.rate
@@ -96,7 +98,7 @@ class Law:
 
     @cached_property
     def stiffness(self) -> Any:
-        """What an implicit step needs of the second derivatives: see `schemes.step`."""
+        """Second derivatives as an implicit step takes them: see `schemes.step`."""
         if not self.scheme.has("implicit"):
             return None
         system = self.scene.system

@@ -1,4 +1,4 @@
-"""One-step matrices of linear scenes: what they are, their powers, and what they keep."""
+"""One-step matrices of linear scenes: their derivation, their powers, and their invariants."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from springcheck.schemes.stepping import step
 def matrix(scheme: Scheme, *, h: float, m: Reals, k: Reals, c: Reals | float = 0.0) -> Extended:
     """One-step matrices on (q, p) of springs m, k (n,), each with friction c -> (n, 2, 2), extended.
 
-    Found by stepping the two unit vectors, so the scheme is written down once.  A scheme that parts slow
+    Its columns are steps of the unit vectors, so the scheme is written down once.  A scheme that parts slow
     from fast takes each spring for a fast one; that of the exact flow is its closed form.
     """
     wide: list[Extended] = [np.atleast_1d(np.asarray(x, np.longdouble)) for x in (m, k, c)]
@@ -54,9 +54,10 @@ def invariant(matrices: Extended, *, h: float) -> Extended:
 
 
 def condition(matrices: Extended, w: Extended) -> Extended:
-    """How far the invariant ellipses of one-step matrices (n, 2, 2) are from circles: the ratio of their
-    axes in energy coordinates (w y, v), w (n,) > 0.  No power of a map is larger than that, whatever its
-    determinant makes of it; infinite where the motion does not turn.
+    """Axis ratio of the invariant ellipses of one-step matrices (n, 2, 2), in energy coordinates (w y, v), w
+    (n,) > 0.
+
+    No power of a map is larger, but for those of its determinant; infinite where the motion does not turn.
     """
     a, b = matrices[:, 0, 0], matrices[:, 0, 1] * w
     c, d = matrices[:, 1, 0] / w, matrices[:, 1, 1]
@@ -68,10 +69,11 @@ def condition(matrices: Extended, w: Extended) -> Extended:
 
 
 def amplification(matrices: Extended, w: Extended, steps: Integers) -> tuple[Floats, Floats]:
-    """How much j steps can enlarge one rounding a step: (sum over i < j of |M**i| / r**i, r**j).
+    """Amplification of one rounding a step over j steps: (sum over i < j of |M**i| / r**i, r**j), r >= 1 the
+    spectral radius.
 
-    r >= 1 is the spectral radius.  Norms are taken in energy coordinates (w y, v), w (n,) > 0, and the
-    worst mode counts; (f,) each.  At the edge of stability |M**i| grows with i, and the sum with j**2.
+    Norms are taken in energy coordinates (w y, v), w (n,) > 0, and the worst mode counts; (f,) each.  At the
+    edge of stability |M**i| grows with i, and the sum with j**2.
     """
     turn = rotation(matrices)
     half = (matrices[:, 0, 0] + matrices[:, 1, 1]) / 2

@@ -1,4 +1,4 @@
-"""Schemes by name: those of the catalogue, those of attachments, and those that engines bring."""
+"""Lookup of schemes by name: of the catalogue, of attachments, and those that engines bring."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from springcheck.schemes.attached import ATTACHED
 from springcheck.schemes.catalogue import SCHEMES, Scheme
 from springcheck.schemes.kinds import KINDS
 
-# as an imported module, a scheme that an engine has brought stays for the life of the process
+# like an imported module, a scheme that an engine brings stays for the life of the process
 _brought: dict[str, Scheme] = dict(ATTACHED)
 
 
@@ -38,7 +38,7 @@ def title(name: str) -> str:
 
 
 def bring(found: Scheme) -> None:
-    """Make the scheme of an engine known.  MethodError where it makes no sense, or its name is taken."""
+    """Register the scheme of an engine.  MethodError where it is invalid, or its name is taken."""
     if not isinstance(found, Scheme):
         raise MethodError(f"a scheme is of type {type(found).__name__}, not springcheck.schemes.Scheme")
     if (SCHEMES | _brought).get(found.name, found) != found:

@@ -1,4 +1,4 @@
-"""What one step of a scheme can round: running error bounds, and how many roundings there are."""
+"""Rounding of one step of a scheme: running error bounds, and the number of roundings."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from springcheck.schemes.stepping import sparse_solver, weighted_sum
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Met:
-    """One evaluation of the force within a step: what bounds its rounding there, and its slope.
+    """One evaluation of the force within a step: the bound on its rounding there, and its slope.
 
-    `magnitude` is made by `System.magnitude`, near the position `q` (..., n) of the evaluation, and `pull`
-    is the force of the potential there.  `stiffness` are the second derivatives of the potential there,
-    (..., n) where no particle is joined to another, else (..., n, n) or (n, n); only an implicit stage needs
-    them.  Without `q` the scene is linear, and what bounds the solution stands for it.
+    `magnitude` is made by `System.magnitude`, near the position `q` (..., n) of the evaluation, and `pull` is
+    the force of the potential there.  `stiffness` are the second derivatives of the potential there, (..., n)
+    where no particle is joined to another, else (..., n, n) or (n, n); only an implicit stage needs them.
+    Without `q` the scene is linear, and the bound of the solution takes its place.
     """
 
     magnitude: Force

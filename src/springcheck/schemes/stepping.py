@@ -17,7 +17,7 @@ Slope: TypeAlias = Callable[[Reals], tuple[Reals, bool]]
 """Positions (..., n) -> second derivatives there, and whether as matrices (..., n, n) instead of (..., n)."""
 
 Rate: TypeAlias = "Reals | Callable[[Reals, Reals], tuple[Reals, Reals, Reals]]"
-"""Rates of friction (n,) [1/T], or a function of where an implicit stage ends and starts: see `Law.rates`."""
+"""Rates of friction (n,) [1/T], or a function of an implicit stage's end and start: see `Law.rates`."""
 
 
 def weighted_sum(start: Reals, coefficients: Iterable[Any], values: Sequence[Reals]) -> Reals:
@@ -175,7 +175,7 @@ def _implicit_stage(
         change = _newton(residual, k, joined, factor)
         guess = guess - change
         off = np.abs(change)
-        # a component near 0 never has all its digits: its change stops shrinking at the rounding of its terms
+        # a component near 0 never has all its digits: its change stalls at the rounding of its terms
         going = (off > 4 * eps * np.abs(guess)) & (
             (off < last / 2) | (off > 1e3 * eps * (scale + np.abs(guess)))
         )
@@ -185,7 +185,7 @@ def _implicit_stage(
     if callable(rate):
         braked, bent, lost = rate(guess, q)
         slowed, moved, p = 1 + x * braked, guess - q, p - m * lost
-        # where 1 + x rate all but vanishes, in a jump, the way says more of the velocity than the forces do
+        # near a zero of 1 + x rate, in a jump, the displacement determines the velocity better than forces
         felt = (1 + np.abs(x * braked)) * np.abs(moved) + np.abs(x * bent * guess)
         by_way = felt > np.abs(slowed) * (np.abs(guess) + np.abs(q))
         with np.errstate(all="ignore"):
@@ -200,7 +200,7 @@ MOST_NEWTON_STEPS = 50
 def _braked(
     at: Reals, q: Reals, p: Reals, x: Any, m: Reals, force: Force, rate: Callable[..., Any]
 ) -> tuple[Reals, Reals, Reals]:
-    """What a stage's end `at` lacks, times 1 + x rate, its derivative but for the stiffness, and the size of
+    """Residual of a stage's end `at`, times 1 + x rate, its derivative but for the stiffness, and the size of
     what cancels in it, (..., n)."""
     braked, bent, lost = rate(at, q)
     slowed, moved, kick = 1 + x * braked, at - q, x * force(at, np.zeros_like(p))
@@ -211,9 +211,9 @@ def _braked(
 
 
 def _bracketed(lacks: Callable[[Reals], Reals], guess: Reals) -> Reals:
-    """A zero of a function that rises in the large, component by component: the next one in its direction.
+    """A zero of a function that increases at large arguments, component by component: the next one downhill.
 
-    Where a solution ceases to exist, as at a fold, Newton's iteration from there is thrown to and fro.
+    Where a solution ceases to exist, as at a fold, Newton's iteration started there oscillates.
     """
     sign, near = np.sign(lacks(guess)), guess
     width: Reals = np.maximum(np.abs(guess), np.finfo(guess.dtype).tiny) / 1024

@@ -22,8 +22,8 @@ def allowed(scene: Scene) -> float:
 
 @by_identity
 class Taken(NamedTuple):
-    """A step: its length, of either sign, the states (n,) at its start and end, and how long its rule lets it
-    be."""
+    """A step: its length, of either sign, the states (n,) at its ends, and the longest that its rule
+    allows."""
 
     h: float
     start: tuple[Reals, Reals]
@@ -32,7 +32,7 @@ class Taken(NamedTuple):
 
 
 def push_of(scene: Scene, force: Reals) -> Reals:
-    """How a rule measures forces (n,), or their errors: their root mean square over the mass."""
+    """Size of forces (n,), or of their errors, as a rule takes it: root mean square of force over mass."""
     return np.asarray(np.sqrt(np.sum((force / scene.m) ** 2) / (3 * scene.particles)))
 
 
@@ -44,8 +44,8 @@ def taken(
 
     `before` is the length of the step before, 0 at the start; the tolerance is a length.  Lengths and times
     are summed up in double precision, as an engine does.  Where the length of the last step is known it is
-    taken as it is, where it leaves less than half of what the rule allows: roundings do not say how many
-    steps there are.
+    taken as it is, if it leaves less than half of what the rule allows: roundings do not determine the number
+    of steps.
     """
     assert scheme.rule is not None
     law = Law(scheme=named(scheme.steps_of), scene=scene, h=0.0)

@@ -23,11 +23,11 @@ GAP = 2
 
 @dataclass(frozen=True, slots=True)
 class Text:
-    """A line of text: its parts, each with its style in Rich's words; nothing in it is markup."""
+    """A line of text: its parts, each with its style as Rich names it; nothing in it is markup."""
 
     parts: tuple[tuple[str, str], ...]
     whole: bool = False
-    """No terminal breaks it between its words."""
+    """Never broken between its words."""
 
     def __str__(self) -> str:
         return "".join(text for text, _ in self.parts)
@@ -42,7 +42,7 @@ class Text:
 
 
 def plain(text: str = "", style: str = "") -> Text:
-    """A line of text from any file, nothing in it a control character."""
+    """A line of text from any file, without control characters."""
     return Text(((errors.plain(text), style),))
 
 
@@ -52,10 +52,10 @@ Row = Sequence[Cell] | Text
 
 @dataclass(frozen=True, slots=True)
 class TextTable:
-    """A table without lines, as narrow as its cells; `prose` alone is broken to fit the width.
+    """A table without rules, as narrow as its cells; only `prose` is wrapped to fit the width.
 
-    Columns that do not fit beside each other stand below each other, each block beside the first column:
-    nothing is cut, and no terminal has to fold a number.
+    Columns that do not fit beside each other are stacked in blocks, each beside the first column: nothing is
+    cut, and no terminal has to fold a number.
     """
 
     titles: tuple[str, ...]
@@ -85,7 +85,7 @@ class TextTable:
                     yield from self._lines(row, widths, block)
 
     def _free(self, widths: Sequence[int], j: int, width: int) -> int:
-        """Columns for the prose: what the others leave, or what the first does where that is too little."""
+        """Columns for the prose: what the others leave, or what the first leaves where that is too little."""
         others = width - sum(widths) + widths[j] - GAP * (len(widths) - 1)
         return others if others >= PROSE or j == 0 else width - widths[0] - GAP
 
@@ -110,7 +110,7 @@ class TextTable:
 
 
 def _blocks(widths: Sequence[int], width: int) -> list[list[int]]:
-    """Columns that fit beside each other, the first one in each block."""
+    """Blocks of columns that fit beside each other, the first one in each block."""
     blocks, used = [[0]], widths[0]
     for j in range(1, len(widths)):
         if used + GAP + widths[j] > width and len(blocks[-1]) > 1:
@@ -124,7 +124,7 @@ def _blocks(widths: Sequence[int], width: int) -> list[list[int]]:
 def table(
     titles: Sequence[str], rows: Iterable[Row], *, left: Collection[str] = ("method",), prose: str = ""
 ) -> TextTable:
-    """A table; the columns `left` start at their left edge, numbers end at their right one."""
+    """A table; the columns `left` are left-aligned, numbers right-aligned."""
     return TextTable(tuple(titles), tuple(rows), frozenset(left), prose)
 
 
@@ -169,6 +169,6 @@ def _recorded(lines: Sequence[Text | TextTable], width: int) -> Console:
 
 
 def hanging(head: str, text: str) -> Lines:
-    """Text of 80 columns, its further lines indented as far as its head is long."""
+    """Text of 80 columns, continuation lines indented by the length of its head."""
     broken = textwrap.wrap(text, 80 - len(head), break_long_words=False, break_on_hyphens=False)
     return [plain((head if i == 0 else " " * len(head)) + line) for i, line in enumerate(broken)]

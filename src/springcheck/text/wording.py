@@ -6,17 +6,17 @@ import math
 from collections.abc import Sequence
 
 STATES_SHOW = ". What the states show: "
-"""Between the reason of a verdict that failed and its cause."""
+"""Separator between the reason of a failed verdict and its cause."""
 
 
 def ordinal(n: int) -> str:
-    """A number's place in a row: 1st, 2nd, 3rd, 11th, 41st."""
+    """Ordinal of a number: 1st, 2nd, 3rd, 11th, 41st."""
     ending = "th" if n % 100 in (11, 12, 13) else {1: "st", 2: "nd", 3: "rd"}.get(n % 10, "th")
     return f"{n}{ending}"
 
 
 def count(n: int, noun: str) -> str:
-    """So many of something: 1 cell, 2 cells."""
+    """A count with its noun: 1 cell, 2 cells."""
     return f"{n} {noun}" if n == 1 else f"{n} {noun}s"
 
 
@@ -27,12 +27,12 @@ def few(names: Sequence[str], most: int, joint: str = ", ") -> str:
 
 
 def either(names: Sequence[str]) -> str:
-    """One of several: a, b or c."""
+    """Alternatives: a, b or c."""
     return " or ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
 
 def number(x: float | None, form: str, infinite: str = "inf") -> str:
-    """A number in this form; "-" where it is not known."""
+    """A number in this format; "-" where it is not known."""
     if x is None or math.isnan(x):
         return "-"
     return infinite if x == math.inf else f"{x:{form}}"
