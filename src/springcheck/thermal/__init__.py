@@ -1,6 +1,6 @@
-"""Thermostats: random schemes as data, their exact laws on springs, and what their states tell.
+"""Thermostats: random schemes as data, their exact laws on springs, and the inference of them from states.
 
-What a scene without a bath needs is their names: all but the catalogue is imported when it is first used.
+A scene without a bath needs their names alone: all but the catalogue is imported when it is first used.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _LATER = {
     "Stepper": "stepper",
     **{name: name for name in ("chance", "draws", "jointly", "rigid")},
 }
-"""What no run without a bath needs, and the module that it is imported from when it is first used."""
+"""Names that no run without a bath needs, and the modules that they are imported from on first use."""
 
 
 def __getattr__(name: str) -> Any:

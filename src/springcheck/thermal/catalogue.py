@@ -28,13 +28,13 @@ from springcheck.thermal.chain import FOURTH, SIXTH, Chain
 from springcheck.thermal.decays import GJ, MOST_FRICTION, Decay, decay
 
 Part: TypeAlias = Fraction | Callable[[Any], Any]
-"""A share of the step, or a function of x = gamma h."""
+"""A fraction of the step, or a function of x = gamma h."""
 
 ONE, HALF = Fraction(1), Fraction(1, 2)
 
 
 class Act(NamedTuple):
-    """One stage: what is done, for which part, and by which draw of the step."""
+    """One stage: its kind, its fraction of the step, and which draw of the step it takes."""
 
     kind: Literal[
         "kick", "slow", "fast", "held", "drift", "exchange", "damp", "undamp", "noise", "jump",
@@ -68,18 +68,18 @@ class Thermostat(Scheme):
     substeps: int = 1
     """How often the fast terms act in a step; above 1 the slow and the fast ones act separately."""
     carried: int = 0
-    """How many of the draws, the first ones, are the last ones of the step before."""
+    """How many draws, the first ones, are the last ones of the step before."""
     uniform: bool = False
-    """Whether draws are uniform in place of normal."""
+    """Whether draws are uniform instead of normal."""
     synchronised: bool = True
     """Whether the momentum that it stores belongs to the time of the position."""
     most: float = inf
-    """gamma h below which it is a thermostat: from there on the variance of its noise is negative."""
+    """Limit of gamma h, from which on the variance of its noise is negative."""
     chain: Chain | None = None
     """The bath of a scheme that takes no draws."""
     held: tuple[Act, ...] = ()
-    """Its stages where a scene has rods: with those that bring back lengths after a drift, and momenta to
-    what moves the ends of a rod alike along it; () where none are known."""
+    """Its stages where a scene has rods, with those that restore lengths after a drift and project momenta;
+    () where none are known."""
 
     def freedoms(self, n: int, particles: int) -> int:
         """Degrees of freedom that its chain counts, of n coordinates of so many particles."""
@@ -99,18 +99,18 @@ class Thermostat(Scheme):
 
     @property
     def collides(self) -> bool:
-        """Whether noise comes with a probability."""
+        """Whether noise comes by collisions, each with a probability."""
         return any(act.kind == "collide" for act in self.acts)
 
     @property
     def splits(self) -> bool:
-        """Whether it kicks by slow and by fast terms apart."""
+        """Whether slow and fast terms kick separately."""
         return self.substeps > 1
 
     @property
     def kinetic_of_rods(self) -> bool:
         """Whether a free rod moves at the temperature of the bath, to every order in the step: a drift keeps
-        speeds and volumes of its phase space, and all else acts on momenta across the rod alone."""
+        speeds and phase-space volume, and all else acts on momenta across the rod alone."""
         return self.held[-1:] == (PROJECT,) and all(act.kind != "jump" for act in self.acts)
 
     @property
@@ -125,12 +125,12 @@ class Thermostat(Scheme):
 
 
 def _stretch(c2: Decay) -> Callable[[Any], Any]:
-    """How much longer than its step a GJ scheme kicks and drifts: q**2 = 2 (1 - c2)/((1 + c2) x)."""
+    """Factor by which a GJ scheme stretches the step of kicks and drifts: q**2 = 2 (1 - c2)/((1 + c2) x)."""
     return lambda x: np.sqrt(2 * c2.lost(x) / (c2.both(x) * x))
 
 
 def value_of(part: Part, x: Any) -> Any:
-    """A share of the step, or a function of x, in the width of x."""
+    """A fraction of the step, or a function of x = gamma h, in the width of x."""
     if callable(part):
         return part(x)
     return x.dtype.type(part.numerator) / x.dtype.type(part.denominator)
@@ -164,7 +164,7 @@ _SAID = {
 
 def _by_letters(letters: str) -> Thermostat:
     acts, middle = splitting(letters), letters == "BAOA"
-    # LF-middle holds before it drifts and after it has: neither draws nor what it stores lie across the rod
+    # LF-middle projects before its drifts and restores lengths after: its draws are not projected
     held = (acts[0], PROJECT, *acts[1:], Act("shake")) if middle else rigidly(acts)
     return Thermostat(
         name=letters.lower(), title=f"{letters}: {_SAID[letters]}", acts=acts, held=held,
@@ -347,7 +347,7 @@ _CHAINS = (
 )  # fmt: skip
 
 NO_NORMAL_NUMBERS = "it takes no generator of normal numbers"
-"""Why a method is not asked what each draw does."""
+"""Why a method cannot be given a scripted generator."""
 
 THERMOSTATS: dict[str, Thermostat] = {
     one.name: one
@@ -356,11 +356,11 @@ THERMOSTATS: dict[str, Thermostat] = {
 
 
 def family_of(name: str) -> tuple[str, int]:
-    """What a name says before the count of substeps that alone tells it from others, and that count, or 0."""
+    """A name without its count of substeps, and that count, or 0."""
     count = name.removeprefix(BY_SUBSTEPS)
     return (name, 0) if count == name else (BY_SUBSTEPS, int(count))
 
 
 def random_scheme(name: str) -> Thermostat:
-    """The thermostat of a name, of the catalogue or of a count of substeps beyond it."""
+    """The thermostat of this name, of the catalogue or with a count of substeps beyond it."""
     return THERMOSTATS.get(name) or by_groups(family_of(name)[1])

@@ -21,7 +21,7 @@ FOURTH = (THIRD, 1 - 2 * THIRD, THIRD)
 
 _OUTER = (0.784513610477560, 0.235573213359357, -1.17767998417887)
 SIXTH = (*_OUTER, 1.31518632068391, *_OUTER[::-1])
-"""Weights of Yoshida's sixth order, solution A, to the digits that OpenMM has."""
+"""Weights of Yoshida's sixth order, solution A, to OpenMM's digits."""
 
 PER_SUBSTEP = 12
 """Roundings of one variable in a substep: two exponentials, four products and two sums, and its own push."""
@@ -29,16 +29,16 @@ PER_SUBSTEP = 12
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Chain:
-    """Links of a chain, and how a step of it is divided."""
+    """A chain: its number of links, and how a step of it is divided."""
 
     length: int = 3
     weights: tuple[float, ...] = (1.0,)
     times: int = 1
-    """How often the weights come, each for its share."""
+    """How often the weights are applied, each time to its part of the step."""
     least: float = 0.0
-    """A kinetic energy [M L2/T2] below which a swing is left out."""
+    """A kinetic energy [M L2/T2] below which the chain is not propagated."""
     three_each: bool = False
-    """Whether it counts three degrees of freedom for each particle, whatever moves it."""
+    """Whether it counts three degrees of freedom for each particle, along however many axes that moves."""
 
     def start(self) -> Extended:
         """Momenta, then places (2 M,), at rest."""
@@ -53,8 +53,8 @@ class Chain:
     def swing(
         self, state: Any, twice: Any, x: Any, *, freedoms: int, thermal: Any, Q: Any
     ) -> tuple[Any, Any]:
-        """The chain (2 M, ...) carried on for the time x beside twice the kinetic energy (...), and what all
-        momenta are multiplied by (...)."""
+        """The chain (2 M, ...) propagated for the time x beside twice the kinetic energy (...), and the
+        factor of all momenta (...)."""
         M = self.length
         s, y, factor = list(state[:M]), list(state[M:]), twice * 0 + 1
 
@@ -83,7 +83,7 @@ class Chain:
         return np.sum(s * s / (2 * Q), axis=0) + thermal * (freedoms * y[0] + np.sum(y[1:], axis=0))
 
     def rounding(self, state: Any, twice: Any, x: Any, *, freedoms: int, thermal: Any, Q: Any) -> Any:
-        """What bounds the rounding of each momentum in a swing (M,), over the unit roundoff."""
+        """Bound on the rounding of each momentum in a propagation (M,), over the unit roundoff."""
         s = np.abs(state[: self.length])
         pushes = [twice + freedoms * thermal, *(s[:-1] ** 2 / Q[:-1] + thermal)]
         substeps = len(self.weights) * self.times

@@ -1,8 +1,8 @@
-"""Chances of draws under their null: independent numbers of a standard normal distribution.
+"""P-values of draws under the null hypothesis: independent standard normal numbers.
 
-Each function returns the probability, two-sided, of a value as bad or worse.  They are exact but for `shape`,
-whose saddlepoint approximation is off by a few percent of the probability itself, however small that is
-(Lugannani & Rice, Adv. Appl. Probab. 12 (1980) 475), and `foretold`, which is a bound.
+Each function returns the probability, two-sided, of a value as extreme or more.  They are exact but for
+`shape`, whose saddlepoint approximation is off by a few percent of the probability itself, however small that
+is (Lugannani & Rice, Adv.  Appl.  Probab. 12 (1980) 475), and `foretold`, which is a bound.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from springcheck.physics.arrays import Floats
 
 FACTOR_LAGS = 20
-"""Steps over which a factor of momenta that is carried on would show."""
+"""Lags at which a factor of momenta that persists would show."""
 
 
 def of_normal(z: float) -> float:
@@ -43,7 +43,7 @@ def shape(x: Floats) -> float:
     """Chance of the weight of the tails (the fourth moment), whatever the variance.
 
     The mean of the fourth Legendre polynomial of the rank 2 Phi(x) - 1 (Neyman's smooth test), of draws
-    whose variance is made 1 first: bounded, so that no single draw decides.
+    normalised to variance 1: bounded, so that no single draw decides.
     """
     from scipy.special import erf
 
@@ -102,7 +102,7 @@ def repeats(x: Floats) -> float:
 
 
 MOST_PAIRED = 512
-"""Columns of which every two are compared."""
+"""Columns that are compared in pairs."""
 
 
 def products(x: Floats) -> Floats:

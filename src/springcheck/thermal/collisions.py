@@ -1,5 +1,5 @@
 """Frames between which no collision took place: there Andersen's steps are those of velocity Verlet, or of
-leapfrog, to rounding, and so tell the spring and the number of steps; their share tells the friction."""
+leapfrog, to rounding, and so give the spring and the number of steps; their fraction gives the friction."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from springcheck.thermal.laws import Law
 from springcheck.thermal.likelihood import Candidate
 
 TRIPLES = 30000
-"""Triples of frames from which a map is tried: of a map that holds for every tenth frame 24 are expected."""
+"""Triples of frames that each give a map: of one that holds for every tenth frame 24 are expected."""
 
 NO_COLLISION = 1e-7
-"""Misfit, relative to the motion, up to which a map holds between two frames without a collision."""
+"""Residual, relative to the motion, up to which a map holds between two frames without a collision."""
 
 FEWEST_OF_EACH = 10
 """Fewest frames with, and fewest without a collision: three of the latter make the map."""
@@ -72,8 +72,8 @@ def between_collisions(q: Floats, v: Floats, h: float) -> list[Candidate]:
 def _of_scheme(
     name: str, A: Floats, h: float, share: float, n: int, size: float, close: float
 ) -> list[Candidate]:
-    """What a scheme means by a map A of frames, a share of them without a collision, and every number of
-    steps that it leaves open: its entries are known to `close` of themselves."""
+    """What a scheme means by a map A of frames, a fraction of them without a collision, for every number of
+    steps that remains possible: its entries are known to `close` of themselves."""
     found: list[Candidate] = []
     # the sine of a small angle is known better than its cosine
     sine = np.sqrt(max(-A[0, 1] * A[1, 0] - (A[0, 0] - A[1, 1]) ** 2 / 4, 0.0))

@@ -11,15 +11,15 @@ import numpy as np
 
 @dataclass(frozen=True, slots=True)
 class Decay:
-    """What a step leaves of a momentum, c(x), and what it takes, 1 - c(x), which small x leave digits of."""
+    """Factor of a momentum over a step, c(x), and the loss 1 - c(x) without its cancellation at small x."""
 
     left: Callable[[Any], Any]
     lost: Callable[[Any], Any]
     added: Callable[[Any], Any] | None = None
-    """1 + c(x), where it loses digits beside 2 - lost(x)."""
+    """1 + c(x), where 2 - lost(x) would cancel."""
 
     def __call__(self, x: Any) -> Any:
-        """What is left."""
+        """c(x)."""
         return self.left(x)
 
     def both(self, x: Any) -> Any:

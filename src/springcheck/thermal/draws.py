@@ -1,7 +1,7 @@
 """The draws behind recorded states: which numbers a random scheme must have taken, and what contradicts it.
 
 Two numbers of a state, q' and p', follow from at most two draws.  Where one draw enters a step, or where one
-acts in two steps, they over-determine it: what is left over is rounding, at every step, at any temperature.
+acts in two steps, they overdetermine it: the residual is rounding, at every step, at any temperature.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from springcheck.thermal.laws import Law
 from springcheck.thermal.stepper import Met, Stepper, forces
 
 PER_ACT, IN_AND_OUT = 6, 4
-"""Roundings of a stage at most (a force 4, its product and sum 2), and of what goes in and comes out."""
+"""Roundings of a stage at most (a force 4, its product and sum 2), and of the first and last state."""
 
 
 HOTTEST = 1e4
-"""Noncentrality of a chi-squared distribution up to which its rank is worked out to all digits."""
+"""Noncentrality of a chi-squared distribution up to which its rank is computed to all digits."""
 
 _NONE: Extended = np.empty((0, 0), np.longdouble)
 
@@ -33,12 +33,12 @@ LARGEST_DRAW = 8.0
 """Size that no draw of a run of a few steps exceeds: the chance is 1e-15 for each."""
 
 SMALLEST = np.longdouble(np.finfo(np.float64).smallest_normal)
-"""What an operation may lose to underflow: at rest in 0 nothing is rounded."""
+"""Loss of an operation to underflow: at rest at 0 nothing else rounds."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Reading:
-    """What frames say of the draws between them."""
+    """The draws between frames, as far as the frames determine them."""
 
     draws: Floats
     """Draws (f-1, n) of mean 0 and variance 1, independent if the scheme is right; NaN where a step had none.
@@ -50,11 +50,11 @@ class Reading:
     roundings: int
     """Largest `across` that rounding explains."""
     error: Floats
-    """What rounding may leave of each draw, (f-1, n), or of two a step (2, f-1, n)."""
+    """Rounding error of each draw, (f-1, n), or of two a step (2, f-1, n)."""
     hits: NDArray[np.bool_] | None = None
     """Where collisions took place, (f-1, n)."""
     missed: Floats | None = None
-    """Size of what a collision changes, in draws, up to which none is seen, (f-1, n)."""
+    """Largest change by a collision that is not noticed, in draws, (f-1, n)."""
     rescaled: Floats | None = None
     """Twice the kinetic energy over kT before and after one factor for all momenta, (2, f-1)."""
     allowed: tuple[Extended, Extended] | None = None
@@ -152,7 +152,7 @@ class _Reader:
             return self._reading(_whitened(one) if c else one, across, unit[0])
         if not c:
             return self._reading(draws.transpose(1, 0, 2).reshape(-1, draws.shape[2]), None, unit)
-        # the last draw of each step is the first of the next; that of the start is not in the record
+        # the last draw of each step is the first of the next; that of the start is not recorded
         off = np.abs(draws[0][1:] - draws[1][:-1]) / (unit[0][1:] + unit[1][:-1])
         off = np.where(unseen[1:] | unseen[:-1], np.maximum(across[1:], across[:-1]), off)
         return self._reading(draws[1], off, unit[1])
@@ -198,7 +198,7 @@ class _Reader:
         none = at(0.0)
         slope, target = at(1.0) - none, np.stack(end)
         if self.scheme.acts[0].kind in ("rescale", "scale"):
-            # without the kicks, which a small momentum loses its digits beside
+            # computed without the kicks, beside which a small momentum would lose its digits
             still = np.zeros_like(start[0])
             slope = np.stack(self.stepper(still, start[1], lambda q, p: 0 * q, [0], 1.0))
         twice = np.sum(slope[1] ** 2 / m, axis=-1, keepdims=True)
@@ -291,9 +291,9 @@ class _Reader:
         self, start: tuple[Extended, Extended], end: tuple[Extended, Extended], *, hit: bool
     ) -> tuple[Extended, Extended, Extended, NDArray[np.bool_]]:
         """Draws (u, f-1, n); by how many roundings the state contradicts them, (f-1, n); one rounding of a
-        draw; and where that hides it, so that no draw and any draw differ by less than what is allowed.
+        draw; and where rounding hides it, so that any draw differs from none by less than what is allowed.
 
-        Of one draw it is the other number of the state that contradicts it; of two none does where they show.
+        One draw is contradicted by the other number of the state; two are not, where both show.
         """
         u = self.directions.shape[1]
         found = np.zeros((u, *start[0].shape), np.longdouble)

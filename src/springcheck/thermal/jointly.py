@@ -1,4 +1,4 @@
-"""Draws of all particles of a step together, where the force amid it has those of others."""
+"""Draws of all particles of a step together, where the force amid it depends on those of others."""
 
 from __future__ import annotations
 

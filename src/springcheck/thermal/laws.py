@@ -1,4 +1,4 @@
-"""What follows exactly from a random scheme on springs: map, noise, stationary covariance, and its moments.
+"""The exact law of a random scheme on springs: map, noise, stationary covariance, and its moments.
 
 One step of a linear random scheme is z' = A z + G xi with z = (q, p) and draws xi of variance 1; one with
 collisions takes one of several such maps, each with a probability.  A and G come from stepping unit states
@@ -19,11 +19,11 @@ from springcheck.thermal.catalogue import Thermostat
 from springcheck.thermal.stepper import Stepper
 
 UNKNOWN_FROM = 1e-6
-"""Relative error from which on a covariance is not given."""
+"""Relative error from which on a covariance is not reported."""
 AT_A_LIMIT = 1e-5
-"""Growth that may be rounding."""
+"""Growth that may be due to rounding."""
 REFINEMENTS = 6
-"""Steps of refinement, each of which gains what 1 - A A' has of digits in double precision."""
+"""Steps of refinement, each of which gains the digits that 1 - A A' has in double precision."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -146,7 +146,7 @@ class Law:
 
     @cached_property
     def _moments(self) -> Extended:
-        """What a step makes of second moments of (q, p, carried draws) but for its noise (n, d d, d d)."""
+        """The map of second moments of (q, p, carried draws), without noise (n, d d, d d)."""
         n, d = self._maps[0][1].shape[:2]
         scale, total = self._scale, np.zeros((n, d * d, d * d), np.longdouble)
         for chance, A, _ in self._maps:
@@ -156,7 +156,7 @@ class Law:
 
     @property
     def growth(self) -> Floats:
-        """Spectral radius of the map of second moments (n,), bounded below 1; infinite beyond all numbers."""
+        """Spectral radius of the map of second moments (n,), stable below 1; infinite where it overflows."""
         moments = self._moments.astype(np.float64)
         out = np.full(len(moments), np.inf)
         finite = np.isfinite(moments).all(axis=(1, 2))
@@ -187,7 +187,7 @@ class Law:
 
     @cached_property
     def _noise(self) -> Floats:
-        """Covariance (n, d, d) of what a step adds to that: of draws, and of which map it takes."""
+        """Covariance (n, d, d) of what a step adds to that: by its draws, and by the choice of its map."""
         if not self.scheme.collides:
             ((_, _, G),) = self._state
             return np.asarray(G @ G.transpose(0, 2, 1))
@@ -204,7 +204,7 @@ class Law:
     def apart(self, steps: Any) -> tuple[Floats, Floats]:
         """What so many steps (n,) come to, as a map (n, 2, 2) and a covariance of noise (n, 2, 2): of draws
         that are carried on into them that part which q and p say nothing of."""
-        # of collisions no normal noise, but one of such second moments
+        # noise of collisions is not normal, but has these second moments
         A, W, every = self._mean, self._noise, np.asarray(steps)[:, None, None]
         B, Q = A, W
         for j in range(1, int(np.max(every))):
@@ -234,7 +234,7 @@ class Law:
         B, Q = np.eye(A.shape[1]) + np.zeros_like(A), np.zeros_like(A)
         for _ in range(steps):
             B, Q = A @ B, A @ Q @ A.transpose(0, 2, 1) + W
-        # of a slow motion 2 (C(0) - C(steps)) would cancel
+        # for a slow motion 2 (C(0) - C(steps)) would cancel
         moved = B - np.eye(A.shape[1])
         return np.asarray((moved @ self._covariance @ moved.transpose(0, 2, 1) + Q)[:, 0, 0])
 

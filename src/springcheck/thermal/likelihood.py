@@ -20,22 +20,22 @@ from springcheck.thermal.catalogue import THERMOSTATS, Thermostat, by_groups
 from springcheck.thermal.laws import Law
 
 ODDS = float(np.log(1e6))
-"""Nats by which one scheme must beat every other to be named."""
+"""Log-likelihood ratio [nats] by which one scheme must exceed every other to be named."""
 
 GAINED_BY_CHANCE = 25.0
-"""Nats that seven free numbers of a map and a noise gain over three or four by chance once in 1e9 times."""
+"""Nats that seven parameters of a map and a noise gain over three or four by chance once in 1e9 times."""
 
 STEPS_A_FRAME = (2, 3, 4, 5, 6, 8)
 """Steps from frame to frame that are tried where they are not known."""
 
 SUBSTEPS_TRIED = (3, 4, 5, 8, 12)
-"""Substeps of fast terms that are tried where two may be too few: more than the last are like as many."""
+"""Substeps of fast terms that are tried where two may be too few: more than the last are all alike."""
 
 NO_RATE = 1e-300
-"""Friction or frequency of a start that is none, so that it has a logarithm."""
+"""Stands for a friction or frequency of 0 in a starting point, so that it has a logarithm."""
 
 UNLIKE_A_FRAME = 0.2
-"""Nats a frame by which two substeps may fall short of the best, for more of them to be tried."""
+"""Nats a frame by which two substeps may be less likely than the best, for more of them to be tried."""
 
 FULL_RANK = tuple(
     name for name, one in THERMOSTATS.items() if one.full_rank and not one.carried and one.substeps <= 2
@@ -43,10 +43,10 @@ FULL_RANK = tuple(
 """Schemes whose every step has new noise of rank two, of those that are told by a count the first."""
 
 EITHER_WAY = 0.5
-"""Sine of the turn between two frames, below which it is taken both ways."""
+"""Sine of the rotation between two frames, below which it is tried in both directions."""
 
 FAR_ABOVE = 200.0
-"""Nats above the best start's, from which on a start is left as soon as little is gained."""
+"""Nats above the best start's, from which on a descent is abandoned as soon as it gains little."""
 
 STEPS_DOWNHILL = 40
 """Steps of Newton's method at most."""
@@ -57,8 +57,8 @@ STARTS_HALVED = 3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Candidate:
-    """A scheme that may have made the states, and the numbers that it would mean, with standard errors; an
-    error of 0 is rounding, and NaN is not known."""
+    """A scheme that may have made the states; its parameters have standard errors, 0 for rounding, NaN if
+    unknown."""
 
     scheme: str
     omega: float = nan
@@ -71,7 +71,7 @@ class Candidate:
     fast: float = 0.0
     """Share of fast terms in omega**2."""
     nats: float = 0.0
-    """Log-likelihood of the best candidate less its own."""
+    """Log-likelihood of the best candidate minus its own."""
     strides: tuple[int, ...] = (1,)
     """Steps from frame to frame that the frames leave open, the likeliest first, of which the numbers are."""
 
@@ -195,7 +195,7 @@ def _of_scheme(
                 friction_error=float(rate * errors[0]), thermal=heat,
                 thermal_error=float(heat * errors[-1]),
                 fast=float(_share(at[i])) if at.shape[1] > 2 else 0.0,
-                # a unit of velocity is no news
+                # a change of the unit of velocity is no information
                 nats=float(nats[i] - n * np.log(h)), strides=(s,),
             )
         )  # fmt: skip
@@ -230,7 +230,7 @@ def _profile(
         ) / (2 * det)
         value = 2 * np.log(thermal) + np.log(det) + 2
     else:
-        # the position says what the momentum says
+        # the position and the momentum carry the same information
         thermal = seen[:, 1, 1] / Q[:, 1, 1]
         value = np.log(seen[:, 1, 1]) + 1
     value = n / 2 * value

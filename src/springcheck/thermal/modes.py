@@ -1,4 +1,4 @@
-"""Modes of joined particles in one bath, by their noise: each is an oscillator by itself."""
+"""Modes of joined particles in one bath, from their noise: each is an oscillator by itself."""
 
 from __future__ import annotations
 

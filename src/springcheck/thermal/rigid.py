@@ -1,12 +1,11 @@
 """The draws behind states of a scene with rods.
 
-Lengths that stay leave fewer numbers in a state than draws act on it, and every one of those acts on several:
-the draws of a step are found for all together, by Gauss and Newton's method, in roundings of the state.  What
-they do not explain is left over.
+Constant lengths leave fewer numbers in a state than draws act on it, and each draw acts on several: the draws
+of a step are found together, by the Gauss-Newton method, in roundings of the state.
 
-Of draws x the positions q' know combinations V x, V orthonormal and given by the start of the step alone, and
-momenta p', which are affine in x once q' is given, further ones orthogonal to them: all are as independent,
-and of variance 1, as the draws themselves, whatever the turn of the step has mixed.
+Of draws x the positions q' determine combinations V x, V orthonormal and given by the start of the step
+alone, and momenta p', which are affine in x once q' is given, further ones orthogonal to them: all are as
+independent, and of variance 1, as the draws themselves, whatever rotation mixes them from step to step.
 """
 
 from __future__ import annotations
@@ -25,11 +24,11 @@ SMALL_DRAW = 1e-4
 """Step of the central difference in a draw, whose truncation error is its square, 1e-8."""
 
 UNSEEN_DRAW = 1e-6
-"""Singular value over the largest below which a combination of draws does nothing: roundings over such a
-change, also where the reference is no wider than double, make 1e-8."""
+"""Singular value over the largest below which a combination of draws has no effect: rounding of the quotients
+makes 1e-8, also where the reference is no wider than double."""
 
 LEAST_SLOPE = 1e-13
-"""The same of combinations of which each is known to do something to some number of a state."""
+"""The same for combinations that are each known to affect some number of a state."""
 
 MOST_GAUSS_NEWTON = 10
 """Gauss-Newton iterations, each of which about squares a small residual: 4 to 9 are needed."""
@@ -94,7 +93,7 @@ class _Reader:
             if iteration == 1:
                 of = self._allowed(x)
             elif iteration and np.all(np.abs(change) <= 1e-9 * (1 + np.abs(x))):
-                # the next would be as much smaller as slopes are known: by 1e-8
+                # the next change would be smaller by the relative error of the slopes: by 1e-8
                 break
         of = self._allowed(x)
         left = np.asarray(((target - now) / of) ** 2, np.float64)
@@ -126,7 +125,7 @@ class _Reader:
 
 
 def _finite(values: Reals) -> Floats:
-    """In double precision; what is no number is 0, and shows in what is left over."""
+    """In double precision; NaN and infinity become 0, and show in the residual."""
     return np.nan_to_num(np.asarray(values, np.float64), nan=0.0, posinf=0.0, neginf=0.0)
 
 

@@ -1,7 +1,7 @@
-"""Which thermostat made the states of an oscillator: by what no noise reaches, and by likelihood.
+"""The thermostat behind the states of an oscillator, by a combination free of noise and by likelihood.
 
-Of one draw a step a combination of (x', v', x, v) is free of noise: a null vector of the recorded frames,
-known to rounding at any temperature.  What it leaves open the likelihood decides.
+With one draw a step a combination of (x', v', x, v) is free of noise: a null vector of the recorded frames,
+known to rounding at any temperature.  Where that is not enough, the likelihood decides.
 """
 
 from __future__ import annotations
@@ -22,20 +22,21 @@ from springcheck.thermal.decays import GJ
 from springcheck.thermal.likelihood import ODDS, Candidate, likely, likely_apart
 
 FEWEST = 200
-"""Frames from which on states are asked for their draws."""
+"""Fewest frames from which draws are inferred."""
 
 NOISE = 1e-3
-"""Smallest noise of a step, relative to the motion, that is taken for noise and not for rounding of a file:
-that of gamma h = 5e-7."""
+"""Smallest noise of a step, relative to the motion, that is not taken for a file's rounding: that of gamma h
+= 5e-7."""
 
 WHITE = 1e-9
-"""Chance below which draws are no draws: deterministic motion that does not close in one frame."""
+"""Chance below which residuals are not white, and so no draws: deterministic motion beyond one frame's
+map."""
 
 COARSE = 0.01
-"""Digits of a file over the noise, from which on they hide whether a step had a collision."""
+"""Ratio of a file's rounding to the noise, from which on it hides whether a step had a collision."""
 
 EVEN = 1e-4
-"""Chance below which what acts on momenta may be a factor, and no draw is told of it."""
+"""Chance below which noise on momenta may be a factor, and no draw is inferred from it."""
 
 UNIT_ROOT = 20.0
 """Bias and spread of a root that is 1, in units of 1 over the number of frames."""
@@ -46,20 +47,21 @@ SPARSE = 0.1
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Thermal:
-    """What the states of an oscillator in a bath say."""
+    """What the states of an oscillator in a bath show."""
 
     candidates: tuple[Candidate, ...]
-    """The best first; none where no scheme that is known fits."""
+    """The best first; none where no known scheme fits."""
     free: tuple[float, ...]
-    """The combination of (x', v', x, v) that noise does not reach, 1 on x'; () where there is none."""
+    """The combination of (x', v', x, v) that is free of noise, 1 on x'; () where there is none."""
     misfit: float
     """Root mean square of that combination over that of the noise."""
     uniform: bool
     """Whether the draws are uniform rather than normal."""
     known: bool = True
-    """Whether what acts is known: one momentum shows no factor, but any change of it that ends a step."""
+    """Whether the kind of noise is known: one momentum shows no factor, but any change of it that ends a
+    step."""
     added: bool = False
-    """Whether draws are added to momenta after velocity Verlet, and no friction shows: no scheme's."""
+    """Whether draws are added to momenta after velocity Verlet, without friction: no scheme's."""
 
     @property
     def named(self) -> bool:
@@ -69,17 +71,18 @@ class Thermal:
 
 
 JOINED_FROM = 6.0
-"""Standard deviations of a correlation, from which on particles are joined: 2e-9 of those that are not."""
+"""Standard deviations of a correlation from which on particles are joined: 2e-9 of those that are not."""
 
 
 def identify_thermal(
     t: Floats, q: Floats, v: Floats, beside: Floats | None = None, *, mixed: bool = False
 ) -> Thermal | None:
-    """What thermostat made positions q and velocities v (f,) at times t (f,); None where none seems to have.
-    In a mode of several particles the draws are mixed, and how each is distributed does not show.
+    """The thermostat that made positions q and velocities v (f,) at times t (f,); None where none seems to
+    have.
 
-    Of a particle that follows those `beside` it (f, others) no scheme is told.  Deterministic motion, coupled
-    or not, leaves no noise of which one frame says nothing to the next.
+    In a mode of several particles the draws are mixed, and their distribution does not show.  For a particle
+    coupled to those `beside` it (f, others) no scheme is inferred.  Deterministic motion, coupled or not,
+    leaves no residual that is white from frame to frame.
     """
     if len(t) < FEWEST or not np.isfinite([q, v]).all():
         return None
@@ -89,21 +92,21 @@ def identify_thermal(
     if not np.all((sizes > 0) & (sizes < np.inf)) or not h > 0:
         return None
     x, u = (q - q[0]) / sizes[0], v / sizes[1]
-    # beside the state a constant: the place of rest is not known
+    # a constant beside the state: the centre is not known
     frames = np.stack([x[1:], u[1:], x[:-1], u[:-1], np.ones(len(t) - 1)], axis=1)
     weights, turned = np.linalg.svd(frames, full_matrices=False)[1:]
     if weights[3] < NOISE * weights[0]:
         return None
     z = np.stack([x, u])
     sizes_left, left = _left_of(z, np.empty((0, z.shape[1] - 1)))
-    # a force that is not linear is no scheme's draw
+    # a nonlinear force is no scheme's draw
     known = np.stack([x[:-1], u[:-1], np.ones(len(x) - 1)], axis=1)
     bent = _follows(left[1], np.stack([x**2, x**3], axis=1)[:-1], known)
 
     def clear(found: Thermal | None) -> Thermal | None:
         return found and replace(found, known=found.known and not bent)
 
-    # what is left of a number that takes no noise is rounding
+    # the residual of a coordinate without noise is rounding
     added = partial(_is_added, left[sizes_left > NOISE], sizes_left[1] * left[1], u[1:])
     even = added(1)
     rest = frames @ turned[4] / max(float(np.std(frames @ turned[4])), 1e-300)
@@ -118,7 +121,7 @@ def identify_thermal(
     if weights[4] < 1e-3 * weights[3]:
         free = turned[4][:4] / np.tile(sizes, 2)
         misfit = weights[4] / weights[3]
-        # what digits leave of it is white but for neighbours, which share a frame
+        # the residual of digits is white but for neighbours, which share a frame
         digits = misfit < 1e-9 or _is_of_digits(rest[::2])
         # of one draw the position and the momentum leave the same; a joint to what is beside may not show
         several = mixed or (beside is not None and beside.size > 0)
@@ -148,8 +151,7 @@ def identify_thermal(
 
 
 def _follows(left: Floats, beside: Floats, known: Floats) -> bool:
-    """Whether what a map of what is `known` (f, k) leaves of a particle depends on more, such as where others
-    are, (f, others)."""
+    """Whether the residual of a map of what is `known` (f, k) depends on more, as on others (f, others)."""
     for x in beside.T:
         rest = x - known @ np.linalg.lstsq(known, x, rcond=None)[0]
         size = float(np.linalg.norm(rest))
@@ -159,8 +161,8 @@ def _follows(left: Floats, beside: Floats, known: Floats) -> bool:
 
 
 def _left_of(z: Floats, beside: Floats) -> tuple[Floats, Floats]:
-    """What the best linear map of states and of more beside them (k, f-1) leaves: its standard deviations
-    (2,), and what is left over these (2, f-1)."""
+    """Residuals of the best linear map of states and further regressors (k, f-1): their standard deviations
+    (2,), and over these (2, f-1)."""
     known = np.concatenate([z[:, :-1], beside, np.ones((1, z.shape[1] - 1))]).T
     left = (z[:, 1:].T - known @ np.linalg.lstsq(known, z[:, 1:].T, rcond=None)[0]).T
     size = np.std(left, axis=1)
@@ -185,7 +187,7 @@ def _is_white(x: Floats) -> bool:
 
 
 def _is_of_digits(x: Floats) -> bool:
-    """Whether what is left are digits, whose size goes with a number's, and whose sign with nothing."""
+    """Whether residuals are rounding to digits: their size goes with a number's, their sign with nothing."""
     return _is_white(np.sign(x - np.median(x)))
 
 
@@ -208,10 +210,10 @@ def _of_one(
     if near(b, d) and near(c, -1):
         half, (decay, slow, error) = near(b, -h / 2), _decay(q, v)
         turn = 4 * (1 + h / (2 * b))
-        # few digits leave BAOAB's null vector near that of the others
+        # with few digits BAOAB's null vector is near that of the others
         blurred = close > 1e-6 and abs(turn - slow) <= 4 * (error + close)
         if half:
-            # without a spring these all are one
+            # without a spring these are all the same
             more = ("baoab", "baoa") if slow < error else ("baoab",) if blurred else ()
             names = ("aboba", "aoboa", *more)
             found = likely(names, q, v, h)
@@ -237,7 +239,7 @@ def _of_one(
         found = [Candidate(scheme=name, **known) for name in names]
         left = np.empty(0)
     elif abs(b) <= close * h and near(d, -h) and -1 < c < 1:
-        # what is no factor of the momenta, and takes nothing from them, is added to them
+        # noise that is no factor of the momenta, and no friction of theirs, is added to them
         added = even and _decay(q, v)[0] >= 1 - UNIT_ROOT / len(q) and _is_white(left)
         known = {"omega": float(np.sqrt(2 * (1 + c)) / h), "omega_error": 0.0}
         found = [] if added else [Candidate(scheme="bussi-after", **known)]
@@ -291,7 +293,7 @@ def _is_correlated(x: Floats) -> bool:
 
 
 def _rate(of: Callable[[Floats], Floats], wanted: float) -> float | None:
-    """The x = gamma h at which a function that falls is `wanted`, by halving."""
+    """The x = gamma h at which a decreasing function is `wanted`, by bisection."""
     low, high = 1e-9, 1e4
     if not of(np.asarray(high)) < wanted < of(np.asarray(low)):
         return None
@@ -303,9 +305,9 @@ def _rate(of: Callable[[Floats], Floats], wanted: float) -> float | None:
 
 def _decay(q: Floats, v: Floats) -> tuple[float, float, float]:
     """Determinant of the fitted linear map, which is the decay of momenta, (h w)**2 by its trace, and a bound
-    of the error of both: five standard errors, and a share of 1/n for the bias of a root near 1
-    (Dickey & Fuller, J. Am. Stat. Assoc. 74 (1979) 427)."""
-    # neither is small beside the other
+    of the error of both: five standard errors, and a share of 1/n for the bias of a root near 1 (Dickey &
+    Fuller, J. Am.  Stat.  Assoc. 74 (1979) 427)."""
+    # normalised, so that neither is small beside the other
     z = np.stack([(x - np.mean(x)) / np.std(x) for x in (q, v)])
     A, n = np.linalg.lstsq(z[:, :-1].T, z[:, 1:].T, rcond=None)[0], len(q)
     decay = float(np.linalg.det(A))
@@ -337,7 +339,7 @@ def _regressed(known: Floats, x: Floats) -> tuple[Floats, Floats, Floats]:
     """Regression of x (f,) on `known` (f, k): coefficients (k,), residuals (f,), standard errors (k,)."""
     entries = np.linalg.lstsq(known, x, rcond=None)[0]
     left = x - known @ entries
-    # columns unlike in size leave an inverse no digits
+    # columns of very different size would cost the inverse its digits
     size = np.linalg.norm(known, axis=0)
     of = np.sqrt(np.diag(np.linalg.inv((known / size).T @ (known / size)))) / size
     return np.asarray(entries), np.asarray(left), np.asarray(np.std(left) * of)

@@ -145,8 +145,8 @@ class Stepper:
         return q, p
 
     def _factor(self, p: Reals, c: Any, lost: Any, xi: Any, signed: bool) -> Any:
-        """What all momenta are multiplied by (..., 1), by a draw for each: Bussi & Parrinello 2008; `lost` is
-        (1 - c) kT."""
+        """Factor of all momenta (..., 1), by a draw for each: Bussi & Parrinello 2008; `lost` is (1 - c)
+        kT."""
         share = lost / np.sum(p * p / self.m, axis=-1, keepdims=True)
         first = xi[..., :1] + np.sqrt(c / share)
         size = np.sqrt(share * (first * first + np.sum(xi[..., 1:] ** 2, axis=-1, keepdims=True)))

@@ -20,10 +20,10 @@ from springcheck.physics.system import System
 from springcheck.physics.terms import Morse
 
 MOST = np.log(np.finfo(np.longdouble).max) - 64
-"""Exponents whose exponential, times what stands beside it here, is a number."""
+"""Exponents whose exponential, times its factors here, stays finite."""
 
 FAR_OUT = 64.0
-"""A phase whose exponential leaves nothing of 1 in any precision that is used here."""
+"""A phase whose exponential exceeds 1 by more than any precision that is used here."""
 
 
 class MorseMotion(ClosedForm):
@@ -48,7 +48,7 @@ class MorseMotion(ClosedForm):
         total, depth, a = m[0] + m[1], wide(term.depth), wide(term.steepness)
         mass = m[0] * m[1] / total
         u, pull = _relative(m, q, p, term.rest)
-        # where exp(steepness u) leaves the range of numbers nothing pulls
+        # where exp(steepness u) overflows there is no force
         x = np.where(a * u > MOST, 0, np.exp(-np.minimum(a * u, MOST)))
         kinetic = (pull / total) ** 2 / (2 * mass * depth)
         # near the bottom of the well the energy is small, near dissociation its excess over 1: neither

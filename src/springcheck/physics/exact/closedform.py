@@ -1,4 +1,4 @@
-"""What every closed form of a motion is and needs."""
+"""The base class of all closed forms of a motion."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ States: TypeAlias = tuple[Extended, Extended]
 PI = 4 * np.arctan(np.longdouble(1))
 
 CANCELS = 16
-"""Sums that are smaller than their summands by this factor are taken in more digits."""
+"""Sums smaller than their summands by this factor are computed with more digits."""
 
 LAST = 64 * EPS
 """Roundings of a closed form, relative to each size that it is made of; `validation/exact_check.py` finds
@@ -21,7 +21,7 @@ at most a tenth of them."""
 
 
 class NoClosedFormError(ValueError):
-    """A system whose motion this closed form does not know."""
+    """A system for which this closed form does not hold."""
 
 
 class ClosedForm:
@@ -69,7 +69,7 @@ def wide(x: Any) -> Extended:
 
 
 def one_each(system: System[Any]) -> bool:
-    """Whether one term alone acts on each particle."""
+    """Whether exactly one term acts on each particle."""
     return bool(np.all(system.pulls() == 1))
 
 

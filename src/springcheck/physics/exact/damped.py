@@ -38,7 +38,7 @@ class UnlikeFriction(ClosedForm):
     """
 
     def __init__(self, system: System[Any]) -> None:
-        """Something else may not act, no mode may grow, and none that nothing holds may be pulled."""
+        """Only for springs and friction, without growing modes, and without a constant force on free ones."""
         super().__init__(system)
         self.need(system.is_linear and system.n <= MOST_UNLIKE)
         self.need(all(term.kind in ("potential", "friction") for term in system.terms))

@@ -1,8 +1,7 @@
-"""More digits for the few numbers that decide a motion and cancel: energies near a barrier, modes of very
-unlike size.
+"""Decimal arithmetic for the few sums that cancel and decide a motion: energies near a barrier, stiff modes.
 
-They are `decimal` numbers of the standard library in arrays of objects: doubles are exact in them, and +,
--, *, /, np.sqrt and np.exp are correctly rounded to `DIGITS`.  A formula is written once, for these and for
+They are `decimal` numbers of the standard library in arrays of objects: doubles are exact in them, and +, -,
+*, /, np.sqrt and np.exp are correctly rounded to `DIGITS`.  A formula is written once, for these and for
 extended precision.
 """
 
@@ -37,12 +36,12 @@ def digits(count: int = DIGITS) -> Iterator[None]:
 
 
 def exactly(x: Any) -> Wide:
-    """Doubles or extended numbers as they are."""
+    """Convert doubles or extended numbers exactly."""
     given = np.asarray(x)
     out = np.empty(given.shape, dtype=object)
     for i, value in np.ndenumerate(given):
         high = float(value)
-        # what an extended number has beyond a double is a double, or 0
+        # the part of an extended number beyond a double is itself a double, or 0
         out[i] = (
             Decimal(high) + Decimal(float(value - high)) if given.dtype == np.longdouble else Decimal(high)
         )

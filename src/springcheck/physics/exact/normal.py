@@ -110,10 +110,10 @@ def split(u: Any, v: Any, w2: Any, rate: Any) -> tuple[Any, Any, Any]:
 
 
 SMALL = 32
-"""Particles up to which modes are found to high relative accuracy, 0.7 s at most."""
+"""Particles up to which modes are computed to high relative accuracy, 0.7 s at most."""
 
 FEW = 8
-"""Particles up to which that takes 15 ms, so that nobody asks whether it is needed."""
+"""Particles up to which that takes 15 ms, and is done whether it is needed or not."""
 
 GRADED = 2.0**10
 """Ratio of squared frequencies from which it is needed."""
@@ -159,7 +159,7 @@ def normal_modes(system: System[Any]) -> Modes:
 
 
 def _modes(system: System[Any], *, start: Start | None = None, **parts: Any) -> Modes:
-    """Modes as they are found; their start is taken from that of the scene where it is not given."""
+    """Modes as computed, with the start of the scene where none is given."""
     nothing = np.zeros_like(parts["w2"])
     blank = Start(u=nothing, v=nothing, slow=nothing, fast=nothing, sizes=(nothing,) * 4)
     found = Modes(**parts, start=start or blank)
@@ -172,7 +172,7 @@ def _start(system: System[Any], modes: Modes) -> Start:
     centre = modes.centre()
     u = y - centre
     slow, fast, _ = split(u, v, modes.w2, modes.rate)
-    # what mixes modes may put the last digits of all into one
+    # a transform that mixes modes may put the last digits of all into one
     of_all = modes.vectors is not None
     size_u, size_v = (np.sqrt(np.sum(x * x)) + np.zeros_like(x) if of_all else np.abs(x) for x in (y, v))
     size_u = size_u + np.abs(centre)
@@ -232,7 +232,7 @@ def _precise(system: System[Any]) -> Modes:
         y, v = vectors.T @ (root * q), vectors.T @ (p / root)
         u = y - np.where(is_zero, 0 * pull, pull / np.where(is_zero, 1, w2))
         slow, fast, _ = split(u, v, w2, np.max(rates))
-        # where a sum cancels, as at rest far from 0, it is known to the digits of what is added up
+        # where a sum cancels, as at rest far from 0, it is known to the digits of its summands
         vast = left * np.max(np.abs(w2)) / np.where(is_zero, np.max(np.abs(w2)) or 1, np.abs(w2))
         of_u = (np.abs(vectors.T) @ np.abs(root * q) + np.abs(y - u)) * vast
         of_v = np.abs(vectors.T) @ np.abs(p / root) * left
