@@ -54,8 +54,7 @@ class _State:
     lifeline = -1
     """File descriptor that closes with the parent process."""
     errors = 2
-    """Standard error as it was: a library's messages may be captured while the signal comes; 2 until
-    `install` keeps another."""
+    """Standard error as it was: a library's messages may be captured as the signal comes."""
 
 
 def install() -> None:

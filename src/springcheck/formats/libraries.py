@@ -138,8 +138,7 @@ def read_mat(path: Path, columns: list[str], step: float | None) -> States:
 
 
 def read_json(path: Path, columns: list[str], step: float | None) -> States:
-    """Lists by name, or values by row as pandas writes them; or rows, named or not, in a list or one on each
-    line."""
+    """Lists by name, or values by row as pandas writes them; or rows, named or not, in a list or on lines."""
     if path.stat().st_size > LONGEST_JSON:
         raise StoreError(f"{path}: more than {LONGEST_JSON >> 20} MiB of JSON; store it as NPZ or HDF5")
     with _library(path, "msgspec", "msgspec"):

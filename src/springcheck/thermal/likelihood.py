@@ -57,8 +57,7 @@ STARTS_HALVED = 3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Candidate:
-    """A scheme that may have made the states; its parameters have standard errors, 0 for rounding, NaN if
-    unknown."""
+    """A scheme that may have made the states; standard errors are 0 for rounding, and NaN if unknown."""
 
     scheme: str
     omega: float = nan
