@@ -52,8 +52,7 @@ _FILTERS = {h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FL
 
 @contextlib.contextmanager
 def for_reading(path: Path) -> Iterator[Any]:
-    """Open a file for reading that libhdf5 is known to survive (see `trust`); StoreError where none can
-    be."""
+    """Open a file for reading that libhdf5 is known to survive (see `trust`); else StoreError."""
     with files.told(path, "read"), opened(path) as file:
         yield file
 
@@ -265,8 +264,7 @@ def array(file: Any, path: str, shape: tuple[int, ...], kinds: str = "f") -> Any
 
 
 def texts(dataset: Any) -> np.ndarray:
-    """Strings of a dataset.  Their lengths are summed before any is read: all may refer to one long
-    string."""
+    """Strings of a dataset, their lengths summed before any is read: all may refer to one long string."""
     if dataset.ndim > 1:
         raise refuse(dataset, "is no list of texts")
     if dataset.size > MOST_TEXTS or _length(dataset) > LONGEST_TEXT:
