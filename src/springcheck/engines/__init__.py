@@ -1,8 +1,8 @@
-"""The engines: ours, those of installed packages, and those that a call brings.  Libraries are left alone.
+"""The engines: ours, those of installed packages, and those that a call brings.  Libraries are not imported.
 
 An engine is one object, an `Engine`, that an entry point of the group `springcheck.engines` names; ours stand
-in modules here.  README.md beside this file shows how to write one.  An engine that cannot be loaded is
-named in one line where engines are listed or asked for, and takes no other down.
+in modules here.  README.md beside this file shows how to write one.  An engine that cannot be loaded is named
+in one line where engines are listed or asked for, and affects no other.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ T = TypeVar("T")
 
 
 def absence(name: str) -> str | None:
-    """Why an engine's library is not here, or None where it is; imports nothing."""
+    """Why an engine's library is missing, or None where it is installed; imports nothing."""
     found = engine(name)
     try:
         there = not found.imports or importlib.util.find_spec(found.imports) is not None
@@ -99,21 +99,21 @@ def load(name: str) -> Engine:
 
 @cache
 def _imported(version: Callable[[], object]) -> object:
-    """Import a library once, where it first is: in the `version` of its engine."""
+    """Import a library where it is imported first: in its engine's `version`."""
     return version()
 
 
 def guarded(label: Label, call: Callable[..., T], *arguments: object, form: str = "") -> T:
-    """Call into an engine.  Whatever it raises comes out as MethodError, with its file and line.
+    """Call into an engine.  Whatever it raises becomes a MethodError, with its file and line.
 
-    So does how the engine has ended an earlier process of this command (see `foreign`).  `form` is the call
-    as the contract writes it, for the message where a function takes other arguments.
+    So does the way in which the engine has ended an earlier process of this command (see `foreign`).  `form`
+    is the call as the contract writes it, for the message where a function takes other arguments.
     """
     with foreign(str(label), f"{label} failed", origin(label.engine).package):
         try:
             return call(*arguments)
         except TypeError as error:
-            # raised by the call itself: no line of the engine was reached
+            # the call itself failed: no line of the engine was reached
             if form and error.__traceback__ and error.__traceback__.tb_next is None:
                 raise MethodError(f"{label} failed: {error}; it is called as {form}") from error
             raise
@@ -122,7 +122,7 @@ def guarded(label: Label, call: Callable[..., T], *arguments: object, form: str 
 
 
 def _reopened() -> None:
-    """Open standard streams again that an engine has closed, before a file of ours takes their numbers."""
+    """Reopen standard streams that an engine has closed, before a file of ours takes their descriptors."""
     for stream, other in ((1, 2), (2, 1)):
         try:
             os.fstat(stream)
@@ -146,7 +146,7 @@ def start(scene: Scene, label: Label, seed: Any = None) -> Simulation:
 
 
 def arithmetic(label: Label) -> Arithmetic:
-    """How the engine of a label says that it rounds.  MethodError where its own code fails."""
+    """The rounding that the engine of a label declares.  MethodError where its own code fails."""
     found: object = guarded(label, load(label.engine).arithmetic, label, form="arithmetic(label)")
     if not isinstance(found, Arithmetic):
         raise MethodError(f"{label} failed: its arithmetic is of type {type(found).__name__}")
@@ -154,10 +154,8 @@ def arithmetic(label: Label) -> Arithmetic:
 
 
 def origin_of(label: Label) -> dict[str, str]:
-    """Where a run comes from, in words: the engine's versions, title, method, and how it stores velocities.
-
-    MethodError where the engine's own code fails.
-    """
+    """Provenance of a run in words: the engine's versions, title, method, and how it stores velocities.
+    MethodError where the engine's own code fails."""
     driver, run_by = load(label.engine), method(label)
     versions = guarded(label, lambda: {str(key): str(value) for key, value in driver.version().items()})
     return {
@@ -169,7 +167,8 @@ def origin_of(label: Label) -> dict[str, str]:
 
 
 def parse(text: str) -> Label:
-    """Read ``engine:method[@platform[-precision]]``; says what is known where a part is not."""
+    """Parse ``engine:method[@platform[-precision]]``; an unknown part is answered with those that are
+    known."""
     head, _, place = text.partition("@")
     name, colon, method = head.partition(":")
     if not colon:
@@ -202,7 +201,7 @@ def method(label: Label) -> Method:
 
 
 def _methods_meant(name: str, glob: str, bath: bool | None) -> list[str]:
-    """The methods of an engine that a glob may name: where it says nothing of methods, the default ones."""
+    """The methods of an engine that a glob may match: the default ones where it does not name methods."""
     found, meant = engine(name), list[str]()
     for of_bath, methods in ((False, found.methods), (True, found.thermostats)):
         if bath in (None, of_bath):
@@ -213,17 +212,17 @@ def _methods_meant(name: str, glob: str, bath: bool | None) -> list[str]:
 
 
 UNNAMED = "**"
-"""The pattern of those that run where nobody names a method: a scene's own list, or `*`."""
+"""Pattern of what runs where nobody names a method: a scene's own list, or `*`."""
 
 
 def match(patterns: tuple[str, ...], *, bath: bool | None = False) -> tuple[Label, ...]:
-    """Labels that glob patterns name, each once, in the order of the engines.
+    """Labels that glob patterns match, each once, in the order of the engines.
 
-    A pattern without a wildcard is a label and may name a platform.  With a wildcard the part before
-    `@` is the glob and the platform is carried over to every engine that has it.  With a `bath` it names
-    thermostats, without one none of them, and both where that is None.  `*` alone names the methods that are
-    declared as default, and so does `engine:*` of an engine that has such; every other glob names all that it
-    fits.
+    A pattern without a wildcard is a label and may name a platform.  With a wildcard the part before `@` is
+    the glob and the platform is carried over to every engine that has it.  With a `bath` it matches
+    thermostats, without one none of them, and both where that is None.  `*` alone stands for the methods that
+    are declared as default, and so does `engine:*` of an engine that has such; every other glob stands for
+    all that it matches.
     """
     chosen: dict[str, Label] = {}
     for pattern in patterns:

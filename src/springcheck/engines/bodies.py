@@ -1,4 +1,4 @@
-"""Rigid bodies of engines for games, pushed and read one by one between the steps of their world."""
+"""Rigid bodies of game engines, pushed and read one by one between the steps of their world."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ class Bodies(ABC):
     """The attributes of a body that are its place along x and y, and its velocity along x."""
     numbers: ClassVar[type] = np.float32
     fastest: ClassVar[float] = float(np.finfo(np.float32).max) ** 0.5
-    """Speed up to which the world can square it [L/T]."""
+    """Speed up to which the world can square it without overflow [L/T]."""
     shortest: ClassVar[float] = 0.0
-    """Length up to which a joint of the world has no direction, and pulls nothing [L]."""
+    """Length up to which a joint of the world has no direction, and no force [L]."""
 
     def __init__(self, scene: Scene, method: Method, label: Label, step: float) -> None:
         ours = method.name == "force"
@@ -70,7 +70,8 @@ class Bodies(ABC):
 
     @abstractmethod
     def begin(self, label: Label, step: float) -> None:
-        """Make the world, without gravity.  MethodError where the engine cannot take steps of this length."""
+        """Create the world, without gravity.  MethodError where the engine cannot take steps of this
+        length."""
 
     @abstractmethod
     def add(self, m: float, q: float, v: float) -> Any:
@@ -86,7 +87,7 @@ class Bodies(ABC):
 
     @abstractmethod
     def step(self, row: int) -> None:
-        """Move the world by one step; Stopped(row, ...) where it does not move as it was told."""
+        """Advance the world by one step; Stopped(row, ...) where it does not obey."""
 
     def advance(self, every: int, q: Floats, p: Floats) -> None:
         """Fill rows of q and p (f, n), `every` steps each."""

@@ -1,4 +1,4 @@
-"""Springs as the bonds of molecular programs, which know their length but not its sign."""
+"""Springs as the bonds of molecular programs, which have a length without a sign."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from springcheck.physics.terms import Cosine, RadialSpring, Spring, WallSpring
 from springcheck.schemes import scheme
 
 ANCHOR_MASS = 2.0**100
-"""Mass of a particle that stands for the fixed end of a rod: a massless one cannot have any [u]."""
+"""Mass of a particle that stands for the fixed end of a rod, since no massless particle can have one [u]."""
 
 
 Joint: TypeAlias = tuple[tuple[int, ...], float, Floats | None]
@@ -34,14 +34,13 @@ Bond: TypeAlias = tuple[int, int, float, float, tuple[float, ...] | None]
 
 @np.errstate(over="ignore")
 def origins(scene: Scene, scheme_name: str) -> Floats:
-    """Where each particle's coordinate in such a program is counted from, (n,) [L].
+    """Origin of each particle's coordinate in such a program, (n,) [L].
 
-    A bond of a rest length is the scene's spring only while it does not turn over.  Where the energy that the
+    A bond of a rest length is the scene's spring only while it does not invert.  Where the energy that the
     scheme can reach rules that out, real positions are used (origins 0).  Elsewhere each particle is counted
     from its own rest position, so that every bond has rest length 0 and the two laws are one.  Every group of
-    joined particles is looked at by itself: what stands beside it changes no number of it.
-
-    Raises MethodError where springs in a ring have no common rest.
+    joined particles is treated by itself, so that it does not depend on others.  Raises MethodError where
+    springs in a ring have no common rest.
     """
     pairs = [term for term in scene.terms if isinstance(term, Spring)]
     springs = [t for t in scene.terms if isinstance(t, WallSpring | Spring)]
@@ -62,7 +61,7 @@ def origins(scene: Scene, scheme_name: str) -> Floats:
     if scene.box is not None:
         _within_half(scene, springs, energy[group])
         reach = float(scene.system.energy(scene.q, scene.p)) * (2 + hw) / (2 - hw) if bounded else np.inf
-        # one bond may have all of the energy
+        # a single bond may have all of the energy
         for one in (x for x in scene.terms if isinstance(x, RadialSpring)):
             longest = one.rest + np.sqrt(2 * reach / np.abs(one.k))
             _shorter(scene, one, longest, np.full(len(one), min(scene.box)))
@@ -78,7 +77,7 @@ def origins(scene: Scene, scheme_name: str) -> Floats:
 
 
 def _within_half(scene: Scene, springs: list[WallSpring | Spring], energy: Floats) -> None:
-    """MethodError where a spring may become half as long as the box, by the energy at each particle (n,)."""
+    """MethodError where a spring may reach half of the box, by the energy at each particle (n,)."""
     for term in springs:
         first = term.particles[0]
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -88,7 +87,7 @@ def _within_half(scene: Scene, springs: list[WallSpring | Spring], energy: Float
 
 
 def _shorter(scene: Scene, term: Term, most: Floats, box: Floats) -> None:
-    """MethodError where a row of a term, which may become `most` (s,) long, reaches half of the box (s,)."""
+    """MethodError where a row of a term, of length up to `most` (s,), reaches half of the box (s,)."""
     short = most < box / 2
     if np.all(short):
         return
@@ -109,8 +108,8 @@ def _shorter(scene: Scene, term: Term, most: Floats, box: Floats) -> None:
 
 
 LOST = 16.0
-"""Lengths of a rod by which a push moves its ends where there was no step to find: one that brings it back to
-its length moves them by h w of it, below 1, and what 16 leaves has lost 4 bits more."""
+"""Lengths of a rod by which a push moves its ends where no step exists: one that restores its length moves
+them by h w of it, below 1, and what 16 leaves has lost 4 bits more."""
 
 
 def without_push(rods: Rods, q: Floats, p: Floats, reach: Floats, row: int) -> Floats:
@@ -128,17 +127,17 @@ def without_push(rods: Rods, q: Floats, p: Floats, reach: Floats, row: int) -> F
 
 
 def cells(scene: Scene, origins: Floats) -> Floats:
-    """How many lengths of the box each position, counted from its origin, stands off the box (n,)."""
+    """Periods of the box by which each position, counted from its origin, lies outside the box (n,)."""
     if scene.box is None:
         return np.zeros(scene.n)
     return np.asarray(np.floor((scene.q - origins) / scene.periods))
 
 
 def rests(scene: Scene, label: Label) -> Floats:
-    """Where each particle is counted from so that every bond has rest length 0, (n,) [L].
+    """Origin of each particle for which every bond has rest length 0, (n,) [L].
 
-    Such a bond pulls along each axis by itself, and noise across the line does not reach it.  MethodError
-    where springs have no common rest.
+    Such a bond pulls along each axis by itself, independent of noise across the line.  MethodError where
+    springs have no common rest.
     """
     pairs = [term for term in scene.terms if isinstance(term, Spring)]
     if not any(np.any(term.rest) for term in pairs):
@@ -202,7 +201,7 @@ def joints(scene: Scene, term: Term, origins: Floats) -> list[Tie]:
 
 
 def in_all_of_space(scene: Scene, label: Label) -> None:
-    """MethodError where noise along an axis that the scene leaves out would turn a rod that way."""
+    """MethodError where noise along an axis that the scene leaves out would rotate a rod that way."""
     if scene.system.rods and scene.n < 3 * scene.particles:
         raise MethodError(
             f"{label}: its noise acts along x, y and z, and turns a rod; the scene's particles move along "
@@ -211,7 +210,7 @@ def in_all_of_space(scene: Scene, label: Label) -> None:
 
 
 def rods(joined: list[Joint], anchors: int) -> Iterator[Bond]:
-    """Rods as bonds without a force, but for the third of a triangle; anchors are numbered from here on."""
+    """Rods as bonds without a force, except the third of a triangle; anchors are numbered from here on."""
     closing = {tuple(sorted(ends)) for ends, *_ in triangles(joined)}
     for ends, length, point in joined:
         if point is not None:
@@ -243,12 +242,13 @@ def lengths(term: Spring, origins: Floats) -> Floats:
 
 
 def off_axis(positions: Floats, elsewhere: NDArray[np.bool_]) -> float:
-    """The largest size of what is no coordinate of the scene, of positions (particles or more, 3)."""
+    """Largest |position| along axes that are no coordinates of the scene, of positions (particles or more,
+    3)."""
     return float(np.max(np.abs(positions.reshape(-1)[: len(elsewhere)][elsewhere]), initial=0.0))
 
 
 def far(scene: Scene) -> float:
-    """A length beyond all of the motion, for a spring that knows its length alone, which has no sign [L].
+    """An offset beyond all of the motion, for a spring that has a length without a sign [L].
 
     A power of 2, so that adding it rounds and nothing else; every rounding of a force is k eps times this.
     """

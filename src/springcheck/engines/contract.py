@@ -14,7 +14,8 @@ from springcheck.schemes import Scheme
 
 
 class Need(Enum):
-    """What a scene must have for a method to be worth running; the value is the phrase for a report."""
+    """A feature that a scene must have for a method to be worth running; the value is the phrase for a
+    report."""
 
     DAMPING = "damping"
     FAST_SPRINGS = "springs marked fast"
@@ -34,7 +35,7 @@ KEYS = {Need.DAMPING: "damping", Need.FIELD: "magnetic"}
 """The terms that are needed."""
 
 ANY_POTENTIAL = "any potential"
-"""Among the terms of a method: it takes the force of every potential as a function, whatever its law."""
+"""Among the terms of a method: it takes the force of every potential as a function."""
 
 EVERY_POTENTIAL = frozenset({ANY_POTENTIAL, "wall-spring", "spring", "quartic", "cosine", "morse", "weight"})
 """The terms of a method that takes the force as a function: the potentials that are known, and all others."""
@@ -53,7 +54,7 @@ FIELD = frozenset({"magnetic"})
 """The term of a method whose force may turn velocities."""
 
 NO_NUMBERS = "none: a chain is deterministic"
-"""The generator of a thermostat whose bath is a few variables of its own."""
+"""The generator of a thermostat whose bath is deterministic."""
 
 BRAKES = frozenset({"van-der-pol"})
 """The term of a method whose friction may depend on the position."""
@@ -69,12 +70,12 @@ class Method:
     scheme: str
     """A scheme of the catalogue, or one that the engine brings."""
     about: str
-    """One line for `springcheck list`: what of the library is called."""
+    """One line for `springcheck list`: which class or function of the library is called."""
     adaptive: bool = False
     """Whether it chooses its steps by the scene's tolerance; `scheme` then has no one-step map."""
     default: bool = True
-    """Whether `*` names it, which is what a scene runs by unless it says otherwise.  Methods that are not
-    default are run by name, or by a glob that spells part of it."""
+    """Whether `*` includes it, which a scene runs by default.  Other methods are run by name, or by a glob
+    that spells part of it."""
     terms: frozenset[str] = SPRINGS
     """Keys of the terms that it can evaluate."""
     kinds: frozenset[str] = frozenset({"particles"})
@@ -83,13 +84,13 @@ class Method:
     rebuilds_velocity: bool = False
     """The velocity is a difference of positions over the step, which costs digits: eps q / h."""
     one_friction: bool = False
-    """One friction rate serves all particles of a run."""
+    """Whether a single friction rate serves all particles of a run."""
     generator: str = ""
-    """What draws the numbers of a random method, in words."""
+    """The random number generator of a random method, in words."""
     scripted: bool = False
     """Whether its seed may be a generator of one's own, an object with `standard_normal(size)`."""
     note: str = ""
-    """A remark of the library's authors that belongs beside a finding, and the thread where they made it."""
+    """A remark of the library's authors for beside a finding, and the thread where they made it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -107,11 +108,11 @@ class Label:
 
 
 class Simulation(Protocol):
-    """A started engine.  It moves and does nothing else: the driver records, times and judges.
+    """A started engine.  It advances and does nothing else: the driver records, times and judges.
 
-    An engine in three dimensions may have an attribute `off_axis`, the largest size that it has seen of
-    a coordinate that the scene leaves out; one that chooses its steps by a rule an attribute `last_steps`
-    (f,), the lengths of those that ended at the rows which `advance` has filled last.
+    An engine in three dimensions may have an attribute `off_axis`, the largest |coordinate| that it has seen
+    along axes that the scene leaves out; one that chooses its steps by a rule an attribute `last_steps` (f,),
+    the lengths of those that ended at the rows which `advance` has filled last.
     """
 
     @property
@@ -128,7 +129,7 @@ class Simulation(Protocol):
 
 
 class Stopped(Exception):  # noqa: N818 - an outcome, not an error
-    """An engine gave up: rows that it had filled, and what it said."""
+    """An engine gave up: the rows that it had filled, and its message."""
 
     def __init__(self, rows: int, message: str) -> None:
         super().__init__(message)
@@ -148,7 +149,7 @@ class Engine:
     """start(scene, method, label, step): the engine at the scene's start.  The step may be negative.  Of a
     random method it takes one more argument by name, its seed."""
     version: Callable[[], Mapping[str, str]]
-    """Versions of the library and of what it stands on, by name."""
+    """Versions of the library and of its own dependencies, by name."""
     arithmetic: Callable[[Label], Arithmetic] = lambda label: Arithmetic()
     """How the library rounds: double precision throughout by default."""
     convention: Callable[[Method], str] = lambda method: "synchronised"
@@ -168,10 +169,10 @@ class Engine:
     atlas: tuple[str, ...] = ()
     """Methods on platforms, as `method@platform`, that the atlas of extremes measures beside the methods."""
     squares_lengths: bool = False
-    """Forces come from the lengths of bonds, roots of squares, and 1/m and 1/h are formed: half the range of
-    exponents is left."""
+    """Forces come from the lengths of bonds, roots of squares, and 1/m and 1/h are formed: half of the
+    exponent range is left."""
     any_axis: bool = False
-    """Whether it moves particles along y and z as well: it then reads `Scene.where`."""
+    """Whether it also moves particles along y and z: it then reads `Scene.where`."""
     periodic: bool = False
     """Whether it serves scenes in a periodic box, its positions counted on across the borders."""
 
@@ -217,7 +218,7 @@ def version_of(module: str, name: str = "") -> Callable[[], dict[str, str]]:
 
 
 def installed_version(distribution: str) -> Callable[[], dict[str, str]]:
-    """The function `version` of a library that does not say it itself, from its installed metadata."""
+    """The function `version` of a library that does not report it, from its installed metadata."""
 
     def version() -> dict[str, str]:
         from importlib import metadata
@@ -228,7 +229,7 @@ def installed_version(distribution: str) -> Callable[[], dict[str, str]]:
 
 
 def deferred(module: str, *more: str) -> dict[str, Any]:
-    """`start`, `version` and more functions of a module that is imported as the first of them is called."""
+    """`start`, `version` and more functions of a module that is imported when the first of them is called."""
 
     def of(name: str) -> Callable[..., Any]:
         def call(*arguments: object, **options: object) -> Any:

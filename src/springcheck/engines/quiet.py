@@ -1,4 +1,4 @@
-"""Keeping a library's own printing off the user's terminal and out of our results."""
+"""Keep a library's own printing off the user's terminal and out of our results."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from typing import Any
 
 @contextmanager
 def caught(descriptor: int) -> Iterator[list[str]]:
-    """Catch what a library prints to standard output (1) or error (2) while this context is open.
+    """Capture what a library prints to standard output (1) or error (2) while this context is open.
 
-    What its C or C++ code prints, and what Python code prints to another stream in its place, as in a
-    notebook.  The list that is handed out holds the text, as one string, once the context is left.  Where
-    the descriptor is closed nothing is caught.
+    From C or C++ code, and from Python code that prints to another stream in its place, as in a notebook.
+    The list that is handed out holds the text, as one string, once the context is left.  Where the descriptor
+    is closed nothing is captured.
     """
     text: list[str] = []
     try:

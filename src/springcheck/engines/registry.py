@@ -1,4 +1,4 @@
-"""Where engines come from: entry points of installed packages, ours among them, and what a call brings."""
+"""Sources of engines: entry points of installed packages, ours among them, and what a call brings."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ MODULES = (
 
 
 class Origin(NamedTuple):
-    """Where an engine comes from: a package with its version, or a file."""
+    """The source of an engine: a package with its version, or a file."""
 
     package: str
     version: str
@@ -52,8 +52,8 @@ class _Found(NamedTuple):
     reason: str = ""
 
 
-# engines that a call brings: a file's, a function, a command.  They live as long as the process, as an
-# imported module does
+# brought by a call, as a file, a function or a command: like an imported module they stay for the life of the
+# process
 _brought: dict[str, _Found] = {}
 
 
@@ -97,7 +97,7 @@ def _look(name: str) -> _Found | None:
 
 @cache
 def _loaded(name: str, place: str, load: Callable[[], object]) -> Engine | str:
-    """The engine that `load` imports, or why there is none, whatever the code of others raises."""
+    """The engine that `load` imports, or why there is none, whatever its code raises."""
     try:
         with foreign(place, f"{place} cannot be loaded"):
             return _checked(load(), name)
@@ -107,7 +107,7 @@ def _loaded(name: str, place: str, load: Callable[[], object]) -> Engine | str:
 
 @contextmanager
 def foreign(name: str, what: str, file: str = "") -> Iterator[None]:
-    """Run the code of others, known by this name: whatever it raises becomes a MethodError "`what`: why".
+    """Run foreign code, known by this name: whatever it raises becomes a MethodError "`what`: why".
 
     Code that has ended an earlier process of this command (`interrupts.supervised`) is not run again: the
     MethodError says how it ended that one.
@@ -125,16 +125,14 @@ def foreign(name: str, what: str, file: str = "") -> Iterator[None]:
         raise MethodError(f"{what}: {told(error, file)}") from error
     finally:
         if os.getpid() != process:
-            # the copy that a fork in there has made is not the program
+            # a fork within foreign code is not the program
             os._exit(1)
         interrupts.calling("")
 
 
 def _checked(found: object, name: str = "") -> Engine:
-    """The object, if it is an engine that keeps the contract; its schemes are known from then on.
-
-    MethodError, with what the contract asks, where it does not.
-    """
+    """The object, if it is an engine that keeps the contract; its schemes are registered.  MethodError, with
+    what the contract asks, where it does not."""
     if not isinstance(found, Engine):
         raise MethodError(f"it is of type {type(found).__name__}, not a springcheck.engines.Engine")
     if not isinstance(found.name, str) or not found.name.replace("-", "").replace("_", "").isalnum():
@@ -222,7 +220,7 @@ def module_name(name: str) -> str:
 
 
 def bring(found: Engine, where: str, version: str = "") -> Engine:
-    """Make an engine known for the rest of this process.  MethodError where it does not keep the contract."""
+    """Register an engine for the rest of this process.  MethodError where it does not keep the contract."""
     found = _checked(found)
     taken = _look(found.name)
     if taken is not None and found.name not in _brought:
@@ -233,7 +231,7 @@ def bring(found: Engine, where: str, version: str = "") -> Engine:
 
 @contextmanager
 def while_here(found: Engine, where: str, version: str) -> Iterator[None]:
-    """Make an engine known within this context, and what had its name again after it."""
+    """Register an engine within this context, and restore what had its name after it."""
     before = _brought.get(found.name)
     bring(found, where, version)
     try:
@@ -250,10 +248,8 @@ def is_brought(name: str) -> bool:
 
 
 def from_file(path: Path) -> Engine | None:
-    """Bring the engine of a Python file: its one `Engine`, or the one that it calls ENGINE.
-
-    None for a file that only registers terms.
-    """
+    """Register the engine of a Python file: its one `Engine`, or the one that it calls ENGINE. None for a
+    file that only registers terms."""
     before = terms.known()
     module = module_of(path)
     there = {id(x): x for x in vars(module).values() if isinstance(x, Engine)}

@@ -1,4 +1,4 @@
-"""How far adaptive solvers have to go between two outputs."""
+"""How far an adaptive solver has to integrate between two outputs."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ MOST_RADIANS = 3e7
 
 
 def turned(scene: Scene, step: float) -> float:
-    """Radians of the fastest rate at the start between two outputs."""
+    """Angle [rad] of the fastest rate at the start between two outputs."""
     system = scene.system
     with np.errstate(all="ignore"):
         rows = system.gershgorin(scene.q) / scene.m
@@ -23,10 +23,8 @@ def turned(scene: Scene, step: float) -> float:
 
 
 def followed(scene: Scene, step: float) -> float:
-    """Radians that a solver has to follow between two outputs, 0 where no such bound is known.
-
-    Those of the fastest mode that moves by more than the tolerance, until friction has taken it below.
-    """
+    """Angle [rad] that a solver has to resolve between two outputs, 0 where no such bound is known.  That of
+    the fastest mode that moves by more than the tolerance, until friction has damped it below."""
     system, duration = scene.system, abs(step) * scene.every
     radians = turned(scene, step)
     if not MOST_RADIANS < radians < np.inf or not system.is_linear or not system.has_modes:
@@ -41,7 +39,7 @@ def followed(scene: Scene, step: float) -> float:
 
 
 def driven(scene: Scene, step: float) -> float:
-    """Radians that the fastest drive turns through between two outputs, which a solver follows as well."""
+    """Angle [rad] of the fastest drive between two outputs, which a solver resolves as well."""
     drives: list[Any] = [term for term in scene.terms if term.kind == "drive"]
     with np.errstate(over="ignore"):
         turns = [np.max(np.abs(term.frequency * step)) * scene.every for term in drives if len(term)]

@@ -35,7 +35,7 @@ def version() -> dict[str, str]:
 
 
 def arithmetic(label: Label) -> Arithmetic:
-    """NumPy's double precision; `compare_atoms` takes positions within 1e-15 of each other for the same."""
+    """NumPy's double precision; `compare_atoms` treats positions within 1e-15 of each other as equal."""
     return Arithmetic(stale=1e-15, lengths=1e-13 if label.method in ("rattle", "langevin-rods") else 0.0)
 
 
@@ -43,7 +43,7 @@ class Springs(Calculator):  # type: ignore[misc]
     """The terms of a scene, as an ASE calculator.  `length` and `time` are its units."""
 
     implemented_properties: ClassVar[list[str]] = ["energy", "forces"]
-    # compared at every step else, which takes longer than the step: forces follow from positions alone
+    # compared at every step otherwise, which takes longer than the step: forces follow from positions alone
     ignored_changes: ClassVar[set[str]] = {*all_changes} - {"positions"}
 
     def __init__(self, system: System[Scene], length: float, time: float) -> None:
@@ -152,14 +152,14 @@ class _Dynamics:
 
     def advance(self, every: int, q: Floats, p: Floats) -> None:
         atoms, run = self._atoms, self._dynamics.run
-        # np.errstate would say the same, but slows down every NumPy call inside it: ASE by a tenth
+        # np.errstate would do the same, but slows down every NumPy call inside it: ASE by a tenth
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)
             for row in range(len(q)):
                 try:
                     run(every)
                 except RuntimeError as error:
-                    # lengths of constraints that its iterations do not find
+                    # lengths of constraints that its iteration does not reach
                     raise Stopped(row, str(error)) from error
                 q[row] = atoms.arrays["positions"].reshape(-1)[self._where]
                 p[row] = atoms.arrays["momenta"].reshape(-1)[self._where]

@@ -1,4 +1,4 @@
-"""How OpenMM rounds on each platform, and to which tolerance it keeps lengths."""
+"""Rounding of OpenMM on each platform, and its tolerance of constrained lengths."""
 
 from __future__ import annotations
 
@@ -51,8 +51,8 @@ LENGTHS = {
 
 SHAKE = 2.0**-24
 """GPU-type platforms keep SHAKE's squared lengths and inverse masses in single precision in every mode
-(`params` in `IntegrationUtilities.cpp`).  By the masses a free molecule's momentum sways: that is no
-tolerance, and fails."""
+(`params` in `IntegrationUtilities.cpp`).  Rounded masses make a free molecule's momentum fluctuate: that is
+no tolerance, and fails."""
 
 
 def arithmetic(label: Label) -> Arithmetic:

@@ -69,7 +69,7 @@ FAST_STEPS = {"mts": 8} | {f"mts-langevin-{n}": n for n in (2, 3, 4)}
 """Evaluations of the fast springs in a step, beside one of the others, by method."""
 
 ATTENTIVE = 500
-"""Steps in one call, which hears no Ctrl-C: 1.5 ms on Reference, 0.1 s on OpenCL; a call takes 1 us."""
+"""Steps in one call, which cannot be interrupted: 1.5 ms on Reference, 0.1 s on OpenCL; a call takes 1 us."""
 
 
 def version() -> dict[str, str]:
@@ -106,7 +106,7 @@ def _system(scene: Scene, origins: Floats) -> tuple[mm.System, Floats]:
         except MethodError:
             if scene.box is not None or not isinstance(term, WallSpring):
                 raise
-            # unlike along its axes: no bond, but a potential of each coordinate
+            # different along its axes: no bond, but a potential of each coordinate
             for force in _custom(scene, term, origins):
                 force.setForceGroup(int(term.fast))
                 system.addForce(force)
@@ -176,7 +176,7 @@ def _driven(scene: Scene, term: Any, origins: Floats) -> Iterator[mm.Force]:
     for i, *numbers in term.rows():
         given = dict(zip((column.field for column in term.columns), numbers, strict=True))
         particle, axis = divmod(int(places[i]), 3)
-        # a force that is constant in space does not know where positions are counted from
+        # a force that is constant in space does not depend on the origin of positions
         wanted = energy.format(**given).replace("*x", f"*{'xyz'[axis]}").replace("(x-", f"({'xyz'[axis]}-")
         force = mm.CustomExternalForce(wanted)
         force.addGlobalParameter("time", 0.0)
@@ -187,7 +187,7 @@ def _driven(scene: Scene, term: Any, origins: Floats) -> Iterator[mm.Force]:
 
 
 def _stays_right_way_round(scene: Scene, term: Morse) -> None:
-    """MethodError where a Morse bond could reach length 0: OpenMM's knows its length, not its sign."""
+    """MethodError where a Morse bond could reach length 0: OpenMM's has a length without a sign."""
     energy = 4 * float(scene.system.energy(scene.q, scene.p))
     barrier = term.depth * np.expm1(term.steepness * term.rest) ** 2
     if np.any((scene.q[term.b] <= scene.q[term.a]) | (term.rest <= 0) | (barrier <= energy)):
@@ -268,7 +268,7 @@ def _context(system: mm.System, integrator: mm.Integrator, label: Label) -> mm.C
 
 
 def _warm_up(context: mm.Context, integrator: mm.Integrator, positions: Floats) -> None:
-    """Take and forget a step: OpenMM compiles what it needs in the first, which belongs to the start."""
+    """Take a step and undo it: OpenMM compiles its kernels in the first step, which counts as start."""
     context.setPositions(positions)
     # a scene that blows up in its first step is to do so in its run
     with contextlib.suppress(mm.OpenMMException):
@@ -285,7 +285,7 @@ class _Context:
         if step < 0 and scene.system.is_damped:
             raise MethodError(f"{label}: no negative step is taken, so friction runs forwards in time only")
         if arithmetic(label).parameters == "single":
-            # the half kicks below must be those of the springs that OpenMM feels
+            # the half kicks below must be those of the springs as OpenMM rounds them
             scene = scene.system.in_single
         if scene.system.is_driven and arithmetic(label).state > 2.0**-53:
             raise MethodError(f"{label}: the time of a drive is a parameter, kept in single precision there")

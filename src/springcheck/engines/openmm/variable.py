@@ -20,8 +20,8 @@ MOST_STEPS = 1e8
 """Most steps of a run: a minute for one particle."""
 
 MOST_TRIED, ESCAPED = 10_000, 30
-"""Most steps of the trial of a motion that may escape, two seconds; and how many amplitudes of its energy
-away it has escaped: in a well within a negative quartic potential it reaches sqrt(2) at most."""
+"""Most steps of the trial of a motion that may escape, two seconds; and the distance in amplitudes from which
+on it has escaped: in a well within a negative quartic potential it reaches sqrt(2) at most."""
 
 
 REACHED = 0.9
@@ -31,8 +31,8 @@ COARSEST = 1e-2
 
 
 def _barrier(scene: Scene) -> float:
-    """The energy below which nothing leaves a well within a negative quartic potential, all other potentials
-    being springs; 0 where none is known."""
+    """The energy of the barrier around a well within a negative quartic potential, all other potentials being
+    springs; 0 where none is known."""
     if any(term.key not in ("wall-spring", "spring", "quartic") for term in scene.terms):
         return 0.0
     if any(np.any(term.k < 0) for term in scene.terms if isinstance(term, Spring | WallSpring)):
@@ -101,7 +101,7 @@ class Variable(_Context):
         self._most = _stays(scene, label, step, w)
         super().__init__(scene, method, label, step)
         self.last_steps = np.zeros(0)
-        # the mean is over all particles, anchors among them
+        # the mean is over all particles, anchors included
         count = self._context.getSystem().getNumParticles()
         self._integrator.setErrorTolerance(allowed(scene) * np.sqrt(scene.particles / count))
 

@@ -1,7 +1,7 @@
-"""springcheck's own methods: the blog's two loops, and every scheme of the catalogue beside them.
+"""springcheck's own methods: the blog's two loops, and every scheme of the catalogue.
 
-Three of them belong to what a scene runs unasked: explicit, semi-implicit and implicit Euler.  The others
-are there for whoever names them, in a scene's `include` or by `--method`.
+Three of them run by default: explicit, semi-implicit and implicit Euler.  The others are run by name, in a
+scene's `include` or by `--method`.
 """
 
 from __future__ import annotations
@@ -26,17 +26,17 @@ from springcheck.schemes import ATTACHED, SCHEMES, Scheme
 from springcheck.thermal import THERMOSTATS
 
 NAMES = {"explicit-euler": "euler"}
-"""Methods named otherwise than their scheme."""
+"""Methods whose names differ from their scheme's."""
 
 ABOUT = {
     "explicit-euler": "explicit Euler: both from the old state",
     "semi-implicit-euler": "kick, then drift with the new momentum",
     "implicit-euler": "both from the new state",
 }
-"""The methods that a scene runs unasked, and what to say of them."""
+"""The methods that a scene runs by default, and their descriptions."""
 
 BY_DEFAULT = {"baoab", "baoa", "aboba", "obabo", "oabao", "gj-i", "bbk"}
-"""The thermostats that a scene with a bath runs unasked."""
+"""The thermostats that a scene with a bath runs by default."""
 
 
 def _requires(scheme: Scheme) -> frozenset[Need]:

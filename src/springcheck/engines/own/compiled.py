@@ -1,8 +1,8 @@
-"""The kernels compiled by numba, their code saved beside them and loaded only as it was written.
+"""The kernels compiled by numba, cached beside them, and loaded only as they were written.
 
-numba loads saved code without a look at it: a file cut short or zeroed ends in an exception of any kind,
-or kills the process.  So a digest of every file stands beside them, and what does not agree is removed and
-compiled anew.  It covers the sources too, because numba watches the file of the kernel alone.
+numba loads cached code without a check: a file cut short or zeroed ends in an exception of any kind, or kills
+the process.  So a digest of every file is stored beside them, and what does not match is removed and compiled
+again.  It covers the sources too, because numba watches the file of the kernel alone.
 """
 
 from __future__ import annotations
@@ -33,12 +33,12 @@ HELPERS: tuple[Callable[..., Any], ...] = tuple(
     for thing in vars(module).values()
     if inspect.isfunction(thing) and thing.__module__ == module.__name__
 )
-"""What the kernels call."""
+"""The functions that the kernels call."""
 
 
 @cache
 def _registered() -> None:
-    """Make the helpers known to numba, which calls nothing that it has not been told of."""
+    """Register the helpers with numba, which calls no other function."""
     from numba.extending import register_jitable
 
     for helper in HELPERS:
@@ -59,16 +59,16 @@ def compiled(kernel: Callable[..., Any], arguments: tuple[Any, ...]) -> Callable
     except ImportError:
         raise
     except Exception:
-        # saved code that cannot be read, or no folder to save it in: compile for this process alone
+        # the cache cannot be read, or written: compile for this process alone
         return _jit(kernel, looks, saved=False)
 
 
 _TYPES: dict[tuple[Any, ...], tuple[Any, ...]] = {}
-"""Types of arguments by their looks: numba takes a millisecond to find and to compare them."""
+"""Types of arguments by their description: numba takes a millisecond to find and compare them."""
 
 
 def _look(argument: Any) -> Any:
-    """All of an argument that numba's type of it depends on."""
+    """The properties of an argument on which its numba type depends."""
     if isinstance(argument, np.ndarray):
         flags = argument.flags
         return (
@@ -116,14 +116,14 @@ def _files(folder: Path, kernel: Callable[..., Any]) -> list[Path]:
 
 
 def _digest(folder: Path, kernel: Callable[..., Any]) -> str:
-    """Digest of the saved code of a kernel and of the sources that it was compiled from."""
+    """Digest of the cached code of a kernel and of the sources that it was compiled from."""
     sources = [Path(__file__), *(Path(inspect.getfile(module)) for module in (forces, updates, kernels))]
     sums = [(path.name, hashlib.sha256(path.read_bytes()).hexdigest()) for path in _files(folder, kernel)]
     return repr([*sums, *(hashlib.sha256(path.read_bytes()).hexdigest() for path in sources)])
 
 
 def _unbroken(folder: Path, kernel: Callable[..., Any]) -> bool:
-    """Whether the saved code of a kernel is as it was written; removes it where it is not."""
+    """Whether the cached code of a kernel is as it was written; removes it where it is not."""
     with contextlib.suppress(OSError):
         if (folder / f"{kernel.__name__}.seal").read_text() == _digest(folder, kernel):
             return True
@@ -133,7 +133,7 @@ def _unbroken(folder: Path, kernel: Callable[..., Any]) -> bool:
 
 
 def _seal(folder: Path, kernel: Callable[..., Any]) -> None:
-    """Write down what the saved code of a kernel is; without it the next process compiles anew."""
+    """Store the digest of the cached code of a kernel; without it the next process compiles again."""
     with contextlib.suppress(OSError):
         path = folder / f"{kernel.__name__}.seal"
         draft = path.with_suffix(f".{os.getpid()}")

@@ -61,7 +61,7 @@ class Program:
 
     @property
     def stages(self) -> int:
-        """Stages of the tableau, or operations: what the time of a step is proportional to."""
+        """Stages of the tableau, or operations: proportional to the time of a step."""
         return self.a.shape[1] or len(self.operations)
 
     @property

@@ -25,8 +25,8 @@ from springcheck.physics.terms import WallSpring
 from springcheck.schemes import Scheme
 
 WORTH = 1_000_000
-"""Spring-steps from which compiling pays.  Interpreted, one takes 0.1 us, recorded 0.3 us; importing numba
-takes 0.15 s, loading saved code 5 ms, compiling it the first time 1 to 4 s."""
+"""Spring-steps from which on compiling pays.  Interpreted, one takes 0.1 us, recorded 0.3 us; importing numba
+takes 0.15 s, loading cached code 5 ms, compiling it the first time 1 to 4 s."""
 
 
 Carrier: TypeAlias = tiles.Whole | tiles.Tiled | vectors.Vectors
@@ -34,7 +34,7 @@ Carrier: TypeAlias = tiles.Whole | tiles.Tiled | vectors.Vectors
 
 
 class Own:
-    """A started run of an own method.  `compiled` says which way it goes."""
+    """A started run of an own method; `compiled` says whether by a compiled kernel."""
 
     def __init__(self, how: Carrier, evaluations: tuple[int, int], *, compiled: bool) -> None:
         self.force_calls = 0
@@ -80,10 +80,10 @@ def prepare(
     compiled: bool | None = None,
     threads: int | None = None,
 ) -> Own:
-    """Like `start`, by any scheme; `compiled` forces the kernel either way, left out the length decides.
+    """Like `start`, by any scheme; `compiled` forces the kernel either way, by default the length decides.
 
-    Forced, a missing numba is an ImportError; left out, the interpreted kernel serves.  `threads` at most
-    are used, as many as there are processors where it is left out.
+    Forced, a missing numba is an ImportError; otherwise the interpreted kernel serves.  At most `threads`
+    threads are used, by default as many as there are processors.
     """
     found = schemes.scheme(scheme) if isinstance(scheme, str) else scheme
     with np.errstate(all="ignore"):

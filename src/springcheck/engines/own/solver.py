@@ -23,8 +23,7 @@ MOST_BYTES = 1 << 29
 """Memory that the factors of one scene may take: 512 MiB, a band of 60 elements for 1e6 particles."""
 
 NATURAL = 3
-"""Width of the band up to which particles are taken in the order of the scene, unasked whether another
-order makes it narrower."""
+"""Width of the band up to which particles keep the order of the scene, without a search for a better one."""
 
 
 def factors(scene: Scene, x: float) -> Factors:

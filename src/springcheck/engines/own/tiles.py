@@ -27,7 +27,7 @@ NARROW, MANY_STEPS = 1024, 32
 stay in the first-level cache."""
 
 MARGIN = 64
-"""Particles that a tile of a chain gets on each side: it goes alone until what is wrong comes as far."""
+"""Particles that a tile of a chain gets on each side: it goes alone until its ends' error comes as far."""
 
 PARALLEL = 2_000_000
 """Particle-steps of one call from which threads pay: 1 to 2 ms, where starting them takes 0.1 ms."""
@@ -36,8 +36,8 @@ LANES = 8
 """Numbers in a cache line of 64 bytes, and in the widest vector."""
 
 STAGGER = 9 * LANES
-"""Numbers left free between two rows: the processor takes a load for dependent on a recent store to the
-same place in another page of 4 KiB."""
+"""Numbers left free between two rows: the processor takes a load to depend on a recent store to the same
+place in another page of 4 KiB."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -54,7 +54,7 @@ class Job:
     stages: int = 0
     """Stages of a tableau, 0 where there is none."""
     reach: int = 0
-    """Over how many neighbours a step of joined particles reaches; 0 where all must go together."""
+    """Neighbours over which a step of joined particles reaches; 0 where all must advance together."""
     joined: bool = False
     """Whether neighbours are joined."""
 
