@@ -327,13 +327,3 @@ def test_r_respa_calls_its_fast_and_its_slow_force_as_often_by_every_engine(labe
     own = springcheck.simulate(scene, "own:respa8").force_calls
     # a step of ours ends with the forces that the next one starts with, which the first one lacks
     assert (own, springcheck.simulate(scene, label).force_calls) == (902, 900)
-
-
-@pytest.mark.parametrize(("label", "fast"), [("box2d:force", 0.9), ("rapier:force", 390.0)])
-def test_force_calls_before_a_stop_are_counted(label: str, fast: float, need: Need) -> None:
-    need(label)
-    scene = scenes.load_scene("spring-uneven")
-    scene = replace(scene, q=0 * scene.q, p=-scene.m * fast, terms=(WallSpring(i=[0], k=[-3.0], at=[0.0]),))
-    run = springcheck.simulate(replace(scene, step=0.1, steps=400, every=1), label)
-    assert run.outcome.status == "stopped"
-    assert run.force_calls == len(run.t) > 1

@@ -348,3 +348,13 @@ def test_what_a_library_does_not_take_is_refused_in_its_words(
     need(label)
     with pytest.raises(MethodError, match=f"^{label}: {said}"):
         run(replace(load_scene("spring-uneven"), **changes), label)
+
+
+@pytest.mark.parametrize(("label", "fast"), [("box2d:force", 0.9), ("rapier:force", 390.0)])
+def test_force_calls_before_a_stop_are_counted(label: str, fast: float, need: Need) -> None:
+    need(label)
+    scene = load_scene("spring-uneven")
+    scene = replace(scene, q=0 * scene.q, p=-scene.m * fast, terms=(WallSpring(i=[0], k=[-3.0], at=[0.0]),))
+    made = run(replace(scene, step=0.1, steps=400, every=1), label)
+    assert made.outcome.status == "stopped"
+    assert made.force_calls == len(made.t) > 1
