@@ -307,3 +307,14 @@ def test_a_run_of_a_scene_that_records_every_other_step_passes_its_times() -> No
     scene = replace(spring(), steps=8, every=2)
     verdicts = {v.check: v.passed for v in checks.judge(scene, driver.run(scene, LABEL))}
     assert verdicts["times"] is True
+
+
+def test_a_scene_without_a_title_has_its_name_for_one(tmp_path: Path) -> None:
+    text = "\n".join(x for x in scenes.text_of("spring-uneven").splitlines() if not x.startswith("title"))
+    path = tmp_path / "odd.toml"
+    path.write_text(text)
+    found, shipped = scenes.load_scene(path), scenes.load_scene("spring-uneven")
+    assert found.title == found.name == "odd"
+    assert found.digest == shipped.digest
+    assert scenes.parse(found.to_toml(), name="x").title == "odd"
+    assert Scene(m=[2.7], q=[-1.3], p=[0.4], step=0.37, steps=3).title == "scene"

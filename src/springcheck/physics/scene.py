@@ -151,6 +151,7 @@ def _checked(scene: Scene) -> Iterator[tuple[str, Any]]:
     yield "include", tuple(include)
     for field in ("name", "title", "source", "include"):
         _check_text(getattr(scene, field), field)
+    yield "title", scene.title or scene.name
 
 
 def _places(scene: Scene) -> Integers | None:

@@ -179,7 +179,7 @@ def gather(path: Path) -> Content:
     wrong = {verdict.method for verdict in verdicts if verdict.passed is False}
     if labels and (motion := _motion(path, wrong, most)):
         banks["motion"] = motion
-    title = (scene.title or scene.name) if scene else path.name
+    title = scene.title if scene else path.name
     return Content(
         title=title,
         scene=scene,

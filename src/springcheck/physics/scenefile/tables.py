@@ -180,8 +180,8 @@ BODIES = {
 class SceneBase(SceneTable, frozen=True):
     """A scene file without the tables of the terms that need no more than their columns."""
 
-    title: str
     time: TimeTable
+    title: str = ""
     source: str = ""
     units: Units | None = None
     kind: Kind | None = None
