@@ -20,23 +20,23 @@ from springcheck.physics.arrays import Floats, Reals
 from springcheck.physics.scene import Scene
 
 FEWEST_MASSES, LONG = 3, 8
-"""Particles from which a scene has modes worth drawing, and from which its wave is drawn as an image."""
+"""Particles from which on a chain has modes worth a figure, and from which on its wave is an image."""
 
 MODES = 3
-"""The strongest ones are drawn."""
+"""How many of the strongest modes are drawn."""
 
 WEAK = 1e-9
-"""Part of the energy below which a mode is not at work."""
+"""Fraction of the energy below which a mode is not excited."""
 
 PANELS = 6
 """Images: the exact wave, and the errors of five schemes."""
 
 DECADES = 20.0
-"""Ratio of energies from which their scale is logarithmic."""
+"""Ratio of energies from which on their scale is logarithmic."""
 
 BLOCKS, IMAGE_ROWS = 100, 120
-"""Blocks of neighbours over which errors are averaged, and most frames in the image of a wave: no picture
-resolves the short waves of a long chain."""
+"""Blocks of neighbours over which errors are averaged, and most frames in the image of a wave: an image does
+not resolve the short waves of a long chain."""
 
 WAVE_SHADES = (
     "#2166ac", "#4393c3", "#92c5de", "#d1e5f0", "#f7f7f7", "#fddbc7", "#f4a582", "#d6604d", "#b2182b",
@@ -44,11 +44,11 @@ WAVE_SHADES = (
 """Colours of displacements, from the largest below rest to the largest above (Brewer)."""
 
 SHARES = (0.003, 0.01, 0.03, 0.1, 0.3, 1.0)
-"""Bounds of the shades of errors, as parts of the largest displacement."""
+"""Bounds of the shades of errors, relative to the largest displacement."""
 
 
 def banks(runs: Runs, exact: Exact) -> list[Bank]:
-    """The charts of a chain, none where a scene is no linear chain of at least three."""
+    """The charts of a chain, none where a scene is not a linear chain of at least three."""
     scene, system = runs.scene, runs.scene.system
     if scene.n < FEWEST_MASSES or system.is_separate or not system.has_modes:
         return []

@@ -17,8 +17,8 @@ import numpy as np
 from springcheck.physics.arrays import Floats
 
 GUIDE, EXACTLY, SEPARATRIX, BEGIN, REJECTED = "guide", "exact", "separatrix", "beginning", "failed"
-"""Groups that are no scheme's: lines that show a slope or a limit, the exact solution, what parts motions of
-two kinds, where all begin, and what some verdict rejects."""
+"""Groups that are no scheme's: guides to a slope or a limit, the exact solution, separatrices, the common
+start, and what some verdict rejects."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,21 +28,19 @@ class Scale:
     name: str
     log: bool = False
     values: Sequence[float] = ()
-    """Values that stand at 0, 1, 2 ... on an axis of tiles."""
+    """Values at the positions 0, 1, 2 ... of an axis of tiles."""
     names: Sequence[str] = ()
-    """Names of the values 0, 1, 2 ...; every one is written at the axis."""
+    """Names at the positions 0, 1, 2 ...; every one is written at the axis."""
     shown: tuple[float, float] | None = None
-    """Range shown at first; left out: that of the curves."""
+    """Range shown at first; by default that of the curves."""
     factor: float = 1.0
-    """Factor of numbers shown in the unit of the name."""
+    """Factor from the numbers to the unit in the name."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Curve:
-    """Points of one name; curves of one name are switched on and off together.
-
-    One of the group `GUIDE` is no method's: a thin line that a figure names at its end.
-    """
+    """Points of one name; curves of one name are switched on and off together.  One of the group `GUIDE` is
+    no method's: a thin line with its name at its end."""
 
     name: str
     group: str
@@ -56,13 +54,13 @@ class Curve:
     open: Sequence[bool] = ()
     """Which points are estimates: these have hollow marks, all others filled ones."""
     title: str = ""
-    """The scheme in words, or what is wrong with it."""
+    """The scheme in words, or the fault."""
     over: bool = False
-    """Whether its line is that of an earlier curve of its group, on which a figure shows its marks alone."""
+    """Whether it coincides with an earlier curve of its group, on which a figure shows its marks alone."""
     dots: bool = False
-    """Whether points stand too far apart to be joined: each is a dot, and its line is faint if it has one."""
+    """Whether points are too far apart to be joined: each is a dot, and its line is faint if it has one."""
     band: tuple[Sequence[float] | Floats, Sequence[float] | Floats] | None = None
-    """The least and the largest of the numbers whose middle one is y."""
+    """Smallest and largest of the numbers whose median is y."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,13 +88,13 @@ class Rule:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Naming:
-    """The name of a curve where it stands apart, in its colour; at x = 1 beside the picture."""
+    """The name of a curve where it is well separated, in its colour; at x = 1 beside the axes."""
 
     text: str
     group: str
     x: float
     y: float
-    """Parts of the picture's width and height."""
+    """Fractions of the width and height of the axes."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -112,32 +110,33 @@ class Chart:
     short: str = ""
     """Label that distinguishes it from the other charts of its bank."""
     equal: bool = False
-    """Whether a unit is of one length on both axes."""
+    """Whether both axes have the same scale."""
     labels: Sequence[Naming] = ()
     note: str = ""
-    """What the picture leaves out."""
+    """What the chart leaves out."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Bank:
-    """Charts with one legend: of their curves, or of themselves where they are tiles."""
+    """Charts with one legend: of their curves, or of the charts where they are tiles."""
 
     title: str
     charts: Sequence[Chart]
     name: str = ""
-    """Name of its figure's file; left out: the page alone shows it."""
+    """Name of its figure's file; without one it is shown by the page alone."""
     heading: str = ""
-    """Heading of its figure; left out: the title of its first chart."""
+    """Heading of its figure; by default the title of its first chart."""
     on: Sequence[str] | None = None
     """Series drawn at first; all by default."""
     columns: int = 0
-    """Charts beside each other in a figure; left out: as many as suit it."""
+    """Charts beside each other in a figure; by default as many as suit it."""
     size: tuple[float, float] | None = None
-    """Size of a chart in a figure [in]; left out: what suits it."""
+    """Size of a chart in a figure [in]; by default what suits it."""
 
 
 def plain(bank: Bank) -> dict[str, Any]:
-    """For JSON: numbers that are none are words, rows of tiles are runs of one kind, [count, kind]."""
+    """For JSON: numbers that are not finite are words, rows of tiles are run-length encoded, [count,
+    kind]."""
     names = [x.name for chart in bank.charts for x in chart.curves]
     titles = [chart.title for chart in bank.charts if chart.tiles]
     found = asdict(bank) | {"on": list(dict.fromkeys([*names, *titles] if bank.on is None else bank.on))}
@@ -161,7 +160,7 @@ def plain(bank: Bank) -> dict[str, Any]:
 
 
 def _powers(axis: dict[str, Any]) -> list[tuple[float, int]]:
-    """Places of powers of ten among many values in even ratios: [place, exponent], a few of them."""
+    """Places of powers of ten among many geometrically spaced values: [place, exponent], a few of them."""
     values = np.asarray(axis["values"], np.float64)
     if len(values) < 3 or not np.all(values > 0):
         return []

@@ -18,35 +18,35 @@ from springcheck.physics.arrays import Floats, Reals
 from springcheck.physics.trajectory import Trajectory
 
 MOST = 1e3
-"""Energies and errors, relative to those of the start, beyond which nothing is read off a picture."""
+"""Energies and errors, relative to those of the start, beyond which a chart shows nothing useful."""
 
 LARGE = 30.0
-"""How many times the right energy one may be that sets the scale; one beyond leaves the picture."""
+"""Multiple of the right energy up to which a run sets the scale; larger ones leave the chart."""
 
 DECADES = 100.0
-"""Ratio of largest to smallest energy from which the scale is logarithmic."""
+"""Ratio of largest to smallest energy from which on the scale is logarithmic."""
 
 LEAST = 1e-4
 """Lower end of the logarithmic scale, relative to the initial energy."""
 
 MOST_TURNING = 8
-"""Particles of which some must turn where an orbit is one."""
+"""Particles among which some must turn for their motion to be called an orbit."""
 
 CHANGED, EVENLY, FINDINGS_SAID = 0.05, 0.99, 3
-"""Part of an energy, or logarithm of it over the start's, from which it has changed; part of its change that
-is even, which what wavers has not; schemes that a title names."""
+"""Fraction of an energy, or logarithm of its ratio to the start's, that counts as a change; fraction of a
+change that is uniform, unlike an oscillation; and schemes that a title names."""
 
 SEEN = 0.01
-"""Part of an energy from which an axis that is not logarithmic shows what it does."""
+"""Fraction of an energy from which on a linear axis shows a change."""
 
 FLAT = 1e-3
-"""Share of half a picture, less than the width of a line in it."""
+"""Fraction of half a chart below the width of a line."""
 
 FLOOR, ALL_ROUNDED = 2.0**-53, 2.0**-44
-"""Relative differences below this are none: they stand on the lower edge; differences that are roundings."""
+"""Relative differences that are drawn at the lower edge if below, and that count as roundings if below."""
 
 EMPTY = 1e3
-"""Factor between the errors of some and all others from which both have a picture of their own."""
+"""Factor between the errors of some and all others from which on both have a chart of their own."""
 
 
 def energy(runs: Runs, exact: Exact) -> Bank:
@@ -90,7 +90,7 @@ def energy(runs: Runs, exact: Exact) -> Bank:
     what = "exact" if changes else "initial"
     lower = decades(runs, differences, f"|energy - {what}| / {of}", f"Energy off the {what} one.")
     said = _said(runs, found, differences) if scene.system.keeps_energy or changes else ""
-    # lines that lie on one another say nothing beside their differences
+    # coinciding lines are better shown by their differences
     flat = lower and scene.system.keeps_energy and max(map(np.max, differences.values())) < FLAT * ys.half
     charts = lower if flat else [upper, *lower]
     return runs.bank("energy", charts, said or "energy", (7.2, 4.2 if flat and len(lower) == 1 else 2.7))
@@ -123,7 +123,7 @@ def _largest(runs: Runs, found: Mapping[str, Floats]) -> dict[str, float]:
 
 
 def steady(energies: Floats, every: int) -> float:
-    """Relative change of an energy that is the same in every step; 0 where it wavers or stays."""
+    """Relative change of an energy that is the same in every step; 0 where it oscillates or stays."""
     if not (np.isfinite(energies).all() and np.min(energies) > 0 and len(energies) > 4):
         return 0.0
     y, n = np.log(energies), np.arange(len(energies))
@@ -136,7 +136,7 @@ def steady(energies: Floats, every: int) -> float:
 
 
 def orbits(runs: Runs, exact: Exact) -> str:
-    """Whose orbits spiral, and how far the states of others are off at most."""
+    """Whose orbits spiral, and the largest error of the states of others."""
     scene = runs.scene
     said: dict[str, list[str]] = {"spirals out": [], "spirals in": [], "keeps to its orbit": []}
     off = {}
@@ -153,7 +153,7 @@ def orbits(runs: Runs, exact: Exact) -> str:
             unit = CHANGED * float(scene.system.norm.unit) ** 2
             # a motion that diverged did not oscillate
             out = not np.isfinite(e).all() or np.min(last) > np.max(first) + unit
-            # at once, or more and more; half of a negative energy is more of it
+            # at once, or more and more; of a negative energy half is larger
             inwards = not out and np.max(last) < max(np.min(first), min(e[0], e[0] / 2)) - unit
             way = "spirals out" if out else "spirals in" if inwards else "keeps to its orbit"
             said[way].append(group.title)
@@ -184,7 +184,7 @@ def _scale(found: Sequence[Floats], true: Floats | None) -> Frame:
         bottom = max(min(LEAST, 0.1 * float(np.min(true)) if true is not None else LEAST), FLOOR)
         return Frame(max(low / 2, bottom), 2 * high, len(near) < len(found) or low < bottom, log=True)
     ys = frames.widened(low, high, clipped=len(near) < len(found))
-    # smaller differences are for the panel of differences below
+    # smaller differences are left to the panel of differences below
     room = max(ys.half, SEEN * abs(ys.centre))
     return Frame(ys.centre - room, ys.centre + room, ys.clipped)
 
@@ -193,10 +193,8 @@ def decades(
     runs: Runs, found: Mapping[str, Floats], name: str, title: str, *, known: bool = False
 ) -> list[Chart]:
     """Differences (f,) of each run on logarithmic scales: those far smaller than all others apart, so that no
-    decade is empty; none where all are roundings.
-
-    `known`: what says how large they are follows from the scene, and 1 is as large as the motion itself.
-    """
+    decade is empty; none where all are roundings.  `known`: the scale follows from the scene, and 1 is as
+    large as the motion itself."""
     finite = {label: np.where(np.isfinite(x), x, np.inf) for label, x in found.items()}
     if max((float(np.max(x)) for x in finite.values()), default=0.0) <= ALL_ROUNDED and not known:
         return []
@@ -208,8 +206,8 @@ def decades(
 
 
 def _panel(runs: Runs, found: Mapping[str, Floats], name: str, title: str, rules: Sequence[Rule]) -> Chart:
-    """Differences (f,) of some of the runs, and the rules that their decades meet."""
-    # the start is right; what is less than the floor at other frames stands on the lower edge
+    """Differences (f,) of some of the runs, and the rules within their decades."""
+    # the start is right; differences below the floor at other frames are drawn at the lower edge
     positive = [x[1:][x[1:] > 0] for x in found.values()]
     low = max(min((float(np.quantile(x, 0.02)) for x in positive if len(x)), default=FLOOR) / 2, FLOOR)
     inside = [float(np.max(x)) for x in found.values() if np.max(x) <= MOST]

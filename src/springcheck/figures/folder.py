@@ -10,11 +10,11 @@ from springcheck.errors import StoreError
 from springcheck.store import files
 
 FIGURES = "springcheck-figures.json"
-"""Index of a folder of figures: for each file the store that it shows, and the file's sha256."""
+"""Index of a folder of figures: the store that each file shows, and the file's sha256."""
 
 
 def folder_of(path: Path) -> Path:
-    """Where the figures of a store go unless told."""
+    """Default folder of a store's figures."""
     return Path("figures", path.stem)
 
 

@@ -1,4 +1,4 @@
-"""Which part of an axis a picture shows: the exact solution, and what does not go far beyond it."""
+"""The part of an axis that a chart shows: the exact solution, and what does not go far beyond it."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from springcheck.figures.views import with_unit
 from springcheck.physics.arrays import Floats
 
 EXPLODED, LARGE = 3.0, 6.0
-"""How many times as far as the exact solution goes a run that grows may go and still set the scale of a
-picture, and one that does not grow."""
+"""Multiple of the exact solution's reach up to which a growing run sets the scale of a chart, and any other
+run."""
 
 GROWS = 1.3
 """Ratio of the second half's reach to the first half's from which a run grows."""
 
 FAR_OFF = 1e6
-"""Half widths of a picture that a line is drawn beyond it: far enough to leave it in its direction."""
+"""Half-widths beyond a chart to which a line is drawn: far enough to leave it in its direction."""
 
 ROUNDINGS = 1e-9
 """Relative difference of values below which a picture shows them as equal."""
@@ -28,14 +28,14 @@ ROUNDINGS = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """The part of an axis that a picture shows."""
+    """The part of an axis that a chart shows."""
 
     low: float
     high: float
     clipped: bool = False
     """Whether some run goes far beyond."""
     log: bool = False
-    """Whether decades are of one length."""
+    """Whether the axis is logarithmic."""
 
     @property
     def centre(self) -> float:
@@ -59,11 +59,11 @@ class Frame:
 
     @property
     def far(self) -> tuple[float, float]:
-        """Ends as far off as lines are drawn."""
+        """Limits to which lines are drawn beyond the axis."""
         return self.centre - FAR_OFF * self.half, self.centre + FAR_OFF * self.half
 
     def parts(self, values: Sequence[float] | Floats) -> Floats:
-        """Values as parts of the axis: 0 to 1 inside."""
+        """Values as fractions of the axis: 0 to 1 inside."""
         x, low, high = np.asarray(values, np.float64), self.low, self.high
         with np.errstate(all="ignore"):
             if self.log:
@@ -78,7 +78,7 @@ class Frame:
         return int(np.argmax(outside)) if outside.any() else None
 
     def within(self, values: Floats) -> Floats:
-        """Values up to the first one outside, which is brought nearer: far away, drawing it overflows."""
+        """Values up to the first one outside, which is clipped: far away, drawing it overflows."""
         end = self.leaves(values)
         values = values if end is None else values[: end + 1]
         return np.clip(values, *self.far)
@@ -87,7 +87,7 @@ class Frame:
 def frame(runs: Sequence[Floats], truth: Floats | None, *, far: float | None = None) -> Frame:
     """What to show: the exact solution and every run that does not go far beyond it.
 
-    Without an exact solution far is measured by the middle one of the runs.  `far`: how far beyond the exact
+    Without an exact solution the median of the runs takes its place.  `far`: how far beyond the exact
     solution any run may go.
     """
     spans = [(float(np.min(x)), float(np.max(x))) for x in runs]
@@ -109,7 +109,7 @@ def frame(runs: Sequence[Floats], truth: Floats | None, *, far: float | None = N
 
 
 def widened(low: float, high: float, margin: float = 0.06, *, clipped: bool = False) -> Frame:
-    """A frame around values, some room about them; what differs by roundings alone is one value."""
+    """A frame around values, with a margin; values that differ by roundings alone count as one."""
     size = max(abs(low), abs(high))
     edge = margin * (high - low) if high - low > ROUNDINGS * size else 0.1 * size or 1.0
     return Frame(low - edge, high + edge, clipped)
@@ -124,7 +124,7 @@ def _grows(x: Floats) -> bool:
 
 
 def nearer(x: Floats, y: Floats, a: Frame, b: Frame) -> tuple[Floats, Floats]:
-    """States up to the first one outside, brought nearer along the ray from the middle if it is far away."""
+    """States up to the first one outside, clipped along the ray from the centre if it is far away."""
     ends = [i for i in (a.leaves(x), b.leaves(y)) if i is not None]
     if not ends:
         return x, y

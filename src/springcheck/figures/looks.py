@@ -159,7 +159,7 @@ def scheme_of(label: str) -> str:
 
 
 def title(scheme: str) -> str:
-    """The title of a scheme as short as a legend needs it: without how it goes, and without its orders."""
+    """The title of a scheme as short as a legend needs it: without its mechanism and its orders."""
     return schemes.title(scheme).partition(":")[0].partition(", orders ")[0]
 
 

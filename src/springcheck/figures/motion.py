@@ -17,9 +17,9 @@ Motion = tuple[Floats, Floats, Floats]
 SMOOTH = 1500
 """Points of a smooth line."""
 FEWEST_POINTS, MOST_NUMBERS = 16, 1 << 21
-"""Points of a line of very many particles, and positions of all of them."""
+"""Points of a line for very many particles, and positions of all of them."""
 SPLIT, CLOSE = 64, 20
-"""Parts of the distance of its points, and distances from its start within which there are more."""
+"""Fraction of the distance of its points, and distances from its start within which there are more."""
 
 
 def true_motion(scene: Scene, runs: Sequence[Trajectory], points: int = SMOOTH) -> Motion | None:
@@ -48,7 +48,7 @@ def smooth(scene: Scene, first: float, last: float, points: int = SMOOTH) -> Mot
 
 
 BOUNDS = 17
-"""Times at which the uncertainty of an exact solution is worked out."""
+"""Times at which the uncertainty of an exact solution is evaluated."""
 
 
 class Exact:
@@ -68,22 +68,20 @@ class Exact:
         return self._found[key]
 
     def error(self, run: Trajectory) -> Floats:
-        """Distance of each frame from it (f,), relative to the initial energy norm.
-
-        No error below what is known of the exact solution is shown as one.
-        """
+        """Distance of each frame from it (f,), relative to the initial energy norm, but no smaller than its
+        uncertainty."""
         q, p = self.at(run)
         return np.maximum(self.scene.system.norm(run.q - q, run.p - p), self.uncertainty(run.t))
 
     def uncertainty(self, t: Floats) -> Floats:
-        """How well it is known at these times (f,), relative to the initial energy norm."""
+        """Its uncertainty at these times (f,), relative to the initial energy norm."""
         times = np.linspace(0, float(np.max(np.abs(t))), BOUNDS)
         bounds = [exact.uncertainty(self.scene, float(time)) for time in times]
         return np.interp(np.abs(t), times, bounds)
 
 
 def periods(x: Floats) -> float:
-    """How many times a motion goes round: half of the crossings of its mean."""
+    """Number of periods of a motion: half of the crossings of its mean."""
     if len(x) < 3 or not np.isfinite(x).all():
         return 0.0
     side = x > np.mean(x)

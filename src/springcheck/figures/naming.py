@@ -1,4 +1,4 @@
-"""Names of the curves of a chart, each where it stands apart or where it ends."""
+"""Labels of the curves of a chart, each where it is well separated or where it ends."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from springcheck.figures.frames import Frame
 from springcheck.physics.arrays import Floats
 
 MOST_NAMINGS, NAME_HIGH = 9, 0.052
-"""Curves that are named where they stand, and the height of a name as a part of the picture's."""
+"""Most curves with a label on them, and the height of a label as a fraction of the axes'."""
 
 NAME_AWAY, LETTER, NAME_PLACES = 0.03, 0.018, 60
-"""Parts of a picture that its name is away from other curves, and that a letter is wide; points at which
-there may be room for a name."""
+"""Distance of a label from other curves and width of a letter, as fractions of the axes; and points at which
+a label may find space."""
 
 
 Place = tuple[str, str, Floats, Floats]
@@ -43,10 +43,9 @@ def _named(chart: Chart) -> list[Place]:
 
 
 def at_ends(chart: Chart, *, height: float = NAME_HIGH) -> Chart:
-    """A chart with the names of its curves over time at their ends, beside the picture, or where they leave
-    it.
+    """A chart with labels at the ends of its curves over time, beside the axes, or where they leave them.
 
-    They are moved apart as far as a line of text is high.
+    They are moved apart by the height of a line of text.
     """
     ends: list[tuple[float, str, str]] = []
     out: list[Naming] = []
@@ -82,14 +81,14 @@ def at_ends(chart: Chart, *, height: float = NAME_HIGH) -> Chart:
 
 
 def labelled(chart: Chart) -> Chart:
-    """A chart with the names of the curves that stand apart somewhere, each where it is farthest from all
+    """A chart with labels on the curves that are well separated somewhere, each where it is farthest from all
     others."""
     points: dict[tuple[str, str], Floats] = {}
     for text, group, u, v in _named(chart):
         inside = (u > 0.02) & (u < 0.98) & (v > 0.03) & (v < 0.95)
         points[text, group] = np.stack([u[inside], v[inside]], axis=1)
     out: list[Naming] = []
-    # what is wrong comes first, a line that is no scheme's last
+    # faults come first, lines that are no scheme's last
     order = sorted(points.items(), key=lambda x: (x[0][1] != REJECTED, x[0][1] == SEPARATRIX))
     for (text, group), mine in order:
         others = np.concatenate([np.empty((0, 2)), *(x for key, x in points.items() if key != (text, group))])

@@ -1,4 +1,4 @@
-"""Runs in one picture: a curve for each motion with the marks of its engines, cut off where it leaves.
+"""Runs in one chart: a curve for each motion with the marks of its engines, ending where it leaves the axes.
 
 Engines of one scheme that pass share a line; one that failed has its own, in red and on top.
 """
@@ -19,12 +19,12 @@ from springcheck.physics.trajectory import Trajectory
 TRUTH = "exact solution"
 
 MOST_LEAVING = 4
-"""Schemes that are named where they leave a picture."""
+"""Schemes that are named where they leave the axes."""
 
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """Runs of one scheme that lie on one another, so that they share a line; or one that failed."""
+    """Runs of one scheme that coincide, so that they share a line; or one that failed."""
 
     scheme: str
     members: tuple[Trajectory, ...]
@@ -171,7 +171,7 @@ class Runs:
         )
 
     def leaving(self, when: Callable[[Trajectory], int | None]) -> str:
-        """Which schemes leave a picture for good, and when: at which frame, None where never."""
+        """Which schemes leave the axes for good, and at which frame, None where they do not."""
         factor, unit = self.time_unit
         firsts = {group.title: group.members[0] for group in self.groups}
         frames = {name: when(run) for name, run in firsts.items()}
@@ -191,7 +191,7 @@ def exact_curve(x: Floats, y: Floats) -> Curve:
 
 
 def share(x: float) -> str:
-    """A part of a whole as it is read: in percent, or as a power of ten."""
+    """A fraction in a readable form: in percent, or as a power of ten."""
     return (
         f"{100 * x:.2g} %" if 5e-4 <= x < 0.995 else f"{100 * x:.0f} %" if 0.995 <= x < 1000 else f"{x:.0e}"
     )

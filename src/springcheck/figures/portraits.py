@@ -17,31 +17,31 @@ from springcheck.physics.arrays import Floats
 from springcheck.physics.trajectory import Trajectory
 
 ALIKE = 2.5
-"""Ratio of two ranges up to which equal scales on both axes help."""
+"""Ratio of two ranges up to which equal scales on both axes are useful."""
 
 MANY_PERIODS, PERIODS_SHOWN = 14, 6
 """Periods from which the first and the last ones are shown separately, and how many of each."""
 
 CHORD = 0.015
-"""Part of a picture by which lines between frames may miss the exact solution: beyond, frames are dots."""
+"""Fraction of the axes by which lines between frames may miss the exact solution: beyond, frames are dots."""
 
 JUMP, MANY_POINTS, TO_AND_FRO = 0.3, 1000, 0.25
-"""Distance of two points, in half pictures, that is a jump in a curve of many points; and the part of all
-frames from which a run is said to jump to and fro."""
+"""Distance of two points, in half axes, that is a jump in a curve of many points; and the fraction of all
+frames from which on a run is said to jump to and fro."""
 
 STEEP, START_SHOWN = 30.0, 8.0
-"""Reach, in medians, from which a motion runs away; and what is shown of it, in reaches of its start."""
+"""Reach, in medians, from which on a motion runs away; and what is shown of it, in reaches of its start."""
 
 STANDS, SOON = 0.02, 0.1
-"""Part of its way that is left where a motion has settled; and the part of the run within which that is
-soon."""
+"""Fraction of its displacement that is left where a motion has settled; and the fraction of the run within
+which that is early."""
 
 MOST_CLOUDS = 12
 """Most schemes in a bath that have a panel of their own."""
 
 
 def phase_portraits(runs: Runs, shown: Sequence[View], truth: Motion | None, said: str = "") -> Bank:
-    """Momentum over position, or what else a view shows: a chart for each; `said`: what was found."""
+    """Momentum over position, or what else a view shows: a chart for each; `said` is the finding."""
     charts = [_portrait(runs, view, truth, alone=len(shown) == 1) for view in shown]
     what = "path" if shown[0].what == "path" else "phase portrait"
     planes = what == "path" and len(charts) == 3
@@ -58,7 +58,7 @@ def _size(charts: Sequence[Chart], wide: float, most: float) -> tuple[float, flo
 
 
 def _heading(what: str, said: str) -> str:
-    """What was found, and in brackets what is drawn."""
+    """The finding, and in brackets what is drawn."""
     return f"{said} ({what})" if said else what
 
 
@@ -115,7 +115,7 @@ def clouds(runs: Runs, view: View, thermal: float) -> Bank:
     """States in a bath: a panel for each scheme, with the ring on which the energy is kT above the least."""
     groups = runs.groups[:MOST_CLOUDS]
     picked = {run.label: view.pick(run.q, run.p) for run in runs.every}
-    # one that runs away sets the scale of none
+    # one that diverges sets the scale of none
     sizes = sorted(max(float(np.max(np.abs(a))) for a in one) for one in picked.values())
     usual = [one for one in picked.values() if np.max(np.abs(one[0])) <= 100 * (sizes[len(sizes) // 2] or 1)]
     xs, ys = (
@@ -157,32 +157,32 @@ def _frames(picked: Sequence[State], true: State | None, view: View) -> tuple[Fr
         # the whole turn, and all of the separatrix
         top = 1.1 * max(float(np.nanmax(y)) for _, y in view.separatrices(-1, 1))
         x, y = Frame(-view.turn / 2, view.turn / 2), Frame(min(y.low, -top), max(y.high, top))
-        # round and round is not away
+        # rotation is not divergence
         return x, Frame(y.low, y.high, clipped)
     return Frame(x.low, x.high, clipped), Frame(y.low, y.high, clipped)
 
 
 def _parted(x: Floats, y: Floats, xs: Frame, ys: Frame) -> State:
-    """A finely drawn curve without the lines over its jumps, which no state is near."""
+    """A finely drawn curve without the lines over its jumps, where no state is near."""
     far = np.hypot(np.diff(x) / xs.half, np.diff(y) / ys.half) > JUMP
     at = (1 + np.flatnonzero(far)).tolist() if len(x) > MANY_POINTS else []
     return np.insert(x, at, np.nan), np.insert(y, at, np.nan)
 
 
 def _swings(y: Floats, ys: Frame) -> bool:
-    """Whether frames jump to and fro, so that lines between them would fill the picture."""
+    """Whether frames jump to and fro, so that lines between them would fill the axes."""
     d = np.diff(y)
     return len(d) > 1 and bool(np.mean((d[1:] * d[:-1] < 0) & (np.abs(d[1:]) > JUMP * ys.half)) > TO_AND_FRO)
 
 
 def _meets(x: Floats, y: Floats, xs: Frame, ys: Frame) -> bool:
-    """Whether a curve y(x), or its mirror, runs through the picture."""
+    """Whether a curve y(x), or its mirror, crosses the axes."""
     inside = (x >= xs.low) & (x <= xs.high) & np.isfinite(y)
     return bool(np.any(inside & ((y <= ys.high) | (-y >= ys.low))))
 
 
 def _steep(picked: Mapping[str, State], true: State | None) -> tuple[Frame, Frame] | None:
-    """What is shown of a motion that runs away: its beginning.  None where it does not."""
+    """The visible part of a motion that runs away: its beginning.  None where it does not."""
     x, y = true if true is not None else next(iter(picked.values()))
     size = np.abs(x)
     start, end = float(size[0]), float(np.max(size))
@@ -199,7 +199,7 @@ def _beginning(x: Floats) -> Frame:
 
 
 def _chords(run: Trajectory, truth: Motion | None, view: View, *frames: Frame) -> bool:
-    """Whether frames stand so far apart that lines between them miss the exact solution by what is seen."""
+    """Whether frames are so far apart that lines between them visibly miss the exact solution."""
     if truth is None:
         return False
     t, *motion = np.abs(truth[0]), *view.pick(truth[1], truth[2])
@@ -263,7 +263,7 @@ def _spans(runs: Runs, shown: Sequence[View], truth: Motion | None) -> list[tupl
     if count <= MANY_PERIODS:
         return [(first, last)]
     length = PERIODS_SHOWN * (last - first) / count
-    # in a bath one part is as good as another
+    # in a bath all parts are alike
     return [(first, first + length), (last - length, last)][: 1 if runs.scene.bath else 2]
 
 

@@ -46,28 +46,27 @@ NO_KIND = ("not tried", "#ffffff")
 """Name and colour of a tile without a kind."""
 
 MOST_MARKS, FEWEST_MARKS, ALL_MARKS, MANY = 14, 4, 66, 200
-"""Most and fewest marks on a curve, and most on all curves of a picture; the points of a curve without a line
-that has more than many are all shown, as small marks."""
+"""Most and fewest marks on a curve, and most on all curves of a chart; more points than the last of a curve
+without a line are all shown, as small marks."""
 
 GOLDEN_PART = 0.618
-"""Curves begin their marks at its multiples, modulo 1, which lie far from one another however many there
-are."""
+"""Curves begin their marks at its multiples, modulo 1, which are well spread however many there are."""
 
 DRAWN_UP_TO = 1e6
-"""How many times as far as its picture reaches a line is drawn: farther, drawing it overflows."""
+"""Multiple of the axes' range up to which a line is drawn: farther, drawing it overflows."""
 
 LEGEND_LINE = 0.17
-"""Height of a line of the legend, with its part of the space between entries [in]."""
+"""Height of a line of the legend with the space between entries [in]."""
 
 LETTERS, WIDEST = 11.3, 38
 """Letters of a title per inch; most letters of a line of the legend."""
 
 MOST_TICKS, MOST_TICKS_UP, EVEN = 8, 12, 40
-"""Most values of tiles along x and along y that are written; of more than `EVEN` in even ratios, powers of
-ten."""
+"""Most values of tiles that are written along x and along y; of more than `EVEN` geometrically spaced ones,
+powers of ten."""
 
 SMALL_MAPS = 6
-"""Maps from which on they are small, three beside each other, and write what they have in common once."""
+"""Number of maps from which on they are small, three beside each other, and write common labels once."""
 
 
 def picture(bank: Bank) -> Figure:
@@ -85,7 +84,7 @@ def picture(bank: Bank) -> Figure:
     handles += _kinds(charts)
     lines = sum(1 + handle.get_label().count("\n") for handle in handles)
     rows = -(-len(charts) // columns)
-    # room for the whole legend
+    # space for the whole legend
     figure = Figure(
         figsize=(wide * columns + 2.4, max(high * rows, LEGEND_LINE * lines) + 0.6), layout="constrained"
     )
@@ -123,8 +122,7 @@ def _heading(figure: Figure, text: str, width: int) -> None:
 
 
 def _entries(curves: Sequence[Curve]) -> list[Line2D]:
-    """One entry for each group of curves, with the marks of the engines of its methods; what is wrong comes
-    first."""
+    """One entry for each group of curves, with the marks of the engines of its methods; faults come first."""
     groups: dict[tuple[str, str], list[Curve]] = {}
     for curve in curves:
         mine = groups.setdefault((curve.group, curve.name if curve.group == REJECTED else ""), [])
@@ -163,7 +161,7 @@ OTHER_LINES: dict[str, dict[str, Any]] = {
     SEPARATRIX: {"color": "#666666", "linewidth": 0.9, "linestyle": (0, (2, 2)), "zorder": 1.5},
     BEGIN: {"color": "k", "linestyle": "none", "marker": "+", "markersize": 9, "zorder": 4},
 }
-"""How what is no scheme's is drawn."""
+"""Line styles of what is no scheme's."""
 
 
 def _kinds(charts: Sequence[Chart]) -> list[Patch]:
@@ -199,7 +197,7 @@ def _chart(axes: Axes, chart: Chart, letters: int) -> None:
 
 
 def _label(axes: Axes, label: Naming) -> None:
-    """The name of a curve where it stands; white around it, so that lines do not run through it."""
+    """The label of a curve; white around it, so that lines do not run through it."""
     color = OTHER_LINES[label.group]["color"] if label.group in OTHER_LINES else looks.look(label.group).color
     beside, left = label.x >= 1, label.x > 0.6
     axes.annotate(
@@ -212,7 +210,7 @@ def _label(axes: Axes, label: Naming) -> None:
 
 
 def _drawable(values: Any, scale: Scale) -> Floats:
-    """Numbers in the unit of their axis; what is far beyond its picture is brought nearer."""
+    """Numbers in the unit of their axis; those far beyond it are clipped."""
     x = np.asarray(values, np.float64)
     if scale.shown is not None:
         low, high = scale.shown

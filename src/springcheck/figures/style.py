@@ -58,7 +58,8 @@ def style() -> Iterator[None]:
 def save(figure: Figure, folder: Path, name: str) -> list[Path]:
     """Write a figure as PNG and SVG; StoreError where the folder cannot be written.
 
-    Its texts may come from any file: control characters are escaped, and what is no formula stays text.
+    Its texts may come from any file: control characters are escaped, and what is not valid mathtext stays
+    text.
     """
     texts = figure.findobj(Text)
     for text in texts:
@@ -71,7 +72,7 @@ def save(figure: Figure, folder: Path, name: str) -> list[Path]:
         try:
             drawn = _drawn(figure)
         except ValueError:
-            # a title with dollars that is no formula
+            # a title with dollar signs that is not mathtext
             for text in texts:
                 text.set_parse_math(False)
             drawn = _drawn(figure)
@@ -94,7 +95,7 @@ def _drawn(figure: Figure) -> dict[str, bytes]:
         figure.set_dpi(DPI)
         engine = figure.get_layout_engine()
         if engine and any(axes.get_aspect() != "auto" for axes in figure.axes):
-            # a pass finds the room of names before axes of equal scales have theirs
+            # a first pass sizes the labels before axes of equal scales are laid out
             for _ in range(2):
                 engine.execute(figure)
         FigureCanvasAgg(figure).print_png(png)  # type: ignore[no-untyped-call]

@@ -64,13 +64,13 @@ class View:
     pick: Callable[[Reals, Reals], State]
     """q and p (f, n) -> x and y (f,)."""
     turn: float = 0.0
-    """The length after which x begins again, 0 where it does not."""
+    """The period of x, 0 where it has none."""
     potential: Callable[[Floats], Floats] | None = field(default=None)
-    """The potential of x alone, where the motion of x depends on nothing else."""
+    """The potential of x alone, where the motion of x is independent of other coordinates."""
     mass: float = 1.0
 
     def wrapped(self, x: Floats, y: Floats) -> State:
-        """States on one turn, from -turn/2 to turn/2; NaN between two of which one is on the other side."""
+        """States in one period, from -turn/2 to turn/2; NaN between two on opposite sides of its border."""
         if not self.turn:
             return x, y
         near = x - self.turn * np.round(x / self.turn)
@@ -78,8 +78,8 @@ class View:
         return np.insert(near, breaks, np.nan), np.insert(y, breaks, np.nan)
 
     def separatrices(self, low: float, high: float) -> list[State]:
-        """The curves of constant energy through the tops of hills near a range of x: motions on their two
-        sides are of different kinds."""
+        """Curves of constant energy through the maxima of the potential near a range of x, which separate
+        motions of different kinds."""
         if self.potential is None or not (np.isfinite([low, high]).all() and high > low):
             return []
         x = (
@@ -97,14 +97,15 @@ class View:
         out = []
         for level in levels:
             rest = level - v
-            # the top of a hill itself, where a rounding may make it negative
+            # a maximum itself, where a rounding may make it negative
             rest = np.where(np.abs(rest) <= 1e-12 * np.ptp(v), 0, rest)
             with np.errstate(invalid="ignore"):
                 out.append((x, np.sqrt(2 * self.mass * rest)))
         return out
 
     def ring(self, low: float, high: float, height: float) -> list[State]:
-        """The curve on which the energy is this much above the least, where it closes within a range of x."""
+        """The curve on which the energy is this much above the minimum, where it closes within a range of
+        x."""
         if self.potential is None:
             return []
         x = np.linspace(low, high, 2001)
@@ -135,7 +136,7 @@ def views(scene: Scene, particle: int | None = None) -> list[View]:
                 f"--particle {particle}: scene {scene.name} has particles 0 to {scene.n - 1}"
             )
         return [_single(scene, particle)]
-    # two particles that hold on to each other and to nothing else
+    # two particles that are bound to each other and to nothing else
     if scene.n == 2 and scene.terms and all(term.bodies == 2 for term in scene.terms):
         return [_bond(scene)]
     return [_single(scene, i) for i in range(scene.n if scene.n <= MOST_PANELS else 1)]
@@ -169,7 +170,7 @@ def _single(scene: Scene, i: int) -> View:
     turns = {float(2 * np.pi / w) for t in scene.terms if isinstance(t, Cosine) for w in t.wave[t.i == i]}
     alone = scene.system.is_separate
     part = scene.system.part(np.array([i])) if alone else None
-    # an angle in units of pi, where it is one: of a pendulum and of nothing else
+    # an angle in units of pi, for a pendulum alone
     turn = turns.pop() if len(turns) == 1 and part is not None and _only_cosine(part) else 0.0
     centre = float(part.terms[0].at[0]) if turn and part is not None else 0.0  # type: ignore[attr-defined]
     scale = 2.0 / turn if turn else 1.0
