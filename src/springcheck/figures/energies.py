@@ -54,14 +54,14 @@ def energy(runs: Runs, exact: Exact) -> Bank:
 
     Without friction that is the initial energy; where friction acts and no closed form is known it is the
     initial one too, and the axis says so.  All in units of the kinetic plus the absolute potential energy of
-    the start, which is the initial energy unless a potential is negative.
+    the start, which is the initial energy unless a potential is negative; see `Norm` where that is 0.
     """
     scene = runs.scene
     start = float(scene.system.energy(scene.q, scene.p))
-    unit = float(scene.system.norm.unit) ** 2 or 1.0
+    unit = float(scene.system.norm.unit) ** 2
     whole = abs(start - unit) <= 1e-12 * unit
     unit = start if whole else unit
-    of = "initial energy" if whole else "initial T + |V|"
+    of = "initial energy" if whole else scene.system.norm.of or "unit"
     changes = not scene.system.keeps_energy and exact.known
 
     def energies(q: Reals, p: Reals) -> Floats:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from springcheck.errors import SceneError
 from springcheck.physics import graph, memory
 from springcheck.physics.arrays import WIDE, Extended, Floats, Force, Integers, Reals, in_pieces
-from springcheck.physics.driven import with_clock
+from springcheck.physics.driven import Drive, with_clock
 from springcheck.physics.fields import SceneFields
 from springcheck.physics.magnetic import Magnetic
 from springcheck.physics.norm import SMALLEST_ENERGY, Norm, kinetic_energy
@@ -313,8 +313,22 @@ class System(Generic[Fields]):
             terms=self.terms,
             groups=self.free_groups,
             duration=self.duration,
-            unit=np.longdouble(np.sqrt(unit)),
+            unit=np.longdouble(np.sqrt(unit or self.gained or 1.0)),
+            of="initial T + |V|" if unit else "energy that it may gain" if self.gained else "",
         )
+
+    @cached_property
+    @np.errstate(all="ignore")
+    def gained(self) -> Any:
+        """Energy of the deflection by its forces, drives at full strength, or that they give within the run;
+        and that a bath gives [M L2/T2]."""
+        q = self.q.astype(np.longdouble)
+        push = np.abs(self.potential_force(q, 0 * q))
+        for term in self.terms:
+            if isinstance(term, Drive):
+                term.scatter(np.abs(term.amplitude), push)
+        held = np.maximum(self.hessian_diagonal(q), self.m / self.duration**2)
+        return np.sum(push * push / (2 * held)) + self.n * self.scene.thermal
 
     @property
     def _is_away_from_rest(self) -> bool:
