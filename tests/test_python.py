@@ -237,7 +237,7 @@ def test_wrong_arguments_are_answered_in_words() -> None:
         (lambda: made(t, t + 1j, t), "q: real numbers"),
         (lambda: made(t, ["a"] * 4, t), "q: real numbers"),
         (lambda: made(t, t, v=t, mass=-1), "above 0"),
-        (lambda: made(t, t, v=t, mass=[1, 2]), "one for each particle"),
+        (lambda: made(t, t, v=t, mass=[1, 2]), "one number or \\(n,\\) above 0"),
         (lambda: made(t, t, t, scene="spring"), "a Scene is needed"),
         (lambda: made(t, [t] * 4, [t] * 4, scene=scene), "do not fit together"),
         (lambda: springcheck.compare(scene, [run, run]), "unlike labels"),

@@ -54,7 +54,7 @@ def test_the_error_of_a_driven_spring_from_rest_is_in_units_of_its_static_deflec
     assert verdicts["tolerance"].passed
     assert main(["run", "driven.toml", "--method", "own:velocity-verlet"]) == 0
     said = capsys.readouterr().out
-    assert "over the root of the energy that it may gain" in said
+    assert "over the root of the possible gain" in said
     assert "as H0 is 0" in said
     # a drive moves it: its precision can be studied
     assert springcheck.precision(scene, "own:rk4", budget=1.0)
@@ -74,3 +74,13 @@ def test_a_wrong_engine_that_leaves_its_rest_fails() -> None:
 def test_differences_of_runs_in_a_bath_from_rest_are_relative_to_the_thermal_energy() -> None:
     found = springcheck.run("bath-uneven", ["own:baoab", "own:obabo"])
     assert 0.1 < found.comparison.max_difference[0, 1] < 100
+
+
+@pytest.mark.parametrize("option", [["--trajectory", "own:euler"], ["--step", "0.1"]])
+def test_what_goes_with_files_of_others_is_refused_for_a_store(
+    option: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "run.h5"
+    springcheck.run("spring", "own:euler", path=path)
+    assert main(["plot", str(path), "-o", str(tmp_path), *option]) == 2
+    assert "file of another program" in capsys.readouterr().err

@@ -135,7 +135,7 @@ def steady(energies: Floats, every: int) -> float:
     return float(np.expm1(rate / every))
 
 
-def orbits(runs: Runs, exact: Exact) -> str:
+def orbits(runs: Runs, parts: Runs, exact: Exact) -> str:
     """Whose orbits spiral, and how far the states of others are off at most."""
     scene = runs.scene
     said: dict[str, list[str]] = {"spirals out": [], "spirals in": [], "keeps to its orbit": []}
@@ -157,7 +157,7 @@ def orbits(runs: Runs, exact: Exact) -> str:
             inwards = not out and np.max(last) < max(np.min(first), min(e[0], e[0] / 2)) - unit
             way = "spirals out" if out else "spirals in" if inwards else "keeps to its orbit"
             said[way].append(group.title)
-    turns = max(periods(x) for x in runs.longest.q.T[:MOST_TURNING])
+    turns = max(periods(x) for x in parts.longest.q.T[:MOST_TURNING])
     if turns >= 1 and (said["spirals out"] or said["spirals in"]):
         many = {
             "spirals out": "spiral out",

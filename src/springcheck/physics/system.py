@@ -303,7 +303,8 @@ class System(Generic[Fields]):
             unit = self.kinetic_energy(p)
             for term in self.terms:
                 unit = unit + np.abs(term.energy(q))
-        if not SMALLEST_ENERGY < unit < np.inf and not WIDE and self._is_away_from_rest:
+        away = np.any(self.p) or any(np.any(term.elongation(self.q)) for term in self.terms)
+        if not SMALLEST_ENERGY < unit < np.inf and not WIDE and away:
             raise SceneError(
                 f"scene {self.scene.name}: the energy of its start is {unit:.0e}, which leaves the range of "
                 "numbers of this machine (long double is no wider than double): choose other units"
@@ -314,7 +315,7 @@ class System(Generic[Fields]):
             groups=self.free_groups,
             duration=self.duration,
             unit=np.longdouble(np.sqrt(unit or self.gained or 1.0)),
-            of="initial T + |V|" if unit else "energy that it may gain" if self.gained else "",
+            of="initial T + |V|" if unit else "possible gain" if self.gained else "",
         )
 
     @cached_property
@@ -329,11 +330,6 @@ class System(Generic[Fields]):
                 term.scatter(np.abs(term.amplitude), push)
         held = np.maximum(self.hessian_diagonal(q), self.m / self.duration**2)
         return np.sum(push * push / (2 * held)) + self.n * self.scene.thermal
-
-    @property
-    def _is_away_from_rest(self) -> bool:
-        stretched = (np.any(x.elongation(self.q) != 0) for x in self.terms)
-        return bool(np.any(self.p != 0)) or any(stretched)
 
     @cached_property
     def amplitudes(self) -> tuple[Floats, Floats]:

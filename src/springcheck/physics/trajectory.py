@@ -90,29 +90,25 @@ class Trajectory:
             raise SpringcheckError(f"{label}: momenta p or velocities v= are needed beside t and q")
         if scene is not None and not hasattr(scene, "system"):
             raise SpringcheckError(f"{label}: scene= is a {type(scene).__name__}; a Scene is needed")
-        m = scene.m if mass is None and scene is not None else mass
+        m, every = (mass, every) if scene is None else (scene.m if mass is None else mass, scene.every)
         if p is None and m is None:
             raise SpringcheckError(f"{label}: velocities make momenta with mass= or scene=")
-        every = every if scene is None else scene.every
         if not every >= 1 or every % 1:
             raise SpringcheckError(f"{label}: every = {every}: a whole number of steps, 1 or more, is needed")
         given = {"t": t, "q": q, "p or v": v if p is None else p, "mass": m if p is None else 1.0}
         time, where, speed, m = reals(label, **given)
         where, speed = (x[:, None] if x.ndim == 1 else x for x in (where, speed))
         shape = (*time.shape, scene.n if scene is not None else where.size // max(1, time.size))
-        if time.ndim != 1 or where.shape != shape or speed.shape != shape:
+        alike = time.ndim == 1 and where.shape == speed.shape == shape and m.shape in {(), (1,), shape[1:]}
+        if not alike or not np.all(m > 0):
             raise SpringcheckError(
-                f"{label}: t {time.shape}, q {where.shape} and p or v {speed.shape} do not fit together: "
-                f"(f,), (f, n) and (f, n) are needed{f', n = {scene.n}' if scene is not None else ''}"
-            )
-        if m.shape not in {(), (1,), shape[1:]} or not np.all(m > 0):
-            raise SpringcheckError(
-                f"{label}: mass {m}: numbers above 0, one or one for each particle, are needed"
+                f"{label}: t {time.shape}, q {where.shape}, p or v {speed.shape} and mass {m} do not fit "
+                "together: (f,), (f, n), (f, n) and one number or (n,) above 0 are needed"
             )
         if scene is None and len(time) < 2:
             raise SpringcheckError(f"{label}: one frame has no step; two at least are needed, or scene=")
-        step = scene.step if scene is not None else float(time[-1] - time[0]) / ((len(time) - 1) * every)
         steps = (len(time) - 1) * int(every)
+        step = scene.step if scene is not None else float(time[-1] - time[0]) / steps
         more: Any = {"scene": scene, "outcome": Outcome(status="complete", step=steps)}
         made = cls(
             label=label, scheme=scheme, t=time, q=where, p=speed * m, step=step, every=int(every), **more
