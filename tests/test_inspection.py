@@ -248,6 +248,30 @@ def test_a_long_run_is_drawn_where_its_motion_can_be_followed(tmp_path: Path, st
     assert of_runs(scene, found.runs, found.followed)
 
 
+def test_a_part_of_a_run_is_called_one_and_errors_are_those_of_all_of_it(tmp_path: Path) -> None:
+    scene = springcheck.spring(m=2.7, k=0.3, q=-1.3, p=0.4, step=0.37, steps=80_000)
+    path = tmp_path / "long.h5"
+    session.run(scene, path, methods=["own:velocity-verlet"])
+    # 54 steps are a whole turn and 3.4 steps: between the frames drawn a slow wave seems to be
+    found = drawable(path, 1500)
+    assert found.followed is not found.runs
+    phase, position, _, error = of_runs(scene, found.runs, found.followed)
+    # its phase, (h w)**3 / 24 a step, is half a turn behind in the middle and nearly a whole one at the end
+    for bank, most in ((phase, "200 %"), (position, "100 %"), (error, "200 %")):
+        assert f"by at most {most} (velocity Verlet)" in bank.heading
+    for bank in (phase, position):
+        assert "from t = 2.94e+04 on" in bank.heading
+
+
+def test_what_has_left_a_picture_before_its_first_frame_is_said_so(tmp_path: Path) -> None:
+    scene = springcheck.spring(m=2.7, k=0.3, q=-1.3, p=0.4, step=0.37, steps=4000)
+    path = tmp_path / "spiral.h5"
+    session.run(scene, path, methods=["own:velocity-verlet", "own:euler"])
+    found = drawable(path, 1000)
+    phase = of_runs(scene, found.runs, found.followed)[0].charts[0]
+    assert phase.note == "outside: explicit Euler before 1.3e+03"
+
+
 def test_what_explodes_leaves_the_picture_to_the_others(tmp_path: Path) -> None:
     scene, path = scenes.load_scene("two-scales"), tmp_path / "two-scales.h5"
     session.run(scene, path, methods=["own:euler", "own:implicit-euler"])

@@ -213,6 +213,54 @@ def test_a_trajectory_is_made_of_plain_arrays_and_knows_its_error() -> None:
             springcheck.Trajectory.from_arrays(t, **wrong)
 
 
+@pytest.mark.parametrize("known", [True, False])
+def test_a_right_trajectory_of_arrays_passes_whatever_the_scene_records(known: bool) -> None:
+    scene = springcheck.spring(m=2.7, k=0.3, q=-1.3, p=0.4, step=0.37, steps=171, every=3)
+    run = springcheck.simulate(scene, "own:velocity-verlet")
+    more = {"scene": scene} if known else {"every": 3}
+    mine = springcheck.Trajectory.from_arrays(run.t, run.q, run.p, scheme="velocity-verlet", **more)
+    assert mine.outcome.step == 171
+    assert not springcheck.judge(scene, mine).failed
+    other = np.arange(1.0, len(run.t))
+    moved = springcheck.Trajectory.from_arrays(np.append(0.0, other), run.q, run.p, scene=scene)
+    with pytest.raises(SpringcheckError, match="no whole steps"):
+        moved.error()
+
+
+def test_wrong_arguments_are_answered_in_words() -> None:
+    scene, t = springcheck.load_scene("spring"), np.arange(4.0)
+    made = springcheck.Trajectory.from_arrays
+    run = springcheck.simulate(scene, "own:euler")
+    for call, words in (
+        (lambda: made(t, t, t, every=0), "every = 0"),
+        (lambda: made(t, t, t, every=1.5), "every = 1.5"),
+        (lambda: made(t, t + 1j, t), "q: real numbers"),
+        (lambda: made(t, ["a"] * 4, t), "q: real numbers"),
+        (lambda: made(t, t, v=t, mass=-1), "above 0"),
+        (lambda: made(t, t, v=t, mass=[1, 2]), "one number or \\(n,\\) above 0"),
+        (lambda: made(t, t, t, scene="spring"), "a Scene is needed"),
+        (lambda: made(t, [t] * 4, [t] * 4, scene=scene), "do not fit together"),
+        (lambda: springcheck.compare(scene, [run, run]), "unlike labels"),
+        (lambda: springcheck.compare(scene, []), "unlike labels"),
+        (lambda: springcheck.identify(run, step="a"), "step: real numbers"),
+        (lambda: springcheck.identify(run, mass="a"), "mass: real numbers"),
+        (lambda: springcheck.simulate(scene, None), "a method's label or a function"),
+        (lambda: springcheck.simulate(scene, lambda q, p, h, force, mass: (q + 1j, p)), "real numbers"),
+        (lambda: springcheck.precision(scene, "own:rk4", workers=0), "number of processes"),
+        (lambda: springcheck.precision(scene, "own:rk4", budget="a"), "number of seconds"),
+        (lambda: springcheck.ensemble(scene, {"time.step": ["a"]}, "own:rk4"), "real numbers"),
+        (
+            lambda: springcheck.ensemble(scene, {"time.step": "1:2"}, samples=2, seed=-1),
+            "whole number, 0 or more",
+        ),
+    ):
+        with pytest.raises(SpringcheckError, match=words):
+            call()
+    assert springcheck.compare(scene, run).labels == ("exact", "own:euler")
+    numbered = [springcheck.simulate("bath-spring", "own:baoab", seed=one).q for one in (3, np.int64(3))]
+    np.testing.assert_array_equal(*numbered)
+
+
 @pytest.mark.parametrize("name", ["states.csv", "states.npz"])
 def test_what_a_trajectory_saves_reads_back_to_the_last_bit_and_is_identified(name: str) -> None:
     run = springcheck.simulate("spring-uneven", "own:velocity-verlet")

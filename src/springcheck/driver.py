@@ -77,9 +77,9 @@ def checked_seed(seed: int | None) -> int:
         import secrets
 
         return 1 + secrets.randbelow(MOST_SEED)
-    if isinstance(seed, bool) or not isinstance(seed, int) or not 1 <= seed <= MOST_SEED:
+    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or not 1 <= seed <= MOST_SEED:
         raise MethodError(f"seed = {seed!r}: a whole number from 1 to {MOST_SEED} is needed")
-    return seed
+    return int(seed)
 
 
 def play(

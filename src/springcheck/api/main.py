@@ -16,6 +16,7 @@ from springcheck.api.taking import Step, labels_of, scene_of, spoken, trajectory
 from springcheck.checks import compare as comparing
 from springcheck.errors import MethodError, SpringcheckError
 from springcheck.physics import exact as solutions
+from springcheck.physics.arrays import reals
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Comparison, Trajectory, of_scene
 
@@ -109,17 +110,23 @@ def judge(scene: Scene | str | Path, trajectory: Trajectory) -> Verdicts:
             )
     if run.every < 1 or run.step == 0:
         raise SpringcheckError(f"{run.label}: every = {run.every} by step = {run.step:g} lie no frames apart")
-    return Verdicts(checks.judge(found, run))
+    # what is made of arrays has the energies of its states
+    return Verdicts(checks.judge(found, run if run.scene or run.origin else run.with_energies(found)))
 
 
 def compare(
     scene: Scene | str | Path, trajectories: Mapping[str, Trajectory] | Sequence[Trajectory]
 ) -> Comparison:
     """Largest differences of every pair of trajectories, and from the exact solution where it is known."""
-    if isinstance(trajectories, Mapping):
-        named = {label: trajectory_of(one) for label, one in trajectories.items()}
+    several = [trajectories] if isinstance(trajectories, Trajectory) else trajectories
+    if isinstance(several, Mapping):
+        named = {label: trajectory_of(one) for label, one in several.items()}
     else:
-        named = {trajectory_of(one).label: one for one in trajectories}
+        named = {trajectory_of(one).label: one for one in several}
+    if len(named) < max(1, len(several)):
+        raise SpringcheckError(
+            "compare needs trajectories of unlike labels, or a dict of them by other names"
+        )
     return comparing.compare(scene_of(scene), named)
 
 
@@ -162,12 +169,12 @@ def identify(
         raise SpringcheckError(
             "identify needs t, q and p (or v=), a Trajectory, a DataFrame, or the path of a file"
         )
-    arrays = [None if x is None else np.asarray(x, np.float64) for x in (q, p, v)]
-    of_q, of_p, of_v = (x[:, None] if x is not None and x.ndim == 1 else x for x in arrays)
-    assert of_q is not None
-    m = None if mass is None else np.broadcast_to(np.asarray(mass, np.float64), of_q.shape[1:])
-    times = np.asarray(t, np.float64)
-    return of_states(times, of_q, of_p, v=of_v, mass=m, stiffness=stiffness, friction=friction, step=step)
+    given: dict[str, Any] = {"t": t, "q": q, "p": p, "v": v, "mass": mass,
+             "stiffness": stiffness, "friction": friction, "step": step}  # fmt: skip
+    given = {name: x for name, x in given.items() if x is not None}
+    arrays = zip(given, reals("identify", **given), strict=True)
+    numbers: dict[str, Any] = {name: x if x.ndim else x.item() for name, x in arrays}
+    return of_states(**numbers)
 
 
 def exact(scene: Scene | str | Path) -> Trajectory:

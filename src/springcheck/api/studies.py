@@ -11,6 +11,7 @@ from springcheck.api.showing import Said, Shelf
 from springcheck.api.taking import Step, scene_of, spoken, taken
 from springcheck.errors import SpringcheckError
 from springcheck.physics import scenefile
+from springcheck.physics.arrays import reals
 from springcheck.physics.scene import Scene
 
 if TYPE_CHECKING:
@@ -35,7 +36,7 @@ def precision(
 
     found = scene_of(scene)
     with taken(methods, force, workers) as (named, how):
-        if not 0 < budget < math.inf:
+        if not (isinstance(budget, int | float) and 0 < budget < math.inf):
             raise SpringcheckError(f"budget={budget}: a number of seconds above 0 is needed")
         from springcheck.studies.choose import choose
 
@@ -117,9 +118,10 @@ def ensemble(
     from springcheck.studies.ensemble.vary import plan
 
     found = scene_of(scene)
+    several = {x: y if isinstance(y, str) else reals("vary", **{x: y})[0].ravel() for x, y in vary.items()}
     given = [
-        f"{field}={values if isinstance(values, str) else ','.join(repr(float(x)) for x in values)}"
-        for field, values in vary.items()
+        f"{field}={values if isinstance(values, str) else ','.join(map(repr, values.tolist()))}"
+        for field, values in several.items()
     ]
     with taken(methods, force, workers) as (named, how):
         text = found.to_toml() if isinstance(scene, Scene) else scenefile.text_of(scene)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,8 +24,10 @@ gives the force at q."""
 @contextmanager
 def labels_of(methods: str | Step | Sequence[str | Step], scheme: str = "") -> Iterator[list[str]]:
     """Labels of these methods; functions among them are an engine within this context, and not after it."""
-    several = [methods] if isinstance(methods, str) or callable(methods) else list(methods)
+    several = list(methods) if isinstance(methods, Iterable) and not isinstance(methods, str) else [methods]
     steps = [one for one in several if not isinstance(one, str)]
+    if wrong := [one for one in steps if not callable(one)]:
+        raise SpringcheckError(f"a method's label or a function is needed, not {wrong[0]!r}")
     if not steps and scheme:
         raise SpringcheckError(f"scheme={scheme!r} goes with a function of yours; methods have their own")
     if not steps:
@@ -54,12 +56,17 @@ def spoken() -> Iterator[None]:
 @contextmanager
 def taken(methods: Any, force: bool, workers: int) -> Iterator[tuple[list[str], How]]:
     """Labels of these methods for a study, and how it is measured: functions of yours by this process."""
-    from springcheck.studies.team import Processes
+    from springcheck.studies.team import MOST_PROCESSES, Processes
 
-    several = [methods] if isinstance(methods, str) or callable(methods) else methods
-    if workers > 1 and any(callable(one) for one in several):
-        raise SpringcheckError("workers: a function of yours is known to this process alone; leave it out")
+    if not (isinstance(workers, int) and 1 <= workers <= MOST_PROCESSES):
+        raise SpringcheckError(
+            f"workers={workers!r}: a number of processes from 1 to {MOST_PROCESSES} is needed"
+        )
     with spoken(), labels_of(methods) as named:
+        if workers > 1 and any(label.startswith("stepper:") for label in named):
+            raise SpringcheckError(
+                "workers: a function of yours is known to this process alone; leave it out"
+            )
         yield named, {"force": force, "progress": None, "team": Processes(workers)}
 
 

@@ -72,7 +72,7 @@ class Bench:
         Copy 0 starts in equilibrium; in copies 1..n one position is perturbed, in the rest one momentum.
         """
         scene, n = self.scene, self.scene.n
-        unit = float(scene.system.norm.unit) or 1.0
+        unit = float(scene.system.norm.unit)
         pushes = np.concatenate([np.sqrt(2 / self.stiffness) * unit, np.sqrt(2 * scene.m) * unit])
         state = np.zeros((2 * n + 1, 2 * n))
         state[:, :n] = scene.system.modes.rest.astype(np.float64)

@@ -290,7 +290,7 @@ def company(bench: Bench) -> Finding | str:
     if steps < 1:
         return ENDED
     two = scene.system.tiled(2)
-    lively = 3 * scene.p + np.sqrt(2 * scene.m) * (float(scene.system.norm.unit) or 1.0)
+    lively = 3 * scene.p + np.sqrt(2 * scene.m) * float(scene.system.norm.unit)
     beside = replace(two, p=np.concatenate([scene.p, lively]), steps=steps, every=1)
     both = bench.run(beside, bench.label)
     if len(both.t) != len(alone.t):

@@ -88,14 +88,14 @@ def shadow_energy(case: Case) -> Finding | str:
     u, v = case.system.modes.about_centres(run.q, run.p)
     stored = form[:, 0] * u * u + form[:, 1] * u * v + form[:, 2] * v * v
     expected = first * factor ** case.steps[:, None].astype(np.longdouble)
-    # |dE| <= 2 |z| |dz| in the form's own norm, whose size beside the energy's is `shape`
+    # |dE| <= 2 |z| |dz| in the form's own norm, `shape` times the energy's; |z| is known to its rounding
     shape = np.max(np.abs(form[:, 0]) / case.w**2 + np.abs(form[:, 1]) / case.w + np.abs(form[:, 2]))
     _, unit = case.growth
     size = np.maximum.accumulate(case.system.norm.size(run.q - rest, run.p))
     if case.steps[0] != 0:
         most_q, most_p = case.envelope
         size = np.maximum(size, case.system.norm.size(most_q - np.abs(rest), most_p))
-    scale = 2 * shape * size * unit
+    scale = 2 * shape * np.maximum(size, unit) * unit
     off = np.max(np.abs(stored - expected), axis=1)
     late = (case.steps > 0) & ~_beyond(case, scale, shape * size * size, np.max(np.abs(expected), axis=1))
     seen = np.where(late & (off != 0), off / scale, 0)

@@ -63,6 +63,8 @@ def _plot(options: Namespace) -> int:
         which = {"columns": _columns(options), "step": options.step, "trajectory": options.trajectory}
         written, notes = drawing.draw_foreign(path, into, particle=options.particle, **which)
     else:
+        if options.trajectory is not None or options.step is not None:
+            raise SpringcheckError(f"{path}: --trajectory and --step go with the file of another program")
         doubts = output.doubts(options.file)
         chosen = {name: getattr(options, name) for name in ("particle", "quantity", "over")}
         written, notes = drawing.draw(path, into, **chosen)

@@ -37,7 +37,8 @@ WORDS = {
     "study": "many runs and what they say together: precision, stability, extremes, faults",
     "rounding": "what a result lacks because numbers have 53 bits: half an ulp for each operation",
     "ulp": "unit in the last place: the distance of neighbouring numbers, 2**-52 of one between 1 and 2",
-    "energy norm": "the size of a difference of states: the root of its energy, over that of the start",
+    "energy norm": "the size of a difference of states: the root of its energy, over that of the start or, "
+    "of a start without any, of what it may gain",
     "ensemble": "many runs of a scene with numbers varied: `springcheck run SCENE --vary FIELD=A:B:N`",
 }
 """Words of the field and of springcheck, each with its meaning."""

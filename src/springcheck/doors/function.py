@@ -219,6 +219,8 @@ class _Steps:
         if not isinstance(out, tuple | list | np.ndarray) or len(out) != 2:
             what = type(out).__name__ + (f" of {len(out)}" if isinstance(out, tuple | list) else "")
             raise MethodError(f"{self._name}: returned {what}; a step returns (q, p)")
+        if np.iscomplexobj(out[0]) or np.iscomplexobj(out[1]):
+            raise MethodError(f"{self._name}: returned complex numbers, and no real numbers")
         q, p = (np.atleast_1d(np.asarray(x, np.float64)) for x in out)
         if q.shape != (self._n,) or p.shape != (self._n,):
             raise MethodError(f"{self._name}: returned shapes {q.shape} and {p.shape}, not ({self._n},)")

@@ -54,14 +54,14 @@ def energy(runs: Runs, exact: Exact) -> Bank:
 
     Without friction that is the initial energy; where friction acts and no closed form is known it is the
     initial one too, and the axis says so.  All in units of the kinetic plus the absolute potential energy of
-    the start, which is the initial energy unless a potential is negative.
+    the start, which is the initial energy unless a potential is negative; see `Norm` where that is 0.
     """
     scene = runs.scene
     start = float(scene.system.energy(scene.q, scene.p))
-    unit = float(scene.system.norm.unit) ** 2 or 1.0
+    unit = float(scene.system.norm.unit) ** 2
     whole = abs(start - unit) <= 1e-12 * unit
     unit = start if whole else unit
-    of = "initial energy" if whole else "initial T + |V|"
+    of = "initial energy" if whole else scene.system.norm.of or "unit"
     changes = not scene.system.keeps_energy and exact.known
 
     def energies(q: Reals, p: Reals) -> Floats:
@@ -135,7 +135,7 @@ def steady(energies: Floats, every: int) -> float:
     return float(np.expm1(rate / every))
 
 
-def orbits(runs: Runs, exact: Exact) -> str:
+def orbits(runs: Runs, parts: Runs, exact: Exact) -> str:
     """Whose orbits spiral, and the largest error of the states of others."""
     scene = runs.scene
     said: dict[str, list[str]] = {"spirals out": [], "spirals in": [], "keeps to its orbit": []}
@@ -157,7 +157,7 @@ def orbits(runs: Runs, exact: Exact) -> str:
             inwards = not out and np.max(last) < max(np.min(first), min(e[0], e[0] / 2)) - unit
             way = "spirals out" if out else "spirals in" if inwards else "keeps to its orbit"
             said[way].append(group.title)
-    turns = max(periods(x) for x in runs.longest.q.T[:MOST_TURNING])
+    turns = max(periods(x) for x in parts.longest.q.T[:MOST_TURNING])
     if turns >= 1 and (said["spirals out"] or said["spirals in"]):
         many = {
             "spirals out": "spiral out",

@@ -82,6 +82,12 @@ class Runs:
         return Scale(name=with_unit("time t", unit), factor=factor, shown=(span or self.times).ends)
 
     @property
+    def part(self) -> str:
+        """From when on they are shown, where that is not from the start on."""
+        first, (factor, unit) = min((float(run.t[0]) for run in self.every), key=abs), self.time_unit
+        return f", from t = {factor * first:.3g} {unit}".rstrip() + " on" if first else ""
+
+    @property
     def wrong(self) -> str:
         """Which of them are wrong, to begin a title with; "" where none is."""
         names = [group.title for group in self.groups if group.failed]
@@ -174,10 +180,10 @@ class Runs:
         """Which schemes leave the axes for good, and at which frame, None where they do not."""
         factor, unit = self.time_unit
         firsts = {group.title: group.members[0] for group in self.groups}
-        frames = {name: when(run) for name, run in firsts.items()}
+        found = [(name, run.t, when(run)) for name, run in firsts.items()]
         said = [
-            f"{name} at {factor * abs(float(firsts[name].t[i])):.3g} {unit}".rstrip()
-            for name, i in frames.items()
+            f"{name} {'at' if i or not t[0] else 'before'} {factor * t[i]:.3g} {unit}".rstrip()
+            for name, t, i in found
             if i is not None
         ]
         if len(said) > MOST_LEAVING:

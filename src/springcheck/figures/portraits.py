@@ -46,7 +46,7 @@ def phase_portraits(runs: Runs, shown: Sequence[View], truth: Motion | None, sai
     what = "path" if shown[0].what == "path" else "phase portrait"
     planes = what == "path" and len(charts) == 3
     size = (4.0, 3.6) if planes else _size(charts, *((5.6, 5.2) if len(charts) == 1 else (4.9, 3.4)))
-    said = _heading(f"{what}{_of(runs, shown)}", said)
+    said = _heading(f"{what}{_of(runs, shown)}{runs.part}", said)
     return runs.bank(what.replace(" ", "-"), charts, said, size, columns=3 if planes else min(2, len(charts)))
 
 
@@ -213,15 +213,16 @@ def _chords(run: Trajectory, truth: Motion | None, view: View, *frames: Frame) -
     return max(missed) > 2 * CHORD
 
 
-def positions(runs: Runs, shown: Sequence[View], truth: Motion | None) -> Bank:
-    """Positions over time: a row for each view; of many periods the first and the last."""
+def positions(runs: Runs, shown: Sequence[View], truth: Motion | None, whole: Runs) -> Bank:
+    """Positions over time: a row for each view; of many periods the first and the last.  `whole`: the runs
+    from start to end, of which errors are said."""
     spans = _spans(runs, shown, truth)
     charts = [_position(runs, view, truth, span, alone=len(shown) == 1) for view in shown for span in spans]
     parts = "" if len(spans) == 1 else f"; the first and the last {PERIODS_SHOWN} periods"
     few = "; a few periods" if spans[-1][1] < _last(runs) else ""
     bath = f"every method draws noise of its own{few}"
-    off = _off(runs, shown[0]) if runs.scene.bath is None else bath
-    said = _heading(f"{shown[0].what}{_of(runs, shown)}", off) + parts
+    off = _off(whole, shown[0]) if runs.scene.bath is None else bath
+    said = _heading(f"{shown[0].what}{_of(runs, shown)}{runs.part}", off) + parts
     size = (7.6 if len(spans) == 1 else 5.0, 3.8 if len(shown) == 1 else 1.9)
     return runs.bank("position", charts, said, size, columns=len(spans))
 

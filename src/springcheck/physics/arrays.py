@@ -24,6 +24,8 @@ from typing import Any, Literal, TypeAlias, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from springcheck.errors import SpringcheckError
+
 Floats: TypeAlias = NDArray[np.float64]
 Extended: TypeAlias = NDArray[np.longdouble]
 Reals: TypeAlias = NDArray[np.floating[Any]]
@@ -134,3 +136,16 @@ def in_pieces(law: Callable[..., Reals], rows: int, *more: Reals) -> Callable[[R
         return found.reshape(*q.shape[:-1], *found.shape[1:])
 
     return bounded
+
+
+def reals(where: str, **given: Any) -> list[Floats]:
+    """Copies of what is given, as doubles.  SpringcheckError where that is no real numbers."""
+    found = []
+    for name, x in given.items():
+        try:
+            found.append(np.array(float("no") if np.iscomplexobj(x) else x, np.float64))
+        except (TypeError, ValueError):
+            raise SpringcheckError(
+                f"{where}: {name}: real numbers, or an array of them, are needed"
+            ) from None
+    return found

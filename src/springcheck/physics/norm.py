@@ -20,9 +20,10 @@ class Norm:
 
     The square root of the sum of dp**2 / 2m and of |k| du**2 / 2 over the rows of all terms, u their
     elongation and |k| their absolute curvature at rest, divided by that of the kinetic plus the absolute
-    potential energy of the start.  For one spring it is the distance in the phase plane in units of the
-    amplitude.  A group of particles that nothing holds would have no size in position: there the kinetic
-    energy counts that makes up the difference of its centre within the duration of the run.
+    potential energy of the start, or where that is 0 of what it may gain (`System.gained`), or 1.  For one
+    spring it is the distance in the phase plane in units of the amplitude.  A group of particles that nothing
+    holds would have no size in position: there the kinetic energy counts that makes up the difference of its
+    centre within the duration of the run.
     """
 
     m: Floats
@@ -31,9 +32,11 @@ class Norm:
     duration: float
     unit: np.longdouble
     """The initial energy norm, a root of an energy."""
+    of: str
+    """What energy that is; "" where the start has none and gains none, and the unit is 1."""
 
     def __call__(self, dq: Reals, dp: Reals) -> Floats:
-        """(..., n) and (..., n) -> (...).  At rest in equilibrium the unit is 0 and any error infinite."""
+        """(..., n) and (..., n) -> (...)."""
         size = self.size(dq, dp)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             return np.asarray(np.where(size == 0, 0, size / self.unit), dtype=np.float64)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from springcheck.errors import SceneError
 from springcheck.physics import graph, memory
 from springcheck.physics.arrays import WIDE, Extended, Floats, Force, Integers, Reals, in_pieces
-from springcheck.physics.driven import with_clock
+from springcheck.physics.driven import Drive, with_clock
 from springcheck.physics.fields import SceneFields
 from springcheck.physics.magnetic import Magnetic
 from springcheck.physics.norm import SMALLEST_ENERGY, Norm, kinetic_energy
@@ -303,7 +303,8 @@ class System(Generic[Fields]):
             unit = self.kinetic_energy(p)
             for term in self.terms:
                 unit = unit + np.abs(term.energy(q))
-        if not SMALLEST_ENERGY < unit < np.inf and not WIDE and self._is_away_from_rest:
+        away = np.any(self.p) or any(np.any(term.elongation(self.q)) for term in self.terms)
+        if not SMALLEST_ENERGY < unit < np.inf and not WIDE and away:
             raise SceneError(
                 f"scene {self.scene.name}: the energy of its start is {unit:.0e}, which leaves the range of "
                 "numbers of this machine (long double is no wider than double): choose other units"
@@ -313,13 +314,22 @@ class System(Generic[Fields]):
             terms=self.terms,
             groups=self.free_groups,
             duration=self.duration,
-            unit=np.longdouble(np.sqrt(unit)),
+            unit=np.longdouble(np.sqrt(unit or self.gained or 1.0)),
+            of="initial T + |V|" if unit else "possible gain" if self.gained else "",
         )
 
-    @property
-    def _is_away_from_rest(self) -> bool:
-        stretched = (np.any(x.elongation(self.q) != 0) for x in self.terms)
-        return bool(np.any(self.p != 0)) or any(stretched)
+    @cached_property
+    @np.errstate(all="ignore")
+    def gained(self) -> Any:
+        """Energy of the deflection by its forces, drives at full strength, or that they give within the run;
+        and that a bath gives [M L2/T2]."""
+        q = self.q.astype(np.longdouble)
+        push = np.abs(self.potential_force(q, 0 * q))
+        for term in self.terms:
+            if isinstance(term, Drive):
+                term.scatter(np.abs(term.amplitude), push)
+        held = np.maximum(self.hessian_diagonal(q), self.m / self.duration**2)
+        return np.sum(push * push / (2 * held)) + self.n * self.scene.thermal
 
     @cached_property
     def amplitudes(self) -> tuple[Floats, Floats]:

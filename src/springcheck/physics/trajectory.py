@@ -6,12 +6,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, Self
 
 import numpy as np
 
 from springcheck.errors import SpringcheckError
-from springcheck.physics.arrays import Arithmetic, Extended, Floats
+from springcheck.physics.arrays import Arithmetic, Extended, Floats, reals
 
 if TYPE_CHECKING:
     from springcheck.physics.scene import Scene
@@ -83,33 +83,43 @@ class Trajectory:
         """A trajectory of anybody's numbers: times t (f,) [T], q [L], and p [M L/T] or v [L/T], (f,), (f, n).
 
         `every` is the number of steps from frame to frame, `mass` (n,) or one for all [M] makes p of v; a
-        `scene` gives both masses and step, and what `judge` and `error` hold it against.  SpringcheckError
-        where the numbers do not fit together.
+        `scene` gives masses, step, `every` and the energies of these states, and what `judge` and `error`
+        hold it against.  SpringcheckError where the numbers do not fit together.
         """
-        time = np.asarray(t, np.float64)
         if p is None and v is None:
             raise SpringcheckError(f"{label}: momenta p or velocities v= are needed beside t and q")
-        m = scene.m if mass is None and scene is not None else mass
+        if scene is not None and not hasattr(scene, "system"):
+            raise SpringcheckError(f"{label}: scene= is a {type(scene).__name__}; a Scene is needed")
+        m, every = (mass, every) if scene is None else (scene.m if mass is None else mass, scene.every)
         if p is None and m is None:
             raise SpringcheckError(f"{label}: velocities make momenta with mass= or scene=")
-        where, speed = (
-            x[:, None] if x.ndim == 1 else x
-            for x in (np.array(y, np.float64) for y in (q, v if p is None else p))
-        )
-        if time.ndim != 1 or where.ndim != 2 or where.shape != speed.shape or len(where) != len(time):
+        if not every >= 1 or every % 1:
+            raise SpringcheckError(f"{label}: every = {every}: a whole number of steps, 1 or more, is needed")
+        given = {"t": t, "q": q, "p or v": v if p is None else p, "mass": m if p is None else 1.0}
+        time, where, speed, m = reals(label, **given)
+        where, speed = (x[:, None] if x.ndim == 1 else x for x in (where, speed))
+        shape = (*time.shape, scene.n if scene is not None else where.size // max(1, time.size))
+        alike = time.ndim == 1 and where.shape == speed.shape == shape and m.shape in {(), (1,), shape[1:]}
+        if not alike or not np.all(m > 0):
             raise SpringcheckError(
-                f"{label}: t {time.shape}, q {where.shape} and p or v {speed.shape} do not fit together: "
-                "(f,), (f, n) and (f, n) are needed"
+                f"{label}: t {time.shape}, q {where.shape}, p or v {speed.shape} and mass {m} do not fit "
+                "together: (f,), (f, n), (f, n) and one number or (n,) above 0 are needed"
             )
         if scene is None and len(time) < 2:
             raise SpringcheckError(f"{label}: one frame has no step; two at least are needed, or scene=")
-        step = scene.step if scene is not None else float(time[-1] - time[0]) / ((len(time) - 1) * every)
-        return cls(
-            label=label, scheme=scheme, t=time, q=where, step=step,
-            p=speed if p is not None else speed * np.asarray(m, np.float64),
-            every=every if scene is None else scene.every,
-            outcome=Outcome(status="complete", step=(len(time) - 1) * every), scene=scene,
-        )  # fmt: skip
+        steps = (len(time) - 1) * int(every)
+        step = scene.step if scene is not None else float(time[-1] - time[0]) / steps
+        more: Any = {"scene": scene, "outcome": Outcome(status="complete", step=steps)}
+        made = cls(
+            label=label, scheme=scheme, t=time, q=where, p=speed * m, step=step, every=int(every), **more
+        )
+        return made if scene is None else made.with_energies(scene)
+
+    def with_energies(self, scene: Scene) -> Self:
+        """The same with the energies of its states, where they are not there and this scene asks for them."""
+        if self.energy is not None or "energy" not in scene.quantities:
+            return self
+        return replace(self, energy=np.asarray(scene.system.energy(self.q, self.p), np.float64))
 
     @property
     def v(self) -> Floats:
@@ -136,10 +146,13 @@ class Trajectory:
         return scene.system.norm(self.q - q, self.p - p)
 
     def _exact(self, scene: Scene) -> tuple[Extended, Extended]:
-        """The exact solution at each frame."""
+        """The exact solution at each frame.  SpringcheckError where one is at no whole step."""
         from springcheck.physics import exact
 
-        return exact.true_motion(scene, np.arange(len(self.t), dtype=np.int64) * self.every, self.step)
+        steps = np.rint(self.t / self.step)
+        if not np.all(np.abs(self.t - steps * self.step) <= 1e-6 * abs(self.step)):
+            raise SpringcheckError(f"{self.label}: its times are no whole steps of {self.step:g}")
+        return exact.true_motion(scene, steps.astype(np.int64), self.step)
 
     def at(self, rows: slice) -> Trajectory:
         """These frames alone."""

@@ -61,10 +61,13 @@ def _after(brought: Brought, part: Callable[[], T]) -> T:
 ALONE = Processes()
 
 
+MOST_PROCESSES = 4096
+
+
 def processes(text: str) -> int:
     """A number of them on the command line."""
-    if not (text.isdecimal() and 0 < int(text) <= 4096):
-        raise ArgumentTypeError(f"{text!r}: a number of processes from 1 to 4096 is needed")
+    if not (text.isdecimal() and 0 < int(text) <= MOST_PROCESSES):
+        raise ArgumentTypeError(f"{text!r}: a number of processes from 1 to {MOST_PROCESSES} is needed")
     return int(text)
 
 

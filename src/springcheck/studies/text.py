@@ -35,9 +35,9 @@ def resumed(pieces: int, what: str) -> Lines:
 def of_energy(scene: Scene) -> str:
     """What the column of energies holds."""
     system = scene.system
-    if system.keeps_energy:
-        return "(H - H0)/|H0| where it is largest"
     changes = ["loss by friction"] * system.is_damped + ["work of the drive"] * system.is_driven
-    if has_true_motion(scene):
-        return f"(H - H exact)/|H0| where it is largest, the exact {' and '.join(changes)} taken off"
-    return f"(H - H0)/|H0| where it is largest, the {' and '.join(changes)} in it"
+    known = bool(changes) and has_true_motion(scene)
+    off = f"H - H{' exact' if known else '0'}"
+    part = f"({off})/|H0|" if system.energy(scene.q, scene.p) else f"{off}, as H0 is 0,"
+    how = f", the {'exact ' * known}{' and '.join(changes)} {'taken off' if known else 'in it'}"
+    return f"{part} where it is largest{how if changes else ''}"

@@ -143,7 +143,7 @@ function said(s) {
   });
   const free = size < 2 ? "explicit Euler spirals out, the two others stay"
     : size > 2 ? "beyond 2, all three explode" : "the limit itself";
-  by("live-said").textContent = !(s.k > 0) ? "No restoring force: the exact motion leaves as well."
+  by("live-said").textContent = !(s.k > 0) ? "No restoring force: nothing brings the mass back."
     : s.c ? `${turn}, damping ratio ${number(Math.abs(zeta))}: ${each.join(", ")}` : `${turn}: ${free}`;
 }
 

@@ -61,7 +61,7 @@ def uncertainty(scene: Scene, duration: float) -> float:
     """Bound of the error of `true_motion` from the start to a time [T], relative to the initial energy norm.
 
     No error of an engine is known better than to this, and smaller ones are not reported.  It is inf where
-    the motion leaves the extended range, 0 where the scene rests.  ValueError as for `true_motion`.
+    the motion leaves the extended range.  ValueError as for `true_motion`.
     """
     system = scene.system
     if system.solution is None:
@@ -77,7 +77,5 @@ def uncertainty(scene: Scene, duration: float) -> float:
             square = np.longdouble(np.sum(system.rigidity * dq * dq + dp * dp / scene.m) / 2)
             for group in system.free_groups if duration else ():
                 square += np.sum(scene.m[group] * dq[group] ** 2) / (2 * duration * duration)
-        if square == 0 or system.norm.unit == 0:
-            return 0.0
         found = float(np.sqrt(square) / system.norm.unit)
     return found if found >= 0 else np.inf

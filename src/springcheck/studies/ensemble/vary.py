@@ -105,7 +105,9 @@ def plan(given: Sequence[str], samples: int | None = None, seed: int = 0, *, tex
     names = [axis.field for axis in axes]
     if len(set(names)) < len(names):
         raise SpringcheckError(f"--vary: {max(names, key=names.count)} is given twice")
-    found = Plan(axes=axes, samples=samples, seed=seed, text=text)
+    if not (isinstance(seed, int | np.integer) and seed >= 0):
+        raise SpringcheckError(f"--seed {seed}: a whole number, 0 or more, is needed")
+    found = Plan(axes=axes, samples=samples, seed=int(seed), text=text)
     if not 0 < found.cells <= MOST_CELLS:
         raise SpringcheckError(f"{found.cells} cells: 1 to {MOST_CELLS} can be run")
     return found

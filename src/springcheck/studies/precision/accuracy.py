@@ -83,7 +83,7 @@ def truth(scene: Scene) -> Truth:
             f"scene {scene.name}: no closed form of its exact solution is known, so none of its errors is; "
             "a study of precision needs springs, or quartic potentials without couplings, and no bath"
         )
-    if not scene.system.norm.unit > 0:
+    if not scene.system.norm.of:
         raise SceneError(f"scene {scene.name} rests in equilibrium: give a particle a position or a momentum")
     w = _frequency(scene)
     if not np.isfinite(w):

@@ -58,7 +58,8 @@ def drawable(path: Path, most: int = MOST_FRAMES) -> Drawable:
         runs[run.label], stride = keeper.strided(path, run.label, frames)
         if stride > 1:
             notes.append(f"{run.label}: every {ordinal(stride)} of {run.frames} frames is drawn")
-            fast |= not _shows_motion(runs[run.label])
+            end = keeper.end(path, run.label, min(END_FRAMES, frames))
+            fast |= not _shows_motion(runs[run.label], end, stride)
     followed = runs
     if fast:
         followed = {run.label: keeper.end(path, run.label, min(END_FRAMES, frames)) for run in summary.runs}
@@ -68,8 +69,9 @@ def drawable(path: Path, most: int = MOST_FRAMES) -> Drawable:
     return Drawable(scene=scene, runs=runs, followed=followed, notes=notes)
 
 
-def _shows_motion(run: Trajectory) -> bool:
-    """Whether its frames stand close enough to be joined by lines."""
-    q = run.q[:, 0] if len(run.q) > 1 else np.zeros(2)
+def _shows_motion(run: Trajectory, end: Trajectory, stride: int) -> bool:
+    """Whether its frames stand close enough to be joined by lines: what moves round and back to its place
+    between two of them is seen by the frames of its end, none of which are left out."""
     with np.errstate(over="ignore"):
-        return bool(np.max(np.abs(np.diff(q))) <= RESOLVED * np.ptp(q))
+        moved, each = (np.max(np.abs(np.diff(one.q[:, 0])), initial=0.0) for one in (run, end))
+        return bool(max(moved, stride * each) <= RESOLVED * np.ptp(run.q[:, 0]))

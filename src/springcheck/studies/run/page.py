@@ -69,20 +69,20 @@ def of_runs(
         few = Runs(scene, {label: followed[label] for label in firsts}, failed)
         out = [
             portraits.clouds(usable, shown[0], scene.thermal),
-            portraits.positions(few, shown, None),
+            portraits.positions(few, shown, None, usable),
             energies.means(usable, scene.thermal),
             *_temperatures(usable, heated or [heated_of(scene, [run]) for run in usable.every]),
         ]
         return [_of_particle(one, particle) for one in out[: 2 if particle is not None else None]]
-    truth = true_motion(scene, parts.every, points)
+    truth, said = true_motion(scene, parts.every, points), energies.orbits(usable, parts, exact)
     out = [
-        portraits.phase_portraits(parts, shown, truth, energies.orbits(parts, exact)),
-        portraits.positions(parts, shown, truth),
+        portraits.phase_portraits(parts, shown, truth, said),
+        portraits.positions(parts, shown, truth, usable),
     ]
     if particle is not None:
         return [_of_particle(one, particle) for one in out]
     if planes := paths(scene):
-        out.append(portraits.phase_portraits(parts, planes, truth, energies.orbits(parts, exact)))
+        out.append(portraits.phase_portraits(parts, planes, truth, said))
     out.append(energies.energy(usable, exact))
     if exact.known:
         out.append(energies.error(usable, exact))

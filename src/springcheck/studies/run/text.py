@@ -52,8 +52,10 @@ def _report(report: Report) -> Lines:
     size = "" if scene.n == 1 else f", {scene.size}"
     head = f"{scene.title}: {count(scene.steps, 'step')} of {scene.step:g}{size}"
     out: Lines = [plain(head, "bold"), plain(), _runs(report.runs)]
+    unit = f"root of the {scene.system.norm.of or 'unit'}, as the start has no energy"
+    unit = "initial energy norm" if "initial" in unit else unit
     out += [
-        plain("error: largest distance from the exact solution, over the initial energy norm", "dim"),
+        plain(f"error: largest distance from the exact solution, over the {unit}", "dim"),
         *[plain(f"<: {BELOW}", "dim") for run in report.runs[:1] if any(x.error_below for x in report.runs)],
         plain(f"energy: {of_energy(report.scene)}", "dim"),
     ]
