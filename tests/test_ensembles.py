@@ -208,6 +208,12 @@ def test_the_command_line_runs_inspects_and_draws_an_ensemble(
     assert cli.main(["plot", path, "-o", "g", "--quantity", "outcome", "--over", "time.step"]) == 0
     assert Path("g/ensemble-outcome-over-time-step.png").exists()
     capsys.readouterr()
+    # a file of somebody else's in the way is told before anything is drawn
+    Path("f/ensemble-max_error.svg").write_text("mine")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("springcheck.figures.render.picture", lambda bank: pytest.fail("it is drawn"))
+        assert cli.main(["plot", path, "-o", "f"]) == 2
+    assert "is no figure of ours as it was drawn: move it away" in capsys.readouterr().err
     for given, words in (
         (["--quantity", "max_eror"], "did you mean max_error?"),
         (["--over", "spring.0.mass"], "one or two of spring.0.stiffness, time.step are needed"),
