@@ -248,6 +248,17 @@ def test_a_solver_that_would_take_hours_between_two_outputs_is_refused(label: st
 
 
 @pytest.mark.parametrize("name", ["rk45", "dop853"])
+def test_an_explicit_solver_is_refused_where_friction_makes_its_steps_too_short(name: str) -> None:
+    scene = load_scene("overdamped")
+    stiff = scene.derived(
+        terms=tuple(replace(x, c=1e9 * x.c) if x.key == "damping" else x for x in scene.terms)
+    )
+    with pytest.raises(MethodError, match=r"fastest rate, which bounds the steps of an explicit solver"):
+        run(stiff, f"scipy:{name}")
+    assert run(replace(stiff, steps=20), "scipy:radau").outcome.status == "complete"
+
+
+@pytest.mark.parametrize("name", ["rk45", "dop853"])
 def test_scipys_solvers_hold_what_the_tolerance_allows(name: str) -> None:
     scene = load_scene("spring-uneven")
     made = run(scene, f"scipy:{name}")
