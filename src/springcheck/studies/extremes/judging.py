@@ -16,7 +16,7 @@ import numpy as np
 
 from springcheck import checks, engines, schemes
 from springcheck.checks.case import keeps, least_moved, overflows
-from springcheck.engines.contract import Label
+from springcheck.engines.contract import Label, Stopped
 from springcheck.physics.arrays import Arithmetic, Extended, Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory, of_scene
@@ -112,8 +112,10 @@ def sizes(label: Label, scene: Scene, q: Extended, p: Extended, q2: Extended, p2
     )
 
 
-def judge(label: Label, specs: Sequence[Spec], scene: Scene, q: Floats, p: Floats, said: str) -> list[Cell]:
-    """Cells of one run: q, p (f, n) as the engine left them, not finite where it went there."""
+def judge(
+    label: Label, specs: Sequence[Spec], scene: Scene, q: Floats, p: Floats, stop: Stopped | None
+) -> list[Cell]:
+    """Cells of one run: q, p (f, n) as the engine left them, not finite where it went there or stopped."""
     how = engines.arithmetic(label)
     with np.errstate(all="ignore"):
         case = checks.Case(trajectory=as_trajectory(label, scene, q, p, how), scene=scene)
@@ -139,14 +141,11 @@ def judge(label: Label, specs: Sequence[Spec], scene: Scene, q: Floats, p: Float
         unstable = bool(growth[i] * spec.steps >= np.log(GROWN)) and spec.k > 0
         outcome: Outcome
         if not bad.any():
-            reason = said if len(q) <= spec.steps else ""
-            outcome = "unstable, as theory says" if unstable else "right"
+            outcome, reason = "unstable, as theory says" if unstable else "right", ""
             # a force that grows is small at first
             peak = float(inside.force[0, i] if unstable else np.max(inside.force[:, i], initial=0))
             coarse = how.quantum > DIGITS * peak > 0
-            if reason:
-                outcome, reason = "silently wrong", f"stopped for no reason that is known here: {said}"
-            elif np.any(here & ~(strict[:, i] <= bound)):
+            if np.any(here & ~(strict[:, i] <= bound)):
                 outcome, reason = "engine's limit", f"numbers below {low:.1e} lose digits to underflow"
             elif coarse:
                 outcome = "engine's limit"
@@ -154,7 +153,11 @@ def judge(label: Label, specs: Sequence[Spec], scene: Scene, q: Floats, p: Float
         else:
             j = int(np.argmax(bad))
             named = _reason(how, spec, inside, i, np.flatnonzero(bad), low, high)
-            if named is None:
+            if named is None and stop and j == len(bad) - 1:
+                mine = stop.is_limit and len(specs) == 1
+                outcome = "engine's limit" if mine else "silently wrong"
+                reason = str(stop) if mine else f"stopped for no reason that is known here: {stop}"
+            elif named is None:
                 outcome, reason = (
                     "silently wrong",
                     f"step {j + 1} is off by {value:.3g} roundings of {bound:g}",
