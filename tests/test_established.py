@@ -402,3 +402,18 @@ def test_extreme_cases_of_rigid_bodies_have_outcomes_of_their_own(label: str, ne
     (cell,) = running.cells(kind, [fast])
     assert cell.outcome == "engine's limit"
     assert "moves no body" in cell.reason
+
+
+def test_a_spring_that_grows_past_the_length_of_its_joint_is_at_its_engines_limit(need: Need) -> None:
+    need("pymunk:damped-spring")
+    (cell,) = running.cells(engines.parse("pymunk:damped-spring"), [grid.force_cell(2.01, -2)])
+    assert cell.outcome == "engine's limit"
+    assert cell.reason.startswith("a joint of length")
+
+
+@pytest.mark.parametrize(("m", "k"), [(3.7, 2.9e-18), (3.7e30, 2.9e30)])
+def test_rapier_takes_no_spring_whose_inverse_it_takes_for_nothing(m: float, k: float, need: Need) -> None:
+    need("rapier:spring-joint")
+    scene = one_spring(m=m, k=k, q=0.3, p=0.7 * m, step=0.1, steps=20)
+    with pytest.raises(MethodError, match=r"Rapier takes 1/x for 0 where x is below 1e-20"):
+        run(scene, "rapier:spring-joint")

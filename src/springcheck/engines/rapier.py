@@ -22,6 +22,11 @@ from springcheck.engines.contract import (
 from springcheck.errors import MethodError
 from springcheck.physics.scene import Scene
 
+SUBSTEPS = 4
+
+SMALLEST_DIVISOR = 1e-20
+"""Rapier takes 1/x for 0 where x is no larger (`utils::inv`): a soft spring is then a rigid joint."""
+
 
 class _World(Bodies):
     """Rapier's world in motion."""
@@ -50,6 +55,12 @@ class _World(Bodies):
     def tie(self, scene: Scene, label: Label) -> None:
         length, ground = scene.system.far, self._world.add_body(self._library.RigidBody.fixed())
         for i, k, at in walls(scene, label):
+            kick = k * (self._step / SUBSTEPS) ** 2
+            if min(kick, 1 / self.m[i] + 1 / max(kick, SMALLEST_DIVISOR)) <= SMALLEST_DIVISOR:
+                raise MethodError(
+                    f"{label}: Rapier takes 1/x for 0 where x is below {SMALLEST_DIVISOR:g}, as k (h/4)**2 = "
+                    f"{kick:.3g} or its inverse and 1/m together are; the scene in other units is inside"
+                )
             spring = self._library.SpringJointBuilder(length, k, 0.0)
             joint = spring.local_anchor1((at - length, 0, 0)).build()
             self._world.impulse_joints.insert(ground, self._handles[i], joint, True)

@@ -36,8 +36,11 @@ def raw(scene: Scene, label: Label) -> tuple[Floats, Floats, Stopped | None]:
 
 def cells(label: Label, specs: Sequence[Spec]) -> list[Cell]:
     """Run and judge cells of one step and one length, in as few runs as the engine allows."""
-    requires = engines.method(label).requires
-    scene, half = grid.scene(list(specs), label, requires), len(specs) // 2
+    half = len(specs) // 2
+    if half and engines.arithmetic(label).joints:
+        # all joints of a run are as long as the largest motion needs them
+        return cells(label, specs[:half]) + cells(label, specs[half:])
+    scene = grid.scene(list(specs), label, engines.method(label).requires)
     try:
         q, p, stop = raw(scene, label)
     except MethodError as error:
