@@ -15,6 +15,7 @@ from springcheck import checks, driver, engines
 from springcheck.errors import MethodError
 from springcheck.physics import exact
 from springcheck.physics import scenefile as scenes
+from springcheck.physics.builders import spring as one_spring
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Spring, WallSpring
 from springcheck.physics.trajectory import Trajectory
@@ -327,3 +328,12 @@ def test_r_respa_calls_its_fast_and_its_slow_force_as_often_by_every_engine(labe
     own = springcheck.simulate(scene, "own:respa8").force_calls
     # a step of ours ends with the forces that the next one starts with, which the first one lacks
     assert (own, springcheck.simulate(scene, label).force_calls) == (902, 900)
+
+
+def test_forces_beyond_fixed_point_are_the_reason_of_what_moves_across_the_line(need: Need) -> None:
+    need("openmm:verlet@OpenCL-double")
+    scene = one_spring(m=1e-150, k=2.9, q=1e200, p=0.7, step=0.1, steps=20)
+    run = springcheck.simulate(scene, "openmm:verlet@OpenCL-double")
+    (verdict,) = (v for v in checks.judge(scene, run) if v.check == "line")
+    assert verdict.passed is False
+    assert "the engine's limit: fixed-point sum of forces overflows beyond 2**31" in verdict.why

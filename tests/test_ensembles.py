@@ -208,6 +208,12 @@ def test_the_command_line_runs_inspects_and_draws_an_ensemble(
     assert cli.main(["plot", path, "-o", "g", "--quantity", "outcome", "--over", "time.step"]) == 0
     assert Path("g/ensemble-outcome-over-time-step.png").exists()
     capsys.readouterr()
+    # a file of somebody else's in the way is told before anything is drawn
+    Path("f/ensemble-max_error.svg").write_text("mine")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("springcheck.figures.render.picture", lambda bank: pytest.fail("it is drawn"))
+        assert cli.main(["plot", path, "-o", "f"]) == 2
+    assert "is no figure of ours as it was drawn: move it away" in capsys.readouterr().err
     for given, words in (
         (["--quantity", "max_eror"], "did you mean max_error?"),
         (["--over", "spring.0.mass"], "one or two of spring.0.stiffness, time.step are needed"),
@@ -233,20 +239,19 @@ def grid_of(counts: tuple[int, ...], value: Callable[..., Any]) -> tuple[Any, di
 
 def test_every_cell_of_a_grid_stands_in_its_map() -> None:
     found, cells = grid_of((5, 4), lambda a, b: a + 1000 * b)
-    (choice,) = page.choices(found, "max_error")
-    part = page.reduced(cells, found, choice)
+    part = page.reduced(cells, found, "max_error", page.fields_over(found))
     assert isinstance(part, page.Map)
     np.testing.assert_allclose(part.values, part.x + 1000 * part.y[:, None], rtol=1e-14)
 
 
 def test_a_grid_of_many_cells_is_shown_by_the_medians_of_neighbours() -> None:
     found, cells = grid_of((200, 130), lambda a, b: np.log(a))
-    part = page.reduced(cells, found, page.choices(found, "max_error")[0])
+    part = page.reduced(cells, found, "max_error", page.fields_over(found))
     assert isinstance(part, page.Map)
     assert part.values.shape == (44, 50)
     np.testing.assert_allclose(part.values, np.broadcast_to(np.log(part.x), (44, 50)), atol=1e-12)
     found, cells = grid_of((2001,), lambda a: a * (1 + 0.5 * (np.arange(len(a)) % 2)))
-    line = page.reduced(cells, found, page.choices(found, "max_error")[0])
+    line = page.reduced(cells, found, "max_error", page.fields_over(found))
     assert isinstance(line, page.Line)
     assert len(line.x) == page.MOST_POINTS
     assert np.all((line.low <= line.x * 1.01) & (line.high >= 1.48 * line.x))
@@ -267,7 +272,7 @@ def test_shades_of_a_map_follow_the_signs_of_its_numbers_and_not_what_explodes()
 
 def test_fields_that_are_not_shown_have_the_value_in_their_middle() -> None:
     found, cells = grid_of((5, 4, 3), lambda a, b, c: a + 1000 * b + 1e6 * c)
-    part = page.reduced(cells, found, page.choices(found, "max_error", "c,a")[0])
+    part = page.reduced(cells, found, "max_error", page.fields_over(found, "c,a"))
     assert isinstance(part, page.Map)
     assert part.fixed == {"b": pytest.approx(2 / 3)}
     expected = part.y[:, None] + 2000 / 3 + 1e6 * part.x
@@ -280,13 +285,13 @@ def test_random_samples_are_put_together_in_tiles_and_nothing_is_lost() -> None:
     cells = {"a": a, "b": b, "max_error": np.where(b > 0, 2.0, a)}
     cells["max_error"][7] = np.nan
     found: Any = SimpleNamespace(fields=("a", "b"), grid=False)
-    part = page.reduced(cells, found, page.Choice(quantity="max_error", over=("a", "b")))
+    part = page.reduced(cells, found, "max_error", ("a", "b"))
     assert isinstance(part, page.Map)
     assert np.all(part.values[part.y > 0.1] == 2)
     low = part.values[part.y < -0.1]
     assert np.all(np.abs(np.log(low / part.x)) < np.log(part.x[1] / part.x[0]))
     # without a line: the other field differs, too
-    line = page.reduced(cells, found, page.Choice(quantity="max_error", over=("a",)))
+    line = page.reduced(cells, found, "max_error", ("a",))
     assert isinstance(line, page.Line)
     assert np.min(line.low) == np.nanmin(cells["max_error"])
 

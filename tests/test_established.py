@@ -15,10 +15,12 @@ import pytest
 from springcheck import checks, conformance, driver, engines
 from springcheck.engines import lammps
 from springcheck.errors import MethodError
+from springcheck.physics.builders import spring as one_spring
 from springcheck.physics.scene import Scene
 from springcheck.physics.scenefile import load_scene
 from springcheck.physics.terms import Cosine, Spring, WallSpring
 from springcheck.physics.trajectory import Trajectory
+from springcheck.studies.extremes import grid, running
 
 pytestmark = pytest.mark.slow
 
@@ -248,6 +250,17 @@ def test_a_solver_that_would_take_hours_between_two_outputs_is_refused(label: st
 
 
 @pytest.mark.parametrize("name", ["rk45", "dop853"])
+def test_an_explicit_solver_is_refused_where_friction_makes_its_steps_too_short(name: str) -> None:
+    scene = load_scene("overdamped")
+    stiff = scene.derived(
+        terms=tuple(replace(x, c=1e9 * x.c) if x.key == "damping" else x for x in scene.terms)
+    )
+    with pytest.raises(MethodError, match=r"fastest rate, which bounds the steps of an explicit solver"):
+        run(stiff, f"scipy:{name}")
+    assert run(replace(stiff, steps=20), "scipy:radau").outcome.status == "complete"
+
+
+@pytest.mark.parametrize("name", ["rk45", "dop853"])
 def test_scipys_solvers_hold_what_the_tolerance_allows(name: str) -> None:
     scene = load_scene("spring-uneven")
     made = run(scene, f"scipy:{name}")
@@ -358,3 +371,49 @@ def test_force_calls_before_a_stop_are_counted(label: str, fast: float, need: Ne
     made = run(replace(scene, step=0.1, steps=400, every=1), label)
     assert made.outcome.status == "stopped"
     assert made.force_calls == len(made.t) > 1
+
+
+@pytest.mark.parametrize("label", ["box2d:distance-joint", "rapier:spring-joint", "pymunk:damped-spring"])
+def test_a_joint_whose_length_is_rounded_is_right_however_small_its_motion_has_become(
+    label: str, need: Need
+) -> None:
+    need(label)
+    for m, k, turn in ((1.4989, 40.6313, 0.468), (4.2277, 0.4279, 1.2), (0.0218, 0.0134, 1.49)):
+        w = float(np.sqrt(k / m))
+        scene = one_spring(m=m, k=k, q=-0.9, p=0.4 * m * w, step=turn / w, steps=60)
+        made = run(scene, label)
+        assert [v for v in checks.judge(scene, made) if v.passed is False] == []
+        # a stiffness that is off by what a joint's rounding is not
+        wrong = replace(scene, terms=(WallSpring(i=[0], k=[k * 1.003], at=[0.0]),))
+        assert any(v.passed is False for v in checks.judge(wrong, made))
+
+
+@pytest.mark.parametrize(
+    "label", ["box2d:force", "box2d:distance-joint", "rapier:force", "rapier:spring-joint"]
+)
+def test_extreme_cases_of_rigid_bodies_have_outcomes_of_their_own(label: str, need: Need) -> None:
+    need(label)
+    kind = engines.parse(label)
+    ordinary = grid.force_cell(0.1, 0)
+    beyond = [replace(ordinary, k=1e300), replace(ordinary, q=1e30), replace(ordinary, m=1e-60)]
+    cells = running.cells(kind, [*beyond, ordinary])
+    assert [cell.outcome for cell in cells] == [*3 * ["engine's limit"], "right"]
+    fast = grid.Spec(block="force", m=3.75, k=2.4, q=0.0, p=1e6, h=0.125)
+    (cell,) = running.cells(kind, [fast])
+    assert cell.outcome == "engine's limit"
+    assert "moves no body" in cell.reason
+
+
+def test_a_spring_that_grows_past_the_length_of_its_joint_is_at_its_engines_limit(need: Need) -> None:
+    need("pymunk:damped-spring")
+    (cell,) = running.cells(engines.parse("pymunk:damped-spring"), [grid.force_cell(2.01, -2)])
+    assert cell.outcome == "engine's limit"
+    assert cell.reason.startswith("a joint of length")
+
+
+@pytest.mark.parametrize(("m", "k"), [(3.7, 2.9e-18), (3.7e30, 2.9e30)])
+def test_rapier_takes_no_spring_whose_inverse_it_takes_for_nothing(m: float, k: float, need: Need) -> None:
+    need("rapier:spring-joint")
+    scene = one_spring(m=m, k=k, q=0.3, p=0.7 * m, step=0.1, steps=20)
+    with pytest.raises(MethodError, match=r"Rapier takes 1/x for 0 where x is below 1e-20"):
+        run(scene, "rapier:spring-joint")

@@ -16,6 +16,7 @@ import finer_atlas
 import long_cells
 import solver_cells
 from springcheck import engines, store
+from springcheck.engines.contract import Stopped
 from springcheck.figures import render
 from springcheck.physics.arrays import WIDE
 from springcheck.studies.extremes import STUDY, grid, judging, page, running
@@ -153,8 +154,9 @@ def test_an_engine_that_gives_up_over_some_cells_takes_no_others_with_it(
     def gives_up(scene: Any, label: Any) -> Any:
         q, p, _ = right(scene, label)
         if not np.any(scene.q == specs[7].q):
-            return q, p, ""
-        return q[:3], p[:3], "it stops"
+            return q, p, None
+        q[3] = p[3] = np.nan
+        return q[:4], p[:4], Stopped(2, "it stops")
 
     monkeypatch.setattr(running, "raw", gives_up)
     found = running.cells(label, specs)

@@ -10,7 +10,7 @@ import springcheck
 from springcheck import driver
 from springcheck.physics.scene import Scene
 from springcheck.physics.scenefile import parse
-from springcheck.studies.run.tally import bound_freedoms, heated_of
+from springcheck.thermal.heat import bound_freedoms, heated_of
 
 THREE = """
 title = "three free masses, two springs"

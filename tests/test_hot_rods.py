@@ -28,8 +28,8 @@ from springcheck.physics.trajectory import Trajectory
 from springcheck.studies.faults import measure
 from springcheck.studies.faults.heat import RODS_IN_BATHS
 from springcheck.studies.faults.seeded import Fault
-from springcheck.studies.run.tally import heated_of
 from springcheck.thermal import THERMOSTATS, Stepper
+from springcheck.thermal.heat import heated_of
 from springcheck.thermal.rigid import read
 from springcheck.thermal.stepper import forces
 

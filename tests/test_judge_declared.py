@@ -156,6 +156,7 @@ DECLARED: dict[str, dict[str, Any]] = {
     "cancels": {"arithmetic": Arithmetic(cancels=2)},
     "keeps_displacement": {"arithmetic": Arithmetic(keeps_displacement=True), "rebuilds_velocity": True},
     "from_start": {"arithmetic": Arithmetic(from_start=True)},
+    "joints": {"arithmetic": Arithmetic(joints=True)},
     "rebuilds_velocity": {"rebuilds_velocity": True},
     "off_axis": {"off_axis": 1e-9},
 }

@@ -6,11 +6,13 @@ import json
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from springcheck import driver, engines, store
+from springcheck.engines.contract import Label
 from springcheck.errors import SceneError, StoreError
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.arrays import WIDE
@@ -276,6 +278,25 @@ def test_a_method_that_cannot_serve_the_scene_is_a_row() -> None:
     (point,) = found.points
     assert point.outcome == "cannot run"
     assert "circuit" in point.message
+
+
+def test_a_method_whose_first_point_does_not_fit_into_the_budget_is_cut_off_before_it() -> None:
+    scene, bare = scenes.load_scene("spring-uneven"), driver.bare
+    slow, quick = engines.parse("ase:velocity-verlet"), engines.parse("own:velocity-verlet")
+
+    def at_its_speed(scene: Scene, label: Label, **how: Any) -> driver.Bare:
+        found = bare(scene, label, **how)
+        runs = 100.0 if label == slow and scene.steps > 1 else found.timing.run
+        return found._replace(timing=replace(found.timing, run=runs))
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(driver, "bare", at_its_speed)
+        found = precision.record(scene, [slow, quick], budget=0.5)
+    (point,) = found.of(str(slow))
+    assert point.outcome == "cut off"
+    # one for the errors and two to be timed
+    assert point.message == "the budget of 0.5 s ends before it, which takes about 300 s"
+    assert len(found.of(str(quick))) > 4
 
 
 def test_a_budget_that_ends_is_said() -> None:

@@ -17,9 +17,9 @@ from springcheck.physics.bath import Bath
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Quartic, Spring, WallSpring
 from springcheck.physics.trajectory import Trajectory
-from springcheck.studies.run.tally import heated_of
 from springcheck.thermal import Stepper, Thermostat
 from springcheck.thermal.catalogue import by_groups
+from springcheck.thermal.heat import heated_of
 from springcheck.thermal.likelihood import FULL_RANK, SUBSTEPS_TRIED, likely
 
 LABELS = (

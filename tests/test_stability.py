@@ -20,7 +20,7 @@ from springcheck import driver, engines, schemes
 from springcheck.physics import builders
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.arrays import Extended
-from springcheck.physics.terms import Damping
+from springcheck.physics.terms import Damping, Quartic
 from springcheck.studies.choose import LeftOut
 from springcheck.studies.run import measure as session
 from springcheck.studies.run import text as run_text
@@ -109,9 +109,15 @@ def test_resonances_of_multiple_time_steps_are_those_of_the_exact_matrix(need: N
     assert wanted[0, 1] == pytest.approx(16 * np.sin(np.pi / 16), abs=1e-14)
 
 
-def test_a_scene_without_fast_springs_has_no_resonances() -> None:
-    with pytest.raises(Exception, match="springs marked fast"):
-        resonance.measure(scenes.load_scene("spring"), engines.parse("openmm:mts"))
+def test_a_scene_without_fast_springs_or_with_more_than_springs_has_no_resonances_and_yet_limits() -> None:
+    label = engines.parse("own:respa8")
+    assert not resonance.serves(scenes.load_scene("spring"), label)
+    bent = scenes.load_scene("multiple-time-steps")
+    assert resonance.serves(bent, label)
+    bent = bent.derived(terms=(*bent.terms, Quartic(i=np.array([0]), b=np.array([0.3]), at=np.zeros(1))))
+    found = stability.record(bent, None, [str(label)])
+    assert found.resonances == ()
+    assert found.limits[0].agrees
 
 
 def test_bdf_leaves_the_stiff_mode_behind_where_adams_cannot(need: Need) -> None:

@@ -31,8 +31,8 @@ from springcheck.physics.terms import Spring, WallSpring
 from springcheck.physics.trajectory import Trajectory, of_scene
 from springcheck.studies.faults import baths
 from springcheck.studies.run import measure
-from springcheck.studies.run.tally import Heat
 from springcheck.thermal import THERMOSTATS, Stepper, chance
+from springcheck.thermal.heat import Heat
 from springcheck.thermal.stepper import forces
 
 pytestmark = pytest.mark.slow

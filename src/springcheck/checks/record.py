@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from springcheck.checks.case import REPEATED, Case
+from springcheck.checks.case import REPEATED, Case, overflows, strongest
 from springcheck.checks.check import Finding, check
 from springcheck.physics import exact
 from springcheck.physics.arrays import AS_WRITTEN
@@ -133,9 +133,15 @@ SINGLE_RANGE = float(np.sqrt(np.finfo(np.float32).max))
 @check("line", family="record", requires={"three-dimensions"})
 def line(case: Case) -> Finding:
     """Along axes that the scene leaves out nothing moves, exactly."""
-    off = case.trajectory.off_axis
+    off, how = case.trajectory.off_axis, case.trajectory.arithmetic
     assert off is not None
-    return Finding(abs(off), 0.0, "L", "every force along another axis is a product with 0")
+    why = "every force along another axis is a product with 0"
+    # of a start whose forces overflow there may be no second frame, whose step would tell it
+    if off and np.isfinite(how.overflow):
+        peak = np.max(strongest(case.scene.terms, case.trajectory.q.astype(np.longdouble)), initial=0)
+        if peak >= how.overflow:
+            why = f"the engine's limit: {overflows(how)}, along every axis, and a force is {peak:.3g}"
+    return Finding(abs(off), 0.0, "L", why)
 
 
 @check("energy", family="record", requires={"energies"})

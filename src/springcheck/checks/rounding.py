@@ -15,6 +15,11 @@ SMALLEST = np.longdouble(5e-324 if WIDE else 1e-323)
 step is no wider than double."""
 
 
+OF_LENGTH = 6
+"""Roundings of a joint's length: the places of both ends, their difference, its square, the root of that, and
+what is left beyond the rest length."""
+
+
 def of_step(
     case: Claim,
     q: Reals,
@@ -65,6 +70,9 @@ def of_step(
 def _evaluations(case: Claim, places: list[Reals] | None, recorded: bool) -> list[Met]:
     """Error bound of each evaluation of the force within a step."""
     scene, scheme = case.judged, case.scheme
+    far, none = np.full(scene.n, scene.system.far, np.longdouble), np.zeros(scene.n, np.longdouble)
+    pulls = scene.system.magnitude()(far, none) if case.trajectory.arithmetic.joints else 0.0
+    joints = OF_LENGTH / np.longdouble(case.roundings) * pulls
     acting = {"slow": scene.system.slow, "fast": scene.system.fast, "magnetic": sum(case.law.fields, ())}
     found: list[Met] = []
     made: dict[tuple[str, float], Met] = {}
@@ -82,6 +90,7 @@ def _evaluations(case: Claim, places: list[Reals] | None, recorded: bool) -> lis
                 magnitude=_force(case, acting.get(terms, scene.terms), bent, whole, recorded and at_end),
                 stiffness=stiffness,
                 joined=not scene.system.is_separate,
+                joints=joints,
                 q=near,
                 friction=scene.system.friction_at(near)
                 if near is not None and scene.system.brakes_by_place

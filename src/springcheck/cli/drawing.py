@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -43,8 +44,7 @@ def draw(path: Path, into: Path, **chosen: Any) -> tuple[list[Path], list[str]]:
     nothing to draw.
     """
     chosen = {name: value for name, value in chosen.items() if value is not None}
-    if into.exists() and not into.is_dir():
-        raise SpringcheckError(f"{into} is a file: figures need a folder, name another one with -o")
+    folder.check((), into, path)
     summary = store.summary(path)
     studies = list(inspect.held(summary))
     if not studies:
@@ -61,7 +61,7 @@ def draw(path: Path, into: Path, **chosen: Any) -> tuple[list[Path], list[str]]:
     with interrupts.folder() as made:
         written: list[Path] = []
         for study, found in drawn:
-            written += study.draw(found, made, **chosen)
+            written += study.draw(found, made, partial(folder.check, folder=into, path=path), **chosen)
             notes += getattr(found, "notes", ())
         if not written:
             raise SpringcheckError(f"{path}: nothing was measured in its study that can be drawn")
@@ -82,7 +82,7 @@ def draw_foreign(
     from springcheck.figures import looks, render
     from springcheck.figures.charts import Bank, Chart, Curve, Scale
     from springcheck.figures.motion import periods
-    from springcheck.figures.style import save, style
+    from springcheck.figures.style import files_of, save, style
 
     found = states_in(path, columns, step, trajectory)
     other, name = (found.p, "p") if found.p is not None else (np.asarray(found.v), "v")
@@ -121,6 +121,7 @@ def draw_foreign(
     ]
     heading = f"{path.name}: {_found(found.q[:, chosen[0]], len(found.t))}"
     bank = Bank(name="states", title="Coordinates", charts=charts, heading=heading, size=(4.4, 3.8))
+    folder.check(files_of(bank.name), into, path)
     with style(), interrupts.folder() as made:
         return folder.put(save(render.picture(bank), made, bank.name), into, path), notes
 

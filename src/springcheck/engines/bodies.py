@@ -8,17 +8,17 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from springcheck.engines.bonds import far
-from springcheck.engines.contract import Label, Method
+from springcheck.engines.bonds import walls
+from springcheck.engines.contract import Label, Method, Stopped
 from springcheck.errors import MethodError
 from springcheck.physics.arrays import Arithmetic, Floats
 from springcheck.physics.scene import Scene
 
 
 def single(label: Label) -> Arithmetic:
-    """Single precision; a joint's length, up to 8 times the motion's reach, is rounded at both ends."""
-    force = 16 * 2.0**-24 if label.method.endswith("-joint") else 2.0**-24
-    return Arithmetic(name="single", state=2.0**-24, force=force, parameters="single")
+    """Single precision, and joints whose lengths are rounded."""
+    joints = label.method.endswith("-joint")
+    return Arithmetic(name="single", state=2.0**-24, force=2.0**-24, parameters="single", joints=joints)
 
 
 class Bodies(ABC):
@@ -32,8 +32,10 @@ class Bodies(ABC):
     v: ClassVar[str]
     """The attributes of a body that are its place along x and y, and its velocity along x."""
     numbers: ClassVar[type] = np.float32
-    fastest: ClassVar[float] = float(np.finfo(np.float32).max) ** 0.5
-    """Speed up to which the world can square it without overflow [L/T]."""
+    fastest: float = np.inf
+    """Largest speed that the world gives a body [L/T]."""
+    limit: str = ""
+    """The sentence on that."""
     shortest: ClassVar[float] = 0.0
     """Length up to which a joint of the world has no direction, and no force [L]."""
 
@@ -43,8 +45,9 @@ class Bodies(ABC):
         self.off_axis = 0.0
         self.m = scene.m
         self._force = scene.system.force if ours else None
-        self._fit(scene, label, ours)
+        self._step = step
         self.begin(label, step)
+        self._fit(scene, label, ours)
         rows = zip(scene.m.tolist(), scene.q.tolist(), scene.p.tolist(), strict=True)
         self.bodies = [self.add(m, q, p / m) for m, q, p in rows]
         if not ours:
@@ -57,10 +60,11 @@ class Bodies(ABC):
         # components that are small beside the rest of the motion may vanish
         speed, whole = float(np.max(speeds)), float(np.max([speeds, np.abs(scene.q)]))
         sizes = [(least, "mass", x, most) for x in scene.m.tolist()]
-        sizes += [(least, "motion", whole or 1.0, most), (0.0, "speed", speed, self.fastest)]
+        sizes += [(least, "motion", whole or 1.0, most), (0.0, "speed", speed, most**0.5)]
+        sizes += [(least, "step", abs(self._step), most)]
         if not ours:
-            length = far(scene)
-            sizes += [(max(least**0.5, self.shortest), "joint's length", length, most**0.5)]
+            sizes += [(max(least**0.5, self.shortest), "joint's length", scene.system.far, most**0.5)]
+            sizes += [(0.0, "stiffness", k, most) for _, k, _ in walls(scene, label)]
         for lowest, what, size, highest in sizes:
             if not lowest <= size <= highest:
                 raise MethodError(
@@ -86,8 +90,8 @@ class Bodies(ABC):
         """Set the force of the next step along x."""
 
     @abstractmethod
-    def step(self, row: int) -> None:
-        """Advance the world by one step; Stopped(row, ...) where it does not obey."""
+    def step(self) -> None:
+        """Move the world by one step."""
 
     def advance(self, every: int, q: Floats, p: Floats) -> None:
         """Fill rows of q and p (f, n), `every` steps each."""
@@ -97,11 +101,22 @@ class Bodies(ABC):
             for row in range(len(q)):
                 self.force_calls += every
                 for _ in range(every):
+                    here, there = (np.array([of(body) for body in bodies], np.float64) for of in (x, v))
                     if force is not None:
-                        here, there = (np.array([of(body) for body in bodies], np.float64) for of in (x, v))
-                        for body, f in zip(bodies, force(here, there * self.m).tolist(), strict=True):
+                        forces = force(here, there * self.m)
+                        if not (largest := float(np.max(np.abs(forces)))) <= np.finfo(self.numbers).max:
+                            raise Stopped(row, f"a force of {largest:.3g} is outside what it computes with")
+                        for body, f in zip(bodies, forces.tolist(), strict=True):
                             self.push(body, f)
-                    self.step(row)
+                        there += self._step * forces / self.m
+                    self._within(row, there, 1.0)
+                    self.step()
+                    self._within(row, np.array([v(body) for body in bodies]), 0.999)
                 q[row] = [x(body) for body in bodies]
                 p[row] = [v(body) for body in bodies] * self.m
             self.off_axis = max(self.off_axis, *(abs(y(body)) for body in bodies))
+
+    def _within(self, row: int, speeds: Floats, part: float) -> None:
+        """Stopped(row, ...) where the world does not move as it was told, at this part of its limit."""
+        if np.any(np.abs(speeds) > part * self.fastest):
+            raise Stopped(row, self.limit, is_limit=True)

@@ -247,16 +247,6 @@ def off_axis(positions: Floats, elsewhere: NDArray[np.bool_]) -> float:
     return float(np.max(np.abs(positions.reshape(-1)[: len(elsewhere)][elsewhere]), initial=0.0))
 
 
-def far(scene: Scene) -> float:
-    """An offset beyond all of the motion, for a spring that has a length without a sign [L].
-
-    A power of 2, so that adding it rounds and nothing else; every rounding of a force is k eps times this.
-    """
-    q, _ = scene.system.amplitudes
-    reach = float(np.max(np.abs(scene.q)) + np.max(q))
-    return float(2.0 ** np.ceil(np.log2(4 * reach))) if 0 < reach < 2.0**500 else 1.0
-
-
 def hinges(scene: Scene, label: Label) -> Iterator[tuple[int, float, tuple[float, float, float], float]]:
     """Rotors as bodies on hinges along z, in a gravity of 1 along x: number, mass, centre of mass, and moment
     of inertia about that.  Half of the rotor's inertia is that of the mass in its centre.

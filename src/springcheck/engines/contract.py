@@ -129,11 +129,14 @@ class Simulation(Protocol):
 
 
 class Stopped(Exception):  # noqa: N818 - an outcome, not an error
-    """An engine gave up: the rows that it had filled, and its message."""
+    """An engine gave up: the rows that it had filled, and its message.
 
-    def __init__(self, rows: int, message: str) -> None:
+    `is_limit`: it moves nothing beyond a limit of its own, which the message names.
+    """
+
+    def __init__(self, rows: int, message: str, *, is_limit: bool = False) -> None:
         super().__init__(message)
-        self.rows = rows
+        self.rows, self.is_limit = rows, is_limit
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -164,7 +164,7 @@ class _Steps:
                         step(model, data, self._substeps)
                     if dropped[0].number:
                         p[:row] *= self._m
-                        raise Stopped(row, "MuJoCo sets controls to 0 where one is beyond 1e10")
+                        raise Stopped(row, "MuJoCo sets controls beyond 1e10 to 0", is_limit=True)
                 q[row] = q_now
                 p[row] = v_now
             p *= self._m
@@ -213,5 +213,6 @@ ENGINE = Engine(
     start=_Steps,
     version=version_of("mujoco"),
     arithmetic=arithmetic,
+    squares_lengths=True,
     convention=lambda method: "velocities of the joints, synchronised",
 )  # fmt: skip

@@ -6,11 +6,9 @@ the old positions, and a spring that it evaluates itself is that of the new ones
 
 from __future__ import annotations
 
-import sys
 from typing import Any
 
 from springcheck.engines.bodies import Bodies
-from springcheck.engines.bonds import far
 from springcheck.engines.contract import (
     EVERY_FORCE,
     SPRINGS,
@@ -33,8 +31,8 @@ def version() -> dict[str, str]:
 
 
 def arithmetic(label: Label) -> Arithmetic:
-    """Double precision; a spring's length, up to 8 times the motion's reach, is rounded at both ends."""
-    return Arithmetic(force=16 * 2.0**-53) if label.method == "damped-spring" else Arithmetic()
+    """Double precision, and springs whose lengths are rounded."""
+    return Arithmetic(joints=label.method == "damped-spring")
 
 
 class _Space(Bodies):
@@ -42,7 +40,6 @@ class _Space(Bodies):
 
     x, y, v = "position.x", "position.y", "velocity.x"
     numbers = float
-    fastest = sys.float_info.max
 
     def begin(self, label: Label, step: float) -> None:
         import pymunk
@@ -60,7 +57,7 @@ class _Space(Bodies):
         return body
 
     def tie(self, scene: Scene, label: Label) -> None:
-        length, bodies, wall = far(scene), self.bodies, self._space.static_body
+        length, bodies, wall = scene.system.far, self.bodies, self._space.static_body
         spring = self._library.DampedSpring
         for term in scene.terms:
             if isinstance(term, WallSpring):
@@ -74,7 +71,7 @@ class _Space(Bodies):
     def push(self, body: Any, force: float) -> None:
         body.force = (force, 0.0)
 
-    def step(self, row: int) -> None:
+    def step(self) -> None:
         self._space.step(self._h)
 
 

@@ -10,18 +10,22 @@ from __future__ import annotations
 from typing import Any
 
 from springcheck.engines.bodies import Bodies, single
-from springcheck.engines.bonds import far, walls
+from springcheck.engines.bonds import walls
 from springcheck.engines.contract import (
     EVERY_FORCE,
     Engine,
     Label,
-    Stopped,
     by_name,
     named,
     version_of,
 )
 from springcheck.errors import MethodError
 from springcheck.physics.scene import Scene
+
+SUBSTEPS = 4
+
+SMALLEST_DIVISOR = 1e-20
+"""Rapier takes 1/x for 0 where x is no larger (`utils::inv`): a soft spring is then a rigid joint."""
 
 
 class _World(Bodies):
@@ -38,7 +42,8 @@ class _World(Bodies):
         self._handles: list[Any] = []
         self._world = rapier3d.PhysicsWorld(gravity=(0, 0, 0))
         self._world.integration_parameters.dt = step
-        self._fastest = self._world.integration_parameters.normalized_max_linear_velocity
+        self.fastest = self._world.integration_parameters.normalized_max_linear_velocity
+        self.limit = f"Rapier moves no body faster than {self.fastest:g}"
 
     def add(self, m: float, q: float, v: float) -> Any:
         body = self._library.RigidBody.dynamic(
@@ -48,8 +53,14 @@ class _World(Bodies):
         return self._world.rigid_bodies[self._handles[-1]]
 
     def tie(self, scene: Scene, label: Label) -> None:
-        length, ground = far(scene), self._world.add_body(self._library.RigidBody.fixed())
+        length, ground = scene.system.far, self._world.add_body(self._library.RigidBody.fixed())
         for i, k, at in walls(scene, label):
+            kick = k * (self._step / SUBSTEPS) ** 2
+            if min(kick, 1 / self.m[i] + 1 / max(kick, SMALLEST_DIVISOR)) <= SMALLEST_DIVISOR:
+                raise MethodError(
+                    f"{label}: Rapier takes 1/x for 0 where x is below {SMALLEST_DIVISOR:g}, as k (h/4)**2 = "
+                    f"{kick:.3g} or its inverse and 1/m together are; the scene in other units is inside"
+                )
             spring = self._library.SpringJointBuilder(length, k, 0.0)
             joint = spring.local_anchor1((at - length, 0, 0)).build()
             self._world.impulse_joints.insert(ground, self._handles[i], joint, True)
@@ -58,10 +69,8 @@ class _World(Bodies):
         body.reset_forces(True)
         body.add_force((force, 0, 0), True)
 
-    def step(self, row: int) -> None:
+    def step(self) -> None:
         self._world.step()
-        if any(abs(body.linvel.x) > 0.999 * self._fastest for body in self.bodies):
-            raise Stopped(row, f"Rapier moves no body faster than {self._fastest:g}")
 
 
 ENGINE = Engine(

@@ -32,6 +32,8 @@ from springcheck.schemes import Scheme, solver
 
 SOLVERS = {"rk45": "RK45", "dop853": "DOP853", "radau": "Radau", "bdf": "BDF", "lsoda": "LSODA"}
 
+EXPLICIT_SOLVERS = ("RK45", "DOP853")
+
 SMALLEST_TOLERANCE = 100 * np.finfo(np.float64).eps
 """Smallest relative tolerance that SciPy takes; it raises smaller ones to this."""
 
@@ -42,8 +44,8 @@ class _Solver:
     def __init__(self, scene: Scene, method: Method, label: Label, step: float) -> None:
         from scipy import integrate
 
-        solvers.refuse_hours(scene, label, step)
         name = SOLVERS[method.name]
+        solvers.refuse_hours(scene, label, step, explicit=name in EXPLICIT_SOLVERS)
         self.force_calls = 0
         self._n, self._h, self._done = scene.n, step, 0
         n, m, system = scene.n, scene.m, scene.system

@@ -46,13 +46,19 @@ def driven(scene: Scene, step: float) -> float:
     return float(max(turns, default=0.0))
 
 
-def refuse_hours(scene: Scene, label: Label, step: float) -> None:
-    """MethodError where a solver would not come to its first output in an hour."""
-    radians, of_drive = followed(scene, step), driven(scene, step)
-    what = "motion" if radians > of_drive else "drive"
-    if (radians := max(radians, of_drive)) > MOST_RADIANS:
+def refuse_hours(scene: Scene, label: Label, step: float, *, explicit: bool = False) -> None:
+    """MethodError where a solver would not come to its first output in an hour.
+
+    The steps of an `explicit` one stay as short as the fastest rate, though nothing moves as fast any more.
+    """
+    found = [(followed(scene, step), "motion", 3.0), (driven(scene, step), "drive", 3.0)]
+    if explicit and np.isfinite(fastest := turned(scene, step)):
+        # the limit of DOP853 on the negative real axis is 6, that of RK45 3
+        found.append((fastest, "fastest rate, which bounds the steps of an explicit solver,", 1 / 6))
+    radians, what, each = max(found)
+    if radians > MOST_RADIANS:
         raise MethodError(
             f"{label}: the {what} turns through {radians:.3g} radians between two frames, which takes "
-            f"{3 * radians:.0e} internal steps or more, hours and longer; {MOST_RADIANS:.0e} radians are the "
-            "most, take shorter steps or record more frames"
+            f"{each * radians:.0e} internal steps or more, hours and longer; {MOST_RADIANS:.0e} radians are "
+            "the most, take shorter steps or record more frames"
         )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Iterable
 from pathlib import Path
 
 from springcheck.errors import StoreError
@@ -18,18 +19,26 @@ def folder_of(path: Path) -> Path:
     return Path("figures", path.stem)
 
 
-def put(drawn: list[Path], folder: Path, path: Path) -> list[Path]:
-    """Put figures of a store into a folder; StoreError where that would replace any other file."""
+def check(names: Iterable[str], folder: Path, path: Path) -> None:
+    """StoreError where figures of a store by these names would replace any other file of a folder."""
+    if folder.exists() and not folder.is_dir():
+        raise StoreError(f"{folder} is a file: figures need a folder, name another one with -o")
     mine = str(path.absolute())
     known = _known(folder)
-    content = {one.name: one.read_bytes() for one in drawn}
-    for name in content:
+    for name in names:
         target = folder / name
         whose, *old = known.get(name, [mine])
         if target.is_symlink() or (target.exists() and _sha256(target.read_bytes()) not in old):
             raise StoreError(f"{target} is no figure of ours as it was drawn: move it away")
         if target.exists() and whose != mine:
             raise StoreError(f"{target} shows {whose}: name another folder with -o")
+
+
+def put(drawn: list[Path], folder: Path, path: Path) -> list[Path]:
+    """Put figures of a store into a folder; StoreError where that would replace any other file."""
+    content = {one.name: one.read_bytes() for one in drawn}
+    check(content, folder, path)
+    mine, known = str(path.absolute()), _known(folder)
     for name, figure in content.items():
         _, *old = known.get(name, [mine])
         # the last one too: whoever is killed in between may find it in its place

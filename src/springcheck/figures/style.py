@@ -55,6 +55,12 @@ def style() -> Iterator[None]:
         yield
 
 
+def files_of(name: str) -> list[str]:
+    """Names of the files of a figure: PNG and SVG."""
+    safe = re.sub(r"[^\w-]", "-", name)[:LONGEST_LINE]
+    return [f"{safe}.png", f"{safe}.svg"]
+
+
 def save(figure: Figure, folder: Path, name: str) -> list[Path]:
     """Write a figure as PNG and SVG; StoreError where the folder cannot be written.
 
@@ -76,9 +82,8 @@ def save(figure: Figure, folder: Path, name: str) -> list[Path]:
             for text in texts:
                 text.set_parse_math(False)
             drawn = _drawn(figure)
-        safe = re.sub(r"[^\w-]", "-", name)[:LONGEST_LINE]
-        for ending, content in drawn.items():
-            written.append(folder / f"{safe}.{ending}")
+        for file, content in zip(files_of(name), drawn, strict=True):
+            written.append(folder / file)
             files.put_bytes(content, written[-1])
     except OSError as error:
         why = files.cause(error, writing=True)
@@ -86,8 +91,8 @@ def save(figure: Figure, folder: Path, name: str) -> list[Path]:
     return written
 
 
-def _drawn(figure: Figure) -> dict[str, bytes]:
-    """The figure as PNG, and as SVG of the same layout, by ending; `savefig` would draw each twice."""
+def _drawn(figure: Figure) -> tuple[bytes, bytes]:
+    """The figure as PNG, and as SVG of the same layout; `savefig` would draw each twice."""
     png, svg = BytesIO(), BytesIO()
     with warnings.catch_warnings():
         # a title may be in any script: what the font has not is drawn as boxes
@@ -101,4 +106,4 @@ def _drawn(figure: Figure) -> dict[str, bytes]:
         FigureCanvasAgg(figure).print_png(png)  # type: ignore[no-untyped-call]
         figure.set_layout_engine("none")
         FigureCanvasSVG(figure).print_svg(svg, metadata={"Date": None})  # type: ignore[no-untyped-call]
-    return {"png": png.getvalue(), "svg": svg.getvalue()}
+    return png.getvalue(), svg.getvalue()

@@ -90,6 +90,8 @@ class Arithmetic:
     """A velocity rebuilt over the step comes from the stored displacement, not from x' - x."""
     from_start: bool = False
     """Positions are kept as displacements from the start, as total Lagrangian finite elements do."""
+    joints: bool = False
+    """Springs are joints as long as `System.far`, and a force has the rounding of that length."""
 
     @property
     def unit(self) -> float:
@@ -107,6 +109,7 @@ class Arithmetic:
             "stale": f"forces kept within {self.stale:.2g}",
             "lengths": f"lengths of rods kept to {self.lengths:.2g}",
             "from_start": "positions kept as displacements from the start",
+            "joints": "springs as joints whose lengths are rounded",
             "cancels": "coefficients of the bath from 1 - exp(-friction h) as a difference",
         }
         plain = Arithmetic()

@@ -347,6 +347,15 @@ class System(Generic[Fields]):
             q = np.where(held, np.sqrt(2 / np.where(held, k, 1)) * unit, p / self.m * self.duration)
         return q, p
 
+    @property
+    def far(self) -> float:
+        """A length beyond all of the motion, for a spring that knows its length alone, which has no sign [L].
+
+        A power of 2, so that adding it rounds and nothing else.
+        """
+        reach = float(np.max(np.abs(self.q)) + np.max(self.amplitudes[0]))
+        return float(2.0 ** np.ceil(np.log2(4 * reach))) if 0 < reach < 2.0**500 else 1.0
+
     # other scenes made of this one, and what follows from them
 
     def beside(self, scene: Fields) -> Self:

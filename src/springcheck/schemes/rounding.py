@@ -30,6 +30,8 @@ class Met:
     joined: bool = False
     q: Reals | None = None
     pull: Reals | None = None
+    joints: Any = 0.0
+    """Rounding of a force by the lengths of joints, whose engine solves an implicit stage for velocities."""
     friction: tuple[Reals, Reals] | None = None
     """Rates of friction there, and their derivatives (..., n), where it depends on the position."""
 
@@ -69,6 +71,7 @@ def magnitude_step(
             if kind.evaluates:
                 here = next(each)
                 last = here.magnitude(q, np.zeros_like(p) if kind.evaluates == "potential" else p)
+                last = last + here.joints
                 pull = here.pull
             setting = Setting(m=m, rate=rate, force=last, turns=turns)
             part = number(c, np.float64) * wide
@@ -119,7 +122,7 @@ def _tableau(
             pull = _implicit_stage(here, way, qs, ps, np.abs(own), m, np.abs(1 + own * slowing))
             ps = (ps + np.abs(own) * pull) / np.abs(1 + own * slowing)
         else:
-            pull = here.magnitude(qs, ps)
+            pull = here.magnitude(qs, ps) + here.joints
         forces.append(pull)
         velocities.append(ps / m)
     weights = [abs(float(c)) * size for c in scheme.b]
@@ -167,7 +170,7 @@ def _implicit_stage(
         found = np.abs(here.q)
     there = here.magnitude(found, way[0])
     residual = right + found + factor * there
-    of_velocity = solve.turned(x * here.magnitude(*way[1:]), m) + solve.kicked(q) * m / x
+    of_velocity = solve.turned(x * (here.magnitude(*way[1:]) + here.joints), m) + solve.kicked(q) * m / x
     return np.maximum(there + solve.kicked(residual) * m * slowed / (x * x), of_velocity / x)
 
 

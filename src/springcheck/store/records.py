@@ -45,6 +45,7 @@ KEPT = {
     "bath_cancels": "arithmetic.cancels",
     "keeps_displacement": "arithmetic.keeps_displacement",
     "counts_from_start": "arithmetic.from_start",
+    "springs_are_joints": "arithmetic.joints",
     "rebuilds_velocity": "rebuilds_velocity",
     "off_axis": "off_axis",
 }
@@ -88,6 +89,7 @@ class RunRecord(msgspec.Struct, frozen=True, kw_only=True):
     bath_cancels: int = 0
     keeps_displacement: bool = False
     counts_from_start: bool = False
+    springs_are_joints: bool = False
     rebuilds_velocity: bool = False
     off_axis: float | None = None
 

@@ -11,6 +11,7 @@ import gc
 from argparse import Namespace
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -70,7 +71,7 @@ class StudyResult:
         from springcheck.figures.style import style
 
         with style():
-            return study_of(self).pictures(self)
+            return {name: draw() for name, draw in study_of(self).pictures(self).items()}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -142,22 +143,29 @@ class Study:
         found: StudyResult = self._part("measure").stored(path)
         return found
 
-    def draw(self, found: StudyResult, folder: Path, **chosen: Any) -> list[Path]:
-        """Draw a stored or a fresh result into a folder, as it is `chosen`; returns the files."""
-        from springcheck.figures.style import save, style
+    def draw(
+        self, found: StudyResult, folder: Path, check: Callable[[list[str]], object] = list, **chosen: Any
+    ) -> list[Path]:
+        """Draw a stored or a fresh result into a folder, as it is `chosen`; returns the files.
+
+        `check` is called with their names before the first is drawn.
+        """
+        from springcheck.figures.style import files_of, save, style
 
         with style():
             pictures = self.pictures(found, **chosen)
-            return [path for name, picture in pictures.items() for path in save(picture, folder, name)]
+            check([file for name in pictures for file in files_of(name)])
+            return [path for name, draw in pictures.items() for path in save(draw(), folder, name)]
 
-    def pictures(self, found: StudyResult, **chosen: Any) -> dict[str, Any]:
-        """Its figures as matplotlib's, by name."""
+    def pictures(self, found: StudyResult, **chosen: Any) -> dict[str, Callable[[], Any]]:
+        """By the name of each of its figures what draws it by matplotlib."""
         if self._has("figure"):
             drawn: dict[str, Any] = self._part("figure").pictures(found, **chosen)
-            return drawn
+            return {name: partial(drawn.get, name) for name in drawn}
         from springcheck.figures import render
 
-        return {bank.name: render.picture(bank) for bank in self.banks(found, **chosen) if bank.name}
+        banks = self.banks(found, **chosen)
+        return {bank.name: partial(render.picture, bank) for bank in banks if bank.name}
 
     def banks(self, found: StudyResult, **chosen: Any) -> list[Bank]:
         """Its charts in figures and in the report page; none where it has no such part."""

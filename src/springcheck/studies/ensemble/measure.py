@@ -144,13 +144,15 @@ def _run(scene: Scene, changes: Any, chosen: np.ndarray, label: Label, found: di
     """Run these cells side by side; where the engine gives up over some, halves find which."""
     many = together(scene, changes, chosen)
     try:
-        q, p, said = raw(many, label)
+        q, p, stop = raw(many, label)
+        stopped = stop is not None
     except MethodError:
         if len(chosen) == 1:
             found["outcome"][chosen] = OUTCOMES.index("stopped")
             return
-        q, p, said = many.q[None], many.p[None], "it takes no copies of this scene side by side"
-    if said and len(chosen) > 1:
+        # it takes no copies of this scene side by side
+        q, p, stopped = many.q[None], many.p[None], True
+    if stopped and len(chosen) > 1:
         half = len(chosen) // 2
         _run(scene, changes, chosen[:half], label, found)
         _run(scene, changes, chosen[half:], label, found)
@@ -160,7 +162,7 @@ def _run(scene: Scene, changes: Any, chosen: np.ndarray, label: Label, found: di
     finite = np.all(np.isfinite(states[0]) & np.isfinite(states[1]), axis=2)
     frames = np.where(finite.all(axis=0), len(q), np.argmin(finite, axis=0))
     found["steps"][chosen] = (frames - 1) * many.every
-    found["outcome"][chosen] = np.where(frames == many.frames, 0, 2 if said else 1)
+    found["outcome"][chosen] = np.where(frames == many.frames, 0, 2 if stopped else 1)
     for name, x in zip(("q0", "p0"), states, strict=True):
         found[name][chosen] = x[frames - 1, np.arange(copies), 0]
     with np.errstate(all="ignore"):

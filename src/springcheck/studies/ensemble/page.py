@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -70,14 +70,6 @@ class Map:
     """The other fields of a grid, with their value here."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Choice:
-    """A quantity over one or two fields."""
-
-    quantity: str
-    over: tuple[str, ...]
-
-
 def _title(quantity: str, scene: Scene) -> str:
     """The title of a quantity: with friction or a drive the energy is that beside the exact solution's."""
     if quantity == "energy_drift" and not scene.system.keeps_energy and has_true_motion(scene):
@@ -85,45 +77,29 @@ def _title(quantity: str, scene: Scene) -> str:
     return TITLES[quantity]
 
 
-def choices(found: Ensemble, quantity: str | None = None, over: str | None = None) -> list[Choice]:
-    """What is asked for; else error and energy over the first one or two fields.
-
-    SpringcheckError where there is no such quantity or field.
-    """
-    if quantity is not None and quantity not in TITLES:
-        close = nearest(quantity, TITLES)
-        raise SpringcheckError(f"--quantity {quantity}: {', '.join(TITLES)} can be drawn{close}")
+def fields_over(found: Ensemble, over: str | None = None) -> tuple[str, ...]:
+    """The fields that are asked for, else the first one or two.  SpringcheckError where there is none."""
     fields = found.fields[:2] if over is None else tuple(name.strip() for name in over.split(","))
     if not set(fields) <= set(found.fields) or len(fields) != len(set(fields)) or len(fields) > 2:
         raise SpringcheckError(f"--over {over}: one or two of {', '.join(found.fields)} are needed")
-    names = DRAWN if quantity is None else (quantity,)
-    return [Choice(quantity=name, over=fields) for name in names]
+    return fields
 
 
-def parts(found: Ensemble, choice: Choice) -> Iterator[tuple[str, Line | Map]]:
-    """Cells shown of each method, read one by one; methods without a number are left out."""
-    for tally in found.tallies:
-        cells = found.of(tally.method)
-        part = reduced(cells, found, choice)
-        if np.isfinite(part.y if isinstance(part, Line) else part.values).any():
-            yield tally.method, part
-
-
-def reduced(cells: Columns, found: Ensemble, choice: Choice) -> Line | Map:
+def reduced(cells: Columns, found: Ensemble, quantity: str, over: Sequence[str]) -> Line | Map:
     """Cells of one method that are shown; the other fields of a grid have the value in their middle."""
-    keep = np.ones(len(cells[choice.quantity]), dtype=bool)
+    keep = np.ones(len(cells[quantity]), dtype=bool)
     fixed = {}
     for name in found.fields:
-        if found.grid and name not in choice.over:
+        if found.grid and name not in over:
             known = np.unique(cells[name])
             fixed[name] = float(known[len(known) // 2])
             keep &= cells[name] == fixed[name]
-    values = np.asarray(cells[choice.quantity][keep], np.float64)
-    values = np.abs(values) if choice.quantity in SIZES else values
-    over = [cells[name][keep] for name in choice.over]
-    if len(over) == 1:
-        return _line(over[0], values, fixed, joined=found.grid or len(found.fields) == 1)
-    return _map(over[0], over[1], values, fixed, grid=found.grid)
+    values = np.asarray(cells[quantity][keep], np.float64)
+    values = np.abs(values) if quantity in SIZES else values
+    along = [cells[name][keep] for name in over]
+    if len(along) == 1:
+        return _line(along[0], values, fixed, joined=found.grid or len(found.fields) == 1)
+    return _map(along[0], along[1], values, fixed, grid=found.grid)
 
 
 def even_in_logarithm(values: Floats) -> bool:
@@ -202,33 +178,42 @@ def banks(found: Ensemble, *, quantity: str | None = None, over: str | None = No
 
     SpringcheckError where there is no such quantity or field.
     """
-    out = []
-    for choice in choices(found, quantity, over):
-        shown = dict(parts(found, choice))
+    if quantity is not None and quantity not in TITLES:
+        close = nearest(quantity, TITLES)
+        raise SpringcheckError(f"--quantity {quantity}: {', '.join(TITLES)} can be drawn{close}")
+    out, fields = [], fields_over(found, over)
+    for name in DRAWN if quantity is None else (quantity,):
+        every = (
+            (tally.method, reduced(found.of(tally.method), found, name, fields)) for tally in found.tallies
+        )
+        # methods without a number are left out
+        shown = {x: y for x, y in every if np.isfinite(y.y if isinstance(y, Line) else y.values).any()}
         if not shown:
             continue
         lines = {method: one for method, one in shown.items() if isinstance(one, Line)}
         maps = {method: one for method, one in shown.items() if isinstance(one, Map)}
-        charts = [_lines(found.scene, choice, lines)] if lines else _maps(found.scene, choice, maps)
-        fields = "" if over is None else "-over-" + "-".join(choice.over)
-        title = "Methods drawn" if lines else f"Colour: {_title(choice.quantity, found.scene)}"
+        charts = (
+            [_lines(found.scene, name, fields, lines)] if lines else _maps(found.scene, name, fields, maps)
+        )
+        of = "" if over is None else "-over-" + "-".join(fields)
+        title = "Methods drawn" if lines else f"Colour: {_title(name, found.scene)}"
         out.append(
             Bank(
-                name=f"ensemble-{choice.quantity}{fields}", title=title, charts=charts,
-                heading=_heading(found.scene, choice, shown), columns=1 if lines else min(3, len(charts)),
-                size=(6.8, 4.2) if lines else None,
+                name=f"ensemble-{name}{of}", title=title, charts=charts,
+                heading=_heading(found.scene, name, fields, shown),
+                columns=1 if lines else min(3, len(charts)), size=(6.8, 4.2) if lines else None,
             )
         )  # fmt: skip
     return out
 
 
-def _heading(scene: Scene, choice: Choice, shown: Mapping[str, Line | Map]) -> str:
+def _heading(scene: Scene, quantity: str, over: Sequence[str], shown: Mapping[str, Line | Map]) -> str:
     """The quantity, the fields on the axes, and the values of the fields that are not shown."""
     typical = {x: float(np.nanmedian(y.y if isinstance(y, Line) else y.values)) for x, y in shown.items()}
     best = min(typical, key=lambda x: abs(typical[x]))
-    over = " and ".join(named(x, scene) for x in choice.over)
-    said = [f"{scene.title}: {_title(choice.quantity, scene).partition(',')[0]} over {over}"]
-    if len(shown) > 1 and choice.quantity in SIZES:
+    fields = " and ".join(named(x, scene) for x in over)
+    said = [f"{scene.title}: {_title(quantity, scene).partition(',')[0]} over {fields}"]
+    if len(shown) > 1 and quantity in SIZES:
         same = [
             x for x in typical if x != best and abs(typical[x] - typical[best]) <= 1e-9 * abs(typical[best])
         ]
@@ -259,10 +244,10 @@ def _limits(scene: Scene) -> dict[str, float]:
     return {"spring.0.stiffness": 4 * m / h**2, "time.step": float(2 * np.sqrt(m / k))}
 
 
-def _lines(scene: Scene, choice: Choice, shown: Mapping[str, Line]) -> Chart:
-    title, (over,) = _title(choice.quantity, scene), choice.over
+def _lines(scene: Scene, quantity: str, fields: Sequence[str], shown: Mapping[str, Line]) -> Chart:
+    title, (over,) = _title(quantity, scene), fields
     y = _axis(
-        choice.quantity,
+        quantity,
         scene,
         np.concatenate([x for one in shown.values() for x in (one.low, one.y, one.high)]),
     )
@@ -304,18 +289,18 @@ def _axis(quantity: str, scene: Scene, values: Floats) -> Scale:
     return Scale(name=name)
 
 
-def _maps(scene: Scene, choice: Choice, shown: Mapping[str, Map]) -> list[Chart]:
-    kinds, bounds = _kinds(choice.quantity, [one.values.ravel() for one in shown.values()])
+def _maps(scene: Scene, quantity: str, over: Sequence[str], shown: Mapping[str, Map]) -> list[Chart]:
+    kinds, bounds = _kinds(quantity, [one.values.ravel() for one in shown.values()])
     charts = []
     for method, one in shown.items():
         rows = np.searchsorted(bounds, one.values, side="right")
-        limit = _across(scene, choice, one)
+        limit = _across(scene, over, one)
         charts.append(
             Chart(
                 title=f"{method}.",
                 short=method,
-                x=Scale(name=named(choice.over[0], scene), values=one.x.tolist()),
-                y=Scale(name=named(choice.over[1], scene), values=one.y.tolist()),
+                x=Scale(name=named(over[0], scene), values=one.x.tolist()),
+                y=Scale(name=named(over[1], scene), values=one.y.tolist()),
                 tiles=Tiles(kinds=kinds, rows=np.where(np.isnan(one.values), -1, rows).tolist()),
                 curves=limit,
             )
@@ -323,11 +308,11 @@ def _maps(scene: Scene, choice: Choice, shown: Mapping[str, Map]) -> list[Chart]
     return charts
 
 
-def _across(scene: Scene, choice: Choice, one: Map) -> list[Curve]:
+def _across(scene: Scene, over: Sequence[str], one: Map) -> list[Curve]:
     """The line h omega = 2 on a map of stiffness against step, in coordinates of its tiles."""
-    if set(choice.over) != set(_limits(scene)):
+    if set(over) != set(_limits(scene)):
         return []
-    flat = choice.over[0] == "time.step"
+    flat = over[0] == "time.step"
     steps, ks = (one.x, one.y) if flat else (one.y, one.x)
     k = np.geomspace(float(ks[0]), float(ks[-1]), 200)
     h = 2 * np.sqrt(float(scene.m[0]) / k)

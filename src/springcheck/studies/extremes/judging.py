@@ -16,7 +16,7 @@ import numpy as np
 
 from springcheck import checks, engines, schemes
 from springcheck.checks.case import keeps, least_moved, overflows
-from springcheck.engines.contract import Label
+from springcheck.engines.contract import Label, Stopped
 from springcheck.physics.arrays import Arithmetic, Extended, Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory, of_scene
@@ -112,9 +112,14 @@ def sizes(label: Label, scene: Scene, q: Extended, p: Extended, q2: Extended, p2
     )
 
 
-def judge(label: Label, specs: Sequence[Spec], scene: Scene, q: Floats, p: Floats, said: str) -> list[Cell]:
-    """Cells of one run: q, p (f, n) as the engine left them, not finite where it went there."""
-    how = engines.arithmetic(label)
+def judge(
+    label: Label, specs: Sequence[Spec], scene: Scene, q: Floats, p: Floats, stop: Stopped | None
+) -> list[Cell]:
+    """Cells of one run: q, p (f, n) as the engine left them, not finite where it went there or stopped."""
+    how, alone = engines.arithmetic(label), len(specs) == 1
+    if stop and not alone:
+        # whose step was not taken is not known
+        q, p = q[:-1], p[:-1]
     with np.errstate(all="ignore"):
         case = checks.Case(trajectory=as_trajectory(label, scene, q, p, how), scene=scene)
         exact_q, exact_p = case.next_states
@@ -138,37 +143,36 @@ def judge(label: Label, specs: Sequence[Spec], scene: Scene, q: Floats, p: Float
         value = float(np.max(np.where(here, np.minimum(ratio[:, i], 1e300), 0), initial=0.0))
         unstable = bool(growth[i] * spec.steps >= np.log(GROWN)) and spec.k > 0
         outcome: Outcome
-        if not bad.any():
-            reason = said if len(q) <= spec.steps else ""
-            outcome = "unstable, as theory says" if unstable else "right"
+        j = int(np.argmax(bad)) if bad.any() else len(bad)
+        if stop and j >= len(bad) - alone:
+            outcome, reason = "silently wrong", f"stopped for no reason that is known here: {stop}"
+        else:
+            outcome, reason = "silently wrong", f"step {j + 1} is off by {value:.3g} roundings of {bound:g}"
+        if not bad.any() and not stop:
+            outcome, reason = "unstable, as theory says" if unstable else "right", ""
             # a force that grows is small at first
             peak = float(inside.force[0, i] if unstable else np.max(inside.force[:, i], initial=0))
             coarse = how.quantum > DIGITS * peak > 0
-            if reason:
-                outcome, reason = "silently wrong", f"stopped for no reason that is known here: {said}"
-            elif np.any(here & ~(strict[:, i] <= bound)):
+            if np.any(here & ~(strict[:, i] <= bound)):
                 outcome, reason = "engine's limit", f"numbers below {low:.1e} lose digits to underflow"
             elif coarse:
                 outcome = "engine's limit"
                 reason = f"fixed-point forces: a quantum of {how.quantum:.1e} leaves too few digits"
-        else:
-            j = int(np.argmax(bad))
-            named = _reason(how, spec, inside, i, np.flatnonzero(bad), low, high)
-            if named is None:
-                outcome, reason = (
-                    "silently wrong",
-                    f"step {j + 1} is off by {value:.3g} roundings of {bound:g}",
-                )
-            elif unstable and "beyond" in named and j > 0:
+        elif bad.any():
+            far = scene.system.far if how.joints else np.inf
+            named = _reason(how, spec, inside, i, np.flatnonzero(bad), low, high, far)
+            if named and unstable and "beyond" in named and j > 0:
                 outcome, reason = "unstable, as theory says", f"grown out of range by step {j + 1}: {named}"
-            else:
+            elif named:
                 outcome, reason = "engine's limit", named
+            elif stop and stop.is_limit and alone and j == len(bad) - 1:
+                outcome, reason = "engine's limit", str(stop)
         cells.append(cell(label, spec, outcome, reason, value, bound))
     return cells
 
 
 def _reason(
-    how: Arithmetic, spec: Spec, inside: Sizes, i: int, bad: np.ndarray, low: float, high: float
+    how: Arithmetic, spec: Spec, inside: Sizes, i: int, bad: np.ndarray, low: float, high: float, far: float
 ) -> str | None:
     """A reason that holds at every step that is off, or None."""
     if how.parameters == "single":
@@ -183,6 +187,7 @@ def _reason(
             len(bad), how.quantum > DIGITS * peak
         ),
         keeps(how): least_moved(inside.moved[:, i])[bad] <= 2 * how.stale,
+        f"a joint of length {far:.3g} is passed": inside.force[bad, i] >= abs(spec.k) * np.longdouble(far),
         f"a step forms numbers beyond {high:.1e}": ~(inside.largest[bad, i] <= high),
         f"a step forms numbers below {low:.1e}": inside.smallest[bad, i] < low,
     }

@@ -16,31 +16,39 @@ from springcheck.studies.extremes.grid import Spec
 from springcheck.studies.extremes.judging import Cell
 
 
-def raw(scene: Scene, label: Label) -> tuple[Floats, Floats, str]:
-    """Every frame as the engine leaves it, the start first, finite or not, and its message if it stopped.
+def raw(scene: Scene, label: Label) -> tuple[Floats, Floats, Stopped | None]:
+    """Every frame as the engine leaves it, the start first, finite or not, and how it stopped if it did: the
+    frame that it did not reach is then the last, and is no number.
 
     The driver ends a run at the first number that is not finite; here that is one cell among many.
     """
     with np.errstate(all="ignore"):
         started = engines.load(label.engine).start(scene, engines.method(label), label, scene.step)
-        q, p = np.empty((scene.frames, scene.n)), np.empty((scene.frames, scene.n))
+        q, p = np.full((scene.frames, scene.n), np.nan), np.full((scene.frames, scene.n), np.nan)
         q[0], p[0] = scene.q, scene.p
         try:
             started.advance(scene.every, q[1:], p[1:])
         except Stopped as stop:
-            return q[: stop.rows + 1], p[: stop.rows + 1], str(stop)
-    return q, p, ""
+            q[stop.rows + 1 :] = p[stop.rows + 1 :] = np.nan
+            return q[: stop.rows + 2], p[: stop.rows + 2], stop
+    return q, p, None
 
 
 def cells(label: Label, specs: Sequence[Spec]) -> list[Cell]:
     """Run and judge cells of one step and one length, in as few runs as the engine allows."""
-    requires = engines.method(label).requires
-    scene = grid.scene(list(specs), label, requires)
+    half = len(specs) // 2
+    if half and engines.arithmetic(label).joints:
+        # all joints of a run are as long as the largest motion needs them
+        return cells(label, specs[:half]) + cells(label, specs[half:])
+    scene = grid.scene(list(specs), label, engines.method(label).requires)
     try:
-        q, p, said = raw(scene, label)
+        q, p, stop = raw(scene, label)
     except MethodError as error:
-        return [judging.cell(label, spec, "engine's limit", f"it refuses: {error}") for spec in specs]
-    found = judging.judge(label, specs, scene, q, p, said)
+        if half:
+            # it may refuse all for the sake of one
+            return cells(label, specs[:half]) + cells(label, specs[half:])
+        return [judging.cell(label, specs[0], "engine's limit", f"it refuses: {error}")]
+    found = judging.judge(label, specs, scene, q, p, stop)
     if len(specs) == 1:
         return found
     if stale := engines.arithmetic(label).stale:
@@ -52,12 +60,11 @@ def cells(label: Label, specs: Sequence[Spec]) -> list[Cell]:
             cells(label, [spec])[0] if alone else cell
             for spec, cell, alone in zip(specs, found, slow, strict=True)
         ]
-    if not said:
+    if not stop:
         return found
     # the engine gave up over some: those that had left its numbers are done, the others run again
     over = [x.outcome not in ("silently wrong", "right") and bool(x.reason) for x in found]
     if not any(over) or all(over):
-        half = len(specs) // 2
         return cells(label, specs[:half]) + cells(label, specs[half:])
     rest = iter(cells(label, [spec for spec, done in zip(specs, over, strict=True) if not done]))
     return [cell if done else next(rest) for cell, done in zip(found, over, strict=True)]

@@ -37,9 +37,18 @@ from springcheck.studies.precision import fits
 from springcheck.studies.precision.accuracy import Errors, Truth, truth
 from springcheck.studies.precision.fits import POINTS, Point, points_of
 from springcheck.studies.precision.result import MethodSummary, PrecisionStudy
-from springcheck.studies.precision.sweeps import PLANNED, Sweep, affordable, begin, blank, take, to_time
+from springcheck.studies.precision.sweeps import (
+    PLANNED,
+    Sweep,
+    affordable,
+    begin,
+    blank,
+    price,
+    take,
+    to_time,
+)
 from springcheck.studies.precision.timing import Clock, take_turns, tick
-from springcheck.text.wording import count
+from springcheck.text.wording import count, duration
 
 BUDGET = 75.0
 """Default budget of a study [s]."""
@@ -57,7 +66,8 @@ def record(
     left: Sequence[LeftOut] = (),
     **how: Unpack[How],
 ) -> PrecisionStudy:
-    """Measure these methods on a scene within about `budget` seconds, not counting imports and compilation.
+    """Measure these methods on a scene within about `budget` seconds, not counting imports, compilation and a
+    first run of each method, which shows what its points will take.
 
     A method that cannot run, a run that diverges and a sweep that the budget cuts off are points with
     their reason; methods that were `left` out are named beside them.  A store has a table
@@ -101,7 +111,8 @@ def _measure(
             # its time could not be measured
             take(sweep, sweep.known)
     for sweep in _open(sweeps):
-        sweep.points.append(blank(sweep, CUT_OFF, f"the budget of {budget:g} s ends before it"))
+        ends = f"the budget of {budget:g} s ends before it, which takes about {duration(price(sweep))}"
+        sweep.points.append(blank(sweep, CUT_OFF, ends))
     seconds = perf_counter() - began
     for sweep in sweeps:
         kept.keep(form, str(sweep.label), sweep.points, study_seconds=seconds)

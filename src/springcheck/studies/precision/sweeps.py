@@ -43,15 +43,13 @@ class Sweep:
     condition: fits.Condition | None
     """How rounding adds up in it."""
     cost: float = 0.0
-    """Seconds of one bare run at the last point."""
+    """Seconds that one bare run at the next point will take."""
     start: float = 0.0
     """Seconds of a start."""
     overhead: float = 0.0
     """Seconds that the last point took beside its runs: starts, comparisons, reading."""
-    growth: float = 2.0
-    """Cost of a point relative to the one before."""
     read: float = 0.0
-    """Seconds of the last run with every step read."""
+    """Seconds that a run with every step read will take."""
     first_start: float | None = None
     ahead: dict[Place, Point] = field(default_factory=dict)
     """Points whose errors were measured before their turn to be timed."""
@@ -101,9 +99,10 @@ def begin(scene: Scene, label: Label, known: Truth) -> Sweep:
                 needed = coarsest(known, limit)
                 raise MethodError(f"its coarsest run takes {needed:.0e} steps, more than {MOST_STEPS:.0e}")
             began = perf_counter()
-            driver.bare(sweep.scene, label, planned=PLANNED)
+            driver.bare(replace(sweep.scene, steps=1), label, planned=PLANNED)
             sweep.first_start = perf_counter() - began
-            sweep.start = driver.bare(sweep.scene, label, planned=PLANNED).timing.start
+            first = driver.bare(to_time(plain, sweep), label, planned=PLANNED).timing
+            sweep.start, sweep.cost = first.start, first.run
         except MethodError as error:
             reason = str(error)
         except Stopped:
@@ -119,13 +118,11 @@ def take(sweep: Sweep, point: Point) -> None:
     """Append a measured point, estimate the cost of the next one from it, and advance to that."""
     sweep.points.append(point)
     if point.run_seconds_repeats:
-        before, sweep.cost = sweep.cost, min(point.run_seconds_repeats)
-        sweep.read = min(point.read_seconds_repeats, default=np.inf)
+        *_, before, run = [0.0, *(x.seconds for x in sweep.points if x.run_seconds_repeats)]
         sweep.start = min(point.start_seconds_repeats)
-        used = runs(sweep.cost + sweep.start) * sweep.cost
-        sweep.overhead = max(0.0, point.spent_seconds - used)
-        if sweep.method.adaptive and before:
-            sweep.growth = max(1.2, sweep.cost / before)
+        sweep.overhead = max(0.0, point.spent_seconds - runs(run + sweep.start) * run)
+        growth = max(1.2, run / before) if sweep.method.adaptive and before else 2.0
+        sweep.cost, sweep.read = growth * run, growth * min(point.read_seconds_repeats, default=np.inf)
     sweep.scene = None if is_finished(sweep) else next(sweep.scenes, None)
 
 
@@ -187,8 +184,8 @@ def _need(sweep: Sweep, duration: float) -> float:
     steps, _ = fits.expected_floor(points, fit, sweep.condition, duration)
     run, last, total = sweep.cost, float(points[-1].steps or 1), 0.0
     while last < 1.2 * steps:
+        total += _seconds(sweep, run)
         run, last = 2 * run, 2 * last
-        total += sweep.overhead + run * runs(run + sweep.start)
     return total
 
 
@@ -207,10 +204,14 @@ def warm_ups(seconds: float) -> int:
     return 1 if seconds < 0.1 else 0
 
 
+def _seconds(sweep: Sweep, run: float) -> float:
+    """Seconds that a point will take of which one bare run takes so many."""
+    return sweep.overhead + run * runs(run + sweep.start)
+
+
 def price(sweep: Sweep) -> float:
     """Seconds that the next point will take."""
-    run = sweep.cost * sweep.growth
-    return sweep.overhead + run * runs(run + sweep.start)
+    return _seconds(sweep, sweep.cost)
 
 
 def is_finished(sweep: Sweep) -> bool:

@@ -60,7 +60,7 @@ class Clock:
 
     def warm_up(self, shortest: float) -> None:
         """Find how many runs fit into one timing, and how many timings are worth taking."""
-        expected = self.sweep.cost * self.sweep.growth
+        expected = self.sweep.cost
         if warm_ups(expected + self.sweep.start):
             warm = self._bare()
             expected = warm.timing.run if warm else 0.0
@@ -74,7 +74,7 @@ class Clock:
         if run:
             self.runs.append(run)
         reads = READS if self.sweep.start < STARTS else 1
-        if number < reads and self.sweep.read * self.sweep.growth <= READ_SECONDS:
+        if number < reads and self.sweep.read <= READ_SECONDS:
             read = self._bare(copies=self.copies, read=True)
             if read:
                 self.reads.append(read.timing.run)

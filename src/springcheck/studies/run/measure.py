@@ -251,7 +251,7 @@ def judge(
         verdicts=tuple(v for name in sources for v in worst[name]),
         comparison=comparison,
         same=() if scene.bath else tuple(compare.same_motions(scene, last, comparison)),
-        temperatures=() if not scene.bath else tuple(tallies[name].heat.line(name) for name in sources),
+        temperatures=tuple(tally.heat.line(name) for name, tally in tallies.items() if tally.heat),
         judged_frames=min(judged_frames, scene.frames) if stride > 1 else scene.frames,
         resumed=tuple(name for name in resumed if name in sources),
     )

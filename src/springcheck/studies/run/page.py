@@ -18,8 +18,8 @@ from springcheck.figures.views import paths, views
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory
 from springcheck.studies import keeper
-from springcheck.studies.run.result import Heated, Report, Stored
-from springcheck.studies.run.tally import heated_of
+from springcheck.studies.run.result import Report, Stored
+from springcheck.thermal.heat import Heated, heated_of
 
 POSITIONS_IN_BATH = 4
 """Schemes in a bath whose positions are drawn: more hide one another."""

@@ -19,6 +19,7 @@ from springcheck.text.wording import count
 
 if TYPE_CHECKING:
     from springcheck.studies.run.drawable import Drawable
+    from springcheck.thermal.heat import Heated
 
 FAULT = "fault"
 """Engine name in the labels of engines broken on purpose."""
@@ -44,21 +45,6 @@ class MethodRun:
     start_seconds: float
     run_seconds: float
     force_calls: int
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Heated:
-    """Temperatures of a run over that of its bath: measured, with standard errors, and as its scheme has
-    them exactly; NaN where there is no law."""
-
-    method: str
-    scheme: str
-    configurational: float
-    configurational_error: float
-    configurational_law: float
-    kinetic: float
-    kinetic_error: float
-    kinetic_law: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)

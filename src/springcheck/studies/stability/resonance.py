@@ -14,7 +14,6 @@ import numpy as np
 
 from springcheck import engines, schemes
 from springcheck.engines.contract import Label, Need
-from springcheck.errors import SceneError
 from springcheck.physics.arrays import Floats, Reals
 from springcheck.physics.scene import Scene
 from springcheck.studies.stability import propagators
@@ -50,17 +49,14 @@ def fast_frequency(scene: Scene) -> float:
 
 
 def serves(scene: Scene, label: Label) -> bool:
-    """Whether a method takes the scene's fast springs in steps of their own."""
-    fast = scene.system.fast
+    """Whether a method takes the scene's fast springs in steps of their own, and nothing acts but springs."""
     marked = engines.method(label).requires == {Need.FAST_SPRINGS}
-    return bool(fast) and marked and not engines.refusal(scene, label)
+    springs = scene.system.is_linear and not scene.system.is_damped
+    return marked and springs and not engines.refusal(scene, label)
 
 
 def measure(scene: Scene, label: Label) -> Resonance:
     """Scan the bands of a scene with springs marked fast, and find their edges to 1e-9."""
-    reason = engines.refusal(scene, label)
-    if reason:
-        raise SceneError(f"{label}: {reason}")
     turn = np.linspace(*TURN, COPIES)
 
     def scanned(step: Stepper) -> tuple[Floats, tuple[tuple[float, float], ...]]:
@@ -81,8 +77,6 @@ def measure(scene: Scene, label: Label) -> Resonance:
 
 def radii(scene: Scene, label: Label, turn: Floats, step: Stepper) -> Floats:
     """Spectral radii of one step (j,) of copies of the scene at these h w of the fast spring."""
-    if not scene.system.is_linear or scene.system.is_damped:
-        raise SceneError(f"scene {scene.name}: a scan of resonances knows springs only")
     copies = len(turn)
     scale = (turn / (abs(scene.step) * fast_frequency(scene))) ** 2
     # coordinates in which q and p/(m w) are alike
