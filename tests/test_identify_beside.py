@@ -132,3 +132,23 @@ def test_a_repeated_frame_of_a_motion_with_quadratic_drag_names_no_scheme_of_the
     t, q, v = march(explicit, 0.7, 0.2, force, 201)
     q, v = (np.insert(x, 131, x[131])[:201] for x in (q, v))
     assert identify(t, q, v=v).statement.startswith("The motion stands still for a step: it is repeated at")
+
+
+@pytest.mark.parametrize("drag", [0, 1])
+@pytest.mark.parametrize(
+    ("step", "every_h", "frames"), [(verlet, 0.3, 60), (verlet, 0.1, 200), (heun, 0.3, 60)]
+)
+def test_few_digits_do_not_tell_a_small_quadratic_drag_from_friction_and_say_so(
+    step: Any, every_h: float, frames: int, drag: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The drag's friction is known to 50 of its errors; a linear one of ten times its size shows."""
+    monkeypatch.setitem(globals(), "H", every_h)
+
+    def force(q: Any, v: Any, t: float) -> Any:
+        return -1.7 * q - (0.003 * np.abs(v) * v if drag else 0.03 * v)
+
+    t, q, v = march(step, 1.1, 0.4, force, frames)
+    q, v = (np.array([float(f"{x:.3g}") for x in y]) for y in (q, v))
+    found = identify(t, q, v=v, mass=1.0, stiffness=1.7, step=every_h)
+    assert found.fits
+    assert ("not known here" in found.statement) == bool(drag)

@@ -17,6 +17,7 @@ from springcheck.identify.coarse import CHANCE
 from springcheck.identify.evidence import FALLS, LEFT_BY_ROUNDING, Evidence, matched
 from springcheck.identify.families import title
 from springcheck.identify.fit import fit
+from springcheck.identify.hypothesis import ERRORS, Match
 from springcheck.identify.result import Explanation
 from springcheck.physics.arrays import Floats
 
@@ -283,6 +284,32 @@ LAWS = (
     OUTER_DRIVE,
 )  # fmt: skip
 """Laws of the force at each step, in the order in which those that explain as much are named."""
+
+
+NOT_LINEAR = [x for x in LAWS if x.kind in (OF_VELOCITY, ANHARMONIC) and not x.flexible]
+"""Laws of a force that a linear friction stands for where numbers are few."""
+
+
+def friction_shows(e: Evidence, part: Match) -> bool:
+    """Whether a friction is left where the columns of a law that is not linear stand beside the map's."""
+    found, slope = e.found, np.linalg.inv(e.found.entries.astype(np.float64)).T.reshape(4)
+    known = math.sqrt(float(slope @ found.covariance @ slope))
+    for law in NOT_LINEAR:
+        beside = np.stack([*e.linear, *law.columns(e)], axis=1)
+        columns = np.zeros((e.pairs, 2, 2 * beside.shape[1]))
+        columns[:, 0, ::2] = columns[:, 1, 1::2] = beside
+        flat = columns.reshape(2 * e.pairs, -1)
+        weighted = found.noise.solve(columns).reshape(flat.shape)
+        inverse = np.linalg.pinv(flat.T @ weighted, hermitian=True)
+        x = inverse @ (weighted.T @ e.misses.ravel())
+        # columns are of q and v in turn, each for both numbers of the next state
+        at = np.array([0, 2, 1, 3])
+        scale = max(found.chi2 / max(found.freedom, 1), 1.0)
+        error = math.sqrt(scale * float(slope @ inverse[at][:, at] @ slope)) / known
+        lost = part.g * part.stride - float(slope @ x[at])
+        if lost <= ERRORS * part.g_error * part.stride * max(error, 1.0):
+            return False
+    return True
 
 
 def explained_by(e: Evidence, found: Regression) -> Explanation:
