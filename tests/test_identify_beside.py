@@ -120,6 +120,32 @@ def test_dry_friction_is_told_with_its_force(step: Any, share: float, frames: in
     assert np.isclose(said, dry, rtol=1e-2 if step is verlet else 0.1)
 
 
+@pytest.mark.parametrize(
+    ("share", "h", "frames"), [(0.02, 0.39, 200), (0.3, 0.2, 40), (0.3, 0.39, 200), (0.02, 0.39, 12)]
+)
+def test_dry_friction_that_holds_a_motion_in_the_end_or_of_few_frames_is_told(
+    share: float, h: float, frames: int
+) -> None:
+    """From where the velocity changes its sign in every frame it was Andersen's thermostat."""
+    q, v, rows = 1.1, 0.4, []
+    for _ in range(frames):
+        rows.append((q, v))
+        v -= h * 1.7 * (q + share * np.sign(v))
+        q += h * v
+    q, v = np.array(rows).T
+    found = identify(h * np.arange(frames), q, v=v, mass=1.0, stiffness=1.7)
+    assert (found.scheme, found.fits) == (None, False)
+    assert found.statement.startswith(f"Dry (Coulomb) friction acts: a force of one size, {1.7 * share:.6g} ")
+
+
+def test_what_misses_by_the_size_of_the_state_is_no_exact_solution() -> None:
+    def force(q: Any, v: Any, t: float) -> Any:
+        return -1.7 * q - 0.17 * np.sign(v)
+
+    t, q, v = march(heun, 1.1, 0.4, force, 200)
+    assert "exact solution" not in identify(t, q, v=v, mass=1.0, stiffness=1.7).statement
+
+
 def test_a_repeated_frame_of_a_motion_with_quadratic_drag_names_no_scheme_of_the_rest() -> None:
     """What the drag leaves over makes the map of the other frames so uncertain that others fit it."""
 

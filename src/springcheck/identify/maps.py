@@ -80,6 +80,8 @@ class MapTable:
     kinds: tuple[tuple[str, NDArray[np.bool_]], ...]
     """Kinds of map other than stages, and which families are of it (F,)."""
     path: Floats
+    scaled: NDArray[np.bool_]
+    """Whether a whole state is multiplied by coefficients, and not only what is added to it (F,)."""
     held: NDArray[np.bool_]
     damped: bool
 
@@ -202,9 +204,16 @@ def table(families: tuple[Family, ...]) -> MapTable:
         inside=_in_both_widths(np.array([not family.stages for family in families])),
         kinds=tuple((name, np.array(members)) for name, members in kinds.items() if any(members)),
         path=np.array([family.path for family in families], np.float64),
+        scaled=np.array([not _adds(family) for family in families]),
         held=np.array(kinds["held"]),
         damped=any(family.damped for family in families),
     )
+
+
+def _adds(family: Family) -> bool:
+    """Whether every step adds kicks, drifts or slopes to a state, and multiplies none."""
+    explicit = bool(family.stages) or len(family.stability[1]) == 1
+    return explicit and {kind for kind, _ in family.stages} <= {"kick", "drift", "explicit"}
 
 
 def unit(family: Family, a: Reals, g: Reals) -> Reals:
