@@ -302,11 +302,6 @@ def powers(entries: Extended, frames: int) -> Extended:
     return np.asarray(out[:frames])
 
 
-def _splitting(a: Reals, first: float, drift: float, second: float) -> Reals:
-    q11, q12 = 1 - drift * first * a, drift + 0 * a
-    return _matrices(q11, q12, -a * (first + second * q11), 1 - second * a * q12)
-
-
 def _lagging(a: Reals, base: str, steps: int) -> Reals:
     """The map of (q_n, v_(n + steps)): the same motion, its velocities of another frame."""
     m = unit(FAMILIES[base], a, np.zeros_like(a))
@@ -324,11 +319,6 @@ FORMULAS: dict[str, Callable[[Reals], Reals]] = {
     "halves swapped": lambda a: _matrices(1 - a, 0.5 + 0 * a, -a * (1 - a / 2), 1 - a / 4),
     "implicit velocity": lambda a: _matrices(1 + 0 * a, 1 + 0 * a, -a / (1 + a), 1 / (1 + a)),
     "one iteration": lambda a: _matrices(1 - a, 1 - a, -a, 1 - a),
-    "half drift": lambda a: _splitting(a, 0.5, 0.5, 0.5),
-    "double drift": lambda a: _splitting(a, 0.5, 2, 0.5),
-    "full kicks": lambda a: _splitting(a, 1, 1, 1),
-    "no second kick": lambda a: _splitting(a, 0.5, 1, 0),
-    "no first kick": lambda a: _splitting(a, 0, 1, 0.5),
     **{
         f"{name} {'behind' if n < 0 else 'ahead'}": partial(_lagging, base=name, steps=n)
         for name in (EULER, VERLET, POSITION, "rk4", "exact")

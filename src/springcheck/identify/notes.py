@@ -46,7 +46,7 @@ LEAPFROG = {
 
 
 def separation(seen: Measured, one: Joint, other: Joint) -> float:
-    """Mahalanobis distance of two schemes' maps, each at its best, by the errors of the other's comparison."""
+    """Mahalanobis distance of two schemes' maps, each at its best, by the other's errors."""
     total = 0.0
     for found, terms, a, b in zip(seen.maps, seen.terms, one.parts, other.parts, strict=True):
         target, first = Target(found, terms), np.zeros(1, np.int64)
