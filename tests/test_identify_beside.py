@@ -120,6 +120,32 @@ def test_dry_friction_is_told_with_its_force(step: Any, share: float, frames: in
     assert np.isclose(said, dry, rtol=1e-2 if step is verlet else 0.1)
 
 
+@pytest.mark.parametrize(
+    ("share", "h", "frames"), [(0.02, 0.39, 200), (0.3, 0.2, 40), (0.3, 0.39, 200), (0.02, 0.39, 12)]
+)
+def test_dry_friction_that_holds_a_motion_in_the_end_or_of_few_frames_is_told(
+    share: float, h: float, frames: int
+) -> None:
+    """From where the velocity changes its sign in every frame it was Andersen's thermostat."""
+    q, v, rows = 1.1, 0.4, []
+    for _ in range(frames):
+        rows.append((q, v))
+        v -= h * 1.7 * (q + share * np.sign(v))
+        q += h * v
+    q, v = np.array(rows).T
+    found = identify(h * np.arange(frames), q, v=v, mass=1.0, stiffness=1.7)
+    assert (found.scheme, found.fits) == (None, False)
+    assert found.statement.startswith(f"Dry (Coulomb) friction acts: a force of one size, {1.7 * share:.6g} ")
+
+
+def test_what_misses_by_the_size_of_the_state_is_no_exact_solution() -> None:
+    def force(q: Any, v: Any, t: float) -> Any:
+        return -1.7 * q - 0.17 * np.sign(v)
+
+    t, q, v = march(heun, 1.1, 0.4, force, 200)
+    assert "exact solution" not in identify(t, q, v=v, mass=1.0, stiffness=1.7).statement
+
+
 def test_a_repeated_frame_of_a_motion_with_quadratic_drag_names_no_scheme_of_the_rest() -> None:
     """What the drag leaves over makes the map of the other frames so uncertain that others fit it."""
 
@@ -132,3 +158,23 @@ def test_a_repeated_frame_of_a_motion_with_quadratic_drag_names_no_scheme_of_the
     t, q, v = march(explicit, 0.7, 0.2, force, 201)
     q, v = (np.insert(x, 131, x[131])[:201] for x in (q, v))
     assert identify(t, q, v=v).statement.startswith("The motion stands still for a step: it is repeated at")
+
+
+@pytest.mark.parametrize("drag", [0, 1])
+@pytest.mark.parametrize(
+    ("step", "every_h", "frames"), [(verlet, 0.3, 60), (verlet, 0.1, 200), (heun, 0.3, 60)]
+)
+def test_few_digits_do_not_tell_a_small_quadratic_drag_from_friction_and_say_so(
+    step: Any, every_h: float, frames: int, drag: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The drag's friction is known to 50 of its errors; a linear one of ten times its size shows."""
+    monkeypatch.setitem(globals(), "H", every_h)
+
+    def force(q: Any, v: Any, t: float) -> Any:
+        return -1.7 * q - (0.003 * np.abs(v) * v if drag else 0.03 * v)
+
+    t, q, v = march(step, 1.1, 0.4, force, frames)
+    q, v = (np.array([float(f"{x:.3g}") for x in y]) for y in (q, v))
+    found = identify(t, q, v=v, mass=1.0, stiffness=1.7, step=every_h)
+    assert found.fits
+    assert ("not known here" in found.statement) == bool(drag)

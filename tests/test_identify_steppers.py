@@ -146,3 +146,17 @@ def test_a_wrong_claim_on_an_anharmonic_scene_is_answered_by_the_scheme(
     assert any(v.why.endswith(f"Every step recorded there is that of {said}") for v in failed), failed
     longer = driver.run(replace(scene, step=1.001 * scene.step), made)
     assert seen_to_take(scene, replace(longer, step=scene.step), 50) == ""
+
+
+@pytest.mark.parametrize(("box", "begins"), [(2.0, -1.0), (3.0, -1.5), (10.0, 0.0)])
+def test_positions_that_a_step_wraps_into_a_box_are_named(box: float, begins: float) -> None:
+    """They were noise, a wrong start, a restart from one digit."""
+
+    def step(q: Any, p: Any, h: float, force: Force, m: Any) -> tuple[Any, Any]:
+        p = p + h / 2 * force(q)
+        q = q + h * p / m
+        return q - box * ((q - begins) // box), p + h / 2 * force(q)
+
+    found = identify_stepper(step)
+    assert (found.scheme, found.fits) == (None, False)
+    assert found.statement.startswith(f"The positions are wrapped into a box of {box:g},")

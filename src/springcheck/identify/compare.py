@@ -50,7 +50,8 @@ class Target:
         uncertain by the roundings of its path times what s steps add to a state, whatever the fit says.
         """
         added = np.minimum(np.sqrt(np.abs(x.a)) + np.abs(x.g), 1)
-        whole = (every.path[x.which] * added + WHOLE) * s * self.largest * self.terms.rounding
+        whole = np.where(every.scaled[x.which], WHOLE, WHOLE / math.sqrt(len(self.found.z)))
+        whole = (every.path[x.which] * added + whole) * s * self.largest * self.terms.rounding
         return np.asarray(1 / np.sqrt(self.variance[:, None] + whole**2))
 
     def entries(self, every: MapTable, x: Guesses, s: Floats, values: Reals) -> Reals:

@@ -68,7 +68,7 @@ def _solver(e: Evidence) -> list[Explanation]:
         joints += nearest([e.found], [e.terms], distinct(damped=True), strides)
         distances = {x: distance(e.found, x.parts[0]) for x in joints}
         near = min((x for x in joints if x.scheme == "exact"), key=lambda x: distances[x], default=None)
-        if near is None or distances[near] > 0.05:
+        if near is None or max(distances[near], residual) > 0.05:
             return []
         # without friction every scheme is far from a damped motion, and says nothing of its steps
         alike = [(x, d) for x, d in distances.items() if x.scheme != "exact" and x.damped <= near.damped]

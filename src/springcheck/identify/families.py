@@ -238,16 +238,21 @@ WRONG_RK4: tuple[tuple[str, tuple[Any, ...], tuple[Any, ...]], ...] = (
 )
 """What is written down wrongly in Runge-Kutta methods, as tableaux."""
 
-_FAULTS = (
+_FAULTS: tuple[tuple[Any, ...], ...] = (
     ("old force", "Velocity Verlet whose second half kick uses the old force, "
      "so that one force is held over the whole step", "compute the force anew after the drift"),
     ("halves swapped", "Velocity Verlet with its halves swapped: q + h/2 v + h**2 a, not q + h v + h**2/2 a",
      "move the factor 1/2 from h v to h**2 a"),
-    ("half drift", "Velocity Verlet with a drift of half the step", "drift by the whole step"),
-    ("double drift", "Velocity Verlet with a drift of two steps", "drift by one step between half kicks"),
-    ("full kicks", "Velocity Verlet with two full kicks instead of two half kicks", "halve both kicks"),
-    ("no second kick", "Velocity Verlet without its second half kick", "add the half kick after the drift"),
-    ("no first kick", "Velocity Verlet without its first half kick", "add the half kick before the drift"),
+    ("half drift", "Velocity Verlet with a drift of half the step", "drift by the whole step",
+     HALF_KICK, HALF_DRIFT, HALF_KICK),
+    ("double drift", "Velocity Verlet with a drift of two steps", "drift by one step between half kicks",
+     HALF_KICK, DRIFT, DRIFT, HALF_KICK),
+    ("full kicks", "Velocity Verlet with two full kicks instead of two half kicks", "halve both kicks",
+     KICK, DRIFT, KICK),
+    ("no second kick", "Velocity Verlet without its second half kick", "add the half kick after the drift",
+     HALF_KICK, DRIFT),
+    ("no first kick", "Velocity Verlet without its first half kick", "add the half kick before the drift",
+     DRIFT, HALF_KICK),
     ("implicit velocity", "An implicit velocity, but the position is moved by the old velocity",
      "move the position by the new velocity: q + h v'"),
     ("one iteration", "Implicit Euler by one fixed-point iteration, so that its equation is not solved",
@@ -262,10 +267,11 @@ def title(scheme: str) -> str:
     return name[0].upper() + name[1:]
 
 
-def _fault(name: str, cause: str, remedy: str) -> Family:
+def _fault(name: str, cause: str, remedy: str, *stages: Stage) -> Family:
     return Family(
-        name=f"fault: {name}", scheme=name, formula=name, cause=cause, remedy=remedy, path=20, limit=1.0
-    )
+        name=f"fault: {name}", scheme=name, formula="" if stages else name, stages=stages, cause=cause,
+        remedy=remedy, path=20, limit=1.0,
+    )  # fmt: skip
 
 
 FAULTS = (

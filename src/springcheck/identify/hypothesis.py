@@ -28,9 +28,6 @@ EXCLUDED = ERRORS**2
 SURE = 6.0
 """Standard errors by which a number differs from another for certain, and within which it may be off."""
 
-LAW_SHOWS = 50.0
-"""Standard errors of a friction from which its law shows: by another a tenth of it is unlike."""
-
 STRIDES = 12, 100
 """Steps to a frame looked at: up to so many, and where nothing fits, or a choice is left, up to those."""
 
@@ -110,11 +107,6 @@ class Joint:
     @property
     def damped(self) -> bool:
         return FAMILIES[self.family].damped and not FAMILIES[self.family].held
-
-    @property
-    def shows_law(self) -> bool:
-        """Whether a drag that is not linear in the velocity would not fit as well as its friction, if any."""
-        return not self.damped or all(x.g > LAW_SHOWS * x.g_error for x in self.parts)
 
     @property
     def keeps_area(self) -> bool:

@@ -17,6 +17,7 @@ from springcheck.identify.coarse import CHANCE
 from springcheck.identify.evidence import FALLS, LEFT_BY_ROUNDING, Evidence, matched
 from springcheck.identify.families import title
 from springcheck.identify.fit import fit
+from springcheck.identify.hypothesis import ERRORS, Match
 from springcheck.identify.result import Explanation
 from springcheck.physics.arrays import Floats
 
@@ -60,6 +61,8 @@ class Regression:
     """Numbers that the law has for each of position and velocity, those of the map among them."""
     counted: float
     """Pairs that count: those that are large beside the others."""
+    above: int
+    """Pairs that one map misses by more than rounding."""
     x: Floats
     """Coefficients (columns, 2) of the map's columns, then of the law's."""
     turn: float
@@ -72,7 +75,9 @@ class Regression:
     @property
     def shows(self) -> bool:
         """Whether so many pairs follow the law, or so closely, that chance leaves no such share."""
-        spare = self.counted - self.parameters
+        # every pair that is explained to rounding is one that chance would have missed
+        counted = self.above if self.exact and not self.law.flexible else self.counted
+        spare = counted - self.parameters
         closely = spare > 0 and self.left**spare < CHANCE
         return self.counted > PAIRS_A_NUMBER * self.parameters or (
             closely and (self.law is POWERS or not self.law.flexible)
@@ -102,7 +107,7 @@ def regression(e: Evidence, law: Cause) -> Regression:
         # a pair of which a law says nothing is not explained by it: the map is that of the others
         own = every[:, : len(e.linear)]
         missing = missing - own @ np.linalg.lstsq(own, missing)[0]
-    square = np.sum(missing**2, axis=1)
+    square, above = np.sum(missing**2, axis=1), np.any(np.abs(missing) > FALLS * rounding, axis=1)
     total = float(np.sum(square))
     share = len(missing) / max(len(missing) - int(rank), 1)
     return Regression(
@@ -111,7 +116,8 @@ def regression(e: Evidence, law: Cause) -> Regression:
         parameters=int(rank) - (len(e.linear) - 2) + 3 * law.waves,
         counted=total**2 / float(np.sum(square**2)) if total else 0.0,
         left=math.sqrt(float(np.sum(left**2)) * share / total) if total else 1.0,
-        worst=float(np.max(np.abs(left), initial=0.0)), exact=bool(np.all(np.abs(left) <= rounding)),
+        worst=float(np.max(np.abs(left), initial=0.0)), above=int(np.count_nonzero(above)),
+        exact=bool(np.all(np.abs(left) <= rounding)),
     )  # fmt: skip
 
 
@@ -132,9 +138,12 @@ def _alternating(e: Evidence) -> list[Floats]:
 
 
 def _directions(e: Evidence) -> list[Floats]:
-    """Sign of the velocity (f - 1,); NaN near where it turns round, in a step or in a stage of one."""
+    """Sign of the velocity (f - 1,); NaN near where it turns round, in a step or in a stage of one, and from
+    where it does so in every frame on, or rests: there friction holds it."""
     old, new = e.states[:-1, 1], e.states[1:, 1]
     clear = (old * new > 0) & (2 * np.minimum(np.abs(old), np.abs(new)) > np.abs(new - old))
+    held = np.flatnonzero((old[:-1] * new[:-1] <= 0) & (old[1:] * new[1:] <= 0))
+    clear[held[0] if len(held) else len(clear) :] = False
     both = np.unique(np.sign(old[clear])).size > 1
     return [np.where(clear & both, np.sign(old), math.nan)]
 
@@ -283,6 +292,32 @@ LAWS = (
     OUTER_DRIVE,
 )  # fmt: skip
 """Laws of the force at each step, in the order in which those that explain as much are named."""
+
+
+NOT_LINEAR = [x for x in LAWS if x.kind in (OF_VELOCITY, ANHARMONIC) and not x.flexible]
+"""Laws of a force that a linear friction stands for where numbers are few."""
+
+
+def friction_shows(e: Evidence, part: Match) -> bool:
+    """Whether a friction is left where the columns of a law that is not linear stand beside the map's."""
+    found, slope = e.found, np.linalg.inv(e.found.entries.astype(np.float64)).T.reshape(4)
+    known = math.sqrt(float(slope @ found.covariance @ slope))
+    for law in NOT_LINEAR:
+        beside = np.stack([*e.linear, *law.columns(e)], axis=1)
+        columns = np.zeros((e.pairs, 2, 2 * beside.shape[1]))
+        columns[:, 0, ::2] = columns[:, 1, 1::2] = beside
+        flat = columns.reshape(2 * e.pairs, -1)
+        weighted = found.noise.solve(columns).reshape(flat.shape)
+        inverse = np.linalg.pinv(flat.T @ weighted, hermitian=True)
+        x = inverse @ (weighted.T @ e.misses.ravel())
+        # columns are of q and v in turn, each for both numbers of the next state
+        at = np.array([0, 2, 1, 3])
+        scale = max(found.chi2 / max(found.freedom, 1), 1.0)
+        error = math.sqrt(scale * float(slope @ inverse[at][:, at] @ slope)) / known
+        lost = part.g * part.stride - float(slope @ x[at])
+        if lost <= ERRORS * part.g_error * part.stride * max(error, 1.0):
+            return False
+    return True
 
 
 def explained_by(e: Evidence, found: Regression) -> Explanation:

@@ -80,6 +80,8 @@ class MapTable:
     kinds: tuple[tuple[str, NDArray[np.bool_]], ...]
     """Kinds of map other than stages, and which families are of it (F,)."""
     path: Floats
+    scaled: NDArray[np.bool_]
+    """Whether a whole state is multiplied by coefficients, and not only what is added to it (F,)."""
     held: NDArray[np.bool_]
     damped: bool
 
@@ -202,9 +204,16 @@ def table(families: tuple[Family, ...]) -> MapTable:
         inside=_in_both_widths(np.array([not family.stages for family in families])),
         kinds=tuple((name, np.array(members)) for name, members in kinds.items() if any(members)),
         path=np.array([family.path for family in families], np.float64),
+        scaled=np.array([not _adds(family) for family in families]),
         held=np.array(kinds["held"]),
         damped=any(family.damped for family in families),
     )
+
+
+def _adds(family: Family) -> bool:
+    """Whether every step adds kicks, drifts or slopes to a state, and multiplies none."""
+    explicit = bool(family.stages) or len(family.stability[1]) == 1
+    return explicit and {kind for kind, _ in family.stages} <= {"kick", "drift", "explicit"}
 
 
 def unit(family: Family, a: Reals, g: Reals) -> Reals:
@@ -293,11 +302,6 @@ def powers(entries: Extended, frames: int) -> Extended:
     return np.asarray(out[:frames])
 
 
-def _splitting(a: Reals, first: float, drift: float, second: float) -> Reals:
-    q11, q12 = 1 - drift * first * a, drift + 0 * a
-    return _matrices(q11, q12, -a * (first + second * q11), 1 - second * a * q12)
-
-
 def _lagging(a: Reals, base: str, steps: int) -> Reals:
     """The map of (q_n, v_(n + steps)): the same motion, its velocities of another frame."""
     m = unit(FAMILIES[base], a, np.zeros_like(a))
@@ -315,11 +319,6 @@ FORMULAS: dict[str, Callable[[Reals], Reals]] = {
     "halves swapped": lambda a: _matrices(1 - a, 0.5 + 0 * a, -a * (1 - a / 2), 1 - a / 4),
     "implicit velocity": lambda a: _matrices(1 + 0 * a, 1 + 0 * a, -a / (1 + a), 1 / (1 + a)),
     "one iteration": lambda a: _matrices(1 - a, 1 - a, -a, 1 - a),
-    "half drift": lambda a: _splitting(a, 0.5, 0.5, 0.5),
-    "double drift": lambda a: _splitting(a, 0.5, 2, 0.5),
-    "full kicks": lambda a: _splitting(a, 1, 1, 1),
-    "no second kick": lambda a: _splitting(a, 0.5, 1, 0),
-    "no first kick": lambda a: _splitting(a, 0, 1, 0.5),
     **{
         f"{name} {'behind' if n < 0 else 'ahead'}": partial(_lagging, base=name, steps=n)
         for name in (EULER, VERLET, POSITION, "rk4", "exact")

@@ -85,7 +85,7 @@ _FAULTS = tuple(
         misses=f"other mistakes of the same map.  What to do: {one.remedy}",
     )
     for one in FAULTS
-    if one.formula
+    if not one.stability[0]
 )
 
 MEANINGS = {one.name: one for one in (*_KNOWN, *_FAULTS)}

@@ -20,7 +20,8 @@ from springcheck.identify.candidates import (
 from springcheck.identify.evidence import Measured
 from springcheck.identify.families import FAMILIES, title
 from springcheck.identify.fit import Map
-from springcheck.identify.hypothesis import Match
+from springcheck.identify.hypothesis import Joint, Match
+from springcheck.identify.laws import friction_shows
 from springcheck.identify.misplaced import turned
 from springcheck.identify.notes import (
     LEAPFROG,
@@ -64,7 +65,7 @@ def named(seen: Measured, explained: Explained, step: float | None) -> Identific
         joints, stated_fits = of_rate or joints, stated_fits and bool(of_rate)
         seen = seen if of_rate else replace(seen, friction=None)
     found = _known(seen, {x: explained[x] for x in joints}, stated_fits)
-    plainly = friction is not None or seen.record.deep or all(x.shows_law for x in joints)
+    plainly = friction is not None or seen.record.deep or all(_shows_law(seen, x) for x in joints)
     if seen.stiffness is None:
         of_maps = zip(seen.maps, seen.terms, strict=True)
         plainly = plainly and any(visible(*x, damped=joints[0].damped) for x in of_maps)
@@ -80,6 +81,12 @@ def named(seen: Measured, explained: Explained, step: float | None) -> Identific
     # a scheme on another spring, or a wrong one on the stated spring: the latter is the plainer
     other = [x.cause for x in found.explanations if ": " in x.cause]
     return found.refuted("; or ".join([faults[0].cause, *other]), *faults, *found.explanations)
+
+
+def _shows_law(seen: Measured, joint: Joint) -> bool:
+    """Whether a drag or a force that is not linear would not fit as well as its friction, if any."""
+    each = enumerate(joint.parts)
+    return not joint.damped or all(friction_shows(seen.evidence(i), part) for i, part in each)
 
 
 def _known(seen: Measured, explained: Explained, stated_fits: bool) -> Identification:

@@ -9,11 +9,13 @@ import numpy as np
 
 from springcheck.errors import IdentificationError
 from springcheck.identify.clock import FEWEST_STATES
-from springcheck.identify.compare import compare
+from springcheck.identify.compare import Target, compare
 from springcheck.identify.evidence import Measured
 from springcheck.identify.families import FAMILIES, title
 from springcheck.identify.fit import Map
+from springcheck.identify.guesses import Guesses
 from springcheck.identify.hypothesis import ERRORS, SURE, Joint, Terms
+from springcheck.identify.maps import table
 from springcheck.identify.record import DEEP, Record
 from springcheck.identify.result import OR_UNKNOWN, Explanation, Identification
 from springcheck.identify.search import coincident, identical
@@ -43,17 +45,16 @@ LEAPFROG = {
 }
 
 
-def separation(maps: list[Map], one: Joint, other: Joint) -> float:
-    """Mahalanobis distance of two schemes' maps, each at its best, by the covariance of the measured ones."""
+def separation(seen: Measured, one: Joint, other: Joint) -> float:
+    """Mahalanobis distance of two schemes' maps, each at its best, by the other's errors."""
     total = 0.0
-    for found, a, b in zip(maps, one.parts, other.parts, strict=True):
-        if "inverse" not in found.found:
-            error = np.sqrt(np.diag(found.covariance))
-            even = found.covariance / error[:, None] / error[None, :]
-            found.found["inverse"] = np.linalg.pinv(even, hermitian=True) / error[:, None] / error[None, :]
-        off = np.array(a.predicted) - np.array(b.predicted)
-        total += float(off @ found.found["inverse"] @ off)
-    return math.sqrt(max(total, 0.0))
+    for found, terms, a, b in zip(seen.maps, seen.terms, one.parts, other.parts, strict=True):
+        target, first = Target(found, terms), np.zeros(1, np.int64)
+        at = Guesses(which=first, root=first, a=np.array([b.a]), g=np.array([b.g]))
+        weight = target.weight(table((FAMILIES[b.family],)), at, np.array([float(b.stride)]))[:, 0]
+        off = target.axes.T @ (np.array(a.predicted) - np.array(b.predicted)).astype(np.float64)
+        total += float(np.sum((weight * off) ** 2))
+    return math.sqrt(total)
 
 
 def of_few(record: Record, found: Identification) -> Identification:
@@ -204,7 +205,7 @@ def untold(seen: Measured, joints: list[Joint]) -> list[str]:
         told = ["more digits", "a larger step"]
     else:
         others = [x for x in joints[1:] if (x.scheme, x.stride) != (plainest.scheme, plainest.stride)]
-        apart = ((separation(seen.maps, plainest, x), x) for x in others)
+        apart = ((separation(seen, plainest, x), x) for x in others)
         least, nearest = min(apart, key=lambda pair: pair[0])
         digits = math.ceil(math.log10(APART / least)) if least > 0 else MOST_DIGITS + 1
         pair = f"the data cannot tell these apart: the maps of {plainest} and {nearest}"

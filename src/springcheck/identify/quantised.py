@@ -8,27 +8,26 @@ is those forces; noise of the same size, or an error that goes with anything els
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache, partial
+from functools import partial
 from typing import TypeAlias
 
 import numpy as np
 
 from springcheck.identify import coarse
 from springcheck.identify.coarse import CHANCE, EXCESS, QUANTUM, over_single
-from springcheck.identify.families import FAMILIES, Family
+from springcheck.identify.families import FAMILIES
 from springcheck.identify.fit import Map
 from springcheck.identify.hypothesis import Match
-from springcheck.identify.maps import KINDS
 from springcheck.identify.record import Record
 from springcheck.physics.arrays import Floats
-from springcheck.schemes import SCHEMES, number
+from springcheck.schemes import SCHEMES, Scheme, number
 
 EXPLAINED = 0.3
 """Share of the misses in the root mean square that is left at most where forces are cut off: of the noise of
 unlike forces more than all is left, 1.4 of it."""
 
 REFINED = 16
-"""Newton's steps of stiffness and friction, which the misses bias, with forces cut off."""
+"""Newton's steps of the stiffness, which the misses bias, with forces cut off."""
 
 Force: TypeAlias = Callable[[Floats, Floats], Floats]
 """k (c, 1) and q (c, f) -> -k q as an arithmetic has it, both k and the result in quanta, powers of 2."""
@@ -45,26 +44,13 @@ def _all_single(k: Floats, q: Floats) -> Floats:
     return ((-k).astype(np.float32) * q.astype(np.float32)).astype(np.float64)
 
 
-def _cut(k: Floats, q: Floats) -> Floats:
-    return np.trunc(-k * q)
-
-
-def _rounded(k: Floats, q: Floats) -> Floats:
-    return np.rint(-k * q)
-
-
-def _floor(k: Floats, q: Floats) -> Floats:
-    return np.floor(-k * q)
-
-
-def _then_cut(inner: Force) -> Force:
-    return lambda k, q: np.trunc(inner(k, q))
-
-
 FORCES: dict[str, tuple[Force, ...]] = {
-    "fixed-point force": (_cut, _rounded, _floor),
-    "mixed": (_single, _all_single, _then_cut(_single), _then_cut(_all_single)),
-}
+    "fixed-point force": (lambda k, q: np.trunc(-k * q), lambda k, q: np.rint(-k * q)),
+    "mixed": (
+        _single, _all_single,
+        lambda k, q: np.trunc(_single(k, q)), lambda k, q: np.trunc(_all_single(k, q)),
+    ),
+}  # fmt: skip
 
 
 def coarse_forces(record: Record, j: int, found: Map, match: Match, signed: Floats) -> tuple[str, str, bool]:
@@ -81,11 +67,9 @@ def coarse_forces(record: Record, j: int, found: Map, match: Match, signed: Floa
 
 
 def _reproduced(record: Record, j: int, found: Map, match: Match, precision: str) -> bool:
-    """Whether forces of a precision, carried out, explain what frames miss."""
+    """Whether forces of a precision, in an explicit scheme without friction, explain what frames miss."""
     family = FAMILIES[match.family]
-    if record.mass is None or found.slips is not None or family.held or family.flow:
-        return False
-    if family.scheme not in SCHEMES or SCHEMES[family.scheme].has("implicit"):
+    if record.mass is None or family.damped or SCHEMES[family.scheme].has("implicit"):
         return False
     mass, h = float(record.mass[j]), float(record.interval) / match.stride
     # about the equilibrium; velocities as lengths
@@ -93,46 +77,33 @@ def _reproduced(record: Record, j: int, found: Map, match: Match, precision: str
     v = (found.z[:, 1] * found.size[1] / record.interval).astype(np.float64) * h
     kick = h * h / mass * QUANTUM
 
-    def missed(values: Floats, pull: Pull, *, leaps: bool = False) -> Floats:
-        """What frames miss (c, 2 f - 2) where steps have these a and g (c, 2)."""
-        a, g = values.T[:, :, None]
-        # explicit Euler moves positions by no unknown
-        x, y = (np.broadcast_to(z[:-1], (len(values), len(z) - 1)) for z in (q, v))
+    def missed(a: Floats, pull: Pull, *, leaps: bool = False) -> Floats:
+        """What frames miss (c, 2 f - 2) where steps have these (h w)**2 (c, 1)."""
+        x, y = (np.broadcast_to(z[:-1], (len(a), len(z) - 1)) for z in (q, v))
         if leaps:
             # stored half a step early, and half a kick of the exact force added where it was read
             y = y + a * x / 2
-            for _ in range(match.stride):
-                y = y + pull(a, x)
-                x = x + y
+        scheme = SCHEMES["semi-implicit-euler" if leaps else family.scheme]
+        for _ in range(match.stride):
+            x, y = _step(scheme, x, y, partial(pull, a))
+        if leaps:
             y = y - a * x / 2
-        else:
-            for _ in range(match.stride):
-                x, y = _step(family, x, y, partial(pull, a), g)
         return np.concatenate([q[1:] - x, v[1:] - y], axis=1)
 
     def exact(a: Floats, x: Floats) -> Floats:
         return -a * x
 
-    free = [0, 1] if family.damped else [0]
-    start = np.array([[match.a, match.g]])
+    start, shift = np.array([[match.a]]), 1e-6 * match.a
     rows = missed(start, exact).reshape(2, -1)
     size = np.sqrt(np.mean(rows**2, axis=1, keepdims=True)) + 2.0**-52 * np.max(np.abs(q))
     scale = np.broadcast_to(1 / size, rows.shape).ravel()
-    slopes = []
-    for i in free:
-        shift = np.zeros(2)
-        shift[i] = 1e-6 * match.a if i == 0 else 1e-6
-        slopes.append((missed(start + shift, exact) - missed(start - shift, exact))[0] / (2 * shift[i]))
-    columns = np.stack(slopes, axis=1) * scale[:, None]
-    if not np.all(np.isfinite(columns)):
-        return False
+    slope = (missed(start + shift, exact) - missed(start - shift, exact))[0] / (2 * shift) * scale
     # what another stiffness takes away is explained without any quantum
-    inverse = np.linalg.pinv(columns).T
-    plain = start.copy()
-    plain[:, free] -= missed(start, exact) * scale @ inverse
+    inverse = (slope / (slope @ slope))[:, None]
+    plain = start - missed(start, exact) * scale @ inverse
     without = missed(plain, exact) * scale
     before = float(np.sqrt(np.mean(without**2)))
-    counted = float(np.sum(without**2) ** 2 / np.sum(without**4)) - len(free)
+    counted = float(np.sum(without**2) ** 2 / np.sum(without**4)) - 1
     if counted <= 0:
         return False
     most = min(EXPLAINED, CHANCE ** (1 / counted))
@@ -156,35 +127,19 @@ def _reproduced(record: Record, j: int, found: Map, match: Match, precision: str
                 return True
             if not np.any(np.isfinite(share)):
                 break
-            values[:, free] -= left @ inverse
+            values = values - left @ inverse
     return False
 
 
-@cache
-def _stages(family: Family) -> tuple[tuple[str, float], ...]:
-    return tuple((kind, float(number(part, np.longdouble))) for kind, part in family.stages)
-
-
-def _step(
-    family: Family, q: Floats, v: Floats, pull: Callable[[Floats], Floats], g: Floats
-) -> tuple[Floats, Floats]:
-    """One step on (q, v h), with h**2 F/m from `pull` and the friction gamma h."""
-    inside = 0 * g if family.stages else g
-    if family.stability[0]:
-        scheme = SCHEMES[family.scheme]
-        slopes: list[tuple[Floats, Floats]] = []
-        for row in scheme.a:
-            x, y = q, v
-            for share, (dx, dy) in zip(row, slopes, strict=False):
-                x, y = x + float(share) * dx, y + float(share) * dy
-            slopes.append((y, pull(x) - inside * y))
-        for share, (dx, dy) in zip(scheme.b, slopes, strict=True):
-            q, v = q + float(share) * dx, v + float(share) * dy
-    for kind, c in _stages(family):
-        if kind == "drift":
-            q = q + c * v
-            continue
-        before, after, decay = KINDS[kind]
-        force = 0 if kind == "friction" else pull(q)
-        v = ((1 - before * c * g) * v + c * force) / (1 + after * c * g) * np.exp(-decay * c * g)
-    return q, v
+def _step(scheme: Scheme, q: Floats, v: Floats, pull: Callable[[Floats], Floats]) -> tuple[Floats, Floats]:
+    """One step on (q, v h), with h**2 F/m from `pull`."""
+    slopes: list[tuple[Floats, Floats]] = []
+    for row in (*scheme.a, scheme.b):
+        x, y = q, v
+        for share, (dx, dy) in zip(row, slopes, strict=False):
+            x, y = x + float(share) * dx, y + float(share) * dy
+        slopes.append((y, pull(x)))
+    for kind, part in scheme.stages:
+        c = float(number(part, np.longdouble))
+        x, y = (x + c * y, y) if kind == "drift" else (x, y + c * pull(x) * (kind != "friction"))
+    return x, y

@@ -38,6 +38,9 @@ TINY_STEP = 1e-6, 1e-3
 RUNAWAY = 1e5
 """Growth of a state at which a run ends."""
 
+ALONG, MANY_PLACES = 4.0, 257
+"""Largest position from which a step is taken, and how many places there are."""
+
 LONG = 16
 """Part of the time on the well that one step takes by which schemes of one map on a spring are told apart."""
 
@@ -146,6 +149,9 @@ def identify_stepper(step: Stepper) -> Identification:
     found = results[0]
     if not found.fits and _draws(step):
         return _identified(step, frames=BATH_FRAMES)
+    if not all(x.fits for x in results) and (leaps := _leaps(step)):
+        # a motion that is torn says nothing else
+        return replace(found.refuted(leaps.cause, leaps), nearest=None)
     wrong = [*_on_springs(step, results), *_unasked_friction(found)]
     if any(x.cause.startswith(ONE_MAP) for x in found.explanations[:1]):
         wrong += _short(step)
@@ -260,6 +266,21 @@ def _unasked_friction(found: Identification) -> list[Explanation]:
     whose = title(found.candidates[0].scheme)
     cause = f"{whose} with a friction that the force has not: c/m is {rates}"
     return [Explanation(cause=cause, remedy="set the damping to 0, which many engines do not by default")]
+
+
+def _leaps(step: Stepper) -> Explanation | None:
+    """Explain positions that are put back into a box: linear in where a step starts, but for equal leaps."""
+    m, k, h = SPRINGS[0]
+    places = np.linspace(-ALONG, ALONG, MANY_PLACES)
+    moved = np.diff([_one(step, q, 0.7 * m, h, _spring(k), m)[0] for q in places])
+    usual = float(np.median(moved))
+    off = np.abs(moved - usual)
+    leaps, rest = off[off > abs(usual)], off[off <= abs(usual)]
+    if not len(leaps) or np.ptp(leaps) > 1e-9 * leaps[0] or np.max(rest) > 1e-9 * abs(usual):
+        return None
+    cause = f"The positions are wrapped into a box of {leaps[0]:.6g}, and forces are those of wrapped ones"
+    remedy = "do not wrap positions between steps, or take the nearest image where forces are worked out"
+    return Explanation(cause=cause, remedy=remedy)
 
 
 def _draws(step: Stepper) -> bool:

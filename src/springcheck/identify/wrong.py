@@ -180,60 +180,46 @@ def _meaning(e: Evidence, x: Joint) -> tuple[bool, str, str] | None:
     part = x.parts[0]
     scale = math.exp(-part.log_mass)
     known = 6 * (part.mass_error + part.a_error / abs(part.a)) + e.record.jitter + 32 * ROUNDING
-
-    def is_(one: float, other: float, room: float = 1e-6) -> bool:
-        return abs(one / other - 1) <= room + known
-
     h = float(e.record.interval) / x.stride
-    mass = None if e.record.mass is None else float(e.record.mass[e.j])
-    stiffer = part.a * x.stride**2 / e.stated if e.stated else None
-    agrees = stiffer is not None and any(is_(stiffer, y, 0.0) for y in (1.0, scale, scale**2))
-    if stiffer is not None and is_(stiffer, scale**2, 0.0):
-        if is_(scale, 1 / h**2):
-            return agrees, ", but the step taken is 1/h: it divides by the step", "multiply by the step"
-        cause = (
-            f", but times are {1 / scale:.6g} times what was stepped: the step taken is {scale:.6g} times "
-            "theirs"
-        )
-        if abs(scale - 1) <= 1e-2:
-            longer = f"{scale - 1:.3g} of it"
-            cause = f", but times are not what was stepped: the step taken is longer than theirs by {longer}"
-        return agrees, cause, "look at how time is counted: the times are wrong by that factor"
-    if mass is not None and is_(scale, mass):
-        if stiffer is not None and is_(stiffer, 1.0):
-            return (
-                agrees,
-                ", but p is treated as a velocity: dq/dt = p and dp/dt = F/m",
-                "divide p by the mass in the drift only",
-            )
-        return agrees, ", but the mass is left out: dq/dt = p", "divide the momentum by the mass in the drift"
-    if mass is not None and is_(scale, 1 / mass):
-        return (
-            agrees,
-            ", but velocities are divided by the mass once more",
-            "divide the momentum by the mass once",
-        )
-    if stiffer is not None and is_(stiffer, scale, 0.0) and is_(scale, 1 / h**2):
-        cause = f", but velocities would have to be {scale:.6g} times as large: the drift divides by the step"
-        return agrees, cause, "multiply by the step"
-    if mass is not None and stiffer is not None and is_(stiffer, scale, 0.0):
-        # what divides momenta and forces alike
-        return (
-            agrees,
-            f" in a mass {_times(1 / scale)} times the stated one",
-            "look at the mass and its units: dq/dt = p/m and (h w)**2 = h**2 k/m show the same other one",
-        )
-    of_mass = (
-        "" if mass is None or stiffer is not None else f"; or the mass {_times(1 / scale)} times as large"
-    )
-    for factor, meaning in CONSTANTS:
-        if is_(scale, factor):
-            return (
-                agrees,
-                f", but velocities would have to be {scale:.6g} times as large: {meaning}{of_mass}",
-                "look at the units of positions, velocities and times",
-            )
+    mass = math.nan if e.record.mass is None else float(e.record.mass[e.j])
+    stiffer = part.a * x.stride**2 / e.stated if e.stated else math.nan
+    agrees = any(abs(stiffer / scale**n - 1) <= known for n in range(3))
+    for factor, power, meaning, remedy in _meanings(scale, mass, h, stated=bool(e.stated)):
+        room = known + (UNSCALED if power in (None, 0) else 0.0)
+        if (factor is None or abs(scale / factor - 1) <= UNSCALED + known) and (
+            power is None or abs(stiffer / scale**power - 1) <= room
+        ):
+            return agrees, meaning, remedy
     return None
+
+
+def _meanings(
+    scale: float, mass: float, h: float, *, stated: bool
+) -> list[tuple[float | None, int | None, str, str]]:
+    """What a scale of the velocities may mean: the scale that means it, and the power of the scale that the
+    stiffness is times the stated one, None where either may be any; the meaning, and what to do."""
+    large, factor = f", but velocities would have to be {scale:.6g} times as large: ", _times(1 / scale)
+    taken = f"{1 / scale:.6g} times what was stepped: the step taken is {scale:.6g} times theirs"
+    if abs(scale - 1) <= 1e-2:
+        taken = f"not what was stepped: the step taken is longer than theirs by {scale - 1:.3g} of it"
+    known = not math.isnan(mass)
+    of_mass = f"; or the mass {factor} times as large" if known and not stated else ""
+    units = "look at the units of positions, velocities and times"
+    return [
+        (1 / h**2, 2, ", but the step taken is 1/h: it divides by the step", "multiply by the step"),
+        (None, 2, f", but times are {taken}",
+         "look at how time is counted: the times are wrong by that factor"),
+        (mass, 0, ", but p is treated as a velocity: dq/dt = p and dp/dt = F/m",
+         "divide p by the mass in the drift only"),
+        (mass, None, ", but the mass is left out: dq/dt = p", "divide the momentum by the mass in the drift"),
+        (1 / mass, None, ", but velocities are divided by the mass once more",
+         "divide the momentum by the mass once"),
+        (1 / h**2, 1, f"{large}the drift divides by the step", "multiply by the step"),
+        # what divides momenta and forces alike
+        (None if known else mass, 1, f" in a mass {factor} times the stated one",
+         "look at the mass and its units: dq/dt = p/m and (h w)**2 = h**2 k/m show the same other one"),
+        *((value, None, f"{large}{meaning}{of_mass}", units) for value, meaning in CONSTANTS),
+    ]  # fmt: skip
 
 
 def faults_of(seen: Measured, friction: float | None) -> list[Explanation]:
