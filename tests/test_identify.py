@@ -18,6 +18,7 @@ from springcheck.doors.function import load
 from springcheck.errors import IdentificationError, MethodError
 from springcheck.identify import Identification, identify, identify_stepper
 from springcheck.identify.hypothesis import aliases
+from springcheck.identify.result import UNTOLD, rounded_by
 from springcheck.physics.arrays import Floats, Force
 from springcheck.schemes import SCHEMES, matrix, step
 
@@ -136,6 +137,7 @@ def test_text_of_six_digits_is_enough_to_name_a_scheme(name: str) -> None:
     found = identify(made.t, text(made.q), text(made.p), **made.names)
     assert right(found, name, made), found
     assert (found.precision, found.fits) == ("text, 6 digits", True)
+    assert ": rounding to 6 digits explains every step" in found.statement
 
 
 def test_text_with_a_fixed_number_of_decimals_is_seen() -> None:
@@ -633,3 +635,16 @@ def test_a_stepper_that_is_not_there_or_fails_is_one_clear_line(tmp_path, monkey
         identify_stepper(lambda q, p, h, force, mass: 3.0)
     with pytest.raises(MethodError, match="nothing moves"):
         identify_stepper(load("mine_7f3:good"))
+
+
+@pytest.mark.parametrize(
+    ("precision", "words"),
+    [
+        ("double", "double arithmetic"),
+        ("double, stored in single", "double arithmetic, stored in single,"),
+        ("text, 6 digits and text, 3 decimals", "rounding to 6 digits and 3 decimals"),
+        (UNTOLD, "rounding"),
+    ],
+)
+def test_what_rounds_the_states_is_said_in_words(precision: str, words: str) -> None:
+    assert rounded_by(precision) == words

@@ -30,7 +30,7 @@ from springcheck.identify.notes import (
     of_stated_friction,
     of_unasked_friction,
 )
-from springcheck.identify.result import Explanation, Identification
+from springcheck.identify.result import UNTOLD, Explanation, Identification, rounded_by
 from springcheck.identify.search import Explained, visible
 from springcheck.identify.together import OF_A_BOND, of_a_bond
 from springcheck.identify.wrong import faults_like, faults_of
@@ -109,7 +109,7 @@ def _known(seen: Measured, explained: Explained, stated_fits: bool) -> Identific
     damped = any(joint.damped for joint in joints)
     doubt = "" if all(joint.damped for joint in joints) else " or without"
     first = candidates[0]
-    precision = common([d.precision for d in worst]) or "cannot tell"
+    precision = common([d.precision for d in worst]) or UNTOLD
     notes += all_remarks(seen, joints, candidates)
     steps = steps_between(stride)
     law = f" with{doubt} friction" if damped else ""
@@ -125,7 +125,7 @@ def _known(seen: Measured, explained: Explained, stated_fits: bool) -> Identific
         also = f" (or {LEAPFROG[scheme]})" if scheme in LEAPFROG else ""
         slips = faults_like(scheme) if scheme in ELSEWHERE else ()
         also = "".join(f" (on a spring also {x.cause})" for x in slips) or also
-        statement = f"{title(scheme)}{also}{law}{steps}: {precision} arithmetic explains every step"
+        statement = f"{title(scheme)}{also}{law}{steps}: {rounded_by(precision)} explains every step"
     else:
         names = list(dict.fromkeys(x.scheme for x in candidates))
         more = f" and {len(names) - 4} more" if len(names) > 4 else ""

@@ -21,7 +21,7 @@ from springcheck.identify.families import FAMILIES, HELD, Family, title
 from springcheck.identify.hypothesis import FEW, SURE, Joint, Match, distinct
 from springcheck.identify.record import SIZES, Record, of_size, stated_stride
 from springcheck.identify.recurrence import FEWEST_FRAMES, Recurrence, classes, matches, recurrence
-from springcheck.identify.result import Explanation, Identification, nothing
+from springcheck.identify.result import UNTOLD, Explanation, Identification, nothing, rounded_by
 from springcheck.text.wording import either
 
 CERTAIN_CHANGE = 1e8
@@ -171,14 +171,14 @@ def _known(seen: Measured, found: list[Recurrence], kept: list[Joint], known: bo
     # several friction laws, or places of it, of one scheme are no other scheme
     fields = shared(candidates, len(found), named=stride is not None)
     fields |= {} if stride else {"step": math.nan, "stride": None}
-    scheme, precision = fields["scheme"], common([x.precision for x in found]) or "cannot tell"
+    scheme, precision = fields["scheme"], common([x.precision for x in found]) or UNTOLD
     frames = steps_between(stride)
     if scheme:
         said = common([x.law for x in candidates])
         law = f" with {said}" if said else " with friction" if all(damped) else ""
         notes += law_assumed(candidates) if all(damped) else []
         whose = held_over(joints[0]) if scheme == HELD.scheme else title(scheme)
-        statement = f"{whose}{law}{frames}, by positions alone: {precision} arithmetic explains them"
+        statement = f"{whose}{law}{frames}, by positions alone: {rounded_by(precision)} explains them"
     else:
         listed = names[:6] + ([f"{len(names) - 6} more"] if len(names) > 6 else [])
         change = "are kept" if preserving else "shrink" if float(found[0].beta) > 0 else "grow"

@@ -190,6 +190,18 @@ def _plain(x: Any, name: str = "") -> Any:
     return x
 
 
+UNTOLD = "cannot tell"
+"""Precision of states that show none."""
+
+
+def rounded_by(precision: str) -> str:
+    """What rounds states of a precision, in a sentence: double arithmetic, rounding to 6 digits."""
+    kind, comma, stored = precision.partition(", ")
+    if kind == "text":
+        return f"rounding to {precision.replace('text, ', '')}"
+    return "rounding" if precision == UNTOLD else f"{kind} arithmetic{comma}{stored}{comma.strip()}"
+
+
 OR_UNKNOWN = "; or a scheme that is not known here"
 ONLY_TURNS = "The velocity of coordinates "
 """How a statement begins of what may be no scheme on springs, but a rotation."""
