@@ -4,6 +4,7 @@ disk unless it is asked for, and results that show themselves."""
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -259,6 +260,32 @@ def test_wrong_arguments_are_answered_in_words() -> None:
     assert springcheck.compare(scene, run).labels == ("exact", "own:euler")
     numbered = [springcheck.simulate("bath-spring", "own:baoab", seed=one).q for one in (3, np.int64(3))]
     np.testing.assert_array_equal(*numbered)
+
+
+def test_a_wave_that_a_chain_has_not_is_no_other_wave() -> None:
+    for mode in (0, 4, 1.5):
+        with pytest.raises(SpringcheckError, match="modes 1 to 3"):
+            springcheck.chain(masses=3, waves=[(mode, 0.4)])
+
+
+def test_threads_that_capture_what_libraries_print_leave_the_streams_as_they_were() -> None:
+    from concurrent.futures import ThreadPoolExecutor
+    from time import sleep
+
+    from springcheck.engines import quiet
+
+    def capture(number: int) -> list[str]:
+        with quiet.caught(1) as text:
+            sleep(0.01 * (number % 3))
+            sys.stdout.write(f"{number}\n")
+        return text
+
+    shown, kept = sys.stdout, os.fstat(1)
+    with ThreadPoolExecutor(4) as threads:
+        found = list(threads.map(capture, range(12)))
+    assert found == [[str(number)] for number in range(12)]
+    assert sys.stdout is shown
+    assert (os.fstat(1).st_dev, os.fstat(1).st_ino) == (kept.st_dev, kept.st_ino)
 
 
 @pytest.mark.parametrize("name", ["states.csv", "states.npz"])

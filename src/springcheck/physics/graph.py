@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from springcheck.errors import SceneError
 from springcheck.physics.arrays import Floats, Integers
 from springcheck.physics.term import Term
 from springcheck.physics.terms import RadialSpring, Spring, WallSpring
@@ -139,9 +140,11 @@ def alike(system: Any) -> tuple[tuple[Integers, Integers], ...]:
 
 
 def standing(masses: int, waves: Sequence[tuple[int, float]]) -> Floats:
-    """Positions (n,) of standing waves (mode, amplitude) in a chain of n masses."""
+    """Positions (n,) of standing waves (mode, amplitude) in a chain of n masses.  Raises SceneError."""
     q = np.zeros(masses)
     for mode, amplitude in waves:
+        if mode not in range(1, masses + 1):
+            raise SceneError(f"waves: mode {mode}: a chain of {masses} has modes 1 to {masses}")
         # whole turns are taken off while the phase is still a whole number of 1/(n + 1) half turns
         phase = mode * np.arange(1, masses + 1) % (2 * (masses + 1))
         q += amplitude * np.sin(np.pi * phase / (masses + 1))

@@ -300,9 +300,7 @@ class System(Generic[Fields]):
         """The measure of errors of this scene (see `Norm`)."""
         q, p = self.q.astype(np.longdouble), self.p.astype(np.longdouble)
         with np.errstate(all="ignore"):
-            unit = self.kinetic_energy(p)
-            for term in self.terms:
-                unit = unit + np.abs(term.energy(q))
+            unit = sum((np.abs(term.energy(q)) for term in self.terms), self.kinetic_energy(p))
         away = np.any(self.p) or any(np.any(term.elongation(self.q)) for term in self.terms)
         if not SMALLEST_ENERGY < unit < np.inf and not WIDE and away:
             raise SceneError(
@@ -325,9 +323,8 @@ class System(Generic[Fields]):
         and that a bath gives [M L2/T2]."""
         q = self.q.astype(np.longdouble)
         push = np.abs(self.potential_force(q, 0 * q))
-        for term in self.terms:
-            if isinstance(term, Drive):
-                term.scatter(np.abs(term.amplitude), push)
+        for term in (drive for drive in self.terms if isinstance(drive, Drive)):
+            term.scatter(np.abs(term.amplitude), push)
         held = np.maximum(self.hessian_diagonal(q), self.m / self.duration**2)
         return np.sum(push * push / (2 * held)) + self.n * self.scene.thermal
 
