@@ -26,6 +26,7 @@ from springcheck.engines.contract import Label
 from springcheck.physics import scenefile as scenes
 from springcheck.studies.stability import STUDY, limits
 from springcheck.studies.stability import measure as stability
+from springcheck.studies.stability.propagators import Springs
 from springcheck.text.lines import as_text
 
 SCENES = ("detest-b1", "multiple-time-steps", "two-scales", "overdamped")
@@ -40,7 +41,7 @@ def edge(label: Label, theory: float) -> float:
     if not 0 < theory < np.inf or engines.arithmetic(label).state > 2.0**-53:
         return float("nan")
     steps = 1000
-    _, size = limits.stepped(label, theory, steps)
+    size = np.hypot(*limits.stepped(Springs(label=label, turn=np.array([theory])), steps))
     n = np.arange(steps // 10, steps + 1)
     if len(size) <= steps or np.any(size[n] <= 0):
         return float("nan")

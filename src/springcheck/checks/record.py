@@ -137,10 +137,9 @@ def line(case: Case) -> Finding:
     assert off is not None
     why = "every force along another axis is a product with 0"
     # of a start whose forces overflow there may be no second frame, whose step would tell it
-    if off and np.isfinite(how.overflow):
-        peak = np.max(strongest(case.scene.terms, case.trajectory.q.astype(np.longdouble)), initial=0)
-        if peak >= how.overflow:
-            why = f"the engine's limit: {overflows(how)}, along every axis, and a force is {peak:.3g}"
+    peak = np.max(strongest(case.scene.terms, case.trajectory.q.astype(np.longdouble))) if off else 0.0
+    if how.overflow <= peak:
+        why = f"the engine's limit: {overflows(how)}, along every axis, and a force is {peak:.3g}"
     return Finding(abs(off), 0.0, "L", why)
 
 

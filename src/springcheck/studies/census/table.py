@@ -33,8 +33,9 @@ def _velocity(offset: float | None) -> str:
     return "-" if offset is None else "synchronised" if offset == 0 else f"{offset:+g} of a step"
 
 
-def _number(x: float | None, least: float) -> str:
-    return "-" if x is None else "0" if abs(x) < least else f"{x:+.3g}"
+def amount(x: float | None, least: float, form: str = "+.3g") -> str:
+    """A signed number, 0 where it is below the least that counts."""
+    return "0" if x is not None and abs(x) < least else number(x, form)
 
 
 WATCHED: Mapping[str, tuple[str, Callable[[Mapping[str, Any]], str]]] = {
@@ -44,8 +45,8 @@ WATCHED: Mapping[str, tuple[str, Callable[[Mapping[str, Any]], str]]] = {
     "scheme": ("scheme, from the states", lambda x: titles(x["found"])),
     "velocity": ("stored velocity", lambda x: _velocity(x["velocity_offset"])),
     "substeps": ("steps inside", lambda x: str(x["substeps"] or "-")),
-    "friction": ("unasked friction c/m", lambda x: _number(x["friction"], 1e-9)),
-    "det": ("det - 1", lambda x: _number(x["area"], 1e-6 if x["precision"] == "single" else 1e-12)),
+    "friction": ("unasked friction c/m", lambda x: amount(x["friction"], 1e-9)),
+    "det": ("det - 1", lambda x: amount(x["area"], 1e-6 if x["precision"] == "single" else 1e-12)),
     "precision": ("arithmetic", lambda x: str(x["precision"])),
     "limit": (
         "first limit, h omega",

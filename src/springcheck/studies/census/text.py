@@ -9,6 +9,7 @@ import numpy as np
 
 from springcheck.figures.looks import title
 from springcheck.studies.census.result import Census, Entry
+from springcheck.studies.census.table import amount
 from springcheck.studies.text import left_out, resumed
 from springcheck.text.lines import Lines, Row, hanging, plain, table
 from springcheck.text.wording import few, number, seconds
@@ -87,16 +88,12 @@ def _row(x: Entry, partners: tuple[str, ...]) -> Row:
     return [
         plain("  " + x.method, "" if x.agrees else "bold red"),
         number(x.amplitude, ".4f"),
-        _number(x.area, 1e-13),
+        amount(x.area, 1e-13, "+.2e"),
         "-" if np.isnan(x.velocity_offset) else f"{x.velocity_offset:+.1f} h",
-        _number(x.friction, 1e-9),
+        amount(x.friction, 1e-9, "+.2e"),
         number(x.limit, ".3f", "none"),
         x.precision,
         f"{x.force_calls:.3g}",
         seconds(x.seconds),
         few(partners, 2),
     ]
-
-
-def _number(x: float, least: float) -> str:
-    return "0" if abs(x) < least else number(x, "+.2e")

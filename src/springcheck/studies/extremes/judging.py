@@ -9,7 +9,7 @@ that is off without a reason makes the cell silently wrong.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -84,12 +84,14 @@ class Sizes:
     largest: Extended
     smallest: Extended
     force: Extended
-    moved: Extended
-    """How far the position goes."""
+    moved: Floats
+    """How far the engine moves the position, by forces that it may have cached."""
 
 
-def sizes(label: Label, scene: Scene, q: Extended, p: Extended, q2: Extended, p2: Extended) -> Sizes:
-    """Intermediates of a step from (q, p) to its exact successor (q2, p2).
+def sizes(
+    label: Label, scene: Scene, start: tuple[Floats, Floats], end: tuple[Extended, Extended], moved: Floats
+) -> Sizes:
+    """Intermediates of a step from states q, p (f-1, n) to their exact successors.
 
     Whatever order an engine works in, it forms positions, momenta, velocities, forces, accelerations and
     the changes that they make.  An engine that squares lengths of bonds also forms 1/m and 1/h.
@@ -97,7 +99,7 @@ def sizes(label: Label, scene: Scene, q: Extended, p: Extended, q2: Extended, p2
     m = scene.m.astype(np.longdouble)
     h = np.abs(np.longdouble(scene.step))
     k = np.abs(scene.system.hessian_diagonal(scene.q))
-    x, y = np.maximum(np.abs(q), np.abs(q2)), np.maximum(np.abs(p), np.abs(p2))
+    x, y = (np.maximum(np.abs(one), np.abs(other)) for one, other in zip(start, end, strict=True))
     force = k * x
     parts = [x, y, y / m, force, force / m, h * force, h * force / m, h * y / m]
     parts += [np.broadcast_to(part, x.shape) for part in (k, k / m, h * h * k / m)]
@@ -107,9 +109,7 @@ def sizes(label: Label, scene: Scene, q: Extended, p: Extended, q2: Extended, p2
         parts += [x * x, y / m * (y / m) * h * h]
     whole = np.stack([np.asarray(part, np.longdouble) for part in parts])
     nonzero = np.where(whole > 0, whole, np.inf)
-    return Sizes(
-        largest=np.max(whole, axis=0), smallest=np.min(nonzero, axis=0), force=force, moved=np.abs(q2 - q)
-    )
+    return Sizes(largest=np.max(whole, axis=0), smallest=np.min(nonzero, axis=0), force=force, moved=moved)
 
 
 def judge(
@@ -128,11 +128,7 @@ def judge(
         ratio = _largest(dq, dp, of_q, of_p)
         strict = _largest(dq, dp, *case.allowance_at(q[:-1], p[:-1], smallest=np.longdouble(0)))
         from_finite = np.isfinite(q[:-1]) & np.isfinite(p[:-1])
-        inside = sizes(
-            label, case.judged, q[:-1].astype(np.longdouble), p[:-1].astype(np.longdouble), exact_q, exact_p
-        )
-        # displacements as the engine made them, by forces that it may have cached
-        inside = replace(inside, moved=np.abs(np.diff(q, axis=0)))
+        inside = sizes(label, case.judged, (q[:-1], p[:-1]), case.next_states, np.abs(np.diff(q, axis=0)))
         growth = growth_of(case, scene)
     bound = float(case.roundings)
     low, high = RANGES["single" if how.force >= 2.0**-24 else "double"]

@@ -37,16 +37,7 @@ from springcheck.studies.precision import fits
 from springcheck.studies.precision.accuracy import Errors, Truth, truth
 from springcheck.studies.precision.fits import POINTS, Point, points_of
 from springcheck.studies.precision.result import MethodSummary, PrecisionStudy
-from springcheck.studies.precision.sweeps import (
-    PLANNED,
-    Sweep,
-    affordable,
-    begin,
-    blank,
-    price,
-    take,
-    to_time,
-)
+from springcheck.studies.precision.sweeps import PLANNED, Sweep, begin, blank, fitting, price, take, to_time
 from springcheck.studies.precision.timing import Clock, take_turns, tick
 from springcheck.text.wording import count, duration
 
@@ -99,7 +90,7 @@ def _measure(
         if kept.progress:
             kept.progress(min(perf_counter() - began, budget), budget, what)
 
-    while ready := affordable(_open(sweeps), known, budget - (perf_counter() - began)):
+    while ready := fitting(_open(sweeps), known, budget - (perf_counter() - began)):
         now = perf_counter()
         _level(ready, known, tell)
         if perf_counter() < now:

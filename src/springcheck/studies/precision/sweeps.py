@@ -151,7 +151,7 @@ def by_tolerance(scene: Scene) -> Iterator[Scene]:
         yield replace(scene, step=h, steps=scene.steps * finer, every=1, tolerance=tolerance)
 
 
-def affordable(sweeps: list[Sweep], known: Truth, left: float) -> list[Sweep]:
+def fitting(sweeps: list[Sweep], known: Truth, left: float) -> list[Sweep]:
     """The sweeps whose next point fits into the seconds left; where none does, the cheapest that still fits.
 
     Seconds are reserved for the methods that can reach their floor; the others share the rest equally.  A

@@ -11,7 +11,6 @@ from springcheck import driver, engines, schemes
 from springcheck.checks.stats import line
 from springcheck.engines.contract import Label
 from springcheck.physics.arrays import Extended, Floats
-from springcheck.physics.trajectory import Trajectory
 from springcheck.studies.stability import propagators
 from springcheck.studies.stability.propagators import STEP, Springs, first
 
@@ -133,14 +132,12 @@ def _points(theory: float) -> Floats:
     return np.unique(np.concatenate([wide, near]))
 
 
-def stepped(label: Label, turn: float, steps: int) -> tuple[Trajectory, Floats]:
-    """A run of one spring, and its amplitude sqrt(x**2 + y**2) in scaled coordinates (f,)."""
-    springs = Springs(label=label, turn=np.array([turn]))
+def stepped(springs: Springs, steps: int) -> tuple[Floats, Floats]:
+    """A run of one spring in scaled coordinates, (f,) each."""
     of_q, of_p = propagators.units(springs)
     # a thousandth of the scan's force leaves room to grow
-    start = propagators.scene(springs, of_q * 1e-3, of_p * 0.7e-3, steps=steps)
-    run = driver.run(start, label)
-    return run, np.hypot(run.q[:, 0] / of_q[0], run.p[:, 0] / of_p[0])
+    run = driver.run(propagators.scene(springs, of_q * 1e-3, of_p * 0.7e-3, steps=steps), springs.label)
+    return run.q[:, 0] / of_q[0], run.p[:, 0] / of_p[0]
 
 
 def _growth(label: Label, turn: float) -> tuple[float, float]:
@@ -157,14 +154,14 @@ def _growth(label: Label, turn: float) -> tuple[float, float]:
     steps = 400
     if predicted != 0:
         steps = int(np.clip(16 / abs(predicted), 40, 400))
-    run, size = stepped(label, turn, steps)
+    x, y = stepped(springs, steps)
+    size = np.hypot(x, y)
     usable = np.flatnonzero(np.isfinite(size) & (size > 0))
     first = usable[-1] * 3 // 4
     n = np.arange(first, usable[-1] + 1)
     if found.angle[0] != 0:
         form = schemes.invariant(matrix, h=STEP)[0]
-        of_q, of_p = propagators.units(springs)
-        x, y = run.q[n, 0] / of_q[0], run.p[n, 0] / of_p[0]
+        x, y = x[n], y[n]
         # along the invariant ellipse the amplitude does not waver
         ellipse = np.abs(form[0] * x * x + form[1] * x * y + form[2] * y * y)
         logs = 0.5 * np.log(ellipse.astype(np.float64))
