@@ -325,7 +325,7 @@ class System(Generic[Fields]):
         push = np.abs(self.potential_force(q, 0 * q))
         for term in (drive for drive in self.terms if isinstance(drive, Drive)):
             term.scatter(np.abs(term.amplitude), push)
-        held = np.maximum(self.hessian_diagonal(q), self.m / self.duration**2)
+        held = np.maximum(self.hessian_diagonal(q), self.m / self.duration / self.duration)
         return np.sum(push * push / (2 * held)) + self.n * self.scene.thermal
 
     @cached_property
@@ -346,10 +346,7 @@ class System(Generic[Fields]):
 
     @property
     def far(self) -> float:
-        """A length beyond all of the motion, for a spring that knows its length alone, which has no sign [L].
-
-        A power of 2, so that adding it rounds and nothing else.
-        """
+        """A length beyond all motion, for a spring without a sign; a power of 2, for adding it rounds [L]."""
         reach = float(np.max(np.abs(self.q)) + np.max(self.amplitudes[0]))
         return float(2.0 ** np.ceil(np.log2(4 * reach))) if 0 < reach < 2.0**500 else 1.0
 

@@ -138,12 +138,11 @@ def judge(
         bad = here & ~(ratio[:, i] <= bound)
         value = float(np.max(np.where(here, np.minimum(ratio[:, i], 1e300), 0), initial=0.0))
         unstable = bool(growth[i] * spec.steps >= np.log(GROWN)) and spec.k > 0
-        outcome: Outcome
         j = int(np.argmax(bad)) if bad.any() else len(bad)
+        outcome: Outcome = "silently wrong"
+        reason = f"step {j + 1} is off by {value:.3g} roundings of {bound:g}"
         if stop and j >= len(bad) - alone:
-            outcome, reason = "silently wrong", f"stopped for no reason that is known here: {stop}"
-        else:
-            outcome, reason = "silently wrong", f"step {j + 1} is off by {value:.3g} roundings of {bound:g}"
+            reason = f"stopped for no reason that is known here: {stop}"
         if not bad.any() and not stop:
             outcome, reason = "unstable, as theory says" if unstable else "right", ""
             # a force that grows is small at first
@@ -155,7 +154,7 @@ def judge(
                 outcome = "engine's limit"
                 reason = f"fixed-point forces: a quantum of {how.quantum:.1e} leaves too few digits"
         elif bad.any():
-            far = scene.system.far if how.joints else np.inf
+            far = scene.system.far if how.joints else 0.0
             named = _reason(how, spec, inside, i, np.flatnonzero(bad), low, high, far)
             if named and unstable and "beyond" in named and j > 0:
                 outcome, reason = "unstable, as theory says", f"grown out of range by step {j + 1}: {named}"
@@ -183,7 +182,7 @@ def _reason(
             len(bad), how.quantum > DIGITS * peak
         ),
         keeps(how): least_moved(inside.moved[:, i])[bad] <= 2 * how.stale,
-        f"a joint of length {far:.3g} is passed": inside.force[bad, i] >= abs(spec.k) * np.longdouble(far),
+        f"a joint of length {far:.3g} is passed": how.joints & (inside.force[bad, i] >= abs(spec.k) * far),
         f"a step forms numbers beyond {high:.1e}": ~(inside.largest[bad, i] <= high),
         f"a step forms numbers below {low:.1e}": inside.smallest[bad, i] < low,
     }
