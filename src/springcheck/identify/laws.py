@@ -75,9 +75,10 @@ class Regression:
     @property
     def shows(self) -> bool:
         """Whether so many pairs follow the law, or so closely, that chance leaves no such share."""
-        # every pair that is explained to rounding is one that chance would have missed
-        counted = self.above if self.exact and not self.law.flexible else self.counted
-        spare = counted - self.parameters
+        spare = self.counted - self.parameters
+        if self.exact and not self.law.flexible:
+            # every pair beside those that columns alone explain is one that chance would have missed
+            spare = self.above - self.rank
         closely = spare > 0 and self.left**spare < CHANCE
         return self.counted > PAIRS_A_NUMBER * self.parameters or (
             closely and (self.law is POWERS or not self.law.flexible)
