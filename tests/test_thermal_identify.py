@@ -357,3 +357,21 @@ def test_of_schemes_that_a_count_tells_apart_one_entry_is_said() -> None:
     )  # fmt: skip
     several = replace(found, candidates=tuple(replace(one, scheme=x, stride=n) for x, n in names))
     assert several.choice == ["baoab-respa2 to 4", "obabo, 2 to 3 steps a frame"]
+
+
+@pytest.mark.parametrize(("decays", "shows"), [(0, False), (5, False), (200, True)])
+def test_a_friction_that_does_not_show_leaves_bare_kicks_open(decays: int, shows: bool) -> None:
+    """Kicks without a friction were baoab's and twelve others'."""
+    rng, q, v, h, rows = np.random.default_rng(0), 1.0, 0.3, 0.2, []
+    kept = np.exp(-decays / 1000)
+    size = np.sqrt(0.6 * (1 - kept**2)) or 0.02
+    for _ in range(1000):
+        rows.append((q, v))
+        v -= h / 2 * q
+        q += h / 2 * v
+        v = kept * v + size * rng.standard_normal()
+        q += h / 2 * v
+        v -= h / 2 * q
+    q, v = np.array(rows).T
+    statement = identify(h * np.arange(1000), q, v=v, mass=1.0).statement
+    assert ("random kicks without" not in statement) == shows

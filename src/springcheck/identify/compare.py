@@ -20,6 +20,7 @@ from springcheck.identify.fit import Map
 from springcheck.identify.guesses import Guesses, Roots, first, least_squares, polished, roots_of_map
 from springcheck.identify.hypothesis import Joint, Match, Terms, most
 from springcheck.identify.maps import MapTable, table
+from springcheck.identify.record import ROUNDING
 from springcheck.physics.arrays import Floats, Reals
 
 WHOLE = 2
@@ -50,7 +51,9 @@ class Target:
         uncertain by the roundings of its path times what s steps add to a state, whatever the fit says.
         """
         added = np.minimum(np.sqrt(np.abs(x.a)) + np.abs(x.g), 1)
-        whole = np.where(every.scaled[x.which], WHOLE, WHOLE / math.sqrt(len(self.found.z)))
+        # nor that of a whole state, but for sums in double precision
+        scaled = every.scaled[x.which] | (self.terms.rounding > ROUNDING)
+        whole = np.where(scaled, WHOLE, WHOLE / math.sqrt(len(self.found.z)))
         whole = (every.path[x.which] * added + whole) * s * self.largest * self.terms.rounding
         return np.asarray(1 / np.sqrt(self.variance[:, None] + whole**2))
 

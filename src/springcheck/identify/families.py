@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import zip_longest
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -96,10 +97,7 @@ def stability_function(
 
 
 def _plus(x: list[Fraction], y: list[Fraction]) -> list[Fraction]:
-    n = max(len(x), len(y))
-    return [
-        p + q for p, q in zip(x + [Fraction(0)] * (n - len(x)), y + [Fraction(0)] * (n - len(y)), strict=True)
-    ]
+    return [p + q for p, q in zip_longest(x, y, fillvalue=Fraction(0))]
 
 
 def _of(scheme: Scheme, *, damped: bool) -> Family:
@@ -146,29 +144,15 @@ DECAY = (IMPLICIT, EXPONENTIAL)
 SCALED = (EXPONENTIAL, IMPLICIT, "a factor 1 - gamma h")
 
 
-def _placed(scheme: str, place: str, laws: tuple[str, ...], *stages: Stage) -> Family:
+def _placed(
+    scheme: str, place: str, laws: tuple[str, ...], *stages: Stage, after: Family | None = None
+) -> Family:
+    """A scheme with friction in a place: these stages, `after` its own step where that is given."""
     return Family(
-        name=f"{scheme}, friction {place}",
-        scheme=scheme,
-        stages=stages,
-        damped=True,
-        laws=laws,
-        place=place,
-        path=roundings(SCHEMES[scheme]) + 3,
-        limit=SCHEMES[scheme].limit,
-    )
-
-
-def _ended(scheme: Scheme) -> Family:
-    """The velocity scaled after each step."""
-    own = _of(scheme, damped=False)
-    if own.stability[0]:
-        return Family(
-            name=f"{own.name}, friction at the end of the step", scheme=own.name, stages=(("friction", ONE),),
-            stability=own.stability, damped=True, laws=SCALED, place="at the end of the step",
-            path=own.path + 3, limit=own.limit,
-        )  # fmt: skip
-    return _placed(own.name, "at the end of the step", SCALED, *own.stages, ("friction", ONE))
+        name=f"{scheme}, friction {place}", scheme=scheme, stages=(*(after.stages if after else ()), *stages),
+        stability=after.stability if after else ((), ()), damped=True, laws=laws, place=place,
+        path=roundings(SCHEMES[scheme]) + 3, limit=SCHEMES[scheme].limit,
+    )  # fmt: skip
 
 
 KICK, DRIFT, DECAYS, WRONG = ("kick", ONE), ("drift", ONE), ("friction", ONE), ("remembered", ONE)
@@ -200,7 +184,7 @@ DAMPED = (
     _placed(POSITION, "after the kick", DECAY, HALF_DRIFT, KICK, DECAYS, HALF_DRIFT),
     _placed(POSITION, "before the step", DECAY, DECAYS, HALF_DRIFT, KICK, HALF_DRIFT),
     *(
-        _ended(SCHEMES[name])
+        _placed(name, "at the end of the step", SCALED, DECAYS, after=_of(SCHEMES[name], damped=False))
         for name in ("explicit-euler", EULER, "implicit-euler", VERLET, POSITION, "implicit-midpoint",
                      "rk2-midpoint", "rk4", "ruth3", "forest-ruth", "yoshida4")
     ),

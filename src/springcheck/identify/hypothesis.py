@@ -168,30 +168,23 @@ def distinct(*, damped: bool) -> tuple[Family, ...]:
     return tuple(out)
 
 
-def _damped(name: str) -> Family:
-    """A scheme with friction; the scheme itself where only its steps are known."""
-    return FAMILIES.get(f"{name}, damped", FAMILIES[name])
-
-
 @cache
 def aliases(name: str) -> tuple[str, ...]:
     """Schemes whose map on a spring is the same, entry for entry, without friction and with it."""
-    own = FAMILIES[name], _damped(name)
-    return tuple(
-        f.scheme
-        for f in UNDAMPED
-        if f.scheme != name and same_map(f, own[0]) and same_map(_damped(f.scheme), own[1], (0, 0.2, 0.5))
-    )
+    # the scheme itself where only its steps are known
+    damped = {x: FAMILIES.get(f"{x}, damped", FAMILIES[x]) for x in (name, *_still(name))}
+    return tuple(x for x in _still(name) if same_map(damped[x], damped[name], (0, 0.2, 0.5)))
 
 
 @cache
+def _still(name: str) -> tuple[str, ...]:
+    """Schemes whose map is the same where there is no friction."""
+    return tuple(f.scheme for f in UNDAMPED if f.scheme != name and same_map(f, FAMILIES[name]))
+
+
 def frictionless(name: str) -> tuple[str, ...]:
     """Schemes with a friction of their own whose map is this one's where there is none."""
-    return tuple(
-        f.scheme
-        for f in UNDAMPED
-        if f.scheme != name and SCHEMES[f.scheme].has("friction") and same_map(f, FAMILIES[name])
-    )
+    return tuple(x for x in _still(name) if SCHEMES[x].has("friction"))
 
 
 def likely(joints: list[Joint]) -> list[Joint]:

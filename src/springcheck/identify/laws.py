@@ -75,9 +75,10 @@ class Regression:
     @property
     def shows(self) -> bool:
         """Whether so many pairs follow the law, or so closely, that chance leaves no such share."""
-        # every pair that is explained to rounding is one that chance would have missed
-        counted = self.above if self.exact and not self.law.flexible else self.counted
-        spare = counted - self.parameters
+        spare = self.counted - self.parameters
+        if self.exact and not self.law.flexible:
+            # every pair beside those that columns alone explain is one that chance would have missed
+            spare = self.above - self.rank
         closely = spare > 0 and self.left**spare < CHANCE
         return self.counted > PAIRS_A_NUMBER * self.parameters or (
             closely and (self.law is POWERS or not self.law.flexible)
@@ -294,7 +295,7 @@ LAWS = (
 """Laws of the force at each step, in the order in which those that explain as much are named."""
 
 
-NOT_LINEAR = [x for x in LAWS if x.kind in (OF_VELOCITY, ANHARMONIC) and not x.flexible]
+LIKE_FRICTION = [x for x in LAWS if x.kind in (OF_VELOCITY, ANHARMONIC) and not x.flexible]
 """Laws of a force that a linear friction stands for where numbers are few."""
 
 
@@ -302,7 +303,7 @@ def friction_shows(e: Evidence, part: Match) -> bool:
     """Whether a friction is left where the columns of a law that is not linear stand beside the map's."""
     found, slope = e.found, np.linalg.inv(e.found.entries.astype(np.float64)).T.reshape(4)
     known = math.sqrt(float(slope @ found.covariance @ slope))
-    for law in NOT_LINEAR:
+    for law in LIKE_FRICTION:
         beside = np.stack([*e.linear, *law.columns(e)], axis=1)
         columns = np.zeros((e.pairs, 2, 2 * beside.shape[1]))
         columns[:, 0, ::2] = columns[:, 1, 1::2] = beside

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from springcheck.identify.factor import by_a_factor
-from springcheck.identify.hypothesis import SURE
+from springcheck.identify.hypothesis import ERRORS, SURE
 from springcheck.identify.result import Candidate, Explanation, Identification
 from springcheck.physics.arrays import Floats
 from springcheck.text.wording import either
@@ -205,6 +205,9 @@ def _said(
         statement = (
             f"{head}, by no scheme known here, or of joined particles, or frames lie several steps apart"
         )
+    rates = [one.candidates[0] for one in found if best and one.candidates]
+    if rates and all(y.friction <= ERRORS * y.friction_error for y in rates):
+        statement += "; no friction shows: random kicks without one would do as well in so few frames"
     if against:
         statement = f"{statement}, but of {', '.join(against)}"
     only = candidates[0] if named else None

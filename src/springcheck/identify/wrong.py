@@ -238,15 +238,12 @@ def faults_of(seen: Measured, friction: float | None) -> list[Explanation]:
 
 def stiffness_ratio(ratio: float, mass: float | None) -> str:
     """Meaning of a stiffness that is `ratio` times the stated one; "" where there is none."""
-    known = [
+    m = math.nan if mass is None else mass
+    known = (
         (1 / 4.184, "kcal taken for kJ"), (4.184, "kJ taken for kcal"),
         *_either_way(4.814 / 4.184, "4.814 kJ to a kcal instead of 4.184"),
         (2.0, "k q**2 taken for k/2 q**2"), (0.5, "k/2 q**2 taken for k q**2"),
         *((10.0**n, "another unit of length or energy") for n in (-6, -4, -3, -2, -1, 1, 2, 3, 4, 6)),
-    ]  # fmt: skip
-    if mass is not None:
-        known += [
-            (1 / mass, "the force is divided by the mass although p is a momentum"),
-            (mass, "the mass is left out"),
-        ]
+        (1 / m, "the force is divided by the mass although p is a momentum"), (m, "the mass is left out"),
+    )  # fmt: skip
     return next((text for value, text in known if abs(ratio / value - 1) < 1e-5), "")
