@@ -164,9 +164,10 @@ def own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def sketched(monkeypatch: pytest.MonkeyPatch) -> None:
     """A figure is written as the numbers of its lines: most of a picture's time is its pixels."""
 
-    def drawn(figure: Figure) -> dict[str, bytes]:
+    def drawn(figure: Figure) -> tuple[bytes, bytes]:
         lines: list[Any] = figure.findobj(Line2D)
-        return dict.fromkeys(("png", "svg"), b"".join(np.asarray(x.get_xydata()).tobytes() for x in lines))
+        content = b"".join(np.asarray(x.get_xydata()).tobytes() for x in lines)
+        return content, content
 
     monkeypatch.setattr(style, "_drawn", drawn)
 

@@ -157,7 +157,7 @@ def test_plot_and_inspect_serve_every_study(stores: Path, capsys: pytest.Capture
 def test_a_stored_study_is_drawn_without_any_engine(stores: Path) -> None:
     code = (
         "import sys; from springcheck.cli import main; from springcheck.figures import style\n"
-        "style._drawn = lambda figure: dict.fromkeys(('png', 'svg'), b'')\n"
+        "style._drawn = lambda figure: (b'', b'')\n"
         "for path in sys.argv[1:]:\n"
         "    assert main(['plot', path, '-o', path + '-pictures', '--quiet']) == 0\n"
         "    assert main(['inspect', path, '--json']) == 0\n"
