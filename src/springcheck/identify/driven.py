@@ -7,6 +7,7 @@ amplitude 1 has, and so how large the drive is.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import replace
@@ -179,10 +180,11 @@ def _schemes(
     except IdentificationError:
         # it is in its steady state all along
         return
-    joints = [
-        x for damped in (False, True) for x in compare([alone], [e.terms], distinct(damped=damped), FEW[:4])
-    ]
-    for joint in sorted(joints, key=lambda x: x.plainness):
+    # what is left has the roundings of the whole motion, and of what was subtracted
+    size = float(np.max(np.abs(found.z)) / np.max(np.abs(left)))
+    terms = [replace(e.terms, rounding=e.terms.rounding * (1 + size))]
+    several = (compare([alone], terms, distinct(damped=damped), FEW[:4]) for damped in (False, True))
+    for joint in sorted(itertools.chain(*several), key=lambda x: x.plainness):
         match = joint.parts[0]
         unit = _response(e, match, turn)
         # other schemes have its map with other springs than the stated one

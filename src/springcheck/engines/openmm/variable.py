@@ -93,7 +93,7 @@ class Variable(_Context):
                 f"{label}: a tolerance of {scene.tolerance:g} takes some {steps:.0e} steps, and at most "
                 f"{MOST_STEPS:.0e} are taken; --set time.tolerance=1e-6 asks for fewer"
             )
-        if not allowed(scene) > 0:
+        if not scene.system.norm.of or not allowed(scene) > 0:
             raise MethodError(
                 f"{label}: its tolerance is a part of the amplitude, and the energy of the start is 0; "
                 "start it away from rest"
