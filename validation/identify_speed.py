@@ -1,4 +1,4 @@
-"""Claim: one identification takes milliseconds, and half a second where it takes longest.
+"""Claim: one identification takes tens of milliseconds, and two seconds where it takes longest.
 
     python validation/identify_speed.py [CALLS [SRC]]
 
@@ -10,10 +10,10 @@ this one, twice each, and the ratio of the two is printed; the shortest time of 
 after one call that is not timed.
 
 Printed for 15 calls on two idle cores (median and most):
-    plain 3.7 and 15.1 ms.  damped 6.0 and 12.8.  held 4.4 and 5.6.  single 6.6 and 78.2
-    text 9.0 and 63.2.  systematic error 15.7 and 91.5.  16 oscillators 34.5.  as drawn 6.1 and 167.1
-    mean as drawn 10.4 ms: 6.89e+05 calls an hour on two cores
-Commit 81a7ca4: 4.7 (plain), 9.6, 6.5 (held), 12.0, 17.7, 22.8 and 34.7 (16 oscillators); 17.1 in the mean.
+    plain 17.4 and 32.5 ms.  damped 36.2 and 99.3.  held 21.8 and 50.7.  single 61.9 and 1794.8
+    text 64.0 and 476.5.  systematic error 144.9 and 341.1.  16 oscillators 128.3.  as drawn 34.9 and 757.6
+    mean as drawn 56.2 ms: 1.28e+05 calls an hour on two cores
+Commit 49ded500: 21.7 (plain), 41.8, 31.1 (held), 78.3, 49.5, 106.4 and 189.2 (16 oscillators); 41.9 as drawn.
 """
 
 from __future__ import annotations
