@@ -107,7 +107,7 @@ def shown(result: Any, name: str) -> Any:
 
 def test_every_study_has_a_function_whose_result_shows_itself() -> None:
     two = ["own:euler", "own:velocity-verlet"]
-    frame = shown(springcheck.precision("spring", two, budget=0.2), "PrecisionStudy")
+    frame = shown(springcheck.precision("spring", two, budget=np.float32(0.2)), "PrecisionStudy")
     assert set(frame["method"]) <= set(two)
     assert {"max_error", "run_seconds"} <= set(frame.columns)
     limits = springcheck.stability("spring", two)
@@ -132,7 +132,7 @@ def test_a_study_keeps_a_store_that_it_writes_anew_when_it_is_told_to() -> None:
     kept = springcheck.stability("spring", "own:euler", path="s.h5")
     with pytest.raises(StoreError, match=r"s.h5 exists: force=True writes it anew, path= writes another"):
         springcheck.stability("spring", "own:euler", path="s.h5")
-    again = springcheck.stability("spring", "own:euler", path="s.h5", force=True, workers=2)
+    again = springcheck.stability("spring", "own:euler", path="s.h5", force=True, workers=np.int64(2))
     assert again.document() == kept.document()
     assert [path.name for path in Path().iterdir()] == ["s.h5"]
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from numbers import Real
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -36,7 +37,7 @@ def precision(
 
     found = scene_of(scene)
     with taken(methods, force, workers) as (named, how):
-        if not (isinstance(budget, int | float) and 0 < budget < math.inf):
+        if not (isinstance(budget, Real) and 0 < budget < math.inf):
             raise SpringcheckError(f"budget={budget}: a number of seconds above 0 is needed")
         from springcheck.studies.choose import choose
 

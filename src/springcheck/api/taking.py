@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from numbers import Integral
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -58,7 +59,7 @@ def taken(methods: Any, force: bool, workers: int) -> Iterator[tuple[list[str], 
     """Labels of these methods for a study, and how it is measured: functions of yours by this process."""
     from springcheck.studies.team import MOST_PROCESSES, Processes
 
-    if not (isinstance(workers, int) and 1 <= workers <= MOST_PROCESSES):
+    if not (isinstance(workers, Integral) and 1 <= workers <= MOST_PROCESSES):
         raise SpringcheckError(
             f"workers={workers!r}: a number of processes from 1 to {MOST_PROCESSES} is needed"
         )
@@ -67,7 +68,7 @@ def taken(methods: Any, force: bool, workers: int) -> Iterator[tuple[list[str], 
             raise SpringcheckError(
                 "workers: a function of yours is known to this process alone; leave it out"
             )
-        yield named, {"force": force, "progress": None, "team": Processes(workers)}
+        yield named, {"force": force, "progress": None, "team": Processes(int(workers))}
 
 
 def scene_of(scene: Scene | str | Path) -> Scene:

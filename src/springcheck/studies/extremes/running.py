@@ -39,7 +39,7 @@ def cells(label: Label, specs: Sequence[Spec]) -> list[Cell]:
     half = len(specs) // 2
     if half and engines.arithmetic(label).joints:
         # all joints of a run are as long as the largest motion needs them
-        return cells(label, specs[:half]) + cells(label, specs[half:])
+        return [cell for spec in specs for cell in cells(label, [spec])]
     scene = grid.scene(list(specs), label, engines.method(label).requires)
     try:
         q, p, stop = raw(scene, label)
