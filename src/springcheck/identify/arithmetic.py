@@ -268,8 +268,9 @@ def _defects(
     sizes = _roundings(record, j, found, matches)
     ulp, plain, signed = _in_double(record, found, matches, sizes)
     stored = single = np.zeros(len(matches), dtype=bool)
+    half = np.zeros_like(signed)
     if not record.fine:
-        signed, stored, single = _in_file(record, j, found, matches, sizes, signed)
+        signed, half, stored, single = _in_file(record, j, found, matches, sizes, signed)
     missing = np.abs(signed)
     lengths = np.sqrt(np.sum(found.z[:-1].astype(np.float64) ** 2, axis=1))
     share = _largest(missing, np.repeat(lengths[None, :, None], 2, axis=2))
@@ -279,7 +280,7 @@ def _defects(
         precision, note, certain = "", "", True
         if plain[i]:
             precision, note = "double", _written(record)
-        elif _is_rebuilt(match, missing[i], sizes.size[i], sizes.difference[i]):
+        elif not stored[i] and _is_rebuilt(match, missing[i], half[i], sizes.size[i], sizes.difference[i]):
             precision, note = "double", REBUILT_NOTE
         elif record.fine:
             if visible() and not FAMILIES[match.family].flow:
@@ -335,9 +336,9 @@ def _in_double(
 
 def _in_file(
     record: Record, j: int, found: Map, matches: list[Match], sizes: Roundings, signed: Floats
-) -> tuple[Floats, Any, Any]:
-    """Residuals (c, f - 1, 2) by the quanta of the file, and whether these explain them (c,) beside roundings
-    of double precision, or of single."""
+) -> tuple[Floats, Floats, Any, Any]:
+    """Residuals (c, f - 1, 2) by the quanta of the file, what these may do, and whether it explains them (c,)
+    beside roundings of double precision, or of single."""
     b = np.abs(_predicted(matches)).astype(np.float64)
     quanta = record.quanta(j) / found.size.astype(np.float64)
     half = (quanta[1:] + quanta[:-1] @ np.swapaxes(b, 1, 2)) / 2
@@ -356,24 +357,23 @@ def _in_file(
     differs = explained(SINGLE, sizes.size + sizes.difference) & ~single & (not record.deep)
     for i in np.flatnonzero(differs).tolist():
         single[i] = _differences(matches[i]) and coarse.irregular(signed[i])
-    return signed, explained(EPSILON, sizes.size), single
+    return signed, half, explained(EPSILON, sizes.size), single
 
 
-def _is_rebuilt(match: Match, missing: Floats, size: Floats, difference: Floats) -> bool:
-    """Whether velocities alone are off, and by eps q / h, as differences of positions over the step are.
+def _is_rebuilt(match: Match, missing: Floats, half: Floats, size: Floats, difference: Floats) -> bool:
+    """Whether velocities alone are off, and by eps q / h, as differences of positions over the step are,
+    beside what the digits of a file may do, `half`.
 
     Rounding of a position enters the leapfrog's velocity in every step, and the position itself through it:
     it walks at random, with the root of the steps and their power of 3/2.
     """
     steps = np.sqrt(match.stride)
-    if np.any(missing[:, 0] > EPSILON * (4 + 2 * steps**3) * size[:, 0]):
+    unit = EPSILON * steps * difference
+    allowed = half + EPSILON * (4 + 2 * np.array([steps**3, steps])) * size + 4 * unit
+    if np.any(missing > allowed):
         return False
-    unit = EPSILON * steps * difference[:, 1]
-    if np.any(missing[:, 1] > EPSILON * (4 + 2 * steps) * size[:, 1] + 4 * unit):
-        return False
-    least, most = REBUILT
-    share = float(np.sqrt(np.mean(missing[:, 1] ** 2) / np.mean(unit**2)))
-    return least <= share <= most and _differences(match)
+    share = float(np.sqrt(np.mean(missing[:, 1] ** 2) / np.mean(unit[:, 1] ** 2 + half[:, 1] ** 2)))
+    return REBUILT[0] <= share <= REBUILT[1] and _differences(match)
 
 
 def _differences(match: Match) -> bool:
