@@ -1,8 +1,8 @@
-"""Pieces of a study by the workers of a dask scheduler that runs.
+"""Pieces of a study, carried out by the workers of a dask scheduler.
 
-Workers come and go: what one has not answered goes to another.  A worker of other versions is refused,
-because its numbers might differ; dask's `Client.get_executor` does neither.  When the
-scheduler is gone, what was finished is kept, and the same command goes on with another one.
+Workers come and go: a piece without an answer is given to another.  A worker of other versions is refused,
+because its numbers might differ; dask's `Client.get_executor` does neither.  When the scheduler is lost,
+finished pieces are saved, and the same command resumes with another scheduler.
 """
 
 from __future__ import annotations
@@ -26,25 +26,25 @@ from springcheck.studies import provenance
 T = TypeVar("T")
 
 PATIENCE = 60.0
-"""Seconds without any answer after which every piece that is still out is given to another worker as well."""
+"""Seconds without any answer after which every open piece is given to another worker as well."""
 
 ATTEMPTS = 20
-"""Times that a piece is given out before it is blamed for the workers that died over it."""
+"""Attempts after which a piece is blamed for the workers that died over it."""
 
 WAITING = 30.0
 """Seconds to wait for a scheduler and for its first worker."""
 
 SILENT = 30.0
-"""Seconds after which a worker that the scheduler has not heard of gets no piece: it hangs, or was stopped.
-The scheduler itself waits for 300 s and longer."""
+"""Seconds of silence after which a worker gets no piece: it hangs, or was stopped.  The scheduler itself
+waits for 300 s and longer."""
 
 GONE = "the scheduler of the cluster is gone; what was finished is kept, the same command goes on"
 
 LOGGERS = "distributed", "distributed.client", "distributed.core", "tornado", "tornado.application", "asyncio"
-"""Loggers of the library, of which some have levels of their own; those of others are left as they are."""
+"""Loggers of dask, some of which have levels of their own; other loggers are left as they are."""
 
 OUT = 256
-"""Fewest pieces that are given out at a time."""
+"""Fewest pieces that are submitted at a time."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,11 +53,11 @@ class Cluster:
 
     place: str
     workers: int = 2
-    """How many are counted on: more than one, so that the longest pieces come first."""
+    """Assumed number of workers: more than one, so that the longest pieces are submitted first."""
     patience: float = PATIENCE
 
     def carried_out(self, parts: Sequence[Callable[[], T]]) -> Generator[tuple[int, T], None, None]:
-        """Numbers and results of the parts, as they finish."""
+        """Index and result of each part, as it finishes."""
         if not parts:
             return
         with self._client() as client:
@@ -105,19 +105,19 @@ class Cluster:
 
 
 def _on_scheduler(client: Any, function: Callable[..., T]) -> T:
-    """What a function returns there.  TimeoutError where the scheduler does not answer."""
+    """Result of a function called on the scheduler.  TimeoutError where the scheduler does not answer."""
     found: T = client.sync(client._run_on_scheduler, function, callback_timeout=WAITING)
     return found
 
 
 def _silence(dask_scheduler: Any) -> dict[str, float]:
-    """Seconds since each worker was heard of, by its address; called on the scheduler."""
+    """Seconds since each worker was heard of, by its address; runs on the scheduler."""
     now = time.time()
     return {address: now - worker.last_seen for address, worker in dask_scheduler.workers.items()}
 
 
 def _hanging(client: Any, named: set[str]) -> tuple[list[str], list[str]]:
-    """Addresses of the workers that are heard of and of those that are not, each of which is named once."""
+    """Addresses of the workers that answer and of those that are silent; each of these is warned of once."""
     try:
         silence = _on_scheduler(client, _silence)
     except (TimeoutError, OSError) as error:
@@ -133,7 +133,7 @@ def _hanging(client: Any, named: set[str]) -> tuple[list[str], list[str]]:
 
 
 def _checked(part: Callable[[], Any], wanted: dict[str, str]) -> Any:
-    """Measure a piece on a worker, after a look at its versions, whenever it has joined."""
+    """Measure a piece on a worker, after a check of the worker's threads and versions."""
     from distributed import get_worker
 
     worker = get_worker()
@@ -172,7 +172,7 @@ def _answers(
         if given[i] > ATTEMPTS:
             raise SpringcheckError(f"piece {i} was given out {ATTEMPTS} times, and no worker survived it")
         key = f"springcheck-{id(number)}-{i}-{given[i]}"
-        # whoever joins may take it; where a worker hangs, only the others
+        # any worker may take it; where some hang, only the live ones
         where = {"workers": live} if live and hang else {}
         # the first has the highest priority: longest pieces are in front
         how = {"key": key, "pure": False, "priority": -i, "retries": 0, **where}
@@ -185,7 +185,7 @@ def _answers(
     try:
         while len(done) < len(parts):
             if len(done) % OUT == 0:
-                # no worker waits for its next piece
+                # no worker runs out of pieces
                 live, hang = _hanging(client, named)
                 most = max(OUT, 2 * len(live))
             for i in islice(following, max(0, most - len(number))):
@@ -228,7 +228,7 @@ def _answers(
     except (KeyboardInterrupt, GeneratorExit, SpringcheckError):
         raise
     except BaseException as error:
-        # whatever the library makes of a connection that is lost, asyncio's CancelledError for one
+        # dask raises various exceptions for a lost connection, asyncio's CancelledError among them
         if client.status == "running" and isinstance(error, Exception):
             raise
         raise SpringcheckError(GONE) from error

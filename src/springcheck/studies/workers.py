@@ -1,7 +1,7 @@
-"""Parts of a computation in processes of their own, which end with the program, however that ends.
+"""Parts of a computation in separate processes, which end with the program, however that ends.
 
-Those of a `ProcessPoolExecutor` stay for ever where the program is killed, and what they are at runs on where
-it leaves early; on Python 3.11.2 it hangs where they die before they have read a part of 10 MB.
+The processes of a `ProcessPoolExecutor` survive a killed program, and their current work goes on after an
+early exit; on Python 3.11.2 it hangs where they die before they have read a part of 10 MB.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ T = TypeVar("T")
 
 
 def carried_out(parts: Sequence[Callable[[], T]], workers: int) -> Generator[tuple[int, T], None, None]:
-    """Numbers and results of the parts, as they finish; with one worker here, else in so many processes.
+    """Index and result of each part, as it finishes; with one worker here, otherwise in so many processes.
 
-    Parts must be functions that another process can import.  Close the iterator where it is left early.
-    An exception of a part is raised here.  SpringcheckError: a process cannot be started, or has ended
-    without an answer.
+    Parts must be functions that another process can import.  Close the iterator where it is left early. An
+    exception of a part is raised here.  SpringcheckError: a process cannot be started, or has ended without
+    an answer.
     """
     if workers <= 1:
         for i, part in enumerate(parts):
@@ -65,7 +65,7 @@ def carried_out(parts: Sequence[Callable[[], T]], workers: int) -> Generator[tup
 
 
 def _is_a_file(main: Any) -> None:
-    """Raise SpringcheckError where processes that are started would look for the program and not find it."""
+    """Raise SpringcheckError where new processes could not find the main program as a file."""
     path = getattr(main, "__file__", None)
     if getattr(main, "__spec__", None) is None and path is not None and not os.path.exists(path):
         raise SpringcheckError(

@@ -1,4 +1,4 @@
-"""The first limit of stability of a method on the spring, from its states alone."""
+"""First limit of stability of a method on the spring, from its states alone."""
 
 from __future__ import annotations
 
@@ -14,37 +14,37 @@ from springcheck.physics.trajectory import Trajectory
 from springcheck.studies.census import rigid
 
 LEAST, MOST, APART = 0.05, 4.0, 0.05
-"""h omega that are tried, the first of them and the last; of no engine is a limit below 0.05 looked for."""
+"""h omega of the first and the last run, and their spacing; no limit below the first is looked for."""
 
 STEPS = 8
 """Steps of each run: more pairs of states than a map of four entries needs, too few to leave a spring's
 range."""
 
 LEAST_STEPS = 3
-"""Steps from which a map of four entries follows, with two numbers over."""
+"""Fewest steps that determine a map of four entries, with two residual degrees of freedom."""
 
 HALVINGS = 12
-"""Halvings of the bracket, to 0.05 / 4096."""
+"""Bisections of the bracket, to 0.05 / 4096."""
 
 SMALL = 0.1
-"""Part of the scene's start from which runs begin: near the limit a motion grows, and engines have a largest
-speed."""
+"""Factor on the scene's start: near the limit a motion grows, and engines have a largest speed."""
 
 SPREAD = 10
-"""Factor from the standard error of the growth to the error allowed: of eight steps it is poorly known."""
+"""Standard errors of the growth that are allowed for: eight steps estimate it poorly."""
 
 LOST = 0.1
-"""Error of the growth from which states follow no map, as beyond the range of an engine's spring."""
+"""Error of the growth from which states follow no linear map, as beyond the range of an engine's spring."""
 
 STEEPEST = 4
-"""Power of h omega by which the growth of a scheme that always grows begins, at most: RK2's."""
+"""Largest leading power of h omega in the growth of a scheme that always grows: RK2's."""
 
 
 def first_limit(scene: Scene, label: Label) -> float:
-    """The least h omega whose one-step map grows, to a part in 1e5; 0: all grow, infinity: none up to 4.
+    """Smallest h omega whose one-step map grows, to a part in 1e5; 0 where all grow, infinity where none up
+    to 4.
 
     One mass on one spring.  NaN where the engine refuses a step, or where its rounding hides a growth that
-    may begin below the first that is seen.
+    may begin below the first that is detected.
     """
     small = replace(scene, q=scene.q * SMALL, p=scene.p * SMALL, steps=STEPS, every=1, quantities=("q", "p"))
     omega = float(np.sqrt(scene.system.hessian_diagonal(scene.q)[0] / scene.m[0]))
@@ -75,10 +75,8 @@ def first_limit(scene: Scene, label: Label) -> float:
 
 
 def _growth(run: Trajectory) -> tuple[float, float]:
-    """Spectral radius less 1 of the map (2, 2) that fits the states best, and what its error makes of 0.
-
-    Where the whole run follows no map its first steps are looked at: a rest length is passed later.
-    """
+    """Spectral radius minus 1 of the map (2, 2) that fits the states best, and its error.  Where the whole
+    run follows no linear map, its first steps are used: a rest length is passed later."""
     z = np.stack([run.q[:, 0], run.p[:, 0]])
     found = [_of_states(z[:, : steps + 1]) for steps in (STEPS, STEPS // 2, LEAST_STEPS)]
     return next((x for x in found if x[1] < LOST), found[0])

@@ -23,7 +23,7 @@ DECADES = (
     -300, -200, -150, -100, -50, -40, -30, -20, -15, -12, -11, -10, -9, -8, -7, -6, -5, -4, -3, -2, -1, 0,
     1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 15, 20, 30, 40, 50, 100, 150, 200, 300,
 )  # fmt: skip
-"""Powers of ten of the largest force of the start, in the scene's unit: closer where engines differ."""
+"""Powers of ten of the largest initial force, in the scene's unit: denser where engines differ."""
 
 SIZES = (-300, -200, -100, -30, -10, 0, 10, 30, 100, 200, 300)
 """Powers of ten of masses and stiffnesses."""
@@ -34,7 +34,7 @@ STRETCH = (-300, -150, -100, -30, -10, -3, 0, 3, 10, 30, 100, 150, 300)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Spec:
-    """One spring, one start, one step, one length: a cell before it is run."""
+    """Parameters of a cell: one spring, one start, one step, one length."""
 
     block: str
     m: float
@@ -47,13 +47,13 @@ class Spec:
 
     @property
     def finite(self) -> bool:
-        """Whether every number is one that a scene may hold."""
+        """Whether a scene may hold all these numbers."""
         numbers = (self.m, self.k, self.q, self.p, self.h)
         return bool(np.all(np.isfinite(numbers))) and self.m > 0 and self.h != 0
 
     @property
     def force(self) -> float:
-        """Force of the start, or what the momentum would build up to."""
+        """Scale of the initial force: the larger of k |q| and w |p|."""
         with np.errstate(all="ignore"):
             k, m = np.longdouble(abs(self.k)), np.longdouble(self.m)
             return float(max(k * abs(self.q), np.sqrt(k / m) * abs(self.p)))
@@ -81,7 +81,7 @@ def _forces() -> Iterator[Spec]:
 
 
 def force_cell(turn: float, decade: int) -> Spec:
-    """A cell of that plane: mass and step stay, amplitude = force / k."""
+    """A cell of that plane: mass and step are fixed, amplitude = force / k."""
     k = MASS * (turn / STEP) ** 2
     q = float(np.float64(10.0**decade) / np.float64(k))
     return Spec(block="force", m=MASS, k=k, q=q, p=0.6 * MASS * (turn / STEP) * q, h=STEP)
@@ -105,7 +105,7 @@ def steps() -> Iterator[Spec]:
 
 
 def special() -> Iterator[Spec]:
-    """k = 0, k < 0, nothing at all, the smallest and the largest numbers; all with one step."""
+    """k = 0, k < 0, a state of rest, the smallest and the largest numbers; all with one step."""
     for k, q, p in (
         (0.0, 0.3, 0.7), (0.0, 0.0, 0.0), (0.0, 1e300, 1e300), (0.0, 1e-300, 1e-300), (2.9, 0.0, 0.0),
         (2.9, 0.0, 0.7), (2.9, 0.3, 0.0), (-2.9, 0.3, 0.7), (-2.9, 0.0, 0.0), (-1e-300, 0.3, 0.7),
@@ -124,7 +124,7 @@ def scene(cells: list[Spec], label: Label, requires: frozenset[Need]) -> Scene:
     m = np.array([x.m for x in cells])
     c = None
     if Need.DAMPING in requires:
-        # the method is there for friction: h c/m = 1/80
+        # methods that require damping get friction: h c/m = 1/80
         rate = min(0.0125 / abs(first.h), 1e300) if first.h > 0 else 0.0
         with np.errstate(over="ignore", under="ignore"):
             c = np.where(first.block == "force", np.minimum(rate * m, 1e300), 0.0)

@@ -14,23 +14,23 @@ from springcheck.studies.precision.fits import Point
 from springcheck.studies.precision.sweeps import PLANNED, Sweep, repeats, warm_ups
 
 TICKS = 1000
-"""A timing lasts at least so many ticks of the clock, which then blurs it by a thousandth."""
+"""Clock ticks that a timing lasts at least, so that the clock's resolution is a thousandth of it."""
 
 STARTS = 0.02
-"""Seconds that starting several short runs for one timing may take."""
+"""Seconds that the starts of several short runs in one timing may take."""
 
 READS = 3
-"""Timings of a run with every step read; one where starting is slow."""
+"""Timings of a run with every step read; one where a start is slow."""
 
 MOST_LOOKS = 10_000_000
-"""Looks at the clock within which it goes on: those of a second."""
+"""Readings of the clock within which it must advance: those of a second."""
 
 READ_SECONDS = 0.1
 """Longest run that is also timed with every step read: reading costs the same at each step."""
 
 
 def tick() -> float:
-    """The smallest difference that the clock shows [s]."""
+    """Resolution of the clock [s]."""
     seen = []
     for _ in range(100):
         began = perf_counter()
@@ -47,7 +47,7 @@ def tick() -> float:
 
 @dataclass(kw_only=True, eq=False)
 class Clock:
-    """The timings of one point while they are taken."""
+    """Timings of one point while they are measured."""
 
     sweep: Sweep
     scene: Scene
@@ -59,7 +59,7 @@ class Clock:
     spent: float = 0.0
 
     def warm_up(self, shortest: float) -> None:
-        """Find how many runs fit into one timing, and how many timings are worth taking."""
+        """Determine how many runs fit into one timing, and how many timings to take."""
         expected = self.sweep.cost
         if warm_ups(expected + self.sweep.start):
             warm = self._bare()
@@ -69,7 +69,7 @@ class Clock:
         self.count = repeats(expected + self.sweep.start)
 
     def turn(self, number: int) -> None:
-        """One repeat."""
+        """Measure one repeat."""
         run = self._bare(copies=self.copies)
         if run:
             self.runs.append(run)

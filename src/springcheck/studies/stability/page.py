@@ -19,11 +19,11 @@ TURN = "step times frequency, h \N{GREEK SMALL LETTER OMEGA}"
 
 
 LEAST_SHOWN = 0.05
-"""h w of a scene below which its line would stand left of the curves."""
+"""Least h w of a scene that is marked by a line: smaller ones are left of the curves."""
 
 
 def banks(study: Stability) -> list[Bank]:
-    """What was measured."""
+    """Charts of the limits, regions and resonances that were measured."""
     found = []
     if study.limits:
         here = abs(study.scene.step) * fastest(study.scene)
@@ -48,7 +48,7 @@ def banks(study: Stability) -> list[Bank]:
 
 
 def _limits_said(limits: Sequence[Limit]) -> str:
-    """How many methods are stable up to where."""
+    """How many methods are stable up to which h w, in a sentence."""
     count: dict[float, int] = {}
     for x in limits:
         count[x.theory] = count.get(x.theory, 0) + 1
@@ -99,7 +99,7 @@ def _region(x: Region) -> Chart:
         x=Scale(name=TURN, values=x.h_w.tolist()),
         y=Scale(name="damping ratio, c / 2\N{SQUARE ROOT}(k m)", values=x.damping_ratio.tolist()),
         tiles=Tiles(kinds=KINDS, rows=kinds.tolist()),
-        # by the number of its row: critical damping
+        # critical damping, as an index of rows
         rules=[Rule(axis="y", at=critical, look="one")],
         short=f"{x.method}: {x.wrong} against theory",
     )
