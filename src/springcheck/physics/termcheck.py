@@ -1,4 +1,4 @@
-"""Whether the functions of a new term's law agree with each other: it is asked as the term is registered."""
+"""Consistency of the functions of a new term's law, checked as the term is registered."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from springcheck.physics.arrays import Reals
 from springcheck.physics.term import Term
 
 STEP = 2.0**-7
-"""Distance of the points of a difference quotient of eighth order [L]."""
+"""Spacing of the points of a difference quotient of eighth order [L]."""
 SLOPE = np.array([1 / 280, -4 / 105, 1 / 5, -4 / 5, 0, 4 / 5, -1 / 5, 4 / 105, -1 / 280], np.longdouble)
 PRECISION = 1e-9
-"""Relative agreement that is asked for: the quotient's own error is (STEP/length)**8, 1e-17 for a law that
-changes over a unit of length and 1e-9 for one that changes over a tenth of it."""
+"""Relative agreement required: the quotient's own error is (STEP/length)**8, 1e-17 for a law that varies over
+a unit of length and 1e-9 for one that varies over a tenth of it."""
 ROUNDINGS = 32
-"""Operations in one formula at most."""
+"""Most operations in one formula."""
 
 
 RESERVED = (
@@ -27,11 +27,11 @@ RESERVED = (
 
 
 def check(term: type[Term]) -> None:
-    """Raise TypeError where the class lacks a part, ValueError where its functions contradict each other.
+    """Raise TypeError where the class lacks a part, ValueError where its functions are inconsistent.
 
-    Tried at 64 elongations between -0.5 and 0.5, with parameters between 0.5 and 1.5: slope and second are
-    the derivatives of potential and slope, potential and slope are proportional to the first parameter and
-    0 at rest, and slope computed in single precision is off by no more than `rounding` says.
+    Tested at 64 elongations between -0.5 and 0.5, with parameters between 0.5 and 1.5: slope and second are
+    the derivatives of potential and slope, potential and slope are proportional to the first parameter and 0
+    at rest, and the error of slope in single precision is within `rounding`.
     """
     _check_parts(term)
     rng = np.random.default_rng(1)

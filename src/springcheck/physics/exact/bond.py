@@ -20,19 +20,19 @@ from springcheck.physics.system import System
 from springcheck.physics.terms import Morse
 
 MOST = np.log(np.finfo(np.longdouble).max) - 64
-"""Exponents whose exponential, times its factors here, stays finite."""
+"""Largest exponent whose exponential, times its factors here, stays finite."""
 
 FAR_OUT = 64.0
-"""A phase whose exponential exceeds 1 by more than any precision that is used here."""
+"""Phase whose exponential is so large that 1 is negligible beside it in any precision used here."""
 
 
 class MorseMotion(ClosedForm):
-    """One bond each that pulls together: with s = exp(steepness u), s'' = w**2 (excess s + 1), a circular or
-    hyperbolic function (Morse 1929).  The centre of mass moves uniformly.
+    """Attractive bonds without other forces: with s = exp(steepness u), s'' = w**2 (excess s + 1), a circular
+    or hyperbolic function (Morse 1929).  The centre of mass moves uniformly.
 
-    Of each bond (s,): masses of both ends, reduced mass, elongation u, relative momentum p, energy E / depth
+    For each bond (s,): masses of both ends, reduced mass, elongation u, relative momentum p, energy E / depth
     and its excess over 1; w**2 = 2 depth steepness**2 / mass; and the phase of the start from the inner
-    turning point, an angle or beyond dissociation its hyperbolic kin, with its rate.
+    turning point, an angle or above dissociation a hyperbolic angle, with its rate.
     """
 
     key = "morse"
@@ -51,8 +51,8 @@ class MorseMotion(ClosedForm):
         # where exp(steepness u) overflows there is no force
         x = np.where(a * u > MOST, 0, np.exp(-np.minimum(a * u, MOST)))
         kinetic = (pull / total) ** 2 / (2 * mass * depth)
-        # near the bottom of the well the energy is small, near dissociation its excess over 1: neither
-        # follows from the other
+        # near the minimum the energy is small, near dissociation its excess over 1: neither follows from the
+        # other
         excess = kinetic + x * (x - 2)
         near = kinetic + x * (x + 2) > CANCELS * np.abs(excess)
         near |= np.abs(q[1]) + np.abs(q[0]) + np.abs(term.rest) > CANCELS * np.abs(u)
@@ -96,9 +96,9 @@ class MorseMotion(ClosedForm):
     def _stretched(self, a: Extended, t: Extended) -> States:
         """log(s) and its time derivative at times t.
 
-        At the inner turning point s = 1/(1 + root), root**2 = 1 + excess; from there on it grows by
-        root (cosh(phase) - 1) / excess, or root (1 - cos(phase)) / |excess|: nothing cancels.  Far beyond
-        dissociation only root exp(|phase|) / (2 excess) of it is left, whose logarithm cannot overflow.
+        At the inner turning point s = 1/(1 + root), root**2 = 1 + excess; from there on it grows by root
+        (cosh(phase) - 1) / excess, or root (1 - cos(phase)) / |excess|, without cancellation.  Far beyond
+        dissociation only root exp(|phase|) / (2 excess) of it remains, whose logarithm cannot overflow.
         """
         root, bound, edge = np.sqrt(self.energy), self.excess < 0, self.excess == 0
         phase = self.rate * t + self.start
@@ -112,7 +112,7 @@ class MorseMotion(ClosedForm):
         size = np.where(edge, 1, np.abs(self.excess))
         z, dz = 2 * root * half * half / size - root / (root + 1), root * self.rate * whole / size
         leaving = np.abs(endless) + np.log(np.where(far, root / (2 * size), 1))
-        # at the edge of dissociation a parabola
+        # at exactly the dissociation energy a parabola
         fast = np.where(edge, a * self.p / self.mass, 0)
         slow = np.where(edge, self.w**2 * np.exp(np.where(edge, -a * self.u, 0)), 0)
         grown = fast * t + slow * t * t / 2
@@ -150,7 +150,7 @@ def _relative(m: Any, q: Any, p: Any, rest: Any) -> tuple[Any, Any]:
 
 
 def _of_bonds(m: Any, q: Any, p: Any, rest: Any, depth: Any, a: Any) -> tuple[Extended, Extended, Extended]:
-    """Elongation, relative momentum times both masses, and E / depth - 1, in more digits."""
+    """Elongation, relative momentum times both masses, and E / depth - 1, computed in more digits."""
     with digits():
         u, pull = _relative(m, q, p, rest)
     with digits(ENOUGH):

@@ -1,8 +1,8 @@
-"""Decimal arithmetic for the few sums that cancel and decide a motion: energies near a barrier, stiff modes.
+"""Decimal arithmetic for the few sums whose cancellation decides a motion: near barriers, and in stiff modes.
 
-They are `decimal` numbers of the standard library in arrays of objects: doubles are exact in them, and +, -,
-*, /, np.sqrt and np.exp are correctly rounded to `DIGITS`.  A formula is written once, for these and for
-extended precision.
+The numbers are `decimal` numbers of the standard library in arrays of objects: doubles convert exactly, and
++, -, *, /, np.sqrt and np.exp are correctly rounded to `DIGITS`.  A formula is written once, for these and
+for extended precision.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ DIGITS = 420
 """Digits for sums of products of doubles that differ by 300 decades, and for pi beside the largest angle."""
 
 ENOUGH = 57
-"""Digits where all numbers lie within 17 decades of the largest: three words of libmpdec."""
+"""Digits where all numbers are within 17 decades of the largest: three words of libmpdec."""
 
 
 @contextmanager
@@ -73,11 +73,11 @@ def _arctangent(inverse: int) -> Decimal:
 
 
 def sine_cosine(x: Decimal) -> tuple[Decimal, Decimal]:
-    """Sine and cosine of an angle of size 2 or less, to `ENOUGH` digits of their own size."""
+    """Sine and cosine of an angle of size 2 or less, to a relative accuracy of `ENOUGH` digits."""
     with digits(ENOUGH):
         away = pi() / 2 - abs(x)
         if abs(away) < abs(x):
-            # near a quarter turn the cosine is as small as what is left of it
+            # near a quarter turn the cosine is as small as the remaining angle
             return _series(away, even=True).copy_sign(x), _series(away, even=False)
         return _series(x, even=False), _series(x, even=True)
 

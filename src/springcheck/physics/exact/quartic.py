@@ -1,4 +1,4 @@
-"""Springs that harden or soften, and double wells: u'' = -k u - b u**3, by Jacobi's elliptic functions."""
+"""Hardening and softening (Duffing) oscillators, double wells: u'' = -k u - b u**3, by elliptic functions."""
 
 from __future__ import annotations
 
@@ -64,13 +64,13 @@ def _gathered(system: System[Any], of: Callable[[Any], Any]) -> tuple[Any, ...]:
 
 
 def _sums(m: Any, k: Any, b: Any, u: Any, p: Any) -> tuple[Any, Any, Any]:
-    """k + b u**2, and m**3 root**2 and 4 m**2 E of unit masses: what may cancel."""
+    """k + b u**2, and m**3 root**2 and 4 m**2 E of unit masses: the sums that may cancel."""
     x = k + b * u * u
     return x, m * x * x + 2 * b * p * p, 2 * p * p + m * (2 * k + b * u * u) * u * u
 
 
 class QuarticMotion(ClosedForm):
-    """Single particles in wells of one centre each."""
+    """Single particles in quartic potentials with one centre each."""
 
     key = "quartic"
     terms = frozenset({"quartic", "wall-spring"})
@@ -96,7 +96,7 @@ class QuarticMotion(ClosedForm):
         # a turning point
         self.need(np.all((b > 0) | ((k > 0) & (square >= 0) & (x >= 0))))
         root = np.sqrt(square)
-        # root**2 - k**2 is 4 b E, so that of plus and minus the one that cancels follows from the other
+        # root**2 - k**2 is 4 b E: of plus and minus the one that cancels follows from the other
         large = root + np.abs(k)
         small = b * energy / np.where(large > 0, large, 1)
         minus, plus = np.where(k < 0, large, small), np.where(k < 0, small, large)
@@ -105,11 +105,11 @@ class QuarticMotion(ClosedForm):
         self.well, self.centre = _Duffing(**parts, **_orbit(b, root, minus, plus, energy)), at
 
     def at(self, t: Extended) -> States:
-        """cn, dn or sn, by what holds the particle."""
+        """cn, dn or sn, by the kind of orbit."""
         well = self.well
         u, v = np.empty((2, len(t), self.system.n), dtype=np.longdouble)
         softening = well.b <= 0
-        # the sign of the energy: beside |k| it may be lost in the root
+        # the sign of the energy, which may be lost in the root beside |k|
         caught = ~softening & (well.plus < 0)
         for which, law in ((softening, _sn), (caught, _dn), (~softening & ~caught, _cn)):
             if np.any(which):
@@ -130,8 +130,8 @@ class QuarticMotion(ClosedForm):
 def _orbit(
     b: Extended, root: Extended, minus: Extended, plus: Extended, energy: Extended
 ) -> dict[str, Extended]:
-    """A, w, m and m1: of sn below the barriers of a softening spring, of dn when caught in one of two wells,
-    of cn elsewhere (Byrd & Friedman, Handbook of Elliptic Integrals, 1971)."""
+    """A, w, m and m1: for sn below the barriers of a softening spring, for dn within one of two wells, for cn
+    elsewhere (Byrd & Friedman, Handbook of Elliptic Integrals, 1971)."""
     soft = b <= 0
     caught = ~soft & (plus < 0)
     rest = ~soft & (root == 0)
@@ -148,23 +148,23 @@ def _orbit(
 
 
 def _cn(well: _Duffing, t: Extended) -> States:
-    """Across the middle of a stiffening well: u = A cn(w t + phase), w**2 = root."""
+    """Across the centre of a hardening potential: u = A cn(w t + phase), w**2 = root."""
     amplitude, w, m, m1 = well.amplitude, well.w, well.m, well.m1
     cosine = well.u / np.where(amplitude > 0, amplitude, 1)
     turn = w * np.sqrt(m1 + m * cosine * cosine)
-    # on the top of the barrier nothing turns: it is reached after an infinite time
+    # the top of the barrier is reached after an infinite time
     sine = np.where(turn > 0, -well.v / np.where(turn > 0, turn, 1), 1)
     at = jacobi(t * w + argument(sine, well.u, m, m1), m, m1)
     return np.asarray(amplitude * at.cn), np.asarray(-amplitude * w * at.sn * at.dn)
 
 
 def _dn(well: _Duffing, t: Extended) -> States:
-    """Caught in one of two wells: u = +-A dn(w t + phase), w**2 = (root - k)/2."""
+    """Within one of two wells: u = +-A dn(w t + phase), w**2 = (root - k)/2."""
     m, m1, w = well.m, well.m1, well.w
     amplitude = np.copysign(well.amplitude, well.u)
-    # of twice am(phase) sine and cosine are rational in the start
+    # sine and cosine of 2 am(phase) are rational in the start
     y, x = -np.copysign(np.sqrt(2 * well.b) * well.v, well.u * well.v), well.pull
-    # half of that angle, without the angle: the smaller of sine and cosine follows from the larger
+    # half of that angle, without computing it: the smaller of sine and cosine follows from the larger
     large = np.sqrt((well.root + np.abs(x)) / 2)
     small = np.abs(y) / (2 * np.where(large > 0, large, 1))
     sine, cosine = np.where(x < 0, large, small), np.where(x < 0, small, large)

@@ -1,7 +1,8 @@
-"""Pairs on a bond of a rest length that swing along it and do not turn.
+"""Pairs on a bond of a rest length that oscillate along it without rotation.
 
-The length is a spring of the reduced mass about its rest, its direction stays, and the centre of mass goes
-straight on.  Rounding of the start leaves some turning: it is no more than what the ends move by across.
+The length oscillates as a spring of the reduced mass about its rest length, the direction is constant, and
+the centre of mass moves uniformly.  Rounding of the start leaves some rotation, bounded by the transverse
+velocities.
 """
 
 from __future__ import annotations
@@ -19,14 +20,14 @@ from springcheck.physics.system import System
 
 class SwingingMotion(ClosedForm):
     """Arrays by coordinate (n,): signed share of the length, and direction; the centre and its velocity;
-    length less rest and its rate at the start, rest, frequency, amplitude, and the speed across.
-    """
+    excess of the length and its rate at the start, rest length, frequency, amplitude, and the transverse
+    speed."""
 
     key = "bond"
     terms = frozenset({"bond"})
 
     def __init__(self, system: System[Any]) -> None:
-        """No bond may turn, close, or share a particle with another."""
+        """No bond may rotate, reach length 0, or share a particle with another."""
         super().__init__(system)
         term: Any = system.terms[0]
         self.need(one_each(system))
@@ -38,7 +39,7 @@ class SwingingMotion(ClosedForm):
             np.add.at(out, bond, values)
             return out[bond]
 
-        # ways and velocities are differences, which may be small beside what they are of
+        # separations and velocities are differences, which may be small beside their operands
         with digits():
             m, q, p, k, rest = (exactly(x) for x in (system.m, system.q, system.p, term.k, term.rest))
             whole, d, v = m[a] + m[b], q[b] - q[a], p / m
@@ -72,8 +73,8 @@ class SwingingMotion(ClosedForm):
     def doubt(self, t: np.longdouble) -> States:
         time, share, far = np.abs(t), np.abs(self.share), self.rest + self.most
         near, w = self.rest - self.most, self.w
-        # an angle at most, of what keeps its angular momentum, and the way that its turning pushes the ends
-        # apart
+        # a bound on the angle from the conserved angular momentum, and the displacement by its centrifugal
+        # force
         turned = self.across * time * far / near**2 * far
         pushed = (self.across * far / w) ** 2 / near**3
         phase = 2 + w * time

@@ -1,8 +1,8 @@
-"""Rods on which nothing else acts: alone, or as flat rigid bodies that turn about an axis across them.
+"""Rods without other forces: alone, or as flat rigid bodies that rotate about a perpendicular axis.
 
-x(t) = x cos(w t) + v sin(w t)/w about a centre of mass that goes straight on, or about a fixed point.  In a
-drift of h such a body turns by asin(h w) under SHAKE and RATTLE: x + h v is x turned by that angle, and what
-is too long, (1 - cos) x, is what pushes along its rods can balance.
+x(t) = x cos(w t) + v sin(w t)/w about a uniformly moving centre of mass, or about a fixed point.  In a drift
+of h such a body rotates by asin(h w) under SHAKE and RATTLE: x + h v is x rotated by that angle plus an
+excess (1 - cos) x, which impulses along its rods can balance.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class TurningRods(ClosedForm):
             np.add.at(out, of, values)
             return out[of]
 
-        # in more digits: a body may be small beside where it is, and turn slowly beside how it moves
+        # in more digits: a body may be small beside its distance from 0, and rotate slowly beside its drift
         with digits():
             q, p, m = (exactly(by_axes(x)) for x in (system.q, system.p, system.m))
             q, m = q - exactly(by_axes(at)), np.max(m, axis=1, keepdims=True)
@@ -62,7 +62,7 @@ class TurningRods(ClosedForm):
                 extended(y).reshape(-1)[places] for y in (x, v, np.sqrt(square) + 0 * x, w, drift)
             )
         if rods.share:
-            # momenta are those of such a turn
+            # momenta must be those of such a rotation
             off = rods.projected(wide(system.q), wide(system.p)) / system.m - self.drift - self.v
             body, speed = of[places // 3], self.reach * self.w
             each = (
@@ -85,14 +85,14 @@ class TurningRods(ClosedForm):
 
 
 class TurningWallRods(TurningRods):
-    """The same of rods to fixed points."""
+    """Flat rigid bodies on rods to fixed points."""
 
     key = "wall-rod"
     terms = frozenset({"wall-rod"})
 
 
 def _bodies(rods: Rods, particles: int) -> Integers | None:
-    """The body of each particle (particles,), None where some could bend, or has more rods than it needs."""
+    """The body of each particle (particles,), None where some body is flexible, or has redundant rods."""
     of = np.arange(particles)
     for ends in rods.ends * (len(rods) if rods.share else 1):
         of[of == max(of[list(ends)])] = min(of[list(ends)])
