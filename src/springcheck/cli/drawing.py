@@ -21,7 +21,7 @@ from springcheck.text.wording import count
 MOST_COORDINATES = 8
 """Most coordinates that are drawn of another program's file."""
 
-FRAMES, SAME = 12, 0.02
+FEWEST_PERIOD_FRAMES, SAME_REACH = 12, 0.02
 """Fewest frames of a period that lines may join; least relative change of an amplitude that is reported."""
 
 
@@ -96,7 +96,7 @@ def draw_foreign(
         notes.append(f"{count(left, 'moving coordinate')} more, which --particle draws")
     chosen = chosen if len(chosen) else np.array([0])
     # with fewer frames in a period lines would be chords
-    few = any(len(found.t) < FRAMES * periods(found.q[:, i]) for i in chosen)
+    few = any(len(found.t) < FEWEST_PERIOD_FRAMES * periods(found.q[:, i]) for i in chosen)
 
     def curves(x: Any, y: Any, *, joined: bool) -> list[Curve]:
         names = [(f"coordinate {i}", i) for i in chosen.tolist()]
@@ -136,7 +136,7 @@ def _found(q: Any, frames: int) -> str:
     first, last = (float(np.ptp(part)) for part in (q[:quarter], q[-quarter:]))
     change = last / first - 1
     reach = "reaches as far at the end"
-    if abs(change) >= SAME:
+    if abs(change) >= SAME_REACH:
         way = "less far" if change < 0 else "farther" if change < 1 else "as far"
         times = f"{100 * abs(change):.0f} %" if change < 1 else f"{last / first:.3g} times"
         reach = f"reaches {times} {way} at the end"

@@ -17,7 +17,7 @@ from springcheck.formats import States, is_store, moving, read
 from springcheck.identify import files
 from springcheck.identify.files import identify_states, of_arrays
 from springcheck.physics.arrays import AS_WRITTEN, Arithmetic, Floats
-from springcheck.physics.rods import UNTRUE
+from springcheck.physics.rods import START_TOLERANCE
 from springcheck.physics.scene import Scene
 from springcheck.physics.scenefile import load_scene
 from springcheck.physics.trajectory import Outcome, Trajectory, Verdict
@@ -284,7 +284,7 @@ def as_trajectory(
     grid: dict[str, Any] = {"steps": steps, "every": every, "quantities": kept}
     if scene.system.rods and states.roundoff > 2.0**-53:
         # a start of few digits has rods of the right length only to those digits
-        scene.system.rods.check(begun["q"], begun["p"], UNTRUE * 2.0**53 * states.roundoff)
+        scene.system.rods.check(begun["q"], begun["p"], START_TOLERANCE * 2.0**53 * states.roundoff)
         judged = replace(scene, **grid).derived(**begun)
     else:
         judged = replace(scene, **begun, **grid)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from springcheck.studies.arguments import Progress
     from springcheck.text.lines import Lines
 
-PIPE = 1 << 16
+PIPE_WIDTH = 1 << 16
 """Width of output that is not a terminal's: its reader wraps long lines."""
 
 SCHEMAS = {"faults": 2, "stability": 2}
@@ -37,14 +37,14 @@ def show(lines: Lines) -> None:
 
     terminal = sys.stdout.isatty()
     if not terminal and not any(map(os.environ.get, ("FORCE_COLOR", "TTY_COMPATIBLE"))):
-        print("\n".join(str(line).rstrip() for line in shown(lines, PIPE)))
+        print("\n".join(str(line).rstrip() for line in shown(lines, PIPE_WIDTH)))
         return
     from rich.console import Console
 
     # NO_COLOR overrides all other settings; Rich would still write bold
     colours: Literal["auto"] | None = None if os.environ.get("NO_COLOR") else "auto"
     # on a closed pipe Rich would end the program with an exit status of its own
-    width, into = (None, None) if terminal else (PIPE, StringIO())
+    width, into = (None, None) if terminal else (PIPE_WIDTH, StringIO())
     drawn(lines, Console(highlight=False, width=width, color_system=colours, file=into))
     if into is not None:
         # a folded line ends in a blank, which files and diffs do not need

@@ -13,7 +13,7 @@ from springcheck.physics.arrays import Floats, Reals
 from springcheck.physics.scene import Scene
 from springcheck.text.wording import count
 
-CLOSE = 1e-6
+CLOSE_STATE = 1e-6
 """Distance, relative to the amplitude, within which a state explains a first frame."""
 MOST_STEPS, MOST_PARTICLES = 100, 1000
 """Steps of the scheme that are tried, and the most particles of a scene for it."""
@@ -61,7 +61,7 @@ def differs(scene: Scene, scheme: str, q: Floats, p: Floats, *, velocities: bool
 
 
 def _is_at(scene: Scene, q: Floats, p: Floats, there_q: Reals, there_p: Reals) -> bool:
-    return bool(scene.system.norm(q - there_q, p - there_p) <= CLOSE)
+    return bool(scene.system.norm(q - there_q, p - there_p) <= CLOSE_STATE)
 
 
 def _single(scene: Scene, q: Floats, p: Floats) -> str:

@@ -27,7 +27,7 @@ MOST_NEWTON = 60
 """Iterations of Newton's method, which converges quadratically: where more are needed there is no
 solution."""
 
-UNTRUE = 2.0**-46
+START_TOLERANCE = 2.0**-46
 """Largest error of lengths and velocities along rods at the start, relative to their summands: 64 roundings,
 as of numbers written with all their digits."""
 
@@ -338,7 +338,7 @@ class Rods:
             unit = np.sqrt(np.diag(matrix))
             # a column that depends linearly on those before it leaves a diagonal entry of 0 in R
             left = np.abs(np.diag(np.linalg.qr(matrix / np.outer(unit, unit), mode="r")))
-            return int(np.argmax(np.append(left <= UNTRUE * len(self), True)))
+            return int(np.argmax(np.append(left <= START_TOLERANCE * len(self), True)))
 
         if (j := first(self._matrix(r, r))) == len(self):
             return ""
@@ -354,7 +354,7 @@ class Rods:
             "light for pushes along rods on one line to be told apart; give it more mass"
         )
 
-    def check(self, q: Floats, p: Floats, untrue: float = UNTRUE) -> None:
+    def check(self, q: Floats, p: Floats, untrue: float = START_TOLERANCE) -> None:
         """SceneError unless every rod has its length at the start, and no velocity along it."""
         r, v = self.ways(q), self.apart(p / self.m)
         with np.errstate(all="ignore"):

@@ -25,25 +25,25 @@ from springcheck.studies import provenance
 
 T = TypeVar("T")
 
-PATIENCE = 60.0
+PATIENCE_SECONDS = 60.0
 """Seconds without any answer after which every open piece is given to another worker as well."""
 
-ATTEMPTS = 20
+MOST_ATTEMPTS = 20
 """Attempts after which a piece is blamed for the workers that died over it."""
 
-WAITING = 30.0
+WAITING_SECONDS = 30.0
 """Seconds to wait for a scheduler and for its first worker."""
 
-SILENT = 30.0
+SILENT_SECONDS = 30.0
 """Seconds of silence after which a worker gets no piece: it hangs, or was stopped.  The scheduler itself
 waits for 300 s and longer."""
 
-GONE = "the scheduler of the cluster is gone; what was finished is kept, the same command goes on"
+SCHEDULER_GONE = "the scheduler of the cluster is gone; what was finished is kept, the same command goes on"
 
 LOGGERS = "distributed", "distributed.client", "distributed.core", "tornado", "tornado.application", "asyncio"
 """Loggers of dask, some of which have levels of their own; other loggers are left as they are."""
 
-OUT = 256
+FEWEST_SUBMITTED = 256
 """Fewest pieces that are submitted at a time."""
 
 
@@ -54,7 +54,7 @@ class Cluster:
     place: str
     workers: int = 2
     """Assumed number of workers: more than one, so that the longest pieces are submitted first."""
-    patience: float = PATIENCE
+    patience: float = PATIENCE_SECONDS
 
     def carried_out(self, parts: Sequence[Callable[[], T]]) -> Generator[tuple[int, T], None, None]:
         """Index and result of each part, as it finishes."""
@@ -90,10 +90,10 @@ class Cluster:
                 logger.setLevel(logging.CRITICAL)
             try:
                 said = "no scheduler answers: {}"
-                client = distributed.Client(self._address, timeout=WAITING, set_as_default=False)
+                client = distributed.Client(self._address, timeout=WAITING_SECONDS, set_as_default=False)
                 stack.callback(client.close, timeout=1)
                 said = "the scheduler has no worker"
-                client.wait_for_workers(1, timeout=WAITING)
+                client.wait_for_workers(1, timeout=WAITING_SECONDS)
                 # the scheduler unpacks what passes through it
                 said = "springcheck is not installed where the scheduler runs: {}"
                 _on_scheduler(client, provenance.versions)
@@ -106,7 +106,7 @@ class Cluster:
 
 def _on_scheduler(client: Any, function: Callable[..., T]) -> T:
     """Result of a function called on the scheduler.  TimeoutError where the scheduler does not answer."""
-    found: T = client.sync(client._run_on_scheduler, function, callback_timeout=WAITING)
+    found: T = client.sync(client._run_on_scheduler, function, callback_timeout=WAITING_SECONDS)
     return found
 
 
@@ -121,8 +121,8 @@ def _hanging(client: Any, named: set[str]) -> tuple[list[str], list[str]]:
     try:
         silence = _on_scheduler(client, _silence)
     except (TimeoutError, OSError) as error:
-        raise SpringcheckError(GONE) from error
-    hang = sorted(address for address, seconds in silence.items() if seconds > SILENT)
+        raise SpringcheckError(SCHEDULER_GONE) from error
+    hang = sorted(address for address, seconds in silence.items() if seconds > SILENT_SECONDS)
     live = sorted(silence.keys() - hang)
     for address in hang if live else ():
         if address not in named:
@@ -169,8 +169,10 @@ def _answers(
 
     def give(i: int) -> None:
         given[i] += 1
-        if given[i] > ATTEMPTS:
-            raise SpringcheckError(f"piece {i} was given out {ATTEMPTS} times, and no worker survived it")
+        if given[i] > MOST_ATTEMPTS:
+            raise SpringcheckError(
+                f"piece {i} was given out {MOST_ATTEMPTS} times, and no worker survived it"
+            )
         key = f"springcheck-{id(number)}-{i}-{given[i]}"
         # any worker may take it; where some hang, only the live ones
         where = {"workers": live} if live and hang else {}
@@ -184,10 +186,10 @@ def _answers(
     done: set[int] = set()
     try:
         while len(done) < len(parts):
-            if len(done) % OUT == 0:
+            if len(done) % FEWEST_SUBMITTED == 0:
                 # no worker runs out of pieces
                 live, hang = _hanging(client, named)
-                most = max(OUT, 2 * len(live))
+                most = max(FEWEST_SUBMITTED, 2 * len(live))
             for i in islice(following, max(0, most - len(number))):
                 give(i)
             try:
@@ -231,10 +233,10 @@ def _answers(
         # dask raises various exceptions for a lost connection, asyncio's CancelledError among them
         if client.status == "running" and isinstance(error, Exception):
             raise
-        raise SpringcheckError(GONE) from error
+        raise SpringcheckError(SCHEDULER_GONE) from error
     client.cancel(list(number), force=True)
 
 
 def _alive(client: Any) -> None:
     if client.status != "running":
-        raise SpringcheckError(GONE)
+        raise SpringcheckError(SCHEDULER_GONE)

@@ -16,9 +16,9 @@ from springcheck import errors
 if TYPE_CHECKING:
     from rich.console import Console
 
-PROSE = 30
+FEWEST_PROSE_COLUMNS = 30
 """Fewest columns into which prose is wrapped."""
-GAP = 2
+COLUMN_GAP = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,8 +86,8 @@ class TextTable:
 
     def _free(self, widths: Sequence[int], j: int, width: int) -> int:
         """Columns for the prose: the rest of the width, or all but the first column where that is little."""
-        others = width - sum(widths) + widths[j] - GAP * (len(widths) - 1)
-        return others if others >= PROSE or j == 0 else width - widths[0] - GAP
+        others = width - sum(widths) + widths[j] - COLUMN_GAP * (len(widths) - 1)
+        return others if others >= FEWEST_PROSE_COLUMNS or j == 0 else width - widths[0] - COLUMN_GAP
 
     def _lines(self, row: Sequence[Cell], widths: Sequence[int], block: Sequence[int]) -> Iterator[Text]:
         parts = []
@@ -105,7 +105,7 @@ class TextTable:
                 piece = pieces[i] if i < len(pieces) else plain()
                 blank = (" " * (width - len(piece)), "")
                 out += [*piece.parts, blank] if left else [blank, *piece.parts]
-                out.append((" " * GAP, ""))
+                out.append((" " * COLUMN_GAP, ""))
             yield Text(tuple(out), whole=True)
 
 
@@ -113,11 +113,11 @@ def _blocks(widths: Sequence[int], width: int) -> list[list[int]]:
     """Blocks of columns that fit beside each other, the first one in each block."""
     blocks, used = [[0]], widths[0]
     for j in range(1, len(widths)):
-        if used + GAP + widths[j] > width and len(blocks[-1]) > 1:
+        if used + COLUMN_GAP + widths[j] > width and len(blocks[-1]) > 1:
             blocks.append([0])
             used = widths[0]
         blocks[-1].append(j)
-        used += GAP + widths[j]
+        used += COLUMN_GAP + widths[j]
     return blocks
 
 

@@ -65,11 +65,11 @@ def sections(summary: Summary) -> tuple[list[Section], dict[str, Any]]:
     return found, data
 
 
-NUMBERS = 12_000
+PAGE_NUMBERS = 12_000
 """Most doubles in a page, at about 20 bytes each; longer data are strided."""
 FEWEST_SHOWN = 50
 """Frames of each trajectory that are always included."""
-TAIL = 1 << 20
+TAIL_FRAMES = 1 << 20
 """Frames at the end of a run by which runs are compared as one motion, as in `run`."""
 
 
@@ -170,7 +170,7 @@ def gather(path: Path) -> Content:
     scene = scenefile.parse(text, name=name, where=str(path)) if text else None
     labels = [run.label for run in summary.runs if {"q", "p"} <= set(run.quantities)]
     rows = 2 + 2 * min(MOST_PANELS, scene.n if scene else 1)
-    most = max(FEWEST_SHOWN, NUMBERS // (rows * max(1, len(labels))))
+    most = max(FEWEST_SHOWN, PAGE_NUMBERS // (rows * max(1, len(labels))))
     pieces = {label: store.strided(path, label, most) for label in labels}
     kept = bool(summary.runs) and path.is_file()
     inspect.learn(summary)
@@ -263,7 +263,7 @@ def _same(path: Path, scene: Scene, comparison: Comparison | None) -> tuple[Same
     """Which runs are one motion, as `run` reports it."""
     if comparison is None:
         return None
-    ends = {label: store.end(path, label, TAIL) for label in comparison.labels if label != EXACT}
+    ends = {label: store.end(path, label, TAIL_FRAMES) for label in comparison.labels if label != EXACT}
     if any(not len(run.q) or not len(run.p) for run in ends.values()):
         return None
     try:

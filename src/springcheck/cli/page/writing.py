@@ -41,7 +41,7 @@ SHAPES = (
 JSON_WORDS = ("Infinity", "-Infinity", "NaN")
 FEWEST_POOLED = 8
 """Most numbers of a row that is written in place; a longer one is written once and referenced."""
-HEAD = 1024
+MARK_BYTES = 1024
 """Bytes within which the mark is found."""
 
 
@@ -94,7 +94,7 @@ def write(content: Content, path: Path) -> int:
             raise StoreError(f"{path} is a folder: a file's name is needed after -o")
         if path.is_symlink() or path.exists():
             with path.open("rb") as file:
-                if MARK.encode() not in file.read(HEAD):
+                if MARK.encode() not in file.read(MARK_BYTES):
                     raise StoreError(
                         f"{path} is no report of ours: move it away, or name another file with -o"
                     )

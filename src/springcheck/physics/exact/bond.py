@@ -9,20 +9,20 @@ import numpy as np
 from springcheck.physics.arrays import Extended
 from springcheck.physics.exact.closedform import (
     CANCELS,
-    LAST,
+    FORM_EPS,
     ClosedForm,
     States,
     one_each,
     wide,
 )
-from springcheck.physics.exact.digits import ENOUGH, digits, exactly, extended
+from springcheck.physics.exact.digits import FEWER_DIGITS, digits, exactly, extended
 from springcheck.physics.system import System
 from springcheck.physics.terms import Morse
 
-MOST = np.log(np.finfo(np.longdouble).max) - 64
+MOST_EXPONENT = np.log(np.finfo(np.longdouble).max) - 64
 """Largest exponent whose exponential, times its factors here, stays finite."""
 
-FAR_OUT = 64.0
+FAR_PHASE = 64.0
 """Phase whose exponential is so large that 1 is negligible beside it in any precision used here."""
 
 
@@ -49,7 +49,7 @@ class MorseMotion(ClosedForm):
         mass = m[0] * m[1] / total
         u, pull = _relative(m, q, p, term.rest)
         # where exp(steepness u) overflows there is no force
-        x = np.where(a * u > MOST, 0, np.exp(-np.minimum(a * u, MOST)))
+        x = np.where(a * u > MOST_EXPONENT, 0, np.exp(-np.minimum(a * u, MOST_EXPONENT)))
         kinetic = (pull / total) ** 2 / (2 * mass * depth)
         # near the minimum the energy is small, near dissociation its excess over 1: neither follows from the
         # other
@@ -63,7 +63,7 @@ class MorseMotion(ClosedForm):
                 *([exactly(x[end[j]]) for end in ends] for x in (system.m, system.q, system.p)),
                 *(exactly(x[j]) for x in (term.rest, term.depth, term.steepness)),
             )
-        y = np.minimum(a * u, MOST)
+        y = np.minimum(a * u, MOST_EXPONENT)
         gap, p_ = np.expm1(-y), pull / total
         energy = p_ * p_ / (2 * mass * depth) + gap * gap
         w = np.abs(a) * np.sqrt(2 * depth / mass)
@@ -103,8 +103,8 @@ class MorseMotion(ClosedForm):
         root, bound, edge = np.sqrt(self.energy), self.excess < 0, self.excess == 0
         phase = self.rate * t + self.start
         turn, run = np.where(bound, phase, 0), np.where(bound, 0, phase)
-        far = np.abs(run) > FAR_OUT
-        endless, run = np.where(far, run, FAR_OUT), np.where(far, 0, run)
+        far = np.abs(run) > FAR_PHASE
+        endless, run = np.where(far, run, FAR_PHASE), np.where(far, 0, run)
         half, whole = (
             np.where(bound, np.sin(turn / 2), np.sinh(run / 2)),
             np.where(bound, np.sin(turn), np.sinh(run)),
@@ -139,8 +139,8 @@ class MorseMotion(ClosedForm):
         far = sum(np.abs(wide(system.q[end])) for end in ends) + np.abs(term.rest)
         far = far + pushed / (system.m[term.a] + system.m[term.b]) * np.abs(t)
         for end in ends:
-            q[end] = LAST * (far + np.abs(self.u) + reach + speed * time)
-            p[end] = LAST * (pushed + self.mass * speed + force * time)
+            q[end] = FORM_EPS * (far + np.abs(self.u) + reach + speed * time)
+            p[end] = FORM_EPS * (pushed + self.mass * speed + force * time)
         return q, p
 
 
@@ -153,7 +153,7 @@ def _of_bonds(m: Any, q: Any, p: Any, rest: Any, depth: Any, a: Any) -> tuple[Ex
     """Elongation, relative momentum times both masses, and E / depth - 1, computed in more digits."""
     with digits():
         u, pull = _relative(m, q, p, rest)
-    with digits(ENOUGH):
+    with digits(FEWER_DIGITS):
         x = np.exp(-a * u)
         excess = pull * pull / (2 * m[0] * m[1] * (m[0] + m[1]) * depth) + x * (x - 2)
         return extended(u), extended(pull), extended(excess)

@@ -15,7 +15,7 @@ PI = 4 * np.arctan(np.longdouble(1))
 CANCELS = 16
 """Least cancellation, summands over sum, for which sums are computed in more digits."""
 
-LAST = 64 * EPS
+FORM_EPS = 64 * EPS
 """Error bound of a closed form, relative to each size that it consists of; `validation/exact_check.py` finds
 at most a tenth of it."""
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from springcheck.physics.arrays import EPS, Extended
 
-MOST = 40
+MOST_MEANS = 40
 """Most rounds of the mean: six for ordinary moduli, a dozen for m1 near the smallest number."""
 
 
@@ -31,7 +31,7 @@ class Jacobi:
 def _means(m: Extended, m1: Extended) -> Iterator[tuple[Extended, Extended, Extended]]:
     """(a, b, c) of each round, from (1, sqrt(m1), sqrt(m)) until c vanishes beside a."""
     a, b, c = np.ones_like(m), np.sqrt(m1), np.sqrt(m)
-    for _ in range(MOST):
+    for _ in range(MOST_MEANS):
         yield a, b, c
         if np.all(c <= EPS * a):
             return

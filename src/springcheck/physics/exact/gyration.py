@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from springcheck.physics.arrays import Extended
-from springcheck.physics.exact.closedform import CANCELS, LAST, ClosedForm, States
+from springcheck.physics.exact.closedform import CANCELS, FORM_EPS, ClosedForm, States
 from springcheck.physics.exact.digits import digits, exactly, extended
 from springcheck.physics.exact.normal import exact_sums, normal_modes
 from springcheck.physics.exact.response import first_difference
@@ -74,6 +74,6 @@ class Gyration(ClosedForm):
         far = z * (1 + np.abs(one) * hold) + v * hold
         fast = np.abs(self.z * one * other) * hold + v * (1 + np.abs(other) * hold)
         q, p = np.empty((2, self.system.n), np.longdouble)
-        q[self.a] = q[self.b] = LAST * (1 + rate * np.abs(t)) * grown * far
-        p[self.a] = p[self.b] = LAST * (1 + rate * np.abs(t)) * grown * fast
-        return q + LAST * np.abs(self.centre), p * self.system.m
+        q[self.a] = q[self.b] = FORM_EPS * (1 + rate * np.abs(t)) * grown * far
+        p[self.a] = p[self.b] = FORM_EPS * (1 + rate * np.abs(t)) * grown * fast
+        return q + FORM_EPS * np.abs(self.centre), p * self.system.m

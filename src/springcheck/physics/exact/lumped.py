@@ -9,7 +9,7 @@ import numpy as np
 
 from springcheck.physics import graph
 from springcheck.physics.arrays import EPS, Extended, Floats, Integers
-from springcheck.physics.exact.closedform import LAST, ClosedForm, States, wide
+from springcheck.physics.exact.closedform import FORM_EPS, ClosedForm, States, wide
 from springcheck.physics.exact.digits import Wide, digits, exactly, extended
 from springcheck.physics.system import System
 from springcheck.physics.term import Term
@@ -72,7 +72,7 @@ class LumpedMotion(ClosedForm):
         free = free * np.exp(rate * time)
         q = q + np.minimum(time * free / np.sqrt(one.m), 2 * free * np.sum(1 / np.sqrt(k)))
         p = p + free * np.sqrt(one.m)
-        return wide(q[of] + LAST * (np.abs(self.system.q) + np.abs(self.off))), wide(p[of] * self.share)
+        return wide(q[of] + FORM_EPS * (np.abs(self.system.q) + np.abs(self.off))), wide(p[of] * self.share)
 
 
 def _moved(term: Term, of: Integers, off: Wide) -> tuple[Term, Extended]:

@@ -14,7 +14,7 @@ import numpy as np
 from springcheck.physics.arrays import Extended
 from springcheck.physics.driven import ModulatedSpring
 from springcheck.physics.exact.closedform import (
-    LAST,
+    FORM_EPS,
     PI,
     ClosedForm,
     NoClosedFormError,
@@ -28,7 +28,7 @@ from springcheck.physics.system import System
 TAYLOR_ORDER = 22
 """Order of the Taylor series: its next term is (1/2)**23/23!, 5e-30 of the first."""
 
-SCALES = 5
+ERROR_SCALES = 5
 """Coordinates in which the growth of errors is bounded."""
 
 MOST_NODES = 1 << 14
@@ -123,14 +123,17 @@ class ModulatedMotion(ClosedForm):
             M = mode.nodes[-1]
             half = np.trace(M) / 2
             root = np.emath.sqrt((half - 1) * (half + 1)) * np.copysign(1, half)
-            radius, gap = max(float(np.abs(np.real(half + root))), 1.0), max(2 * float(np.abs(root)), LAST)
+            radius, gap = (
+                max(float(np.abs(np.real(half + root))), 1.0),
+                max(2 * float(np.abs(root)), FORM_EPS),
+            )
             # a time before the start is whole periods back, and a part of one forward
             turned, periods = (
                 mode.rate * (t if t >= 0 else mode.period - t),
                 float(np.abs(t) / mode.period) + 1,
             )
             sizes = []
-            for z in mode.rate * np.geomspace(1, _balance(M) / mode.rate, SCALES):
+            for z in mode.rate * np.geomspace(1, _balance(M) / mode.rate, ERROR_SCALES):
                 scaled = mode.nodes * [[1, z], [1 / z, 1]]
                 length = float(np.linalg.norm((scaled[-1] - (half + root) * np.eye(2)).astype(complex)))
                 k = max(length / gap, 1.0)
@@ -138,8 +141,8 @@ class ModulatedMotion(ClosedForm):
                 within = np.max(np.linalg.norm(scaled.astype(np.float64), axis=(1, 2)))
                 grown = within * power**2 * max(mode.rate / z, z / mode.rate)
                 sizes.append(grown * np.hypot(z * mode.start[0], mode.start[1]) / np.array([z, 1]))
-            u[i], v[i] = np.min(sizes, axis=0) * radius**periods * LAST * (1 + turned)
-            u[i] += LAST * np.abs(mode.at)
+            u[i], v[i] = np.min(sizes, axis=0) * radius**periods * FORM_EPS * (1 + turned)
+            u[i] += FORM_EPS * np.abs(mode.at)
         return u, v * self.system.m
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from springcheck.physics.arrays import EPS, Extended, Integers, Reals, by_identity
 from springcheck.physics.exact.closedform import PI
-from springcheck.physics.exact.digits import ENOUGH, Wide, digits, eigen, exactly, extended
+from springcheck.physics.exact.digits import FEWER_DIGITS, Wide, digits, eigen, exactly, extended
 from springcheck.physics.system import System
 from springcheck.physics.terms import Damping, Spring
 
@@ -108,22 +108,22 @@ def split(u: Any, v: Any, w2: Any, rate: Any) -> tuple[Any, Any, Any]:
     return (v - fast * u) / (2 * s), (slow * u - v) / (2 * s), size
 
 
-SMALL = 32
+MOST_PRECISE = 32
 """Most particles whose modes are computed to high relative accuracy, in 0.7 s at most."""
 
-FEW = 8
+ALWAYS_PRECISE = 8
 """Most particles for which that takes 15 ms, and is always done."""
 
-GRADED = 2.0**10
+GRADED_RATIO = 2.0**10
 """Ratio of squared frequencies from which it is needed."""
 
 
 def normal_modes(system: System[Any]) -> Modes:
     """Normal modes of a linear system.
 
-    w2 and vectors are accurate to rounding for separate particles, for a uniform chain, and up to `SMALL`
-    particles; otherwise to n EPS max(w2), as `Modes.doubt` states.  ValueError: it has none, or they are too
-    expensive (see `System.has_modes`).
+    w2 and vectors are accurate to rounding for separate particles, for a uniform chain, and up to
+    `MOST_PRECISE` particles; otherwise to n EPS max(w2), as `Modes.doubt` states.  ValueError: it has none,
+    or they are too expensive (see `System.has_modes`).
     """
     if not system.has_modes:
         raise ValueError(
@@ -137,7 +137,7 @@ def normal_modes(system: System[Any]) -> Modes:
     if system.is_separate:
         w2, doubt = system.hessian_diagonal(zero) / system.m, system.rigidity * np.longdouble(EPS) / system.m
         return _modes(system, w2=w2, pull=pull, root_m=root_m, rate=rate, doubt=np.asarray(doubt))
-    if system.n > SMALL and system.is_uniform_chain:
+    if system.n > MOST_PRECISE and system.is_uniform_chain:
         w2 = _wave_frequencies(system)
         return _modes(system, w2=w2, pull=_sines(pull), root_m=root_m, rate=rate, waves=True, doubt=none)
     scaled = np.asarray(system.hessian(zero) / root_m[:, None] / root_m, np.longdouble)
@@ -146,8 +146,8 @@ def normal_modes(system: System[Any]) -> Modes:
     # a free translation has w2 = 0 up to rounding; unless it is set to 0 it would move as a slow wave
     is_zero = np.abs(w2) <= 8 * system.n * EPS * largest
     graded = np.count_nonzero(is_zero) > len(system.free_groups)
-    graded |= bool(np.any(np.abs(w2[~is_zero]) * GRADED < largest))
-    if system.n <= FEW or (system.n <= SMALL and graded):
+    graded |= bool(np.any(np.abs(w2[~is_zero]) * GRADED_RATIO < largest))
+    if system.n <= ALWAYS_PRECISE or (system.n <= MOST_PRECISE and graded):
         return _precise(system)
     w2 = np.where(is_zero, 0, w2)
     pulls = np.where(is_zero, _drag(system, pull * root_m) @ vectors, pull @ vectors)
@@ -252,7 +252,7 @@ def _digits_for(system: System[Any], k: Wide) -> int:
     decades = Decimal(0)
     for of in (exactly(masses), springs):
         decades += (max(of) / min(of)).log10() if len(of) else 0
-    return max(ENOUGH, 40 + int(decades))
+    return max(FEWER_DIGITS, 40 + int(decades))
 
 
 def _drag(system: System[Any], force: Extended) -> Extended:

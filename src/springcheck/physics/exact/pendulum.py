@@ -10,7 +10,7 @@ import numpy as np
 from springcheck.physics.arrays import Extended
 from springcheck.physics.exact.closedform import (
     CANCELS,
-    LAST,
+    FORM_EPS,
     PI,
     ClosedForm,
     States,
@@ -125,8 +125,8 @@ class PendulumMotion(ClosedForm):
         speed = 2 * swing.length * swing.w * root
         time = np.abs(t) + swing.latency
         force = swing.mass * swing.w**2 * np.minimum(size, swing.length)
-        q[i] = LAST * (np.abs(self.system.q[i]) + size + speed * time)
-        p[i] = LAST * (swing.mass * speed + force * time)
+        q[i] = FORM_EPS * (np.abs(self.system.q[i]) + size + speed * time)
+        p[i] = FORM_EPS * (swing.mass * speed + force * time)
         return q, p
 
 
@@ -193,4 +193,4 @@ class HangingRods(ClosedForm):
         time = np.abs(t) + swing.latency
         q = rods.spread(rods.each(swing.length + speed * time))
         p = rods.spread(rods.each(swing.mass * (speed + swing.w**2 * swing.length * time)))
-        return wide(LAST * (np.abs(self.system.q) + q)), wide(LAST * p)
+        return wide(FORM_EPS * (np.abs(self.system.q) + q)), wide(FORM_EPS * p)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from springcheck.physics.arrays import Extended
 from springcheck.physics.exact.closedform import (
     CANCELS,
-    LAST,
+    FORM_EPS,
     ClosedForm,
     States,
     latency,
@@ -122,8 +122,8 @@ class QuarticMotion(ClosedForm):
         fastest = np.where(hill, well.root**2 / (2 * np.abs(well.b)), np.abs(well.energy) / 2)
         a, speed = well.amplitude, np.sqrt(fastest)
         time = np.abs(t) + latency(well.m1) / np.where(well.w > 0, well.w, 1)
-        q = LAST * (np.abs(self.centre) + a + speed * time)
-        p = LAST * (speed + (np.abs(well.k) + np.abs(well.b) * a * a) * a * time)
+        q = FORM_EPS * (np.abs(self.centre) + a + speed * time)
+        p = FORM_EPS * (speed + (np.abs(well.k) + np.abs(well.b) * a * a) * a * time)
         return np.asarray(q), np.asarray(p * self.system.m)
 
 

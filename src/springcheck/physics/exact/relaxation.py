@@ -14,19 +14,19 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from springcheck.physics.arrays import EPS, Extended, Floats, by_identity
-from springcheck.physics.exact.closedform import LAST, ClosedForm, States, wide
+from springcheck.physics.exact.closedform import FORM_EPS, ClosedForm, States, wide
 from springcheck.physics.exact.digits import digits, exactly, extended
 from springcheck.physics.exact.normal import exact_sums
 from springcheck.physics.system import System
 from springcheck.physics.vanderpol import VanDerPol
 
 RADAU_STAGES = 16
-LATENESS = LAST / 4
+TIME_ERROR = FORM_EPS / 4
 """Relative error of the time; `validation/van_der_pol.py` finds errors of at most 0.075 of the resulting
 bound."""
 SERIES_TAIL = 32 * EPS
 """Largest share of a step's last two series coefficients in its largest one."""
-FELT = 8 * EPS
+FELT_ROUNDING = 8 * EPS
 """Relative change of u at any step to which the roundings of all steps amount; near |u| = 1, where the
 friction is nearly 0, and before a jump, it is amplified.  In 300 starts there it was at most 0.53 of this."""
 MOST_RADAU_STEPS = 20_000
@@ -251,10 +251,10 @@ class VanDerPolMotion(ClosedForm):
         return q, p
 
     def doubt(self, t: np.longdouble) -> States:
-        """Errors of size and position, and the larger of a time known to `LATENESS` and amplified
+        """Errors of size and position, and the larger of a time known to `TIME_ERROR` and amplified
         rounding."""
         u, v, a = (np.array([path.fastest[j] * float(path.width) for path in self.paths]) for j in range(3))
-        late, at = LATENESS * np.abs(t), np.array([np.abs(path.at) for path in self.paths])
-        felt = FELT * np.array([path.width * np.array(path.felt) for path in self.paths]).T
-        dq, dv = np.maximum(LAST * u + late * v, felt[0]), np.maximum(LAST * v + late * a, felt[1])
-        return np.asarray(LAST * at + dq), np.asarray(dv * self.system.m)
+        late, at = TIME_ERROR * np.abs(t), np.array([np.abs(path.at) for path in self.paths])
+        felt = FELT_ROUNDING * np.array([path.width * np.array(path.felt) for path in self.paths]).T
+        dq, dv = np.maximum(FORM_EPS * u + late * v, felt[0]), np.maximum(FORM_EPS * v + late * a, felt[1])
+        return np.asarray(FORM_EPS * at + dq), np.asarray(dv * self.system.m)

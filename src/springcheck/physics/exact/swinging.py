@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from springcheck.physics.arrays import Extended
-from springcheck.physics.exact.closedform import LAST, ClosedForm, States, one_each, wide
+from springcheck.physics.exact.closedform import FORM_EPS, ClosedForm, States, one_each, wide
 from springcheck.physics.exact.digits import Wide, digits, exactly, extended
-from springcheck.physics.rods import UNTRUE
+from springcheck.physics.rods import START_TOLERANCE
 from springcheck.physics.system import System
 
 
@@ -61,7 +61,7 @@ class SwingingMotion(ClosedForm):
         self.along, self.centre, self.drift, self.u, self.rate, self.rest, self.w, self.across, speed = rows
         with np.errstate(all="ignore"):
             self.most = np.hypot(self.u, self.rate / self.w)
-        self.need(np.all((self.rest > self.most) & (self.across <= UNTRUE * speed)))
+        self.need(np.all((self.rest > self.most) & (self.across <= START_TOLERANCE * speed)))
 
     def at(self, t: Extended) -> States:
         sine, cosine = np.sin(self.w * t), np.cos(self.w * t)
@@ -78,8 +78,8 @@ class SwingingMotion(ClosedForm):
         turned = self.across * time * far / near**2 * far
         pushed = (self.across * far / w) ** 2 / near**3
         phase = 2 + w * time
-        q = LAST * (np.abs(self.centre) + np.abs(self.drift) * time + share * (far + self.most * phase))
+        q = FORM_EPS * (np.abs(self.centre) + np.abs(self.drift) * time + share * (far + self.most * phase))
         size = np.abs(self.drift) + share * self.most * w * phase
         swung = w * (turned + pushed * phase) + self.across * far / near
-        p = self.system.m * (LAST * size + share * swung)
+        p = self.system.m * (FORM_EPS * size + share * swung)
         return wide(q + share * (turned + pushed * phase)), wide(p)

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from springcheck.physics.arrays import Extended, Integers
-from springcheck.physics.exact.closedform import LAST, ClosedForm, States, wide
+from springcheck.physics.exact.closedform import FORM_EPS, ClosedForm, States, wide
 from springcheck.physics.exact.digits import Wide, digits, exactly, extended
-from springcheck.physics.rods import UNTRUE, Rods
+from springcheck.physics.rods import START_TOLERANCE, Rods
 from springcheck.physics.system import System
 
 
@@ -68,7 +68,7 @@ class TurningRods(ClosedForm):
             each = (
                 (np.max(np.abs(off[here])), np.max(speed[here])) for here in (body == b for b in set(body))
             )
-            self.need(not any(moved > UNTRUE / 2 * most for moved, most in each))
+            self.need(not any(moved > START_TOLERANCE / 2 * most for moved, most in each))
 
     def at(self, t: Extended) -> States:
         turn, m = self.w * t, wide(self.system.m)
@@ -80,8 +80,8 @@ class TurningRods(ClosedForm):
     def doubt(self, t: np.longdouble) -> States:
         m, time, speed = wide(self.system.m), np.abs(t), np.abs(self.drift)
         turned = self.reach * (2 + self.w * time)
-        q = LAST * (np.abs(self.system.q) + speed * time + turned)
-        return wide(q), wide(LAST * m * (speed + self.w * turned))
+        q = FORM_EPS * (np.abs(self.system.q) + speed * time + turned)
+        return wide(q), wide(FORM_EPS * m * (speed + self.w * turned))
 
 
 class TurningWallRods(TurningRods):

@@ -79,7 +79,7 @@ class _Bodies:
         return [tuple(at[i, x] for i in numbers) for x in (axis or shared[0])]
 
 
-PLACES = {
+FILE_PATHS = {
     "step": "time.step",
     "steps": "time.steps",
     "every": "record.every",
@@ -132,7 +132,7 @@ def scene(table: Any, *, name: str) -> Scene:
     except SceneError as error:
         field, separator, rest = str(error).partition(" ")
         head, colon = field.removesuffix(":"), ":" if field.endswith(":") else ""
-        raise MistakeError(f"{PLACES.get(head, head)}{colon}{separator}{rest}") from error
+        raise MistakeError(f"{FILE_PATHS.get(head, head)}{colon}{separator}{rest}") from error
 
 
 def _bodies(table: Any) -> _Bodies:

@@ -230,13 +230,13 @@ def identifier(name: str) -> str:
     return name.replace("-", "_")
 
 
-OTHERWISE = ("wall-spring", "spring", "magnetic", "wall-rod", "rod", "bond")
+OWN_TABLES = ("wall-spring", "spring", "magnetic", "wall-rod", "rod", "bond")
 """Keys of the terms with tables of their own."""
 
 
 def of_terms() -> tuple[Any, ...]:
     """Terms that are read by their columns alone."""
-    return tuple(term for key, term in terms.known().items() if key not in OTHERWISE)
+    return tuple(term for key, term in terms.known().items() if key not in OWN_TABLES)
 
 
 def scene_table() -> Any:

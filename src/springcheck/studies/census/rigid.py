@@ -24,7 +24,7 @@ from springcheck.physics.trajectory import Trajectory
 LENGTH, PART = 0.75, 0.375
 """Length of the rod [L], and share of the mass at its near end: unequal, and exact in binary."""
 
-TURNS: Mapping[str, Callable[[Floats], Floats]] = {
+ROD_TURNS: Mapping[str, Callable[[Floats], Floats]] = {
     "asin(h w)": np.arcsin,
     "2 asin(h w/2)": lambda x: 2 * np.arcsin(x / 2),
     "atan(h w)": np.arctan,
@@ -34,19 +34,19 @@ TURNS: Mapping[str, Callable[[Floats], Floats]] = {
 """Turn of a free rod in a step: by SHAKE and RATTLE; by these in two drifts of half a step; where the length
 is restored along the rod after the drift; by Cayley's rotation; exactly."""
 
-WORSE = 4
+WORSE_FIT = 4
 """Largest residual of a scheme's map, in residuals of the best linear map."""
 
 NO_SCHEME = "none that is known"
 
-ROUNDED = 1e-13
+ROUNDED_ERROR = 1e-13
 """Largest error that counts as rounding: 400 steps of 2**-52."""
 
-ALIKE = 1e-9
+ALIKE_MAPS = 1e-9
 """Difference of one-step maps along two axes up to which they count as equal: fits of 60 states leave 1e-13,
 solvers their tolerance."""
 
-UNLIKE = 1e-4
+UNLIKE_TURN = 1e-4
 """Relative misfit from which a turn follows none of these: at h w = 0.15 they differ by 1.9e-3 or more."""
 
 
@@ -116,7 +116,7 @@ def name(scene: Scene, found: Trajectory) -> str:
     def left(matrix: Floats) -> float:
         return float(np.max(np.abs(z[:, 1:] - matrix @ z[:, :-1])))
 
-    fit = (one for one, matrix in unlike if left(matrix) <= WORSE * left(best))
+    fit = (one for one, matrix in unlike if left(matrix) <= WORSE_FIT * left(best))
     return " or ".join(fit) or NO_SCHEME
 
 
@@ -133,7 +133,7 @@ def axes(label: Label) -> str:
     if not is_rigid(label):
         maps = np.stack([fitted(found.q[:, axis], found.p[:, axis]) for axis in range(3)])
         coarse = found.arithmetic.state > 2.0**-53
-        alike = np.ptp(maps, axis=0).max() < (1e-4 if coarse else ALIKE)
+        alike = np.ptp(maps, axis=0).max() < (1e-4 if coarse else ALIKE_MAPS)
         # steps that depend on the forces are no linear map
         said += " alike" if alike else "" if engines.method(label).adaptive else " unlike"
     boxed = engines.refusal(load_scene("periodic-box"), label)
@@ -165,13 +165,13 @@ def _turn(found: Trajectory, rods: Rods, scene: Scene) -> str:
 
 def _named(each: Reals, h_w: Floats) -> str:
     """The mean turn per step, as a law of h w (1,) [rad]."""
-    off = {name: float(np.abs(np.mean(each) / turn(h_w) - 1)[0]) for name, turn in TURNS.items()}
+    off = {name: float(np.abs(np.mean(each) / turn(h_w) - 1)[0]) for name, turn in ROD_TURNS.items()}
     name = min(off, key=lambda one: off[one])
-    if not off[name] < UNLIKE:
+    if not off[name] < UNLIKE_TURN:
         return f"turns by {float(np.mean(each) / h_w[0]):.4f} h w a step"
     return f"turns by {name} a step {to(off[name])}"
 
 
 def to(off: float) -> str:
     """A deviation rounded up to a power of ten, so that roundings do not change a column that is compared."""
-    return "to rounding" if off < ROUNDED else f"to {10.0 ** np.ceil(np.log10(off)):.0e}"
+    return "to rounding" if off < ROUNDED_ERROR else f"to {10.0 ** np.ceil(np.log10(off)):.0e}"

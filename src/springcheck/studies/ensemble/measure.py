@@ -29,7 +29,7 @@ from springcheck.studies.ensemble.vary import CHUNK, GRID, Plan, Varied, plan, t
 from springcheck.studies.extremes.running import raw
 from springcheck.studies.keeper import How, Keeper, Piece
 
-NUMBERS = 1 << 17
+NUMBERS_PER_ARRAY = 1 << 17
 """Numbers per array of a run: memory does not grow with the number of cells."""
 
 OUTCOMES = ("complete", "diverged", "stopped")
@@ -134,7 +134,7 @@ def measure(scene: Scene, cells: Plan, chunk: int, label: Label) -> Columns:
     for number in range(int(group.max()) + 1):
         mine = np.flatnonzero(group.ravel() == number)
         first = together(scene, changes, mine[:1])
-        size = 1 if engines.method(label).adaptive else max(1, NUMBERS // (first.frames * first.n))
+        size = 1 if engines.method(label).adaptive else max(1, NUMBERS_PER_ARRAY // (first.frames * first.n))
         for start in range(0, len(mine), size):
             _run(scene, changes, mine[start : start + size], label, found)
     return {**values, **found}

@@ -32,16 +32,16 @@ TITLES = {
 SIZES = ("max_error", "energy_drift")
 """Quantities drawn by their magnitude, over many powers of ten."""
 
-MOST = 1e3
+MOST_SHOWN_SIZE = 1e3
 """Largest relative size that a chart shows: beyond it nothing can be read off."""
 
-DRAWN = SIZES
+DRAWN_QUANTITIES = SIZES
 """Quantities that are drawn by default."""
 
 MOST_POINTS, MOST_TILES = 400, 64
-FEW = 100
+FEW_POINTS = 100
 """Points up to which a curve shows each of them."""
-TOGETHER = 9
+FEWEST_BINNED = 9
 """Fewest random samples in a point or tile, on average."""
 
 
@@ -115,8 +115,8 @@ def even_in_logarithm(values: Floats) -> bool:
 def _line(x: Floats, y: Floats, fixed: Mapping[str, float], *, joined: bool) -> Line:
     order = np.argsort(x, kind="stable")
     x, y = x[order], y[order]
-    most = MOST_POINTS if joined else len(x) // TOGETHER
-    if len(x) <= max(most, FEW):
+    most = MOST_POINTS if joined else len(x) // FEWEST_BINNED
+    if len(x) <= max(most, FEW_POINTS):
         return Line(x=x, y=y, low=y, high=y, joined=joined, fixed=fixed)
     pieces = [np.array_split(z, min(most, MOST_POINTS)) for z in (x, y)]
     known = [(float(np.median(a)), b[np.isfinite(b)]) for a, b in zip(*pieces, strict=True)]
@@ -127,7 +127,7 @@ def _line(x: Floats, y: Floats, fixed: Mapping[str, float], *, joined: bool) -> 
 
 
 def _map(x: Floats, y: Floats, values: Floats, fixed: Mapping[str, float], *, grid: bool) -> Map:
-    most = MOST_TILES if grid else int(np.clip(np.sqrt(len(values) / TOGETHER), 2, MOST_TILES))
+    most = MOST_TILES if grid else int(np.clip(np.sqrt(len(values) / FEWEST_BINNED), 2, MOST_TILES))
     (us, i), (vs, j) = (_tiles(z, most, grid=grid) for z in (x, y))
     found = np.full(len(us) * len(vs), np.nan)
     good = np.isfinite(values)
@@ -182,7 +182,7 @@ def banks(found: Ensemble, *, quantity: str | None = None, over: str | None = No
         close = nearest(quantity, TITLES)
         raise SpringcheckError(f"--quantity {quantity}: {', '.join(TITLES)} can be drawn{close}")
     out, fields = [], fields_over(found, over)
-    for name in DRAWN if quantity is None else (quantity,):
+    for name in DRAWN_QUANTITIES if quantity is None else (quantity,):
         every = (
             (tally.method, reduced(found.of(tally.method), found, name, fields)) for tally in found.tallies
         )
@@ -283,9 +283,9 @@ def _axis(quantity: str, scene: Scene, values: Floats) -> Scale:
     least = good[good > 0]
     low, high = float(np.min(good)), float(np.max(good))
     if low >= 0 and len(least) and high > 100 * (first := float(np.min(least))):
-        return Scale(name=name, log=True, shown=(first / 2, min(2 * high, max(MOST, 4 * first))))
-    if max(-low, high) > MOST:
-        return Scale(name=name, shown=(max(low, -MOST), min(high, MOST)))
+        return Scale(name=name, log=True, shown=(first / 2, min(2 * high, max(MOST_SHOWN_SIZE, 4 * first))))
+    if max(-low, high) > MOST_SHOWN_SIZE:
+        return Scale(name=name, shown=(max(low, -MOST_SHOWN_SIZE), min(high, MOST_SHOWN_SIZE)))
     return Scale(name=name)
 
 
@@ -331,7 +331,7 @@ def _kinds(quantity: str, values: Sequence[Floats]) -> tuple[list[tuple[str, str
     if quantity == "outcome":
         return list(zip(OUTCOMES, ("good", "limit", "wrong"), strict=False)), np.arange(1.0, len(OUTCOMES))
     if quantity in SIZES:
-        return _decades(np.minimum(every[every > 0], MOST))
+        return _decades(np.minimum(every[every > 0], MOST_SHOWN_SIZE))
     low, high = float(np.min(every)), float(np.max(every))
     shades: Sequence[str] = [f"s{i}" for i in range(SHADES)]
     if low < 0:

@@ -26,10 +26,10 @@ Outcome: TypeAlias = Literal[
     "right", "unstable, as theory says", "engine's limit", "silently wrong", "not measured"
 ]
 
-GROWN = 2.0
+UNSTABLE_GROWTH = 2.0
 """Growth of the amplitude over a run from which a cell is called unstable."""
 
-DIGITS = 2.0**-24
+FORCE_RESOLUTION = 2.0**-24
 """Relative resolution that a fixed-point sum must reach to represent a force: single precision's."""
 
 RANGES = {
@@ -137,7 +137,7 @@ def judge(
         here = from_finite[:, i]
         bad = here & ~(ratio[:, i] <= bound)
         value = float(np.max(np.where(here, np.minimum(ratio[:, i], 1e300), 0), initial=0.0))
-        unstable = bool(growth[i] * spec.steps >= np.log(GROWN)) and spec.k > 0
+        unstable = bool(growth[i] * spec.steps >= np.log(UNSTABLE_GROWTH)) and spec.k > 0
         j = int(np.argmax(bad)) if bad.any() else len(bad)
         outcome: Outcome = "silently wrong"
         reason = f"step {j + 1} is off by {value:.3g} roundings of {bound:g}"
@@ -147,7 +147,7 @@ def judge(
             outcome, reason = "unstable, as theory says" if unstable else "right", ""
             # an unstable force is small at first
             peak = float(inside.force[0, i] if unstable else np.max(inside.force[:, i], initial=0))
-            coarse = how.quantum > DIGITS * peak > 0
+            coarse = how.quantum > FORCE_RESOLUTION * peak > 0
             if np.any(here & ~(strict[:, i] <= bound)):
                 outcome, reason = "engine's limit", f"numbers below {low:.1e} lose digits to underflow"
             elif coarse:
@@ -179,7 +179,7 @@ def _reason(
     reasons = {
         overflows(how): inside.force[bad, i] >= how.overflow,
         f"fixed-point forces: a quantum of {how.quantum:.1e} leaves too few digits": np.full(
-            len(bad), how.quantum > DIGITS * peak
+            len(bad), how.quantum > FORCE_RESOLUTION * peak
         ),
         keeps(how): least_moved(inside.moved[:, i])[bad] <= 2 * how.stale,
         f"a joint of length {far:.3g} is passed": how.joints & (inside.force[bad, i] >= abs(spec.k) * far),

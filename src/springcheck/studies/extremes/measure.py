@@ -35,7 +35,7 @@ def everything() -> tuple[str, ...]:
     return ("*", *places)
 
 
-CALM = (0.01, 1.9)
+CALM_TURNS = (0.01, 1.9)
 """h w that count for a window: below, hardly any force shows; beyond, stability decides."""
 
 
@@ -123,7 +123,7 @@ def groups(label: Label, *, quick: bool = False) -> list[list[grid.Spec]]:
 
 
 def windows(cells: Sequence[Cell]) -> list[Window]:
-    """For each method the decades of force around 1 to 1e6 in which every cell of h w in `CALM` is right."""
+    """Decades of force around 1 to 1e6 in which a method's cells within `CALM_TURNS` are all right."""
     found = []
     for method in dict.fromkeys(cell.method for cell in cells):
         calm: dict[int, list[bool]] = {}
@@ -131,7 +131,7 @@ def windows(cells: Sequence[Cell]) -> list[Window]:
             if (
                 cell.method == method
                 and cell.block == "force"
-                and CALM[0] * 0.999 < cell.parameters["h_w"] < CALM[1] * 1.001
+                and CALM_TURNS[0] * 0.999 < cell.parameters["h_w"] < CALM_TURNS[1] * 1.001
             ):
                 calm.setdefault(cell.decade, []).append(cell.outcome in RIGHT)
         right = {x: all(calm[x]) for x in sorted(calm)}

@@ -17,7 +17,7 @@ from springcheck.studies.tables import Rows
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Window:
-    """Range of forces in which a method is right at every h w in `CALM`, in decades of the scene's unit."""
+    """Range of forces in which a method is right at all h w of `CALM_TURNS`, in decades of the unit."""
 
     method: str
     sentence: str

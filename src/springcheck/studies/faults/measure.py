@@ -67,11 +67,11 @@ def scene(where: str) -> Scene:
     return replace(SCENES[where](), name=where)
 
 
-SLOW = frozenset(check.name for check in checks.THOROUGH if check.family == "law")
+SLOW_CHECKS = frozenset(check.name for check in checks.THOROUGH if check.family == "law")
 """Experiments that do not depend on the scene, and take most of the time."""
 SMALLEST, LARGEST = 1e-20, 0.3
 """Sizes between which a detection limit is looked for."""
-HALVINGS = 4
+DECADE_HALVINGS = 4
 """Halvings of a decade: limits are known to a factor 10**(1/16) = 1.15."""
 
 
@@ -118,7 +118,7 @@ def smallest(passed: Passed, check: str, size: float) -> float | None:
     else:
         return None
     low, high = sorted((size, following))
-    for _ in range(HALVINGS):
+    for _ in range(DECADE_HALVINGS):
         middle = float(np.sqrt(low * high))
         if passed(check, middle) is False:
             high = middle
@@ -143,7 +143,7 @@ def examine(fault: Fault, *, limits: bool = True) -> Result:
     found: dict[str, float] = {}
     if limits and fault.size is not None:
         for name in every:
-            if passed(name, fault.size) is None or (name in SLOW and name not in fault.caught_by):
+            if passed(name, fault.size) is None or (name in SLOW_CHECKS and name not in fault.caught_by):
                 continue
             limit = smallest(passed, name, fault.size)
             if limit is not None:

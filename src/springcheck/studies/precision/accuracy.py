@@ -19,11 +19,11 @@ from springcheck.physics.arrays import WIDE, Extended, Floats, Integers, Reals
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Spring, WallSpring
 
-CARRIES = 1e-3
+LEAST_AMPLITUDE = 1e-3
 """Least amplitude, relative to the largest, of modes whose phase is reported: in a mode that hardly moves,
 the rounding of the others is a large angle."""
 
-FRAMES = 4096
+MOST_COMPARED_FRAMES = 4096
 """Most frames at which a run is compared with the exact solution.  Their spacing is below a 250th of a period
 as long as the run has fewer than 16 periods, and every finer step hits the same instants."""
 
@@ -121,7 +121,7 @@ class Errors:
         modes = known.turning
         u, v = self._turned(known.scene.q[None], known.scene.p[None])
         size = np.hypot(u, v)[0]
-        self._clear = (modes.w2 > 0) & (size >= CARRIES * np.max(size)) & (size > 0)
+        self._clear = (modes.w2 > 0) & (size >= LEAST_AMPLITUDE * np.max(size)) & (size > 0)
         self._last = np.zeros(int(np.count_nonzero(self._clear)), dtype=np.longdouble)
         self._own = _own_motion(judged or known.scene, scheme, h)
         self._rounded = 0.0

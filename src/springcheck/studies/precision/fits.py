@@ -123,21 +123,21 @@ def points_of(scene: Scene) -> Rows[Point]:
     return replace(POINTS, units={**POINTS.units, "step": time})
 
 
-ASYMPTOTIC = 2e-2
+ASYMPTOTIC_ERROR = 2e-2
 """Largest error that the leading term of its expansion dominates.  The next term relative to it is about as
 large as the error: a fiftieth here, and a quarter or a half of that at each halving of the step."""
 
 ABOVE_FLOOR = 100.0
 """Least ratio of a fitted error to its rounding, which then shifts it by at most 1 %."""
 
-FITTED = 8
+MOST_FITTED = 8
 """Most points in a fit, the finest ones: their steps span a factor of 128."""
 
 FEWEST_FITTED = 4
 """Points below which no order is claimed."""
 
 
-BENT = 3.0
+BENT_FIT = 3.0
 """Standard errors of a curvature from which the coarsest points are not asymptotic."""
 
 
@@ -156,7 +156,7 @@ def turned(errors: Sequence[float], *, by: int = 1) -> int | None:
     if not errors or np.all(np.isnan(errors)):
         return None
     best = int(np.nanargmin(errors))
-    return best if best < len(errors) - by and errors[best] < ASYMPTOTIC else None
+    return best if best < len(errors) - by and errors[best] < ASYMPTOTIC_ERROR else None
 
 
 def order(points: Sequence[Point]) -> Fit | None:
@@ -166,13 +166,13 @@ def order(points: Sequence[Point]) -> Fit | None:
     chosen = [
         point
         for point in points[: None if best is None else best]
-        if 0 < point.error <= ASYMPTOTIC
+        if 0 < point.error <= ASYMPTOTIC_ERROR
         and point.error >= ABOVE_FLOOR * (floor if point.rounding is None else point.rounding)
-    ][-FITTED:]
+    ][-MOST_FITTED:]
     if len(chosen) < FEWEST_FITTED:
         return None
     x, y = np.log([abs(x.step or 0.0) for x in chosen]), np.log([x.error for x in chosen])
-    while len(x) > FEWEST_FITTED and _bent(x, y) > BENT:
+    while len(x) > FEWEST_FITTED and _bent(x, y) > BENT_FIT:
         x, y = x[1:], y[1:]
     found = line(x, y)
     return Fit(
@@ -241,7 +241,7 @@ def condition(method: Method, arithmetic: Arithmetic, angle: float) -> Condition
     return Condition(name=name, why=why, eps=eps, angle=angle)
 
 
-TYPICAL = 0.25
+TYPICAL_ROUNDING = 0.25
 """Rounding over eps times its condition, where it cannot be measured: about the standard deviation of a
 rounding, eps/sqrt(12), in a sum that changes sign."""
 
@@ -253,7 +253,7 @@ def expected_floor(points: Sequence[Point], fit: Fit, how: Condition, duration: 
         for point in points[-4:]
         if point.rounding and point.steps
     ]
-    per = how.eps * (float(np.median(seen)) if seen else TYPICAL)
+    per = how.eps * (float(np.median(seen)) if seen else TYPICAL_ROUNDING)
     # both are powers of the number of steps
     of_steps, _ = POWERS[how.name]
     ratio, power = fit.constant * abs(duration) ** fit.order / (per * how.value(1)), fit.order + of_steps

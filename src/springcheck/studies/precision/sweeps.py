@@ -15,14 +15,14 @@ from springcheck.errors import MethodError
 from springcheck.physics.arrays import Arithmetic
 from springcheck.physics.scene import Scene
 from springcheck.studies.precision import fits
-from springcheck.studies.precision.accuracy import FRAMES, Truth
+from springcheck.studies.precision.accuracy import MOST_COMPARED_FRAMES, Truth
 from springcheck.studies.precision.fits import Place, Point
 
 TOLERANCES = (1e-3, *(float(f"{mantissa}e-{e}") for e in range(4, 17) for mantissa in (3, 1)))
 """Relative tolerances of adaptive solvers, two a decade, from 1e-3 to 1e-16: a solver's response to one
 beyond double precision is a row as well."""
 
-RESERVED = 0.75
+RESERVED_SHARE = 0.75
 """Largest part of the remaining time that is reserved for methods that can reach their floor."""
 
 PLANNED = 1_000_000_000
@@ -140,12 +140,12 @@ def by_step(scene: Scene, limit: float, known: Truth) -> Iterator[Scene]:
     while steps < MOST_STEPS:
         yield replace(scene, step=known.duration / steps, steps=steps, every=every)
         steps *= 2
-        every = every * 2 if steps // every > FRAMES else every
+        every = every * 2 if steps // every > MOST_COMPARED_FRAMES else every
 
 
 def by_tolerance(scene: Scene) -> Iterator[Scene]:
     """The scene at ever smaller tolerances, on a time grid that resolves its largest error."""
-    finer = max(1, FRAMES // scene.steps)
+    finer = max(1, MOST_COMPARED_FRAMES // scene.steps)
     h = scene.step / finer
     for tolerance in TOLERANCES:
         yield replace(scene, step=h, steps=scene.steps * finer, every=1, tolerance=tolerance)
@@ -160,7 +160,7 @@ def fitting(sweeps: list[Sweep], known: Truth, left: float) -> list[Sweep]:
     needs = sorted((_need(sweep, known.duration), i) for i, sweep in enumerate(sweeps))
     aside, reserved = set(), 0.0
     for need, i in needs:
-        if reserved + need <= RESERVED * left:
+        if reserved + need <= RESERVED_SHARE * left:
             aside.add(i)
             reserved += need
     share = (left - reserved) / max(1, len(sweeps) - len(aside))

@@ -13,13 +13,13 @@ from springcheck.physics.scene import Scene
 from springcheck.studies.precision.fits import Point
 from springcheck.studies.precision.sweeps import PLANNED, Sweep, repeats, warm_ups
 
-TICKS = 1000
+FEWEST_TICKS = 1000
 """Clock ticks that a timing lasts at least, so that the clock's resolution is a thousandth of it."""
 
-STARTS = 0.02
+MOST_START_SECONDS = 0.02
 """Seconds that the starts of several short runs in one timing may take."""
 
-READS = 3
+READ_TIMINGS = 3
 """Timings of a run with every step read; one where a start is slow."""
 
 MOST_LOOKS = 10_000_000
@@ -64,7 +64,7 @@ class Clock:
         if warm_ups(expected + self.sweep.start):
             warm = self._bare()
             expected = warm.timing.run if warm else 0.0
-        most = ceil(STARTS / max(self.sweep.start, 1e-9))
+        most = ceil(MOST_START_SECONDS / max(self.sweep.start, 1e-9))
         self.copies = max(1, min(64, most, ceil(shortest / max(expected, 1e-9))))
         self.count = repeats(expected + self.sweep.start)
 
@@ -73,7 +73,7 @@ class Clock:
         run = self._bare(copies=self.copies)
         if run:
             self.runs.append(run)
-        reads = READS if self.sweep.start < STARTS else 1
+        reads = READ_TIMINGS if self.sweep.start < MOST_START_SECONDS else 1
         if number < reads and self.sweep.read <= READ_SECONDS:
             read = self._bare(copies=self.copies, read=True)
             if read:
@@ -104,7 +104,7 @@ class Clock:
 
 def take_turns(clocks: list[Clock]) -> None:
     """Warm up, then repeat in turn: A B C A B C."""
-    shortest = TICKS * tick()
+    shortest = FEWEST_TICKS * tick()
     for clock in clocks:
         clock.warm_up(shortest)
     for number in range(max((clock.count for clock in clocks), default=0)):

@@ -64,7 +64,7 @@ def _float(text: str) -> float | None:
         return None
 
 
-MEMORY = 0.1
+BATH_MEMORY = 0.1
 """Friction rate times step of a bath without a stated friction: momenta decorrelate in some ten steps."""
 
 
@@ -96,7 +96,7 @@ def bathed(scene: Scene, options: Namespace) -> Scene:
         assert bath is not None
         temperature, text = bath.temperature, f"{bath.temperature:g}"
     if friction is None:
-        friction = bath.friction if bath else MEMORY / abs(scene.step)
+        friction = bath.friction if bath else BATH_MEMORY / abs(scene.step)
     if temperature == 0:
         return builders.cold(replace(scene, bath=None), friction)
     made = Bath(temperature=temperature, friction=friction)

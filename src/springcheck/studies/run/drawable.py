@@ -25,7 +25,7 @@ FIGURE_BYTES, RUN_BYTES = 160, 64
 END_FRAMES = 500
 """Frames that are drawn of the end of a run whose motion is too fast to draw as a whole."""
 
-RESOLVED = 0.25
+RESOLVED_WAY = 0.25
 """Largest displacement between two drawn frames, relative to the range, that still resolves the motion: half
 a radian of an oscillation.  Beyond, lines between frames are chords, and aliasing shows a slow wave."""
 
@@ -74,4 +74,4 @@ def _shows_motion(run: Trajectory, end: Trajectory, stride: int) -> bool:
     detected by the frames of its end, none of which are left out."""
     with np.errstate(over="ignore"):
         moved, each = (np.max(np.abs(np.diff(one.q[:, 0])), initial=0.0) for one in (run, end))
-        return bool(max(moved, stride * each) <= RESOLVED * np.ptp(run.q[:, 0]))
+        return bool(max(moved, stride * each) <= RESOLVED_WAY * np.ptp(run.q[:, 0]))

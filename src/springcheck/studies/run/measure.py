@@ -34,7 +34,7 @@ RUN_BYTES, MORE_BYTES = 2300, 700
 """Peak memory [bytes] of a run for each particle of a chain, and for each further method: as measured for
 uniform chains of 60,000 to 1,000,000 masses, rounded down."""
 
-PIECE = 1 << 16
+PIECE_NUMBERS = 1 << 16
 """Numbers per array that are judged at a time, so that memory does not grow with the run."""
 
 MOST_PIECES = 16
@@ -46,7 +46,7 @@ MOST_NUMBERS = 1 << 24
 at 1 us a number, two minutes for a single one.  Of a longer run pieces are judged, and none of these
 passes it."""
 
-LONG_PIECE = PIECE // 4
+LONG_PIECE = PIECE_NUMBERS // 4
 """Numbers per array in each of them.  Judging takes 8 us a frame, a hundred times as long as making it: two
 seconds in all."""
 
@@ -259,7 +259,7 @@ def judge(
 
 def _pieces(scene: Scene, sources: Mapping[str, Path]) -> tuple[int, int]:
     """Frames of a piece of the stored runs, and the stride: of so many pieces one is judged."""
-    rows = max(2, PIECE // scene.n)
+    rows = max(2, PIECE_NUMBERS // scene.n)
     if scene.frames - 1 <= MOST_PIECES * rows:
         return rows, 1
     first = (next(keeper.windows(source, name, rows)) for name, source in sources.items())
@@ -368,7 +368,7 @@ def _seed(path: Path, name: str, kept: object) -> int:
 def _difference(scene: Scene, one: Path, other: Path, label: str) -> float:
     norm = scene.system.norm
     worst = 0.0
-    rows = max(2, PIECE // scene.n)
+    rows = max(2, PIECE_NUMBERS // scene.n)
     for a, b in zip_longest(keeper.windows(one, label, rows), keeper.windows(other, label, rows)):
         if a is None or b is None or len(a.t) != len(b.t):
             return float("nan")

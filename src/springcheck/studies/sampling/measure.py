@@ -28,13 +28,13 @@ from springcheck.thermal import THERMOSTATS, Law
 
 OMEGA = float(np.sqrt(STIFFNESS / MASS))
 
-TURNS = np.array([0.2, 0.5, 0.8, 1.0, 1.2, 1.4])
+SAMPLED_TURNS = np.array([0.2, 0.5, 0.8, 1.0, 1.2, 1.4])
 """h omega at which temperatures are measured."""
 
 RATE = 0.4
 """Friction over omega at which temperatures are measured."""
 
-FRAMES = np.array([10.0, 20.0, 50.0, 100.0, 200.0, 500.0])
+AVERAGED_STEPS = np.array([10.0, 20.0, 50.0, 100.0, 200.0, 500.0])
 """Steps over which <q**2> is averaged, at the second h omega."""
 
 FRICTIONS = np.array([0.03, 0.1, 0.3, 1.0, 3.0, 10.0])
@@ -43,7 +43,7 @@ FRICTIONS = np.array([0.03, 0.1, 0.3, 1.0, 3.0, 10.0])
 WIDE, WAIT = 1000, 5.0
 """Springs side by side, and decay times of the motion before frames are used."""
 
-LONGEST = 8.0
+LARGEST_H_OMEGA = 8.0
 """Largest h omega up to which a limit is looked for."""
 
 HOTTEST_LAW = 100.0
@@ -71,7 +71,7 @@ def measured(label: Label) -> Sampled:
     method = engines.method(label)
     linear = not THERMOSTATS[method.scheme].rescales
     rows, run, q = [], None, np.empty(0)
-    for i, turn in enumerate(TURNS):
+    for i, turn in enumerate(SAMPLED_TURNS):
         law = law_at(method.scheme, turn, RATE) if linear else None
         exact = (nan, nan) if law is None else (float(law.configurational[0]), float(law.kinetic[0]))
         if linear and not max(exact) < HOTTEST_LAW:
@@ -84,16 +84,16 @@ def measured(label: Label) -> Sampled:
         if i <= 1:
             run, q = made, STIFFNESS * made.q[wait:] ** 2 / KT
     if run is None:
-        raise MethodError(f"{label}: no step is stable from h omega {TURNS[0]} on")
-    law = law_at(method.scheme, TURNS[1], RATE) if linear else None
+        raise MethodError(f"{label}: no step is stable from h omega {SAMPLED_TURNS[0]} on")
+    law = law_at(method.scheme, SAMPLED_TURNS[1], RATE) if linear else None
     columns = np.array(rows).T
     steps = max(run.outcome.step, 1)
     return Sampled(
-        method=str(label), scheme=method.scheme, title=schemes.title(method.scheme), turn=TURNS,
+        method=str(label), scheme=method.scheme, title=schemes.title(method.scheme), turn=SAMPLED_TURNS,
         configurational=columns[0], configurational_error=columns[1], configurational_law=columns[2],
-        kinetic=columns[3], kinetic_error=columns[4], kinetic_law=columns[5], frames=FRAMES,
-        off=np.array([np.sqrt(np.mean((np.mean(q[: int(n)], axis=0) - 1) ** 2)) for n in FRAMES]),
-        off_law=np.array([_off(law, int(n)) for n in FRAMES]), friction=FRICTIONS,
+        kinetic=columns[3], kinetic_error=columns[4], kinetic_law=columns[5], frames=AVERAGED_STEPS,
+        off=np.array([np.sqrt(np.mean((np.mean(q[: int(n)], axis=0) - 1) ** 2)) for n in AVERAGED_STEPS]),
+        off_law=np.array([_off(law, int(n)) for n in AVERAGED_STEPS]), friction=FRICTIONS,
         limit=np.array([_last_stable(partial(_radius_of_engine, label, x)) for x in FRICTIONS])
         if linear and not THERMOSTATS[method.scheme].collides else np.full(len(FRICTIONS), nan),
         limit_law=np.array([_last_stable(partial(_radius, method.scheme, x)) for x in FRICTIONS])
@@ -152,7 +152,7 @@ def _last_stable(radius: Callable[[float], float]) -> float:
         return not radius(turn) <= slack
 
     try:
-        tried = np.geomspace(0.02, LONGEST, 25)
+        tried = np.geomspace(0.02, LARGEST_H_OMEGA, 25)
         first = next((i for i, turn in enumerate(tried) if grows(float(turn))), None)
         if first is None:
             return float("inf")

@@ -18,7 +18,7 @@ W_SIGN = "\N{GREEK SMALL LETTER OMEGA}"
 IS_RIGHT = 0.01
 """Relative deviation of a temperature up to which it is called right."""
 
-FINE = np.linspace(0.02, 1.5, 75)
+LINE_H_W = np.linspace(0.02, 1.5, 75)
 """h omega of the lines."""
 
 
@@ -119,7 +119,7 @@ def _limits(methods: Sequence[Sampled]) -> str:
 def _laws(methods: Sequence[Sampled], of: str) -> list[Curve]:
     """One line for each scheme that has a law."""
     found = dict.fromkeys(one.scheme for one in methods if np.any(np.isfinite(one.configurational_law)))
-    return [Curve(name=title(name), group=name, x=FINE, y=curve(name, FINE, of)) for name in found]
+    return [Curve(name=title(name), group=name, x=LINE_H_W, y=curve(name, LINE_H_W, of)) for name in found]
 
 
 def _marks(one: Sampled, x: np.ndarray, y: np.ndarray, law: np.ndarray) -> Curve:

@@ -13,7 +13,7 @@ from springcheck.studies.study import Studied
 from springcheck.studies.tables import RecordForm
 from springcheck.text.wording import count
 
-APART = 6.0
+DEPARTING_ERRORS = 6.0
 """Standard errors from which a measured number contradicts its law: chance 2e-9."""
 
 
@@ -57,7 +57,7 @@ class Sampled:
             (self.kinetic, self.kinetic_law, self.kinetic_error),
         )
         with np.errstate(all="ignore"):
-            return any(bool(np.any(np.abs(x - law) > APART * error)) for x, law, error in pairs)
+            return any(bool(np.any(np.abs(x - law) > DEPARTING_ERRORS * error)) for x, law, error in pairs)
 
 
 SAMPLED: RecordForm[Sampled] = RecordForm(

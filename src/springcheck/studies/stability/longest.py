@@ -23,19 +23,19 @@ from springcheck.physics.terms import WallSpring
 from springcheck.schemes import Scheme
 from springcheck.studies.stability import propagators
 
-FIRST, LAST = 1e-9, 1e6
+FIRST_STEP, LAST_STEP = 1e-9, 1e6
 """Steps between which a limit is searched, in units of the fastest angular frequency or friction rate."""
 
-NEIGHBOURS = 4096
+SCANNED_STEPS = 4096
 """Steps of the first scan, 1.008 from one to the next."""
 
-FINE = 256
+REFINED_STEPS = 256
 """Steps of each refinement of the bracket."""
 
-SAMPLES = 512
+SAMPLED_STATES = 512
 """States of an anharmonic motion among which the stiffest is searched."""
 
-BETWEEN = 64
+REFINEMENT = 64
 """States in place of each interval about the stiffest, twice: the error of a maximum falls with the square of
 the interval, from 1e-5 of it to 1e-12."""
 
@@ -43,9 +43,9 @@ MOST_MODES = 64
 """Modes of a long chain that are examined: the fastest, the slowest, and some between."""
 
 MOST_COUPLED = 16
-"""Most particles whose modes a scheme or friction couples: a scan has NEIGHBOURS matrices of 2n x 2n."""
+"""Most particles whose modes a scheme or friction couples: a scan has SCANNED_STEPS matrices of 2n x 2n."""
 
-GROWTH = 1e-7
+COUPLED_GROWTH = 1e-7
 """Growth per step from which coupled modes count as growing: nearly equal eigenvalues of their matrix are
 known to the square root of the rounding only."""
 
@@ -87,8 +87,8 @@ def stiffest(scene: Scene) -> Floats:
     system = scene.system
     if system.is_linear or scene.n > MOST_MODES or not exact.has_true_motion(scene):
         return np.asarray(scene.q)
-    found, number = np.asarray(scene.q), SAMPLES
-    steps = np.arange(SAMPLES + 1)
+    found, number = np.asarray(scene.q), SAMPLED_STATES
+    steps = np.arange(SAMPLED_STATES + 1)
     for _ in range(3):
         q, _ = exact.true_motion(scene, steps, scene.step * scene.steps / number)
         finite = np.isfinite(q).all(axis=-1)
@@ -100,8 +100,8 @@ def stiffest(scene: Scene) -> Floats:
             stiff = stiff + np.max(np.maximum(system.friction_at(here)[0], 0), axis=-1) ** 2
         found = here[int(np.argmax(stiff))]
         # refine about the stiffest, from the sample before it to the one after
-        first, number = (int(steps[finite][int(np.argmax(stiff))]) - 1) * BETWEEN, number * BETWEEN
-        steps = np.arange(max(first, 0), min(first + 2 * BETWEEN, number) + 1)
+        first, number = (int(steps[finite][int(np.argmax(stiff))]) - 1) * REFINEMENT, number * REFINEMENT
+        steps = np.arange(max(first, 0), min(first + 2 * REFINEMENT, number) + 1)
     return found
 
 
@@ -152,7 +152,7 @@ def linear(scene: Scene, scheme: Scheme) -> Linear | None:
             for terms in (system.slow, system.fast)
         ]
         squares, turned = np.linalg.eigh(np.asarray(parts[0][0] + parts[1][0], np.float64))
-        if scheme.b and squares[0] >= -GROWTH * squares[-1]:
+        if scheme.b and squares[0] >= -COUPLED_GROWTH * squares[-1]:
             return _oscillators(squares, turned, np.asarray(system.friction_rates, np.float64))
         return Linear(slow=parts[0], fast=parts[1], rate=system.friction_rates[None])
     if system.has_modes:
@@ -215,7 +215,7 @@ def grows(scheme: Scheme, of: Linear, h: Floats) -> np.ndarray:
         return np.asarray(np.any(wild & ((of.slow + of.fast)[:, 0, 0] >= 0), axis=-1))
     finite = np.isfinite(maps).all(axis=(-1, -2))
     values = np.linalg.eigvals(np.where(finite[..., None, None], maps, 0).astype(np.float64))
-    return np.asarray(np.any(~finite | (np.max(np.abs(values), axis=-1) > 1 + GROWTH), axis=-1))
+    return np.asarray(np.any(~finite | (np.max(np.abs(values), axis=-1) > 1 + COUPLED_GROWTH), axis=-1))
 
 
 @lru_cache(maxsize=64)
@@ -243,7 +243,7 @@ def longest(scheme: Scheme, scene: Scene, limit: float | None = None) -> float:
         return np.nan
     w2, known = np.linalg.eigvalsh(np.asarray(of.slow + of.fast, np.float64)), np.inf
     if scheme.has("mixes") or w2.shape[1] > 1:
-        if np.min(w2) < -GROWTH * np.max(np.abs(w2)):
+        if np.min(w2) < -COUPLED_GROWTH * np.max(np.abs(w2)):
             return np.nan
     else:
         alone = (w2[:, 0] > 0) & (of.rate[:, 0] == 0)
@@ -273,9 +273,9 @@ def too_long(name: str, scene: Scene) -> float | None:
 
 def _first(scheme: Scheme, of: Linear, scale: float) -> float:
     """The first growing step of a scan, to a part in 1e10."""
-    h = np.geomspace(FIRST, LAST, NEIGHBOURS) / scale
+    h = np.geomspace(FIRST_STEP, LAST_STEP, SCANNED_STEPS) / scale
     if scheme.has("mixes"):
         # a resonance may be narrow: equal spacing up to the limit of the fast springs alone
-        h = np.linspace(0, scheme.limit, NEIGHBOURS + 1)[1:] / scale
+        h = np.linspace(0, scheme.limit, SCANNED_STEPS + 1)[1:] / scale
     with np.errstate(all="ignore"):
-        return propagators.first(lambda h: (grows(scheme, of, h), h), h, FINE, 6)
+        return propagators.first(lambda h: (grows(scheme, of, h), h), h, REFINED_STEPS, 6)

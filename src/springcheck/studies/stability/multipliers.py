@@ -21,10 +21,10 @@ from springcheck.physics.scene import Scene
 MOST_STEPS = 4096
 """Largest number of steps in a period: for a shorter step, multipliers are measured with this many."""
 
-INVERTIBLE = 2.0**500
+INVERTIBLE_NORM = 2.0**500
 """Largest norm of a matrix for which products of two elements, of it and of its inverse, are doubles."""
 
-LOST = 2.0**60
+OVERFLOWING_SIZE = 2.0**60
 """Size of states from which an engine in single precision may overflow: their squares do."""
 
 
@@ -69,7 +69,7 @@ def measure(scene: Scene, label: Label) -> Multiplier:
     starts = [(rest + 1, 0.0), (rest, size)]
     right = _powers(scene, label, starts, rest, size)
     largest_seen = np.max(np.abs(right), axis=(1, 2))
-    if not np.all((largest_seen <= INVERTIBLE) & (largest_seen >= 1 / INVERTIBLE)):
+    if not np.all((largest_seen <= INVERTIBLE_NORM) & (largest_seen >= 1 / INVERTIBLE_NORM)):
         return _unknown(label, steps, "the products of its scheme's steps are beyond what doubles can invert")
     try:
         # a rounding of the state after each step, propagated to the end
@@ -80,7 +80,7 @@ def measure(scene: Scene, label: Label) -> Multiplier:
         return _unknown(label, steps, "doubles cannot invert the products of its scheme's steps")
     runs = [driver.run(replace(scene, q=np.array([q]), p=np.array([p])), label) for q, p in starts]
     lost = next((run.outcome for run in runs if run.outcome.status != "complete"), None)
-    if lost and np.max(largest_seen) > LOST:
+    if lost and np.max(largest_seen) > OVERFLOWING_SIZE:
         return _unknown(label, steps, f"its run {lost.status} as its scheme grows: {lost.message}")
     ends = np.array([[run.q[-1, 0] - rest, run.p[-1, 0] / size] for run in runs]).T
     values, vectors = np.linalg.eig(right[-1])

@@ -12,7 +12,7 @@ from springcheck.physics.arrays import Floats
 from springcheck.studies.stability import propagators
 from springcheck.studies.stability.propagators import Springs
 
-TURN = (0.05, 20.0)
+REGION_TURNS = (0.05, 20.0)
 """Range of h w."""
 
 RATIO_FROM = 0.025
@@ -49,7 +49,7 @@ class Region:
 
 def measure(label: Label, points: int = 200) -> Region:
     """Measure points * points damped springs in one run, or in one for each rate where a run has only one."""
-    turn = np.geomspace(*TURN, points)
+    turn = np.geomspace(*REGION_TURNS, points)
     ratio = RATIO_FROM * turn / turn[0]
     row, column = (x.ravel() for x in np.indices((points, points)))
     brake = 2 * ratio[row] * turn[column]

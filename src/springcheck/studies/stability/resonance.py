@@ -19,13 +19,13 @@ from springcheck.physics.scene import Scene
 from springcheck.studies.stability import propagators
 from springcheck.studies.stability.propagators import Stepper, by_engine
 
-TURN = (1.0, 7.0)
+RESONANCE_TURNS = (1.0, 7.0)
 """Range of h w of the fast spring."""
 
-COPIES = 1200
+CHAIN_COPIES = 1200
 """Copies of the chain in the first scan: a band of 0.01 holds two of them."""
 
-GROWTH = 1e-7
+RESONANT_GROWTH = 1e-7
 """Growth per step from which a step counts as growing: nearly equal eigenvalues of a 4 x 4 matrix are known
 to the square root of the rounding only."""
 
@@ -57,7 +57,7 @@ def serves(scene: Scene, label: Label) -> bool:
 
 def measure(scene: Scene, label: Label) -> Resonance:
     """Scan the bands of a scene with springs marked fast, and find their edges to 1e-9."""
-    turn = np.linspace(*TURN, COPIES)
+    turn = np.linspace(*RESONANCE_TURNS, CHAIN_COPIES)
 
     def scanned(step: Stepper) -> tuple[Floats, tuple[tuple[float, float], ...]]:
         radius = radii(scene, label, turn, step)
@@ -99,7 +99,7 @@ def _bands(
     turn: Floats, radius: Floats, again: Callable[[Floats], Floats]
 ) -> tuple[tuple[float, float], ...]:
     """Edges of the ranges of growing points, refined to 1e-9."""
-    growing = radius > 1 + GROWTH
+    growing = radius > 1 + RESONANT_GROWTH
     edges = np.flatnonzero(growing[1:] != growing[:-1])
     found = [_edge(turn[j], turn[j + 1], again) for j in edges]
     if growing[0]:
@@ -112,7 +112,7 @@ def _bands(
 def _edge(low: float, high: float, again: Callable[[Floats], Floats]) -> float:
     while high - low > 1e-9:
         turn = np.linspace(low, high, 66)
-        growing = again(turn) > 1 + GROWTH
+        growing = again(turn) > 1 + RESONANT_GROWTH
         j = int(np.flatnonzero(growing[1:] != growing[:-1])[0])
         low, high = float(turn[j]), float(turn[j + 1])
     return (low + high) / 2

@@ -21,7 +21,7 @@ from springcheck.studies.study import Studied
 from springcheck.studies.tables import RecordForm
 from springcheck.text.wording import count
 
-GROWTH = 1e-6
+GROWTH_AGREES = 1e-6
 """Relative difference allowed between measured and predicted growth in double precision: the decaying
 eigenvector's part in the fitted quarter of a run."""
 
@@ -150,11 +150,11 @@ def growth_allowed(limit: Limit) -> float:
     """Relative difference allowed between measured and predicted growth above the limit.
 
     Growth is the square root of the distance from the limit, so that a limit known to `bound` changes it by
-    half of bound over that distance; in double precision the limit is known far better than to `AGREED`.
+    half of bound over that distance; in double precision it is known far better than `AGREED_LIMIT`.
     """
-    if limit.theory in (0.0, np.inf) or limit.bound <= limits.AGREED:
-        return GROWTH
-    return GROWTH + 0.5 * limit.bound / (limit.theory * limits.NEXT)
+    if limit.theory in (0.0, np.inf) or limit.bound <= limits.AGREED_LIMIT:
+        return GROWTH_AGREES
+    return GROWTH_AGREES + 0.5 * limit.bound / (limit.theory * limits.NEAR_LIMIT)
 
 
 def _apart(x: Resonance) -> float:
