@@ -67,7 +67,8 @@ class Record:
 
     @property
     def deep(self) -> bool:
-        """Whether all numbers resolve roundings of single precision: `fine`, or text of as many digits."""
+        """Whether the states resolve single precision's roundings: `fine`, or decimal text of as many
+        digits."""
         pairs = ((self.q, self.q_quantum), (self.v, self.v_quantum))
         return self.fine or all(
             bool(np.max(quantum) <= DEEP * np.max(np.abs(x))) and x_storage.name not in BINARY

@@ -7,7 +7,7 @@ q, p   positions and momenta, (n,) for one state, (f, n) for a trajectory   [L],
 m, k   mass and stiffness                                                   [M], [M/T2]
 h, t   step and time                                                        [T]
 w      angular frequency; w2 its square; a = (h w)**2                       [1/T]
-n      particles (degrees of freedom); every motion is along one line
+n      coordinates (degrees of freedom), each along one axis; on a line one for each particle
 f      frames, the recorded states of a trajectory; frame 0 is the start
 =====  ==========================================================================================
 

@@ -1,4 +1,4 @@
-"""Scenes from numbers in Python: springs side by side, and chains."""
+"""Scenes from numbers in Python: uncoupled springs, and chains."""
 
 from __future__ import annotations
 

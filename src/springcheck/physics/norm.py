@@ -11,7 +11,7 @@ from springcheck.physics.arrays import Extended, Floats, Integers, Reals, in_pie
 from springcheck.physics.term import Term
 
 SMALLEST_ENERGY = np.finfo(np.longdouble).tiny / np.finfo(np.longdouble).eps
-"""Least energy whose squares lose no digits to underflow."""
+"""Least energy whose terms, squares, lose no digits to underflow."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -21,9 +21,9 @@ class Norm:
     The square root of the sum of dp**2 / 2m and of |k| du**2 / 2 over the rows of all terms, u their
     elongation and |k| their absolute curvature at rest, divided by that of the kinetic plus the absolute
     potential energy of the start, or where that is 0 of the energy that it may gain (`System.gained`), or 1.
-    For one spring it is the distance in the phase plane in units of the amplitude.  The position of a free
-    group would not contribute: for it the kinetic energy counts that moves its centre by the difference
-    within the duration of the run.
+    For one spring it is the distance in the phase plane in units of the amplitude.  A free group's
+    position has no potential energy: counted instead is the kinetic energy that moves its centre by the
+    difference within the duration of the run.
     """
 
     m: Floats
@@ -42,7 +42,7 @@ class Norm:
             return np.asarray(np.where(size == 0, 0, size / self.unit), dtype=np.float64)
 
     def size(self, dq: Reals, dp: Reals) -> Extended:
-        """`size` before division by the unit: a root of an energy, (..., n) and (..., n) -> (...)."""
+        """The norm before division by the unit: a root of an energy, (..., n) and (..., n) -> (...)."""
         return self._root(dq, dp, lambda term, q: term.stretch(q))
 
     def most(self, of_q: Reals, of_p: Reals) -> Extended:

@@ -173,7 +173,7 @@ class Rods:
         return np.asarray(np.add.reduceat(part, self._starts, axis=-2))
 
     def split(self, values: NDArray[Any]) -> list[NDArray[Any]]:
-        """Numbers of each row of its terms (s,), split by rods."""
+        """Split an array with one number for each row of the rods (s,) into one array for each rod."""
         return np.split(values[self._order], self._starts[1:]) if len(values) else []
 
     def solve(self, left: Reals, right: Reals, wanted: Reals) -> Reals:

@@ -129,7 +129,7 @@ class Content:
     stride: int
     """Stride of the stored frames in the page."""
     data: Mapping[str, Any]
-    """For the scripts; non-finite numbers are the words that JavaScript has for them."""
+    """Data for the scripts; non-finite numbers are spelled as in JavaScript."""
 
     @property
     def summary_line(self) -> str:

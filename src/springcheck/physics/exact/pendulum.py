@@ -138,7 +138,7 @@ class HangingRods(ClosedForm):
     terms = frozenset({"weight", "wall-rod"})
 
     def __init__(self, system: System[Any]) -> None:
-        """In more digits: near the barrier all depends on the difference of the energy from it."""
+        """In extra digits: near the barrier the motion depends on the energy's small difference from it."""
         super().__init__(system)
         rods: Any = system.rods
         self.need(rods and not rods.share and all(len(ends) == 1 for ends in rods.ends))

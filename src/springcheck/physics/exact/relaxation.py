@@ -27,8 +27,8 @@ bound."""
 SERIES_TAIL = 32 * EPS
 """Largest share of a step's last two series coefficients in its largest one."""
 FELT_ROUNDING = 8 * EPS
-"""Relative change of u at any step to which the roundings of all steps amount; near |u| = 1, where the
-friction is nearly 0, and before a jump, it is amplified.  In 300 starts there it was at most 0.53 of this."""
+"""Relative change of u at one step that is equivalent to the roundings of all steps; near |u| = 1, where the
+friction is nearly 0, and before a jump, it is amplified. In 300 starts there it was at most 0.53 of this."""
 MOST_RADAU_STEPS = 20_000
 MOST_RADAU_CORRECTIONS = 40
 

@@ -33,7 +33,7 @@ SIDE_BY_SIDE, COUNTED, UNCOUNTED = 1000, 1000, 100
 """Springs side by side, steps averaged over, and steps discarded before: exp(-20) of a start is left then."""
 
 NAMED_BY = 2000
-"""Steps of the spring by whose states the scheme is identified."""
+"""Number of steps of the spring from which the scheme is identified."""
 
 DUMBBELL, NEAR_PART = 12.0, 0.375
 """Length of a rod [L], which turns by 0.07 rad a step at kT, and the share of the mass at its near end."""

@@ -136,7 +136,7 @@ class PrecisionStudy(Studied):
 
     @property
     def front(self) -> list[Point]:
-        """Points that no other beats in both error and run time, the fastest first."""
+        """The Pareto front of error and run time, the fastest first."""
         return fits.front(self.timed)
 
     @property

@@ -56,7 +56,7 @@ class Sweep:
 
     @property
     def known(self) -> Point | None:
-        """The next point, where its errors are already measured."""
+        """The next point, if its errors were measured beforehand; None otherwise."""
         return self.ahead.get(blank(self, "").place)
 
     @property

@@ -15,7 +15,7 @@ from springcheck.studies.stability import propagators
 from springcheck.studies.stability.propagators import STEP, Springs, first
 
 FIRST_H_W, LAST_H_W, COARSE_SPRINGS = 1e-9, 1e6, 4096
-"""The scan: h w from FIRST to LAST in COARSE springs, 1.008 from one to the next."""
+"""The scan: `COARSE_SPRINGS` values of h w from `FIRST_H_W` to `LAST_H_W`, in a ratio of 1.008."""
 
 FINE_SPRINGS = 1024
 """Springs in each refinement, which divides the bracket by 1000."""

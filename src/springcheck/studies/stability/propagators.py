@@ -32,7 +32,7 @@ STEP = 0.125
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Springs:
-    """Springs side by side under one method: h w (n,), and friction rate times step, one number or (n,)."""
+    """Uncoupled springs under one method: h w (n,), and friction rate times step, one number or (n,)."""
 
     label: Label
     turn: Floats
@@ -63,7 +63,7 @@ def noise(label: Label) -> float:
 
 
 def scene(springs: Springs, q: Floats, p: Floats, *, steps: int = 1) -> Scene:
-    """A scene of these springs side by side, from q, p (n,)."""
+    """A scene of these uncoupled springs, started at q, p (n,)."""
     requires = engines.method(springs.label).requires
     has_friction = np.any(springs.brake) or Need.DAMPING in requires
     c = np.broadcast_to(springs.brake, springs.turn.shape) * (MASS / STEP)
