@@ -55,7 +55,7 @@ class RadialSpring(LinearLaw, Term):
         """Sums over the axes of each bond, for each of its rows (..., s)."""
         return np.take(np.add.reduceat(values, self._starts, axis=-1), self._bond, axis=-1)
 
-    def _ways(self, q: Reals) -> tuple[Reals, Reals]:
+    def _vectors(self, q: Reals) -> tuple[Reals, Reals]:
         """Vector between the ends, and its length, for each axis (..., s)."""
         d = self.stretch(q)
         s = np.sqrt(self._sum(d * d))
@@ -68,23 +68,23 @@ class RadialSpring(LinearLaw, Term):
         return np.asarray(np.sum(0.5 * (k * (s - rest) * (s - rest)), axis=-1))
 
     def pull(self, q: Reals) -> Reals:
-        d, s = self._ways(q)
+        d, s = self._vectors(q)
         return np.asarray(self.k * (s - self.rest) * (d / s))
 
     def add_change(self, q: Reals, v: Reals, dq: Reals, dv: Reals, out: Reals) -> None:
-        d, s = self._ways(q)
+        d, s = self._vectors(q)
         e, moved = d / s, self.stretch(dq)
         along = e * self._sum(e * moved)
         self.add_pull(self.k * (moved - self.rest / s * (moved - along)), out)
 
     def curvature(self, q: Reals) -> Reals:
         """Upper bound on each row's absolute curvatures, summed over the axes, for Gershgorin's bound."""
-        _, s = self._ways(q)
+        _, s = self._vectors(q)
         bent = self.rest / s
         return np.asarray(np.abs(self.k) * (np.abs(1 - bent) + np.sqrt(3.0) * bent))
 
     def elements(self, q: Reals) -> Iterator[tuple[Integers, Integers, Reals]]:
-        d, s = self._ways(q)
+        d, s = self._vectors(q)
         one, other = np.nonzero(self._bond[:, None] == self._bond)
         bent, e = (self.rest / s)[..., one], d / s
         k = self.k[one] * ((1 - bent) * (one == other) + bent * e[..., one] * e[..., other])
@@ -94,7 +94,7 @@ class RadialSpring(LinearLaw, Term):
 
     def pull_rounding(self, q: Reals, v: Reals, near: Reals | None, exact: bool) -> Reals:
         size = self.most_stretch(np.abs(q))
-        d, s = self._ways(q if near is None else near)
+        d, s = self._vectors(q if near is None else near)
         e, bent = np.abs(d) / s, self.rest / s
         # roundings of the difference vector, of its length by a root, of their quotient, of the products
         way = np.abs(1 - bent) * size + bent * (size + e * self._sum(e * size))

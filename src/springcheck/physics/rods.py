@@ -162,13 +162,13 @@ class Rods:
         return out
 
     @cached_property
-    def _joined(self) -> Floats:
+    def _coupling(self) -> Floats:
         """Change of the vectors of all rows by a unit impulse along each (s, s) [1/M]."""
         unit = np.eye(len(self._rod))
         return np.asarray(self.apart(self.spread(unit) / self.m).T, np.float64)
 
     def _matrix(self, left: Reals, right: Reals) -> Floats:
-        whole = np.asarray(left, np.float64)[..., :, None] * self._joined * right[..., None, :]
+        whole = np.asarray(left, np.float64)[..., :, None] * self._coupling * right[..., None, :]
         part = np.add.reduceat(np.asarray(whole, np.float64), self._starts, axis=-1)
         return np.asarray(np.add.reduceat(part, self._starts, axis=-2))
 
@@ -263,14 +263,14 @@ class Rods:
         around = self._most(of_q)
         if before is not None:
             r = self.ways(before)
-            k = self._enlarged(s, r, self.dot(np.abs(s), around) + square * (ones + loose))
+            k = self._bound(s, r, self.dot(np.abs(s), around) + square * (ones + loose))
             of_q = of_q + self.spread(np.abs(r) * self.each(k), size=True) / m
             across = np.abs(r - s * self.each(self.dot(r, s) / self.dot(s, s)))
             of_p = of_p + self.spread(across * self.each(k), size=True) / np.abs(x)
             around = self._most(of_q)
         along = np.abs(self._along(s, p))
         seen = self.sum_of_sizes(s, of_p / m)
-        held = np.abs(s) * self.each(self._enlarged(s, s, seen)) + around * self.each(along)
+        held = np.abs(s) * self.each(self._bound(s, s, seen)) + around * self.each(along)
         return of_q, of_p + self.spread(held, size=True)
 
     def sum_of_sizes(self, r: Reals, size: Reals) -> Reals:
@@ -291,7 +291,7 @@ class Rods:
         at = np.concatenate([np.abs(one) for one in self._at])[self._order]
         return np.asarray(self._rows("most_stretch", size) + at)
 
-    def _enlarged(self, left: Reals, right: Reals, size: Reals) -> Reals:
+    def _bound(self, left: Reals, right: Reals, size: Reals) -> Reals:
         """Bound on |k| in `solve`, where the wanted amounts have these sizes."""
         if not self.share:
             return np.abs(self.solve(left, right, size))
@@ -331,7 +331,7 @@ class Rods:
             "keeps its length; take a shorter step"
         )
 
-    def _needless(self, r: Reals) -> str:
+    def _redundant(self, r: Reals) -> str:
         """Why the multipliers of the rods are not unique at these vectors (s,), or ""."""
 
         def first(matrix: Floats) -> int:
@@ -367,7 +367,7 @@ class Rods:
                 f"{self.named(j)}: its length is {float(self.length[j])!r}, and its ends are "
                 f"{float(np.sqrt(self.dot(r, r))[j])!r} apart at the start; leave the length out to keep that"
             )
-        if self.share and (needless := self._needless(r)):
+        if self.share and (needless := self._redundant(r)):
             raise SceneError(needless)
         wrong = ~(along <= untrue * size)
         if np.any(wrong):

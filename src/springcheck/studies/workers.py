@@ -38,7 +38,7 @@ def carried_out(parts: Sequence[Callable[[], T]], workers: int) -> Generator[tup
     team: dict[Any, Any] = {}
     try:
         for _ in range(min(workers, len(parts))):
-            with interrupts.held(), _deaf():
+            with interrupts.held(), _blocked_sigint():
                 ours, theirs = get_context("spawn").Pipe()
                 process = get_context("spawn").Process(target=_work, args=(theirs,), daemon=True)
                 process.start()
@@ -77,20 +77,20 @@ def _send(numbered: Any, ours: Any, team: dict[Any, Any]) -> None:
     try:
         ours.send(numbered)
     except OSError:
-        raise _gone(team[ours]) from None
+        raise _died(team[ours]) from None
 
 
 def _answer(ours: Any, team: dict[Any, Any]) -> Any:
     try:
         i, good, found = ours.recv()
     except (EOFError, OSError):
-        raise _gone(team[ours]) from None
+        raise _died(team[ours]) from None
     if not good:
         raise found
     return i, found
 
 
-def _gone(process: Any) -> SpringcheckError:
+def _died(process: Any) -> SpringcheckError:
     process.join()
     return SpringcheckError(
         f"a worker process has ended by itself (exit status {process.exitcode}): is memory short?"
@@ -103,7 +103,7 @@ def _ended(process: Any) -> None:
 
 
 @contextmanager
-def _deaf() -> Iterator[None]:
+def _blocked_sigint() -> Iterator[None]:
     """Block SIGINT in processes started within this context: Ctrl-C reaches the parent, which stops them."""
     if not hasattr(signal, "pthread_sigmask"):
         yield

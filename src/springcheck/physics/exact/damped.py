@@ -93,11 +93,11 @@ def _from_start(A: Extended, start: Extended, t: Extended, rate: np.longdouble) 
     """exp(A t) of one state (2n,) at times t (f, 1); at evenly spaced times by repeated doubling."""
     gaps = np.diff(t[:, 0])
     if len(t) <= RADIX_OF_STEPS or not np.ptp(gaps) <= 8 * EPS * np.max(t) < gaps[0]:
-        return _flown(A, np.broadcast_to(start, (len(t), len(start))), t, rate)
+        return _propagated(A, np.broadcast_to(start, (len(t), len(start))), t, rate)
     out = np.empty((len(t), len(start)), np.longdouble)
-    out[:1] = _flown(A, start[None], t[:1], rate)
+    out[:1] = _propagated(A, start[None], t[:1], rate)
     unit = np.eye(len(A), dtype=np.longdouble)
-    across = _flown(A, unit, np.full((len(A), 1), (t[-1, 0] - t[0, 0]) / (len(t) - 1)), rate).T
+    across = _propagated(A, unit, np.full((len(A), 1), (t[-1, 0] - t[0, 0]) / (len(t) - 1)), rate).T
     done = 1
     while done < len(t):
         more = out[: len(t) - done][:done]
@@ -106,7 +106,7 @@ def _from_start(A: Extended, start: Extended, t: Extended, rate: np.longdouble) 
     return out
 
 
-def _flown(A: Extended, z: Extended, t: Extended, rate: np.longdouble) -> Extended:
+def _propagated(A: Extended, z: Extended, t: Extended, rate: np.longdouble) -> Extended:
     """exp(A t) z of states (f, 2n) at times t (f, 1) >= 0."""
     step = 1 / (2 * rate)
     whole = np.minimum(np.floor(t / step), np.longdouble(RADIX_OF_STEPS) ** MOST_STEP_DIGITS - 1)

@@ -106,7 +106,7 @@ def _moved(u: Extended, v: Extended, t: Extended, law: _Law) -> tuple[Extended, 
             (turns & ~slows, _undamped),
             (turns & slows, _damped),
             (~turns & ~slows, _free),
-            (~turns & slows, _dragged),
+            (~turns & slows, _with_friction),
         ):
             if np.any(kind):
                 y[:, kind], z[:, kind] = one(u[kind], v[kind], t, _Law(*(x[kind] for x in law)))
@@ -182,7 +182,7 @@ def _free(u: Extended, v: Extended, t: Extended, law: _Law) -> tuple[Extended, E
     return np.asarray(u + v * t + law.pull * t * t / 2), np.asarray(v + law.pull * t)
 
 
-def _dragged(u: Extended, v: Extended, t: Extended, law: _Law) -> tuple[Extended, Extended]:
+def _with_friction(u: Extended, v: Extended, t: Extended, law: _Law) -> tuple[Extended, Extended]:
     x = law.rate * t
     gone = -np.expm1(-x) / law.rate
     # (x - 1 + exp(-x)) / x**2, by its series where it would cancel

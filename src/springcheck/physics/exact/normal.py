@@ -148,9 +148,9 @@ def normal_modes(system: System[Any]) -> Modes:
     graded = np.count_nonzero(is_zero) > len(system.free_groups)
     graded |= bool(np.any(np.abs(w2[~is_zero]) * GRADED_RATIO < largest))
     if system.n <= ALWAYS_PRECISE or (system.n <= MOST_PRECISE and graded):
-        return _precise(system)
+        return _in_many_digits(system)
     w2 = np.where(is_zero, 0, w2)
-    pulls = np.where(is_zero, _drag(system, pull * root_m) @ vectors, pull @ vectors)
+    pulls = np.where(is_zero, _of_whole_groups(system, pull * root_m) @ vectors, pull @ vectors)
     # w2 = 0 is exact for translations of free groups, unless other modes are as slow
     known = is_zero & (np.count_nonzero(is_zero) == len(system.free_groups))
     doubt = np.where(known, none, 4 * system.n * EPS * largest)
@@ -212,7 +212,7 @@ def exact_sums(system: System[Any], of: Callable[[Wide], Wide]) -> tuple[Wide, W
     return of(k), force, friction / exactly(system.m)
 
 
-def _precise(system: System[Any]) -> Modes:
+def _in_many_digits(system: System[Any]) -> Modes:
     """Modes in so many digits that stiff and soft ones of a small system keep full accuracy."""
     with digits():
         # sums of the terms as they stand: exact
@@ -255,7 +255,7 @@ def _digits_for(system: System[Any], k: Wide) -> int:
     return max(FEWER_DIGITS, 40 + int(decades))
 
 
-def _drag(system: System[Any], force: Extended) -> Extended:
+def _of_whole_groups(system: System[Any], force: Extended) -> Extended:
     """A force (n,) over the root of mass, reduced in free groups to the part that moves them as a whole.
 
     Springs exert opposite forces at both ends, but not after rounding: the remainder would accelerate the

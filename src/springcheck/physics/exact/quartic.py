@@ -51,7 +51,7 @@ class _Duffing:
         return _Duffing(**{name: getattr(self, name)[which] for name in self.__slots__})
 
 
-def _gathered(system: System[Any], of: Callable[[Any], Any]) -> tuple[Any, ...]:
+def _parameters(system: System[Any], of: Callable[[Any], Any]) -> tuple[Any, ...]:
     """m, k, b, q, at, p of each particle (n,), in numbers made by `of`."""
     k, b, at = (of(np.zeros(system.n)) for _ in range(3))
     for term in system.terms:
@@ -77,18 +77,18 @@ class QuarticMotion(ClosedForm):
 
     def __init__(self, system: System[Any]) -> None:
         super().__init__(system)
-        m, k, b, q, at, p = _gathered(system, wide)
+        m, k, b, q, at, p = _parameters(system, wide)
         for term in system.terms:
             self.need(not isinstance(term, Quartic | WallSpring) or np.all(term.at == at[term.i]))
         u = q - at
         sums = _sums(m, k, b, u, p)
-        m_, k_, b_, q_, at_, p_ = _gathered(system, lambda x: np.abs(wide(x)))
+        m_, k_, b_, q_, at_, p_ = _parameters(system, lambda x: np.abs(wide(x)))
         sizes = _sums(m_, k_, b_, q_ + at_, p_)
         near = np.any([size > CANCELS * np.abs(x) for x, size in zip(sums, sizes, strict=True)], axis=0)
         if np.any(near):
             chosen = np.flatnonzero(near)
             with digits():
-                m_, k_, b_, q_, at_, p_ = _gathered(system.beside(system.part(chosen)), exactly)
+                m_, k_, b_, q_, at_, p_ = _parameters(system.beside(system.part(chosen)), exactly)
                 for out, x in zip(sums, _sums(m_, k_, b_, q_ - at_, p_), strict=True):
                     out[chosen] = extended(x)
         x, square, energy = sums[0] / m, sums[1] / m**3, sums[2] / m**2

@@ -70,7 +70,7 @@ class _Path(NamedTuple):
 
 
 @by_identity
-class _Met(NamedTuple):
+class _Nodes(NamedTuple):
     """u, u' and u'' at the nodes of a step (s,), and the derivative of its end by its start (2, 2)."""
 
     u: Extended
@@ -112,7 +112,7 @@ def _rule() -> _Rule:
     return _Rule((1 + x) / 2, wide(_integrals(x, s) @ series / 2), series)
 
 
-def _step(law: _Law, u: Any, v: Any, h: Any, guess: Extended) -> _Met | None:
+def _step(law: _Law, u: Any, v: Any, h: Any, guess: Extended) -> _Nodes | None:
     """A step of h from (u, v), None where Newton's iteration does not converge."""
     rule = _rule()
     found, last = guess, np.inf
@@ -142,7 +142,7 @@ def _step(law: _Law, u: Any, v: Any, h: Any, guess: Extended) -> _Met | None:
             by = np.linalg.solve(
                 matrix, np.stack([reach @ steep, np.ones(RADAU_STAGES)], axis=-1).astype(np.float64)
             )
-            return _Met(at, found, push, np.stack([np.eye(2)[0] + reach[-1] @ by, by[-1]]))
+            return _Nodes(at, found, push, np.stack([np.eye(2)[0] + reach[-1] @ by, by[-1]]))
         last = off
     return None
 

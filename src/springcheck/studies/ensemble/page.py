@@ -294,7 +294,7 @@ def _maps(scene: Scene, quantity: str, over: Sequence[str], shown: Mapping[str, 
     charts = []
     for method, one in shown.items():
         rows = np.searchsorted(bounds, one.values, side="right")
-        limit = _across(scene, over, one)
+        limit = _line_of_the_limit(scene, over, one)
         charts.append(
             Chart(
                 title=f"{method}.",
@@ -308,7 +308,7 @@ def _maps(scene: Scene, quantity: str, over: Sequence[str], shown: Mapping[str, 
     return charts
 
 
-def _across(scene: Scene, over: Sequence[str], one: Map) -> list[Curve]:
+def _line_of_the_limit(scene: Scene, over: Sequence[str], one: Map) -> list[Curve]:
     """The line h omega = 2 on a map of stiffness against step, in coordinates of its tiles."""
     if set(over) != set(_limits(scene)):
         return []

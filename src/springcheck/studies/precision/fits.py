@@ -137,7 +137,7 @@ FEWEST_FITTED = 4
 """Points below which no order is claimed."""
 
 
-BENT_FIT = 3.0
+MOST_CURVATURE = 3.0
 """Standard errors of a curvature from which the coarsest points are not asymptotic."""
 
 
@@ -172,7 +172,7 @@ def order(points: Sequence[Point]) -> Fit | None:
     if len(chosen) < FEWEST_FITTED:
         return None
     x, y = np.log([abs(x.step or 0.0) for x in chosen]), np.log([x.error for x in chosen])
-    while len(x) > FEWEST_FITTED and _bent(x, y) > BENT_FIT:
+    while len(x) > FEWEST_FITTED and _curvature(x, y) > MOST_CURVATURE:
         x, y = x[1:], y[1:]
     found = line(x, y)
     return Fit(
@@ -184,7 +184,7 @@ def order(points: Sequence[Point]) -> Fit | None:
     )
 
 
-def _bent(x: Floats, y: Floats) -> float:
+def _curvature(x: Floats, y: Floats) -> float:
     """Curvature of y(x) in standard errors of a fitted parabola; large for a few points without scatter."""
     away = x - np.mean(x)
     found = line(away**2, y, away)

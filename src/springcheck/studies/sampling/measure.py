@@ -77,7 +77,7 @@ def measured(label: Label) -> Sampled:
         if linear and not max(exact) < HOTTEST_LAW:
             rows.append((nan,) * 6)
             continue
-        wait = round(WAIT / _memory(law)) if law else 100
+        wait = round(WAIT / _slowest_decay(law)) if law else 100
         made = driver.run(bathed(springs(WIDE, wait + 500), turn, RATE), label, seed=SEED_OF_ALL)
         found = temperatures(made.q[wait:], made.p[wait:])
         rows.append((*found[0], exact[0], *found[1], exact[1]))
@@ -93,7 +93,7 @@ def measured(label: Label) -> Sampled:
         configurational=columns[0], configurational_error=columns[1], configurational_law=columns[2],
         kinetic=columns[3], kinetic_error=columns[4], kinetic_law=columns[5], frames=AVERAGED_STEPS,
         off=np.array([np.sqrt(np.mean((np.mean(q[: int(n)], axis=0) - 1) ** 2)) for n in AVERAGED_STEPS]),
-        off_law=np.array([_off(law, int(n)) for n in AVERAGED_STEPS]), friction=FRICTIONS,
+        off_law=np.array([_error_of_average(law, int(n)) for n in AVERAGED_STEPS]), friction=FRICTIONS,
         limit=np.array([_last_stable(partial(_radius_of_engine, label, x)) for x in FRICTIONS])
         if linear and not THERMOSTATS[method.scheme].collides else np.full(len(FRICTIONS), nan),
         limit_law=np.array([_last_stable(partial(_radius, method.scheme, x)) for x in FRICTIONS])
@@ -102,12 +102,12 @@ def measured(label: Label) -> Sampled:
     )  # fmt: skip
 
 
-def _memory(law: Law) -> float:
+def _slowest_decay(law: Law) -> float:
     """Decay rate per step of the slowest part of the motion."""
     return max(-np.log(law.slowest), 0.02) if law.slowest > 0 else 1.0
 
 
-def _off(law: Law | None, frames: int) -> float:
+def _error_of_average(law: Law | None, frames: int) -> float:
     """Error of k <q**2>/kT over so many frames: systematic and statistical."""
     if law is None or law.scheme.collides:
         # with collisions the motion is a mixture, not Gaussian
