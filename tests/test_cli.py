@@ -317,7 +317,7 @@ def test_extreme_numbers_make_a_report_and_no_warnings(
 def test_of_a_long_run_some_pieces_are_judged_and_it_is_said(
     steps: int, judged: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(session, "PIECE", 16)
+    monkeypatch.setattr(session, "PIECE_NUMBERS", 16)
     monkeypatch.setattr(session, "LONG_PIECE", 4)
     monkeypatch.setattr(session, "MOST_PIECES", 4)
     text = (scenes.folder() / "spring-uneven.toml").read_text().replace("steps = 200", f"steps = {steps}")

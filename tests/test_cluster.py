@@ -214,7 +214,7 @@ def test_a_worker_that_has_hung_before_is_named_and_gets_no_piece(
 
 
 def test_workers_of_which_none_answers_are_named(calm: Farm, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cluster, "SILENT", -1.0)
+    monkeypatch.setattr(cluster, "SILENT_SECONDS", -1.0)
     for worker in calm.workers:
         worker.send_signal(signal.SIGSTOP)
     try:
@@ -228,7 +228,7 @@ def test_workers_of_which_none_answers_are_named(calm: Farm, monkeypatch: pytest
 def test_no_scheduler_is_one_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(cluster, "WAITING", 1.0)
+    monkeypatch.setattr(cluster, "WAITING_SECONDS", 1.0)
     other = tmp_path / "slurm.yaml"
     other.write_text("jobqueue: {slurm: {cores: 1, memory: 1GB}}")
     for place, words in (

@@ -218,7 +218,7 @@ def test_a_finer_atlas_has_every_decade_of_force_at_more_steps(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # few decades
-    few = {"SIZES": (0,), "DECADES": (-20, 0, 20)}
+    few = {"SIZE_DECADES": (0,), "FORCE_DECADES": (-20, 0, 20)}
     for name, value in few.items():
         monkeypatch.setattr(grid, name, value)
     monkeypatch.setattr(finer_atlas, "EVERY_DECADE", range(-20, 21))
@@ -230,11 +230,11 @@ def test_a_finer_atlas_has_every_decade_of_force_at_more_steps(
     ((plane,),) = (bank.charts for bank in page.banks(fine))
     assert plane.tiles is not None
     assert list(plane.x.values) == list(range(-20, 21))
-    assert len(plane.y.values) > len(grid.TURNS)
+    assert len(plane.y.values) > len(grid.CELL_TURNS)
     assert all(-1 not in row for row in plane.tiles.rows)
     assert not fine.wrong
     assert extremes.stored(path).counts() == fine.counts()
     # few more cells complete the rows that there are
     some = finer_atlas.record(None, method, len(base.cells) + 1)
     ((plane,),) = (bank.charts for bank in page.banks(some))
-    assert (list(plane.x.values), len(plane.y.values)) == (list(range(-20, 21)), len(grid.TURNS))
+    assert (list(plane.x.values), len(plane.y.values)) == (list(range(-20, 21)), len(grid.CELL_TURNS))

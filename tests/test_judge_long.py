@@ -61,7 +61,7 @@ def judged(tmp_path: Path, scene: Scene, change: Change) -> Report:
 @pytest.fixture
 def small(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pieces so small that 400 steps of 64 particles are long."""
-    monkeypatch.setattr(measure, "PIECE", 64 * 16)
+    monkeypatch.setattr(measure, "PIECE_NUMBERS", 64 * 16)
     monkeypatch.setattr(measure, "LONG_PIECE", 64 * 4)
 
 

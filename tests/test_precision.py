@@ -221,7 +221,7 @@ def test_every_point_ends_at_the_same_time(name: str) -> None:
         # one rounding of T/N, of the order of the spacing of doubles
         assert abs(here.steps * np.longdouble(here.step) - known.duration) <= 2.0**-53 * known.duration
         assert here.steps % here.every == 0
-        assert here.frames <= max(accuracy.FRAMES + 1, sweeps.coarsest(known, 2.0) + 1)
+        assert here.frames <= max(accuracy.MOST_COMPARED_FRAMES + 1, sweeps.coarsest(known, 2.0) + 1)
         if i > 24:
             break
     assert i > 15

@@ -21,8 +21,8 @@ pytestmark = pytest.mark.slow
 def _smaller(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(measure, "WIDE", 100)
-    monkeypatch.setattr(measure, "TURNS", np.array([0.2, 0.5, 1.2]))
-    monkeypatch.setattr(measure, "FRAMES", np.array([10.0, 100.0, 500.0]))
+    monkeypatch.setattr(measure, "SAMPLED_TURNS", np.array([0.2, 0.5, 1.2]))
+    monkeypatch.setattr(measure, "AVERAGED_STEPS", np.array([10.0, 100.0, 500.0]))
     monkeypatch.setattr(measure, "FRICTIONS", np.array([0.3, 1.0, 3.0]))
 
 

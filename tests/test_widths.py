@@ -25,7 +25,7 @@ from springcheck.studies.faults.table import FAULTS
 from springcheck.studies.precision import measure as precision
 from springcheck.studies.run import measure as run_study
 from springcheck.studies.run import text as run_text
-from springcheck.text.lines import GAP, Lines, TextTable, drawn, table
+from springcheck.text.lines import COLUMN_GAP, Lines, TextTable, drawn, table
 
 pytestmark = pytest.mark.slow
 
@@ -198,7 +198,7 @@ def test_any_table_fits_any_terminal_with_all_its_cells(seed: int) -> None:
         assert max(map(len, lines)) <= width
         assert all(line == line.rstrip() for line in lines)
     assert len(lines) == len(rows) + 1
-    assert GAP == 2
+    assert COLUMN_GAP == 2
 
 
 def test_a_column_without_a_title_is_broken_nowhere() -> None:

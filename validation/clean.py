@@ -44,8 +44,8 @@ FIXED = tuple(
 )
 """Schemes of the plain engine."""
 
-SLOW = tuple(check for check in checks.THOROUGH if check.name in measure.SLOW)
-QUICK = tuple(check for check in checks.THOROUGH if check.name not in measure.SLOW)
+SLOW = tuple(check for check in checks.THOROUGH if check.name in measure.SLOW_CHECKS)
+QUICK = tuple(check for check in checks.THOROUGH if check.name not in measure.SLOW_CHECKS)
 """Experiments that do not look at the scene, and those that do."""
 
 

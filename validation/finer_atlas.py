@@ -30,7 +30,7 @@ from springcheck.studies.extremes.result import CELLS, Atlas
 from springcheck.studies.keeper import Piece
 from springcheck.text.lines import as_text
 
-EVERY_DECADE = range(grid.DECADES[0], grid.DECADES[-1] + 1)
+EVERY_DECADE = range(grid.FORCE_DECADES[0], grid.FORCE_DECADES[-1] + 1)
 
 ROWS, GOLDEN = 8, (5**0.5 - 1) / 2
 """h w of a part; the golden section, whose fractions fill an interval evenly (Weyl 1916)."""
@@ -39,21 +39,21 @@ ROWS, GOLDEN = 8, (5**0.5 - 1) / 2
 def finer(count: int) -> Iterator[list[Spec]]:
     """At least so many more cells of the plane of forces, every decade of force, in parts of `ROWS` h w.
 
-    First those of `grid.TURNS`, then h w that lie evenly in their logarithm however many there are.
+    First those of `grid.CELL_TURNS`, then h w that lie evenly in their logarithm however many there are.
     """
-    low, high = np.log(grid.TURNS[0]), np.log(grid.TURNS[-1])
+    low, high = np.log(grid.CELL_TURNS[0]), np.log(grid.CELL_TURNS[-1])
     part: list[Spec] = []
     for j in itertools.count() if count > 0 else ():
-        done = count <= 0 and j >= len(grid.TURNS)
+        done = count <= 0 and j >= len(grid.CELL_TURNS)
         if part and (done or j % ROWS == 0):
             yield part
             part = []
         if done:
             return
-        new = j - len(grid.TURNS)
-        turn = grid.TURNS[j] if new < 0 else float(np.exp(low + (high - low) * ((new + 1) * GOLDEN % 1)))
+        new = j - len(grid.CELL_TURNS)
+        turn = grid.CELL_TURNS[j] if new < 0 else float(np.exp(low + (high - low) * ((new + 1) * GOLDEN % 1)))
         with np.errstate(over="ignore", under="ignore"):
-            row = [grid.force_cell(turn, x) for x in EVERY_DECADE if new >= 0 or x not in grid.DECADES]
+            row = [grid.force_cell(turn, x) for x in EVERY_DECADE if new >= 0 or x not in grid.FORCE_DECADES]
         row = [x for x in row if x.finite]
         count -= len(row)
         part += row

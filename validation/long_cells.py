@@ -73,7 +73,7 @@ def last(label: Label, specs: Sequence[Spec]) -> list[Cell]:
             if verdict.passed is None and len(case.trajectory.t) > 1:
                 verdict = checks.step_defect(case)
             growth = judging.growth_of(case, scene)[0]
-        unstable = bool(growth * spec.steps >= np.log(judging.GROWN))
+        unstable = bool(growth * spec.steps >= np.log(judging.UNSTABLE_GROWTH))
         outcome: Outcome = "unstable, as theory says" if unstable else "right"
         reason = limit
         if limit and not unstable:

@@ -67,7 +67,7 @@ WAYS = {
 }
 """What is run of each command; `table.csv` is half a drift, `run.h5` the store of the first."""
 
-FEW: dict[str, Any] = {"FAULTS": FAULTS[:1], "HALVINGS": 0}
+FEW: dict[str, Any] = {"FAULTS": FAULTS[:1], "DECADE_HALVINGS": 0}
 """What of the study of faults is enough for a document of it."""
 
 

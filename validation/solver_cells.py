@@ -45,7 +45,7 @@ def specs(*, quick: bool = False) -> list[Spec]:
         found += [x for x in grid.sizes() if x.finite][:: 4 if quick else 1]
         found += [x for x in grid.steps() if x.finite]
         found += [x for x in grid.special() if x.finite]
-        for turn in grid.TURNS:
+        for turn in grid.CELL_TURNS:
             k = MASS * (turn / STEP) ** 2
             found.append(Spec(block="turn", m=MASS, k=k, q=0.3, p=0.7, h=STEP))
     return [x for x in found if x.finite]

@@ -20,8 +20,8 @@ _STRANGE = ("Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp")
 def plain(text: object, longest: int | None = None) -> str:
     r"""Text from a file as it may be shown: on a terminal, in a figure, in a page, in a message.
 
-    What a terminal would obey is written as its escape (``\x1b``); of what is longer than `longest`
-    characters the beginning and the end are kept.
+    Control characters are written as escapes (``\x1b``); a text longer than `longest` characters keeps its
+    beginning and its end.
     """
     shown = str(text)
     if longest is not None and len(shown) > 2 * longest:

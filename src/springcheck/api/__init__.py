@@ -1,4 +1,5 @@
-"""What `import springcheck` offers: functions that take a scene or its name, and say what they need."""
+"""The functions of `import springcheck`, which take a scene or its name, and whose errors name what they
+need."""
 
 from springcheck.api.main import compare, exact, identify, judge, read, run, simulate
 from springcheck.api.showing import Said, Shelf, Verdicts

@@ -1,4 +1,4 @@
-"""Running, judging, comparing and naming: what takes a scene, a trajectory or a file."""
+"""Functions that run, judge, compare and identify: of a scene, a trajectory or a file."""
 
 from __future__ import annotations
 
@@ -36,14 +36,13 @@ def run(
     seed: int | None = None,
     scheme: str = "",
 ) -> Report:
-    """The whole job, as `springcheck run` does it: run, compare, judge.
+    """Run a scene by several methods, compare and judge them, as `springcheck run` does.
 
-    `methods` are labels, globs such as ``"own:*"``, or your own functions (see `simulate`); left out: those
-    of the scene.  `path` keeps everything in a store, and what an interrupted call has finished is reused;
-    without it nothing is left on disk.  `report["own:euler"]` is a trajectory.  `scheme` is what your
-    functions are to be judged as; left out, each is what its states show.
-
-    Raises SpringcheckError for everything that a user can mend.
+    `methods` are labels, globs such as ``"own:*"``, or your own functions (see `simulate`); by default the
+    scene's. `path` saves everything in a store, and what an interrupted call has finished is reused; without
+    it nothing is left on disk.  `report["own:euler"]` is a trajectory.  `scheme` is the scheme that your
+    functions are judged against; by default the one that their states show. Raises SpringcheckError for all
+    errors that a user can correct.
     """
     from springcheck.studies.run import measure
 
@@ -66,15 +65,13 @@ def simulate(
     seed: int | None = None,
     scheme: str = "",
 ) -> Trajectory:
-    """A scene by one method, such as ``"ase:velocity-verlet"``; row 0 is the start.
+    """Run a scene by one method, such as ``"ase:velocity-verlet"``; row 0 is the start.
 
-    A function ``step(q, p, h, force, mass) -> (q, p)`` is a method too: it is given numbers of one particle,
-    or arrays (n,); `scheme` is what it is to be judged as, by default what its states show.  `progress` is
-    called with the number of steps done since its last call; `seed`, a whole number, is that of a
-    random method.
-
-    Raises MethodError: no such method, or it cannot serve the scene, or its engine is not installed, or the
-    seed is no such number.
+    A function ``step(q, p, h, force, mass) -> (q, p)`` is a method too: it is called with numbers of one
+    particle, or arrays (n,); `scheme` is the scheme that it is judged against, by default the one that its
+    states show. `progress` is called with the number of steps done since its last call; `seed`, a whole
+    number, is that of a random method. Raises MethodError: no such method, or it cannot serve the scene, or
+    its engine is not installed, or the seed is no such number.
     """
     found = scene_of(scene)
     if seed is not None:
@@ -84,7 +81,7 @@ def simulate(
 
 
 def judge(scene: Scene | str | Path, trajectory: Trajectory) -> Verdicts:
-    """Every check of a trajectory of this scene; what does not apply is among them, `passed` None.
+    """Verdicts of all checks on a trajectory of this scene; `passed` is None for those that do not apply.
 
     Raises SpringcheckError for frames of another shape, or without a step.
     """
@@ -110,7 +107,7 @@ def judge(scene: Scene | str | Path, trajectory: Trajectory) -> Verdicts:
             )
     if run.every < 1 or run.step == 0:
         raise SpringcheckError(f"{run.label}: every = {run.every} by step = {run.step:g} lie no frames apart")
-    # what is made of arrays has the energies of its states
+    # trajectories made from arrays get the energies of their states
     return Verdicts(checks.judge(found, run if run.scene or run.origin else run.with_energies(found)))
 
 
@@ -141,13 +138,13 @@ def identify(
     friction: float | None = None,
     step: float | None = None,
 ) -> Identification | dict[str, Identification]:
-    """Which scheme made a trajectory, and what is wrong: of arrays t, q and p (or v), of a `Trajectory`, of a
-    DataFrame with columns t, q and p or v (t may be its index), of a file, or of an integrator
+    """Identify the scheme that made a trajectory, and its errors: from arrays t, q and p (or v), a
+    `Trajectory`, a DataFrame with columns t, q and p or v (t may be its index), a file, or an integrator
     ``step(q, p, h, force, mass) -> (q, p)``.
 
     t (f,), q, p and v (f, n) or (f,); a file gives one identification for each of its trajectories, by label.
-    `mass`, `stiffness`, `friction` (c of F = -c v) and `step` are what is stated.  Raises IdentificationError
-    where the states say nothing.
+    `mass`, `stiffness`, `friction` (c of F = -c v) and `step` are stated values.  Raises IdentificationError
+    where the states do not show a scheme.
     """
     from springcheck.identify import files
     from springcheck.identify.report import identify_arrays as of_states

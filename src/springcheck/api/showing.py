@@ -1,4 +1,4 @@
-"""How lists show themselves in Python: verdicts, tables of methods, and text."""
+"""How lists are displayed in Python: verdicts, tables of methods, and text."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from springcheck.physics.trajectory import Verdict, html_table, library
 
 
 class Verdicts(list[Verdict]):
-    """Verdicts, and what they come to; `print` shows the summary and what failed."""
+    """Verdicts and their summary; `print` shows the summary and the failed verdicts."""
 
     @property
     def passed(self) -> bool:
-        """Whether nothing failed, and something that could tell the scheme was judged."""
+        """Whether nothing failed, and a check that distinguishes schemes applied."""
         return checks.status(self) == 0
 
     @property
     def failed(self) -> Verdicts:
-        """Those that failed."""
+        """The verdicts that failed."""
         return Verdicts(verdict for verdict in self if verdict.passed is False)
 
     @property
@@ -35,7 +35,7 @@ class Verdicts(list[Verdict]):
         return html_table(self.summary, [("check", "verdict", "value", "bound", "why"), *rows])
 
     def to_dataframe(self) -> Any:
-        """A pandas DataFrame: a row a verdict."""
+        """A pandas DataFrame with a row for each verdict."""
         names = ("method", "check", "passed", "value", "bound", "unit", "why")
         return library("pandas").DataFrame([{name: getattr(x, name) for name in names} for x in self])
 
@@ -55,12 +55,12 @@ class Shelf(list[dict[str, Any]]):
         return html_table("", [list(self[0]), *rows]) if self else ""
 
     def to_dataframe(self) -> Any:
-        """The same as a pandas DataFrame."""
+        """The rows as a pandas DataFrame."""
         return library("pandas").DataFrame(list(self))
 
 
 class Said(str):
-    """Text that shows itself as it is."""
+    """Text whose representation is the text itself."""
 
     __slots__ = ()
 

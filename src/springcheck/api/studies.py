@@ -29,9 +29,9 @@ def precision(
     scene: Scene | str | Path, methods: str | Step | Sequence[str | Step] = (), *, budget: float = 75.0,
     path: str | Path | None = None, force: bool = False, workers: int = 1,
 ) -> PrecisionStudy:  # fmt: skip
-    """Error against run time, down to rounding, in about `budget` seconds, imports not counted.
+    """Measure error against run time, down to rounding, in about `budget` seconds, without imports.
 
-    Methods as in `run`.  `path` keeps it in a store, `workers` processes measure errors at the same time.
+    Methods as in `run`.  `path` saves the result in a store; `workers` processes measure errors in parallel.
     """
     from springcheck.studies.precision import measure
 
@@ -49,8 +49,8 @@ def stability(
     scene: Scene | str | Path, methods: str | Sequence[str] = (), *, path: str | Path | None = None,
     force: bool = False, workers: int = 1,
 ) -> Stability:  # fmt: skip
-    """Limits of stability of these labels or globs (left out: all), measured against theory; your h omega and
-    the largest step [T] on this scene."""
+    """Measure limits of stability of these labels or globs (by default all) against theory, with the h omega
+    and the largest step [T] on this scene."""
     from springcheck.studies.stability import measure
 
     with taken(methods, force, workers) as (named, how):
@@ -61,7 +61,7 @@ def extremes(
     methods: str | Sequence[str] = (), *, quick: bool = False,
     path: str | Path | None = None, force: bool = False, workers: int = 1,
 ) -> Atlas:  # fmt: skip
-    """The atlas of extreme cases: steps, masses, amplitudes to the ends of the range, and who is right where.
+    """The atlas of extreme cases: steps, masses, amplitudes to the ends of the range, and who is right.
 
     `quick` takes fewer cells (20 s).
     """
@@ -72,7 +72,7 @@ def extremes(
 
 
 def faults(*, path: str | Path | None = None, force: bool = False, workers: int = 1) -> FaultReport:
-    """Engines broken on purpose: which checks see each, and down to which size.  It takes minutes."""
+    """Engines broken on purpose: which checks reject each, and their detection limits.  It takes minutes."""
     from springcheck.studies.faults import measure
 
     with taken((), force, workers) as (_, how):
@@ -83,9 +83,10 @@ def census(
     methods: str | Sequence[str] = (), *, thermostats: bool = False, path: str | Path | None = None,
     force: bool = False, workers: int = 1,
 ) -> Census:  # fmt: skip
-    """Which integrator every installed engine really runs, by its states; by these labels or globs alone.
+    """Identify the integrator that every installed engine really runs, by its states; `methods` are labels or
+    globs.
 
-    With `thermostats` globs name those too, on springs in a bath.
+    With `thermostats` globs match those too, on springs in a bath.
     """
     from springcheck.studies.census import measure
 
@@ -109,11 +110,11 @@ def ensemble(
     methods: str | Step | Sequence[str | Step] = (), *, samples: int | None = None, seed: int = 0,
     path: str | Path | None = None, force: bool = False, workers: int = 1,
 ) -> Ensemble:  # fmt: skip
-    """One scene over many parameters: error, energy and end of each cell.
+    """Run one scene over many parameters: error, energy and end of each cell.
 
-    `vary` names fields of the scene file, each with its values or with ``"LOW:HIGH:COUNT"`` (``":log"`` after
-    it spaces them by ratios): ``{"spring.0.stiffness": [1, 2, 4], "time.step": "0.01:0.1:8:log"}``.  With
-    `samples` each is ``"LOW:HIGH"``, drawn evenly from `seed`.
+    `vary` names fields of the scene file, each with its values or with ``"LOW:HIGH:COUNT"`` (followed by
+    ``":log"`` for logarithmic spacing): ``{"spring.0.stiffness": [1, 2, 4], "time.step": "0.01:0.1:8:log"}``.
+    With `samples` each is ``"LOW:HIGH"``, drawn uniformly from `seed`.
     """
     from springcheck.studies.ensemble import measure
     from springcheck.studies.ensemble.vary import plan
@@ -131,27 +132,25 @@ def ensemble(
 
 
 def methods(scene: Scene | str | Path | None = None) -> Shelf:
-    """Every method that is known: its label, its scheme, whether it runs by default, and why it cannot be
-    used (its engine is not installed, or it cannot serve the `scene`); "" where it can."""
+    """All known methods: label, scheme, whether it runs by default, and why it cannot be used (its engine is
+    not installed, or it cannot serve the `scene`); "" where it can."""
     from springcheck.cli import listing
 
     return Shelf(listing.methods(None if scene is None else scene_of(scene)))
 
 
 def explain(word: str) -> Said:
-    """A check, scheme, method, fault, finding or one of the ten words, in words, from what the code knows.
-
-    SpringcheckError where the word names nothing.
-    """
+    """Explain a check, scheme, method, fault, finding or term.  SpringcheckError for an unknown word."""
     from springcheck.cli import explain as explaining
 
     return Said("\n".join(explaining.lines(word)))
 
 
 def report(path: str | Path, output: str | Path | None = None) -> Path:
-    """A store as one HTML page that checks itself in a browser; `output` is its name with .html by default.
+    """Write a store as one HTML page that checks itself in a browser; `output` is its name with .html by
+    default.
 
-    StoreError where `path` cannot be read, or another file stands where the page would.
+    StoreError where `path` cannot be read, or another file is where the page would be.
     """
     from springcheck.cli import page
 

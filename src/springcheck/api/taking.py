@@ -1,4 +1,4 @@
-"""What the functions of Python are given: scenes, methods, functions of one's own, a way to measure."""
+"""Arguments of the Python functions: scenes, methods, functions of one's own, ways to measure."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ gives the force at q."""
 
 @contextmanager
 def labels_of(methods: str | Step | Sequence[str | Step], scheme: str = "") -> Iterator[list[str]]:
-    """Labels of these methods; functions among them are an engine within this context, and not after it."""
+    """Labels of these methods; functions among them form an engine that exists within this context only."""
     several = list(methods) if isinstance(methods, Iterable) and not isinstance(methods, str) else [methods]
     steps = [one for one in several if not isinstance(one, str)]
     if wrong := [one for one in steps if not callable(one)]:
@@ -43,7 +43,7 @@ def labels_of(methods: str | Step | Sequence[str | Step], scheme: str = "") -> I
 
 @contextmanager
 def spoken() -> Iterator[None]:
-    """Messages that name options of the command name the arguments of the call instead."""
+    """In messages, replace options of the command by the arguments of the call."""
     try:
         yield
     except SpringcheckError as error:
@@ -56,7 +56,7 @@ def spoken() -> Iterator[None]:
 
 @contextmanager
 def taken(methods: Any, force: bool, workers: int) -> Iterator[tuple[list[str], How]]:
-    """Labels of these methods for a study, and how it is measured: functions of yours by this process."""
+    """Labels of these methods for a study, and its `How`; functions of yours are measured by this process."""
     from springcheck.studies.team import MOST_PROCESSES, Processes
 
     if not (isinstance(workers, Integral) and 1 <= workers <= MOST_PROCESSES):
@@ -72,7 +72,7 @@ def taken(methods: Any, force: bool, workers: int) -> Iterator[tuple[list[str], 
 
 
 def scene_of(scene: Scene | str | Path) -> Scene:
-    """A scene, shipped or read, by what it is named by."""
+    """The scene itself, or the one of this name or path.  SpringcheckError for anything else."""
     if isinstance(scene, Scene):
         return scene
     if isinstance(scene, str | Path):
@@ -81,7 +81,7 @@ def scene_of(scene: Scene | str | Path) -> Scene:
 
 
 def trajectory_of(found: Any) -> Trajectory:
-    """What is given, if it is one."""
+    """The argument, if it is a trajectory.  SpringcheckError for anything else."""
     if isinstance(found, Trajectory):
         return found
     raise SpringcheckError(

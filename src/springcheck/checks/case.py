@@ -222,7 +222,7 @@ class Case(Claim):
         return bound, np.asarray(np.maximum(size, first * grown))
 
     def walk(self, steps: Reals | Integers, turn: float | None = None) -> Floats:
-        """What the roundings of so many steps add up to in the coordinates in which a step is a rotation, in
+        """Accumulated rounding of so many steps, in the coordinates in which a step is a rotation and in
         allowances of a step (f,); infinite but for kicks and drifts in double precision without friction.
 
         Roundings of states are as good as random and add up as a random walk: 5 standard deviations of one

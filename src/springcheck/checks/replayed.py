@@ -22,7 +22,7 @@ from springcheck.schemes.variable import Taken, allowed, push_of, taken
 from springcheck.text.wording import count
 
 MOST_REPLAYED = 10_000
-"""Steps: two seconds."""
+"""Most steps of a solver that are replayed: two seconds."""
 
 LOST = 0.1
 """Relative uncertainty of the last step before a frame up to which a longer and a shorter one are replayed

@@ -10,7 +10,7 @@ from springcheck.checks.check import Finding, check, largest
 from springcheck.checks.requires import MAP, missing
 from springcheck.checks.thermal import reading, thermostat
 from springcheck.physics.exact.closedform import PI
-from springcheck.physics.rods import UNTRUE, Rods
+from springcheck.physics.rods import START_TOLERANCE, Rods
 from springcheck.physics.trajectory import Limits
 from springcheck.text.wording import count
 from springcheck.thermal import THERMOSTATS
@@ -99,7 +99,7 @@ def turn(case: Case) -> Finding | str:
         steps, (q0, p0) = steps - steps[0], (x[0].astype(np.longdouble) for x in (run.q, run.p))
     w = rods.rates(q0, p0)
     # rounding errors of momenta along a line are no rotation
-    w = np.where(w * rods.length > UNTRUE * rods.spans(np.abs(p0) / m), w, 0)
+    w = np.where(w * rods.length > START_TOLERANCE * rods.spans(np.abs(p0) / m), w, 0)
     if not np.any(w > 0):
         return "no rod turns"
     parts = [c for kind, (_, c) in zip(case.scheme.kinds, case.scheme.stages, strict=True) if kind.drifts]

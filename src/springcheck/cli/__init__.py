@@ -1,7 +1,7 @@
-"""The command line: parses, calls, prints, and answers mistakes with one line and exit status 2.
+"""The command line: parses, calls, prints, and answers errors of users with one line and exit status 2.
 
-Heavy modules are imported by the command that needs them: `--help` and `list` import no engine, no
-HDF5 and no NumPy that they do not use.
+Heavy modules are imported by the command that needs them: `--help` and `list` import no engine, no HDF5 and
+no NumPy that they do not use.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ INTERRUPTED = interrupts.STATUS
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line; returns the exit status: 0 passed, 1 a verdict failed, 2 a mistake."""
+    """Run the command line; returns the exit status: 0 passed, 1 a verdict failed, 2 an error of the user."""
     try:
         words = sys.argv[1:] if arguments is None else arguments
         options = _parser(words).parse_args(words)
@@ -38,7 +38,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     command: Callable[[argparse.Namespace], int] = options.command
     what = "nothing is kept"
     if "keeps" not in options and "output" in options:
-        # every file is moved to its place whole, each of many figures too
+        # every file is moved into place as a whole, each of several figures too
         what = "no file is half written"
     elif "keeps" in options and options.keeps(options):
         what = "what was finished is kept, the same command goes on"
@@ -64,14 +64,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 if reported(options):
                     ci.failed(options, error)
                 raise
-            # while a full disk can still be said
+            # so that a full disk is still reported
             sys.stdout.flush()
             return status
     except KeyboardInterrupt:
         return _interrupted()
     except Exception as error:
         if interrupts.seen():
-            # a library that was interrupted may call it an error of its own
+            # a library that was interrupted may raise an error of its own
             return _interrupted()
         if isinstance(error, SpringcheckError | OSError):
             return _mistake(error)
@@ -80,7 +80,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 @contextmanager
 def _said() -> Iterator[None]:
-    """Warnings about stores as lines on standard error."""
+    """Print warnings about stores as lines on standard error."""
     with warnings.catch_warnings():
         warnings.simplefilter("always", StoreWarning)
         shown = warnings.showwarning
@@ -96,21 +96,21 @@ def _said() -> Iterator[None]:
 
 
 def _interrupted() -> int:
-    """Say what Ctrl-C has left; returns the exit status."""
+    """Print what Ctrl-C has left; returns the exit status."""
     interrupts.say()
     return INTERRUPTED
 
 
 def _mistake(error: SpringcheckError | OSError) -> int:
-    """Say what went wrong in one line; returns the exit status."""
+    """Print an error in one line; returns the exit status."""
     if isinstance(error, BrokenPipeError):
-        # the program ends without a word
+        # the program ends without a message
         raise error
-    # the library names its files; what is left of OSError is our own output, on a full disk for one
+    # the library names its files; any other OSError is of our own output, on a full disk for example
     said = error.strerror if isinstance(error, OSError) else None
     print(f"springcheck: {said or error}", file=sys.stderr)
     if isinstance(error, OSError):
-        # nothing more can be written, by the interpreter's shutdown either
+        # nothing more can be written, not even by the interpreter's shutdown
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return 2
 
@@ -135,7 +135,7 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
             help=one.about,
             description=one.about[:1].upper() + one.about[1:] + ".",
             epilog="\n".join(
-                # a study of one's own has none
+                # a study of a plug-in has none
                 [
                     "examples:",
                     *(f"  springcheck {one.name} {x}".rstrip() for x in groups.EXAMPLES.get(one.name, [""])),

@@ -1,6 +1,6 @@
 """Reports for continuous integration: JUnit, a badge, and a summary in Markdown.
 
-All three are made from the JSON document of a command, so that nothing is decided twice.
+All three derive from the JSON document of a command, so that nothing is decided twice.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from springcheck.text.wording import STATES_SHOW, count
 
 HEAD = b"<?xml version='1.0' encoding='utf-8'?>\n<testsuites name=\"springcheck\""
 OURS = {"junit": HEAD, "badge": b'{"schemaVersion":'}
-"""First bytes of the files that are written anew: a file with others is somebody else's, and stays."""
+"""First bytes of the files that are overwritten; a file with others is none of these reports, and stays."""
 
 COLOURS = {0: "brightgreen", 1: "red", 2: "lightgrey"}
 
@@ -34,7 +34,7 @@ _NOT_IN_XML = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Case:
-    """One thing that was judged."""
+    """One item that was judged."""
 
     subject: str
     """Method, trajectory or file."""
@@ -43,11 +43,11 @@ class Case:
     """None where nothing could be judged."""
     why: str
     error: bool = False
-    """Not judged because of a mistake that a user can mend."""
+    """Not judged because of an error that a user can correct."""
 
 
 def check_paths(options: Namespace) -> None:
-    """SpringcheckError where a report cannot be written, or would take the place of a file that is none."""
+    """SpringcheckError where a report cannot be written, or would overwrite a file that is none."""
     given = {name: getattr(options, name, None) for name in REPORT_FORMS}
     read = [getattr(options, name, None) for name in ("file", "source", "scene", "output")]
     others = [str(x) for x in (*read, *(getattr(options, "files", None) or ())) if x]
@@ -73,17 +73,17 @@ def check_paths(options: Namespace) -> None:
 
 
 def report(options: Namespace, document: dict[str, Any], status: int) -> None:
-    """Write what was asked for of a command's JSON document and exit status."""
+    """Write the reports requested of a command's JSON document and exit status."""
     _write(options, list(cases(options.name, document, status)), status)
 
 
 def failed(options: Namespace, error: BaseException) -> None:
-    """Write what was asked for of a command that ended in a mistake."""
+    """Write the reports requested of a command that ended in an error."""
     _write(options, [Case(subject=options.name, name="input", passed=None, why=str(error), error=True)], 2)
 
 
 def cases(command: str, document: dict[str, Any], status: int) -> Iterator[Case]:
-    """Everything that a JSON document says was judged."""
+    """Every item that a JSON document reports as judged."""
     for one in document.get("files", [document]):
         for found in one.get("identifications", [one]):
             yield from _identified(found, one.get("file", ""))
@@ -135,7 +135,7 @@ def _number(x: float | None) -> str:
 
 
 def sentence(found: Sequence[Case], status: int) -> str:
-    """The first sentence of a summary: what is wrong, or that nothing is."""
+    """The first sentence of a summary: the failure, or that there is none."""
     wrong = [x for x in found if x.passed is False] or [x for x in found if x.error]
     if wrong:
         named = "" if wrong[0].name in ("scheme", "input") else f", {wrong[0].name}"
@@ -205,7 +205,7 @@ def summary(command: str, found: Sequence[Case], status: int) -> str:
 
 
 def _cell(text: str) -> str:
-    """Text that Markdown shows as it is."""
+    """Text escaped for Markdown."""
     return re.sub(r"([\\|<>`*_\[\]])", r"\\\1", plain(text))
 
 

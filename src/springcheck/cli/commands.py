@@ -1,4 +1,4 @@
-"""The commands that are no studies: what each takes, and what it does with it.
+"""Commands other than studies: their arguments, and what they do.
 
 Heavy modules are imported by the command that needs them.
 """
@@ -26,7 +26,7 @@ class Command(NamedTuple):
     name: str
     about: str
     perform: Callable[[Namespace], int]
-    """Does what it is for; returns the exit status."""
+    """Carries out the command; returns the exit status."""
     arguments: tuple[Argument, ...]
 
 
@@ -38,7 +38,7 @@ def _inspect(options: Namespace) -> int:
         raise SpringcheckError(f"--rows {options.rows}: a number of frames from 1 on is needed")
     doubts = output.doubts(options.file)
     summary = store.summary(Path(options.file))
-    # all of it is read before anything is said
+    # all of it is read before anything is printed
     document = inspect.document(summary, options) if options.json else {}
     lines = [] if options.json else inspect.lines(summary, options)
     output.warn(options.file, doubts)
@@ -129,7 +129,7 @@ def _identify(options: Namespace) -> int:
     asked = schemes.scheme(options.scheme).name if options.scheme is not None else None
     answers: Iterable[tuple[str, Any]]
     if options.integrator is not None:
-        # its output is not shown
+        # its own output goes to standard error
         with redirect_stdout(sys.stderr):
             found = {options.integrator: identify_stepper(function.load(options.integrator))}
         answers = [(options.integrator, (found, []))]
@@ -167,12 +167,12 @@ def _identify(options: Namespace) -> int:
         undecided = any(one.undecided for one in found.values())
         statuses.append(1 if doubts or not fits or any(unlike.values()) else 2 if undecided else 0)
     status = 1 if 1 in statuses else max(statuses)
-    # the text of each file is already shown
+    # the text of each file has already been printed
     return output.answer(options, lambda: {"files": documents} if many else documents[0], list, status)
 
 
 def _unlike(found: Any, asked: str) -> str:
-    """What the states show instead of the scheme that was asked for; "" where they may show that."""
+    """Which scheme the states show instead of the stated one, in a sentence; "" where they may show that."""
     from springcheck.schemes import title
 
     shown = [x for one in (found, *found.candidates) for x in (one.scheme, *one.aliases) if x]
@@ -182,7 +182,7 @@ def _unlike(found: Any, asked: str) -> str:
 
 
 def _in_order(parts: Sequence[Callable[[], Any]], workers: int) -> Iterator[Any]:
-    """The results of the parts, in their order."""
+    """Results of the parts, in their order."""
     from springcheck.studies.team import Processes
 
     known: dict[int, Any] = {}
@@ -196,7 +196,7 @@ def _in_order(parts: Sequence[Callable[[], Any]], workers: int) -> Iterator[Any]
 
 
 def _look(file: str, trajectory: str | None, columns: list[str], stated: dict[str, float | None]) -> Any:
-    """The contents of a file and its untrustworthy parts, or the reason why it cannot be read."""
+    """Identifications of a file and its damaged parts, or the reason why it cannot be read."""
     from springcheck import formats
     from springcheck.identify import files
 
@@ -278,7 +278,7 @@ FORMATS = (
     ".xtc, .trr, .gro, Amber NetCDF, ASE .traj, extended .xyz, .xyz, Octave text, text tables; texts also "
     "gzipped"
 )
-"""What `springcheck.formats` reads, which is not imported for it."""
+"""Formats that `springcheck.formats` reads, which is not imported for this text."""
 
 _FILE = argument("file", metavar="FILE")
 _GROUP = argument("--trajectory", metavar="LABEL", help="one trajectory or particle group of the file")
@@ -357,4 +357,4 @@ COMMANDS = (
         argument("shell", choices=("bash", "zsh"), help="put its lines where your shell begins"),
     )),
 )  # fmt: skip
-"""Every command that is no study, in the order in which `--help` names them."""
+"""Every command that is no study, in the order of `--help`."""

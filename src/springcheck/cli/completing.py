@@ -1,4 +1,4 @@
-"""`springcheck completion`: a script by which a shell completes commands, options, scenes and methods."""
+"""`springcheck completion`: a script for shell completion of commands, options, scenes and methods."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Arguments = Sequence[tuple[tuple[str, ...], dict[str, Any]]]
 
 
 def script(shell: str, commands: Mapping[str, Arguments]) -> str:
-    """A script for `eval` or a shell's folder of completions, from the names and arguments of `commands`."""
+    """A script for `eval` or a shell's completion folder, from the names and arguments of `commands`."""
     labels = [f"{name}:{one}" for name in engines.names() for one in engines.engine(name).methods]
     named = {"--method": labels, "--scheme": schemes.known(), "--scene": scenefile.names()}
     words = {"SCENE": scenefile.names(), "NAME": [x.name for x in checks.ALL] + list(schemes.known())}
@@ -29,7 +29,7 @@ def script(shell: str, commands: Mapping[str, Arguments]) -> str:
             "_springcheck() {",
             "  local cur words before",
             "  cur=${COMP_WORDS[COMP_CWORD]}; before=${COMP_WORDS[COMP_CWORD-1]}; COMPREPLY=()",
-            # a colon parts words for bash, and stands in every label
+            # bash splits words at colons, and every label has one
             "  if declare -F _get_comp_words_by_ref >/dev/null; then _get_comp_words_by_ref -n : cur; fi",
             f"  if [ \"$COMP_CWORD\" -eq 1 ]; then words='{' '.join(commands)}'",
             '  else case "${COMP_WORDS[1]}" in',

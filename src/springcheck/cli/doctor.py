@@ -1,4 +1,4 @@
-"""`springcheck doctor`: what this installation can do, and what is missing for the rest."""
+"""`springcheck doctor`: the capabilities of this installation, and what the missing ones need."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def _engine(name: str) -> dict[str, Any]:
 
 
 def _usable(engine: engines.Engine) -> Iterator[str]:
-    """The platforms on which one of its methods starts here, without their precisions."""
+    """Platforms on which one of its methods starts here, without their precisions."""
     scene = scenefile.load_scene("spring")
     method = next((name for name, one in engine.methods.items() if one.default), "")
     for place in engine.platforms if method else ():
@@ -74,7 +74,7 @@ def _usable(engine: engines.Engine) -> Iterator[str]:
 
 
 def lines(data: dict[str, Any]) -> Lines:
-    """The same for people, the problems with what mends them."""
+    """The data as text, each problem with its remedy."""
     return list(map(plain, _said(data)))
 
 

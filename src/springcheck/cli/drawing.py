@@ -19,14 +19,14 @@ from springcheck.studies import STUDIES
 from springcheck.text.wording import count
 
 MOST_COORDINATES = 8
-"""Most coordinates that are drawn of a file by another program."""
+"""Most coordinates that are drawn of another program's file."""
 
-FRAMES, SAME = 12, 0.02
-"""Frames of a period below which lines between them are chords; relative change of a reach that is none."""
+FEWEST_PERIOD_FRAMES, SAME_REACH = 12, 0.02
+"""Fewest frames of a period that lines may join; least relative change of an amplitude that is reported."""
 
 
 def need_matplotlib() -> None:
-    """SpringcheckError where matplotlib refuses to be imported: the environment asks for no backend of it."""
+    """SpringcheckError where matplotlib cannot be imported: the environment asks for an unknown backend."""
     try:
         import_module("matplotlib")
     except ValueError as error:
@@ -39,9 +39,8 @@ def need_matplotlib() -> None:
 def draw(path: Path, into: Path, **chosen: Any) -> tuple[list[Path], list[str]]:
     """Draw the studies of a store into a folder -> the files, and notes on what they leave out.
 
-    `chosen`: options of a study's figures, as `particle=0`, and only studies that have them are drawn; None
-    chooses nothing.  Figures of this store are replaced, and nothing else.  SpringcheckError where there is
-    nothing to draw.
+    `chosen`: options of a study's figures, as `particle=0`; only studies that have them are drawn, and None
+    is no choice.  Only figures of this store are replaced.  SpringcheckError where there is nothing to draw.
     """
     chosen = {name: value for name, value in chosen.items() if value is not None}
     folder.check((), into, path)
@@ -77,7 +76,7 @@ def draw_foreign(
     step: float | None = None,
     trajectory: str | None = None,
 ) -> tuple[list[Path], list[str]]:
-    """Draw the states in a file of any program, as `draw`; `particle` counts coordinates from 0 on."""
+    """Draw the states in any program's file, as `draw`; `particle` is the index of a coordinate."""
     from springcheck.cli.file import states_in
     from springcheck.figures import looks, render
     from springcheck.figures.charts import Bank, Chart, Curve, Scale
@@ -96,8 +95,8 @@ def draw_foreign(
     if particle is None and left:
         notes.append(f"{count(left, 'moving coordinate')} more, which --particle draws")
     chosen = chosen if len(chosen) else np.array([0])
-    # fewer frames of a period are chords
-    few = any(len(found.t) < FRAMES * periods(found.q[:, i]) for i in chosen)
+    # with fewer frames in a period lines would be chords
+    few = any(len(found.t) < FEWEST_PERIOD_FRAMES * periods(found.q[:, i]) for i in chosen)
 
     def curves(x: Any, y: Any, *, joined: bool) -> list[Curve]:
         names = [(f"coordinate {i}", i) for i in chosen.tolist()]
@@ -127,7 +126,7 @@ def draw_foreign(
 
 
 def _found(q: Any, frames: int) -> str:
-    """How often a coordinate goes round, and how its reach changes."""
+    """Number of periods of a coordinate, and the change of its amplitude, in a sentence."""
     from springcheck.figures.motion import periods
 
     rounds = periods(q)
@@ -137,7 +136,7 @@ def _found(q: Any, frames: int) -> str:
     first, last = (float(np.ptp(part)) for part in (q[:quarter], q[-quarter:]))
     change = last / first - 1
     reach = "reaches as far at the end"
-    if abs(change) >= SAME:
+    if abs(change) >= SAME_REACH:
         way = "less far" if change < 0 else "farther" if change < 1 else "as far"
         times = f"{100 * abs(change):.0f} %" if change < 1 else f"{last / first:.3g} times"
         reach = f"reaches {times} {way} at the end"

@@ -1,5 +1,5 @@
 """`springcheck explain`: a check, a scheme, a method, a fault or a finding in words, from the objects
-themselves.  What a check sees of the faults, and from which size, is measured while one waits."""
+themselves.  The faults that a check rejects, and its detection limits, are measured on request."""
 
 from __future__ import annotations
 
@@ -41,11 +41,11 @@ WORDS = {
     "of a start without any, of what it may gain",
     "ensemble": "many runs of a scene with numbers varied: `springcheck run SCENE --vary FIELD=A:B:N`",
 }
-"""Words of the field and of springcheck, each with its meaning."""
+"""Terms of the field and of springcheck, each with its meaning."""
 
 
 def word(name: str) -> tuple[str, str] | None:
-    """A word and its meaning, by its name or by the beginning of it; None where there is none."""
+    """A term and its meaning, by its name or the beginning of it; None for an unknown one."""
     asked = _bare(name)
     for known, meaning in WORDS.items():
         if asked and asked in (*map(_bare, (known, *known.split(", "))), _bare(known).split()[0].rstrip(",")):
@@ -58,17 +58,17 @@ def _bare(name: str) -> str:
 
 
 def lines(name: str) -> Iterator[str]:
-    """What a name stands for, all of it.  SpringcheckError where it stands for nothing."""
+    """All explanations of a name.  SpringcheckError where it is unknown."""
     if name in _CHECKS:
         return chain(check_lines(_CHECKS[name]), _seen(_CHECKS[name]))
     known = schemes.known()
-    # a scheme is found by its title too, which is what tables print
+    # a scheme is found by its title too, which tables print
     for scheme in known.values():
         if name in (scheme.name, scheme.title):
             return scheme_lines(scheme)
     if ":" in name:
         return _method(name)
-    # heavier to import, and rarely asked for
+    # heavier to import, and rarely needed
     from springcheck.identify.meanings import MEANINGS
 
     parts = [_fault(fault) for fault in FAULTS if fault.name == name]
@@ -200,11 +200,11 @@ _ACTS = {
 }  # fmt: skip
 
 SHOWN = 0.5, 0.1
-"""The h omega and the x = gamma h at which a thermostat is shown in numbers."""
+"""h omega, and x = gamma h, at which numbers of a thermostat are shown."""
 
 
 def _act(act: Act, draws: int) -> str:
-    """A stage of a thermostat, a coefficient that depends on x by its number."""
+    """A stage of a thermostat, with a coefficient that depends on x as a number."""
     c = float(act.part(np.float64(SHOWN[1]))) if callable(act.part) else float(act.part)
     if act.kind == "kick" and c == 0:
         return "F is evaluated at q"
@@ -216,7 +216,7 @@ def _act(act: Act, draws: int) -> str:
 
 
 def _thermostat(name: str) -> Iterator[str]:
-    """Stages of a random scheme, and what its law is on a spring."""
+    """Stages of a random scheme, and numbers of its law on a spring."""
     scheme = THERMOSTATS[name]
     for act in scheme.acts:
         yield f"  {_act(act, scheme.draws)}"

@@ -1,4 +1,4 @@
-"""Judging a trajectory that stands in a file, whoever made it, against the law of a scheme."""
+"""Judging a trajectory in a file, whoever made it, against the law of a scheme."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from springcheck.formats import States, is_store, moving, read
 from springcheck.identify import files
 from springcheck.identify.files import identify_states, of_arrays
 from springcheck.physics.arrays import AS_WRITTEN, Arithmetic, Floats
-from springcheck.physics.rods import UNTRUE
+from springcheck.physics.rods import START_TOLERANCE
 from springcheck.physics.scene import Scene
 from springcheck.physics.scenefile import load_scene
 from springcheck.physics.trajectory import Outcome, Trajectory, Verdict
@@ -48,7 +48,7 @@ class Judgement:
 
     @property
     def not_judged(self) -> bool:
-        """Whether nothing that applied could tell the scheme from another."""
+        """Whether no check that applied distinguishes the scheme from others."""
         return bool(checks.not_judged(self.verdicts))
 
     def document(self) -> dict[str, Any]:
@@ -97,10 +97,8 @@ def judge(
     step: float | None = None,
     trajectory: str | None = None,
 ) -> Judgement:
-    """The verdicts on the trajectory of a file.
-
-    Raises SpringcheckError, in one line, where it cannot be read or is not of the scene.
-    """
+    """Verdicts on the trajectory of a file.  Raises SpringcheckError where it is unreadable or not of the
+    scene."""
     found = load_scene(scene) if isinstance(scene, str) else scene
     known = schemes.scheme(scheme)
     states = states_in(path, columns, step, trajectory)
@@ -119,7 +117,7 @@ def judge(
 
 
 def _taken(states: States, judged: Scene, run: Trajectory, asked: Scene) -> dict[str, str]:
-    """Data taken from the file in place of the scene, and so not judged, by the check of the record."""
+    """Data that replace the scene's and are therefore not judged, by the name of the check of the record."""
     out: dict[str, str] = {}
     if np.any(states.t != run.t):
         off = float(np.max(np.abs(states.t - states.t[0] - run.t)))
@@ -127,7 +125,7 @@ def _taken(states: States, judged: Scene, run: Trajectory, asked: Scene) -> dict
     if np.any(judged.q != asked.q) or np.any(judged.p != asked.p):
         q = judged.q
         if _beside_start(q[None], asked, 1e-6):
-            # further along its line
+            # displaced along its line
             q = q - np.mean(q - asked.q)
         size = float(asked.system.norm(q - asked.q, judged.p - asked.p))
         out["start"] = f"the start was taken as it is written in the file, {size:.2g} of the amplitude off"
@@ -142,8 +140,8 @@ def _taken(states: States, judged: Scene, run: Trajectory, asked: Scene) -> dict
 def _shown(scene: Scene, run: Trajectory, states: States) -> Verdict:
     """Whether the states as a whole show another scheme.
 
-    Few digits leave room for many schemes in every single step, as the other checks look at them; the map
-    that fits all steps together is known far better.
+    With few digits many schemes fit every single step, which the other checks examine; the map that fits all
+    steps together is known far better.
     """
 
     def verdict(passed: bool | None, why: str) -> Verdict:
@@ -153,7 +151,7 @@ def _shown(scene: Scene, run: Trajectory, states: States) -> Verdict:
             passed=passed, why=why,
         )  # fmt: skip
 
-    # digits are counted as written: projections on a line would not show their decimals
+    # digits are counted as written: projections onto a line would not show their decimals
     mass = np.repeat(scene.m, states.q.shape[1] // scene.n)
     try:
         found = identify_states(of_arrays(run.label, replace(states, mass=mass)), step=scene.step)
@@ -170,7 +168,7 @@ def _shown(scene: Scene, run: Trajectory, states: States) -> Verdict:
 def states_in(
     path: Path, columns: Sequence[str] = (), step: float | None = None, label: str | None = None
 ) -> States:
-    """The one trajectory of a file, or that of this label.  StoreError where there are several or none."""
+    """The only trajectory of a file, or that of this label.  StoreError where there are several or none."""
     found = _recorded(path) if not columns and is_store(path) else read(path, columns, step)
     found = {name: x for name, x in found.items() if x.p is not None or x.v is not None} or {
         name: moving(path, x) for name, x in found.items()
@@ -186,16 +184,16 @@ def states_in(
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Recorded(States):
-    """States of a store of ours, which keeps what the engine declared."""
+    """States of one of our stores, with the engine's declarations."""
 
     run: Trajectory
 
 
 def _recorded(path: Path) -> dict[str, States]:
-    """The trajectories of a store of ours."""
+    """The trajectories of one of our stores."""
     found: dict[str, States] = {}
     for run in store.summary(path).runs:
-        # one frame more than is looked at in a piece of a very long run
+        # as a single piece, however long the run
         piece = next(store.windows(path, run.label, run.frames + 1))
         found[run.label] = Recorded(t=piece.t, q=piece.q, p=piece.p, v=None, mass=None, run=piece)
     return found
@@ -204,7 +202,7 @@ def _recorded(path: Path) -> dict[str, States]:
 def as_trajectory(
     path: Path, states: States, scene: Scene, scheme: str
 ) -> tuple[Scene, Trajectory, tuple[str, ...]]:
-    """States as a trajectory of a scene with the file's grid and start, and notes on what was done to them.
+    """States as a trajectory of a scene with the file's grid and start, and notes on the changes made.
 
     StoreError where they are not of the scene: another number of particles, other times, another start.
     """
@@ -227,7 +225,7 @@ def as_trajectory(
         far = float(np.max(np.abs(q), initial=0.0))
         q, other, beside = _along(path, q, other, scene, notes, off)
         if moved := _beside_start(q, scene, off):
-            # moved as far from 0 as the points are, since they are rounded there
+            # displaced from 0 by as much as the points are, since they are rounded there
             notes.append(f"positions counted from {moved:.6g} along it, where the scene has its 0")
             q, scene = q - moved + far, _moved(scene, far)
             beside /= max(1.0, far / (float(np.ptp(q)) or 1.0))
@@ -259,7 +257,7 @@ def as_trajectory(
     if np.any(states.t != t):
         notes.append(TIMES)
     size = scene.system.norm(q[0] - scene.q, p[0] - scene.p)
-    # far from 0 a coordinate is rounded more coarsely than the amplitude is
+    # far from 0 the rounding of a coordinate is larger relative to the amplitude
     rounded = scene.system.norm.most(*(states.roundoff * np.abs(x) for x in (q[0], p[0])))
     if not size <= max(1e-9, 10 * states.roundoff) and not 0 < size * scene.system.norm.unit <= 2 * rounded:
         raise StoreError(
@@ -286,7 +284,7 @@ def as_trajectory(
     grid: dict[str, Any] = {"steps": steps, "every": every, "quantities": kept}
     if scene.system.rods and states.roundoff > 2.0**-53:
         # a start of few digits has rods of the right length only to those digits
-        scene.system.rods.check(begun["q"], begun["p"], UNTRUE * 2.0**53 * states.roundoff)
+        scene.system.rods.check(begun["q"], begun["p"], START_TOLERANCE * 2.0**53 * states.roundoff)
         judged = replace(scene, **grid).derived(**begun)
     else:
         judged = replace(scene, **begun, **grid)
@@ -307,8 +305,8 @@ def as_trajectory(
 
 
 def _in_plane(path: Path, q: Floats, other: Floats, scene: Scene, off: float) -> tuple[Floats, Floats, float]:
-    """Of motions in space (f, 3 particles) the coordinates that the scene has (f, n), and by which part of
-    its size something moves along the axes that it leaves out."""
+    """The scene's coordinates (f, n) of motions in space (f, 3 particles), and the largest motion along the
+    axes that it leaves out, relative to the whole."""
     left = scene.elsewhere
     beside = max(float(np.max(np.abs(x[:, left])) / (np.max(np.abs(x)) or 1.0)) for x in (q - q[0], other))
     if not beside <= off:
@@ -319,8 +317,8 @@ def _in_plane(path: Path, q: Floats, other: Floats, scene: Scene, off: float) ->
 
 
 def _beside_start(q: Floats, scene: Scene, off: float) -> float:
-    """Shift along their line of several particles (f, n) from where the scene has them at the start; 0 where
-    they stand there, or are not as far from each other as in the scene."""
+    """Displacement of several particles (f, n) along their line from the scene's start; 0 where there is
+    none, or their distances are not the scene's."""
     apart = q[0] - scene.q
     moved, size = float(np.mean(apart)), float(np.ptp(scene.q))
     alike = scene.n > 1 and np.ptp(apart) <= off * size < abs(moved)
@@ -328,7 +326,7 @@ def _beside_start(q: Floats, scene: Scene, off: float) -> float:
 
 
 def _moved(scene: Scene, length: float) -> Scene:
-    """The same scene further along its line."""
+    """The scene displaced along its line."""
     terms = tuple(term.shifted(length) if term.bodies == 1 else term for term in scene.terms)
     return replace(scene, q=scene.q + length, terms=terms)
 
@@ -336,8 +334,8 @@ def _moved(scene: Scene, length: float) -> Scene:
 def _along(
     path: Path, q: Floats, other: Floats, scene: Scene, notes: list[str], off: float
 ) -> tuple[Floats, Floats, float]:
-    """Motions in space (f, 3n) along the one line that they keep to (f, n), but for `off` of their size; and
-    by which part of it they are off."""
+    """Motions in space (f, 3n) projected onto their common line (f, n), which they may leave by `off` of
+    their size; and the distance from it relative to their size."""
     r, rates = q.reshape(len(q), -1, 3), other.reshape(len(q), -1, 3)
     moved = (r - r[0]).reshape(-1, 3)
     _, sizes, axes = np.linalg.svd(moved, full_matrices=False)
@@ -351,7 +349,7 @@ def _along(
     )
     if not beside <= off:
         raise StoreError(f"{path}: the motion is not along one line, but {beside:.2g} of its size off it")
-    # which way round: by places between the particles, which do not depend on where 0 is
+    # orientation by the differences of positions, which do not depend on the origin
     several = np.ptp(scene.q) > 0
     here, there = (x - np.mean(x) * several for x in (positions[0], scene.q))
     if np.max(np.abs(here + there)) < np.max(np.abs(here - there)):

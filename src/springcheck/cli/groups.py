@@ -1,4 +1,4 @@
-"""Under which headings the help of a command shows its arguments, and its examples."""
+"""Headings of the arguments in the help of a command, and its examples."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ EXAMPLES: Mapping[str, Sequence[str]] = {
     "doctor": ("",),
     "completion": ("bash",),
 }
-"""Examples of each command, without its name: the help shows them, and a test parses them."""
+"""Examples of each command, without its name: the help prints them, and a test parses them."""
 
 
 GROUPS: Mapping[str, Sequence[str]] = {
@@ -63,7 +63,7 @@ ELSEWHERE: Mapping[str, Mapping[str, str]] = {
         "--stepper": "input", **dict.fromkeys(("--step", "--friction", "--scheme"), "known of the motion"),
     },
 }  # fmt: skip
-"""By command: options that mean something else there than in other commands, and their headings."""
+"""By command: options with another meaning there than in other commands, and their headings."""
 
 
 class Formatter(argparse.RawDescriptionHelpFormatter):
@@ -76,14 +76,14 @@ class Formatter(argparse.RawDescriptionHelpFormatter):
 
 
 def heading(command: str, names: Sequence[str]) -> str:
-    """Under which heading an argument stands; "other" where no group names it, as a plug-in's own."""
+    """Heading of an argument; "other" where no group names it, as one of a plug-in."""
     known = ELSEWHERE.get(command, {})
     every = [known[name] for name in names if name in known]
     return [*every, *(title for title, of in GROUPS.items() if set(names) & {*of}), "other"][0]
 
 
 def add(parser: argparse.ArgumentParser, command: str, arguments: Iterable[Argument]) -> None:
-    """Give a command its arguments, in groups."""
+    """Add arguments to a command, in groups."""
     groups = {title: parser.add_argument_group(title) for title in (*GROUPS, "other")}
     for names, how in arguments:
         groups[heading(command, names)].add_argument(*names, **how)

@@ -1,4 +1,4 @@
-"""`springcheck inspect`: what is in a store, in bounded memory however long its runs are."""
+"""`springcheck inspect`: the contents of a store, in bounded memory however long its runs are."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from springcheck.text.wording import ordinal
 
 
 def held(summary: store.Summary) -> Iterator[tuple[Study, StudyResult]]:
-    """The studies of a store, each with its result.  StoreError where one of them cannot be read."""
+    """The studies of a store with their results.  StoreError where one of them cannot be read."""
     learn(summary)
     for study in STUDIES:
         if study.held(summary):
@@ -25,7 +25,7 @@ def held(summary: store.Summary) -> Iterator[tuple[Study, StudyResult]]:
 
 
 def learn(summary: store.Summary) -> None:
-    """Make the schemes known that engines of these runs bring, where the engines are here."""
+    """Register the schemes that engines of these runs define, where the engines are installed."""
     for run in summary.runs:
         name = run.label.partition(":")[0]
         if run.parameters.get("scheme") not in schemes.known() and name in engines.names():
@@ -65,7 +65,7 @@ def lines(summary: store.Summary, options: Namespace) -> Lines:
 
 
 def _asked_for(summary: store.Summary, options: Namespace) -> tuple[Trajectory | None, int]:
-    """Evenly spaced frames of the trajectory asked for, and the stride between them."""
+    """Evenly spaced frames of the trajectory asked for, and their stride."""
     if options.trajectory is None:
         return None, 1
     return store.strided(summary.path, options.trajectory, 20 if options.rows is None else options.rows)
@@ -87,7 +87,7 @@ def _runs(summary: store.Summary) -> TextTable:
 
 
 def _frames(run: Trajectory, stride: int, last: Trajectory) -> Lines:
-    """Some frames, and the last one as well."""
+    """Table of some frames, and of the last one."""
     n = run.q.shape[1]
     shown = min(n, 3)
     title = f"{run.label}" + (f", every {ordinal(stride)} frame and the last" if stride > 1 else "")

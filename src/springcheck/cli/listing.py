@@ -1,4 +1,4 @@
-"""Lists of the scenes, engines and checks, found in their folders."""
+"""Lists of the scenes, engines and checks, as found in their folders."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def _engine(name: str) -> dict[str, Any]:
 
 
 def methods(scene: Scene | None) -> list[dict[str, Any]]:
-    """Every method: its scheme, whether it runs by default, and why not here, or not on this scene."""
+    """Every method: its scheme, whether it runs by default, and why it cannot run here, or on this scene."""
     rows = []
     for engine in map(_engine, engines.names()):
         for one in engine["methods"]:
@@ -85,7 +85,7 @@ def lines(found: dict[str, Any]) -> Lines:
 
 
 def _entry(name: str, width: int, words: str) -> list[str]:
-    """A name and what it is, in lines of 80 columns; a path stays in one piece, to be copied."""
+    """A name and its description, in lines of 80 columns; a path is not broken, so that it can be copied."""
     return textwrap.wrap(
         f"{name:{width}}  {words}".rstrip(), 80, initial_indent="  ", subsequent_indent=" " * (width + 4),
         break_long_words=False, break_on_hyphens=False,

@@ -20,34 +20,34 @@ if TYPE_CHECKING:
     from springcheck.studies.arguments import Progress
     from springcheck.text.lines import Lines
 
-PIPE = 1 << 16
-"""Width of output that no terminal shows: its reader's tools wrap long lines."""
+PIPE_WIDTH = 1 << 16
+"""Width of output that is not a terminal's: its reader wraps long lines."""
 
 SCHEMAS = {"faults": 2, "stability": 2}
-"""Versions of JSON documents, 1 of the others: raised where a name goes or changes its meaning, and not where
-one is added."""
+"""Versions of JSON documents, 1 of the others: raised where a name is removed or changes its meaning, and not
+where one is added."""
 
 
 def show(lines: Lines) -> None:
-    """Print lines, as wide as the terminal; in a pipe there is no width to keep to.
+    """Print lines as wide as the terminal, or without a limit into a pipe.
 
-    Styles are for a terminal, and for who asks for them: https://force-color.org.
+    Styles are for terminals, and on request: https://force-color.org.
     """
     from springcheck.text.lines import drawn, shown
 
     terminal = sys.stdout.isatty()
     if not terminal and not any(map(os.environ.get, ("FORCE_COLOR", "TTY_COMPATIBLE"))):
-        print("\n".join(str(line).rstrip() for line in shown(lines, PIPE)))
+        print("\n".join(str(line).rstrip() for line in shown(lines, PIPE_WIDTH)))
         return
     from rich.console import Console
 
-    # who wants no colours wants none, whatever else is said; Rich would still write bold
+    # NO_COLOR overrides all other settings; Rich would still write bold
     colours: Literal["auto"] | None = None if os.environ.get("NO_COLOR") else "auto"
     # on a closed pipe Rich would end the program with an exit status of its own
-    width, into = (None, None) if terminal else (PIPE, StringIO())
+    width, into = (None, None) if terminal else (PIPE_WIDTH, StringIO())
     drawn(lines, Console(highlight=False, width=width, color_system=colours, file=into))
     if into is not None:
-        # a line that was folded ends in a blank, which a file or a diff need not keep
+        # a folded line ends in a blank, which files and diffs do not need
         print("\n".join(line.rstrip() for line in into.getvalue().splitlines()))
 
 
@@ -58,8 +58,8 @@ def answer(
     status: int = 0,
     name: str = "",
 ) -> int:
-    """Say what a command has found, as it was asked to: reports for continuous integration, and one JSON
-    document (of the command's name, unless told) or text.  Returns the exit status."""
+    """Print the result of a command as requested: reports for continuous integration, and a JSON document (of
+    the command's name by default) or text.  Returns the exit status."""
     reports = reported(options)
     data = document() if reports or options.json else {}
     if reports:
@@ -87,7 +87,7 @@ def listed(found: Sequence[Any]) -> list[dict[str, str]]:
 
 
 def warn(file: str, found: Sequence[dict[str, str]]) -> None:
-    """Say in one line what of a store cannot be trusted, before anything of it is shown."""
+    """Print in one line which parts of a store are damaged, before anything of it is shown."""
     if found:
         first = "; ".join(f"{one['place']} {one['what']}" for one in found[:3])
         more = f"; {len(found) - 3} more, which springcheck check names" if len(found) > 3 else ""
@@ -96,9 +96,9 @@ def warn(file: str, found: Sequence[dict[str, str]]) -> None:
 
 @contextmanager
 def alone() -> Iterator[None]:
-    """Keep standard output for what we say: what an engine prints, in Python or C, goes to standard error.
+    """Reserve standard output for springcheck: what an engine prints, in Python or C, goes to standard error.
 
-    It gets a stream of its own, which it may close.
+    The engine gets a stream of its own, which it may close.
     """
     sys.stdout.flush()
     shown = sys.stdout
@@ -127,7 +127,7 @@ def alone() -> Iterator[None]:
 
 @contextmanager
 def readable(file: str | None) -> Iterator[None]:
-    """The last line of defence of commands that read a file: whatever is in it, no traceback."""
+    """Turn any other exception in reading a file into a StoreError, so that no content causes a traceback."""
     try:
         yield
     except (SpringcheckError, OSError):

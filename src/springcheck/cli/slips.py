@@ -1,4 +1,4 @@
-"""Slips of the hand on the command line: names that are empty or mistyped, options that nothing reads."""
+"""Slips on the command line: names that are empty or mistyped, options that nothing reads."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ NAMES = {
     "label": "LABEL",
     "trajectory": "--trajectory",
 }
-"""Attributes of the arguments that name something, and how they are called."""
+"""Attributes of the arguments that name something, and their names on the command line."""
 
 
 LEAST_MEMORY = 1 << 29
-"""Bytes of address space: NumPy, libhdf5 and SciPy take 400 MiB, and each thread of theirs more."""
+"""Least address space [bytes]: NumPy, libhdf5 and SciPy take 400 MiB, and each of their threads more."""
 
 UNREAD = (
     ("source", "--from", ("-o", "--force", "--thorough", "--verdicts")),
@@ -34,7 +34,7 @@ UNREAD = (
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser that answers a mistake with one line, and a mistyped word with the nearest one."""
+    """A parser that reports an error in one line, and suggests the nearest word for a mistyped one."""
 
     def __init__(self, *given: Any, **options: Any) -> None:
         super().__init__(*given, **options)
@@ -54,7 +54,7 @@ class Parser(argparse.ArgumentParser):
         raise SystemExit(2)
 
     def _print_message(self, message: str, file: Any = None) -> None:
-        """As argparse has it, but raising what a full disk or a closed pipe raises."""
+        """As argparse's, but raises the errors of a full disk or a closed pipe."""
         print(message, end="", file=file, flush=True)
 
     def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
@@ -68,7 +68,7 @@ class Parser(argparse.ArgumentParser):
         return found
 
     def _of(self, found: argparse.Namespace) -> Iterable[argparse.ArgumentParser]:
-        """This parser, and the one of the command that was given."""
+        """This parser, and the one of the given command."""
         yield self
         for action in self._actions:
             if isinstance(action, argparse._SubParsersAction):
@@ -99,7 +99,7 @@ def look(options: argparse.Namespace) -> None:
 
 
 def _has_room() -> None:
-    """SpringcheckError where libraries could not even be loaded: they crash, or try again and again."""
+    """SpringcheckError where memory does not suffice to load libraries: they crash, or retry forever."""
     try:
         import resource
     except ImportError:
@@ -130,7 +130,7 @@ def _leads_somewhere(name: str) -> None:
 
 
 def open_streams() -> None:
-    """Standard streams that were closed lead nowhere; what they cannot encode is written as its escape."""
+    """Replace closed standard streams by ones that lead nowhere; write what they cannot encode as escapes."""
     for number, name in enumerate(("stdin", "stdout", "stderr")):
         if getattr(sys, name) is None:
             setattr(sys, name, open(number, "r" if number == 0 else "w", closefd=False))  # noqa: SIM115
@@ -140,7 +140,7 @@ def open_streams() -> None:
 
 
 def one_line(error: BaseException) -> str:
-    """One line on a mistake of ours, which no user can mend: what it is, and how to see where."""
+    """One line on an error in springcheck itself, beyond a user's remedy: its type, and how to locate it."""
     said = " ".join(str(error).split())[:200]
     where = "SPRINGCHECK_TRACEBACK=1 shows where"
     return f"{type(error).__name__}: {said}; this is a mistake in springcheck: {where}"

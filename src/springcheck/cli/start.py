@@ -1,4 +1,4 @@
-"""What the first frame of a file is that is not the start of its scene, and masses that contradict it."""
+"""Explanations of a first frame that is not its scene's start, and of masses that contradict the scene."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from springcheck.physics.arrays import Floats, Reals
 from springcheck.physics.scene import Scene
 from springcheck.text.wording import count
 
-CLOSE = 1e-6
-"""Part of the amplitude to which a state is the one that explains a first frame."""
+CLOSE_STATE = 1e-6
+"""Distance, relative to the amplitude, within which a state explains a first frame."""
 MOST_STEPS, MOST_PARTICLES = 100, 1000
-"""Steps of the scheme that are tried, of scenes with so many particles."""
+"""Steps of the scheme that are tried, and the most particles of a scene for it."""
 
 
 def contradicted(path: Path, states: States, scene: Scene) -> None:
@@ -47,7 +47,7 @@ def contradicted(path: Path, states: States, scene: Scene) -> None:
 
 
 def differs(scene: Scene, scheme: str, q: Floats, p: Floats, *, velocities: bool) -> str:
-    """What a first frame (n,) is in place of the scene's start, and what to do; `velocities` says that the
+    """Explain a first frame (n,) that is not the scene's start, with a remedy; `velocities` says that the
     file holds these."""
     with np.errstate(all="ignore"):
         return (
@@ -61,7 +61,7 @@ def differs(scene: Scene, scheme: str, q: Floats, p: Floats, *, velocities: bool
 
 
 def _is_at(scene: Scene, q: Floats, p: Floats, there_q: Reals, there_p: Reals) -> bool:
-    return bool(scene.system.norm(q - there_q, p - there_p) <= CLOSE)
+    return bool(scene.system.norm(q - there_q, p - there_p) <= CLOSE_STATE)
 
 
 def _single(scene: Scene, q: Floats, p: Floats) -> str:
@@ -92,7 +92,7 @@ def _scaled(scene: Scene, q: Floats, p: Floats, velocities: bool) -> str:
             f"positions and {what} are {one:.6g} times the scene's, as in another unit of length; divide "
             "both by that"
         )
-    # of one particle any two numbers are multiples of the scene's: powers of ten are units
+    # for one particle any two numbers are multiples of the scene's: powers of ten are units
     if _is_at(scene, q / _ten(of_q), p / _ten(of_p), scene.q, scene.p):
         return (
             f"positions are {_ten(of_q):g} times the scene's, and {what} {_ten(of_p):g} times, as in other "
@@ -102,13 +102,13 @@ def _scaled(scene: Scene, q: Floats, p: Floats, velocities: bool) -> str:
 
 
 def _ratio(x: Floats, own: Floats) -> float:
-    """x over the scene's own numbers, read where these are largest; 1 where they are 0."""
+    """Ratio of x to the scene's own numbers where these are largest; 1 where they are 0."""
     i = int(np.argmax(np.abs(own)))
     return float(x[i] / own[i]) if own[i] else 1.0
 
 
 def _ten(x: float) -> float:
-    """The power of ten that is nearest to a factor; 1 for none of them."""
+    """The power of ten nearest to a factor; 1 where there is none."""
     return float(10.0 ** np.rint(np.log10(x))) if 0 < x < np.inf else 1.0
 
 
@@ -134,7 +134,7 @@ def _later(scene: Scene, scheme: str, q: Floats, p: Floats) -> str:
         try:
             at = law.step(*at)
         except (SpringcheckError, ArithmeticError, ValueError):
-            # not every scheme has a step that the forces define
+            # not every scheme has a step that the forces determine
             return ""
         if _is_at(scene, q, p, *at):
             return (

@@ -35,7 +35,7 @@ class Bodies(ABC):
     fastest: float = np.inf
     """Largest speed that the world gives a body [L/T]."""
     limit: str = ""
-    """The sentence on that."""
+    """The message where a body would exceed that speed."""
     shortest: ClassVar[float] = 0.0
     """Length up to which a joint of the world has no direction, and no force [L]."""
 

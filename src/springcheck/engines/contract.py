@@ -32,7 +32,7 @@ class Need(Enum):
 
 
 KEYS = {Need.DAMPING: "damping", Need.FIELD: "magnetic"}
-"""The terms that are needed."""
+"""Key of the term that a method needs, for each such need."""
 
 ANY_POTENTIAL = "any potential"
 """Among the terms of a method: it takes the force of every potential as a function."""

@@ -65,7 +65,7 @@ class Curve:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tiles:
-    """A map of kinds over two axes of values: a row of numbers of kinds for each y; -1 is none."""
+    """A map over two axes of values: `rows` holds, for each y, an index into `kinds` for each x, or -1."""
 
     kinds: Sequence[tuple[str, str]]
     """Name and shade of each: good, wild, limit, refused, wrong; or of sizes s0 to s6."""

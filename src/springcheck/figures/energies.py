@@ -17,16 +17,16 @@ from springcheck.figures.portraits import extremes
 from springcheck.physics.arrays import Floats, Reals
 from springcheck.physics.trajectory import Trajectory
 
-MOST = 1e3
+MOST_DRAWN = 1e3
 """Energies and errors, relative to those of the start, beyond which a chart shows nothing useful."""
 
-LARGE = 30.0
+LARGE_ENERGY = 30.0
 """Multiple of the right energy up to which a run sets the scale; larger ones leave the chart."""
 
 DECADES = 100.0
 """Ratio of largest to smallest energy from which on the scale is logarithmic."""
 
-LEAST = 1e-4
+LEAST_DRAWN = 1e-4
 """Lower end of the logarithmic scale, relative to the initial energy."""
 
 MOST_TURNING = 8
@@ -113,7 +113,7 @@ def _said(runs: Runs, found: Mapping[str, Floats], differences: Mapping[str, Flo
                 del largest[group.title]
         said = said[:FINDINGS_SAID]
     if largest:
-        said.append(extremes(largest, "energy off by at most {}", beyond=LARGE))
+        said.append(extremes(largest, "energy off by at most {}", beyond=LARGE_ENERGY))
     return "; ".join(said)
 
 
@@ -170,18 +170,19 @@ def orbits(runs: Runs, parts: Runs, exact: Exact) -> str:
             if names
         )
     some = {name: x for name, x in off.items() if np.isfinite(x)}
-    return extremes(some, "states off by at most {}", beyond=MOST) if some else ""
+    return extremes(some, "states off by at most {}", beyond=MOST_DRAWN) if some else ""
 
 
 def _scale(found: Sequence[Floats], true: Floats | None) -> Frame:
-    """Limits of an axis of energies, set by the exact energy and all runs within `LARGE` times its size."""
+    """Limits of an axis of energies, by the exact energy and all runs within `LARGE_ENERGY` times its
+    size."""
     largest = max(1.0, 0.0 if true is None else float(np.max(np.abs(true))))
-    near = [x for x in found if np.max(np.abs(x)) <= LARGE * largest] or list(found)
+    near = [x for x in found if np.max(np.abs(x)) <= LARGE_ENERGY * largest] or list(found)
     right = [] if true is None else [true]
     low, high = (float(f([f(x) for x in (*near, *right)])) for f in (np.min, np.max))
     if low > 0 and high > DECADES * low:
         # the right energy may fall further
-        bottom = max(min(LEAST, 0.1 * float(np.min(true)) if true is not None else LEAST), FLOOR)
+        bottom = max(min(LEAST_DRAWN, 0.1 * float(np.min(true)) if true is not None else LEAST_DRAWN), FLOOR)
         return Frame(max(low / 2, bottom), 2 * high, len(near) < len(found) or low < bottom, log=True)
     ys = frames.widened(low, high, clipped=len(near) < len(found))
     # smaller differences are left to the panel of differences below
@@ -210,9 +211,9 @@ def _panel(runs: Runs, found: Mapping[str, Floats], name: str, title: str, rules
     # the start is right; differences below the floor at other frames are drawn at the lower edge
     positive = [x[1:][x[1:] > 0] for x in found.values()]
     low = max(min((float(np.quantile(x, 0.02)) for x in positive if len(x)), default=FLOOR) / 2, FLOOR)
-    inside = [float(np.max(x)) for x in found.values() if np.max(x) <= MOST]
+    inside = [float(np.max(x)) for x in found.values() if np.max(x) <= MOST_DRAWN]
     clipped = len(inside) < len(found)
-    high = max((20 if clipped else 2) * max(inside, default=MOST / 20), 10 * low)
+    high = max((20 if clipped else 2) * max(inside, default=MOST_DRAWN / 20), 10 * low)
     leaves = {label: int(np.argmax(x > high)) for label, x in found.items() if np.any(x > high)}
 
     def shown(run: Trajectory) -> tuple[Floats, Floats]:
@@ -244,7 +245,7 @@ def _apart(found: Mapping[str, Floats]) -> list[set[str]]:
         some = x[1:][(x[1:] > 0) & np.isfinite(x[1:])]
         low, high = np.quantile(some, [0.1, 1.0]) if len(some) else (FLOOR, FLOOR)
         # diverging methods are placed with the largest of the others
-        spans.append((min(float(low), 1.0), min(float(high), MOST), label))
+        spans.append((min(float(low), 1.0), min(float(high), MOST_DRAWN), label))
     sets: list[set[str]] = []
     lowest = np.inf
     for low, high, label in sorted(spans, key=lambda x: -x[1]):
@@ -263,7 +264,7 @@ def error(runs: Runs, exact: Exact) -> Bank:
     charts = decades(runs, found, name, title, known=True)
     largest = _largest(runs, found)
     some = {label: x for label, x in largest.items() if np.isfinite(x)}
-    said = extremes(some, "off the exact solution by at most {}", beyond=MOST) if some else "errors"
+    said = extremes(some, "off the exact solution by at most {}", beyond=MOST_DRAWN) if some else "errors"
     return runs.bank("error", charts, said, (7.2, 4.2 if len(charts) == 1 else 2.6))
 
 

@@ -17,7 +17,7 @@ Motion = tuple[Floats, Floats, Floats]
 SMOOTH = 1500
 """Points of a smooth line."""
 FEWEST_POINTS, MOST_NUMBERS = 16, 1 << 21
-"""Points of a line for very many particles, and positions of all of them."""
+"""Fewest points of a line, however many particles, and most positions of all lines together."""
 SPLIT, CLOSE = 64, 20
 """Fraction of the distance of its points, and distances from its start within which there are more."""
 

@@ -62,8 +62,8 @@ def _numbers(matches: list[Match], kind: type[Any]) -> tuple[MapTable, Integers,
 def _maps(
     matches: list[Match], found: Map, *, between: bool, longer: Any = 0.0, a: Any = 0.0, g: Any = 0.0
 ) -> Extended:
-    """The maps (c, 2, 2) that matches predict `between` frames, or for one step, for steps `longer` by a
-    share, and for more of a or g."""
+    """Maps (c, 2, 2) that matches predict `between` frames, or for one step, with the step lengthened by a
+    share `longer`, and a and g increased."""
     every, which, (own_a, own_g, log_mass, stride) = _numbers(matches, np.longdouble)
     own_g = own_g + g
     out = every.frame(
@@ -78,15 +78,15 @@ def _maps(
 
 
 def _derivative(matches: list[Match], found: Map, name: str, *, between: bool = True) -> Extended:
-    """Derivatives (c, 2, 2) of `_maps` by one of its numbers."""
+    """Central-difference derivatives (c, 2, 2) of `_maps` with respect to one of its numbers."""
     d = np.array([1e-7 * (abs(match.a) if name == "a" else 1.0) for match in matches], np.longdouble)
     up, down = (_maps(matches, found, between=between, **{name: x}) for x in (d, -d))
     return np.asarray((up - down) / (2 * d)[:, None, None])
 
 
 def _misses(matches: list[Match], found: Map, slips: Extended | None) -> Extended:
-    """Difference (c, f - 1, 2) between each frame and the predicted step from the frame before, in the
-    units of `found`; steps follow the clock's `slips`."""
+    """Residuals (c, f - 1, 2): each frame minus the predicted step from the frame before, in the units of
+    `found`.  Steps follow the clock's `slips`."""
     out = found.z[1:] - found.z[:-1] @ np.swapaxes(_predicted(matches), 1, 2)
     if slips is not None:
         change = _derivative(matches, found, "longer")
@@ -101,12 +101,12 @@ FREE = 1e6
 def _refitted(
     record: Record, found: Map, matches: list[Match], signed: Floats, unit: Floats, *, numbers: bool = False
 ) -> Floats:
-    """Residuals (c, f - 1, 2), of errors `unit`, less what uncertain parameters explain: the interval, by the
-    rounding of the times; the equilibrium, of which each scheme has its own; and with `numbers` h w and the
-    friction of each match.
+    """Residuals (c, f - 1, 2), with errors `unit`, minus the part that uncertain parameters explain: the
+    interval, by the rounding of the times; the equilibrium, of which each scheme has its own; and with
+    `numbers` h w and the friction of each match.
 
-    A map is read with the rounding of whole states, and so its numbers may miss more of a small component
-    than that is rounded by.
+    A map is fitted with the rounding of whole states, so that its error in a small component may exceed that
+    component's own rounding.
     """
     b = _predicted(matches).astype(np.float64)
     z = found.z[:-1].astype(np.float64)
@@ -136,8 +136,8 @@ def _refitted(
 
 
 def _sums(matches: list[Match], found: Map) -> tuple[Floats, Floats]:
-    """Sums (c, 2, 2) of the sizes of all that a step adds up, and what a frame's first step adds up to at
-    its end, in the frame of `found`."""
+    """Sums (c, 2, 2) of the absolute values of all terms that a step adds up, and those of a frame's first
+    step propagated to its end, in the units of `found`."""
     every, which, (a, g, log_mass, stride) = _numbers(matches, np.float64)
     step = every.sums(which, a, g)
     first = step
@@ -157,11 +157,11 @@ def _substeps(match: Match) -> int:
 
 
 def _unlike(record: Record, found: Map, matches: list[Match]) -> Floats:
-    """Bound (c, f - 1, 2) of the effect on a frame of steps of unlike length, of which the clock shows the
-    sum.
+    """Bound (c, f - 1, 2) on the effect of unequal steps on a frame, of which the clock shows only the sum.
 
-    A step that is longer by the share d does d M**(s - 1 - i) M' M**i to the map of s steps; what the steps'
-    sum does is known, so the departures of these from their mean are left, times the rounding of a step.
+    A step longer by a share d changes the map of s steps by d M**(s - 1 - i) M' M**i.  The effect of the sum
+    of all d is known; what remains is the deviation of these terms from their mean, times the rounding of a
+    step.
     """
     one = _maps(matches, found, between=False).astype(np.float64)
     change = _derivative(matches, found, "longer", between=False).astype(np.float64)
@@ -203,10 +203,10 @@ TOGETHER = 128
 def defects(
     record: Record, j: int, found: Map, matches: list[Match], visible: Callable[[], bool]
 ) -> list[Defect]:
-    """Defect of every step of oscillator j against each scheme, in units of double precision (2**-52).
+    """Defect of every step of oscillator j under each scheme, in units of double precision (2**-52).
 
-    `visible` says that the scheme's own error stands far above the defect, and no other scheme has it;
-    only then is more than plain rounding explained, and never to an exact flow.
+    `visible` returns whether the scheme's own error is far above the defect and no other scheme shares it.
+    Only then are defects beyond plain rounding explained, and never for an exact flow.
     """
     chunks = (matches[i : i + TOGETHER] for i in range(0, len(matches), TOGETHER))
     # numbers of a match that hardly any state shows may be none
@@ -301,7 +301,7 @@ def _in_double(
     record: Record, found: Map, matches: list[Match], sizes: Roundings
 ) -> tuple[Floats, Any, Floats]:
     """Largest residuals (c,) in units in the last place, whether roundings of double precision, those of the
-    clock among them, explain all, and the residuals (c, f - 1, 2)."""
+    clock included, explain all of them, and the residuals (c, f - 1, 2)."""
     stride, unit = sizes.stride, EPSILON * sizes.size
 
     def missed(slips: Extended | None) -> Floats:
@@ -337,8 +337,8 @@ def _in_double(
 def _in_file(
     record: Record, j: int, found: Map, matches: list[Match], sizes: Roundings, signed: Floats
 ) -> tuple[Floats, Floats, Any, Any]:
-    """Residuals (c, f - 1, 2) by the quanta of the file, what these may do, and whether it explains them (c,)
-    beside roundings of double precision, or of single."""
+    """Residuals (c, f - 1, 2), refitted with the file's quanta as errors; what these may do; and whether it
+    explains them (c,) together with roundings of double precision, or of single."""
     b = np.abs(_predicted(matches)).astype(np.float64)
     quanta = record.quanta(j) / found.size.astype(np.float64)
     half = (quanta[1:] + quanta[:-1] @ np.swapaxes(b, 1, 2)) / 2
@@ -361,11 +361,11 @@ def _in_file(
 
 
 def _is_rebuilt(match: Match, missing: Floats, half: Floats, size: Floats, difference: Floats) -> bool:
-    """Whether velocities alone are off, and by eps q / h, as differences of positions over the step are,
-    beside what the digits of a file may do, `half`.
+    """Whether the velocities alone are off, by eps q / h, as differences of positions over the step are, and
+    by the rounding of a file's digits, `half`.
 
-    Rounding of a position enters the leapfrog's velocity in every step, and the position itself through it:
-    it walks at random, with the root of the steps and their power of 3/2.
+    The rounding of a position enters the leapfrog's velocity in every step, and through it the position: a
+    random walk that grows as s**(1/2) in the velocity and as s**(3/2) in the position over s steps.
     """
     steps = np.sqrt(match.stride)
     unit = EPSILON * steps * difference
@@ -377,8 +377,8 @@ def _is_rebuilt(match: Match, missing: Floats, half: Floats, size: Floats, diffe
 
 
 def _differences(match: Match) -> bool:
-    """Whether the velocity may be a difference of positions: their mean difference, as Stoermer's are, or
-    that of the step, where the position is moved by the new velocity."""
+    """Whether the velocity may be a difference of positions: the mean of two, as in Stoermer's schemes, or
+    that of the step, where the new velocity moves the position."""
     if match.scheme in coarse.STOERMER:
         return True
     (q, v), (x, u) = unit(FAMILIES[match.family], np.array([match.a]), np.array([match.g]))[0]

@@ -31,8 +31,8 @@ SINGLE_CONSTANTS = ("fixed-point force", "mixed", "single")
 
 
 def shared(candidates: tuple[Candidate, ...], n: int, *, named: bool = True) -> dict[str, Any]:
-    """Fields of the `Identification` of n oscillators that come from its candidates: the scheme, if it is one
-    alone and may be `named`, and the numbers that all of them share."""
+    """Fields of the `Identification` of n oscillators that follow from its candidates: the scheme, where all
+    have the same and it may be `named`, and the numbers that all share."""
     scheme = common([x.scheme for x in candidates]) if named else None
     # without friction a scheme has the names of others that have none then
     law = next((x for x in candidates if x.law), candidates[0])
@@ -52,14 +52,14 @@ def shared(candidates: tuple[Candidate, ...], n: int, *, named: bool = True) -> 
 
 
 def _alike(rows: list[tuple[float, ...]]) -> tuple[float, ...] | None:
-    """The numbers that all candidates share, to 1e-9, or None."""
+    """Numbers that all candidates share to a relative 1e-9, or None."""
     if len({len(row) for row in rows}) > 1:
         return None
     return rows[0] if np.allclose(rows, rows[0], rtol=1e-9, atol=0, equal_nan=True) else None
 
 
 def steps_between(stride: int | None) -> str:
-    """The number of steps from frame to frame, in a sentence."""
+    """Number of steps between frames, as a phrase."""
     if stride is None:
         return ", in an unknown number of steps"
     return "" if stride == 1 else f", {stride} steps to a frame"
@@ -68,7 +68,7 @@ def steps_between(stride: int | None) -> str:
 def stated_stiffness(
     seen: Measured, plainest: Joint, precision: str, stated: Floats
 ) -> tuple[list[Explanation], list[str]]:
-    """Explanations of a stated stiffness that is not that of the states, and notes on it."""
+    """Explanations of a stated stiffness that differs from the one of the states, and notes on it."""
     quantum = QUANTUM if precision in SINGLE_CONSTANTS else 0.0
     against = seen.disagreements(plainest)
     if not against or (quantum and not seen.disagreements(plainest, quantum=quantum)):
@@ -97,8 +97,9 @@ def stated_stiffness(
 
 
 def of_stated_stiffness(seen: Measured, precisions: dict[Joint, str], stated: Floats) -> list[Joint]:
-    """Select hypotheses, given with the arithmetic that explains each, of the stated stiffness: as it is,
-    with a constant in single precision, or the nearest; and those that have the same one as these."""
+    """Select the hypotheses (each with the arithmetic that explains it) that have the stated stiffness:
+    exactly, with a constant in single precision, or else the nearest; and those of the first one's
+    stiffness."""
     joints = list(precisions)
     agreeing = [x for x in joints if not seen.disagreements(x)] or [
         x for x in joints if not stated_stiffness(seen, x, precisions[x], stated)[0]
@@ -114,8 +115,8 @@ def of_stated_stiffness(seen: Measured, precisions: dict[Joint, str], stated: Fl
 
 
 def nearest_stiffness(seen: Measured, joints: list[Joint], stated: Floats) -> list[Joint]:
-    """Select the hypotheses whose stiffness is nearest to the stated one, which none has, to within single
-    precision of a constant and their own errors."""
+    """Select the hypotheses whose stiffness is nearest to the stated one, where none agrees with it.
+    Differences within the rounding of a constant to single precision and their own errors count as ties."""
     off, room = {}, {}
     for joint in joints:
         _, stiffness, _ = seen.numbers(joint)
@@ -127,7 +128,8 @@ def nearest_stiffness(seen: Measured, joints: list[Joint], stated: Floats) -> li
 
 
 def _single_constants(record: Record, stated: Floats, stride: int) -> list[tuple[str, Floats, bool]]:
-    """Constants that may be in single precision, the stiffness that shows then, and whether of the force."""
+    """Constants that may be in single precision: name, the stiffness that the states then show, and whether
+    the constant belongs to the force."""
     with np.errstate(all="ignore"):
         single = stated.astype(np.float32).astype(np.float64)
         h = float(record.interval) / stride
@@ -144,7 +146,7 @@ def _single_constants(record: Record, stated: Floats, stride: int) -> list[tuple
 
 @cache
 def other_names(scheme: str, *, damped: bool) -> tuple[str, ...]:
-    """Other names of a scheme's map, and what has it on a spring of another stiffness."""
+    """Other names of a scheme's map, and the schemes that have it on a spring of another stiffness."""
     if scheme not in SCHEMES:
         return ELSEWHERE[scheme].also if scheme in ELSEWHERE else ()
     leapfrog = [LEAPFROG[scheme]] if scheme in LEAPFROG else []
@@ -158,14 +160,14 @@ def other_names(scheme: str, *, damped: bool) -> tuple[str, ...]:
 
 
 def held_over(joint: Joint) -> str:
-    """A held force in a sentence, with its numbers of substeps."""
+    """A held force as a phrase, with its possible numbers of substeps."""
     numbers_ = list(map(str, joint.substeps[0])) or ["many"]
     how_many = " to ".join(dict.fromkeys([numbers_[0], numbers_[-1]]))
     return f"Semi-implicit Euler whose force is held over {how_many} substeps"
 
 
 def either_way(ways: list[Identification]) -> Identification:
-    """Identify frames whose times fall: in their order, by steps back in time, and in that of time."""
+    """Combine two identifications of frames whose times fall: as steps back in time, and in reverse order."""
     fitting = [
         x for x in ways if x.fits and not any(rate < 0 for one in x.candidates for rate in one.friction)
     ]
@@ -187,12 +189,12 @@ def either_way(ways: list[Identification]) -> Identification:
 
 
 def common(values: Sequence[T]) -> T | None:
-    """The value that all are, or None."""
+    """The value that all share, or None."""
     return values[0] if len(set(values)) == 1 else None
 
 
 def candidates_of(seen: Measured, joint: Joint) -> list[Candidate]:
-    """Candidates of a hypothesis, one for each friction law of its map, if it has the stated friction c."""
+    """Candidates of a hypothesis: one for each friction law of its map that has the stated friction c."""
     family, record = FAMILIES[joint.family], seen.record
     out = []
     for law in family.laws if joint.damped else ("",):
@@ -223,7 +225,7 @@ def candidates_of(seen: Measured, joint: Joint) -> list[Candidate]:
 
 
 def law_assumed(candidates: Sequence[Candidate]) -> list[str]:
-    """The friction by each law that it may be of, if there is any."""
+    """Note on the friction rate under each law that it may follow; empty without friction."""
     laws = [x for x in candidates if x.law]
     each = "; ".join(f"{', '.join(f'{y:.6g}' for y in x.friction[:3])} by {x.law}" for x in laws[:6])
     is_ = "is" if len(laws) == len(candidates) else "may be"
@@ -233,7 +235,7 @@ def law_assumed(candidates: Sequence[Candidate]) -> list[str]:
 
 
 def all_remarks(seen: Measured, joints: list[Joint], candidates: tuple[Candidate, ...]) -> list[str]:
-    """Notes beside a name: the same maps, the law of friction, turns that frames do not show."""
+    """Notes beside a name: schemes of the same map, the law of friction, turns that frames do not show."""
     out = []
     scheme = common([x.scheme for x in candidates])
     if scheme in LEAPFROG:

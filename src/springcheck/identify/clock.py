@@ -107,8 +107,8 @@ def _even(t: Floats, interval: np.longdouble, quantum: float) -> bool:
 
 
 def _added(t: Floats, interval: np.longdouble, quantum: float) -> np.longdouble | None:
-    """The interval of the steps whose sum, t += h, is t to the last bit; None where none is found.  `quantum`
-    is the rounding of t [T]."""
+    """Interval of a clock t += h that gives t to the last bit; None where no step h does.  `quantum` is the
+    rounding of t [T]."""
     width = _width(t, quantum)
     times = t.astype(width)
     for steps, h in _steps(t, float(interval), quantum):
@@ -124,7 +124,7 @@ def _added(t: Floats, interval: np.longdouble, quantum: float) -> np.longdouble 
 
 
 def _steps(t: Floats, interval: float, quantum: float) -> Iterator[tuple[int, float]]:
-    """Numbers of steps to a frame and steps that the times may be sums of: the first, or short decimals."""
+    """Steps per frame and step h of which the times may be sums: from t = 0 t[1], or a short decimal."""
     if t[0] == 0:
         yield 1, float(t[1])
     for steps in range(1, MOST_ADDED + 1):

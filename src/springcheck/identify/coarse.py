@@ -46,17 +46,18 @@ KICKED = ("explicit-euler", "position-verlet")
 
 
 def over_single(x: float | np.longdouble) -> np.longdouble:
-    """A number over its value in single precision; 1 where that has no such number."""
+    """Ratio of a number to its value in single precision; 1 where that is 0 or overflows."""
     with np.errstate(over="ignore", under="ignore"):
         short = np.longdouble(np.float32(x))
     return np.longdouble(x) / short if short and np.isfinite(short) else np.longdouble(1)
 
 
 def sized(record: Record, j: int, found: Map, match: Match, signed: Floats) -> tuple[str, str]:
-    """Precision and note where what single frames miss, (f-1, 2), has the size and place of a force's error.
+    """Precision and note where the residuals (f - 1, 2) of single frames have the size and place of a force
+    error.
 
-    A force off by e in every kick shifts a frame by at most the sum of its kicks' shifts, carried on by
-    the steps that follow; drifts add only the rounding of the state.
+    An error e of the force in every kick displaces a frame by at most the sum of the kicks' displacements,
+    propagated by the steps that follow; drifts add only the rounding of the state.
     """
     if match.scheme not in SCHEMES:
         return "", ""
@@ -90,8 +91,8 @@ def sized(record: Record, j: int, found: Map, match: Match, signed: Floats) -> t
 
 
 def reach(found: Map, match: Match) -> tuple[Floats, Floats]:
-    """Bounds (2,), in the frame of `found`, of what an error of 1 does to a frame: of h**2 F/(m q) in every
-    kick, and of both components of the state in every step."""
+    """Bounds (2,), in the units of `found`, on the effect on a frame of an error of 1: of h**2 F/(m q) in
+    every kick, and of both components of the state in every step."""
     one = np.ones(1, dtype=np.longdouble)
     a, rate = abs(match.a) * one, match.friction * one
 
@@ -114,11 +115,11 @@ def reach(found: Map, match: Match) -> tuple[Floats, Floats]:
 
 
 def kinematic(record: Record, j: int, found: Map, match: Match) -> tuple[str, str] | None:
-    """Precision and note where positions and velocities of every step fit together to rounding, so that
-    only the force can be coarse; its own numbers then show how, and are none where they show nothing.
+    """Precision and note where positions and velocities of every step are consistent to rounding, so that
+    only the force can be coarse; both are "" where the forces have no quanta.
 
-    None where forces cannot be read so finely that their quanta would show, or so few of them lie near
-    multiples that others might.
+    None where forces cannot be read finely enough for their quanta to show, or too few of them lie near
+    multiples to exclude chance.
     """
     forces = _forces(record, j, found, match)
     if forces is None:
@@ -164,10 +165,10 @@ schemes."""
 
 
 def irregular(missing: Floats, bias: Floats | None = None) -> bool:
-    """Whether what frames miss (f, c) is white, as rounding is, once it is freed of a bias (f, b).
+    """Whether residuals (f, c), freed of a bias (f, b), are white noise, as rounding is.
 
-    What goes with position, velocity, their powers, time, parity or a neighbour comes back after some
-    frames; the sum of squared autocorrelations of a white series is chi-squared (Box & Pierce 1970).
+    A dependence on position, velocity, their powers, time, parity or a neighbour recurs after some frames;
+    the sum of squared autocorrelations of a white series is chi-squared (Box & Pierce 1970).
     """
     lags = range(LAGS.start, min(LAGS.stop, len(missing) // 4))
     if not lags:
@@ -188,7 +189,7 @@ def irregular(missing: Floats, bias: Floats | None = None) -> bool:
 
 
 def white(found: Map, match: Match, signed: Floats) -> bool:
-    """Whether what single frames miss (f - 1, 2) is irregular but for the bias of cutting off."""
+    """Whether the residuals (f - 1, 2) of frames are irregular, apart from the bias of truncated forces."""
     biased = cut_off(found, match)
     biased = np.concatenate([biased, np.ones((len(biased), 1))], axis=1)
     # where the motion decays or grows, residuals are tested relative to the size of each frame as well
@@ -212,8 +213,8 @@ def cut_off(found: Map, match: Match) -> Floats:
 
 
 def _forces(record: Record, j: int, found: Map, match: Match) -> tuple[Floats, float] | None:
-    """Forces read from states alone, where each step has one, and their noise; None where v does not belong
-    to q."""
+    """Forces read from the states alone, one for each step, and their noise; None where the scheme has no
+    single force a step, or v is inconsistent with q."""
     if match.stride != 1 or match.friction != 0 or match.scheme not in (*STOERMER, *KICKED):
         return None
     h = record.interval

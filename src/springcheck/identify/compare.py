@@ -45,10 +45,11 @@ class Target:
         self.variance = np.maximum(values, 1e-15 * values[-1])
 
     def weight(self, every: MapTable, x: Guesses, s: Floats) -> Floats:
-        """1 over the errors (4, c) along the axes.
+        """Reciprocal errors (4, c) along the axes of the covariance.
 
-        No number of pairs averages the rounding of h k or h/m away: an entry of the map over s steps is
-        uncertain by the roundings of its path times what s steps add to a state, whatever the fit says.
+        The rounding of h k or h/m does not average out over pairs: an entry of the map of s steps is
+        uncertain by the roundings of its path times the increment of s steps, whatever the covariance of the
+        fit.
         """
         added = np.minimum(np.sqrt(np.abs(x.a)) + np.abs(x.g), 1)
         # nor that of a whole state, but for sums in double precision
@@ -69,7 +70,7 @@ class Target:
 def matches(
     found: Map, terms: Terms, families: tuple[Family, ...], strides: Iterable[int], *, far: bool = False
 ) -> list[Match]:
-    """The best match of each family and stride with a map, of those that may be accepted; with `far` all."""
+    """Best match of each family and stride with a map, if chi-squared accepts it; with `far` in any case."""
     every = table(families)
     with np.errstate(all="ignore"):
         asked = "roots", tuple(strides)
@@ -99,8 +100,8 @@ def matches(
 def solved(
     every: MapTable, target: Target, roots: Roots, x: Guesses, *, far: bool = False, every_turn: bool = False
 ) -> list[Match]:
-    """The best of these guesses of each family and stride, of those that may be accepted (`far`: of all);
-    of each number of turns and each spring of it where `every_turn` is asked for."""
+    """Best of these guesses for each family and stride, of those that chi-squared accepts (`far`: of all).
+    With `every_turn`, the best for each number of turns, and for each spring that has it."""
     terms = target.terms
     free = [0, 1] if every.damped else [0]
     if terms.mass_unknown and terms.log_stiffness is None:
@@ -189,8 +190,8 @@ def compare(
     *,
     far: bool = False,
 ) -> list[Joint]:
-    """Families and strides that all oscillators may be of, the plainest first, and with `far` all others at
-    their best; what fails one oscillator is not tried on the others."""
+    """Families and strides that agree with every oscillator, the plainest first, or with `far` all at their
+    best. A combination that one oscillator excludes is not tried on the others."""
     steps = list(strides)
     parts: list[dict[tuple[str, int], Match]] = []
     for found, what in zip(maps, terms, strict=True):

@@ -34,8 +34,8 @@ def least_squares(columns: Extended, right: Extended) -> Extended:
 
 
 def map_of_all(record: Record, chosen: list[int]) -> tuple[Extended, Floats, float] | None:
-    """The map (2m, 2m) between frames on (q, v T) of the chosen coordinates about their rest, sizes of the
-    states (2m,), and the root mean square of what it leaves over; None where frames are too few."""
+    """Map (2m, 2m) between frames on (q, v T) of the chosen coordinates about their equilibrium, sizes of the
+    states (2m,), and the root mean square residual; None where frames are too few."""
     z = np.concatenate([record.q[:, chosen], record.v[:, chosen] * record.interval], axis=1)
     frames, n = z.shape
     if frames - 1 < n + 1 + SPARE:
@@ -54,7 +54,7 @@ def map_of_all(record: Record, chosen: list[int]) -> tuple[Extended, Floats, flo
 
 def modes(record: Record, chosen: list[int]) -> tuple[Record, float] | None:
     """Positions and velocities of the normal modes of the chosen coordinates as a record, and the residual of
-    the map of all in units of the states' size; None where no modes are found."""
+    the map of all coordinates relative to the states; None where no modes are found."""
     found = map_of_all(record, chosen)
     if found is None:
         return None

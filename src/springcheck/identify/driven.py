@@ -29,8 +29,8 @@ from springcheck.schemes import Law, scheme, title
 
 
 def frequency(e: Evidence, carrier: Floats) -> float:
-    """Angular frequency, per frame, of the sine and cosine times a carrier (f - 1,) that explain most of what
-    the map misses, beside what it takes up itself."""
+    """Angular frequency [rad/frame] of the sine and cosine, times a carrier (f - 1,), that explain most of
+    the map's residuals beside the map's own columns."""
     frames, pull = e.pairs, e.weight * carrier
     linear = np.stack(e.linear, axis=1) * e.weight[:, None]
     across, missing = np.linalg.qr(linear)[0], e.misses * e.weight[:, None]
@@ -53,7 +53,7 @@ def frequency(e: Evidence, carrier: Floats) -> float:
 
 
 def waves(carrier: Floats, turn: float) -> list[Floats]:
-    """A carrier times the cosine and sine of an angle that turns by so much a frame."""
+    """A carrier times the cosine and sine of an angle that advances by `turn` a frame."""
     n = np.arange(len(carrier))
     return [carrier * np.cos(turn * n), carrier * np.sin(turn * n)]
 
@@ -75,8 +75,8 @@ AGREES = 1e-6
 
 
 def _best(z: Floats, carrier: Floats, turn: float) -> tuple[float, Floats]:
-    """The turn in a frame, and the rows (5, 2) of z, 1, carrier cos and carrier sin, that explain the states
-    z best, from some starts around: near a resonance the drive beats with the motion."""
+    """Angle per frame [rad] and coefficients (5, 2) of z, 1, carrier cos and carrier sin that fit the states
+    z best, from several starting values: near a resonance the drive beats with the motion."""
     apart = np.pi / (2 * len(z)) if len(z) <= FEW_FRAMES else 0.0
     columns = np.stack([*z[:-1].T, np.ones(len(z) - 1)], axis=1)
     found = []
@@ -88,7 +88,7 @@ def _best(z: Floats, carrier: Floats, turn: float) -> tuple[float, Floats]:
 
 
 def _tuned(linear: Floats, ends: Floats, carrier: Floats, turn: float) -> tuple[float, Floats, float]:
-    """The turn in a frame at which `linear` columns (f, n), carrier cos and carrier sin explain `ends` (f, 2)
+    """Angle per frame at which the columns `linear` (f, n), carrier cos and carrier sin fit `ends` (f, 2)
     best, the coefficients (n + 2, 2), and the largest residual."""
     n = np.arange(len(ends))
     rows, worst = np.empty((linear.shape[1] + 2, 2)), np.inf
@@ -109,7 +109,7 @@ def _tuned(linear: Floats, ends: Floats, carrier: Floats, turn: float) -> tuple[
 
 
 def said(e: Evidence, forced: bool, turn: float) -> str:
-    """Formula of a drive, or of a stiffness that oscillates, with its amplitude, frequency and phase."""
+    """Formula of a drive, or of an oscillating stiffness, with its amplitude, frequency and phase."""
     z = e.found.z.astype(np.float64)
     turn, rows = _best(z, np.ones(e.pairs) if forced else z[:-1, 0], turn)
     w = turn / float(e.record.interval)
@@ -141,7 +141,7 @@ def said(e: Evidence, forced: bool, turn: float) -> str:
 
 
 def _forces(e: Evidence, rows: Floats, turn: float, of: str) -> str:
-    """The drive of this turn in a frame by each scheme that explains the rest; "" where none does."""
+    """The drive of this angle per frame by each scheme that has its response; "" where none has."""
     found: dict[str, str] = {}
     b = rows[3] - 1j * rows[4]
     for match, unit in _schemes(e, rows, b, turn):
@@ -163,7 +163,7 @@ def _wave(strength: complex, w: float, first: str, digits: str) -> str:
 def _schemes(
     e: Evidence, rows: Floats, b: NDArray[np.complex128], turn: float
 ) -> Iterator[tuple[Match, NDArray[np.complex128]]]:
-    """The schemes of what is left without the steady state, and their b of a force of amplitude 1."""
+    """Schemes of the motion without its steady state, each with its response b to a force cos(w t)."""
     record, j, found = e.record, e.j, e.found
     n = np.arange(len(found.z))
     turned = np.exp(1j * turn * n)[:, None]
@@ -194,7 +194,8 @@ def _schemes(
 
 
 def _response(e: Evidence, match: Match, turn: float) -> NDArray[np.complex128] | None:
-    """b of a force cos(w t), in the units of the map: a frame from rest, by the scheme with a clock."""
+    """Response b to a force cos(w t), in the units of the map: a frame from rest, by the scheme with a clock.
+    None for a scheme that is not one-step, or that has a friction stage without friction."""
     law = scheme(match.scheme)
     if not law.has("one-step") or (law.has("friction") and match.friction <= 6 * match.g_error):
         # without friction such a scheme is one without a stage for it

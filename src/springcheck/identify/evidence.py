@@ -48,15 +48,15 @@ class Measured:
     """Remarks for the report."""
 
     def noting(self, *more: str) -> Measured:
-        """Copy with more remarks."""
+        """Copy with further remarks."""
         return replace(self, notes=(*self.notes, *more))
 
     def compare(self, families: tuple[Family, ...], strides: Iterable[int]) -> list[Joint]:
-        """The hypotheses that all oscillators may be of."""
+        """Hypotheses that agree with all oscillators."""
         return compare(self.maps, self.terms, families, strides)
 
     def evidence(self, i: int) -> Evidence:
-        """What there is of one oscillator."""
+        """Evidence of one oscillator, by its index in `moving`."""
         j = self.moving[i]
         stiffness = None if self.stiffness is None else float(self.stiffness[j])
         return Evidence(
@@ -67,7 +67,7 @@ class Measured:
     def numbers(
         self, chosen: Joint, law: str = ""
     ) -> tuple[tuple[float, ...], tuple[float, ...] | None, tuple[float, ...]]:
-        """Frequency, stiffness and friction rate of each oscillator, the friction being of this law."""
+        """Frequency [1/T], stiffness [M/T2] and friction rate [1/T] by this law, of each oscillator."""
         h = float(self.record.interval) / chosen.stride
         family = FAMILIES[chosen.family]
         law = law or (family.laws[0] if family.laws else "")
@@ -86,11 +86,11 @@ class Measured:
     def disagreements(
         self, joint: Joint, other: Floats | None = None, quantum: float = 0.0, room: float = 0.0
     ) -> list[str]:
-        """Where the stiffness of the states is not the stated one, or another, beyond six standard errors and
-        rounding.
+        """Sentences on each stiffness that differs from the stated one, or from `other`, by more than six
+        standard errors and rounding.
 
-        Forces cut off at multiples of `quantum` bias it as well, by that share of the mean force.  A
-        coarse file does not show whether h, m, h k or h/m were rounded to single precision.
+        Forces truncated to multiples of `quantum` bias it as well, by that share of the mean force.  A coarse
+        file does not show whether h, m, h k or h/m were rounded to single precision.
         """
         stated, record = self.stiffness if other is None else other, self.record
         _, stiffness, _ = self.numbers(joint)
@@ -127,7 +127,7 @@ class Evidence:
 
     @property
     def stated(self) -> float | None:
-        """(w T)**2 of the stated stiffness, T between two frames; None where it or the mass is not known."""
+        """(w T)**2 of the stated stiffness, T between two frames; None where it or the mass is unknown."""
         if not self.stiffness or self.record.mass is None:
             return 0.0 if self.stiffness == 0 else None
         return self.stiffness / float(self.record.mass[self.j]) * float(self.record.interval) ** 2
@@ -153,18 +153,18 @@ class Evidence:
 
     @property
     def size(self) -> float:
-        """What the map leaves over in a frame, as a share of the state's size."""
+        """Largest root mean square residual of a frame, relative to the state."""
         return float(np.max(self.found.residual))
 
     @cached_property
     def misses(self) -> Floats:
-        """What the map leaves over in each pair (f - 1, 2), in units of the states' size."""
+        """Residuals of the map in each pair (f - 1, 2), in units of the states' size."""
         return self.found.misses()
 
     @cached_property
     def weight(self) -> Floats:
-        """Weight (f - 1,) of each pair: 1 over its size, so that a motion that grows or decays is not judged
-        by its largest states alone."""
+        """Weight (f - 1,) of each pair, inverse to its size: the largest states do not dominate a motion that
+        grows or decays."""
         return np.asarray(self.found.weight / np.max(self.found.weight))
 
     @cached_property
@@ -183,22 +183,22 @@ class Evidence:
 
     @property
     def excess(self) -> Floats:
-        """What each pair misses (f - 1,), in roundings."""
+        """Residual of each pair (f - 1,), in roundings."""
         return np.asarray(np.max(np.abs(self.misses), axis=1) / self.unit)
 
     @property
     def turns(self) -> float:
-        """Turns of the motion in all frames."""
+        """Number of turns of the motion over all frames."""
         return self.pairs * float(self.found.turn.angle[0]) / (2 * math.pi)
 
     @cached_property
     def linear(self) -> list[Floats]:
-        """Columns that the map itself takes up: position, velocity, and the constant that was fitted."""
+        """Columns of the map's own regression: position, velocity, and the constant where one was fitted."""
         return [*self.states[:-1].T, *([np.ones(self.pairs)] if np.any(self.found.centre) else [])]
 
 
 def matched(found: Map, terms: Terms) -> list[Match]:
-    """The schemes of few steps that fit a map, the plainest first."""
+    """Undamped schemes of few steps that fit a map, the plainest first."""
     joints = compare([found], [terms], distinct(damped=False), FEW[:4])
     return [x.parts[0] for x in joints]
 

@@ -46,7 +46,7 @@ LINEAR_LEAVES = 4
 
 
 def explain(seen: Measured) -> tuple[Explanation, ...]:
-    """Explanations of what no scheme fits, the best first."""
+    """Explanations of states that no scheme fits, the best first."""
     evidence = seen.evidence(max(range(len(seen.maps)), key=lambda i: float(np.max(seen.maps[i].residual))))
     if out := turned(seen.record, seen.moving):
         return tuple(out)
@@ -57,7 +57,7 @@ def explain(seen: Measured) -> tuple[Explanation, ...]:
 
 
 def _solver(e: Evidence) -> list[Explanation]:
-    """The exact solution, as near as a solver with an error of its own comes to it."""
+    """The exact solution, to within the error of an adaptive or high-order solver."""
     if min(regression(e, law).left for law in (laws.PARITY, laws.POWERS)) < 1 / FALLS:
         # steps that alternate are no solver's, and its errors are no powers of the state
         return []
@@ -107,7 +107,7 @@ def _drift(e: Evidence) -> list[Explanation]:
 
 
 def _law(e: Evidence) -> list[Explanation]:
-    """The law of the force that explains most of what the map misses by the fewest numbers."""
+    """The force law that explains most of the map's residuals with the fewest parameters."""
     tried = [regression(e, law) for law in laws.LAWS]
     of = {x.law: x for x in tried}
     constant, powers, counted = of[laws.CONSTANT], of[laws.POWERS], of[laws.CONSTANT].counted
@@ -158,7 +158,7 @@ def _law(e: Evidence) -> list[Explanation]:
 
 
 def _out_of_step(e: Evidence, x: Regression) -> float:
-    """Angle over the run by which a law's wave is off the motion's harmonics; NaN where it has none."""
+    """Angle over the run [rad] from a law's wave to the nearest harmonic of the motion; NaN without one."""
     angle = float(e.found.turn.angle[0])
     return e.pairs * min(abs(math.remainder(x.turn - n * angle, 2 * math.pi)) for n in HARMONICS)
 
@@ -174,7 +174,7 @@ def _too_few(e: Evidence, counted: float) -> Explanation:
 
 
 def _unexplained(e: Evidence, counted: float) -> Explanation:
-    """Explanation of residuals that are irregular, or follow no known law, or stand in too few frames."""
+    """Explanation of residuals that are irregular, follow no known law, or occur in too few frames."""
     if counted < FEWEST_MISSES:
         return _too_few(e, counted)
     rows = e.found.residual

@@ -25,8 +25,8 @@ UNLIKE_MOTION = 0.01
 
 
 def one_factor(h: float, q: Floats, v: Floats) -> tuple[str, float, Floats] | None:
-    """Where in a step of h one factor multiplies the velocities v (f, n) of q (f, n), what it leaves
-    unexplained of them, and the factors (f - 1,); None where none does that changes from step to step."""
+    """Place in a step of h at which one factor multiplies the velocities v (f, n) of q (f, n), the relative
+    residual, and the factors (f - 1,); None where no factor that varies from step to step explains them."""
     x, n = q - np.mean(q, axis=0), q.shape[1]
     here, both = (np.column_stack([y, np.ones(len(y))]) for y in (x[:-1], x[:-1] + x[1:]))
     ways = ((v[:-1], np.diff(x, axis=0) / h, here), (v[1:], v[:-1], both), (v[1:], v[:-1], here))
@@ -48,7 +48,7 @@ def one_factor(h: float, q: Floats, v: Floats) -> tuple[str, float, Floats] | No
 
 
 def by_a_factor(found: Identification, h: float, q: Floats, v: Floats) -> Identification:
-    """Identify one factor a step for all momenta, where that explains these states; else what was found."""
+    """Identification by one factor a step for all momenta, where that explains the states, or `found`."""
     if q.shape[1] < 2 or found.verdict == "named":
         return found
     with np.errstate(all="ignore"):

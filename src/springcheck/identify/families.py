@@ -65,7 +65,7 @@ class Family:
     """Whether g is the share of h F/m that enters the position: a force held over substeps."""
 
     def rate(self, law: str, g: float) -> float:
-        """gamma h of a law whose decay within a step is exp(-g)."""
+        """gamma h under a law whose decay within a step is exp(-g)."""
         if law.startswith(IMPLICIT):
             return float(np.expm1(g))
         return float(-np.expm1(-g)) if law.startswith("a factor") else g
@@ -101,7 +101,7 @@ def _plus(x: list[Fraction], y: list[Fraction]) -> list[Fraction]:
 
 
 def _of(scheme: Scheme, *, damped: bool) -> Family:
-    """The scheme itself, or with friction as its own force does it."""
+    """Family of the scheme itself, or `damped`: with friction by its own stage or in its force."""
     stages: tuple[Stage, ...] = tuple(("kick" if kind == "pull" else kind, c) for kind, c in scheme.stages)
     own = any(kind == "friction" for kind, _ in stages)
     if damped and not own:
@@ -128,7 +128,7 @@ _ON_A_SPRING = tuple(
 
 
 def _is_written_out(scheme: Scheme) -> bool:
-    """Whether stages or a stability function give its map, with friction too; else it is stepped."""
+    """Whether stages or a stability function give its map, friction included; otherwise it is stepped."""
     solved = any(x for i, row in enumerate(scheme.a[:-1]) for x in row[i:])
     return not solved and all(kind.evaluates or kind.drifts or kind.decay for kind in scheme.kinds)
 
@@ -147,7 +147,7 @@ SCALED = (EXPONENTIAL, IMPLICIT, "a factor 1 - gamma h")
 def _placed(
     scheme: str, place: str, laws: tuple[str, ...], *stages: Stage, after: Family | None = None
 ) -> Family:
-    """A scheme with friction in a place: these stages, `after` its own step where that is given."""
+    """Family of a scheme with friction in a place: these stages, after the step of `after` if given."""
     return Family(
         name=f"{scheme}, friction {place}", scheme=scheme, stages=(*(after.stages if after else ()), *stages),
         stability=after.stability if after else ((), ()), damped=True, laws=laws, place=place,
@@ -245,7 +245,7 @@ _FAULTS: tuple[tuple[Any, ...], ...] = (
 
 
 def title(scheme: str) -> str:
-    """A scheme's name in a sentence, its first letter large."""
+    """Title of a scheme, with a capital letter."""
     known = SCHEMES.get(scheme) or ELSEWHERE.get(scheme)
     name = known.title if known else scheme
     return name[0].upper() + name[1:]
@@ -317,10 +317,11 @@ FAMILIES = {
 
 
 def substeps(share: float, error: float) -> tuple[range, bool]:
-    """Numbers of substeps that a force may be held over, none where no whole number fits; and whether each
+    """Numbers of substeps over which a force may be held, empty where no integer fits, and whether each
     substep kicks before it drifts.  `error` is the standard error of the share.
 
-    The position gets (n + 1)/2n of h**2 F/m where substeps kick first, (n - 1)/2n where they drift first.
+    The position advances by (n + 1)/2n of h**2 F/m where substeps kick first, by (n - 1)/2n where they drift
+    first.
     """
     if math.isnan(share + error):
         # noise left the fit without a share
@@ -332,5 +333,5 @@ def substeps(share: float, error: float) -> tuple[range, bool]:
 
 
 def endless(share: float, error: float) -> bool:
-    """Whether a force may be held over no end of substeps, which is the force of the last step alone."""
+    """Whether the share is that of infinitely many substeps, as of a force held over the whole step."""
     return abs(2 * share - 1) <= 12 * error

@@ -80,7 +80,7 @@ def read(
 
 
 def of_table(frame: Any) -> formats.States:
-    """Columns of a pandas DataFrame as states; an index with a name is a column too."""
+    """States from the columns of a pandas DataFrame; a named index is a column too."""
     if frame.index.name is not None:
         frame = frame.reset_index()
     columns = {str(name): frame[name] for name in frame.columns if columns_of.kind(str(name)) is not None}
@@ -88,7 +88,7 @@ def of_table(frame: Any) -> formats.States:
 
 
 def of_arrays(name: str, found: formats.States) -> FileStates:
-    """A trajectory that stands in arrays of a file."""
+    """A trajectory from a file's arrays, cut to the frames and coordinates that are used."""
     kept = slice(MOST_FRAMES)
     speed = next((x for x in (found.p, found.v) if x is not None), np.zeros_like(found.q))
     notes = [*found.notes]
@@ -153,7 +153,7 @@ def _velocity_factor(units: Mapping[str, str], notes: list[str]) -> float:
 
 
 def _chosen(q: Floats, p: Floats, notes: list[str]) -> tuple[Integers, tuple[str, ...]]:
-    """The coordinates that move, not more than can be looked at, and notes with what is left out."""
+    """Indices of the coordinates that move, `MOST_OSCILLATORS` at most, and notes with what is left out."""
     moving = np.flatnonzero((np.ptp(q, axis=0) > 0) | (np.ptp(p, axis=0) > 0))
     if len(moving) > MOST_OSCILLATORS:
         notes = [*notes, f"{MOST_OSCILLATORS} of {len(moving)} moving coordinates were looked at"]
@@ -171,11 +171,11 @@ class RodSeen:
 
 
 def rod_of(q: Floats | None, *, fits: bool = False) -> RodSeen | None:
-    """The rod in positions q (f, N), in space or a plane: two particles that turn and keep their distance, or
-    one that swings and keeps its distance from a fixed point; None where there is none.
+    """The rod in positions q (f, N), in space or a plane: two particles at a constant distance that turn, or
+    one that swings at a constant distance from a fixed point; None without a rod.
 
-    Where springs fit as well (`fits`), the distance vector of two has to turn by more than their distance
-    changes; if each keeps to a circle of its own, springs may hold it (`or_springs`).
+    Where springs fit as well (`fits`), the direction of two particles must turn by more than their distance
+    changes; where each keeps to a circle of its own, springs may hold it (`or_springs`).
     """
     on_circles = None
     for axes in (3, 2):
@@ -204,7 +204,7 @@ def rod_of(q: Floats | None, *, fits: bool = False) -> RodSeen | None:
 
 
 def _kept(way: Floats) -> tuple[float, float]:
-    """The mean length of a way (f, 2 or 3), and by how much it changes."""
+    """Mean length of a vector (f, 2 or 3), and the range of its lengths."""
     size = np.linalg.norm(way, axis=1)
     return float(np.mean(size)), float(np.ptp(size))
 
@@ -215,7 +215,7 @@ def _bent(way: Floats) -> float:
 
 
 def _arm(way: Floats) -> Floats:
-    """A way from the centre of the circle that is nearest to it."""
+    """Vector from the centre of the circle that fits a path (f, 2 or 3) best to each of its points."""
     way = way - np.mean(way, axis=0)
     # whose squares stay in range
     size = float(np.max(np.abs(way))) or 1.0
@@ -226,7 +226,7 @@ def _arm(way: Floats) -> Floats:
 
 
 def _turns_back(arm: Floats) -> bool:
-    """Whether an arm (f, 2 or 3) from a centre swings, by less than a right angle a frame, and turns back."""
+    """Whether a vector (f, 2 or 3) from a centre turns by less than a right angle a frame, and reverses."""
     outer = np.einsum("fi,fj->fij", arm[:-1], arm[1:])
     turned = (outer - outer.transpose(0, 2, 1)).reshape(len(outer), -1)
     along = turned @ turned[np.argmax(np.linalg.norm(turned, axis=1))]
@@ -235,8 +235,8 @@ def _turns_back(arm: Floats) -> bool:
 
 
 def sentence(run: Trajectory, mass: Floats, stiffness: Floats | None = None, *, about: int = 0) -> str:
-    """Identification of a trajectory around a frame, in one sentence, for a verdict that failed; "" where
-    the states show nothing.  `stiffness` (n,) where each particle has a spring of its own."""
+    """One sentence that identifies a trajectory around a frame, for a failed verdict; "" where the states
+    show nothing.  `stiffness` (n,) where each particle has a spring of its own."""
     chosen, _ = _chosen(run.q, run.p, [])
     first = max(0, min(about - MOST_FAILED // 2, len(run.t) - MOST_FAILED))
     frames = slice(first, first + MOST_FAILED)
@@ -250,7 +250,7 @@ def sentence(run: Trajectory, mass: Floats, stiffness: Floats | None = None, *, 
 
 
 def shown(scene: Scene, run: Trajectory, about: int) -> str:
-    """Identification of a run around a frame, in one sentence; "" where nothing is known of it."""
+    """One sentence that identifies a run around a frame; "" where nothing is known of it."""
     if not scene.system.is_linear:
         return seen_to_take(scene, run, about)
     springs = scene.system.hessian(scene.q).astype(np.float64) if scene.n <= MOST_OSCILLATORS else None
@@ -259,18 +259,15 @@ def shown(scene: Scene, run: Trajectory, about: int) -> str:
 
 
 def titled(file: Path | str, label: str) -> str:
-    """A trajectory by its file, and by its label where the file has several."""
+    """Name of a trajectory: its file, and its label where the file has several."""
     return str(file) if label == Path(file).name else f"{file}, {label}"
 
 
 def identify_file(
     path: Path, trajectory: str | None, columns: Sequence[str], stated: Mapping[str, float | None]
 ) -> dict[str, Identification]:
-    """Identify the trajectories of a file, by label; `stated`: mass, stiffness, friction, step of the
-    command.
-
-    Raises SpringcheckError, which names the trajectory.
-    """
+    """Identify the trajectories of a file, by label; `stated` holds the command's mass, stiffness, friction
+    and step.  Raises SpringcheckError, which names the trajectory."""
     given = {name: value for name, value in stated.items() if value is not None}
     for name, value in given.items():
         of_size(f"--{name}", value, zero=name in ("stiffness", "friction"))
@@ -307,7 +304,7 @@ def identify_states(
     friction: float | None = None,
     step: float | None = None,
 ) -> Identification:
-    """Identify what a file holds; a stated mass overrides the file's.  Raises IdentificationError."""
+    """Identify the states of a file; a stated mass overrides the file's.  Raises IdentificationError."""
     m = states.mass if mass is None else np.full(states.q.shape[1], mass)
     found = identify_arrays(
         states.t, states.q, states.p, v=states.v, mass=m, stiffness=stiffness, friction=friction, step=step
@@ -319,7 +316,7 @@ def identify_states(
 
 
 def _of_the_mass(states: FileStates, m: Floats | None) -> tuple[str, ...]:
-    """The mass (n,) that momenta over velocities give, and whether it is another than is stated."""
+    """Note on the mass that momenta over velocities give, where none (n,) is stated or that differs."""
     if states.p is None or states.v is None or not np.any(states.v):
         return ()
     i = int(np.argmax(np.max(np.abs(states.v), axis=0)))

@@ -108,27 +108,27 @@ class Map:
 
     @property
     def unscaled(self) -> Extended:
-        """The map on (q, v T), both lengths."""
+        """The map on (q, v T), both in units of length."""
         return np.asarray(self.entries * self.size[:, None] / self.size[None, :])
 
     @property
     def whole(self) -> bool:
-        """Whether the entries are known from one orbit of all states, not from pairs."""
+        """Whether the entries come from one orbit of all states, not from pairs."""
         return self.once is True or (self.once is None and not self.noise.diagonal and self.within)
 
     @property
     def turn(self) -> Rotation:
-        """How the map turns."""
+        """Angle and determinant of the map."""
         return rotation(self.entries[None])
 
     @property
     def clean(self) -> bool:
-        """Whether what is left over may be rounding: no more than ten times what is expected."""
+        """Whether the residuals may be rounding: at most ten times what is expected."""
         return self.chi2 <= CLEAN * self.freedom
 
     @property
     def within(self) -> bool:
-        """Whether what is left over is what the observation model expects."""
+        """Whether the residuals are what the observation model expects."""
         return self.chi2 <= self.freedom + ERRORS * math.sqrt(KURTOSIS * self.freedom + 1)
 
     def misses(self, other: Map | None = None) -> Floats:
@@ -140,7 +140,7 @@ class Map:
 
 
 def _sizes(z: Extended) -> Extended:
-    """Sizes (2,) of the two components over one turn, also where the motion grows or decays."""
+    """Sizes (2,) of the two components over one turn, also of a motion that grows or decays."""
     square = z**2
     size = np.sqrt(square.mean(axis=0))
     size = np.where(size == 0, 1, size)
@@ -163,15 +163,15 @@ class _Solution:
 
     @property
     def cost(self) -> float:
-        """Minus twice the log of the likelihood, but for a constant."""
+        """Minus twice the log-likelihood, up to a constant."""
         return self.chi2 + self.noise.log_det
 
 
 def _minimum(
     z: Extended, sigma: Floats, process: Floats, start: _Solution | None, centred: int, slips: Extended | None
 ) -> _Solution:
-    """Gauss-Newton for the map, a constant part (`centred`: 0 none, 1 an equilibrium at rest, 2 any), and
-    what the clock's slips do to a step (4 further entries)."""
+    """Gauss-Newton for the map, its constant part (`centred`: 0 none, 1 an equilibrium at rest, 2 any), and
+    the effect of the clock's slips on a step (4 further entries)."""
     n = 4 + centred
     x = np.zeros(n if slips is None else n + 4, np.longdouble)
     x[:n] = _first_guess(z, process, start, centred)
@@ -216,8 +216,8 @@ def _minimum(
 
 
 def _first_guess(z: Extended, process: Floats, of: _Solution | None, centred: int) -> Extended:
-    """Entries and constant part (4 + `centred`,) of another solution, or where it has no constant part by
-    linear least squares."""
+    """Entries and constant part (4 + `centred`,) of another solution, or by linear least squares where that
+    has no constant part."""
     if of is not None and (not centred or np.any(of.centre)):
         return np.concatenate([of.entries.ravel(), of.centre[:centred]])
     if not centred:
@@ -233,12 +233,11 @@ def _first_guess(z: Extended, process: Floats, of: _Solution | None, centred: in
 
 
 def fit(record: Record, j: int, *, kept: NDArray[np.bool_] | None = None, constant: bool = False) -> Map:
-    """The map of oscillator j, from the pairs that are `kept` (f - 1,), or from all.
+    """Map of oscillator j from the pairs that are `kept` (f - 1,), or from all.
 
-    A constant part is taken in where it shows, or in any case (`constant`): an equilibrium away from 0, whose
-    velocity is 0, or else a constant that is added to the position in every step (`drifts`).
-
-    Raises IdentificationError where the states allow no fit.
+    A constant part is fitted where it is significant, or always (`constant`): an equilibrium away from 0,
+    whose velocity is 0, or else a constant that is added to the position in every step (`drifts`). Raises
+    IdentificationError where the states allow no fit.
     """
     z: Extended = np.stack([record.q[:, j], record.v[:, j] * record.interval], axis=1).astype(np.longdouble)
     about, whole = _sizes(z - np.mean(z, axis=0)), _sizes(z)
@@ -298,7 +297,7 @@ def fit(record: Record, j: int, *, kept: NDArray[np.bool_] | None = None, consta
 
 
 def _least(freedom: int) -> float:
-    """Least mean square of so many residuals to spare, in squares of a rounding."""
+    """Lower bound on the mean square residual at this freedom, in squares of a rounding."""
     return max(LEAST_LEFT, min(1.0, ENOUGH / max(freedom, 1)))
 
 
@@ -315,14 +314,14 @@ def _lengths(z: Extended, centre: Extended | Floats) -> Floats:
 def _constant_part(
     z: Extended, sigma: Floats, process: Floats, start: _Solution | None, record: Record, constant: bool
 ) -> tuple[_Solution, int, Extended | None]:
-    """The plainest of no constant, an equilibrium and any constant that explains the states, and slips."""
+    """Solution with the plainest constant part that explains the states (`centred`), and the slips fitted."""
     from scipy.special import fdtri
 
     numbers, slips, centred = 2 * len(process), None, 0
     least = _least(numbers - 6) if record.fine else 1.0
 
     def gains(old: _Solution, new: _Solution, least_gain: float) -> bool:
-        """Whether unknowns more remove so much of chi-squared; by chance each removes 1."""
+        """Whether further unknowns reduce chi-squared by so much; by chance each reduces it by 1."""
         spare = max(numbers - 6, 1)
         # a few residuals are small by chance: Fisher's F, of one unknown more
         least_gain = max(least_gain, float(fdtri(1, spare, 1 - CHANCE)))
@@ -357,8 +356,8 @@ def _constant_part(
 def _fed_back(
     z: Extended, sigma: Floats, process: Floats, start: _Solution, centred: int, freedom: int
 ) -> _Solution:
-    """States that were rounded in every step as well as when they were written; the size of the former is
-    fitted, so that chi-squared is its degrees of freedom."""
+    """Solution for states that were rounded in every step as well as when they were written.  The size of the
+    rounding in a step is fitted, so that chi-squared equals its degrees of freedom."""
     level = float(np.median(np.max(sigma[1:], axis=1) / process))
     found = start
     for _ in range(4):

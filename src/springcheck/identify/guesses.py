@@ -138,7 +138,7 @@ class Roots:
 
 
 def roots_of_map(found: Map, strides: Iterable[int]) -> Roots:
-    """The steps that a map may be these powers of, every whole number of unseen turns included."""
+    """Steps of which a map may be one of these powers, for every number of turns that frames do not show."""
     every = np.array(list(strides), np.float64)
     b = found.entries.astype(np.float64)
     ratio = float(found.size[1] / found.size[0])
@@ -195,8 +195,8 @@ class Guesses:
 
 
 def first(every: MapTable, roots: Roots, *, growing: bool, free_scale: bool, far: bool) -> Guesses:
-    """First guesses: a from the phase of the family's own step, g from the rest of the determinant; unless
-    `far`, of those alone whose entries may agree."""
+    """First guesses: a from the phase of the family's own step, g from the remaining determinant.  Without
+    `far`, only those whose entries may agree."""
     turning = np.flatnonzero(np.isfinite(roots.phase))
     standing = np.flatnonzero(~np.isfinite(roots.phase))
     curved = [i for i, f in enumerate(every.families) if not (f.held or f.flow)]
@@ -243,14 +243,14 @@ def first(every: MapTable, roots: Roots, *, growing: bool, free_scale: bool, far
 
 
 def _base(family: Family) -> str:
-    """The family without its friction."""
+    """Name of the family without its friction."""
     return family.scheme if family.damped else family.name
 
 
 def _on_curves(
     every: MapTable, roots: Roots, curved: Integers, turning: Integers, *, free_scale: bool, far: bool
 ) -> tuple[Integers, Integers, Floats, Floats]:
-    """Families and roots whose phase a step without friction has, and whose entries may agree; a and g."""
+    """Families and roots that share a phase, without friction, and whose entries may agree, with a and g."""
     # friction moves a step away from that without it, which many families share
     bases = np.array([_base(every.families[i]) for i in curved.tolist()])
     names, base = np.unique(bases, return_inverse=True)
@@ -303,7 +303,7 @@ def _on_curves(
 
 
 def polished(every: MapTable, roots: Roots, x: Guesses, *, free_scale: bool, far: bool = False) -> Guesses:
-    """Refine guesses by Gauss-Newton on a step's entries, and keep those near a root; with `far` all."""
+    """Refine guesses by Gauss-Newton on a step's entries; keep those near a root, with `far` within `FAR`."""
     # three of a table's guesses, and one more beside the largest phase, where it says little
     rounds = 6 if every.damped else 4
     bound = NEAR[0] + NEAR[1] * roots.error
@@ -338,7 +338,7 @@ def polished(every: MapTable, roots: Roots, x: Guesses, *, free_scale: bool, far
 
 def _entry_sizes(wanted: Floats, roots: Roots, x: Guesses) -> Floats:
     """Scales of the entries: the root of the determinant for diagonal ones; for the others their own size,
-    without its decrease near half a turn."""
+    not reduced near half a turn."""
     whole = np.exp(np.maximum(roots.log_det[x.root] / 2, -600))
     bend = np.nan_to_num(np.abs(np.sinc(roots.phase[x.root] / np.pi)), nan=1.0)
     out = np.abs(wanted)
@@ -351,15 +351,16 @@ def _entry_sizes(wanted: Floats, roots: Roots, x: Guesses) -> Floats:
 
 
 def _compared(m: Floats, *, free_scale: bool) -> Floats:
-    """Numbers compared of matrices (c, 2, 2): the entries, or where velocities have any scale the three
-    numbers that no scale changes."""
+    """Numbers compared of matrices (c, 2, 2): the entries, or with `free_scale` the three invariants under a
+    scaling of velocities."""
     if free_scale:
         return np.stack([m[:, 0, 0], m[:, 0, 1] * m[:, 1, 0], m[:, 1, 1]])
     return np.stack([m[:, 0, 0], m[:, 0, 1], m[:, 1, 0], m[:, 1, 1]])
 
 
 def least_squares(slopes: Floats, right: Floats) -> tuple[Floats, Floats]:
-    """Steps (k, c) of k unknowns, of slopes (k, m, c) and right sides (m, c), and their variances."""
+    """Steps (k, c) of k unknowns by least squares, from slopes (k, m, c) and right sides (m, c);
+    variances."""
     square = np.einsum("imc,jmc->cij", slopes, slopes)
     size = np.sqrt(np.einsum("cii->ci", square)) + 1e-300
     even = square / size[:, :, None] / size[:, None, :] + 1e-13 * np.eye(len(slopes))

@@ -79,12 +79,12 @@ class Match:
 
     @property
     def a_room(self) -> float:
-        """Relative difference from another a within which it may be that one."""
+        """Largest relative difference from another a that is compatible with it."""
         return SURE * self.a_error / abs(self.a)
 
     @property
     def friction(self) -> float:
-        """g where it is friction, 0 where it is not."""
+        """g of a friction; 0 of a held force."""
         return 0.0 if FAMILIES[self.family].held else self.g
 
 
@@ -110,7 +110,7 @@ class Joint:
 
     @property
     def keeps_area(self) -> bool:
-        """Whether all maps predicted have a determinant of 1."""
+        """Whether all predicted maps have determinant 1."""
         entries = np.array([part.predicted for part in self.parts])
         return bool(np.all(np.abs(entries[:, 0] * entries[:, 3] - entries[:, 1] * entries[:, 2] - 1) < 1e-12))
 
@@ -122,7 +122,7 @@ class Joint:
 
     @property
     def substeps(self) -> tuple[range, bool]:
-        """Numbers of substeps that a force may be held over, and whether they kick first."""
+        """Numbers of substeps over which a force may be held, and whether they kick first."""
         found = [substeps(part.g, part.g_error + G_ROUNDING) for part in self.parts]
         if len({first for _, first in found}) > 1:
             return range(0), True
@@ -130,7 +130,7 @@ class Joint:
 
     @property
     def endless(self) -> bool:
-        """Whether the force may be held over no end of substeps."""
+        """Whether the force may be held over infinitely many substeps."""
         return all(endless(part.g, part.g_error + G_ROUNDING) for part in self.parts)
 
     def __str__(self) -> str:
@@ -139,7 +139,7 @@ class Joint:
 
 @cache
 def most(freedom: int) -> float:
-    """Largest chi-squared that is accepted; where nothing is left to predict, that of a solution."""
+    """Largest chi-squared that is accepted; without degrees of freedom, that of an exact solution."""
     # SciPy is imported where it is asked: half of what importing this package takes
     from scipy.special import chdtri
 
@@ -152,13 +152,13 @@ def _samples(family: Family, g: tuple[float, ...]) -> Reals:
 
 
 def same_map(one: Family, other: Family, g: tuple[float, ...] = (0, 0, 0)) -> bool:
-    """Whether two families have one map at three steps, with these frictions."""
+    """Whether two families have the same map at three steps, with these frictions g."""
     return bool(np.max(np.abs(_samples(one, g) - _samples(other, g))) < 1e-15)
 
 
 @cache
 def distinct(*, damped: bool) -> tuple[Family, ...]:
-    """One family of every map.  The implicit midpoint rule speaks for the trapezoidal rule, and so on."""
+    """One family for each map.  The implicit midpoint rule represents the trapezoidal rule, and so on."""
     out: list[Family] = []
     for family in DAMPED if damped else UNDAMPED:
         if not damped and SCHEMES[family.scheme].has("friction"):
@@ -178,12 +178,12 @@ def aliases(name: str) -> tuple[str, ...]:
 
 @cache
 def _still(name: str) -> tuple[str, ...]:
-    """Schemes whose map is the same where there is no friction."""
+    """Other schemes with the same map without friction."""
     return tuple(f.scheme for f in UNDAMPED if f.scheme != name and same_map(f, FAMILIES[name]))
 
 
 def frictionless(name: str) -> tuple[str, ...]:
-    """Schemes with a friction of their own whose map is this one's where there is none."""
+    """Schemes with a friction stage whose map equals this one's without friction."""
     return tuple(x for x in _still(name) if SCHEMES[x].has("friction"))
 
 

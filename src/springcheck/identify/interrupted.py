@@ -43,8 +43,8 @@ SCHEMES_SAID = 2
 
 
 def remembered(seen: Measured) -> tuple[Measured, list[Joint]]:
-    """The frames but the first, and Verlet with the friction of the velocity half a step ago, where it made
-    them: its first step has none, and the force has the friction of the first velocity."""
+    """The frames but the first, and the matches of Verlet with the friction of the velocity half a step ago.
+    Its first step has no such velocity, and takes the friction of the first frame's."""
     record = seen.record
     if not record.fine or len(record.q) <= FEWEST_PAIRS or any(_first_off(x) < FALLS for x in seen.maps):
         return seen, []
@@ -59,7 +59,7 @@ def remembered(seen: Measured) -> tuple[Measured, list[Joint]]:
 
 
 def _first_off(found: Map) -> float:
-    """By which factor the first pair misses more than the later half of the others."""
+    """Ratio of the first pair's residual to the largest in the later half."""
     off = np.max(np.abs(found.misses()), axis=1) * found.weight
     return float(off[0] / max(np.max(off[len(off) // 2 :]), 1e-300))
 
@@ -80,7 +80,7 @@ def _begins(seen: Measured, maps: list[Map], joint: Joint) -> bool:
 
 
 def few_bad_frames(e: Evidence) -> list[Explanation]:
-    """A motion that a few pairs of frames interrupt."""
+    """Explain a motion that a few bad pairs of frames interrupt."""
     kept = np.ones(e.pairs, dtype=bool)
     found = e.found
     for _ in range(8):
@@ -140,7 +140,7 @@ def few_bad_frames(e: Evidence) -> list[Explanation]:
 
 
 def _damped(found: Map, e: Evidence) -> str:
-    """The scheme with friction that fits the rest of a motion, in a sentence; "" where none does."""
+    """Phrase that names the scheme with friction that fits the rest of a motion; "" where none does."""
     joints = compare([found], [e.terms], distinct(damped=True), range(1, 2))
     if not joints:
         return ""
@@ -151,7 +151,7 @@ def _damped(found: Map, e: Evidence) -> str:
 
 
 def _interruption(e: Evidence, found: Map, run: NDArray[np.intp], whose: str) -> tuple[str, str]:
-    """Diagnose a run of bad pairs by the map of the other frames: cause and remedy."""
+    """Cause and remedy of a run of bad pairs, by the map of the other frames."""
     z, b = found.z, found.entries
     first, last = int(run[0]), int(run[-1])
 
@@ -205,7 +205,7 @@ def _interruption(e: Evidence, found: Map, run: NDArray[np.intp], whose: str) ->
 
 
 def _kicked(e: Evidence, found: Map, kick: float, q: float, at: int, whose: str) -> tuple[str, str]:
-    """Cause and remedy of one kick of the velocity at a frame whose position is `q` of the motion's size."""
+    """Cause and remedy of one kick of the velocity at a frame of position `q`, in units of its size."""
     for match in matched(found, e.terms):
         # half a step of the force there, T h F/m = -a s q of s steps: what a leapfrog is early by
         half = match.a * match.stride * q * float(found.size[0] / found.size[1]) / 2

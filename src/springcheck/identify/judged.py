@@ -19,7 +19,7 @@ from springcheck.identify.search import COARSE, terms_of
 def judged(
     record: Record, stiffness: ArrayLike | None, friction: float | None, step: float | None
 ) -> Measured:
-    """Select the oscillators that can be judged, and check what is stated.  Raises IdentificationError."""
+    """Select the oscillators that can be judged, and check stated numbers.  Raises IdentificationError."""
     stated = of_size("stiffness", stiffness, record.q.shape[1], zero=True)
     of_size("friction", friction, zero=True)
     of, moving, maps, notes = _oscillators(record)
@@ -38,8 +38,8 @@ def judged(
 
 
 def _oscillators(record: Record) -> tuple[Record, list[int], list[Map], list[str]]:
-    """The oscillators that can be judged, in a record of their own where they are normal modes; their maps;
-    and notes on those that cannot."""
+    """Record of the oscillators that can be judged, of normal modes where these replace coordinates; their
+    indices; their maps; and notes on the rest."""
     spread = np.ptp(record.q, axis=0) + np.ptp(record.v, axis=0) * abs(record.interval)
     moving = np.flatnonzero(spread > SIZES[0]).tolist()
     if not moving:
@@ -90,8 +90,8 @@ ALIKE = 1e-9
 
 
 def _proportional(record: Record, j: int) -> str:
-    """Message for velocities that follow from the positions alone, in more frames than an arc of few
-    roundings shows; "" where they do not."""
+    """Message for velocities that are constant or proportional to the positions, on an arc well above
+    rounding; "" where they are not."""
     q, v = (x[:, j].astype(np.float64) for x in (record.q, record.v))
     q, v = q - np.mean(q), v - np.mean(v)
     size = float(np.max(np.abs(q)))
@@ -129,7 +129,7 @@ def _forced(found: Map) -> bool:
 
 
 def _uncoupled(record: Record, maps: dict[int, Map]) -> tuple[tuple[Record, list[int]] | None, list[str]]:
-    """Normal modes in place of coordinates, where these do not move by themselves and the modes do."""
+    """Normal modes, where the coordinates are coupled and the modes are not, and a note on them."""
     single = max(float(np.max(found.residual)) for found in maps.values())
     every = list(maps)
     if single < max(64 * COARSE, 1e-8) or not record.fine:

@@ -74,7 +74,7 @@ class Regression:
 
     @property
     def shows(self) -> bool:
-        """Whether so many pairs follow the law, or so closely, that chance leaves no such share."""
+        """Whether enough pairs follow the law, or follow it closely enough, to exclude chance."""
         spare = self.counted - self.parameters
         if self.exact and not self.law.flexible:
             # every pair beside those that columns alone explain is one that chance would have missed
@@ -86,12 +86,12 @@ class Regression:
 
     @property
     def cost(self) -> float:
-        """What is left, of many numbers more than of few."""
+        """Residual times the root of the number of independent columns, in favour of few parameters."""
         return self.left * math.sqrt(self.rank)
 
 
 def regression(e: Evidence, law: Cause) -> Regression:
-    """Regress what the map misses on the columns of a law, beside those of the map."""
+    """Regress the map's residuals on the columns of a law, beside those of the map."""
     columns, turn = law.columns(e), math.nan
     if law.waves:
         turn = driven.frequency(e, columns[0])
@@ -123,13 +123,13 @@ def regression(e: Evidence, law: Cause) -> Regression:
 
 
 def _hats(x: Floats, count: int) -> Floats:
-    """Piecewise linear functions of x that add up to 1, (count, f)."""
+    """Hat functions (count, f) of x, which add up to 1."""
     at = np.linspace(float(np.min(x)), float(np.max(x)), count)
     return np.asarray(np.maximum(0, 1 - np.abs(x - at[:, None]) / ((at[1] - at[0]) or 1.0)))
 
 
 def _in_time(e: Evidence, *carriers: Floats) -> list[Floats]:
-    """Each carrier times piecewise linear functions of time."""
+    """Each carrier times hat functions of time."""
     hats = _hats(np.linspace(-1, 1, e.pairs), min(14, max(4, e.pairs // 8)))
     return [hat * x for x in carriers for hat in hats]
 
@@ -139,8 +139,8 @@ def _alternating(e: Evidence) -> list[Floats]:
 
 
 def _directions(e: Evidence) -> list[Floats]:
-    """Sign of the velocity (f - 1,); NaN near where it turns round, in a step or in a stage of one, and from
-    where it does so in every frame on, or rests: there friction holds it."""
+    """Sign of the velocity (f - 1,).  NaN where it reverses in a step or in a stage of one, and from where it
+    reverses in every frame on, or rests: there friction holds it."""
     old, new = e.states[:-1, 1], e.states[1:, 1]
     clear = (old * new > 0) & (2 * np.minimum(np.abs(old), np.abs(new)) > np.abs(new - old))
     held = np.flatnonzero((old[:-1] * new[:-1] <= 0) & (old[1:] * new[1:] <= 0))
@@ -150,7 +150,7 @@ def _directions(e: Evidence) -> list[Floats]:
 
 
 def _pushed(e: Evidence, found: Regression) -> Floats:
-    """Coefficients (columns, 2) of the next state: those of the map, and what the law adds to them."""
+    """Coefficients (columns, 2) of the next state: those of the map, corrected by the law's regression."""
     whole = found.x.copy()
     whole[:2] += e.found.entries.astype(np.float64).T
     return whole
@@ -183,7 +183,7 @@ def _cubic(e: Evidence, found: Regression) -> str:
 
 
 def _two_maps(e: Evidence, _: Regression) -> str:
-    """Difference between the maps of even and odd frames."""
+    """How the maps of even and odd frames differ, in a sentence."""
     odd = np.arange(e.pairs) % 2 == 1
     halves = [fit(e.record, e.j, kept=mask) for mask in (~odd, odd)]
     left = max(float(np.max(x.residual)) for x in halves)
@@ -300,7 +300,7 @@ LIKE_FRICTION = [x for x in LAWS if x.kind in (OF_VELOCITY, ANHARMONIC) and not 
 
 
 def friction_shows(e: Evidence, part: Match) -> bool:
-    """Whether a friction is left where the columns of a law that is not linear stand beside the map's."""
+    """Whether friction stays significant with the columns of each nonlinear law beside the map's."""
     found, slope = e.found, np.linalg.inv(e.found.entries.astype(np.float64)).T.reshape(4)
     known = math.sqrt(float(slope @ found.covariance @ slope))
     for law in LIKE_FRICTION:
@@ -322,7 +322,7 @@ def friction_shows(e: Evidence, part: Match) -> bool:
 
 
 def explained_by(e: Evidence, found: Regression) -> Explanation:
-    """The law in words."""
+    """Explanation of the residuals by a law."""
     law = found.law
     moved = f"moves a frame by {e.size:.1e} of the state's size in each frame"
     cause = law.cause.format(moved=moved, j=e.j) if isinstance(law.cause, str) else law.cause(e, found)
@@ -332,6 +332,6 @@ def explained_by(e: Evidence, found: Regression) -> Explanation:
 
 
 def alone(law: Cause, e: Evidence) -> list[Explanation]:
-    """The law, where it explains next to everything."""
+    """Explanation by a law that leaves almost no residual; empty otherwise."""
     found = regression(e, law)
     return [explained_by(e, found)] if found.shows and found.left < 1 / FALLS else []

@@ -38,7 +38,7 @@ def _in_both_widths(x: Extended) -> Columns:
 
 
 def _slots(families: tuple[Family, ...]) -> Extended:
-    """Kicks with the drift after each, (slots, 5, F): e, i, x, b, d with the shares in them."""
+    """Kicks, each with the drift after it, (slots, 5, F): e, i, x, b, d, the shares included."""
     rows = [_pairs(family.stages) for family in families]
     most = max((len(row) for row in rows), default=0)
     out = np.zeros((most, 5, len(families)), np.longdouble)
@@ -48,7 +48,7 @@ def _slots(families: tuple[Family, ...]) -> Extended:
 
 
 def _pairs(stages: tuple[Stage, ...]) -> list[Extended]:
-    """Stages as kicks with a drift each, numbers as in `_slots`."""
+    """Stages as pairs of a kick and a drift, numbers as in `_slots`."""
     out: list[Extended] = []
     open_ = False
     for kind, share in stages:
@@ -86,7 +86,7 @@ class MapTable:
     damped: bool
 
     def unit(self, which: Integers, a: Reals, g: Reals) -> Reals:
-        """One-step matrices (c, 2, 2), a and g (c,), in their width."""
+        """One-step matrices (c, 2, 2) for a and g (c,), in their width of float."""
         out = np.zeros((2, 2, len(a)), a.dtype)
         out[0, 0] = out[1, 1] = 1
         present = np.zeros(len(self.families), dtype=bool)
@@ -130,7 +130,8 @@ class MapTable:
         return _rational(over, under, a, g * inside)
 
     def sums(self, which: Integers, a: Reals, g: Reals) -> Reals:
-        """Sums (c, 2, 2) of the sizes of all that a step adds up, which its roundings are relative to."""
+        """Sums (c, 2, 2) of the absolute values of all terms of a step, which its roundings are relative
+        to."""
         out = np.zeros((2, 2, len(a)))
         out[0, 0] = out[1, 1] = 1
         for kind, members in self.kinds:
@@ -167,8 +168,8 @@ class MapTable:
 def _used(
     every: MapTable, present: bytes
 ) -> tuple[int | None, list[tuple[str, NDArray[np.bool_] | None]], list[tuple[int, list[bool]]]]:
-    """What the families of this mask use: the family's number, where it is one alone; kinds of map other than
-    stages, and whose they are, None where all are of it; slots, and which of their numbers are not 0."""
+    """What the families of this mask use: the family's number, where it is the only one; kinds of map other
+    than stages with their members, None where all are of it; slots, and which of their numbers are not 0."""
     those = np.frombuffer(present, dtype=bool)
     at = np.flatnonzero(those)
     kinds = [(kind, None if np.all(of[at]) else of) for kind, of in every.kinds if np.any(of[at])]
@@ -179,7 +180,7 @@ def _used(
 
 @cache
 def table(families: tuple[Family, ...]) -> MapTable:
-    """The families' coefficients."""
+    """Coefficients of the families, for evaluation together."""
     degree = max(len(part) for family in families for part in (*family.stability, (1,)))
 
     def coefficients(row: tuple[Fraction | str, ...]) -> list[np.longdouble]:
@@ -211,7 +212,7 @@ def table(families: tuple[Family, ...]) -> MapTable:
 
 
 def _adds(family: Family) -> bool:
-    """Whether every step adds kicks, drifts or slopes to a state, and multiplies none."""
+    """Whether every step adds kicks, drifts or slopes to a state, and never multiplies it."""
     explicit = bool(family.stages) or len(family.stability[1]) == 1
     return explicit and {kind for kind, _ in family.stages} <= {"kick", "drift", "explicit"}
 
@@ -246,7 +247,7 @@ def _rational(over: Reals, under: Reals, a: Reals, g: Reals) -> Reals:
 
 
 def _exponential(a: Reals, g: Reals) -> Reals:
-    """exp(L), of any damping: L + g/2 is traceless, and its square a multiple of one."""
+    """exp(L) at any damping: L + g/2 is traceless, and its square is a multiple of the identity."""
     w2 = a - g * g / 4
     w = np.sqrt(np.abs(w2))
     even = np.where(w2 >= 0, np.cos(w), np.cosh(np.minimum(w, 1e3)))
@@ -259,10 +260,8 @@ def _exponential(a: Reals, g: Reals) -> Reals:
 
 
 def power(matrices: Reals, strides: Floats) -> Reals:
-    """matrices (c, 2, 2) to the powers strides (c,), from phase and determinant.
-
-    In two to four times less time than `schemes.propagate`, which keeps the digits of 1e7 steps.
-    """
+    """matrices (c, 2, 2) to the powers strides (c,), from phase and determinant.  Two to four times faster
+    than `schemes.propagate`, which keeps the digits of 1e7 steps."""
     found = rotation(matrices)
     s = strides.astype(matrices.dtype)
     root = np.sqrt(np.abs(found.determinant))
@@ -303,7 +302,7 @@ def powers(entries: Extended, frames: int) -> Extended:
 
 
 def _lagging(a: Reals, base: str, steps: int) -> Reals:
-    """The map of (q_n, v_(n + steps)): the same motion, its velocities of another frame."""
+    """Map of (q_n, v_(n + steps)): the same motion, with velocities of another frame."""
     m = unit(FAMILIES[base], a, np.zeros_like(a))
     det = (m[:, 0, 0] * m[:, 1, 1] - m[:, 0, 1] * m[:, 1, 0])[:, None]
     row = m[:, 1, :] if steps > 0 else np.stack([-m[:, 1, 0], m[:, 0, 0]], axis=1) / det
@@ -329,7 +328,7 @@ FORMULAS: dict[str, Callable[[Reals], Reals]] = {
 
 
 def _formula(name: str) -> Callable[[Reals], Reals]:
-    """Formula of the map of a fault, or of a scheme that is stepped."""
+    """The map of a fault, or of a scheme that is stepped, as a function of a."""
     return FORMULAS.get(name) or partial(_stepped, SCHEMES[name])
 
 

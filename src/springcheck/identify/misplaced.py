@@ -32,7 +32,7 @@ Repair = tuple[Record, str, str]
 
 
 def misplaced(e: Evidence) -> list[Explanation]:
-    """The cause, where one map fits as soon as numbers stand in another column, row or unit; else none."""
+    """The cause, where one map fits once numbers are moved to another column, row or sign; otherwise none."""
     before = _left(e.record, e.j)
     if not before:
         return []
@@ -58,13 +58,13 @@ def _left(record: Record, j: int) -> float:
 
 
 def _ways(record: Record, columns: list[int]) -> tuple[Floats, Floats]:
-    """How far positions move between frames (f - 1, n), and how far the mean of their velocities would."""
+    """Displacements between frames (f - 1, n), and those that the mean of their velocities gives."""
     mean = (record.v[1:, columns] + record.v[:-1, columns]) / 2 * record.interval
     return np.diff(record.q[:, columns], axis=0).astype(np.float64), mean.astype(np.float64)
 
 
 def _wrapped(record: Record, j: int) -> Iterator[Repair]:
-    """Positions in a box: leaps of one length."""
+    """Undo positions wrapped into a box: jumps of one length."""
     (moved,), (mean,) = (x.T for x in _ways(record, [j]))
     way, usual = moved - mean, float(np.median(np.abs(moved)))
     leaps = np.abs(way) > LEAPS * max(usual, 1e-300)
@@ -90,7 +90,7 @@ def _wrapped(record: Record, j: int) -> Iterator[Repair]:
 
 
 def unsorted(record: Record) -> list[Explanation]:
-    """Velocities that stand in other columns in every frame, if one map fits each with the right ones."""
+    """Velocities that stand in other columns in every frame, where one map fits each once they are sorted."""
     each = np.flatnonzero(np.ptp(record.q, axis=0) + np.ptp(record.v, axis=0) > 0)
     if not 1 < len(each) <= MOST_COMPARED:
         return []
@@ -110,7 +110,7 @@ def unsorted(record: Record) -> list[Explanation]:
 
 
 def turned(record: Record, moving: list[int]) -> list[Explanation]:
-    """Velocities of the other sign: positions move against them, in frames so close that this shows."""
+    """Velocities of the wrong sign: displacements are opposite to them, in frames close enough to show it."""
     way, mean = _ways(record, moving)
     turn = np.sum((way + mean) ** 2, axis=0) < AGAINST**2 * np.sum(way**2, axis=0)
     against = [j for j, turns in zip(moving, turn, strict=True) if turns]
@@ -126,7 +126,7 @@ def turned(record: Record, moving: list[int]) -> list[Explanation]:
 
 
 def _exchanged(record: Record, j: int) -> Iterator[Repair]:
-    """Numbers of two coordinates that have changed places, in some frames or in all."""
+    """Undo an exchange of the numbers of two coordinates, in some frames or in all."""
     n = record.q.shape[1]
     if not 1 < n <= MOST_COMPARED:
         return
@@ -156,12 +156,12 @@ def _exchanged(record: Record, j: int) -> Iterator[Repair]:
 
 
 def _off(q: Extended, v: Extended, x: Extended, u: Extended, h: np.longdouble) -> float:
-    """Squared distance of a frame from the one before, moved on by the mean of the velocities."""
+    """Squared distance of a frame from the one before, advanced by the mean of the velocities."""
     return float(np.sum((x - q - h * (u + v) / 2) ** 2) + np.sum((h * (u - v)) ** 2))
 
 
 def _nearer(q: Extended, v: Extended, h: np.longdouble) -> bool:
-    """Whether the first velocities are each other's."""
+    """Whether the first velocities of two coordinates are exchanged."""
     way = q[1] - q[0]
     return float(np.sum((way - h * v[0, ::-1]) ** 2)) < float(np.sum((way - h * v[0]) ** 2))
 

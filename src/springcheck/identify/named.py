@@ -46,8 +46,8 @@ VELOCITY_OFFSET = {
 
 
 def named(seen: Measured, explained: Explained, step: float | None) -> Identification:
-    """Identification by the hypotheses that explain every step, of these those that agree with the stated
-    stiffness, `step` and friction; of what only others agree with, why not."""
+    """Identification by the hypotheses that explain every step, restricted to those that agree with the
+    stated stiffness, `step` and friction; where none agrees, with the reason."""
     joints, friction, stride = list(explained), seen.friction, seen.stride
     if (stated := seen.stiffness) is not None:
         bond = of_a_bond(seen.record, seen.moving, stated) if seen.disagreements(joints[0]) else None
@@ -84,13 +84,13 @@ def named(seen: Measured, explained: Explained, step: float | None) -> Identific
 
 
 def _shows_law(seen: Measured, joint: Joint) -> bool:
-    """Whether a drag or a force that is not linear would not fit as well as its friction, if any."""
+    """Whether a quadratic drag or a nonlinear force is excluded as the cause of its friction, if any."""
     each = enumerate(joint.parts)
     return not joint.damped or all(friction_shows(seen.evidence(i), part) for i, part in each)
 
 
 def _known(seen: Measured, explained: Explained, stated_fits: bool) -> Identification:
-    """Identification by hypotheses that explain every step, each with the defects of its steps."""
+    """Identification by hypotheses that explain every step, with the defects of their steps."""
     joints, maps, notes = list(explained), seen.maps, list(seen.notes)
     plainest = joints[0]
     worst = [max(ds, key=lambda d: (d.precision != "double", d.ulp)) for ds in explained.values()]
@@ -157,14 +157,14 @@ def _known(seen: Measured, explained: Explained, stated_fits: bool) -> Identific
 
 
 def difference(found: Map, part: Match) -> tuple[float, ...]:
-    """Measured less predicted entries on (q, v T)."""
+    """Measured minus predicted entries on (q, v T)."""
     off = found.entries.reshape(4) - np.array(part.predicted, dtype=np.longdouble)
     ratio = float(found.size[0] / found.size[1])
     return tuple(float(x) * y for x, y in zip(off, (1, ratio, 1 / ratio, 1), strict=True))
 
 
 def determinants(maps: list[Map], stride: int) -> tuple[tuple[float, ...], float]:
-    """Determinants of one step of each map, and the largest |det - 1| of a map between frames."""
+    """Determinant of one step of each map, and the largest |det - 1| between frames."""
     between = [float(x.entries[0, 0] * x.entries[1, 1] - x.entries[0, 1] * x.entries[1, 0]) for x in maps]
     each = tuple(math.copysign(abs(d) ** (1 / stride), d) for d in between)
     return each, max(abs(d - 1) for d in between)

@@ -46,7 +46,7 @@ LEAPFROG = {
 
 
 def separation(seen: Measured, one: Joint, other: Joint) -> float:
-    """Mahalanobis distance of two schemes' maps, each at its best, by the other's errors."""
+    """Mahalanobis distance between two schemes' best maps, by the other's errors."""
     total = 0.0
     for found, terms, a, b in zip(seen.maps, seen.terms, one.parts, other.parts, strict=True):
         target, first = Target(found, terms), np.zeros(1, np.int64)
@@ -58,10 +58,8 @@ def separation(seen: Measured, one: Joint, other: Joint) -> float:
 
 
 def of_few(record: Record, found: Identification) -> Identification:
-    """Withhold the name where few frames of text or single precision exclude no other scheme.
-
-    Raises IdentificationError where no scheme fits so few.
-    """
+    """Withhold the name where few frames of text or single precision exclude no other scheme.  Raises
+    IdentificationError where no scheme fits so few."""
     if record.fine:
         return found
     fewest, of_text = (FEWEST_OF_TEXT, " of text") if record.text else (FEWEST_STATES - 1, "")
@@ -84,11 +82,12 @@ def of_few(record: Record, found: Identification) -> Identification:
 
 
 def beside_unknown(record: Record, found: Identification, *, stated: bool, seen: bool) -> Identification:
-    """Add "or a scheme that is not known here" where the numbers or times leave room for one.  At a
-    number of steps that nobody stated what lies between two schemes fits as well, and above
-    `CERTAIN_STEPS` none is named; of deep ones a list of many steps says so.  Where the exact flow fits,
-    any scheme fits whose own error does not show; and where the error of the scheme's step, or the law of
-    its friction, is not plainly `seen`, another fits as well."""
+    """Add "or a scheme that is not known here" where the numbers or times do not exclude one.
+
+    With an unknown number of steps, maps between two schemes fit as well, and above `CERTAIN_STEPS` none is
+    named, except for `deep` records.  Where the exact flow fits, so does any scheme of invisible error; and
+    where the error of the scheme's step, or the law of its friction, is not `seen`, another fits as well.
+    """
     few = found.scheme or any(x.stride <= CERTAIN_STEPS for x in found.candidates)
     clear = record.jitter < DEEP
     # what lies between two schemes that the numbers do not tell apart they do not exclude either
@@ -106,9 +105,9 @@ def beside_unknown(record: Record, found: Identification, *, stated: bool, seen:
 
 
 def of_either_sign(found: Identification, against: list[Explanation]) -> Identification:
-    """Withhold the name where positions move against the velocities and the numbers are coarse: a spring so
-    stiff that it nearly comes round between two frames looks like a slow one with the sign of v turned, and a
-    map of few digits fits some scheme on it."""
+    """Withhold the name where positions move against the velocities and the numbers are coarse.  A spring
+    that nearly completes a turn between two frames looks like a slow one with -v, and some scheme fits its
+    map of few digits."""
     if not (found.candidates and against):
         return found
     cause = f"{against[0].cause}; or the motion nearly comes round between two frames: {found.statement}"
@@ -117,7 +116,7 @@ def of_either_sign(found: Identification, against: list[Explanation]) -> Identif
 
 
 def of_stated_friction(found: Identification, stated: float, mass: float) -> Identification:
-    """Say that the stated friction c [M/T] is that of no law: there is one of another size, or none."""
+    """Explain that the stated friction c [M/T] follows no law: the states have another one, or none."""
     rates = sorted(mass * x.friction[0] for x in found.candidates)
     whose = either(list(dict.fromkeys(title(x.scheme) for x in found.candidates))[:4])
     low, high = rates[0], rates[-1]
@@ -137,17 +136,15 @@ def of_stated_friction(found: Identification, stated: float, mass: float) -> Ide
 
 
 def _between(low: float, high: float) -> str:
-    """One number, or the range of the values by several laws of friction."""
+    """One number, or the range of the values under several friction laws."""
     if abs(high - low) <= 1e-6 * abs(high):
         return f"{high:.6g}"
     return f"{low:.5g} to {high:.5g} (by its law)"
 
 
 def of_unasked_friction(found: Identification) -> Identification:
-    """Reject friction that is the mark of a scheme written down wrongly: h k/(n m), n whole.
-
-    Where a scheme without friction has the stated stiffness, nothing is unasked.
-    """
+    """Reject friction that indicates a scheme written down wrongly: h k/(n m), n whole.  A scheme without
+    friction that has the stated stiffness is not rejected."""
     if not found.fits or not found.friction or not found.step or not all(x.law for x in found.candidates):
         return found
     for one in found.candidates:
@@ -172,7 +169,7 @@ def of_unasked_friction(found: Identification) -> Identification:
 
 
 def hidden_friction(record: Record, found: Map) -> float:
-    """Largest rate c/m [1/T] that the map's determinant leaves room for, by chance."""
+    """Largest friction rate c/m [1/T] that is compatible with the map's determinant and its error."""
     gradient = np.linalg.inv(found.entries.astype(np.float64)).T.reshape(4)
     error = math.sqrt(float(gradient @ found.covariance @ gradient))
     loss = abs(math.log(abs(float(np.linalg.det(found.entries.astype(np.float64))))))
@@ -180,7 +177,7 @@ def hidden_friction(record: Record, found: Map) -> float:
 
 
 def same_maps(seen: Measured, joint: Joint) -> list[str]:
-    """Damped springs that have the very same map, and what tells them from the scheme without friction."""
+    """Note on damped springs that have the same map, and what distinguishes them from the undamped scheme."""
     names, record = coincident(joint.scheme), seen.record
     if not names or joint.stride != 1:
         return []
@@ -198,7 +195,7 @@ def same_maps(seen: Measured, joint: Joint) -> list[str]:
 
 
 def untold(seen: Measured, joints: list[Joint]) -> list[str]:
-    """Why several schemes or numbers of steps are left, and what more the states would have to show."""
+    """Why several schemes or numbers of steps remain, and what further data would distinguish them."""
     plainest, record = joints[0], seen.record
     if plainest.scheme == "exact":
         why = "no error of a step is visible: fine steps of many schemes come as near to the exact flow"
@@ -225,7 +222,7 @@ def untold(seen: Measured, joints: list[Joint]) -> list[str]:
 
 
 def _stiffer(one: Joint, other: Joint) -> bool:
-    """Whether a spring differs in stiffness between two schemes for certain."""
+    """Whether two schemes imply stiffnesses that differ for certain."""
     return any(
         abs(a.a * one.stride**2 - b.a * other.stride**2)
         > SURE * (a.a_error * one.stride**2 + b.a_error * other.stride**2)

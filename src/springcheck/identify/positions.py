@@ -103,8 +103,8 @@ def _all_preserve(found: list[Recurrence]) -> bool:
 def _joined(
     found: list[Recurrence], families: tuple[Family, ...], strides: range, wanted: list[float]
 ) -> list[Joint]:
-    """Families and strides that every oscillator may be of, and each spring of the first; those of the others
-    are the nearest to the `wanted` (w T)**2, or where that is 0 of the fewest unseen turns."""
+    """Families and strides that agree with every oscillator, for each spring of the first.  Springs of the
+    others are those nearest to the `wanted` (w T)**2, or where that is 0 of the fewest unseen turns."""
     parts: list[dict[tuple[str, int], list[Match]]] = []
     for x in found:
         own: dict[tuple[str, int], list[Match]] = {}
@@ -125,7 +125,7 @@ def _joined(
 def _first(
     found: list[Recurrence], families: tuple[Family, ...], strides: range, wanted: list[float]
 ) -> list[Joint]:
-    """Join hypotheses of the fewest steps of each family: where more fit as well, they prove nothing."""
+    """Hypotheses of the fewest steps for each family: more steps that fit as well prove nothing."""
     out = _joined(found, families, strides[:1], wanted)
     left = tuple(f for f in families if f.name not in {x.family for x in out})
     if left and len(strides) > 1:
@@ -137,8 +137,8 @@ def _first(
 
 
 def _stated(seen: Measured, joints: list[Joint]) -> tuple[Measured, list[Joint]]:
-    """Hypotheses of the stated stiffness, or where none is, of it with a number in single precision, which
-    is noted."""
+    """Hypotheses of the stated stiffness, or where there are none, of it with a number in single precision,
+    and a note on that."""
     for room in (0.0, SINGLE_ROOM):
         fitting = [x for x in joints if not seen.disagreements(x, room=room)]
         if fitting:
@@ -148,7 +148,7 @@ def _stated(seen: Measured, joints: list[Joint]) -> tuple[Measured, list[Joint]]
 
 
 def _members(joints: list[Joint]) -> list[Joint]:
-    """Every scheme that shares the positions, each number of steps once, of the fewest unseen turns."""
+    """Every scheme with the same positions, once for each number of steps, with the fewest unseen turns."""
     shared = {x[0].name: x for x in classes()}
     out: dict[tuple[str, int], Joint] = {}
     for joint in joints:
@@ -160,7 +160,7 @@ def _members(joints: list[Joint]) -> list[Joint]:
 
 
 def _known(seen: Measured, found: list[Recurrence], kept: list[Joint], known: bool) -> Identification:
-    """Identification of positions that one scheme or several explain."""
+    """Identification of positions that one or several schemes explain."""
     record, notes, joints = seen.record, list(seen.notes), _members(kept)
     candidates = tuple(x for joint in joints for x in candidates_of(seen, joint))
     names = list(dict.fromkeys(x.scheme for x in candidates))
@@ -206,7 +206,7 @@ def _known(seen: Measured, found: list[Recurrence], kept: list[Joint], known: bo
 
 
 def _none(seen: Measured, found: list[Recurrence], joints: list[Joint]) -> Identification:
-    """No scheme, and why; `joints` fit but for what is stated."""
+    """Identification without a scheme, and why; `joints` fit but contradict what is stated."""
     worst = max(found, key=lambda x: x.residual)
     remedy = "compare the order of its stages and their coefficients with the scheme's; velocities show more"
     if any(not x.precision for x in found):

@@ -54,8 +54,8 @@ FORCES: dict[str, tuple[Force, ...]] = {
 
 
 def coarse_forces(record: Record, j: int, found: Map, match: Match, signed: Floats) -> tuple[str, str, bool]:
-    """Precision of forces that leave these misses (f - 1, 2), a note, and whether it is certain; "" where
-    none explains them."""
+    """Precision of forces that explain these residuals (f - 1, 2), a note, and whether it is certain; ""
+    where none explains them."""
     name, note = coarse.sized(record, j, found, match, signed)
     for each in FORCES if name == "mixed" else [name] if name else []:
         if _reproduced(record, j, found, match, each):
@@ -67,7 +67,7 @@ def coarse_forces(record: Record, j: int, found: Map, match: Match, signed: Floa
 
 
 def _reproduced(record: Record, j: int, found: Map, match: Match, precision: str) -> bool:
-    """Whether forces of a precision, in an explicit scheme without friction, explain what frames miss."""
+    """Whether forces of a precision, in an explicit scheme without friction, explain the residuals."""
     family = FAMILIES[match.family]
     if record.mass is None or family.damped or SCHEMES[family.scheme].has("implicit"):
         return False
@@ -78,7 +78,7 @@ def _reproduced(record: Record, j: int, found: Map, match: Match, precision: str
     kick = h * h / mass * QUANTUM
 
     def missed(a: Floats, pull: Pull, *, leaps: bool = False) -> Floats:
-        """What frames miss (c, 2 f - 2) where steps have these (h w)**2 (c, 1)."""
+        """Residuals (c, 2 f - 2) of steps with these (h w)**2 (c, 1)."""
         x, y = (np.broadcast_to(z[:-1], (len(a), len(z) - 1)) for z in (q, v))
         if leaps:
             # stored half a step early, and half a kick of the exact force added where it was read

@@ -56,18 +56,19 @@ class Record:
         return self.q_storage.name == self.v_storage.name == "double"
 
     def quanta(self, j: int) -> Floats:
-        """Distance of neighbouring numbers around each state (f, 2) of an oscillator, on (q, v interval)."""
+        """Spacing of representable numbers at each state (f, 2) of an oscillator, on (q, v interval)."""
         return np.stack([self.q_quantum[:, j], self.v_quantum[:, j] * abs(float(self.interval))], axis=1)
 
     def sigma(self, j: int) -> Floats:
-        """Standard uncertainty (f, 2) of the states (q, v interval) of an oscillator, as they were written;
-        0 in double precision, whose rounding is that of the arithmetic."""
+        """Standard uncertainty (f, 2) of an oscillator's recorded states (q, v interval); 0 in double
+        precision, whose rounding is that of the arithmetic."""
         coarse = [self.q_storage.name != "double", self.v_storage.name != "double"]
         return np.asarray(self.quanta(j) * coarse / np.sqrt(12.0))
 
     @property
     def deep(self) -> bool:
-        """Whether all numbers show roundings of single precision: `fine`, or text with as many digits."""
+        """Whether the states resolve single precision's roundings: `fine`, or decimal text of as many
+        digits."""
         pairs = ((self.q, self.q_quantum), (self.v, self.v_quantum))
         return self.fine or all(
             bool(np.max(quantum) <= DEEP * np.max(np.abs(x))) and x_storage.name not in BINARY
@@ -93,18 +94,16 @@ def _states(x: ArrayLike, name: str, frames: int) -> Floats:
 
 
 def _alive(positions: Floats, moving: Floats) -> int:
-    """Frames until a motion has died down so far that single precision keeps no relative precision of it.
-
-    From there on products underflow, and what is left is no scheme's step any more.
-    """
+    """Number of frames until a motion has decayed so far that products underflow in single precision; from
+    there on the states follow no scheme's step."""
     alive = np.any((np.abs(positions) >= LEAST) & (np.abs(moving) >= LEAST), axis=1)
     last = int(np.flatnonzero(alive)[-1]) if np.any(alive) else 0
     return last + 1 if last + 1 >= FEWEST_STATES else len(positions)
 
 
 def of_size(name: str, x: ArrayLike | None, n: int = 1, *, zero: bool = False) -> Floats | None:
-    """A number that is stated of n oscillators, or of each (n,): a mass of `SIZES`, or what may be a product
-    of two, and 0 where that says something.  Raises IdentificationError."""
+    """Check a stated number of n oscillators, or of each (n,): a mass within `SIZES`, or a product of two
+    such sizes, and 0 only where `zero`.  Raises IdentificationError."""
     if x is None:
         return None
     out = np.ravel(np.asarray(x, dtype=np.float64))
@@ -124,7 +123,8 @@ def of_size(name: str, x: ArrayLike | None, n: int = 1, *, zero: bool = False) -
 def read(
     t: ArrayLike, q: ArrayLike, p: ArrayLike | None, v: ArrayLike | None, mass: ArrayLike | None
 ) -> Record:
-    """Check and order what a caller has: times (f,), positions, and momenta or velocities or both (f, n)."""
+    """Record of times (f,), positions, and momenta or velocities or both (f, n).  Raises
+    IdentificationError."""
     times = np.asarray(t, dtype=np.float64)
     if times.ndim != 1 or not np.all(np.isfinite(times)):
         raise IdentificationError(f"times must be one row of finite numbers; found shape {np.shape(t)}")
@@ -194,7 +194,7 @@ def read(
 
 
 def stated_stride(record: Record, step: float | None, notes: list[str]) -> int | None:
-    """Steps to a frame of a stated step; -1, and a note, where it does not divide the interval."""
+    """Steps between frames by the stated step; -1, and a note, where it does not divide the interval."""
     if step is None:
         return None
     of_size("step", step)

@@ -56,12 +56,12 @@ class Recurrence:
 
     @property
     def preserving(self) -> bool:
-        """Whether areas are kept to within the errors."""
+        """Whether areas are preserved to within the errors."""
         return abs(float(self.beta)) <= ERRORS * math.sqrt(self.covariance[1, 1])
 
 
 def recurrence(record: Record, j: int, steps: int) -> Recurrence:
-    """The recurrence of oscillator j, `steps` to a frame at most."""
+    """Recurrence of oscillator j, with at most `steps` steps between frames."""
     q = record.q[:, j]
     stored = np.maximum(record.q_quantum[:, j] / np.sqrt(12.0), 0.0)
     size = np.abs(q).astype(np.float64)
@@ -116,7 +116,7 @@ def _phase(alpha: np.longdouble, beta: np.longdouble) -> float:
 
 
 def _around(x: Floats) -> Floats:
-    """The largest of each number and its neighbours, three to either side."""
+    """Running maximum over each number and three neighbours on either side."""
     wide = np.pad(x, 3, mode="edge")
     return np.asarray(np.max(np.lib.stride_tricks.sliding_window_view(wide, 7), axis=1))
 
@@ -124,8 +124,8 @@ def _around(x: Floats) -> Floats:
 def _neighbours(
     q: Extended, noise: Floats, slips: Extended | None
 ) -> tuple[np.longdouble, np.longdouble, Floats, Floats]:
-    """alpha, beta, their covariance (2, 2) and what is left over (f - 2,), from neighbouring frames; where
-    steps follow the clock's `slips` these move frames along their way, which the state tells."""
+    """alpha, beta, their covariance (2, 2) and the residuals (f - 2,), from neighbouring frames.  Where steps
+    follow the clock's `slips`, these displace frames along the motion."""
     weight = (1 / noise)[:, None]
     # a motion that grows is not centred by its largest frames
     share = 1 / np.square(noise / np.min(noise))
@@ -156,7 +156,7 @@ def _orbit(
     q: Extended, unit_: Floats, alpha: np.longdouble, beta: np.longdouble
 ) -> tuple[np.longdouble, np.longdouble, Floats] | None:
     """alpha, beta and their covariance from one orbit c + r**n (A cos + B sin)(n phase) of which all frames
-    were rounded once; None where that leaves over more than rounding."""
+    were rounded once; None where the residuals exceed that rounding."""
     frames = len(q)
     values = (q - q[0]).astype(np.float64)
     n = np.arange(frames, dtype=np.float64)
@@ -211,7 +211,7 @@ def recurrence_of(m: Reals) -> tuple[Reals, Reals]:
 
 @cache
 def classes() -> tuple[tuple[Family, ...], ...]:
-    """Schemes without friction whose positions agree for every step, together."""
+    """Classes of undamped schemes whose positions agree for every step."""
     out: list[list[Family]] = []
     for family in distinct(damped=False):
         own = _shape(family)
@@ -223,7 +223,7 @@ def classes() -> tuple[tuple[Family, ...], ...]:
 
 @cache
 def _shape(family: Family) -> Reals:
-    """alpha and beta at three steps."""
+    """alpha and beta (2, 3) of a family at three steps."""
     a = np.array([0.3, 0.7, 1.1])
     return np.stack(recurrence_of(unit(family, a, np.zeros(3))))
 
@@ -249,9 +249,9 @@ class PositionTarget(Target):
 
 
 def matches(found: Recurrence, families: tuple[Family, ...], strides: range) -> list[Match]:
-    """Families (one of each class without friction; any with it) whose recurrence this may be, each number of
-    steps and of unseen turns, and each spring of these: without velocities turns to the left and to the right
-    look alike."""
+    """Families (one of each undamped class; any with friction) that may have this recurrence, with each
+    number of steps and of unseen turns, and each spring.  Without velocities both senses of rotation look
+    alike."""
     every = table(families)
     ways = [(s, i) for s in strides for i in range(max(s, FLOW_TURNS if s == 1 else 1) + 1)]
     s, i = np.array(ways, np.float64).T

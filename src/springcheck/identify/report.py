@@ -39,13 +39,11 @@ def identify_arrays(
     """The scheme that made a trajectory of oscillators, from its states alone.
 
     t (f,) [T]; q (f, n) or (f,) [L]; p [M L/T] or v [L/T] or both, like q.  Where both are given the mass
-    follows from them; where neither is, `positions` says what is left open.  With momenta alone and no mass,
-    symmetric schemes look alike on a spring; the notes say so.  Coupled oscillators are judged by their
-    normal modes.  `mass` [M], `stiffness` [M/T2], `friction` c [M/T] and `step` [T] are what is stated of the
-    trajectory: they are held against it.
-
-    Raises IdentificationError where the states cannot show a map: too few, not finite, at rest, at uneven
-    times, or not spanning the plane.
+    follows from them; where neither is, `positions` reports what is left open.  With momenta alone and no
+    mass, symmetric schemes look alike on a spring, which the notes report.  Coupled oscillators are replaced
+    by their normal modes.  `mass` [M], `stiffness` [M/T2], `friction` c [M/T] and `step` [T] are stated
+    values, which the states are tested against. Raises IdentificationError where the states cannot show a
+    map: too few, not finite, at rest, at uneven times, or not spanning the plane.
     """
     if p is None and v is None:
         return identify_positions(read(t, q, None, np.zeros(np.shape(q)), mass), stiffness, friction, step)
@@ -92,7 +90,7 @@ def _of_record(
 def _of_coordinates(
     record: Record, stiffness: ArrayLike | None, friction: float | None, step: float | None
 ) -> Identification:
-    """Measure maps, hold the schemes against them, and say what those that are left mean."""
+    """Measure maps, compare them with the schemes, and interpret the hypotheses that remain."""
     seen = judged(record, stiffness, friction, step)
     if any(found.drifts for found in seen.maps):
         return _unknown(seen, range(1, 2))
@@ -104,7 +102,8 @@ def _of_coordinates(
 
 
 def _unknown(seen: Measured, strides: range) -> Identification:
-    """No scheme: what may be wrong, and the nearest of these strides, but to velocities of the other sign."""
+    """Identification without a scheme: possible causes, and the nearest scheme of these strides, unless
+    velocities have the wrong sign."""
     maps = seen.maps
 
     def distance(joint: Joint) -> float:

@@ -116,8 +116,8 @@ class Identification:
 
     @property
     def choice(self) -> list[str]:
-        """The schemes of the candidates, each once with its numbers of steps: "rk4, 5 to 9 steps a frame";
-        those that a number alone tells apart together."""
+        """Schemes of the candidates, each once with its numbers of steps: "rk4, 5 to 9 steps a frame".  Names
+        that differ in a number alone are joined."""
         strides: dict[str, set[int]] = {}
         for x in self.candidates:
             strides.setdefault(x.scheme, set()).add(x.stride)
@@ -129,25 +129,25 @@ class Identification:
         return [f"{stem}{_ranges(sorted(counts))}{often}" for (stem, often), counts in alike.items()]
 
     def noting(self, *more: str) -> Identification:
-        """Copy with more remarks."""
+        """Copy with further remarks."""
         return replace(self, notes=(*self.notes, *more))
 
     def doubted(self, statement: str, *more: str, because: tuple[Explanation, ...] = ()) -> Identification:
-        """Copy that names none of its candidates: something else may have made the states as well."""
+        """Copy that names none of its candidates, because something else may have made the states."""
         return replace(
             self.noting(*more), verdict="not told apart", scheme=None, aliases=(), fits=False, undecided=True,
             statement=statement, explanations=because,
         )  # fmt: skip
 
     def refuted(self, statement: str, *because: Explanation) -> Identification:
-        """Copy without candidates: something else made the states."""
+        """Copy without candidates, because something else made the states."""
         return replace(
             self, verdict="none", scheme=None, aliases=(), candidates=(), fits=False, statement=statement,
             explanations=because,
         )  # fmt: skip
 
     def document(self) -> dict[str, Any]:
-        """For JSON: numbers for one oscillator, lists for several, null for what is not known."""
+        """As a JSON document: numbers for one oscillator, lists for several, null for unknown values."""
         return dict(_plain(asdict(self)))
 
 
@@ -160,8 +160,8 @@ def nothing(
     notes: Sequence[str],
     **near: Any,
 ) -> Identification:
-    """No scheme, and why; of `determinant` there is one for each oscillator that moves, and `near` says of
-    the nearest scheme what is known."""
+    """Identification without a scheme, and why.  `determinant` has one value for each moving oscillator;
+    `near` holds what is known of the nearest scheme."""
     unknown = (math.nan,) * len(determinant)
     return Identification(
         verdict="none", statement=explanations[0].cause, friction=unknown, determinant=determinant,
@@ -195,7 +195,7 @@ UNTOLD = "cannot tell"
 
 
 def rounded_by(precision: str) -> str:
-    """What rounds states of a precision, in a sentence: double arithmetic, rounding to 6 digits."""
+    """Cause of the rounding at a precision, as a phrase: double arithmetic, rounding to 6 digits."""
     kind, comma, stored = precision.partition(", ")
     if kind == "text":
         return f"rounding to {precision.replace('text, ', '')}"
@@ -272,7 +272,7 @@ def _numbers(values: tuple[float, ...] | None) -> str:
 
 
 def _range(rows: Sequence[tuple[float, ...]]) -> str:
-    """The values (s, n) that several schemes give one oscillator, from the least to the largest."""
+    """Range of the values (s, n) that several schemes imply for a single oscillator, as text."""
     values = [f"{x:.9g}" for x in sorted(row[0] for row in rows if len(row) == 1)]
     ends = list(dict.fromkeys([values[0], values[-1]] if values else []))
     return " to ".join(ends)

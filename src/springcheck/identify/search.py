@@ -72,7 +72,8 @@ def coincident(name: str) -> tuple[str, ...]:
 
 
 def identical(one: Joint, other: Joint, *, free_scale: bool) -> bool:
-    """Whether two families have the same step, at the unknowns of each: an identity, which no digits undo."""
+    """Whether two families have the same step, each at its own unknowns, so that no digits tell them
+    apart."""
     if one.stride != other.stride:
         return False
     both = FAMILIES[one.family], FAMILIES[other.family]
@@ -98,12 +99,11 @@ class Room:
 
 
 def accounted(seen: Measured) -> tuple[Measured, Explained, bool]:
-    """The hypotheses of which a known arithmetic explains every step, on the terms on which they fit; and
-    whether any fits, explained or not.
+    """The hypotheses of which a known arithmetic explains every step, with the data that they fit, and
+    whether any hypothesis fits, explained or not.
 
-    Tried in turn: the schemes of the catalogue, where digits are few about an equilibrium that does not show
-    as well; the one that begins by another step; of a stated stiffness those that have it; schemes
-    elsewhere; numbers in single precision.
+    Tried in turn: the schemes of the catalogue, in coarse files also about an unseen equilibrium; Verlet with
+    another first step; those that have the stated stiffness; schemes elsewhere; numbers in single precision.
     """
     fine = seen.record.fine
     joints, wide = find(seen)
@@ -152,7 +152,8 @@ def _of_few_steps(found: Explained) -> bool:
 
 
 def _or_elsewhere(seen: Measured, found: Explained) -> Explained:
-    """Schemes that springcheck does not run beside those that it does, where these leave room for them."""
+    """The hypotheses found, beside the schemes that springcheck does not run and the states do not
+    exclude."""
 
     def elsewhere(strides: range) -> Explained:
         joints = seen.compare(KNOWN_ELSEWHERE, strides) or seen.compare(DAMPED_ELSEWHERE, strides)
@@ -179,7 +180,7 @@ def _or_elsewhere(seen: Measured, found: Explained) -> Explained:
 
 
 def _single_parameters(seen: Measured) -> tuple[list[Joint], str]:
-    """Schemes that fit if the step or the mass is the stated one in single precision, and which of them."""
+    """Schemes that fit if the step or the mass was rounded to single precision, and a note on which."""
     record, stride = seen.record, seen.stride
     if record.momenta:
         return [], ""
@@ -199,15 +200,13 @@ def _single_parameters(seen: Measured) -> tuple[list[Joint], str]:
 
 
 def _shortened(x: np.longdouble | float) -> float:
-    """Log of a number in single precision over the number."""
+    """Log of the ratio of a number in single precision to the number."""
     return -float(np.log(over_single(x)))
 
 
 def find(seen: Measured) -> tuple[list[Joint], Measured]:
-    """All families that the states do not exclude, the plainest first, and on the terms that allow for them.
-
-    What is plainer comes first, and ends the search where it fits.
-    """
+    """All families that the states do not exclude, the plainest first, and the terms on which they fit.
+    Plainer hypotheses are tried first, and end the search where they fit."""
     fine, stride = seen.record.fine, seen.stride
     first = (range(stride, stride + 1),) if stride is not None and stride > 0 else ()
     for rooms in _plan(seen):
@@ -230,7 +229,7 @@ def find(seen: Measured) -> tuple[list[Joint], Measured]:
 
 
 def explained(seen: Measured, accepted: list[Joint]) -> Explained:
-    """The schemes of which a known arithmetic explains every step, with the defects of their steps."""
+    """The hypotheses of which a known arithmetic explains every step, with the defects of their steps."""
     left = [x for x in accepted if not FAMILIES[x.family].held or x.substeps[0]]
     of_each: list[list[Defect]] = [[] for _ in left]
     for i, (j, found, what) in enumerate(zip(seen.moving, seen.maps, seen.terms, strict=True)):
@@ -250,8 +249,8 @@ def explained(seen: Measured, accepted: list[Joint]) -> Explained:
 
 
 def _stands_out(seen: Measured, accepted: list[Joint], found: Map, terms: Terms, *, damped: bool) -> bool:
-    """Whether no other map fits, and the error of this one's step is visible; on springs of two stiffnesses
-    two schemes may have one map."""
+    """Whether no other map fits, and the error of this scheme's step is visible.  On springs of two
+    stiffnesses two schemes may have one map."""
     one = accepted[0]
     alone = all(
         (x.scheme, x.stride) == (one.scheme, one.stride) or identical(one, x, free_scale=seen.record.momenta)
@@ -261,14 +260,13 @@ def _stands_out(seen: Measured, accepted: list[Joint], found: Map, terms: Terms,
 
 
 def _plan(seen: Measured) -> list[list[Room]]:
-    """Order of the search: tolerances, the plainest first; what stands together is equally plain.
+    """Order of the search: tolerances, the plainest first, those of one list equally plain.
 
-    Without friction first, and with it where nothing fits.  Coefficients are rounded in double precision,
-    unless the states show that the arithmetic was coarser, or are too few to show that it was not; text
-    does not show it, so there single precision is as plain as friction.  A bias of the size of what single
-    steps leave over comes last: what is one orbit, rounded once, has none.  Coarse numbers make room for
-    other schemes' few steps, so there many are tried before a wider room; with a bias many hide at once, so
-    that none could be named.
+    Undamped first, then damped where nothing fits.  Coefficients are rounded in double precision, unless the
+    states show a coarser arithmetic or are too few to exclude it; text does not show it, so that single
+    precision is as plain as friction there.  A bias of the size of the residuals comes last: one orbit,
+    rounded once, has none.  Coarse numbers admit few steps of other schemes, so that many steps are tried
+    before a wider tolerance; with a bias so many would fit that none could be named.
     """
     record, whole = seen.record, all(found.whole for found in seen.maps)
     residual = max(float(np.max(found.residual)) for found in seen.maps)
@@ -296,9 +294,9 @@ def _plan(seen: Measured) -> list[list[Room]]:
 def _further(seen: Measured, accepted: list[Joint], room: Room) -> list[Joint]:
     """Further hypotheses that the states do not exclude, beside those accepted of few steps to a frame.
 
-    More of them may fit as well: the error of a step falls with their number, and where the exact flow
-    fits, so does any scheme from some number on.  In double precision that is looked at only where few
-    steps leave a choice.  Friction that is hardly needed may still be there.
+    The error of a step falls with the number of steps, so that larger numbers may fit too; where the exact
+    flow fits, so does any scheme from some number on.  In double precision these are tried only where few
+    steps leave a choice.  Friction that is barely significant may still be there.
     """
     out: list[Joint] = []
     open_ended = len(accepted) > 1 or any(x.scheme == "exact" or x.stride == STRIDES[0] for x in accepted)
@@ -310,8 +308,8 @@ def _further(seen: Measured, accepted: list[Joint], room: Room) -> list[Joint]:
 
 
 def _rivals(seen: Measured, fitting: list[Joint], *, many: bool) -> list[Joint]:
-    """Rival hypotheses in coarse files: a force held over substeps is nearly as many steps, and friction
-    may be what steps lose.  What has a fitting scheme's map at one friction must fit better."""
+    """Rival hypotheses in coarse files: a force held over substeps resembles many steps, and friction may
+    explain a loss of area.  A family that contains a fitting scheme's map must fit better than it."""
     losing = many or not any(x.keeps_area and x.chi2 < POOR for x in fitting)
     others = distinct(damped=True) if losing else ()
     same = {name: x.chi2 for x in fitting for name in coincident(x.family)}
@@ -320,10 +318,10 @@ def _rivals(seen: Measured, fitting: list[Joint], *, many: bool) -> list[Joint]:
 
 
 def visible(found: Map, terms: Terms, *, damped: bool) -> bool:
-    """Whether the error of a scheme's step stands far above what the numbers leave over.
+    """Whether the error of a scheme's step is far above the residuals.
 
-    An adaptive solver misses the exact flow by as much as its steps scatter, and then many schemes with
-    many small steps fit within that; a coarse arithmetic does not bring a map nearer to the exact flow.
+    An adaptive solver departs from the exact flow by the scatter of its steps, within which many schemes of
+    many small steps fit; a coarse arithmetic does not bring a map nearer to the exact flow.
     """
     asked = "visible", terms, damped
     if asked not in found.found:
@@ -334,7 +332,7 @@ def visible(found: Map, terms: Terms, *, damped: bool) -> bool:
 
 
 def terms_of(record: Record, j: int, stated: Floats | None) -> Terms:
-    """On what terms the map of oscillator j of a record is compared."""
+    """Conditions on which the map of oscillator j of a record is compared."""
     log_stiffness = None
     if record.momenta and stated is not None and stated[j] > 0:
         log_stiffness = math.log(stated[j] * float(record.interval) ** 2)

@@ -63,7 +63,8 @@ class _Timeless:
 def _one(
     step: Stepper, q: float, p: float, h: float, force: Callable[..., Any], mass: float
 ) -> tuple[float, float]:
-    """One step of the student's; numbers first, arrays of one particle where it wants to index them."""
+    """One step of the stepper on numbers, or on arrays of one particle where it needs to index them.  Raises
+    MethodError."""
     force = _Timeless(force)
     try:
         try:
@@ -112,7 +113,7 @@ def _spring(k: float) -> Callable[..., Any]:
 def _identified(
     step: Stepper, spring: tuple[float, ...] = SPRINGS[0], frames: int = FRAMES, way: int = 1, clock: int = 1
 ) -> Identification:
-    """The scheme of a stepper on a spring (m, k, h) whose steps go this way, and the clock that way."""
+    """Identify a stepper on a spring (m, k, h) with steps of sign `way` and times of sign `clock`."""
     m, k, h = spring
     t, q, p = _run(step, _spring(k), m, way * h, (1.3, 0.7 * m), frames)
     return identify_arrays(way * clock * t, q, p, mass=m, stiffness=k, step=clock * h)
@@ -129,12 +130,10 @@ def _step(
 def identify_stepper(step: Stepper) -> Identification:
     """Which scheme a callable ``step(q, p, h, force, mass) -> (q, p)`` is, and what is wrong with it.
 
-    It is driven over three springs of uneven mass, stiffness and step, backwards in time, and over an
-    anharmonic well, where the order of a scheme shows that on a spring can look higher than it is.
-    ``force`` may be called as force(q), force(q, p) or force(q, p, t), and knows the time at which the step
-    starts as ``force.t``.  The numbers are those of the first spring.
-
-    Raises MethodError where the callable fails or returns no pair of finite numbers.
+    It is run on three springs of uneven mass, stiffness and step, backwards in time, and on a quartic
+    potential: a spring alone can overestimate the order of a scheme.  ``force`` may be called as force(q),
+    force(q, p) or force(q, p, t); ``force.t`` is the time at which the step starts.  The numbers are those of
+    the first spring. Raises MethodError where the callable fails or returns no pair of finite numbers.
     """
     results: list[Identification] = []
     for spring in SPRINGS:
@@ -184,8 +183,8 @@ def identify_stepper(step: Stepper) -> Identification:
 
 
 def _on_a_well(step: Stepper, found: Identification) -> Identification:
-    """Which of the schemes that have one map on a spring takes the stepper's step in a quartic well: the name
-    is that one's, or nobody's where it is none that is known here."""
+    """Name the scheme, of those with one map on a spring, whose step the stepper takes in a quartic
+    potential, or withhold the name where none does."""
     m, b, q, p, duration = WELL
     scene = Scene(
         m=np.array([m]), q=np.array([q]), p=np.array([p]),
@@ -214,7 +213,7 @@ def _on_a_well(step: Stepper, found: Identification) -> Identification:
 
 
 def _on_springs(step: Stepper, results: list[Identification]) -> list[Explanation]:
-    """What the springs after the first show of a scheme that fits on it, or of a method with parameters."""
+    """What the further springs show of a scheme that fits on the first, or of a method with parameters."""
     if not results[0].fits:
         return _parameters(step, results[0])
     if len({x.scheme for x in results}) == 1:
@@ -239,7 +238,7 @@ def _on_springs(step: Stepper, results: list[Identification]) -> list[Explanatio
 
 
 def _parameters(step: Stepper, found: Identification) -> list[Explanation]:
-    """Refute a method whose parameters, read from the first spring, are others on the next ones."""
+    """Refute a method whose parameters, read from the first spring, differ on the others."""
     read = [_parametric(found)]
     for spring in SPRINGS[1:] if read[0] else ():
         try:
@@ -254,7 +253,7 @@ def _parameters(step: Stepper, found: Identification) -> list[Explanation]:
 
 
 def _parametric(found: Identification) -> str:
-    """The method with parameters of which a map would be; "" where it is of none."""
+    """Method with parameters that would have the map, as named in the explanation; "" where there is none."""
     cause = found.explanations[0].cause if found.explanations else ""
     return cause.partition(MAP_OF)[2].partition(";")[0]
 
@@ -269,7 +268,7 @@ def _unasked_friction(found: Identification) -> list[Explanation]:
 
 
 def _leaps(step: Stepper) -> Explanation | None:
-    """Explain positions that are put back into a box: linear in where a step starts, but for equal leaps."""
+    """Explain positions wrapped into a box: linear in the starting position, except for equal jumps."""
     m, k, h = SPRINGS[0]
     places = np.linspace(-ALONG, ALONG, MANY_PLACES)
     moved = np.diff([_one(step, q, 0.7 * m, h, _spring(k), m)[0] for q in places])
@@ -284,13 +283,13 @@ def _leaps(step: Stepper) -> Explanation | None:
 
 
 def _draws(step: Stepper) -> bool:
-    """Whether a third call from one state still gives another result than the second."""
+    """Whether a third call from one state still differs from the second, as with random numbers."""
     _, one, other = (_step(step) for _ in range(3))
     return one != other
 
 
 def _short(step: Stepper) -> list[Explanation]:
-    """Terms linear in h whose weights do not add up to 1: no scheme, whatever its order."""
+    """Terms linear in h whose weights do not add up to 1: inconsistent, whatever its order."""
     (m, k, _), (h, most) = SPRINGS[0], TINY_STEP
     q, p = _step(step, h)
     drift, kick = (q - 1.3) / (h * 0.7), (p - 0.7 * m) / (-h * k * 1.3)
@@ -306,7 +305,7 @@ def _short(step: Stepper) -> list[Explanation]:
 
 
 def _calls(step: Stepper) -> int:
-    """Evaluations of the force in a step."""
+    """Number of force evaluations in a step."""
     calls: list[Any] = []
 
     def force(q: Any, p: Any = 0.0) -> Any:
@@ -318,7 +317,7 @@ def _calls(step: Stepper) -> int:
 
 
 def _backwards(step: Stepper, found: Identification) -> list[Explanation]:
-    """Test a negative step: explanations where it does not go backwards by the same scheme."""
+    """Explanations of a negative step that does not go backwards by the same scheme."""
     back = _identified(step, way=-1, clock=-1)
     if back.scheme == found.scheme:
         return []
@@ -330,7 +329,8 @@ def _backwards(step: Stepper, found: Identification) -> list[Explanation]:
 
 
 def _order(step: Stepper) -> tuple[float, float]:
-    """Slope of log error against log step on a quartic well, with its standard error; NaN where unseen."""
+    """Slope of log error against log step on a quartic potential, with its standard error; NaN where none
+    shows."""
     from scipy.integrate import solve_ivp
 
     m, b, q0, p0, duration = WELL

@@ -42,7 +42,7 @@ class Storage:
     """Digits after the point, where that is what is constant."""
 
     def quantum(self, x: Floats) -> Floats:
-        """Distance of neighbouring numbers around x that the storage can hold."""
+        """Spacing of the representable numbers around x."""
         if self.decimals is not None:
             return np.full(x.shape, 10.0**-self.decimals)
         if self.digits:
@@ -54,20 +54,20 @@ class Storage:
 
 
 def _spacing(x: Floats, name: str) -> Floats:
-    """Distance of neighbouring numbers of a binary format around x."""
+    """Spacing of the numbers of a binary format around x."""
     _, exponent = np.frexp(x)
     return np.asarray(np.ldexp(1.0, np.maximum(exponent - BINARY[name], SMALLEST[name])))
 
 
 def _rounded(x: Floats, name: str) -> Floats:
-    """Numbers of a binary format, nearest to x."""
+    """x rounded to the nearest numbers of a binary format."""
     unit = _spacing(x, name)
     return np.asarray(np.rint(x / unit) * unit)
 
 
 def single_of(x: Floats, digits: int = 0) -> bool:
-    """Whether x are numbers of single precision: within an ulp of double, as a conversion of units leaves
-    them, or within the rounding of so many decimal digits that they were written with."""
+    """Whether x are numbers of single precision: within an ulp of double, as after a conversion of units, or
+    within the rounding of the decimal digits that they were written with."""
     x = x[x != 0]
     off = np.abs(_rounded(x, "single") - x)
     if np.all(off <= 2.0**-51 * np.abs(x)):
@@ -82,7 +82,7 @@ def single_of(x: Floats, digits: int = 0) -> bool:
 
 
 def storage(x: Floats) -> Storage:
-    """Detect the format of x from the numbers themselves."""
+    """Detect the storage format of x from the numbers themselves."""
     values = np.ravel(x)
     values = values[values != 0]
     if len(np.unique(np.abs(values))) < FEWEST_VALUES:

@@ -23,11 +23,9 @@ STEPS = 24
 def takers(
     names: Iterable[str], scene: Scene, h: float, q: Reals, p: Reals, least: float = 2.0**-49
 ) -> tuple[str, ...]:
-    """The schemes of `names` that take each row of q, p (f, n) to the next one by a step of h [T].
-
-    The error of a step is what two of half its length differ by.  `least` is the distance from a scheme's
-    step, relative to the state, that may be rounding.
-    """
+    """The schemes of `names` that take each row of q, p (f, n) to the next by a step of h [T].  The error of
+    a step is estimated by two of half its length.  `least` is the distance from a scheme's step, relative to
+    the state, that may be rounding."""
     start, end = (q[:-1].astype(np.longdouble), p[:-1].astype(np.longdouble)), (q[1:], p[1:])
     size = [np.max(np.abs(x), axis=1, keepdims=True) for x in end]
     found = []
@@ -45,8 +43,8 @@ def takers(
 
 
 def seen_to_take(scene: Scene, run: Trajectory, about: int) -> str:
-    """The schemes of the catalogue that take the recorded steps about a frame, in a sentence; "" for none,
-    and where not all forces are potentials or steps lie between frames."""
+    """One sentence on the schemes of the catalogue that take the recorded steps around a frame; "" where none
+    does, where not all forces are potentials, and where frames are several steps apart."""
     if run.every != 1 or any(term.kind != "potential" for term in scene.terms):
         return ""
     first = max(0, min(about - STEPS // 2, len(run.t) - STEPS))

@@ -34,8 +34,7 @@ REMEDY = "record every step, each oscillator by itself, with the velocities that
 def explained(
     found: Identification, t: Any, q: Any, p: Any, v: Any, mass: Any, **stated: Any
 ) -> Identification:
-    """Identify a bath in states (f, n) at times t (f,) that no scheme explains; else what was found
-    before."""
+    """Identification of a bath in states (f, n) at times t (f,) that no scheme explains, or `found`."""
     given = _given(t, q, p, v, mass)
     if given is None:
         return found
@@ -49,8 +48,8 @@ def of_bath(
 ) -> Identification | None:
     """Identification of the thermostat of states (f, n) at times t (f,); None where nothing random shows.
 
-    `mixed` says that several draws act on each coordinate, whose distribution then does not show.  The
-    `stiffness`, `friction` c and `step` that are `stated` are held against what each scheme would mean.
+    With `mixed` several draws act on each coordinate, whose distribution then does not show.  The stated
+    `stiffness`, `friction` c and `step` are compared with what each scheme implies.
     """
     given = _given(t, q, p, v, mass)
     if given is None:
@@ -78,7 +77,7 @@ def of_bath(
 
 
 def _given(t: Any, q: Any, p: Any, v: Any, mass: Any) -> tuple[Floats, Floats, Floats, Floats] | None:
-    """Times (f,), positions and velocities (f, n) and masses (n,) that a bath may be seen in, or None."""
+    """Times (f,), positions and velocities (f, n) and masses (n,) in which a bath may show, or None."""
     times, positions = np.asarray(t, np.float64), np.asarray(q, np.float64)
     u = np.asarray(p if v is None else v, np.float64)
     if times.ndim != 1 or len(times) < FEWEST or positions.shape != u.shape or len(positions) != len(times):
@@ -96,7 +95,7 @@ def _given(t: Any, q: Any, p: Any, v: Any, mass: Any) -> tuple[Floats, Floats, F
 
 
 def _against(one: Any, first: Thermal, h: float, m: float, stated: Mapping[str, Any]) -> list[str]:
-    """What is stated and is not so if this candidate made the states; m is 0 where no mass is known."""
+    """Stated numbers that this candidate contradicts, as phrases; m is 0 where no mass is known."""
     steps = [h / stride for stride in one.strides]
     step = min(steps, key=lambda x: abs(x - (stated.get("step") or x)))
     # a standard error that was not worked out, NaN, is the best candidate's, whose noise is the same
@@ -226,13 +225,13 @@ def _said(
 
 
 def _counts(names: list[str]) -> str:
-    """A family of schemes that are told by a count of substeps."""
+    """Name of a family of schemes that differ in their number of substeps, with the range."""
     (stem, _), counts = family_of(names[0]), sorted(family_of(x)[1] for x in names)
     return f"{stem}{counts[0]} to {counts[-1]}{' or more' if counts[-1] == SUBSTEPS_TRIED[-1] else ''}"
 
 
 def _with_strides(name: str, strides: tuple[int, ...]) -> str:
-    """A scheme and the steps from frame to frame that it leaves open."""
+    """A scheme's name with the range of its steps per frame."""
     if strides == (1,):
         return name
     low, high = min(strides), max(strides)
@@ -240,7 +239,7 @@ def _with_strides(name: str, strides: tuple[int, ...]) -> str:
 
 
 def _numbers(name: str, one: Any, m: float | None) -> str:
-    """The numbers that a candidate means, each with its standard error."""
+    """The numbers that a candidate implies, each with its standard error."""
     scale = 1.0 if m is None else m
     of = (
         ("omega", one.omega, one.omega_error), ("friction", one.friction, one.friction_error),
@@ -252,7 +251,7 @@ def _numbers(name: str, one: Any, m: float | None) -> str:
 
 
 def _measured(x: float, error: float) -> str:
-    """A number to a digit more than its error leaves it."""
+    """A number to one digit beyond its error."""
     if not (0 < error < abs(x)):
         return f"{x:.12g}" + (f" +- {error:.1g}" if error > 0 else "")
     digits = math.floor(math.log10(abs(x))) - math.floor(math.log10(error)) + 2

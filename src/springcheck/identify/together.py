@@ -23,11 +23,9 @@ OF_A_BOND = (
 
 
 def of_a_bond(record: Record, moving: list[int], stated: Floats) -> Floats | None:
-    """The stiffness of each coordinate (n,) where the stated one is that of a bond between two particles at
-    rest as a whole: k m_j/mu, mu the reduced mass; None where the states are no pair's.
-
-    The momenta of one half of the coordinates are opposite to those of the other half in every frame.
-    """
+    """Stiffness of each coordinate (n,) where the stated one is that of a bond between two particles at rest
+    as a whole: k m_j/mu, mu the reduced mass; None where the states are no pair's.  Such momenta of one half
+    of the coordinates are opposite to those of the other half in every frame."""
     half = len(moving) // 2
     if record.mass is None or len(moving) % 2 or not half:
         return None
@@ -46,7 +44,7 @@ def of_a_bond(record: Record, moving: list[int], stated: Floats) -> Floats | Non
 
 
 def at_rest(record: Record, found: Identification) -> Identification:
-    """Note the stiffness of the bond of two particles in space, at rest as a whole: that of each
+    """Note the stiffness of the bond of two particles in space whose centre of mass rests: that of each
     coordinate is k m/mu, mu the reduced mass."""
     n = record.q.shape[1]
     moving = np.flatnonzero(np.ptp(record.q, axis=0) + np.ptp(record.v, axis=0) > 0)
@@ -73,8 +71,7 @@ OF_A_PAIR = f"{BOUND}, which swing along their line: their distance is judged"
 
 
 def of_a_pair(record: Record, found: Identification) -> Identification:
-    """Note that the distance of two particles was judged, and the stiffness of their bond where their
-    masses are known."""
+    """Note that the distance of two particles was judged, and their bond's stiffness if masses are known."""
     note = OF_A_PAIR
     if record.mass is not None and found.scheme and found.omega:
         moving = np.flatnonzero(np.ptp(record.q, axis=0) > 0)
@@ -84,10 +81,10 @@ def of_a_pair(record: Record, found: Identification) -> Identification:
 
 
 def distance(record: Record) -> Record | None:
-    """The distance of two particles that swing along their line, in any direction, while their middle rests
-    or moves at a constant velocity; None of any other states.
+    """Distance of two particles that oscillate along their line, in any direction, while their centre of mass
+    rests or moves at constant velocity, as a record; None for other states.
 
-    Each coordinate swings about a place that moves; in single precision the middle and the direction walk.
+    In single precision the centre of mass and the direction walk at random.
     """
     moving = np.flatnonzero(np.ptp(record.q, axis=0) + np.ptp(record.v, axis=0) > 0)
     half = len(moving) // 2
@@ -125,7 +122,7 @@ def distance(record: Record) -> Record | None:
 
 
 def of_rotation(record: Record, found: Identification) -> Identification:
-    """Check for a rotation, which springs may explain as well, or which is there where no scheme fits."""
+    """Look for a rotation, which springs may explain as well, or which is there where no scheme fits."""
     if found.explanations and (cause := (not found.fits and unsorted(record)) or of_plane(record)):
         return replace(found, statement=cause[0].cause, explanations=tuple(cause))
     if not found.fits or (pair := _turning(record)) is None:
@@ -142,11 +139,9 @@ def of_rotation(record: Record, found: Identification) -> Identification:
 
 
 def _turning(record: Record) -> tuple[int, int, complex] | None:
-    """Two coordinates whose velocity (v_i + i v_j) is multiplied by the same number from frame to frame,
-    and that number, not real; None where there are none.
-
-    A charge in a magnetic field moves so, and a circular orbit about an isotropic spring.
-    """
+    """Two coordinates whose complex velocity v_i + i v_j is multiplied by one constant factor, not real, in
+    every frame, and that factor; None where there are none.  A charge in a magnetic field moves so, and a
+    circular orbit about an isotropic spring."""
     v = record.v.astype(np.float64)
     for i, j in combinations(range(min(v.shape[1], MOST_COMPARED)), 2):
         w = v[:, i] + 1j * v[:, j]
@@ -174,11 +169,11 @@ BORIS_AGREES = 1e-10
 
 
 def of_plane(record: Record) -> list[Explanation]:
-    """Explain by a rotation of two coordinates into each other, of the first pair that it alone couples: a
-    magnetic field across their plane, or a turning frame.
+    """Explain the first pair of coordinates that a rotation alone couples: a magnetic field across their
+    plane, or a rotating frame.
 
-    With z = x + i y, on springs alike along both axes, a frame takes (z, z') to A (z, z') with a complex A,
-    where without a field A is real.  The phase of its determinant is the angle by which it turns a velocity.
+    With z = x + i y, on isotropic springs, a frame takes (z, z') to A (z, z') with a complex A, which is real
+    without a field.  The phase of its determinant is the angle by which it turns a velocity.
     """
     moving = np.flatnonzero(np.ptp(record.q, axis=0) + np.ptp(record.v, axis=0) > 0)
     for i, j in combinations(moving[:MOST_COMPARED].tolist(), 2):
@@ -230,6 +225,6 @@ def _of_two(record: Record, i: int, j: int) -> list[Explanation]:
 
 
 def _boris(stiff: float, turn: complex) -> NDArray[np.complex128]:
-    """Its map of (z, z' h) by (h w)**2 and the factor exp(-2 i atan(W h/2)) of the velocity."""
+    """Map of Boris' scheme on (z, z' h), by (h w)**2 and the factor exp(-2 i atan(W h/2)) of the velocity."""
     drift, kick = np.array([[1, 0.5], [0, 1]]), np.array([[1, 0], [-stiff / 2, 1]])
     return np.asarray(drift @ kick @ np.diag([1, turn]) @ kick @ drift, np.complex128)

@@ -44,7 +44,7 @@ FEWEST_WITH_MEMORY = 12
 
 
 def misfit(e: Evidence) -> Explanation:
-    """The class of a map that is no known scheme's, and how large the misfit is."""
+    """Explanation by the class of a map that is no known scheme's, with the size of the misfit."""
     q, v = e.found.z[1:].astype(np.float64).T
     slope = float(q @ v / (q @ q)) if np.any(q) else 0.0
     if slope and np.all(np.abs(v - slope * q) <= 8 * e.unit):
@@ -78,12 +78,12 @@ def misfit(e: Evidence) -> Explanation:
 
 
 def _class(e: Evidence) -> str:
-    """Class of a one-step method, read from its map of a spring; "" where it is none's.
+    """Class of a one-step method, from its map of a spring; "" where it has none.
 
     A Runge-Kutta method takes (q, v) by R(h L), which is x + y L with L**2 = -w**2, so that M11 = M22 and
-    M12, M21 show (h w)**2; R(i h w) less exp(i h w) is c (i h w)**n with a real c, and order n - 1.
-    The theta method's (1 + (1 - theta) z)/(1 - theta z) gives a real theta.  Newmark's method has
-    M12 = 1/(1 + beta a), M11 = 1 - a M12/2, M22 = 1 - gamma a M12 on (q, h v), and M21 to hold it against.
+    M12, M21 show (h w)**2; R(i h w) - exp(i h w) is c (i h w)**n with a real c, and order n - 1. The theta
+    method's (1 + (1 - theta) z)/(1 - theta z) gives a real theta.  Newmark's method has M12 = 1/(1 + beta a),
+    M11 = 1 - a M12/2, M22 = 1 - gamma a M12 on (q, h v), and M21 to test it by.
     """
     if e.terms.mass_unknown:
         return ""
@@ -134,7 +134,7 @@ def _class(e: Evidence) -> str:
 
 
 def by_parameter(e: Evidence) -> str:
-    """The method with a parameter that has the map of every step; "" where none has."""
+    """The method with a parameter that has the map of every step; "" where there is none."""
     kind = _class(e)
     return kind.removeprefix(MAP_OF) if kind.startswith(MAP_OF) else ""
 
@@ -149,10 +149,8 @@ TWO_STEPS = Cause(
 
 
 def memory(e: Evidence) -> list[Explanation]:
-    """Two states that together give the next, where one does not: a scheme of two steps, whose memory dies.
-
-    What one map misses stands in the first frames then, and not in the first pair alone.
-    """
+    """Explain states that follow from the two before: a scheme of two steps, or one whose memory dies.  The
+    residuals of one map are then in the first frames, and not in the first pair alone."""
     size, off = np.max(np.abs(e.states[1:]), axis=1), np.max(np.abs(e.misses), axis=1)
     if len(e.states) < FEWEST_WITH_MEMORY or np.min(size) < 1e-100 * np.max(size):
         return []
@@ -188,8 +186,8 @@ def memory(e: Evidence) -> list[Explanation]:
 
 
 def _many_steps(rho: list[float], sigma: list[float], x: Floats) -> Floats:
-    """Map of (q, v h) of a linear multistep method, rho(E) y = h L sigma(E) y, once its start is
-    forgotten, by the root of rho - z sigma that comes nearest to exp(z); x is (h w)**2."""
+    """Map of (q, v h) of a linear multistep method, rho(E) y = h L sigma(E) y, after its start-up transient,
+    by the root of rho - z sigma nearest to exp(z); x is (h w)**2."""
     z = 1j * math.sqrt(max(x[0], 1e-300))
     roots = np.roots(np.array(rho) - z * np.array(sigma))
     r = roots[np.argmin(np.abs(roots - np.exp(z)))]
@@ -198,7 +196,7 @@ def _many_steps(rho: list[float], sigma: list[float], x: Floats) -> Floats:
 
 def _generalised(shares: Callable[[float], tuple[float, float]], x: Floats) -> Floats:
     """Map of the generalised alpha method (Chung & Hulbert, J. Appl. Mech. 60 (1993) 371), of second order
-    and least damping, by the shares alpha_m and alpha_f of the parameter x[1]; x[0] is (h w)**2."""
+    and least damping, by its alpha_m and alpha_f as functions of the parameter x[1]; x[0] is (h w)**2."""
     a, (m, f) = x[0], shares(x[1])
     gamma, beta = 0.5 - m + f, (1 - m + f) ** 2 / 4
     whole = 1 - m + (1 - f) * a * beta
@@ -232,7 +230,7 @@ PARAMETERS = 0.05, 0.3, 0.6, 0.9
 
 
 def _remembered(e: Evidence, found: Map) -> list[str]:
-    """The schemes with memory that a map, of frames whose start is forgotten, is of."""
+    """Schemes with memory that have the map of frames after the start-up transient."""
     from scipy.optimize import least_squares
 
     entries, error = found.unscaled.astype(np.float64).ravel(), np.sqrt(np.diag(found.covariance))

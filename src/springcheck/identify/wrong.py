@@ -20,21 +20,21 @@ from springcheck.text.wording import either
 
 @cache
 def _faults() -> tuple[Family, ...]:
-    """Faults whose map is no scheme's: velocities a step ahead of a kick-drift scheme are drift-kick."""
+    """Faults with a map of their own, unlike kick-drift with velocities a step ahead, which is drift-kick."""
     return tuple(f for f in FAULTS if not any(same_map(f, scheme) for scheme in distinct(damped=False)))
 
 
 @cache
 def faults_like(scheme: str) -> tuple[Family, ...]:
-    """Faults whose map is this scheme's."""
+    """Faults that have this scheme's map."""
     return tuple(f for f in FAULTS if same_map(f, FAMILIES[scheme]))
 
 
 def wrong_map(e: Evidence) -> list[Explanation]:
-    """Schemes that are written down wrongly; friction of the wrong sign; held forces; wrong scales.
+    """Schemes written down wrongly, friction of the wrong sign, held forces, wrong scales.
 
-    Where a scheme has the map itself, a fault that has it too is that scheme on another spring: none, but
-    with a stiffness that is stated.
+    A fault that has a scheme's map is that scheme on another spring, and is no explanation unless the
+    stiffness is stated.
     """
     ranked: list[tuple[int, Explanation]] = []
     fitting = matched(e.found, e.terms)
@@ -73,7 +73,8 @@ def _departing(e: Evidence, scheme: str) -> Explanation:
 
 
 def _rank(e: Evidence, joint: Joint) -> int:
-    """0 for a fault that is nothing else and of the stated stiffness, 3 where the stiffness is another."""
+    """0 for a fault of the stated stiffness, or of one step to a frame where none is stated; 3 for another
+    stiffness, 2 for more steps."""
     if (stated := e.stated) is None:
         return 0 if joint.stride == 1 else 2
     part = joint.parts[0]
@@ -131,7 +132,7 @@ def _times(factor: float) -> str:
 
 
 def _scales(e: Evidence) -> tuple[list[Explanation], bool]:
-    """Schemes that fit once velocities have another scale, what that scale means, and whether it is one: a
+    """Schemes that fit once velocities are rescaled, what the scale means, and whether it means something: a
     known factor, or that of the stated stiffness."""
     if e.terms.mass_unknown:
         return [], False
@@ -176,7 +177,7 @@ def _scales(e: Evidence) -> tuple[list[Explanation], bool]:
 
 def _meaning(e: Evidence, x: Joint) -> tuple[bool, str, str] | None:
     """Meaning of a scale of the velocities, by the mass, the stated stiffness and well-known factors: whether
-    the stated stiffness agrees with it, what it means, and what to do."""
+    it agrees with the stated stiffness, the meaning, and what to do."""
     part = x.parts[0]
     scale = math.exp(-part.log_mass)
     known = 6 * (part.mass_error + part.a_error / abs(part.a)) + e.record.jitter + 32 * ROUNDING
@@ -196,8 +197,8 @@ def _meaning(e: Evidence, x: Joint) -> tuple[bool, str, str] | None:
 def _meanings(
     scale: float, mass: float, h: float, *, stated: bool
 ) -> list[tuple[float | None, int | None, str, str]]:
-    """What a scale of the velocities may mean: the scale that means it, and the power of the scale that the
-    stiffness is times the stated one, None where either may be any; the meaning, and what to do."""
+    """Possible meanings of a scale of the velocities: the scale, and the power of it by which the stiffness
+    differs from the stated one, None where either may be any; the meaning, and what to do."""
     large, factor = f", but velocities would have to be {scale:.6g} times as large: ", _times(1 / scale)
     taken = f"{1 / scale:.6g} times what was stepped: the step taken is {scale:.6g} times theirs"
     if abs(scale - 1) <= 1e-2:
@@ -223,7 +224,7 @@ def _meanings(
 
 
 def faults_of(seen: Measured, friction: float | None) -> list[Explanation]:
-    """Schemes written down wrongly of the stated stiffness and friction, where a right one has others."""
+    """Wrong schemes that have the stated stiffness and friction, where a right one has others."""
     e = seen.evidence(0)
     rate = None if friction is None or e.record.mass is None else friction / float(e.record.mass[e.j])
     joints = compare([e.found], [e.terms], _faults(), range(1, 3))

@@ -1,1 +1,1 @@
-"""The physics of a scene: its data, its terms, what follows from them, and the exact solution."""
+"""The physics of a scene: its data, its terms, quantities derived from them, and the exact solution."""

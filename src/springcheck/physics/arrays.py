@@ -7,7 +7,7 @@ q, p   positions and momenta, (n,) for one state, (f, n) for a trajectory   [L],
 m, k   mass and stiffness                                                   [M], [M/T2]
 h, t   step and time                                                        [T]
 w      angular frequency; w2 its square; a = (h w)**2                       [1/T]
-n      particles (degrees of freedom); every motion is along one line
+n      coordinates (degrees of freedom), each along one axis; on a line one for each particle
 f      frames, the recorded states of a trajectory; frame 0 is the start
 =====  ==========================================================================================
 
@@ -29,7 +29,7 @@ from springcheck.errors import SpringcheckError
 Floats: TypeAlias = NDArray[np.float64]
 Extended: TypeAlias = NDArray[np.longdouble]
 Reals: TypeAlias = NDArray[np.floating[Any]]
-"""Real numbers of any width: what is computed comes back in the width that came in."""
+"""Real numbers of any width; results have the width of the arguments."""
 
 ROUNDOFF = float(np.finfo(np.longdouble).eps) / 2
 """Unit roundoff of `Extended`, in which every reference is computed: 2**-64 on x86-64, 2**-53 where
@@ -39,7 +39,7 @@ EPS = 2 * ROUNDOFF
 """Spacing of the numbers above 1 in extended precision: 1.1e-19 on x86-64."""
 
 WIDE = ROUNDOFF < 2.0**-53
-"""Whether a reference has digits that an engine has not."""
+"""Whether references have more digits than engines."""
 
 Integers: TypeAlias = NDArray[np.int64]
 Force: TypeAlias = Callable[[Reals, Reals], Reals]
@@ -49,9 +49,9 @@ Class = TypeVar("Class")
 
 
 def by_identity(kind: type[Class]) -> type[Class]:
-    """Class decorator: an object is equal to itself alone.
+    """Class decorator: an object equals itself alone.
 
-    A NamedTuple compares its fields one by one, and two arrays have no one answer.
+    A NamedTuple would compare its fields one by one, and the comparison of arrays has no single truth value.
     """
     for name in ("__eq__", "__ne__", "__hash__"):
         setattr(kind, name, getattr(object, name))
@@ -59,7 +59,7 @@ def by_identity(kind: type[Class]) -> type[Class]:
 
 
 AS_WRITTEN = "as written"
-"""The name of the arithmetic of numbers in a file, whose decimals are seen in them."""
+"""Name of the arithmetic of numbers in a file, whose digits are read from the numbers themselves."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -72,34 +72,34 @@ class Arithmetic:
     force: float = 2.0**-53
     """Unit roundoff of the force."""
     quantum: float = 0.0
-    """Fixed-point unit of force [M L/T2]: each term's force on a particle is cut off to a multiple of it."""
+    """Quantum of fixed-point forces [M L/T2], to which each term's force on a particle is truncated."""
     overflow: float = float("inf")
     """Largest force that the fixed-point sum holds."""
     parameters: Literal["double", "single"] = "double"
-    """Width in which force constants and rest lengths are kept."""
+    """Precision in which force constants and rest lengths are stored."""
     excess: float = 0.0
-    """Every force is too large by this fraction."""
+    """Relative excess of every force."""
     stale: float = 0.0
-    """Forces are kept while no position has moved by more than this since they were computed [L]."""
+    """Largest displacement since a force was computed for which the engine reuses it [L]."""
     lengths: float = 0.0
-    """Relative tolerance to which rods keep their lengths, where that is coarser than rounding."""
+    """Relative tolerance of the lengths of rods, where that is coarser than rounding."""
     cancels: int = 0
-    """Power of 1/x, x = gamma h, or of x above 1, in the relative rounding of a thermostat's coefficients:
-    of what comes of 1 - c, where c itself is rounded."""
+    """Power of 1/x, x = gamma h, or of x above 1, in the relative rounding of a thermostat's coefficients,
+    from 1 - c with a rounded c."""
     keeps_displacement: bool = False
-    """A velocity rebuilt over the step comes from the stored displacement, not from x' - x."""
+    """Whether a velocity rebuilt over the step comes from the stored displacement, not from x' - x."""
     from_start: bool = False
-    """Positions are kept as displacements from the start, as total Lagrangian finite elements do."""
+    """Whether positions are stored as displacements from the start, as total Lagrangian elements do."""
     joints: bool = False
-    """Springs are joints as long as `System.far`, and a force has the rounding of that length."""
+    """Whether springs are joints of length `System.far`, whose rounding each force has."""
 
     @property
     def unit(self) -> float:
-        """The coarser of both unit roundoffs."""
+        """The larger of both unit roundoffs."""
         return max(self.state, self.force)
 
     def __str__(self) -> str:
-        """What of it is not double precision, in words, or nothing."""
+        """Departures from double precision, in words; "" where there are none."""
         named = {
             "state": f"states to {self.state:.2g}",
             "force": f"forces to {self.force:.2g}",
@@ -117,13 +117,13 @@ class Arithmetic:
 
 
 MOST_NUMBERS = 1 << 21
-"""Numbers of rows of terms that are worked out at a time: 32 MB in extended precision."""
+"""Most numbers of rows of terms that are computed at a time: 32 MB in extended precision."""
 
 
 def in_pieces(law: Callable[..., Reals], rows: int, *more: Reals) -> Callable[[Reals, Reals], Reals]:
-    """A law of states (q, p, *more), each (..., n), with as many states at once as their rows of terms allow.
+    """A law of states (q, p, *more), each (..., n), evaluated on as many states at once as memory allows.
 
-    200 frames of 200,000 springs on one particle would else be 1.5 GB in the making.
+    Without this, 200 frames of 200,000 springs on one particle would take 1.5 GB of intermediate results.
     """
 
     def bounded(q: Reals, p: Reals) -> Reals:
@@ -142,7 +142,7 @@ def in_pieces(law: Callable[..., Reals], rows: int, *more: Reals) -> Callable[[R
 
 
 def reals(where: str, **given: Any) -> list[Floats]:
-    """Copies of what is given, as doubles.  SpringcheckError where that is no real numbers."""
+    """Copies of the arguments as doubles.  SpringcheckError for anything but real numbers."""
     found = []
     for name, x in given.items():
         try:

@@ -14,12 +14,12 @@ reduced units the temperature is kT itself."""
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Bath:
-    """A heat bath.  Raises SceneError where its numbers make no sense."""
+    """A heat bath.  Raises SceneError for invalid numbers."""
 
     temperature: float
     """[K], or kT where units are reduced; > 0."""
     friction: float
-    """The rate gamma at which it slows every particle down [1/T]; > 0."""
+    """Friction rate gamma of every particle [1/T]; > 0."""
 
     def __post_init__(self) -> None:
         for name, remedy in (

@@ -1,4 +1,4 @@
-"""Scenes from numbers in Python: springs side by side, and chains."""
+"""Scenes from numbers in Python: uncoupled springs, and chains."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Damping, Spring, Term, WallSpring
 
 SCENE_BYTES = 150
-"""Memory of a mass of a chain, before anything is run; see `need`."""
+"""Bytes for each mass of a chain, before anything is run; see `need`."""
 
 
 def spring(
@@ -88,9 +88,9 @@ def chain(
 
 
 def cold(scene: Scene, friction: float) -> Scene:
-    """The scene in a bath of temperature 0: friction alone, which every particle feels at one rate [1/T].
+    """The scene in a bath of temperature 0: friction alone, of one rate for every particle [1/T].
 
-    SceneError where that is no number > 0, or the scene has a friction of its own.
+    SceneError where the rate is no number > 0, or the scene has a friction of its own.
     """
     if not 0 < friction < np.inf:
         raise SceneError(f"bath.friction = {friction!r}: a number > 0 is needed")
@@ -106,7 +106,7 @@ def _between(masses: int, k: Floats) -> tuple[Spring, WallSpring]:
     row = np.arange(masses - 1)
     ends, none = np.unique([0, masses - 1]), np.zeros(masses - 1)
     if k.ndim == 0:
-        # a chain of one mass hangs on both walls
+        # the only mass of a chain is joined to both walls
         walls = WallSpring(i=ends, k=np.full(len(ends), k * (2 if masses == 1 else 1)), at=0.0 * ends)
         return Spring(a=row, b=row + 1, k=none + k, rest=none), walls
     if k.shape != (masses + 1,):

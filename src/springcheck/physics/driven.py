@@ -1,9 +1,9 @@
 """Terms whose force depends on the time: a driving force, and a spring of modulated stiffness.
 
-The time is a coordinate (see `System.clocked`): the position of a clock, which moves by 1 a unit of time and
-which nothing acts on.  On the extended states the motion is autonomous, so that the stages of a scheme decide
-where within a step each force is evaluated (Hairer, Lubich & Wanner, Geometric Numerical Integration,
-VIII.2.1, the extended phase space).
+The time is a coordinate (see `System.clocked`): the position of a clock of unit velocity on which no force
+acts. On the extended states the motion is autonomous, so that the stages of a scheme decide where within a
+step each force is evaluated (Hairer, Lubich & Wanner, Geometric Numerical Integration, VIII.2.1, the extended
+phase space).
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from springcheck.physics.arrays import Floats, Integers, Reals
 from springcheck.physics.term import Column, LinearLaw, Origin, Term, WithoutPotential
 
 CLOCK = 2.0**-500
-"""Mass of the clock [M], whose momentum is the same number: it moves by 1 a unit of time, and its energy is
-nothing beside that of any motion."""
+"""Mass of the clock [M], equal to its momentum for a unit velocity; its energy is negligible beside that of
+any motion."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -41,7 +41,7 @@ class _Driven(Term):
         return np.asarray(np.cos(self.frequency * time + self.phase))
 
     def turned(self, size: Reals) -> Reals:
-        """Roundings of `wave`: its own, and those of an angle at times of this size (..., n) -> (..., s)."""
+        """Roundings of `wave`: its own, and of its argument at times of this size (..., n) -> (..., s)."""
         time = np.abs(size[..., -1:]) if self.clock else 0
         return np.asarray(1 + np.abs(self.frequency) * time + np.abs(self.phase))
 
@@ -60,7 +60,7 @@ _TURNS = (Column("frequency", "frequency", single=False), Column("phase", "phase
 class Drive(WithoutPotential, _Driven):
     """Driving forces on particles i: amplitude cos(frequency t + phase).  amplitude [M L/T2].
 
-    They have no energy: what a drive does to the energy is its work.
+    They have no potential energy: they do work on the particles.
     """
 
     key: ClassVar[str] = "drive"
@@ -80,8 +80,8 @@ class Drive(WithoutPotential, _Driven):
 class ModulatedSpring(LinearLaw, _Driven):
     """Springs from particles i to fixed points: V = k/2 (1 + depth cos(frequency t + phase)) (q - at)**2.
 
-    k [M/T2], at [L].  Mathieu's equation; their energy is counted without the modulation, whose work it is
-    that changes it.
+    k [M/T2], at [L].  Mathieu's equation; their energy is defined without the modulation, whose work changes
+    it.
     """
 
     key: ClassVar[str] = "modulated-spring"
@@ -99,7 +99,7 @@ class ModulatedSpring(LinearLaw, _Driven):
 
     @staticmethod
     def second(u: Reals, k: Floats, depth: Floats, *_: Floats) -> Reals:  # type: ignore[override]
-        """Largest absolute curvature over all times: `curvature` has that at one time."""
+        """Largest absolute curvature over all times; `curvature` is that at one time."""
         return np.asarray(np.abs(k) * (1 + np.abs(depth)))
 
     def pull(self, q: Reals) -> Reals:
@@ -115,7 +115,7 @@ class ModulatedSpring(LinearLaw, _Driven):
 
 
 def with_clock(scene: Any) -> Any:
-    """A scene with a clock as its last coordinate, which stands at the time: its states are (..., n + 1)."""
+    """A scene with a clock, whose position is the time, as last coordinate: states are (..., n + 1)."""
     q, p, m = (np.append(x, y) for x, y in ((scene.q, 0.0), (scene.p, CLOCK), (scene.m, CLOCK)))
     terms = tuple(replace(term, clock=True) if isinstance(term, _Driven) else term for term in scene.terms)
     places = None if scene.places is None else np.append(scene.places, 3 * scene.particles)
@@ -123,8 +123,8 @@ def with_clock(scene: Any) -> Any:
 
 
 def timed(scene: Any) -> tuple[Callable[[float, Floats, Floats], Floats], ...]:
-    """What a solver with a time of its own asks for, functions of (t, q, p): the force (n,) [M L/T2], and the
-    derivatives (2n, 2n) of (p/m, force) by (q, p)."""
+    """For a solver with its own time, as functions of (t, q, p): the force (n,) [M L/T2], and the derivatives
+    (2n, 2n) of (p/m, force) by (q, p)."""
     system, n = scene.system, scene.n
     if not system.is_driven:
         return lambda t, q, p: system.force(q, p), lambda t, q, p: system.jacobian(q, p)

@@ -1,4 +1,4 @@
-"""The fields of a scene, and what can be counted of them."""
+"""The fields of a scene, and counts of them."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Quantity: TypeAlias = Literal["q", "p", "energy"]
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False, init=False)
 class SceneFields:
-    """The fields of a `Scene`, as they are: only a `Scene` checks them and knows what follows from them."""
+    """The fields of a `Scene`, unchecked: only a `Scene` validates them and derives quantities from them."""
 
     m: Floats
     """Masses, > 0 (n,) [M]."""
@@ -29,7 +29,7 @@ class SceneFields:
     p: Floats
     """Momenta at the start (n,) [M L/T]."""
     places: Integers | None = None
-    """Where each coordinate stands among x, y and z of all particles (n,): 3 particle + axis.  Arrays (n,)
+    """Position of each coordinate among x, y and z of all particles (n,): 3 particle + axis.  Arrays (n,)
     hold a number for each coordinate.  None where each particle has one, along x."""
     terms: tuple[Term, ...] = ()
     """One of each kind, in the order of `terms.known`; terms of one kind are joined."""
@@ -37,12 +37,12 @@ class SceneFields:
     """Step [T], < 0 for a run backwards in time."""
     steps: int
     every: int = 1
-    """Every how many steps a frame is recorded; it divides `steps`."""
+    """Number of steps between recorded frames; it divides `steps`."""
     box: tuple[float, float, float] | None = None
-    """Lengths of a periodic box along x, y and z [L], where every spring is that of the nearest images of its
-    ends; None without one.  Positions are counted on across its borders, so that no motion changes."""
+    """Lengths of a periodic box along x, y and z [L], in which every spring joins the nearest images of its
+    ends; None without one.  Positions are unwrapped across its borders, so that no motion changes."""
     bath: Bath | None = None
-    """The heat bath, which only random methods have; None where the motion is deterministic."""
+    """The heat bath, which random methods require; None where the motion is deterministic."""
     tolerance: float = 1e-12
     """Relative tolerance per step of adaptive solvers."""
     units: Units = "reduced"
@@ -50,7 +50,7 @@ class SceneFields:
     include: tuple[str, ...] = ("*",)
     """Labels or globs of the methods to run."""
     quantities: tuple[str, ...] = ("q", "p", "energy")
-    """What is recorded: q and p, and the energy unless it is left out."""
+    """Recorded quantities: q and p, and the energy unless it is left out."""
     name: str = "scene"
     title: str = ""
     source: str = ""
@@ -67,19 +67,19 @@ class SceneFields:
 
     @property
     def size(self) -> str:
-        """How many particles there are, and along which axes they move where that is not x, in words."""
+        """Number of particles, and the axes along which they move where that is not x, in words."""
         particles = f"{self.particles} particle{'s' if self.particles != 1 else ''}"
         along = ", ".join(self.axes[:-1]) + " and " * (len(self.axes) > 1) + self.axes[-1]
         return particles if self.places is None else f"{particles} along {along}"
 
     @property
     def axes(self) -> tuple[str, ...]:
-        """The axes along which something moves, of x, y and z."""
+        """The axes, of x, y and z, along which something moves."""
         return ("x",) if self.places is None else tuple("xyz"[i] for i in np.unique(self.places % 3))
 
     @property
     def all_places(self) -> Integers:
-        """Where each coordinate stands (n,), as `places`, also where these are left out."""
+        """Position of each coordinate (n,), as `places`, also where these are left out."""
         return 3 * np.arange(self.n) if self.places is None else self.places
 
     @property
@@ -109,8 +109,8 @@ class SceneFields:
         return np.array(self.box)[self.all_places % 3]
 
     def of_half_boxes(self, q: Reals) -> Floats:
-        """The length of the longest spring at positions q (..., n), in halves of the box: from 1 on another
-        image of its end is nearer.  0 without a box (...,)."""
+        """Length of the longest spring at positions q (..., n), in halves of the box: from 1 on another image
+        of its end is nearer.  0 without a box (...,)."""
         found = np.zeros(q.shape[:-1])
         for term in self.terms if self.box is not None else ():
             if term.kind == "potential":
@@ -130,9 +130,9 @@ class SceneFields:
         return self.bath.thermal(self.units) if self.bath else 0.0
 
     def derived(self, **changes: Any) -> Self:
-        """Like `replace`, for numbers that follow from a scene's own and are not checked again.
+        """Like `replace`, for numbers that derive from a scene's own and are not checked again.
 
-        They may be inf, where an engine of single precision would keep them so.
+        They may be inf, where an engine of single precision would store them so.
         """
         twin = object.__new__(type(self))
         twin.__dict__.update(self.__getstate__(), **changes)

@@ -1,4 +1,4 @@
-"""Which particles are joined, and where they stand when nothing is stretched."""
+"""Connections between particles, and their positions at rest."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from springcheck.physics.terms import RadialSpring, Spring, WallSpring
 
 
 def is_uniform_chain(system: Any) -> bool:
-    """Whether equal masses stand in a row between two walls, neighbours joined by equal springs."""
+    """Whether equal masses between two walls are joined to their neighbours by equal springs."""
     m = system.m
     walls = [term for term in system.terms if isinstance(term, WallSpring)]
     links = [term for term in system.terms if isinstance(term, Spring)]
@@ -32,7 +32,7 @@ def is_uniform_chain(system: Any) -> bool:
 
 
 def free_groups(system: Any) -> tuple[Integers, ...]:
-    """Groups of particles joined to each other and held by nothing with a stiffness: they can drift."""
+    """Groups of connected particles that no stiffness holds, so that they can drift."""
     n, terms = system.n, system.terms
     held = np.zeros(n, dtype=bool)
     for term in terms:
@@ -46,12 +46,12 @@ def free_groups(system: Any) -> tuple[Integers, ...]:
 
 
 def _holds(term: Term) -> Any:
-    """Which rows of a term hold their ends: by a stiffness, or as a rod."""
+    """Which rows of a term constrain their ends: by a stiffness, or as a rod."""
     return (term.rigidity > 0) | (term.kind == "constraint")
 
 
 def lowest_joined(n: int, terms: Sequence[Term]) -> Integers:
-    """The lowest particle to which each is joined, through however many others (n,)."""
+    """The lowest particle to which each is connected, directly or not (n,)."""
     lowest = np.arange(n)
     # a bond without stiffness joins nothing
     bonds = [[end[_holds(term)] for end in term.particles] for term in terms if term.bodies == 2]
@@ -71,7 +71,7 @@ def lowest_joined(n: int, terms: Sequence[Term]) -> Integers:
 def rest_positions(n: int, terms: Sequence[Term]) -> Floats | None:
     """Positions (n,) [L] at which every spring between particles has its rest length.
 
-    The lowest particle of each connected group stands at 0.  None where springs in a ring disagree.
+    The lowest particle of each connected group is at 0.  None where springs in a ring are inconsistent.
     """
     springs = [term for term in terms if isinstance(term, Spring)]
     if not any(np.any(term.rest) for term in springs):
@@ -103,9 +103,9 @@ def rest_positions(n: int, terms: Sequence[Term]) -> Floats | None:
 
 
 def _in_a_row(n: int, springs: Spring) -> Floats:
-    """Rest positions where springs join neighbours alone: sums of rest lengths from the last break on."""
+    """Rest positions where springs join neighbours alone: sums of rest lengths from the last gap on."""
     found = np.zeros(n)
-    # a sum begins anew after every break, so that each is rounded as if it stood alone
+    # a sum restarts after every gap, so that each group is rounded as if it were alone
     starts = np.flatnonzero(np.append(True, np.diff(springs.a) > 1))
     for first, last in zip(starts, [*starts[1:], len(springs.a)], strict=True):
         found[springs.b[first:last]] = np.cumsum(springs.rest[first:last])
@@ -113,9 +113,9 @@ def _in_a_row(n: int, springs: Spring) -> Floats:
 
 
 def alike(system: Any) -> tuple[tuple[Integers, Integers], ...]:
-    """The coordinates, by particle, along each pair of axes on which all terms act alike.
+    """Coordinates, by particle, along each pair of axes on which all terms act alike.
 
-    Linear terms, rods and bonds that act on both alike and rest in 0 keep the angular momentum about 0 in
+    Linear terms, rods and bonds that act on both alike and rest in 0 conserve the angular momentum about 0 in
     their plane.
     """
     places, parts = system.scene.places, system.terms
@@ -145,7 +145,7 @@ def standing(masses: int, waves: Sequence[tuple[int, float]]) -> Floats:
     for mode, amplitude in waves:
         if mode not in range(1, masses + 1):
             raise SceneError(f"waves: mode {mode}: a chain of {masses} has modes 1 to {masses}")
-        # whole turns are taken off while the phase is still a whole number of 1/(n + 1) half turns
+        # whole turns are subtracted while the phase is still an integer multiple of 1/(n + 1) half turns
         phase = mode * np.arange(1, masses + 1) % (2 * (masses + 1))
         q += amplitude * np.sin(np.pi * phase / (masses + 1))
     return q

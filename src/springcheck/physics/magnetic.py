@@ -1,4 +1,4 @@
-"""A magnetic field on a charge, or Coriolis' force: at right angles to the velocity, in a plane."""
+"""A magnetic field on a charge, or the Coriolis force: perpendicular to the velocity, in a plane."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Magnetic(WithoutPotential):
         return out
 
     def turns(self, m: Floats) -> Floats:
-        """The angular frequency at which the field alone turns the velocity of each coordinate (n,) [1/T]."""
+        """Angular frequency at which the field alone rotates the velocity of each coordinate (n,) [1/T]."""
         out = np.zeros(len(m))
         for index in (self.a, self.b):
             np.add.at(out, index, np.abs(self.strength) / m[index])

@@ -1,4 +1,4 @@
-"""Memory that a computation would take, against what is there: it is refused before it begins."""
+"""Memory that a computation would take, compared with the available memory before it begins."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ LIMITS = (("memory.max", "memory.current"), ("memory/memory.limit_in_bytes", "me
 
 
 def available(root: Path = Path("/")) -> int | None:
-    """Bytes that this process may still take: of the machine, of its control group, of its own limit.
+    """Bytes available to this process: by the machine, its control group and its own limit.
 
-    None on systems that say nothing of it.
+    None on systems that do not report them.
     """
     found = []
     with suppress(OSError, ValueError, StopIteration):
@@ -37,7 +37,7 @@ def available(root: Path = Path("/")) -> int | None:
 
 
 def need(size: float, what: str, then: str) -> None:
-    """SceneError where `what` takes more bytes than are available; `then` says what to do."""
+    """SceneError where `what` takes more bytes than are available; `then` is the remedy."""
     there = available()
     if there is not None and size > there:
         raise SceneError(

@@ -11,7 +11,7 @@ from springcheck.physics.arrays import Extended, Floats, Integers, Reals, in_pie
 from springcheck.physics.term import Term
 
 SMALLEST_ENERGY = np.finfo(np.longdouble).tiny / np.finfo(np.longdouble).eps
-"""Below it squares lose digits to underflow."""
+"""Least energy whose terms, squares, lose no digits to underflow."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -20,10 +20,10 @@ class Norm:
 
     The square root of the sum of dp**2 / 2m and of |k| du**2 / 2 over the rows of all terms, u their
     elongation and |k| their absolute curvature at rest, divided by that of the kinetic plus the absolute
-    potential energy of the start, or where that is 0 of what it may gain (`System.gained`), or 1.  For one
-    spring it is the distance in the phase plane in units of the amplitude.  A group of particles that nothing
-    holds would have no size in position: there the kinetic energy counts that makes up the difference of its
-    centre within the duration of the run.
+    potential energy of the start, or where that is 0 of the energy that it may gain (`System.gained`), or 1.
+    For one spring it is the distance in the phase plane in units of the amplitude.  A free group's
+    position has no potential energy: counted instead is the kinetic energy that moves its centre by the
+    difference within the duration of the run.
     """
 
     m: Floats
@@ -33,7 +33,7 @@ class Norm:
     unit: np.longdouble
     """The initial energy norm, a root of an energy."""
     of: str
-    """What energy that is; "" where the start has none and gains none, and the unit is 1."""
+    """Which energy that is; "" where the start has none and gains none, and the unit is 1."""
 
     def __call__(self, dq: Reals, dp: Reals) -> Floats:
         """(..., n) and (..., n) -> (...)."""
@@ -42,11 +42,11 @@ class Norm:
             return np.asarray(np.where(size == 0, 0, size / self.unit), dtype=np.float64)
 
     def size(self, dq: Reals, dp: Reals) -> Extended:
-        """The same, not divided by the unit: a root of an energy, (..., n) and (..., n) -> (...)."""
+        """The norm before division by the unit: a root of an energy, (..., n) and (..., n) -> (...)."""
         return self._root(dq, dp, lambda term, q: term.stretch(q))
 
     def most(self, of_q: Reals, of_p: Reals) -> Extended:
-        """The largest `size` of differences whose numbers are at most these, of any sign, (...)."""
+        """The largest `size` of differences bounded by these absolute values (...)."""
         return self._root(of_q, of_p, lambda term, q: term.most_stretch(q))
 
     def _root(self, dq: Reals, dp: Reals, stretch: Callable[[Term, Reals], Reals]) -> Extended:
@@ -54,7 +54,7 @@ class Norm:
         with np.errstate(invalid="ignore", over="ignore"):
             energy = np.asarray(self._energy(q, p, stretch), np.longdouble)
             size = np.array(np.sqrt(energy))
-            # squares that leave the range: of a power of two of the difference, which rounds nothing
+            # squares out of range: scale the difference by a power of two, which is exact
             out = ~((energy > SMALLEST_ENERGY) & np.isfinite(energy))
             if np.any(out):
                 power = np.frexp(np.max(np.maximum(np.abs(q[out]), np.abs(p[out])), axis=-1))[1]

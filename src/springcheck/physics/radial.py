@@ -1,8 +1,8 @@
-"""A bond in space: a spring between two particles that knows its length, whatever its direction.
+"""A bond in space: a spring between two particles whose energy depends on their distance alone.
 
-It is a row for each axis, and the rows of one bond share its number.  With d the way between its ends, s its
-length and e = d/s, its force is k (s - rest) e, and the matrix of second derivatives
-k (1 - rest/s) + k rest/s e e'.  It bends unless it moves along itself.
+It has a row for each axis, and the rows of one bond share its number.  With d the vector between its ends, s
+its length and e = d/s, its force is k (s - rest) e, and the matrix of second derivatives k (1 - rest/s) + k
+rest/s e e'.  It is nonlinear except for motion along its direction.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class RadialSpring(LinearLaw, Term):
     rest: Floats
     number: Floats
 
-    # the law is that of a row by itself, without a rest length: the energy of a bond is no sum over its axes
+    # the row's own law has no rest length: the energy of a bond is no sum over its axes
 
     @cached_property
     def _starts(self) -> Integers:
@@ -48,15 +48,15 @@ class RadialSpring(LinearLaw, Term):
 
     @cached_property
     def _bond(self) -> Integers:
-        """The bond of each row, from 0 on."""
+        """Index of the bond of each row."""
         return np.cumsum(np.append(0, np.diff(self.number) != 0)) if len(self) else self.a
 
     def _sum(self, values: Reals) -> Reals:
-        """Over the axes of each bond, for each of them (..., s)."""
+        """Sums over the axes of each bond, for each of its rows (..., s)."""
         return np.take(np.add.reduceat(values, self._starts, axis=-1), self._bond, axis=-1)
 
-    def _ways(self, q: Reals) -> tuple[Reals, Reals]:
-        """The way between the ends, and its length, for each axis (..., s)."""
+    def _vectors(self, q: Reals) -> tuple[Reals, Reals]:
+        """Vector between the ends, and its length, for each axis (..., s)."""
         d = self.stretch(q)
         s = np.sqrt(self._sum(d * d))
         # a length of 0 has no direction, and d is 0 there
@@ -68,23 +68,23 @@ class RadialSpring(LinearLaw, Term):
         return np.asarray(np.sum(0.5 * (k * (s - rest) * (s - rest)), axis=-1))
 
     def pull(self, q: Reals) -> Reals:
-        d, s = self._ways(q)
+        d, s = self._vectors(q)
         return np.asarray(self.k * (s - self.rest) * (d / s))
 
     def add_change(self, q: Reals, v: Reals, dq: Reals, dv: Reals, out: Reals) -> None:
-        d, s = self._ways(q)
+        d, s = self._vectors(q)
         e, moved = d / s, self.stretch(dq)
         along = e * self._sum(e * moved)
         self.add_pull(self.k * (moved - self.rest / s * (moved - along)), out)
 
     def curvature(self, q: Reals) -> Reals:
-        """Upper bound of each row's absolute curvatures, summed over the axes, for Gershgorin's bound."""
-        _, s = self._ways(q)
+        """Upper bound on each row's absolute curvatures, summed over the axes, for Gershgorin's bound."""
+        _, s = self._vectors(q)
         bent = self.rest / s
         return np.asarray(np.abs(self.k) * (np.abs(1 - bent) + np.sqrt(3.0) * bent))
 
     def elements(self, q: Reals) -> Iterator[tuple[Integers, Integers, Reals]]:
-        d, s = self._ways(q)
+        d, s = self._vectors(q)
         one, other = np.nonzero(self._bond[:, None] == self._bond)
         bent, e = (self.rest / s)[..., one], d / s
         k = self.k[one] * ((1 - bent) * (one == other) + bent * e[..., one] * e[..., other])
@@ -94,7 +94,7 @@ class RadialSpring(LinearLaw, Term):
 
     def pull_rounding(self, q: Reals, v: Reals, near: Reals | None, exact: bool) -> Reals:
         size = self.most_stretch(np.abs(q))
-        d, s = self._ways(q if near is None else near)
+        d, s = self._vectors(q if near is None else near)
         e, bent = np.abs(d) / s, self.rest / s
         # roundings of the difference vector, of its length by a root, of their quotient, of the products
         way = np.abs(1 - bent) * size + bent * (size + e * self._sum(e * size))

@@ -1,11 +1,12 @@
-"""Rods: rigid distances between two particles, or between a particle and a fixed point, and how they hold.
+"""Rods: rigid distances between two particles, or between a particle and a fixed point, and their
+constraints.
 
-A rod is a row of a term for each axis of its particles.  A step that is taken without it is brought back to
-its length along where it lay before the step, and momenta to what moves its ends alike along it (SHAKE:
-Ryckaert, Ciccotti & Berendsen, J. Comput. Phys. 23 (1977) 327; RATTLE: Andersen, ibid. 52 (1983) 24; in
-stages of a splitting: Leimkuhler & Matthews, Proc. R. Soc. A 472 (2016) 20160138).  With s the way between
-the ends after the step without the rod and r that before it, the multiplier k of one rod solves |s + k r| =
-length, a quadratic; rods that share a particle are solved for together, by Newton's method, to rounding.
+A rod is a row of a term for each axis of its particles.  A step without it is projected back to its length
+along its direction before the step, and momenta to those that do not change lengths (SHAKE: Ryckaert,
+Ciccotti & Berendsen, J. Comput. Phys. 23 (1977) 327; RATTLE: Andersen, ibid. 52 (1983) 24; in stages of a
+splitting: Leimkuhler & Matthews, Proc. R. Soc. A 472 (2016) 20160138).  With s the vector between the ends
+after the unconstrained step and r that before it, the multiplier k of one rod solves |s + k r| = length, a
+quadratic; rods that share a particle are solved together, by Newton's method, to rounding.
 """
 
 from __future__ import annotations
@@ -23,11 +24,12 @@ from springcheck.physics.arrays import Extended, Floats, Integers, Reals
 from springcheck.physics.term import Column, OnParticles, Origin, Term, WithoutPotential
 
 MOST_NEWTON = 60
-"""Iterations of Newton's method, which converges quadratically: what needs more has no solution."""
+"""Iterations of Newton's method, which converges quadratically: where more are needed there is no
+solution."""
 
-UNTRUE = 2.0**-46
-"""How far lengths and velocities along rods may be off at the start, relative to what they are made of: 64
-roundings, as numbers have that are written with all of their digits."""
+START_TOLERANCE = 2.0**-46
+"""Largest error of lengths and velocities along rods at the start, relative to their summands: 64 roundings,
+as of numbers written with all their digits."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -86,7 +88,7 @@ class Rods:
                 met[row] = met.get(row, 0) + 1
                 number.append(rods.setdefault((of, met[row]), len(rods)))
         self.ends = tuple(of[1:] for of, _ in rods)
-        """The particles of each rod: two, or one that is tied to a fixed point."""
+        """The particles of each rod: two, or one joined to a fixed point."""
         self._axes = np.asarray(axes, np.int64)
         self._order = np.argsort(number, kind="stable")
         self._rod = np.asarray(number, np.int64)[self._order]
@@ -97,7 +99,7 @@ class Rods:
         wide = m.astype(np.longdouble)
         inverse = [sum(1 / wide[index] for index in term.particles) for term in self._terms]
         self.inverse_mass: Extended = np.concatenate(inverse)[self._order][self._starts]
-        """1/m of both ends together (c,), the inverse of the reduced mass [1/M]."""
+        """Sum of 1/m over both ends (c,), the inverse of the reduced mass [1/M]."""
         taken = [index for term in self._terms for index in term.particles]
         self.share = len(np.unique(np.concatenate(taken))) < sum(map(len, taken))
         """Whether some particle has two rods."""
@@ -108,7 +110,7 @@ class Rods:
         return len(self.length)
 
     def named(self, j: int) -> str:
-        """What a rod is called in messages."""
+        """Name of a rod in messages."""
         several = "s" if len(self.ends[j]) > 1 else ""
         return f"the rod of particle{several} {' and '.join(map(str, self.ends[j]))}"
 
@@ -136,16 +138,16 @@ class Rods:
         return self._rows("stretch", change)
 
     def dot(self, one: Reals, other: Reals) -> Reals:
-        """Products over the axes of each rod (..., s) -> (..., c)."""
+        """Dot products over the axes of each rod (..., s) -> (..., c)."""
         return np.asarray(np.add.reduceat(one * other, self._starts, axis=-1))
 
     def each(self, values: Reals) -> Reals:
-        """A number of each rod (..., c) for each of its axes (..., s)."""
+        """The number of each rod (..., c), repeated for its axes (..., s)."""
         return np.take(values, self._rod, axis=-1)
 
     def spread(self, values: Reals, *, size: bool = False) -> Reals:
-        """Effect on coordinates (..., n) of pushing the ends of each rod apart by values (..., s); the sum of
-        the sizes of these effects, if `size`."""
+        """Effect on coordinates (..., n) of impulses that separate the ends of each rod by values (..., s);
+        with `size` the sum of the absolute effects."""
         back = np.empty_like(values)
         back[..., self._order] = values
         out = np.zeros((*values.shape[:-1], len(self.m)), dtype=values.dtype)
@@ -160,27 +162,28 @@ class Rods:
         return out
 
     @cached_property
-    def _joined(self) -> Floats:
-        """Change of the vectors of all rows by a unit push along each (s, s) [1/M]."""
+    def _coupling(self) -> Floats:
+        """Change of the vectors of all rows by a unit impulse along each (s, s) [1/M]."""
         unit = np.eye(len(self._rod))
         return np.asarray(self.apart(self.spread(unit) / self.m).T, np.float64)
 
     def _matrix(self, left: Reals, right: Reals) -> Floats:
-        whole = np.asarray(left, np.float64)[..., :, None] * self._joined * right[..., None, :]
+        whole = np.asarray(left, np.float64)[..., :, None] * self._coupling * right[..., None, :]
         part = np.add.reduceat(np.asarray(whole, np.float64), self._starts, axis=-1)
         return np.asarray(np.add.reduceat(part, self._starts, axis=-2))
 
     def split(self, values: NDArray[Any]) -> list[NDArray[Any]]:
-        """Numbers of each row of its terms (s,), by rods."""
+        """Split an array with one number for each row of the rods (s,) into one array for each rod."""
         return np.split(values[self._order], self._starts[1:]) if len(values) else []
 
     def solve(self, left: Reals, right: Reals, wanted: Reals) -> Reals:
-        """k (..., c) for which pushes k `right` (..., s) move the ways by as much along `left` as wanted."""
+        """k (..., c) for which impulses k `right` (..., s) move the vectors along `left` as wanted (...,
+        c)."""
         if not self.share:
             return np.asarray(wanted / (self.dot(left, right) * self.inverse_mass.astype(wanted.dtype)))
         matrix = self._matrix(left, right)
         found = np.zeros_like(wanted)
-        # solved in double precision, and made as wide as the numbers by its residual
+        # solved in double precision, and refined to the precision of the numbers by its residual
         for _ in range(3):
             moved = self.apart(self._push(found, right) / self.m.astype(wanted.dtype))
             lacks = np.asarray(wanted - self.dot(left, moved), np.float64)
@@ -188,7 +191,7 @@ class Rods:
         return found
 
     def reach(self, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """The coordinates (n,) that rods join to some of these (n,), they among them."""
+        """The coordinates (n,) connected by rods to some of these (n,), these included."""
         while True:
             taken = self._rows("most_stretch", chosen.astype(np.float64))
             more = chosen | (self.spread(self.each(self.dot(taken, taken)), size=True) > 0)
@@ -196,24 +199,24 @@ class Rods:
                 return chosen
             chosen = more
 
-    # what they do to a step
+    # effect on a step
 
     def multiplier(self, r: Reals, s: Reals) -> Reals:
-        """k (..., c) with which k r, momentum times time, brings the ways s (..., s) back to their lengths.
+        """k (..., c) for which k r, momentum times time, restores the lengths of the vectors s (..., s).
 
-        NaN where none does, which for a rod that turns freely is from h w = 1 on.
+        NaN where there is none, for a freely rotating rod from h w = 1 on.
         """
         length = self.length.astype(s.dtype)
         if not self.share:
             a, b, c = self.dot(r, r), self.dot(r, s), self.dot(s, s) - length * length
             root = np.sqrt(b * b - a * c)
-            # the rod that lies within a quarter turn of where it lay
+            # of two solutions the rod within a quarter turn of its former direction
             k = np.where(b > 0, -c / (b + root), (root - b) / a)
             return np.asarray(k / self.inverse_mass.astype(s.dtype))
         k = np.zeros_like(self.dot(r, s))
         last, going = np.full(k.shape[:-1], np.inf), np.ones(k.shape[:-1], np.bool_)
         m = self.m.astype(s.dtype)
-        # each state by itself: one without a solution must not stop the others
+        # each state separately: one without a solution must not stop the others
         for _ in range(MOST_NEWTON):
             now = s + self.apart(self._push(k, r) / m)
             gap = (self.dot(now, now) - length * length) / 2
@@ -230,28 +233,29 @@ class Rods:
         return self.spread(self.each(k) * r)
 
     def _along(self, r: Reals, p: Reals) -> Reals:
-        """The multipliers of what changes lengths in momenta p (..., n), at ways r (..., s)."""
+        """Multipliers of the components of momenta p (..., n) that change lengths, at vectors r (..., s)."""
         return self.solve(r, r, self.dot(r, self.apart(p / self.m.astype(p.dtype))))
 
     def drifted(self, before: Reals, q: Reals, p: Reals, x: Any) -> tuple[Reals, Reals]:
-        """A drift for the time x from `before` to q, with its momenta p, brought back to the lengths."""
+        """A drift over the time x from `before` to q, with its momenta p, projected back to the lengths."""
         r = self.ways(before)
         push = self._push(self.multiplier(r, self.ways(q)), r)
         return q + push / self.m.astype(q.dtype), p + push / x
 
     def projected(self, q: Reals, p: Reals) -> Reals:
-        """Momenta without what would change a length: RATTLE's second half."""
+        """Momenta without the components that change a length: RATTLE's second half."""
         r = self.ways(q)
         return np.asarray(p - self._push(self._along(r, p), r))
 
     def sizes(
         self, before: Reals | None, q: Reals, p: Reals, x: Any, of: tuple[Reals, Reals], loose: float
     ) -> tuple[Reals, Reals]:
-        """What bounds the rounding of a stage after its rods have held it, `of` before they did.
+        """Bound on the rounding of a stage with rods, from the bound `of` it without them.
 
         The stage leads from `before`, None where nothing moves, to q, with momenta p that are not projected
-        yet.  An error of the ways s is seen along s, and taken back along r: r/(r s) times as much.  What
-        that leaves of momenta is its part across the rod.  `loose` is the tolerance of lengths, in roundings.
+        yet.  An error of the vectors s is measured along s and corrected along r, which amplifies it by r/(r
+        s).  In the momenta only its part across the rod remains.  `loose` is the tolerance of lengths, in
+        roundings.
         """
         of_q, of_p = of
         m, s, ones = self.m.astype(q.dtype), self.ways(q), np.ones(len(self))
@@ -259,22 +263,22 @@ class Rods:
         around = self._most(of_q)
         if before is not None:
             r = self.ways(before)
-            k = self._enlarged(s, r, self.dot(np.abs(s), around) + square * (ones + loose))
+            k = self._bound(s, r, self.dot(np.abs(s), around) + square * (ones + loose))
             of_q = of_q + self.spread(np.abs(r) * self.each(k), size=True) / m
             across = np.abs(r - s * self.each(self.dot(r, s) / self.dot(s, s)))
             of_p = of_p + self.spread(across * self.each(k), size=True) / np.abs(x)
             around = self._most(of_q)
         along = np.abs(self._along(s, p))
         seen = self.sum_of_sizes(s, of_p / m)
-        held = np.abs(s) * self.each(self._enlarged(s, s, seen)) + around * self.each(along)
+        held = np.abs(s) * self.each(self._bound(s, s, seen)) + around * self.each(along)
         return of_q, of_p + self.spread(held, size=True)
 
     def sum_of_sizes(self, r: Reals, size: Reals) -> Reals:
-        """Bound of products of the vectors r (..., s) with changes of positions of these sizes (..., n)."""
+        """Bound on products of the vectors r (..., s) with changes of positions of these sizes (..., n)."""
         return self.dot(np.abs(r), self._rows("most_stretch", size))
 
     def spans(self, size: Reals) -> Reals:
-        """Bound of the length by which changes of these sizes (..., n) move the vectors (..., c)."""
+        """Bound on the length by which changes of these sizes (..., n) move the vectors (..., c)."""
         most = self._rows("most_stretch", size)
         return np.asarray(np.sqrt(self.dot(most, most)))
 
@@ -283,41 +287,41 @@ class Rods:
         return np.asarray(self.dot(np.abs(self.ways(q)), self._most(np.abs(q))) / self.length**2)
 
     def _most(self, size: Reals) -> Reals:
-        """Bound of the vectors between positions of these sizes."""
+        """Bound on the vectors between positions of these sizes."""
         at = np.concatenate([np.abs(one) for one in self._at])[self._order]
         return np.asarray(self._rows("most_stretch", size) + at)
 
-    def _enlarged(self, left: Reals, right: Reals, size: Reals) -> Reals:
-        """Bound of |k| in `solve`, where what is wanted has these sizes."""
+    def _bound(self, left: Reals, right: Reals, size: Reals) -> Reals:
+        """Bound on |k| in `solve`, where the wanted amounts have these sizes."""
         if not self.share:
             return np.abs(self.solve(left, right, size))
         inverse = np.abs(_where_regular(np.linalg.inv, self._matrix(left, right)))
         found = (inverse @ size[..., None])[..., 0]
         return np.asarray(np.where(np.isnan(found), np.inf, found))
 
-    # what is said of states
+    # properties of states
 
     def strain(self, q: Reals) -> Reals:
         """Strain of each rod, its excess length over its length, at positions q (..., n) -> (..., c)."""
         r, length = self.ways(q), self.length.astype(q.dtype)
-        # the difference of squares by its factors: a length has lost half of what they tell
+        # the difference of squares by its factors, since a length alone has lost half of its digits
         size = np.sqrt(self.dot(r, r))
         return np.asarray((size - length) / length)
 
     @property
     def freedoms(self) -> int:
-        """Degrees of freedom that they leave: `check` refuses one that the others make needless."""
+        """Degrees of freedom besides the rods; `check` excludes redundant ones."""
         return len(self.m) - len(self)
 
     def rates(self, q: Reals, p: Reals) -> Reals:
-        """Angular velocity of each rod, its sign left out, at states (..., n) -> (..., c) [1/T]."""
+        """Absolute angular velocity of each rod at states (..., n) -> (..., c) [1/T]."""
         v, r = self.apart(p / self.m.astype(p.dtype)), self.ways(q)
         square = self.dot(r, r)
         along = self.each(self.dot(r, v) / square) * r
         return np.asarray(np.sqrt(self.dot(v - along, v - along) / square))
 
     def too_fast(self, q: Floats, p: Floats, h: float) -> str:
-        """Why no multiplier keeps the lengths in a step of h from a state (n,), or ""; forces left out."""
+        """Why no multiplier satisfies the lengths in a force-free step of h from a state (n,), or ""."""
         turn = self.rates(q, p) * abs(h)
         if self.share or not np.any(turn >= 1):
             return ""
@@ -327,14 +331,14 @@ class Rods:
             "keeps its length; take a shorter step"
         )
 
-    def _needless(self, r: Reals) -> str:
-        """Why the multipliers of the rods have no one solution at these ways (s,), or ""."""
+    def _redundant(self, r: Reals) -> str:
+        """Why the multipliers of the rods are not unique at these vectors (s,), or ""."""
 
         def first(matrix: Floats) -> int:
             unit = np.sqrt(np.diag(matrix))
             # a column that depends linearly on those before it leaves a diagonal entry of 0 in R
             left = np.abs(np.diag(np.linalg.qr(matrix / np.outer(unit, unit), mode="r")))
-            return int(np.argmax(np.append(left <= UNTRUE * len(self), True)))
+            return int(np.argmax(np.append(left <= START_TOLERANCE * len(self), True)))
 
         if (j := first(self._matrix(r, r))) == len(self):
             return ""
@@ -350,8 +354,8 @@ class Rods:
             "light for pushes along rods on one line to be told apart; give it more mass"
         )
 
-    def check(self, q: Floats, p: Floats, untrue: float = UNTRUE) -> None:
-        """SceneError unless every rod has its length at the start, and nothing moves along it."""
+    def check(self, q: Floats, p: Floats, untrue: float = START_TOLERANCE) -> None:
+        """SceneError unless every rod has its length at the start, and no velocity along it."""
         r, v = self.ways(q), self.apart(p / self.m)
         with np.errstate(all="ignore"):
             off, along = np.abs(self.strain(q)), np.abs(self.dot(r, v))
@@ -363,7 +367,7 @@ class Rods:
                 f"{self.named(j)}: its length is {float(self.length[j])!r}, and its ends are "
                 f"{float(np.sqrt(self.dot(r, r))[j])!r} apart at the start; leave the length out to keep that"
             )
-        if self.share and (needless := self._needless(r)):
+        if self.share and (needless := self._redundant(r)):
             raise SceneError(needless)
         wrong = ~(along <= untrue * size)
         if np.any(wrong):

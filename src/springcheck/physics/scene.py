@@ -21,15 +21,15 @@ from springcheck.physics.term import Term, check_sign, frozen
 from springcheck.physics.terms import in_order
 
 MOST_STEPS = 2**53
-"""Numbers of steps up to which each is a double of its own, so that t = i h tells them apart."""
+"""Number of steps up to which every integer is a double, so that t = i h is distinct."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Scene(SceneFields):
-    """What is to be simulated: a system, its start, its time grid, and what is asked of it.
+    """A system, its start, its time grid, and what is recorded of it.
 
-    Making one, or changing one by `dataclasses.replace`, raises SceneError where it makes no sense.  Arrays
-    are kept as read-only copies.  Its identity is `digest`, and `to_toml` writes it as a scene file.
+    Construction, also by `dataclasses.replace`, raises SceneError for invalid values.  Arrays are stored as
+    read-only copies.  Its identity is `digest`, and `to_toml` writes it as a scene file.
     """
 
     def __post_init__(self) -> None:
@@ -50,14 +50,14 @@ class Scene(SceneFields):
 
     @cached_property
     def system(self) -> SolvedSystem[Scene]:
-        """What follows from the scene: forces, energies, modes and the like, each worked out once."""
+        """Quantities derived from the scene: forces, energies, modes and the like, each computed once."""
         return SolvedSystem(self)
 
     @cached_property
     def digest(self) -> str:
-        """The scene's identity: sha256 of all its numbers, and of no word about them.
+        """The scene's identity: SHA-256 of all its numbers, without its texts.
 
-        Equal for scenes that no method can tell apart: name, title, source and the list of methods do not
+        Equal for scenes that no method can distinguish: name, title, source and the list of methods do not
         count, nor does the sign of a zero.
         """
         total = hashlib.sha256()
@@ -86,13 +86,13 @@ class Scene(SceneFields):
         return text(self.system)
 
     def to_toml(self) -> str:
-        """The scene as a scene file, written from its numbers: read back it has exactly the same ones."""
+        """The scene as the text of a scene file, which reads back with exactly the same numbers."""
         return self._toml
 
     def replace(self, **changes: Any) -> Scene:
-        """A scene that is like this one but for these fields: ``scene.replace(step=0.05, steps=400)``.
+        """A copy with other values of these fields: ``scene.replace(step=0.05, steps=400)``.
 
-        SceneError where there is no such field, or a value makes no sense.
+        SceneError for an unknown field, or an invalid value.
         """
         known = [field.name for field in fields(self)]
         for name in changes:
@@ -102,7 +102,7 @@ class Scene(SceneFields):
 
 
 def _checked(scene: Scene) -> Iterator[tuple[str, Any]]:
-    """The fields of a scene in the types in which it keeps them.  Raises SceneError, the field first."""
+    """The validated fields of a scene in their types.  Raises SceneError, which begins with the field."""
     n: int | None = None
     for field, sign in (("m", "positive"), ("q", "any"), ("p", "any")):
         values = frozen(getattr(scene, field), np.float64, n, field)
@@ -155,7 +155,7 @@ def _checked(scene: Scene) -> Iterator[tuple[str, Any]]:
 
 
 def _places(scene: Scene) -> Integers | None:
-    """The places of the coordinates, None where they are what None stands for."""
+    """The places of the coordinates, None where they are those that None implies."""
     if scene.places is None:
         return None
     n = len(scene.m)
@@ -176,7 +176,7 @@ def _places(scene: Scene) -> Integers | None:
 
 
 def _box(scene: Scene, terms: tuple[Term, ...]) -> tuple[float, ...] | None:
-    """The three lengths of the box, in which springs alone may act."""
+    """The three lengths of the box.  SceneError where anything but springs acts in it."""
     if scene.box is None:
         return None
     try:
@@ -194,7 +194,7 @@ def _box(scene: Scene, terms: tuple[Term, ...]) -> tuple[float, ...] | None:
 
 
 BOXED = ("wall-spring", "spring", "bond", "damping")
-"""Terms that a box may hold."""
+"""Keys of the terms that may act in a box."""
 
 
 def _terms(given: Any, n: int, places: Integers | None) -> tuple[Term, ...]:
@@ -250,7 +250,7 @@ def _quantities(given: Any) -> tuple[str, ...]:
         raise SceneError(f"quantities: {unknown[0]!r} is none of {', '.join(known)}")
     if not {"q", "p"} <= set(found):
         raise SceneError('quantities needs "q" and "p"; "energy" may be left out')
-    # each once, and in one order
+    # each once, in a fixed order
     return tuple(one for one in known if one in found)
 
 

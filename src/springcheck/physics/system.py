@@ -1,4 +1,4 @@
-"""What follows from a scene, each fact worked out once: forces, curvature, energies, sizes, modes, variants.
+"""Quantities derived from a scene, each computed once: forces, curvature, energies, sizes, modes, variants.
 
 `scene.system` is the one `System` of a scene.  Its functions take any width of float, and a trajectory as
 well as one state.
@@ -27,15 +27,15 @@ from springcheck.physics.terms import Damping, VanDerPol
 Fields = TypeVar("Fields", bound=SceneFields)
 
 MOST_JOINED = 256
-"""Joined particles up to which normal modes are computed: their cost in extended precision grows with the
+"""Most joined particles for which normal modes are computed: their cost in extended precision grows with the
 cube, 5 s here.  The modes of a uniform chain are known at any length."""
 
 MOST_DENSE = 1024
-"""Joined particles up to which second derivatives are kept as n x n numbers."""
+"""Most joined particles for which second derivatives are stored as n x n numbers."""
 
 
 class System(Generic[Fields]):
-    """The facts of one scene but for its motion.  m, q, p (n,) and terms are the scene's own."""
+    """The facts of one scene without its motion.  m, q, p (n,) and terms are the scene's own."""
 
     def __init__(self, scene: Fields) -> None:
         self.scene = scene
@@ -57,12 +57,13 @@ class System(Generic[Fields]):
 
     @property
     def keeps_energy(self) -> bool:
-        """Whether the exact motion does: without friction and drives."""
+        """Whether the exact motion conserves the energy: without friction and drives."""
         return not (self.is_damped or self.is_driven)
 
     @cached_property
     def clocked(self) -> Fields:
-        """The scene with a clock beside its particles (see `driven`); itself where no force needs one."""
+        """The scene with a clock beside its particles (see `driven`), or itself if no force depends on
+        time."""
         return with_clock(self.scene) if self.is_driven else self.scene
 
     @cached_property
@@ -82,7 +83,7 @@ class System(Generic[Fields]):
 
     @cached_property
     def has_modes(self) -> bool:
-        """Whether the motion falls apart into modes: linear, uncoupled by friction, and they can be had.
+        """Whether the motion decouples into modes that can be computed: linear, and uncoupled by friction.
 
         Friction does not couple modes where no term joins two particles, or where it has one rate.
         """
@@ -94,13 +95,13 @@ class System(Generic[Fields]):
 
     @property
     def has_one_friction_rate(self) -> bool:
-        """Whether every particle is slowed down at the same rate, to a rounding of c/m."""
+        """Whether every particle has the same friction rate, to a rounding of c/m."""
         rate = self.friction_rates
         return bool(np.ptp(rate) <= 2.0**-52 * np.max(rate))
 
     @cached_property
     def acting(self) -> dict[str, NDArray[np.bool_]]:
-        """For the key of each term, on which particles such a term acts (n,)."""
+        """For the key of each term, the particles on which such a term acts (n,)."""
         out: dict[str, NDArray[np.bool_]] = {}
         for term in self.terms:
             for index in term.particles:
@@ -108,7 +109,7 @@ class System(Generic[Fields]):
         return out
 
     def pulls(self, terms: Iterable[Term] | None = None) -> Integers:
-        """How many rows of these terms, or of all, act on each particle (n,)."""
+        """Number of rows of these terms, or of all, on each particle (n,)."""
         count = np.zeros(self.n)
         for term in self.terms if terms is None else terms:
             term.scatter(np.ones(len(term)), count)
@@ -132,7 +133,7 @@ class System(Generic[Fields]):
 
     @cached_property
     def slow(self) -> tuple[Term, ...]:
-        """The terms that a method of multiple time steps takes in its long step."""
+        """Terms that a method of multiple time steps evaluates in its long step."""
         return tuple(term for term in self.terms if not term.fast)
 
     @cached_property
@@ -161,7 +162,7 @@ class System(Generic[Fields]):
         return in_pieces(self._sum(parts, [term.add_force for term in parts]), sum(map(len, parts)))
 
     def _sum(self, parts: Sequence[Term], added: Sequence[Callable[[Reals, Reals, Reals], None]]) -> Force:
-        """What these functions of (q, v, out), one a term, add up to, as a function of (q, p)."""
+        """Sum of these functions of (q, v, out), one for each term, as a function of (q, p)."""
         needs_velocity = any(term.kind in ("friction", "magnetic") for term in parts)
 
         def total(q: Reals, p: Reals) -> Reals:
@@ -179,10 +180,10 @@ class System(Generic[Fields]):
     ) -> Force:
         """Like the force of these terms, or of all, with every difference taken as a sum of absolute values.
 
-        Rounding cannot exceed a few eps times this: the running error bound of Wilkinson.  It takes sizes
-        of positions and momenta.  Nonlinear laws are evaluated at the states `near` (..., n), a step away
-        at most (the positions to the last bit where they are `exact`), or where these are not given at the
-        worst place within the sizes.
+        Rounding cannot exceed a few eps times this: the running error bound of Wilkinson.  Its arguments are
+        sizes of positions and momenta.  Nonlinear laws are evaluated at the states `near` (..., n), a step
+        away at most (with `exact` at these positions to the last bit), or without them at the worst position
+        within the sizes.
         """
         parts = tuple(self.terms if terms is None else terms)
 
@@ -195,7 +196,7 @@ class System(Generic[Fields]):
 
     @cached_property
     def friction_rates(self) -> Extended:
-        """Rates at which friction alone would slow each particle down, c/m (n,) [1/T], extended precision."""
+        """Friction rates c/m of the particles (n,) [1/T], extended precision."""
         out = np.zeros(self.n, dtype=np.longdouble)
         for term in self.terms:
             if isinstance(term, Damping):
@@ -203,7 +204,7 @@ class System(Generic[Fields]):
         return out
 
     def friction_at(self, q: Reals) -> tuple[Reals, Reals]:
-        """Rates of friction at q (..., n) [1/T], and their derivatives by each particle's position."""
+        """Friction rates at q (..., n) [1/T], and their derivatives by each particle's position."""
         rates = self.friction_rates.astype(q.dtype) + np.zeros_like(q), np.zeros_like(q)
         for term in (term for term in self.terms if isinstance(term, VanDerPol)):
             term.add_rates(q, self.m, rates)
@@ -226,18 +227,18 @@ class System(Generic[Fields]):
         return out
 
     def hessian_diagonal(self, q: Reals) -> Extended:
-        """Diagonal of `hessian` (..., n), all of it where nothing joins two particles."""
+        """Diagonal of `hessian` (..., n), which is all of it for separate particles."""
         out, wide = np.zeros(q.shape, dtype=np.longdouble), q.astype(np.longdouble)
         for term in self.terms:
             term.scatter(np.broadcast_to(term.curvature(wide), (*q.shape[:-1], len(term))), out)
         return out
 
     def slope(self, q: Reals) -> tuple[Extended, bool]:
-        """The one or the other, by whether some term joins two particles, and whether one does."""
+        """`hessian_diagonal` for separate particles, otherwise `hessian`; and whether it is the latter."""
         return self.hessian_diagonal(q) if self.is_separate else self.hessian(q), not self.is_separate
 
     def sparse_hessian(self, q: Reals) -> Any:
-        """The `hessian` by its elements that are not 0, a scipy.sparse.csc_array in double precision."""
+        """The `hessian` by its nonzero elements, a scipy.sparse.csc_array in double precision."""
         from scipy.sparse import csc_array
 
         rows, columns, values = (np.concatenate(x) for x in zip(*self.elements(q), strict=True))
@@ -255,9 +256,9 @@ class System(Generic[Fields]):
         return np.vstack([upper, lower]).astype(np.float64)
 
     def curvatures(self, q: Reals) -> Any:
-        """Second derivatives in the cheapest form that holds them: (n,) of single particles, else (n, n).
+        """Second derivatives in the cheapest form: (n,) for separate particles, otherwise (n, n).
 
-        That of more than `MOST_DENSE` particles is sparse where no term pushes two particles apart.
+        For more than `MOST_DENSE` particles the matrix is sparse where no term has a negative curvature.
         """
         if self.is_separate:
             return self.hessian_diagonal(q)
@@ -274,7 +275,7 @@ class System(Generic[Fields]):
 
     @cached_property
     def rigidity(self) -> Floats:
-        """The same from the terms' absolute curvature at rest alone (n,) [M/T2]."""
+        """The bound of `gershgorin` from the terms' absolute curvature at rest alone (n,) [M/T2]."""
         out = np.zeros(self.n)
         for term in self.terms:
             term.scatter(term.rigidity * term.bodies, out)
@@ -288,7 +289,7 @@ class System(Generic[Fields]):
 
     def energy(self, q: Reals, p: Reals) -> Reals:
         """Total energy of states q, p (..., n) -> (...) [M L2/T2], whatever the order of the arrays."""
-        # NumPy adds up rows of another order in another order
+        # NumPy sums rows of another memory order in another order
         q, p = np.ascontiguousarray(q), np.ascontiguousarray(p)
         total = self.kinetic_energy(p)
         for term in self.terms:
@@ -319,8 +320,8 @@ class System(Generic[Fields]):
     @cached_property
     @np.errstate(all="ignore")
     def gained(self) -> Any:
-        """Energy of the deflection by its forces, drives at full strength, or that they give within the run;
-        and that a bath gives [M L2/T2]."""
+        """Energy of the deflection by its forces, drives at full strength, or that they give within the run,
+        and of a bath [M L2/T2]."""
         q = self.q.astype(np.longdouble)
         push = np.abs(self.potential_force(q, 0 * q))
         for term in (drive for drive in self.terms if isinstance(drive, Drive)):
@@ -330,9 +331,9 @@ class System(Generic[Fields]):
 
     @cached_property
     def amplitudes(self) -> tuple[Floats, Floats]:
-        """How far each position and momentum could go (n,) if it had all of the initial energy to itself.
+        """Largest position and momentum of each particle (n,) if it had all of the initial energy.
 
-        A particle that nothing holds is as far as it could get within the run.
+        For a free particle the position is what it could reach within the run.
         """
         unit = float(self.norm.unit)
         k = np.zeros(self.n)
@@ -346,14 +347,14 @@ class System(Generic[Fields]):
 
     @property
     def far(self) -> float:
-        """A length beyond all motion, for a spring without a sign; a power of 2, for adding it rounds [L]."""
+        """A length larger than any motion, for joints, which have no negative length; a power of 2 [L]."""
         reach = float(np.max(np.abs(self.q)) + np.max(self.amplitudes[0]))
         return float(2.0 ** np.ceil(np.log2(4 * reach))) if 0 < reach < 2.0**500 else 1.0
 
-    # other scenes made of this one, and what follows from them
+    # scenes derived from this one, and their facts
 
     def beside(self, scene: Fields) -> Self:
-        """The facts of a scene that is made of this one."""
+        """The facts of a scene that is derived from this one."""
         return type(self)(scene)
 
     def without(self, key: str) -> Self:
@@ -362,7 +363,7 @@ class System(Generic[Fields]):
 
     @cached_property
     def in_single(self) -> Fields:
-        """The scene as an engine keeps it that holds the parameters of its potential in single precision."""
+        """The scene as stored by an engine that keeps the parameters of its potential in single precision."""
         return self.scene.derived(terms=tuple(term.in_single() for term in self.terms))
 
     def scaled(self, factor: float) -> Fields:
@@ -370,7 +371,7 @@ class System(Generic[Fields]):
         return self.scene.derived(terms=tuple(term.scaled(factor) for term in self.terms))
 
     def tiled(self, copies: int) -> Fields:
-        """So many copies of the scene side by side, which do not act on each other."""
+        """So many copies of the scene side by side, without interaction."""
         m, q, p = (np.tile(x, copies) for x in (self.m, self.q, self.p))
         terms = tuple(term.tiled(copies, self.n) for term in self.terms)
         places = self.scene.places
@@ -379,18 +380,18 @@ class System(Generic[Fields]):
         return self.scene.derived(m=m, q=q, p=p, places=places, terms=terms)
 
     def from_states(self, q: Floats, p: Floats) -> Fields:
-        """Copies of the scene side by side, one from each of these states (c, n), and one step of them."""
+        """Copies of the scene side by side for one step, one from each of these states (c, n)."""
         return self.tiled(len(q)).derived(q=q.ravel(), p=p.ravel(), steps=1, every=1)
 
     def part(self, chosen: Integers) -> Fields:
-        """These particles (s,) alone, renumbered, with the rows of terms that act on nothing else."""
+        """These particles (s,) alone, renumbered, with the rows of terms that act on them alone."""
         number = np.full(self.n, -1)
         number[chosen] = np.arange(len(chosen))
         m, q, p = (x[chosen] for x in (self.m, self.q, self.p))
         terms = (term.restricted(number) for term in self.terms)
         places = self.scene.places
         if places is not None:
-            # the particles that are left, numbered anew
+            # renumber the remaining particles
             _, of = np.unique(places[chosen] // 3, return_inverse=True)
             places = 3 * of + places[chosen] % 3
         return self.scene.derived(m=m, q=q, p=p, places=places, terms=tuple(x for x in terms if len(x)))

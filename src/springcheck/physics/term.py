@@ -1,9 +1,9 @@
-"""What a term of a scene is: rows of parameters on particles, their law, and all that is done to them.
+"""A term of a scene: rows of parameters on particles, their law, and all operations on them.
 
 A term is a frozen dataclass of arrays, one entry a row, derived from `OnParticles` or `OnPairs`.  It states
-its law as four functions of the elongation u of its rows and of its parameters; everything else (energy
-and force of a whole state, hardening, single precision, copies, parts of a scene) follows from them here.
-A formula is written once for every width of float, for one state and for a whole trajectory alike.
+its law as four functions of the elongation u of its rows and of its parameters; all else (energy and force of
+a whole state, hardening, single precision, copies, parts of a scene) follows from them here.  A formula is
+written once for every width of float, for one state and for a whole trajectory alike.
 """
 
 from __future__ import annotations
@@ -24,16 +24,16 @@ Origin: TypeAlias = Literal["potential", "friction", "magnetic", "drive", "const
 
 
 class Column(NamedTuple):
-    """A parameter of a term: its name in a scene file, the field that holds it, and what it may be."""
+    """A parameter of a term: its name in a scene file, the field that holds it, and its accepted values."""
 
     name: str
     field: str
     default: float | None = None
     sign: Literal["any", "positive", "nonnegative"] = "any"
     inverse: bool = False
-    """The file gives the inverse of what the field holds."""
+    """Whether the file gives the inverse of the field's value."""
     single: bool = True
-    """Whether an engine that keeps parameters in single precision keeps this one so."""
+    """Whether an engine with parameters in single precision stores this one so."""
 
 
 class Term:
@@ -48,11 +48,11 @@ class Term:
     ends: ClassVar[tuple[str, ...]]
     """The fields that hold the particles of each row: one, or two that the row joins."""
     origin: ClassVar[str] = ""
-    """The field that is subtracted from the elongation, and so is no argument of the law."""
+    """The field that is subtracted from the elongation, and is therefore no argument of the law."""
     is_linear: ClassVar[bool] = False
     """Whether the force is linear in positions and velocities."""
     kind: ClassVar[Origin] = "potential"
-    """What its force comes from: a potential energy, the velocities, the time, or a length that it keeps."""
+    """Origin of its force: a potential energy, the velocities, the time, or a constrained length."""
     fast: bool = False
     """Whether a method of multiple time steps takes these rows in its short step."""
 
@@ -60,7 +60,7 @@ class Term:
     potential: ClassVar[Any]
     """Energy of each row (..., s) [M L2/T2], 0 at rest."""
     slope: ClassVar[Any]
-    """First derivative of the energy by u: what pulls u back, (..., s) [M L/T2]."""
+    """First derivative of the energy by u: the restoring force (..., s) [M L/T2]."""
     second: ClassVar[Any]
     """Second derivative of the energy by u, (..., s) or, where it is constant, (s,) [M/T2]."""
     rounding: ClassVar[Any]
@@ -81,7 +81,7 @@ class Term:
             object.__setattr__(self, column.field, values)
 
     def check(self, n: int) -> None:
-        """SceneError unless every parameter is finite and of its sign, and on particles 0 to n - 1."""
+        """SceneError unless every parameter is finite and of its sign, and all ends are below n."""
         for name, index in zip(self.ends, self.particles, strict=True):
             bad = np.flatnonzero((index < 0) | (index >= n))
             if len(bad):
@@ -124,7 +124,7 @@ class Term:
 
     @cached_property
     def _places(self) -> tuple[tuple[Where, bool], ...]:
-        """Where each end stands in a row of all particles, and whether that names some particle twice."""
+        """Index of each end in an array of all particles, and whether it contains some particle twice."""
         return tuple(_place(index) for index in self.particles)
 
     def stretch(self, q: Reals) -> Reals:
@@ -152,7 +152,7 @@ class Term:
         return np.asarray(np.sum(self.potential(self.elongation(q), *self.parameters), axis=-1))
 
     def pull(self, q: Reals) -> Reals:
-        """What shortens the elongation of each row at positions q (..., n) -> (..., s) [M L/T2]."""
+        """Restoring force of each row at positions q (..., n) -> (..., s) [M L/T2]."""
         return np.asarray(self.slope(self.elongation(q), *self.parameters))
 
     def add_force(self, q: Reals, v: Reals, out: Reals) -> None:
@@ -160,26 +160,25 @@ class Term:
         self.add_pull(self.pull(q), out)
 
     def add_pull(self, pull: Reals, out: Reals) -> None:
-        """Add to out (..., n) what shortens the elongation of each row by a force (..., s) [M L/T2]."""
+        """Add a force (..., s) [M L/T2] that shortens the elongation of each row to out (..., n)."""
         if self.bodies == 2:
             _scatter(np.add, out, self._places[0], pull)
         _scatter(np.subtract, out, self._places[-1], pull)
 
     def add_change(self, q: Reals, v: Reals, dq: Reals, dv: Reals, out: Reals) -> None:
-        """Add to out (..., n) the change of the force at (q, v) by small ones, but for what is linear in
-        v."""
+        """Add to out (..., n) the linear change of the force at (q, v), without the part linear in v."""
         self.add_pull(self.curvature(q) * self.stretch(dq), out)
 
     def add_rounding(self, q: Reals, v: Reals, out: Reals, near: Reals | None, exact: bool) -> None:
-        """Add to out (..., n) what bounds the rounding of add_force at states of sizes q, v."""
+        """Add to out (..., n) a bound on the rounding of add_force at states of sizes q, v."""
         self.scatter(self.pull_rounding(q, v, near, exact), out)
 
     def pull_rounding(self, q: Reals, v: Reals, near: Reals | None, exact: bool) -> Reals:
-        """What bounds the rounding of each row's force (..., s) at states of sizes q, v (..., n), the law
-        taken near a state, or where that is not given at the worst place within the sizes.
+        """Bound on the rounding of each row's force (..., s) at states of sizes q, v (..., n), with the law
+        evaluated near a state, or without one at the worst position within the sizes.
 
-        `exact` says that the force is taken at `near` itself: a law that feels a rounding of its position
-        more than that of its elongation may say less then.
+        With `exact` the force is evaluated at `near` itself: a law that is more sensitive to a rounding of
+        its position than to that of its elongation may have a smaller bound then.
         """
         size = self.most_stretch(np.abs(q))
         if self.origin:
@@ -200,21 +199,21 @@ class Term:
 
     @cached_property
     def rigidity(self) -> Floats:
-        """Absolute curvature of each row at rest (s,) [M/T2]: what errors of position are weighed by."""
+        """Absolute curvature of each row at rest (s,) [M/T2], the weight of errors of position."""
         zero = np.zeros(len(self))
         return np.asarray(np.abs(self.second(zero, *self.parameters)) + zero)
 
     def scaled(self, factor: float | Floats) -> Self:
-        """With energy and force multiplied by a factor: one number, or one for each row (s,)."""
+        """Copy with energy and force multiplied by a factor: one number, or one for each row (s,)."""
         strength = self.columns[0].field
         return self._changed(**{strength: getattr(self, strength) * factor})
 
     def shifted(self, length: float) -> Self:
-        """With the origin of every row's elongation moved [L]; friction has none."""
+        """Copy with the origin of every row's elongation moved [L]; friction has none."""
         return self._changed(**{self.origin: getattr(self, self.origin) + length}) if self.origin else self
 
     def centred(self) -> Self:
-        """With every row at rest where positions are 0."""
+        """Copy with every row at rest where positions are 0."""
         return self._changed(**{self.origin: np.zeros(len(self))}) if self.origin else self
 
     def in_single(self) -> Self:
@@ -225,7 +224,7 @@ class Term:
         return self._changed(**kept)
 
     def tiled(self, copies: int, n: int) -> Self:
-        """Copies of its rows, the j-th on particles n j places further."""
+        """Copies of its rows, the j-th on particles shifted by n j."""
         shift = n * np.arange(copies)[:, None]
         return self._changed(
             **{name: (getattr(self, name) + shift).ravel() for name in self.ends},
@@ -246,7 +245,7 @@ class Term:
         return self._changed(**{name: np.append(values, rows[name]) for name, values in self.arrays.items()})
 
     def separated(self, q: Reals) -> tuple[Self, Reals]:
-        """The term with particles of its own for each row, and their positions for q (..., n)."""
+        """The term with separate particles for each row, and their positions for q (..., n)."""
         own = np.arange(self.bodies * len(self)).reshape(self.bodies, -1)
         where = np.concatenate([np.take(q, index, axis=-1) for index in self.particles], axis=-1)
         return self._changed(**dict(zip(self.ends, own, strict=True))), where
@@ -263,7 +262,7 @@ class Term:
 
 
 class LinearLaw:
-    """The law of a linear spring, of the first parameter alone."""
+    """The law of a linear spring, with the first parameter as its stiffness."""
 
     @staticmethod
     def potential(u: Reals, k: Floats, *_: Floats) -> Reals:
@@ -283,7 +282,7 @@ class LinearLaw:
 
 
 class WithoutPotential(Term):
-    """A term whose rows have no energy: friction, a field, a driving force, a rod."""
+    """A term without potential energy: friction, a magnetic field, a driving force, a rod."""
 
     @staticmethod
     def potential(u: Reals, *_: Floats) -> Reals:
@@ -297,7 +296,7 @@ class WithoutPotential(Term):
         return np.zeros_like(strength)
 
     def scaled(self, factor: float | Floats) -> Self:
-        """Itself: it is no part of the potential."""
+        """Itself, since it is no part of the potential."""
         return self
 
 
@@ -345,7 +344,7 @@ def frozen(values: Any, kind: type, rows: int | None, what: str) -> NDArray[Any]
 
 
 def refrozen(self: object, state: dict[str, Any]) -> None:
-    """Put what another process has sent into a frozen object; its arrays come back writeable."""
+    """Restore a frozen object from another process, whose arrays arrive writeable."""
     self.__dict__.update(state)
     for value in state.values():
         if isinstance(value, np.ndarray):
@@ -353,7 +352,7 @@ def refrozen(self: object, state: dict[str, Any]) -> None:
 
 
 def check_sign(values: Floats, sign: str, what: str) -> None:
-    """SceneError, naming the first that is wrong, unless all values are finite and of this sign."""
+    """SceneError, naming the first invalid value, unless all are finite and of this sign."""
     right, wanted = np.isfinite(values), "a finite number"
     if np.all(right) and sign == "positive":
         right, wanted = values > 0, "a number > 0"
@@ -372,7 +371,8 @@ def _place(index: Integers) -> tuple[Where, bool]:
 
 
 def _taken(q: Reals, where: Where) -> Reals:
-    # take, because the layout of q[..., index] makes the order of a later sum depend on the number of states
+    # take, because the memory order of q[..., index] makes the order of a later sum depend on the number of
+    # states
     return q[..., where] if isinstance(where, slice) else np.take(q, where, axis=-1)
 
 

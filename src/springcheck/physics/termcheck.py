@@ -1,4 +1,4 @@
-"""Whether the functions of a new term's law agree with each other: it is asked as the term is registered."""
+"""Consistency of the functions of a new term's law, checked as the term is registered."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ import numpy as np
 from springcheck.physics.arrays import Reals
 from springcheck.physics.term import Term
 
-STEP = 2.0**-7
-"""Distance of the points of a difference quotient of eighth order [L]."""
-SLOPE = np.array([1 / 280, -4 / 105, 1 / 5, -4 / 5, 0, 4 / 5, -1 / 5, 4 / 105, -1 / 280], np.longdouble)
-PRECISION = 1e-9
-"""Relative agreement that is asked for: the quotient's own error is (STEP/length)**8, 1e-17 for a law that
-changes over a unit of length and 1e-9 for one that changes over a tenth of it."""
-ROUNDINGS = 32
-"""Operations in one formula at most."""
+SPACING = 2.0**-7
+"""Spacing of the points of a difference quotient of eighth order [L]."""
+WEIGHTS = np.array([1 / 280, -4 / 105, 1 / 5, -4 / 5, 0, 4 / 5, -1 / 5, 4 / 105, -1 / 280], np.longdouble)
+LAW_AGREEMENT = 1e-9
+"""Relative agreement required. The quotient errs by (SPACING/length)**8: 1e-17 for a law that varies over a
+unit of length, 1e-9 over a tenth."""
+FORMULA_ROUNDINGS = 32
+"""Most operations in one formula."""
 
 
-RESERVED = (
+RESERVED_WORDS = (
     "particle", "rotor", "inductor", "capacitor", "resistor", "chain", "ends", "fast", "title", "source",
     "units", "kind", "time", "methods", "record",
 )  # fmt: skip
@@ -27,11 +27,11 @@ RESERVED = (
 
 
 def check(term: type[Term]) -> None:
-    """Raise TypeError where the class lacks a part, ValueError where its functions contradict each other.
+    """Raise TypeError where the class lacks a part, ValueError where its functions are inconsistent.
 
-    Tried at 64 elongations between -0.5 and 0.5, with parameters between 0.5 and 1.5: slope and second are
-    the derivatives of potential and slope, potential and slope are proportional to the first parameter and
-    0 at rest, and slope computed in single precision is off by no more than `rounding` says.
+    Tested at 64 elongations between -0.5 and 0.5, with parameters between 0.5 and 1.5: slope and second are
+    the derivatives of potential and slope, potential and slope are proportional to the first parameter and 0
+    at rest, and the error of slope in single precision is within `rounding`.
     """
     _check_parts(term)
     rng = np.random.default_rng(1)
@@ -41,8 +41,8 @@ def check(term: type[Term]) -> None:
     functions: Any = term
     for lower, upper in (("potential", "slope"), ("slope", "second")):
         of, slope = getattr(functions, lower), getattr(functions, upper)
-        points = u + STEP * np.arange(-4, 5)[:, None]
-        quotient = SLOPE @ np.stack([of(row, *parameters) + 0 * row for row in points]) / STEP
+        points = u + SPACING * np.arange(-4, 5)[:, None]
+        quotient = WEIGHTS @ np.stack([of(row, *parameters) + 0 * row for row in points]) / SPACING
         _agree(term, f"{upper} is not the derivative of {lower}", slope(u, *parameters), quotient)
     double = [2 * parameters[0], *parameters[1:]]
     for name in ("potential", "slope"):
@@ -51,7 +51,7 @@ def check(term: type[Term]) -> None:
         _agree(term, wrong, of(u, *double), 2 * of(u, *parameters))
         _agree(term, f"{name} is not 0 at rest", of(0 * u, *parameters), 0 * u)
     narrow = functions.slope(u.astype(np.float32), *(x.astype(np.float32) for x in parameters))
-    bound = ROUNDINGS * 2.0**-24 * np.abs(functions.rounding(np.abs(u), u, *parameters))
+    bound = FORMULA_ROUNDINGS * 2.0**-24 * np.abs(functions.rounding(np.abs(u), u, *parameters))
     if not np.all(np.abs(narrow - functions.slope(u, *parameters)) <= bound):
         raise ValueError(f"{term.__name__}: slope rounds more than rounding(size, u, ...) says")
 
@@ -61,7 +61,7 @@ def _check_parts(term: type[Term]) -> None:
         if not hasattr(term, name):
             raise TypeError(f"{term.__name__} lacks {name!r}, which a term needs")
     words = [term.key, *(column.name for column in term.columns)]
-    bad = [word for word in words if not word.replace("-", "_").isidentifier() or word in RESERVED]
+    bad = [word for word in words if not word.replace("-", "_").isidentifier() or word in RESERVED_WORDS]
     if bad:
         raise TypeError(
             f"{term.__name__}: {bad[0]!r} cannot be the name of a table or a column in a scene file"
@@ -83,5 +83,5 @@ def _check_parts(term: type[Term]) -> None:
 
 def _agree(term: type[Term], wrong: str, one: Reals, other: Reals) -> None:
     size = np.max(np.abs(other))
-    if not np.all(np.abs(one - other) <= PRECISION * (size or 1)):
+    if not np.all(np.abs(one - other) <= LAW_AGREEMENT * (size or 1)):
         raise ValueError(f"{term.__name__}: {wrong}")

@@ -1,7 +1,7 @@
-"""The terms that there are: springs, quartic potentials, pendulums, Morse bonds, friction, and the driven.
+"""The terms: springs, quartic potentials, pendulums, Morse bonds, friction, and driven terms.
 
-To add one, write its class with its law and put `@register` before it, here or in a file of your own: the
-ten lines are shown in data/README.md.
+To add one, write its class with its law and put `@register` before it, here or in a file of your own:
+data/README.md shows the ten lines.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class WallSpring(LinearLaw, OnParticles):
 
     key: ClassVar[str] = "wall-spring"
     formula: ClassVar[str] = "k/2 (q - at)**2"
-    # a wall is a place of its own, which engines of single precision keep like a position
+    # a wall is a separate coordinate, which engines of single precision store like a position
     columns: ClassVar[tuple[Column, ...]] = (
         Column("stiffness", "k"),
         Column("wall", "at", 0.0, single=False),
@@ -79,7 +79,7 @@ class Quartic(OnParticles):
 
     @staticmethod
     def rounding(size: Reals, u: Reals, b: Floats) -> Reals:
-        # a relative error of u counts threefold in u**3
+        # a relative error of u is amplified threefold in u**3
         return 3 * np.abs(b) * u * u * size
 
 
@@ -116,12 +116,12 @@ class Cosine(OnParticles):
 
     @staticmethod
     def rounding(size: Reals, u: Reals, depth: Floats, wave: Floats) -> Reals:
-        # the sine's own rounding, and that of its argument, which turns round and round
+        # the sine's own rounding, and that of its argument, which grows with the number of turns
         return np.abs(depth * wave) * (1 + np.abs(wave) * size)
 
     def pull_rounding(self, q: Reals, v: Reals, near: Reals | None, exact: bool) -> Reals:
-        """Many turns away the argument's rounding is all there is, unless nothing is subtracted and the
-        product with `wave` is exact."""
+        """Many turns away the argument's rounding dominates, unless nothing is subtracted and the product
+        with `wave` is exact."""
         whole = (self.at == 0) & (np.frexp(self.wave)[0] == 0.5)
         if near is None or not exact or not np.any(whole):
             return Term.pull_rounding(self, q, v, near, exact)
@@ -131,7 +131,7 @@ class Cosine(OnParticles):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Weight(OnParticles):
-    """Constant forces on particles i: V = -force (q - at).  force [M L/T2], at [L]: nothing rests in them."""
+    """Constant forces on particles i: V = -force (q - at), without equilibrium.  force [M L/T2], at [L]."""
 
     key: ClassVar[str] = "weight"
     formula: ClassVar[str] = "-force (q - at)"
@@ -190,7 +190,8 @@ class Morse(OnPairs):
 
     @staticmethod
     def rounding(size: Reals, u: Reals, depth: Floats, steepness: Floats) -> Reals:
-        # roundings of 1 - x, of x = exp(-steepness u), which may come of 1 - x, and of u, which both feel
+        # roundings of 1 - x, of x = exp(-steepness u), which may come from 1 - x, and of u, to which both are
+        # sensitive
         x = 1 + np.expm1(-steepness * u)
         s = np.abs(steepness)
         return np.asarray(
@@ -211,7 +212,7 @@ class Damping(WithoutPotential):
     i: Integers
     c: Floats
 
-    # of the velocity, not of an elongation
+    # functions of the velocity, not of an elongation
     slope: ClassVar[Any] = staticmethod(LinearLaw.slope)
     rounding: ClassVar[Any] = staticmethod(LinearLaw.rounding)
 
@@ -246,11 +247,11 @@ T = TypeVar("T", bound=type[Term])
 
 
 def register(term: T) -> T:
-    """Make a class of terms known to scene files by its key; a decorator.
+    """Class decorator that registers a term for scene files by its key.
 
     Raises:
         TypeError: the class lacks a part, or its key is taken.
-        ValueError: the functions of its law contradict each other (see `termcheck`).
+        ValueError: the functions of its law are inconsistent (see `termcheck`).
     """
     taken = _KNOWN.get(term.key)
     if taken is not None and (taken.__module__, taken.__qualname__) != (term.__module__, term.__qualname__):
@@ -266,10 +267,10 @@ def known() -> dict[str, type[Term]]:
 
 
 def in_order(terms: Iterable[Term]) -> tuple[Term, ...]:
-    """Terms as a scene holds them: one of each kind, in one order, none without rows.
+    """Terms as a scene holds them: one of each kind, in a fixed order, none without rows.
 
-    First springs, fast ones last among them, then the other potentials, then friction: forces are added up
-    in this order, so that scenes of the same rows move alike to the last bit.
+    Springs first, fast ones last among them, then the other potentials, then friction: forces are summed in
+    this order, so that scenes of the same rows have bitwise the same motion.
     """
     known = list(_KNOWN)
     found: dict[tuple[type[Term], bool], Term] = {}

@@ -19,10 +19,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
-    """How a run ended.  Nothing that is not `complete` passes for a result."""
+    """How a run ended.  Only a `complete` one is a result."""
 
     status: Literal["complete", "diverged", "stopped", "continued"]
-    """`continued`: a piece of a run that goes on after it."""
+    """`continued`: a piece of a run that has further pieces."""
     step: int
     """Steps done with finite numbers."""
     message: str = ""
@@ -30,7 +30,7 @@ class Outcome:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Timing:
-    """Seconds of wall clock: `start` until the engine stands ready, `run` inside `advance` alone."""
+    """Seconds of wall clock: `start` until the engine is ready, `run` inside `advance` alone."""
 
     start: float = 0.0
     run: float = 0.0
@@ -53,7 +53,7 @@ class Trajectory:
     tolerance: float | None = None
     """Relative tolerance per step; None for a method of fixed step."""
     energy: Floats | None = None
-    """Total energy of each frame, (f,) [M L2/T2]; None where the scene asks for none."""
+    """Total energy of each frame, (f,) [M L2/T2]; None where the scene does not record it."""
     last_step: Floats | None = None
     """Length of the adaptive step that ended at each frame (f,) [T], in either direction of time, 0 at the
     start; None for fixed steps, or where the solver reports none."""
@@ -62,9 +62,9 @@ class Trajectory:
     off_axis: float | None = None
     """Largest |y| or |z| seen, for engines in three dimensions."""
     origin: Mapping[str, str] = field(default_factory=dict)
-    """Versions, platform, velocity convention and the like: what a reader needs to repeat the run."""
+    """Versions, platform, velocity convention and the like, as needed to repeat the run."""
     scene: Scene | None = None
-    """The scene that was run, where that is known: `v` and `error` need it."""
+    """The scene that was run, if known: `v` and `error` need it."""
 
     @classmethod
     def from_arrays(
@@ -80,11 +80,11 @@ class Trajectory:
         label: str = "data",
         every: int = 1,
     ) -> Trajectory:
-        """A trajectory of anybody's numbers: times t (f,) [T], q [L], and p [M L/T] or v [L/T], (f,), (f, n).
+        """A trajectory from arrays: times t (f,) [T], q [L], and p [M L/T] or v [L/T], (f,) or (f, n).
 
-        `every` is the number of steps from frame to frame, `mass` (n,) or one for all [M] makes p of v; a
-        `scene` gives masses, step, `every` and the energies of these states, and what `judge` and `error`
-        hold it against.  SpringcheckError where the numbers do not fit together.
+        `every` is the number of steps between frames, `mass` (n,) or one for all [M] converts v to p; a
+        `scene` gives masses, step, `every`, the energies of these states, and the reference for `judge` and
+        `error`. SpringcheckError where the arrays are inconsistent.
         """
         if p is None and v is None:
             raise SpringcheckError(f"{label}: momenta p or velocities v= are needed beside t and q")
@@ -116,14 +116,14 @@ class Trajectory:
         return made if scene is None else made.with_energies(scene)
 
     def with_energies(self, scene: Scene) -> Self:
-        """The same with the energies of its states, where they are not there and this scene asks for them."""
+        """Copy with the energies of its states, where they are missing and this scene records them."""
         if self.energy is not None or "energy" not in scene.quantities:
             return self
         return replace(self, energy=np.asarray(scene.system.energy(self.q, self.p), np.float64))
 
     @property
     def v(self) -> Floats:
-        """Velocities p/m (f, n) [L/T].  SpringcheckError where no scene tells the masses."""
+        """Velocities p/m (f, n) [L/T].  SpringcheckError where no scene gives the masses."""
         return np.asarray(self.p / self._known.m)
 
     @property
@@ -146,7 +146,7 @@ class Trajectory:
         return scene.system.norm(self.q - q, self.p - p)
 
     def _exact(self, scene: Scene) -> tuple[Extended, Extended]:
-        """The exact solution at each frame.  SpringcheckError where one is at no whole step."""
+        """The exact solution at each frame.  SpringcheckError where a time is no whole number of steps."""
         from springcheck.physics import exact
 
         steps = np.rint(self.t / self.step)
@@ -160,7 +160,7 @@ class Trajectory:
         return replace(self, t=self.t[rows], q=self.q[rows], p=self.p[rows], **more)
 
     def save(self, path: str | Path) -> Path:
-        """Write t, q, p (and m, energy) as .csv or .npz, every double so that it reads back as it is.
+        """Write t, q, p (and m, energy) as .csv or .npz, every double so that it reads back exactly.
 
         `springcheck.identify` and the command read both.  SpringcheckError where it cannot be written.
         """
@@ -183,7 +183,7 @@ class Trajectory:
         return place
 
     def plot(self, ax: Any = None, *, particle: int = 0) -> Any:
-        """Phase portrait of one particle, the exact solution behind it where it is known -> its axes.
+        """Phase portrait of one particle, over the exact solution where it is known -> its axes.
 
         `ax`: matplotlib axes of your own.  `springcheck.plot` draws several trajectories, and over time.
         """
@@ -210,7 +210,7 @@ class Trajectory:
         return html_table(repr(self), rows)
 
     def to_dataframe(self) -> Any:
-        """A pandas DataFrame: a row a frame, columns q0, p0, q1 ... and energy where it was kept; index t."""
+        """A pandas DataFrame: a row for each frame, columns q0, p0, q1 ..., energy if recorded; index t."""
         pandas = library("pandas")
         columns: dict[str, Floats] = {}
         for i in range(self.q.shape[1]):
@@ -220,7 +220,7 @@ class Trajectory:
         return pandas.DataFrame(columns, index=pandas.Index(self.t, name="t"))
 
     def to_xarray(self) -> Any:
-        """An xarray Dataset: q and p over t and particle, energy over t where it was kept."""
+        """An xarray Dataset: q and p over t and particle, energy over t if recorded."""
         xarray = library("xarray")
         kept = {name: (("t", "particle"), getattr(self, name)) for name in ("q", "p")}
         if self.energy is not None:
@@ -244,7 +244,7 @@ def _few(values: Floats) -> str:
 
 
 def library(name: str) -> Any:
-    """A library that only what is asked for here needs.  SpringcheckError where it is not installed."""
+    """Import a library for a single feature.  SpringcheckError where it is not installed."""
     try:
         return import_module(name)
     except ModuleNotFoundError:
@@ -281,16 +281,16 @@ class Comparison:
 
 
 def _told(words: str) -> Any:
-    """A field of `Limits`, and what is said of it."""
+    """A field of `Limits`, and its phrase."""
     return field(default=None, metadata={"words": words})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Limits:
-    """The relative change of each quantity from which on a check fails; None where it says nothing of it."""
+    """The relative change of each quantity from which on a check fails; None where the check is blind."""
 
     stiffness: float | None = _told("a stiffness off by {:.1e}")
-    """Relative change of the spring, or other potential's row, that shows least among those that show."""
+    """Relative change of the spring, or other potential's row, with the largest such limit."""
     step: float | None = _told("a step off by {:.1e}")
     friction: float | None = _told("a friction off by {:.1e}")
     """Relative change of the friction on one particle."""
@@ -299,9 +299,9 @@ class Limits:
     reaction: float | None = _told("a force off its reaction by {:.1e}")
     """Relative excess of the force on one particle over its reactions on the others."""
     order: float | None = _told("an order or exponent off by {:.1e}")
-    """Change of an order or an exponent, absolute."""
+    """Absolute change of an order or an exponent."""
     amplitude: float | None = _told("a drive's amplitude off by {:.1e}")
-    """Relative change of the amplitude of the drive, or depth of the modulation, that shows least."""
+    """Relative change of a drive's amplitude, or of the depth of a modulation: the largest such limit."""
     frequency: float | None = _told("its frequency off by {:.1e}")
     """Relative change of the frequency of a drive."""
     phase: float | None = _told("its phase off by {:.1e} rad")
@@ -310,14 +310,14 @@ class Limits:
     """Delay of a drive, in steps."""
 
     def __str__(self) -> str:
-        """The same in words, or nothing."""
+        """The limits in words; "" where all are None."""
         known = ((of.metadata["words"], getattr(self, of.name)) for of in fields(self))
         said = [words.format(x) for words, x in known if x is not None]
         return f"would see {', '.join(said)}" if said else ""
 
     @classmethod
     def least(cls, several: Iterable[Limits]) -> Limits:
-        """The least limits among several checks, or among the pieces of a run that one check has seen."""
+        """The smallest limits among several checks, or among pieces of a run that one check has judged."""
         every, names = list(several), [of.name for of in fields(cls)]
         known = {name: [x for one in every if (x := getattr(one, name)) is not None] for name in names}
         return cls(**{name: min(x, default=None) for name, x in known.items()})
@@ -346,7 +346,7 @@ class Verdict:
 
     @property
     def reason(self) -> str:
-        """Why, and what the check would have seen."""
+        """The reason, and the smallest faults that the check would have detected."""
         exact = "would see any other value" if self.passed and self.bound == 0 else ""
         return "; ".join(filter(None, (self.why, str(self.sees) or exact)))
 

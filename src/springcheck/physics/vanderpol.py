@@ -1,4 +1,4 @@
-"""Van der Pol's friction: it feeds small swings and brakes large ones, and every motion ends in one cycle."""
+"""Van der Pol's friction: it amplifies small oscillations and damps large ones, towards a limit cycle."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from springcheck.physics.term import Column, Origin, WithoutPotential
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class VanDerPol(WithoutPotential):
-    """Friction of particles i that their place decides: force c (1 - ((q - at)/width)**2) v.
+    """Position-dependent friction of particles i: force c (1 - ((q - at)/width)**2) v.
 
-    c [M/T], width and at [L].  On a spring k, m q'' = c (1 - x**2) q' - k q has mu = c/sqrt(k m).
-    B. van der Pol, Phil. Mag. 2 (1926) 978.
+    c [M/T], width and at [L].  On a spring k, m q'' = c (1 - x**2) q' - k q has mu = c/sqrt(k m). B. van der
+    Pol, Phil. Mag. 2 (1926) 978.
     """
 
     key: ClassVar[str] = "van-der-pol"
@@ -34,15 +34,13 @@ class VanDerPol(WithoutPotential):
     at: Floats
 
     def resistance(self, q: Reals) -> tuple[Reals, Reals]:
-        """What the velocity is multiplied by to give the brake, and its derivative by q: (..., s) each
-        [M/T]."""
+        """Friction coefficient of each row, and its derivative by q: (..., s) each [M/T], [M/(L T)]."""
         x = (np.take(q, self.i, axis=-1) - self.at) / self.width
         # (x - 1) (x + 1) keeps its digits where the friction changes its sign
         return np.asarray(self.c * ((x - 1) * (x + 1))), np.asarray(2 * self.c * x / self.width)
 
     def add_rates(self, q: Reals, m: Floats, out: tuple[Reals, Reals]) -> None:
-        """Add the same over the masses m (n,) to the numbers of each particle (..., n): see
-        `System.friction_at`."""
+        """Add the coefficients over the masses m (n,), by particle (..., n): see `System.friction_at`."""
         for values, each in zip(self.resistance(q), out, strict=True):
             self.scatter(values / m[self.i].astype(q.dtype), each)
 
@@ -55,5 +53,5 @@ class VanDerPol(WithoutPotential):
 
     def pull_rounding(self, q: Reals, v: Reals, near: Reals | None, exact: bool) -> Reals:
         x = (np.abs(np.take(q if near is None else near, self.i, axis=-1)) + np.abs(self.at)) / self.width
-        # a rounding of the place is felt twice in its square
+        # a rounding of the position counts twice in its square
         return self.c * (1 + 3 * x * x) * np.abs(np.take(v, self.i, axis=-1))

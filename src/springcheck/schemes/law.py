@@ -114,8 +114,8 @@ class Law:
     ) -> tuple[Reals, Reals]:
         """One step from states (..., n), in the width of q; `forces` makes the forces of terms.
 
-        `slope` stands for the scene's own where the states are not positions, `varied` says that all but the
-        first are changes of it.  For all else see `schemes.step`.
+        `slope` replaces the scene's own where the states are not positions; `varied`: all states but the
+        first are variations of it.  For the other arguments see `schemes.step`.
         """
         system, forces = self.scene.system, forces or self.scene.system.force_of
         return step(

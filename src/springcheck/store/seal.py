@@ -93,7 +93,7 @@ def sealed(body: bytes, run: str = "") -> bytes:
 
 
 def encoded(seal: Seal) -> bytes:
-    """The two lines at the end of a file."""
+    """The seal as bytes: the last two lines of a file."""
     line = b"\n" + json.dumps(asdict(seal), separators=(",", ":")).encode() + b"\n"
     return line + _foot(line)
 

@@ -10,7 +10,7 @@ Argument = tuple[tuple[str, ...], dict[str, Any]]
 
 
 class Progress(Protocol):
-    """Told how much is done, of how much (pieces, steps or seconds of a budget), and what comes next."""
+    """Callback for progress: the amount done, the whole (pieces, steps or seconds), and what is next."""
 
     def __call__(self, done: float, whole: float, what: str = "") -> None: ...
 
@@ -34,7 +34,7 @@ SCENE = argument("scene", metavar="SCENE", help="a shipped scene's name, or the 
 
 
 def store_arguments(default: str = "SCENE.h5") -> tuple[Argument, ...]:
-    """Arguments of every study that is kept in a store: where, which methods, what runs beside them."""
+    """Arguments of every study that is saved in a store: its path, its methods, options of its runs."""
     return (
         argument("-o", "--output", metavar="FILE", help=f"the store (default: {default})"),
         repeatable("--method", "LABEL", "engine:method[@platform[-precision]] or a glob such as 'own:*'"),
@@ -70,5 +70,5 @@ REPORT_FORMS = ("junit", "badge", "summary")
 
 
 def reported(options: Namespace) -> bool:
-    """Whether a command line asks for any of the three."""
+    """Whether a command line asks for a JUnit report, a badge or a summary."""
     return any(getattr(options, name, None) is not None for name in REPORT_FORMS)

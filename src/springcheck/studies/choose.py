@@ -23,8 +23,8 @@ class LeftOut:
 def sorted_out(
     labels: Iterable[Label], reason: Callable[[Label], str | None], needed: str = ""
 ) -> tuple[list[Label], list[LeftOut]]:
-    """Methods for which `reason` is None, and the others with their reasons.  MethodError where there is none
-    of the former and something is `needed` of them."""
+    """Methods for which `reason` is None, and the others with their reasons.  MethodError where `needed` is
+    given and no method is usable."""
     reasons = {label: reason(label) for label in labels}
     left = [LeftOut(method=str(label), reason=why) for label, why in reasons.items() if why]
     usable = [label for label, why in reasons.items() if not why]
@@ -41,11 +41,10 @@ ALL = "*:?*"
 def choose(scene: Scene, patterns: Sequence[str]) -> tuple[list[Label], list[LeftOut], tuple[str, ...]]:
     """Methods that can serve a scene, of those that the patterns (or the scene) name, and those left out.
 
-    With them, where the scene names them, the labels of others that are here and could serve it.
-
-    Raises MethodError when a method that is named in full cannot run: it was asked for.
+    Where the scene names them, the labels of further methods that are installed and could serve it are added.
+    Raises MethodError when a method that is named in full cannot run: it was requested.
     """
-    # a scene's `*` stands for the default methods, one that somebody gives for all
+    # in a scene `*` stands for the default methods, in an argument for all
     patterns = patterns or [engines.UNNAMED]
     own = engines.UNNAMED in patterns
     named = [

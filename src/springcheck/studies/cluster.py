@@ -1,8 +1,8 @@
-"""Pieces of a study by the workers of a dask scheduler that runs.
+"""Pieces of a study, carried out by the workers of a dask scheduler.
 
-Workers come and go: what one has not answered goes to another.  A worker of other versions is refused,
-because its numbers might differ; dask's `Client.get_executor` does neither.  When the
-scheduler is gone, what was finished is kept, and the same command goes on with another one.
+Workers come and go: a piece without an answer is given to another.  A worker of other versions is refused,
+because its numbers might differ; dask's `Client.get_executor` does neither.  When the scheduler is lost,
+finished pieces are saved, and the same command resumes with another scheduler.
 """
 
 from __future__ import annotations
@@ -25,26 +25,26 @@ from springcheck.studies import provenance
 
 T = TypeVar("T")
 
-PATIENCE = 60.0
-"""Seconds without any answer after which every piece that is still out is given to another worker as well."""
+PATIENCE_SECONDS = 60.0
+"""Seconds without any answer after which every open piece is given to another worker as well."""
 
-ATTEMPTS = 20
-"""Times that a piece is given out before it is blamed for the workers that died over it."""
+MOST_ATTEMPTS = 20
+"""Attempts after which a piece is blamed for the workers that died over it."""
 
-WAITING = 30.0
+WAITING_SECONDS = 30.0
 """Seconds to wait for a scheduler and for its first worker."""
 
-SILENT = 30.0
-"""Seconds after which a worker that the scheduler has not heard of gets no piece: it hangs, or was stopped.
-The scheduler itself waits for 300 s and longer."""
+SILENT_SECONDS = 30.0
+"""Seconds of silence after which a worker gets no piece: it hangs, or was stopped.  The scheduler itself
+waits for 300 s and longer."""
 
-GONE = "the scheduler of the cluster is gone; what was finished is kept, the same command goes on"
+SCHEDULER_GONE = "the scheduler of the cluster is gone; what was finished is kept, the same command goes on"
 
 LOGGERS = "distributed", "distributed.client", "distributed.core", "tornado", "tornado.application", "asyncio"
-"""Loggers of the library, of which some have levels of their own; those of others are left as they are."""
+"""Loggers of dask, some of which have levels of their own; other loggers are left as they are."""
 
-OUT = 256
-"""Fewest pieces that are given out at a time."""
+FEWEST_SUBMITTED = 256
+"""Fewest pieces that are submitted at a time."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,11 +53,11 @@ class Cluster:
 
     place: str
     workers: int = 2
-    """How many are counted on: more than one, so that the longest pieces come first."""
-    patience: float = PATIENCE
+    """Assumed number of workers: more than one, so that the longest pieces are submitted first."""
+    patience: float = PATIENCE_SECONDS
 
     def carried_out(self, parts: Sequence[Callable[[], T]]) -> Generator[tuple[int, T], None, None]:
-        """Numbers and results of the parts, as they finish."""
+        """Index and result of each part, as it finishes."""
         if not parts:
             return
         with self._client() as client:
@@ -90,10 +90,10 @@ class Cluster:
                 logger.setLevel(logging.CRITICAL)
             try:
                 said = "no scheduler answers: {}"
-                client = distributed.Client(self._address, timeout=WAITING, set_as_default=False)
+                client = distributed.Client(self._address, timeout=WAITING_SECONDS, set_as_default=False)
                 stack.callback(client.close, timeout=1)
                 said = "the scheduler has no worker"
-                client.wait_for_workers(1, timeout=WAITING)
+                client.wait_for_workers(1, timeout=WAITING_SECONDS)
                 # the scheduler unpacks what passes through it
                 said = "springcheck is not installed where the scheduler runs: {}"
                 _on_scheduler(client, provenance.versions)
@@ -105,24 +105,24 @@ class Cluster:
 
 
 def _on_scheduler(client: Any, function: Callable[..., T]) -> T:
-    """What a function returns there.  TimeoutError where the scheduler does not answer."""
-    found: T = client.sync(client._run_on_scheduler, function, callback_timeout=WAITING)
+    """Result of a function called on the scheduler.  TimeoutError where the scheduler does not answer."""
+    found: T = client.sync(client._run_on_scheduler, function, callback_timeout=WAITING_SECONDS)
     return found
 
 
 def _silence(dask_scheduler: Any) -> dict[str, float]:
-    """Seconds since each worker was heard of, by its address; called on the scheduler."""
+    """Seconds since each worker was heard of, by its address; runs on the scheduler."""
     now = time.time()
     return {address: now - worker.last_seen for address, worker in dask_scheduler.workers.items()}
 
 
 def _hanging(client: Any, named: set[str]) -> tuple[list[str], list[str]]:
-    """Addresses of the workers that are heard of and of those that are not, each of which is named once."""
+    """Addresses of the workers that answer and of those that are silent; each of these is warned of once."""
     try:
         silence = _on_scheduler(client, _silence)
     except (TimeoutError, OSError) as error:
-        raise SpringcheckError(GONE) from error
-    hang = sorted(address for address, seconds in silence.items() if seconds > SILENT)
+        raise SpringcheckError(SCHEDULER_GONE) from error
+    hang = sorted(address for address, seconds in silence.items() if seconds > SILENT_SECONDS)
     live = sorted(silence.keys() - hang)
     for address in hang if live else ():
         if address not in named:
@@ -133,7 +133,7 @@ def _hanging(client: Any, named: set[str]) -> tuple[list[str], list[str]]:
 
 
 def _checked(part: Callable[[], Any], wanted: dict[str, str]) -> Any:
-    """Measure a piece on a worker, after a look at its versions, whenever it has joined."""
+    """Measure a piece on a worker, after a check of the worker's threads and versions."""
     from distributed import get_worker
 
     worker = get_worker()
@@ -169,10 +169,12 @@ def _answers(
 
     def give(i: int) -> None:
         given[i] += 1
-        if given[i] > ATTEMPTS:
-            raise SpringcheckError(f"piece {i} was given out {ATTEMPTS} times, and no worker survived it")
+        if given[i] > MOST_ATTEMPTS:
+            raise SpringcheckError(
+                f"piece {i} was given out {MOST_ATTEMPTS} times, and no worker survived it"
+            )
         key = f"springcheck-{id(number)}-{i}-{given[i]}"
-        # whoever joins may take it; where a worker hangs, only the others
+        # any worker may take it; where some hang, only the live ones
         where = {"workers": live} if live and hang else {}
         # the first has the highest priority: longest pieces are in front
         how = {"key": key, "pure": False, "priority": -i, "retries": 0, **where}
@@ -184,10 +186,10 @@ def _answers(
     done: set[int] = set()
     try:
         while len(done) < len(parts):
-            if len(done) % OUT == 0:
-                # no worker waits for its next piece
+            if len(done) % FEWEST_SUBMITTED == 0:
+                # no worker runs out of pieces
                 live, hang = _hanging(client, named)
-                most = max(OUT, 2 * len(live))
+                most = max(FEWEST_SUBMITTED, 2 * len(live))
             for i in islice(following, max(0, most - len(number))):
                 give(i)
             try:
@@ -228,13 +230,13 @@ def _answers(
     except (KeyboardInterrupt, GeneratorExit, SpringcheckError):
         raise
     except BaseException as error:
-        # whatever the library makes of a connection that is lost, asyncio's CancelledError for one
+        # dask raises various exceptions for a lost connection, asyncio's CancelledError among them
         if client.status == "running" and isinstance(error, Exception):
             raise
-        raise SpringcheckError(GONE) from error
+        raise SpringcheckError(SCHEDULER_GONE) from error
     client.cancel(list(number), force=True)
 
 
 def _alive(client: Any) -> None:
     if client.status != "running":
-        raise SpringcheckError(GONE)
+        raise SpringcheckError(SCHEDULER_GONE)

@@ -41,21 +41,21 @@ open_new, need_space, size = store.open_new, store.need_space, store.size
 windows, strided, end, summary = store.windows, store.strided, store.end, store.summary
 digest, attributes = store.digest, store.attributes
 tables, verdicts, comparison = store.tables_of, store.verdicts, store.comparison
-"""Functions of `store` on trajectories, which are written as they go and read in pieces, and on results."""
+"""Functions of `store` on trajectories, which are written and read in pieces, and on results."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Piece:
-    """A part of a study that is measured by itself, and kept as one table."""
+    """A part of a study that is measured separately, and saved as one table."""
 
     key: str
     """Its name among the pieces of its form."""
     what: str
-    """Its name for people."""
+    """Its name in progress reports."""
     measure: Callable[[], Any]
     form: Form[Any]
     cost: float = 0.0
-    """Estimate of the time that it takes, relative to the others."""
+    """Estimate of the time that it takes, relative to other pieces."""
 
     @property
     def name(self) -> str:
@@ -66,7 +66,7 @@ class Piece:
 def each(
     labels: Iterable[Label], what: str, measure: Callable[[Label], Callable[[], Any]], form: Form[Any]
 ) -> list[Piece]:
-    """One piece for each method; `measure(label)` is what measures it."""
+    """One piece for each method, measured by `measure(label)`."""
     named = [(label, f"{what} {label}".strip()) for label in labels]
     return [Piece(key=str(label), what=name, measure=measure(label), form=form) for label, name in named]
 
@@ -74,7 +74,7 @@ def each(
 class Keeper:
     """Access to the pieces that an earlier call has finished, and the place where this call saves its own.
 
-    Without a journal nothing was finished and nothing is kept.
+    Without a journal nothing is resumed and nothing is saved.
     """
 
     def __init__(
@@ -91,12 +91,12 @@ class Keeper:
         self.progress = progress
         self._by: dict[str, list[dict[str, str]]] = {}
         self.names: list[str] = []
-        """Names of the tables of the pieces, in the order in which they were asked for."""
+        """Names of the tables of the pieces, in the order in which they were requested."""
         self.resumed = 0
-        """Pieces that were not measured again."""
+        """Number of pieces that were not measured again."""
 
     def finished(self, form: Form[Any], key: str) -> Any:
-        """What an earlier call has kept under this key, or None."""
+        """The result that an earlier call has saved under this key, or None."""
         table = self._finished.get(form.beginning + key)
         return None if table is None else form.found(table)
 
@@ -126,12 +126,12 @@ class Keeper:
         self._journal.add(table, by=before, rows=form.joined)
 
     def add(self, table: Table) -> None:
-        """Keep a table that is no result."""
+        """Save a table that is no result."""
         if self._journal is not None:
             self._journal.add(table)
 
     def results(self, pieces: Sequence[Piece]) -> list[Any]:
-        """The results of these pieces, in their order: an earlier call's, else measured and saved."""
+        """Results of these pieces, in their order: an earlier call's, or measured and saved."""
         found = {piece.name: result for piece, result in self.stream(pieces)}
         return [found[piece.name] for piece in pieces]
 
@@ -146,7 +146,7 @@ class Keeper:
             else:
                 left.append(piece)
         if self.team.workers > 1:
-            # the longest first: whoever comes last is then not waited for long
+            # longest pieces first, so that the last one to finish is not waited for long
             left.sort(key=lambda piece: -piece.cost)
         done = len(pieces) - len(left)
         self._tell(done, pieces, left[:1])
@@ -154,7 +154,7 @@ class Keeper:
             for j, result, by in measured:
                 self.keep(left[j].form, left[j].key, result, by)
                 done += 1
-                # these, the last of those that were left, are still to be measured
+                # the next of the pieces that are still to be measured
                 following = len(left) - (len(pieces) - done)
                 self._tell(done, pieces, left[following : following + 1])
                 yield left[j], result
@@ -162,7 +162,7 @@ class Keeper:
     def carried_out(
         self, parts: Sequence[Callable[[], T]]
     ) -> Generator[tuple[int, T, Mapping[str, str]], None, None]:
-        """Numbers and results of the parts, as the team finishes them, and who measured each."""
+        """Index and result of each part, as the team finishes them, and who measured it."""
         with closing(self.team.carried_out([partial(_measured, part) for part in parts])) as found:
             for j, (result, by) in found:
                 yield j, result, by
@@ -172,7 +172,7 @@ class Keeper:
             self.progress(done, len(pieces), *(piece.what for piece in following))
 
     def commit(self, name: str, document: Mapping[str, Any], scene: Scene | None = None) -> None:
-        """Put everything that was kept, and the study's document, into the store."""
+        """Write everything that was saved, and the study's document, into the store."""
         if self._journal is not None:
             text = json.dumps(document, allow_nan=False)
             self._journal.commit(scene, documents={name: text})
@@ -187,14 +187,14 @@ class How(TypedDict, total=False):
 
 
 def how(options: Namespace, progress: Progress | None) -> How:
-    """How the command line asks to write the store."""
+    """The command line's `How`."""
     return {"force": options.force, "progress": progress, "team": teams.of(options)}
 
 
 @contextmanager
 def kept(path: str | Path | None, command: str, **how: Unpack[How]) -> Iterator[Keeper]:
-    """A study that is kept in a store; an unfinished one of the same command is resumed.  Without a path
-    nothing is kept.
+    """A study that is saved in a store; an unfinished one of the same command is resumed.  Without a path
+    nothing is saved.
 
     Raises StoreError, before anything is measured, when the file exists or cannot be written.
     """
@@ -210,8 +210,8 @@ def study(
     name: str, path: str | Path | None, labels: Sequence[Label], measure: Callable[[Keeper], T],
     *options: str, scene: Scene | None = None, **how: Unpack[How],
 ) -> T:  # fmt: skip
-    """A study of these methods as `measure` makes it, kept in a store (see `kept`); `options` are all else
-    that decides its numbers beside the scene."""
+    """Run the study `measure` of these methods and save it in a store (see `kept`); `options` is all that
+    determines its numbers besides the scene."""
     more = options if scene is None else (scene.digest, *options)
     with kept(path, command(name, labels, *more), **how) as keeper:
         found: Any = replace(measure(keeper), resumed=keeper.resumed, path=keeper.path)  # type: ignore[type-var]
@@ -243,9 +243,9 @@ class Kept:
 
 
 def restoring(name: str) -> Callable[[Callable[[Kept], T]], Callable[[str | Path], T]]:
-    """Makes of a function that builds a study from what is kept of it one that reads it from a store.
+    """Turn a function that builds a study from its `Kept` data into one that reads it from a store.
 
-    That raises StoreError where the file holds none, or a part of it is missing.
+    The latter raises StoreError where the file holds no such study, or a part of it is missing.
     """
 
     def reader(build: Callable[[Kept], T]) -> Callable[[str | Path], T]:
@@ -264,7 +264,7 @@ def restoring(name: str) -> Callable[[Callable[[Kept], T]], Callable[[str | Path
 
 @cache
 def record() -> Mapping[str, str]:
-    """Who measures here: the machine, the versions, and digests of its arithmetic."""
+    """Identity of this process: the machine, the versions, and digests of its arithmetic."""
     machine = {name: str(value) for name, value in store.machine().items()}
     return {**machine, **provenance.versions(), **provenance.bits()}
 
@@ -274,18 +274,18 @@ def _measured(work: Callable[[], T]) -> tuple[T, dict[str, str]]:
 
 
 def who(path: Path) -> list[str]:
-    """Remarks on the machines that measured the pieces of a store; none where they were of one kind."""
+    """Notes on the machines that measured the pieces of a store; none where they were of one kind."""
     return provenance.sentences(store.measured_by(path))
 
 
 def stored_scene(path: Path) -> Scene:
-    """The scene of a store, parsed from the text that it keeps."""
+    """The scene of a store, parsed from its saved text."""
     name = str(store.summary(path).root.get("scene_name", path.stem))
     return scenefile.parse(store.scene_text(path), name=name, where=f"{path} (scene)")
 
 
 def origin(labels: Iterable[Label]) -> dict[str, str]:
-    """The machine, and the versions of everything that these methods run on."""
+    """The machine, and the versions of all packages that these methods use."""
     found = {name: str(value) for name, value in store.machine().items()}
     for name in sorted({label.engine for label in labels}):
         distribution = engines.engine(name).distribution
@@ -298,17 +298,17 @@ def origin(labels: Iterable[Label]) -> dict[str, str]:
 
 
 def command(study: str, labels: Sequence[Label], *options: str) -> str:
-    """All that decides the numbers of a study, by which its journal is recognised.
+    """All that determines the numbers of a study; its journal is recognised by it.
 
-    The machine and the versions are part of it: times of two machines, limits of two releases of an
-    engine, do not belong into one file.
+    The machine and the versions are part of it: times of two machines, or limits of two releases of an
+    engine, must not share a file.
     """
     versions = [f"{name} {version}" for name, version in origin(labels).items()]
     return "\n".join([study, *map(str, labels), *versions, *options])
 
 
 def plain(data: Any) -> Any:
-    """Results as plain data for JSON: dataclasses are objects, arrays lists; no finite number is None."""
+    """Results as plain data for JSON: dataclasses become objects, arrays lists, non-finite numbers None."""
     return msgspec.json.decode(msgspec.json.encode(data, enc_hook=_plain))
 
 

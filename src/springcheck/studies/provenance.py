@@ -1,8 +1,8 @@
-"""Who measured a piece of a study: host, processor, versions, and the last bits of its arithmetic.
+"""Provenance of a piece of a study: host, processor, versions, and the last bits of its arithmetic.
 
-Libraries choose their loops by the processor, and two of these may round differently.  Every process that
-measures does the same few computations once; where their results differ in a bit, so may those of a study,
-and its report says so.
+Libraries choose their loops by the processor, and two processors may round differently.  Every process that
+measures does the same few computations once; where their results differ in a bit, those of a study may differ
+too, and its report says so.
 """
 
 from __future__ import annotations
@@ -17,20 +17,20 @@ from springcheck import engines
 from springcheck.text.wording import few
 
 PACKAGES = ("springcheck", "numpy", "numba", "scipy")
-"""Packages on which numbers depend, beside those of the engines."""
+"""Packages that numbers depend on, beside those of the engines."""
 
 MOST_HOSTS = 4
 """Hosts that are named for each kind of processor."""
 
 BITS = ("elementary functions", "sums", "linear algebra")
-"""Operations whose results differ where the processors' libraries round differently."""
+"""Operations whose results differ where the libraries round differently on two processors."""
 
 
 def versions() -> dict[str, str]:
-    """Versions of what numbers depend on, engines and plug-ins among it; what is not here is left out."""
+    """Versions of all that numbers depend on, engines and plug-ins included, as far as installed."""
     from importlib.metadata import PackageNotFoundError, version
 
-    # a call's own files have versions, too; they are part of the command
+    # engine files of a call have versions, too; they are part of the command
     known = [name for name in engines.names() if not engines.is_brought(name)]
     engines_ = [engines.engine(name).distribution for name in known]
     plugins = [engines.origin(name).package for name in known]
@@ -45,7 +45,7 @@ def versions() -> dict[str, str]:
 
 def bits() -> dict[str, str]:
     """Digests of computations that round as the processor's libraries do."""
-    # whole numbers over a power of 2: the arguments are the same everywhere
+    # whole numbers over a power of 2: the arguments are the same on every machine
     x = np.arange(1.0, 4001.0) / 512
     a = np.sqrt(np.arange(1.0, 1601.0)).reshape(40, 40) / 8 + 9 * np.eye(40)
     found = {

@@ -1,8 +1,7 @@
-"""What a study is: a folder with its measure, result, text and figure, and its line in the list of studies.
+"""Definition of a study: a folder with its measure, result, text and figure, and a line in the list.
 
-The folder's `__init__` declares the study and imports nothing heavy; its parts are imported when they are
-used: `measure.perform` and `measure.stored`, `text.lines`, and `page.banks` or, where matplotlib draws by
-itself, `figure.pictures`.
+The folder's `__init__` declares the study and imports nothing heavy; its parts are imported on use:
+`measure.perform` and `measure.stored`, `text.lines`, and `page.banks` or, with matplotlib, `figure.pictures`.
 """
 
 from __future__ import annotations
@@ -27,14 +26,14 @@ if TYPE_CHECKING:
 
 
 class StudyResult:
-    """What a study has found, and how that shows itself in Python: in a line, as the command's text, a table.
+    """Result of a study, and its forms in Python: a line, the text of the command, a table.
 
-    Its class stands beside the `STUDY` of its package.
+    Its class stands in the package whose `STUDY` it belongs to.
     """
 
     __slots__ = ()
     table_of: ClassVar[str] = ""
-    """The key of its document under which the rows of its table stand."""
+    """Key of its document that holds the rows of its table."""
 
     @property
     def status(self) -> int:
@@ -42,7 +41,7 @@ class StudyResult:
         raise NotImplementedError
 
     def document(self) -> dict[str, Any]:
-        """Plain data for JSON; what is not a finite number is None."""
+        """Plain data for JSON; non-finite numbers are None."""
         raise NotImplementedError
 
     def __str__(self) -> str:
@@ -56,18 +55,18 @@ class StudyResult:
         return as_html(study_of(self).lines(self))
 
     def rows(self) -> list[dict[str, Any]]:
-        """The rows of its table as plain data; numbers that are not known are None."""
+        """The rows of its table as plain data; unknown numbers are None."""
         found: list[dict[str, Any]] = self.document()[self.table_of]
         return found
 
     def to_dataframe(self) -> Any:
-        """The rows as a pandas DataFrame; the columns of nested values are called ``outer.inner``."""
+        """The rows as a pandas DataFrame; columns of nested values are named ``outer.inner``."""
         from springcheck.physics.trajectory import library
 
         return library("pandas").json_normalize(self.rows())
 
     def figures(self) -> dict[str, Any]:
-        """What `springcheck plot` draws, as matplotlib's figures by name."""
+        """The figures of `springcheck plot`, as matplotlib's figures by name."""
         from springcheck.figures.style import style
 
         with style():
@@ -76,24 +75,24 @@ class StudyResult:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Studied(StudyResult):
-    """What every study says that is kept in a store by its document and tables."""
+    """Result of a study that is stored by its document and tables."""
 
     left_out: tuple[LeftOut, ...] = ()
     resumed: int = 0
-    """Pieces that an interrupted call had finished."""
+    """Number of pieces that an interrupted call had finished."""
     path: Path | None = None
-    """Where it was stored."""
+    """Path of the store."""
 
 
 def study_of(found: object) -> Study:
-    """The study that has found this: of `run --vary` it is the ensemble."""
+    """The study that this is a result of; for `run --vary` the ensemble."""
     study: Study = import_module(type(found).__module__.rpartition(".")[0]).STUDY
     return study
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Study:
-    """A study as the command line, `inspect` and `plot` know it."""
+    """A study as seen by the command line, `inspect` and `plot`."""
 
     name: str
     """The name of its command, of its folder, and of its document in a store."""
@@ -101,29 +100,29 @@ class Study:
     arguments: tuple[Argument, ...]
     """The arguments of its command."""
     trajectories: bool = False
-    """Kept in a store as trajectories, not as a document."""
+    """Stored as trajectories, not as a document."""
     chooses: tuple[str, ...] = ()
     """Options of `plot` that its figures take."""
     keeps: Callable[[Namespace], bool] = lambda options: True
-    """Whether what is finished outlives an interrupt, so that the same command goes on."""
+    """Whether finished pieces survive an interrupt, so that the same command resumes."""
     package: str = ""
-    """Where its parts are; left out: in the folder of its name."""
+    """Package of its parts; by default the folder of its name."""
 
     def perform(self, options: Namespace, progress: Progress | None) -> StudyResult:
-        """Measure what the command line asks for; SpringcheckError for what a user can mend."""
-        # first, while the stack is short: beyond a chunk of it Python 3.11 maps memory for every call, and to
-        # make the terms' classes takes hundreds
+        """Carry out what the command line asks for; SpringcheckError for what a user can correct."""
+        # first, while the stack is short: beyond a chunk of it Python 3.11 maps memory for every call, and
+        # making the terms' classes takes hundreds
         import_module("springcheck.physics.terms")
         measure = self._part("measure")
         if not gc.isenabled():
-            # the program has switched it off for its imports: what was imported stays, and is not searched
+            # the program has disabled it for its imports: imported objects stay, and are not scanned
             gc.freeze()
             gc.enable()
         found: StudyResult = measure.perform(options, progress)
         return found
 
     def lines(self, found: StudyResult, options: Namespace | None = None, path: Path | None = None) -> Lines:
-        """The report as text; with the `path` of its store the one that `inspect` shows."""
+        """The report as text; with the `path` of its store the one of `inspect`."""
         lines: Lines = self._part("text").lines(found, options)
         where: Path | None = path or getattr(found, "path", None)
         if self.trajectories or where is None:
@@ -139,14 +138,14 @@ class Study:
         return bool(summary.runs) if self.trajectories else self.name in summary.documents
 
     def stored(self, path: Path) -> StudyResult:
-        """What a store holds of this study.  StoreError where it cannot be read."""
+        """The result that a store holds of this study.  StoreError where it cannot be read."""
         found: StudyResult = self._part("measure").stored(path)
         return found
 
     def draw(
         self, found: StudyResult, folder: Path, check: Callable[[list[str]], object] = list, **chosen: Any
     ) -> list[Path]:
-        """Draw a stored or a fresh result into a folder, as it is `chosen`; returns the files.
+        """Draw a stored or a fresh result into a folder, with the options `chosen`; returns the files.
 
         `check` is called with their names before the first is drawn.
         """
@@ -158,7 +157,7 @@ class Study:
             return [path for name, draw in pictures.items() for path in save(draw(), folder, name)]
 
     def pictures(self, found: StudyResult, **chosen: Any) -> dict[str, Callable[[], Any]]:
-        """By the name of each of its figures what draws it by matplotlib."""
+        """Functions that draw its figures by matplotlib, by name."""
         if self._has("figure"):
             drawn: dict[str, Any] = self._part("figure").pictures(found, **chosen)
             return {name: partial(drawn.get, name) for name in drawn}

@@ -1,8 +1,8 @@
-"""Results as tables of a store and back, bit for bit, by the fields of their dataclasses.
+"""Results as tables of a store and back, bitwise, by the fields of their dataclasses.
 
-A field is a column of its name; of a dictionary of numbers each of the `keys` in its metadata is one.
-Unknown numbers (None) are NaN and unknown counts -1; a tuple of numbers is a row of a column of two
-dimensions, filled up with NaN.
+A field becomes a column of its name, a dictionary of numbers a column for each of the `keys` in its metadata.
+Unknown numbers (None) are NaN and unknown counts -1; tuples of numbers are rows of two dimensions,
+NaN-padded.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Form(Generic[T]):
-    """How results of one kind are kept.  A table's name is `beginning` and the key of its result."""
+    """Stored form of one kind of result.  A table's name is `beginning` and the key of its result."""
 
     kind: type[Any]
     beginning: str
     named: str = "method"
-    """The field that is the key, and no column; empty where there is none."""
+    """The field that holds the key and is no column; empty where there is none."""
     units: Mapping[str, str] = field(default_factory=dict)
     signal: str = ""
     axes: tuple[str, ...] = ()
@@ -36,7 +36,7 @@ class Form(Generic[T]):
     log: tuple[str, ...] = ()
     about: str = ""
     joined: bool = False
-    """Whether results are rows of one table: of those of the keys <table>/<piece> the store holds <table>."""
+    """Whether results are rows of one table: <table> holds those of the keys <table>/<piece>."""
     extra: Callable[[T], Mapping[str, Any]] = lambda found: {}
     """Columns for viewers that follow from the others; they are not read back."""
 
@@ -58,7 +58,7 @@ class Form(Generic[T]):
         )
 
     def found(self, table: Table) -> T:
-        """The result of such a table.  KeyError where it is another's."""
+        """The result in such a table.  KeyError where it has another form."""
         raise NotImplementedError
 
     def _split(self, found: T) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -70,7 +70,7 @@ class Form(Generic[T]):
 
 
 class RecordForm(Form[T]):
-    """One result a table: its arrays are the columns, its numbers and texts the attributes."""
+    """One result per table: its arrays are the columns, its numbers and texts the attributes."""
 
     def _split(self, found: T) -> tuple[dict[str, Any], dict[str, Any]]:
         kept: dict[str, Any] = {}
@@ -91,13 +91,13 @@ class RecordForm(Form[T]):
                 pairs = get_origin(one.hint) is tuple
                 values[one.name] = tuple(map(tuple, array.tolist())) if pairs else array
             elif one.name != self.named and (one.name in table.attributes or not one.has_default):
-                # what an earlier version did not measure has its default
+                # fields that an earlier version did not measure have their default
                 values[one.name] = table.attributes[one.name]
         return self.kind(**values)  # type: ignore[no-any-return]
 
 
 class Rows(Form[Sequence[T]]):
-    """One result a row."""
+    """One result per row."""
 
     def _split(self, found: Sequence[T]) -> tuple[dict[str, Any], dict[str, Any]]:
         return dict(_columns(_fields(self.kind), self.named, found)), {}
@@ -110,7 +110,7 @@ class Rows(Form[Sequence[T]]):
 
 
 class Documents(Form[T]):
-    """A result as a row of one text, its document in JSON: of results that are lists of names."""
+    """A result as a row of one text, its JSON document, for results that are lists of names."""
 
     def _split(self, found: T) -> tuple[dict[str, Any], dict[str, Any]]:
         return {"document": [msgspec.json.encode(found).decode()]}, {}

@@ -1,7 +1,7 @@
-"""Executors of the pieces of a study: this process, processes beside it, or the workers of a cluster.
+"""Executors of the pieces of a study: this process, further processes, or the workers of a cluster.
 
-The parent alone writes.  A piece is a function that another process can import, and what it returns travels
-back; so the numbers are the same whoever measures them.
+The parent alone writes.  A piece is a function that another process can import, and its result is returned,
+so that the numbers do not depend on who measures them.
 """
 
 from __future__ import annotations
@@ -25,24 +25,24 @@ class Team(Protocol):
 
     @property
     def workers(self) -> int:
-        """How many pieces are measured at the same time."""
+        """Number of pieces that are measured at the same time."""
         ...
 
     def carried_out(self, parts: Sequence[Callable[[], T]]) -> Generator[tuple[int, T], None, None]:
-        """Numbers and results of the parts, as they finish.  Close the iterator where it is left early."""
+        """Index and result of each part, as it finishes.  Close the iterator where it is left early."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class Processes:
-    """Processes of this machine; one is the program itself."""
+    """Processes of this machine; a single one is the program itself."""
 
     workers: int = 1
     brought: Brought | None = None
     """Engines that the call has brought."""
 
     def carried_out(self, parts: Sequence[Callable[[], T]]) -> Generator[tuple[int, T], None, None]:
-        """Numbers and results of the parts, as they finish."""
+        """Index and result of each part, as it finishes."""
         from springcheck.studies.workers import carried_out
 
         if self.workers > 1 and self.brought is not None:
@@ -51,7 +51,7 @@ class Processes:
 
 
 def _after(brought: Brought, part: Callable[[], T]) -> T:
-    """Run a part in a process that may not yet know the engines that the call has brought."""
+    """Run a part in a process that may not know the engines of the call yet."""
     from springcheck import doors
 
     doors.bring_once(brought)
@@ -65,7 +65,7 @@ MOST_PROCESSES = 4096
 
 
 def processes(text: str) -> int:
-    """A number of them on the command line."""
+    """Parse a number of processes of the command line."""
     if not (text.isdecimal() and 0 < int(text) <= MOST_PROCESSES):
         raise ArgumentTypeError(f"{text!r}: a number of processes from 1 to {MOST_PROCESSES} is needed")
     return int(text)

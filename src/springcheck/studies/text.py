@@ -1,4 +1,4 @@
-"""What the reports of several studies say alike."""
+"""Text that the reports of several studies share."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from springcheck.text.wording import count
 
 
 def left_out(left: Sequence[LeftOut], word: str = "Left out") -> Lines:
-    """One line for each reason, which names no method again."""
+    """One line for each reason, without the name of the method in it."""
     reasons: dict[str, list[str]] = {}
     for one in left:
         reasons.setdefault(one.reason.removeprefix(f"{one.method}: "), []).append(one.method)
@@ -25,7 +25,7 @@ def left_out(left: Sequence[LeftOut], word: str = "Left out") -> Lines:
 
 
 def resumed(pieces: int, what: str) -> Lines:
-    """A line on what an interrupted call had finished, where there was one."""
+    """A line on the pieces resumed from an interrupted call, if any."""
     if not pieces:
         return []
     were = "was" if pieces == 1 else "were"
@@ -33,7 +33,7 @@ def resumed(pieces: int, what: str) -> Lines:
 
 
 def of_energy(scene: Scene) -> str:
-    """What the column of energies holds."""
+    """Explanation of the column of energies."""
     system = scene.system
     changes = ["loss by friction"] * system.is_damped + ["work of the drive"] * system.is_driven
     known = bool(changes) and has_true_motion(scene)

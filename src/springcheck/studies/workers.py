@@ -1,7 +1,7 @@
-"""Parts of a computation in processes of their own, which end with the program, however that ends.
+"""Parts of a computation in separate processes, which end with the program, however that ends.
 
-Those of a `ProcessPoolExecutor` stay for ever where the program is killed, and what they are at runs on where
-it leaves early; on Python 3.11.2 it hangs where they die before they have read a part of 10 MB.
+The processes of a `ProcessPoolExecutor` survive a killed program, and their current work goes on after an
+early exit; on Python 3.11.2 it hangs where they die before they have read a part of 10 MB.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ T = TypeVar("T")
 
 
 def carried_out(parts: Sequence[Callable[[], T]], workers: int) -> Generator[tuple[int, T], None, None]:
-    """Numbers and results of the parts, as they finish; with one worker here, else in so many processes.
+    """Index and result of each part, as it finishes; with one worker here, otherwise in so many processes.
 
-    Parts must be functions that another process can import.  Close the iterator where it is left early.
-    An exception of a part is raised here.  SpringcheckError: a process cannot be started, or has ended
-    without an answer.
+    Parts must be functions that another process can import.  Close the iterator where it is left early. An
+    exception of a part is raised here.  SpringcheckError: a process cannot be started, or has ended without
+    an answer.
     """
     if workers <= 1:
         for i, part in enumerate(parts):
@@ -38,7 +38,7 @@ def carried_out(parts: Sequence[Callable[[], T]], workers: int) -> Generator[tup
     team: dict[Any, Any] = {}
     try:
         for _ in range(min(workers, len(parts))):
-            with interrupts.held(), _deaf():
+            with interrupts.held(), _blocked_sigint():
                 ours, theirs = get_context("spawn").Pipe()
                 process = get_context("spawn").Process(target=_work, args=(theirs,), daemon=True)
                 process.start()
@@ -65,7 +65,7 @@ def carried_out(parts: Sequence[Callable[[], T]], workers: int) -> Generator[tup
 
 
 def _is_a_file(main: Any) -> None:
-    """Raise SpringcheckError where processes that are started would look for the program and not find it."""
+    """Raise SpringcheckError where new processes could not find the main program as a file."""
     path = getattr(main, "__file__", None)
     if getattr(main, "__spec__", None) is None and path is not None and not os.path.exists(path):
         raise SpringcheckError(
@@ -77,20 +77,20 @@ def _send(numbered: Any, ours: Any, team: dict[Any, Any]) -> None:
     try:
         ours.send(numbered)
     except OSError:
-        raise _gone(team[ours]) from None
+        raise _died(team[ours]) from None
 
 
 def _answer(ours: Any, team: dict[Any, Any]) -> Any:
     try:
         i, good, found = ours.recv()
     except (EOFError, OSError):
-        raise _gone(team[ours]) from None
+        raise _died(team[ours]) from None
     if not good:
         raise found
     return i, found
 
 
-def _gone(process: Any) -> SpringcheckError:
+def _died(process: Any) -> SpringcheckError:
     process.join()
     return SpringcheckError(
         f"a worker process has ended by itself (exit status {process.exitcode}): is memory short?"
@@ -103,7 +103,7 @@ def _ended(process: Any) -> None:
 
 
 @contextmanager
-def _deaf() -> Iterator[None]:
+def _blocked_sigint() -> Iterator[None]:
     """Block SIGINT in processes started within this context: Ctrl-C reaches the parent, which stops them."""
     if not hasattr(signal, "pthread_sigmask"):
         yield

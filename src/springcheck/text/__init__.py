@@ -1,1 +1,1 @@
-"""Words, lines and tables: what reports, messages and pages are written with."""
+"""Words, lines and tables of reports, messages and pages."""

@@ -1,6 +1,6 @@
-"""Lines and tables of text: numbers, labels and names are never cut, however narrow the terminal.
+"""Lines and tables of text: numbers, labels and names are never truncated, however narrow the terminal.
 
-Rich draws them on a terminal and breaks its lines; a pipe gets them as they are, without Rich.
+Rich prints them on a terminal and wraps lines; a pipe gets them unwrapped, without Rich.
 """
 
 from __future__ import annotations
@@ -16,18 +16,18 @@ from springcheck import errors
 if TYPE_CHECKING:
     from rich.console import Console
 
-PROSE = 30
-"""Fewest columns that a cell of prose is broken into."""
-GAP = 2
+FEWEST_PROSE_COLUMNS = 30
+"""Fewest columns into which prose is wrapped."""
+COLUMN_GAP = 2
 
 
 @dataclass(frozen=True, slots=True)
 class Text:
-    """A line of text: its parts, each with its style as Rich names it; nothing in it is markup."""
+    """A line of text: its parts, each with a style as Rich names it; nothing in it is markup."""
 
     parts: tuple[tuple[str, str], ...]
     whole: bool = False
-    """Never broken between its words."""
+    """Whether it must not be broken between its words."""
 
     def __str__(self) -> str:
         return "".join(text for text, _ in self.parts)
@@ -55,12 +55,12 @@ class TextTable:
     """A table without rules, as narrow as its cells; only `prose` is wrapped to fit the width.
 
     Columns that do not fit beside each other are stacked in blocks, each beside the first column: nothing is
-    cut, and no terminal has to fold a number.
+    truncated, and no terminal has to fold a number.
     """
 
     titles: tuple[str, ...]
     rows: tuple[Row, ...]
-    """A row that is a Text is a heading over all columns."""
+    """Rows; a row that is a Text is a heading over all columns."""
     left: frozenset[str]
     prose: str
 
@@ -85,9 +85,9 @@ class TextTable:
                     yield from self._lines(row, widths, block)
 
     def _free(self, widths: Sequence[int], j: int, width: int) -> int:
-        """Columns for the prose: what the others leave, or what the first leaves where that is too little."""
-        others = width - sum(widths) + widths[j] - GAP * (len(widths) - 1)
-        return others if others >= PROSE or j == 0 else width - widths[0] - GAP
+        """Columns for the prose: the rest of the width, or all but the first column where that is little."""
+        others = width - sum(widths) + widths[j] - COLUMN_GAP * (len(widths) - 1)
+        return others if others >= FEWEST_PROSE_COLUMNS or j == 0 else width - widths[0] - COLUMN_GAP
 
     def _lines(self, row: Sequence[Cell], widths: Sequence[int], block: Sequence[int]) -> Iterator[Text]:
         parts = []
@@ -105,7 +105,7 @@ class TextTable:
                 piece = pieces[i] if i < len(pieces) else plain()
                 blank = (" " * (width - len(piece)), "")
                 out += [*piece.parts, blank] if left else [blank, *piece.parts]
-                out.append((" " * GAP, ""))
+                out.append((" " * COLUMN_GAP, ""))
             yield Text(tuple(out), whole=True)
 
 
@@ -113,11 +113,11 @@ def _blocks(widths: Sequence[int], width: int) -> list[list[int]]:
     """Blocks of columns that fit beside each other, the first one in each block."""
     blocks, used = [[0]], widths[0]
     for j in range(1, len(widths)):
-        if used + GAP + widths[j] > width and len(blocks[-1]) > 1:
+        if used + COLUMN_GAP + widths[j] > width and len(blocks[-1]) > 1:
             blocks.append([0])
             used = widths[0]
         blocks[-1].append(j)
-        used += GAP + widths[j]
+        used += COLUMN_GAP + widths[j]
     return blocks
 
 
@@ -138,7 +138,7 @@ def shown(lines: Sequence[Text | TextTable], wide: int) -> Iterator[Text]:
 
 
 def drawn(lines: Sequence[Text | TextTable], console: Console) -> None:
-    """Print them in their styles, as wide as the console."""
+    """Print lines in their styles, as wide as the console."""
     from rich.text import Text as Styled
 
     for line in shown(lines, console.width):
@@ -151,12 +151,12 @@ def drawn(lines: Sequence[Text | TextTable], console: Console) -> None:
 
 
 def as_text(lines: Sequence[Text | TextTable], width: int = 100) -> str:
-    """Lines without colours, as `str` of a result."""
+    """Lines without colours, as in `str` of a result."""
     return "\n".join(line.rstrip() for line in _recorded(lines, width).export_text().splitlines())
 
 
 def as_html(lines: Sequence[Text | TextTable]) -> str:
-    """The same with its colours, for notebooks."""
+    """Lines with their colours, for notebooks."""
     return _recorded(lines, 120).export_html(inline_styles=True, code_format="<pre>{code}</pre>")
 
 
@@ -169,6 +169,6 @@ def _recorded(lines: Sequence[Text | TextTable], width: int) -> Console:
 
 
 def hanging(head: str, text: str) -> Lines:
-    """Text of 80 columns, continuation lines indented by the length of its head."""
+    """Text in 80 columns, continuation lines indented by the length of its head."""
     broken = textwrap.wrap(text, 80 - len(head), break_long_words=False, break_on_hyphens=False)
     return [plain((head if i == 0 else " " * len(head)) + line) for i, line in enumerate(broken)]

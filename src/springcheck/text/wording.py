@@ -1,4 +1,4 @@
-"""Numbers and names in words: places, counts, times, alternatives."""
+"""Numbers and names in words: ordinals, counts, times, alternatives."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def either(names: Sequence[str]) -> str:
 
 
 def number(x: float | None, form: str, infinite: str = "inf") -> str:
-    """A number in this format; "-" where it is not known."""
+    """A number in this format; "-" where it is unknown."""
     if x is None or math.isnan(x):
         return "-"
     return infinite if x == math.inf else f"{x:{form}}"

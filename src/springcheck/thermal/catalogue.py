@@ -64,7 +64,7 @@ class Thermostat(Scheme):
     symplectic: bool = False
     acts: tuple[Act, ...]
     draws: int = 1
-    """Draws that act in a step."""
+    """Number of draws of each coordinate that act in a step, carried ones included."""
     substeps: int = 1
     """How often the fast terms act in a step; above 1 the slow and the fast ones act separately."""
     carried: int = 0

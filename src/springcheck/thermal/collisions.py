@@ -72,8 +72,8 @@ def between_collisions(q: Floats, v: Floats, h: float) -> list[Candidate]:
 def _of_scheme(
     name: str, A: Floats, h: float, share: float, n: int, size: float, close: float
 ) -> list[Candidate]:
-    """What a scheme means by a map A of frames, a fraction of them without a collision, for every number of
-    steps that remains possible: its entries are known to `close` of themselves."""
+    """Parameters at which a scheme has the map A between frames, a `share` of them without a collision, with
+    every possible number of steps; A is known to the relative error `close`."""
     found: list[Candidate] = []
     # the sine of a small angle is known better than its cosine
     sine = np.sqrt(max(-A[0, 1] * A[1, 0] - (A[0, 0] - A[1, 1]) ** 2 / 4, 0.0))

@@ -103,11 +103,10 @@ class Law:
     @cached_property
     def _even(self) -> Floats:
         """Stationary covariance of (q, p, carried draws) in units of `_scale`; infinite where there is none,
-        NaN where the step says less of it than `UNKNOWN_FROM`.
+        NaN where its relative error exceeds `UNKNOWN_FROM`.
 
-        With little friction, or much, next to nothing is left of 1 - A A': it is taken in extended precision,
-        as are the residuals by which the solution is refined.  The carried draws keep the unit covariance of
-        their own.
+        With little friction, or much, 1 - A A' nearly cancels: it is computed in extended precision, as are
+        the residuals of the iterative refinement.  The carried draws keep their unit covariance.
         """
         n, d = self._maps[0][1].shape[:2]
         right = np.zeros((n, d * d), np.longdouble)
@@ -202,8 +201,8 @@ class Law:
         return np.asarray((np.linalg.matrix_power(self._mean, steps) @ self._covariance)[:, :2, :2])
 
     def apart(self, steps: Any) -> tuple[Floats, Floats]:
-        """What so many steps (n,) come to, as a map (n, 2, 2) and a covariance of noise (n, 2, 2): of draws
-        that are carried on into them that part which q and p say nothing of."""
+        """Map (n, 2, 2) of so many steps (n,), and covariance of their noise (n, 2, 2), with the part of the
+        carried draws that is uncorrelated with q and p."""
         # noise of collisions is not normal, but has these second moments
         A, W, every = self._mean, self._noise, np.asarray(steps)[:, None, None]
         B, Q = A, W

@@ -92,10 +92,10 @@ class Stepper:
     ) -> tuple[Reals, Reals]:
         """One step from (q, p), each (..., n), by what `forces` gives.
 
-        `draws` are `scheme.draws` arrays of the shape of q; `hit` says where a collision takes place, or is
-        the factor of all momenta, which else comes of the draws.  A force after the last drift is taken at
-        `end`, where it is known: draws of other particles act there.  `met` takes what rods have met, which
-        a step of absolute values needs, with the tolerance `loose` of their lengths in roundings.
+        `draws` are `scheme.draws` arrays of the shape of q; `hit` is the mask of collisions, or the factor
+        of all momenta, otherwise computed from the draws.  A force after the last drift is evaluated at
+        `end`, if given: draws of other particles act there.  `met` collects the states at which rods
+        project; a step of absolute values reads them, with the tolerance `loose` of lengths in roundings.
         """
         m, h, last, q_old, held = self.m, self.h, p, q, q
         way = iter(met or ())

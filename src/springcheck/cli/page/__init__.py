@@ -1,8 +1,8 @@
-"""`springcheck report`: a store as one HTML file that needs no server and asks nothing of any network.
+"""`springcheck report`: a store as one HTML file that needs no server and loads nothing from any network.
 
-`content` gathers what it shows, `writing` puts it into the template.  The page holds its numbers as text
-that reads back as the stored doubles, and where a scene is one particle on one wall spring it runs the
-loops of three methods again in the reader's browser and compares (`loops.js`).
+`content` gathers what it shows, `writing` fills the template.  The page holds its numbers as text that reads
+back as the stored doubles.  Where a scene is one particle on one wall spring, it repeats the loops of three
+methods in the reader's browser and compares (`loops.js`).
 """
 
 from springcheck.cli.page.content import Content, gather

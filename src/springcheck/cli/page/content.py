@@ -45,7 +45,7 @@ class Section:
 
 
 def sections(summary: Summary) -> tuple[list[Section], dict[str, Any]]:
-    """The studies of a store that are no trajectories, and the data of all their charts by name."""
+    """The studies of a store other than trajectories, and the data of all their charts by name."""
     found: list[Section] = []
     data: dict[str, Any] = {}
     for study, result in inspect.held(summary):
@@ -65,12 +65,12 @@ def sections(summary: Summary) -> tuple[list[Section], dict[str, Any]]:
     return found, data
 
 
-NUMBERS = 12_000
-"""Doubles that a page holds at most, at about 20 bytes each; what is longer is thinned out."""
+PAGE_NUMBERS = 12_000
+"""Most doubles in a page, at about 20 bytes each; longer data are strided."""
 FEWEST_SHOWN = 50
-"""Frames that are kept of each trajectory however many there are."""
-TAIL = 1 << 20
-"""Frames at the end of a run by which it is told whether two of them are one motion, as `run` does."""
+"""Frames of each trajectory that are always included."""
+TAIL_FRAMES = 1 << 20
+"""Frames at the end of a run by which runs are compared as one motion, as in `run`."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -95,18 +95,18 @@ class Passed:
         )
 
     def count(self, passed: bool | None) -> int:
-        """How many passed, failed, or did not apply."""
+        """Number of verdicts that passed, failed, or did not apply."""
         return sum(1 for verdict in self.verdicts if verdict.passed is passed)
 
     @property
     def judged(self) -> bool:
-        """Whether something that applied could tell the scheme, or failed."""
+        """Whether a check that distinguishes schemes applied, or any failed."""
         return bool(self.count(False) or (self.verdicts and not checks.not_judged(self.verdicts)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Content:
-    """What the template is given."""
+    """Data for the template."""
 
     title: str
     scene: Scene | None
@@ -120,16 +120,16 @@ class Content:
     not_trusted: tuple[Damage, ...]
     methods: tuple[Passed, ...]
     explained: Mapping[str, tuple[str, tuple[str, ...]]]
-    """Description of each check among the verdicts, in a sentence and in lines."""
+    """Description of each check among the verdicts, as a sentence and as lines."""
     same: tuple[Same, ...] | None
-    """None where it cannot be told: a scheme that is not here, or states that were not recorded."""
+    """None where it is unknown: a scheme that is not installed, or states that were not recorded."""
     comparison: Comparison | None
     sha256: str
     """SHA-256 of the file; empty where the run has not ended."""
     stride: int
-    """Every how many stored frames one stands in the page."""
+    """Stride of the stored frames in the page."""
     data: Mapping[str, Any]
-    """For the scripts; numbers that are none are the words that JavaScript has for them."""
+    """Data for the scripts; non-finite numbers are spelled as in JavaScript."""
 
     @property
     def summary_line(self) -> str:
@@ -138,29 +138,29 @@ class Content:
 
     @property
     def finding(self) -> str:
-        """Heading of its first chart, else its title."""
+        """Heading of its first chart, or else its title."""
         banks = iter(self.data["banks"].values())
         found = str(self.data["banks"].get("motion", next(banks, {})).get("heading", ""))
         return found.partition(" (phase portrait")[0] or self.title
 
     @property
     def not_exercised(self) -> str:
-        """The features that a pass does not cover; empty for a study without a scene."""
+        """Features that a pass does not cover; empty for a study without a scene."""
         return checks.not_exercised(self.scene) if self.scene and self.methods else ""
 
     @property
     def failed(self) -> tuple[Passed, ...]:
-        """The methods that some verdict rejects."""
+        """Methods with a failed verdict."""
         return tuple(one for one in self.methods if one.count(False))
 
     @property
     def name(self) -> str:
-        """Name of the store, as a shell takes it."""
+        """Name of the store, quoted for a shell."""
         return shlex.quote(self.summary.path.name)
 
 
 def gather(path: Path) -> Content:
-    """Read what a report shows.  SpringcheckError where the store holds neither trajectory nor study."""
+    """Gather the contents of a report.  SpringcheckError where a store has neither trajectory nor study."""
     summary = store.summary(path)
     studies, banks = sections(summary)
     if not summary.runs and not studies:
@@ -170,7 +170,7 @@ def gather(path: Path) -> Content:
     scene = scenefile.parse(text, name=name, where=str(path)) if text else None
     labels = [run.label for run in summary.runs if {"q", "p"} <= set(run.quantities)]
     rows = 2 + 2 * min(MOST_PANELS, scene.n if scene else 1)
-    most = max(FEWEST_SHOWN, NUMBERS // (rows * max(1, len(labels))))
+    most = max(FEWEST_SHOWN, PAGE_NUMBERS // (rows * max(1, len(labels))))
     pieces = {label: store.strided(path, label, most) for label in labels}
     kept = bool(summary.runs) and path.is_file()
     inspect.learn(summary)
@@ -224,7 +224,7 @@ def _motion(path: Path, wrong: Collection[str], most: int) -> dict[str, Any] | N
         """Numbers that are not the file's own are written with seven digits."""
         return x if np.asarray(x).tobytes() in kept else [float(f"{value:.7g}") for value in x]
 
-    # in a bath the finding is the temperature: its chart comes before the clouds of states
+    # in a bath the temperature is the main result: its chart comes before the clouds of states
     found.sort(key=lambda bank: bank.name != "temperature")
     charts = [
         replace(
@@ -242,7 +242,7 @@ def _motion(path: Path, wrong: Collection[str], most: int) -> dict[str, Any] | N
 
 
 def _known(summary: Summary) -> dict[str, Any]:
-    """What the trajectories, or the first study that tells it, say of versions and machine."""
+    """Versions and machine of the trajectories, or of the first study that records them."""
     if summary.runs:
         return dict(summary.runs[0].parameters)
     for name in summary.documents:
@@ -260,10 +260,10 @@ def _methods(summary: Summary, verdicts: Sequence[Verdict]) -> Iterator[Passed]:
 
 
 def _same(path: Path, scene: Scene, comparison: Comparison | None) -> tuple[Same, ...] | None:
-    """Which of them are one motion, as `run` says it."""
+    """Which runs are one motion, as `run` reports it."""
     if comparison is None:
         return None
-    ends = {label: store.end(path, label, TAIL) for label in comparison.labels if label != EXACT}
+    ends = {label: store.end(path, label, TAIL_FRAMES) for label in comparison.labels if label != EXACT}
     if any(not len(run.q) or not len(run.p) for run in ends.values()):
         return None
     try:

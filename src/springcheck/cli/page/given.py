@@ -1,7 +1,7 @@
-"""What the scripts of a page are given: runs, the numbers of their scene, schemes as their coefficients.
+"""Data for the scripts of a page: runs, the numbers of their scene, schemes as their coefficients.
 
-Of one particle on a spring in a bath: splittings by their stages, places of sliders, and covariances by `Law`
-that the page holds its own against.
+For one particle on a spring in a bath: splittings by their stages, positions of sliders, and covariances by
+`Law` with which the page compares its own.
 """
 
 from __future__ import annotations
@@ -25,26 +25,26 @@ from springcheck.physics.terms import WallSpring
 from springcheck.physics.trajectory import Trajectory
 
 LONGEST = 2_000_000
-"""Steps up to which a browser runs the loops again: about a second."""
+"""Most steps of which a browser repeats the loops: about a second."""
 STAGES = {"kick", "held", "drift", "pull", "friction", "implicit-friction"}
 """Stages of a splitting that a page can carry out."""
 LOOPS = {
     "own:euler": "own", "own:semi-implicit-euler": "own", "own:velocity-verlet": "own",
     "ase:velocity-verlet": "ase",
 }  # fmt: skip
-"""Methods of a wall spring whose operations, in their order, a page knows to the last bit."""
+"""Methods of a wall spring whose operations, in their order, a page repeats to the last bit."""
 TRIED = {
     "explicit Euler": "explicit-euler",
     "semi-implicit Euler": "semi-implicit-euler",
     "velocity Verlet": "velocity-verlet",
 }
-"""Schemes that run by the reader's own numbers."""
+"""Schemes that run with the reader's own numbers."""
 SLIDING = np.arange(201) / 200
-"""Places of a slider."""
+"""Positions of a slider."""
 
 
 def to_scripts(scene: Scene | None, pieces: Sequence[Trajectory], wrong: Collection[str]) -> dict[str, Any]:
-    """The data of a page, but for its charts; `wrong` are the methods that some verdict rejects."""
+    """The data of a page except its charts; `wrong` are the methods with a failed verdict."""
     one = spring(scene) if scene and not scene.bath else None
     return {
         "runs": [drawn(piece, scene, failed=piece.label in wrong) for piece in pieces],
@@ -62,14 +62,14 @@ def to_scripts(scene: Scene | None, pieces: Sequence[Trajectory], wrong: Collect
 
 
 def plain_schemes() -> list[dict[str, Any]]:
-    """One scheme of every one-step map that `identify` tells apart where nothing is damped."""
+    """One scheme for every undamped one-step map that `identify` distinguishes."""
     known = laws(schemes.SCHEMES)
     names = [family.scheme for family in distinct(damped=False)]
     return [{"scheme": name, "title": title(name), "law": known[name]} for name in names]
 
 
 def _live() -> Bank:
-    """The charts of the sliders; their scripts fill in the numbers of the curves."""
+    """Charts of the sliders; their scripts fill in the numbers of the curves."""
     curves = [Curve(name=name, group=group, x=[], y=[]) for name, group in TRIED.items()]
     w = np.arange(301) / 100
     factors = [Curve(name=name, group=group, x=w, y=0 * w) for name, group in TRIED.items()]
@@ -86,7 +86,7 @@ def _live() -> Bank:
 
 
 def spring(scene: Scene) -> dict[str, float] | None:
-    """The numbers of one particle on one wall spring; None for any other scene, or one too long."""
+    """Parameters of one particle on one wall spring; None for any other scene, or one too long."""
     if scene.n != 1 or len(scene.terms) != 1 or scene.steps > LONGEST:
         return None
     wall = scene.terms[0]
@@ -97,7 +97,7 @@ def spring(scene: Scene) -> dict[str, float] | None:
 
 
 def sliders(*, h: float, k: float, m: float, q: float, p: float, at: float) -> dict[str, list[float]]:
-    """Values at each place of each slider, in even ratios where a sign is kept."""
+    """Values at each position of each slider, in even ratios where the sign is fixed."""
     w = math.sqrt(abs(k) / m) or 1.0
     start = abs(p) or abs(q - at) * m * w or 1.0
     return {
@@ -118,8 +118,7 @@ def _rounded(places: Floats) -> list[float]:
 
 
 def linear(scene: Scene) -> dict[str, Any] | None:
-    """The numbers of one particle in any linear force f - k q - c p/m; None for any other scene, or one too
-    long."""
+    """Parameters of one particle in a linear force f - k q - c p/m; None for another or too long scene."""
     system = scene.system
     if scene.n != 1 or not system.is_linear or scene.steps > LONGEST:
         return None
@@ -133,7 +132,7 @@ def linear(scene: Scene) -> dict[str, Any] | None:
 
 
 def laws(names: Iterable[str]) -> dict[str, Any]:
-    """Schemes by name, as their stages or their tableau in doubles; "exact" where they follow that motion."""
+    """Schemes by name, as their stages or their tableau in doubles; "exact" for exact and adaptive ones."""
     known, found = schemes.known(), dict[str, Any]()
     for scheme in (known[name] for name in names if name in known):
         if scheme.has("flow") or scheme.has("adaptive"):
@@ -147,7 +146,7 @@ def laws(names: Iterable[str]) -> dict[str, Any]:
 
 
 def drawn(piece: Trajectory, scene: Scene | None = None, *, failed: bool = False) -> dict[str, Any]:
-    """The first particle of a trajectory, and what rounding may do to it in a step."""
+    """The first particle of a trajectory, and a bound on the effect of rounding in a step."""
     how, loop = piece.arithmetic, LOOPS.get(piece.label, "")
     # ASE calculates in units of its own
     known = scene and spring(scene) and not (loop == "ase" and scene.units == "md")
@@ -167,8 +166,8 @@ def drawn(piece: Trajectory, scene: Scene | None = None, *, failed: bool = False
 
 
 def _stretch(piece: Trajectory, scene: Scene | None) -> float:
-    """How much an error of a step may grow as it is carried on: as far as the orbit of the scheme's map is
-    from a circle; where it is no ellipse, as many times as there are steps."""
+    """Amplification of an error of a step as it is propagated: the deviation of the orbit of the scheme's map
+    from a circle; the number of steps where the orbit is no ellipse."""
     known = linear(scene) if scene else None
     if known is None or laws([piece.scheme]).get(piece.scheme, "exact") == "exact":
         return 1.0
@@ -187,11 +186,11 @@ def _stretch(piece: Trajectory, scene: Scene | None) -> float:
 
 
 TRIED_STEPS, TRIED_FRICTIONS = (0.3, 1.0, 1.9), (0.05, 1.0, 8.0)
-"""h omega and gamma/omega at which the page is held against Python, beside the scene's own."""
+"""h omega and gamma/omega at which the page is compared with Python, beside the scene's own."""
 
 
 def bath(scene: Scene | None, ran: Collection[str]) -> dict[str, Any] | None:
-    """Of one particle that a spring holds; None for any other scene.  `ran` are schemes, drawn at first."""
+    """Data of one particle on a spring in a bath, or None; the schemes `ran` are drawn at first."""
     if scene is None or scene.bath is None or scene.n != 1 or not scene.system.is_linear:
         return None
     from springcheck.thermal import THERMOSTATS, Law

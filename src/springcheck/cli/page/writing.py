@@ -27,7 +27,7 @@ MARK = '<meta name="generator" content="springcheck report">'
 SCRIPTS = ("loops.js", "drawing.js", "charts.js", "files.js", "page.js")
 """Scripts of the page, each after those that it needs."""
 DASHES = ("", "7 4", "2 3", "9 3 2 3", "14 4", "9 3 2 3 2 3", "2 6")
-"""In the order of `looks.LINES`."""
+"""Dashes in the order of `looks.LINES`."""
 PLAIN_DASHES = {EXACTLY: "1 5", SEPARATRIX: "3 3", GUIDE: "", BEGIN: ""}
 """Dashes of lines that belong to no scheme."""
 SHAPES = (
@@ -37,16 +37,16 @@ SHAPES = (
     "m0-4l4 4l-4 4l-4-4z",
     "m-3-3l6 6m0-6l-6 6",
 )
-"""Marks, drawn from where they stand."""
+"""Marks as paths, relative to their position."""
 JSON_WORDS = ("Infinity", "-Infinity", "NaN")
 FEWEST_POOLED = 8
-"""Most numbers of a row that is written in place; a longer one is written once and referred to."""
-HEAD = 1024
-"""Bytes in which the mark stands."""
+"""Most numbers of a row that is written in place; a longer one is written once and referenced."""
+MARK_BYTES = 1024
+"""Bytes within which the mark is found."""
 
 
 def html(content: Content) -> str:
-    """The page.  Scripts and styles run by their digest alone; nothing else is loaded from anywhere."""
+    """The page.  Scripts and styles are admitted by their digests; nothing else is loaded from anywhere."""
     around = jinja2.Environment(
         loader=jinja2.FileSystemLoader(HERE),
         autoescape=True,
@@ -58,7 +58,7 @@ def html(content: Content) -> str:
     kept: list[str] = []
 
     def keep(text: str) -> str:
-        """The text, of which the page's script is told too."""
+        """The text, which is passed to the page's script as well."""
         kept.append(Markup(text).unescape().strip() if isinstance(text, Markup) else plain(text).strip())
         return text
 
@@ -75,26 +75,26 @@ def html(content: Content) -> str:
     return around.get_template("page.html").render(
         content=content,
         scene=content.scene,
-        # the text is the file's, hence stripped of control characters line by line
+        # the text is the file's, and is freed of control characters line by line
         scene_lines=[plain(line) for line in content.scene_text.splitlines()],
         mark=Markup(MARK),
         style=Markup(style),
         style_digest=_digest(style),
         script=Markup(script),
         script_digest=_digest(script),
-        # asked for at the end of the page
+        # evaluated at the end of the page
         data=lambda: _json(pooled(_with_looks({**content.data, "words": kept}))),
     )
 
 
 def write(content: Content, path: Path) -> int:
-    """Write the page; returns its size [B].  StoreError where any other file stands there."""
+    """Write the page; returns its size [B].  StoreError where any other file is there."""
     try:
         if path.is_dir():
             raise StoreError(f"{path} is a folder: a file's name is needed after -o")
         if path.is_symlink() or path.exists():
             with path.open("rb") as file:
-                if MARK.encode() not in file.read(HEAD):
+                if MARK.encode() not in file.read(MARK_BYTES):
                     raise StoreError(
                         f"{path} is no report of ours: move it away, or name another file with -o"
                     )
@@ -108,10 +108,10 @@ def write(content: Content, path: Path) -> int:
 
 
 def _with_looks(data: Mapping[str, Any]) -> dict[str, Any]:
-    """The data with a look of each curve: colours on white and on black, dash, dash in print, mark.
+    """The data with a look for each curve: colours on white and on black, dash, dash in print, mark.
 
-    Curves of one name and scheme have one look; those of one scheme share a colour, and their dashes take
-    turns.  In print, where all are black, schemes differ by their dashes in the order in which they come.
+    Curves of one name and scheme have one look; those of one scheme share a colour and alternate dashes.  In
+    print, where all are black, schemes differ by their dashes in order of appearance.
     """
     order: dict[str, int] = {}
 
@@ -132,7 +132,7 @@ def _with_looks(data: Mapping[str, Any]) -> dict[str, Any]:
         found: dict[tuple[str, str], dict[str, Any]] = {}
         for curve in (curve for chart in bank["charts"] for curve in chart["curves"]):
             if (curve["name"], curve["group"]) not in found:
-                # a theory's line and the marks on it are of one look
+                # a theory's line and the marks on it share one look
                 kind = curve["group"], curve["line"]
                 found[curve["name"], curve["group"]] = look(curve["group"], counts[kind])
                 counts[kind] += 1
@@ -153,7 +153,7 @@ def _with_looks(data: Mapping[str, Any]) -> dict[str, Any]:
 def pooled(data: Any) -> list[Any]:
     """Every row once: [rows, data], where {"#": i} stands for the i-th row of numbers, {"$": i} of text.
 
-    Looks stand among them too.  Numbers that are no numbers in JSON are among rows alone.
+    Looks are pooled too.  Numbers that JSON cannot represent occur in rows alone.
     """
     rows: dict[str, int] = {}
 

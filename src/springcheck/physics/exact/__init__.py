@@ -1,17 +1,13 @@
 """The exact (analytic) solution of a scene, in extended precision.
 
-Linear scenes move in normal modes (`linear`), or, where friction joins these, by the matrix exponential
-(`damped`).  Single particles in a quartic potential or on a pendulum,
-and pairs on a Morse bond, have closed forms of their own (`solution`), by Jacobi's elliptic functions
-(`elliptic`).  Where the particles of a scene fall into groups that nothing joins, its motion is known if
-that of every group is.  Its error is some roundings of that width times the angle turned through: a phase
-of 1e6 is known to 1e-13, and to 1e-9 where `long double` is no wider than double (`arrays.ROUNDOFF`).
-
-Each comes with bounds of its own errors, which `validation/exact_check.py` holds against another route;
-`uncertainty` is what they come to.
-
-Times are taken as (number of steps) * h with the very double h that the engines were given: after 1e7
-steps a phase in double precision would be wrong by 1e-10.
+Linear scenes move in normal modes (`linear`), or, where friction couples these, by the matrix exponential
+(`damped`).  Single particles in a quartic potential or on a pendulum, and pairs on a Morse bond, have closed
+forms (`solution`) in Jacobi's elliptic functions (`elliptic`).  Where the particles of a scene fall into
+groups without interaction, its motion is known if that of every group is.  The error is some roundings of
+that width times the phase: a phase of 1e6 is known to 1e-13, and to 1e-9 where `long double` is no wider than
+double (`arrays.ROUNDOFF`).  Each solution has bounds of its own errors, which `validation/exact_check.py`
+compares with an independent route; `uncertainty` is the total. Times are (number of steps) * h with the very
+double h that the engines were given: after 1e7 steps a phase in double precision would be wrong by 1e-10.
 """
 
 from __future__ import annotations
@@ -31,24 +27,24 @@ __all__ = ["EPS", "Modes", "has_true_motion", "true_motion", "uncertainty"]
 
 
 MOST_NUMBERS = 1 << 20
-"""Positions that are worked out at a time, in extended precision."""
+"""Most positions that are computed at a time, in extended precision."""
 
 
 def has_true_motion(scene: Scene) -> bool:
-    """Whether `true_motion` knows the scene."""
+    """Whether `true_motion` has a closed form for the scene."""
     return scene.system.solution is not None
 
 
 def true_motion(scene: Scene, steps: Integers, h: float) -> tuple[Extended, Extended]:
     """Exact q and p (f, n) after these numbers of steps of h, in extended precision.
 
-    Motion that leaves even the extended range comes back infinite.  ValueError: the motion has no closed
-    form here (see `has_true_motion`).
+    Motion that leaves even the extended range is infinite.  ValueError: the motion has no closed form here
+    (see `has_true_motion`).
     """
     known = scene.system.solution
     if known is None:
         raise ValueError(f"the motion of scene {scene.name!r} has no closed form here")
-    # each time by itself: what is worked out on the way takes ten times the memory of the result
+    # in blocks of times: the intermediate results take ten times the memory of the result
     rows = max(1, MOST_NUMBERS // scene.n)
     q, p = np.empty((2, len(steps), scene.n), np.longdouble)
     for begin in range(0, len(steps), rows):
@@ -58,22 +54,23 @@ def true_motion(scene: Scene, steps: Integers, h: float) -> tuple[Extended, Exte
 
 
 def uncertainty(scene: Scene, duration: float) -> float:
-    """Bound of the error of `true_motion` from the start to a time [T], relative to the initial energy norm.
+    """Bound on the error of `true_motion` from the start to a time [T], relative to the initial energy norm.
 
-    No error of an engine is known better than to this, and smaller ones are not reported.  It is inf where
-    the motion leaves the extended range.  ValueError as for `true_motion`.
+    Smaller errors of an engine are not reported.  The bound is infinite where the motion leaves the extended
+    range. ValueError as for `true_motion`.
     """
     system = scene.system
     if system.solution is None:
         raise ValueError(f"the motion of scene {scene.name!r} has no closed form here")
     with np.errstate(all="ignore"):
-        # errors of all particles together are not all as large as each of them may be; a chain is held
+        # the errors of all particles together are smaller than the sum of their bounds; a chain has a joint
+        # bound
         square = (
             None if not system.has_modes else LinearMotion(system).energy_of_doubt(np.longdouble(duration))
         )
         if square is None:
             dq, dp = system.solution.doubt(duration)
-            # the elongation of a spring is off by what both of its ends are
+            # the error of a spring's elongation is that of both of its ends
             square = np.longdouble(np.sum(system.rigidity * dq * dq + dp * dp / scene.m) / 2)
             for group in system.free_groups if duration else ():
                 square += np.sum(scene.m[group] * dq[group] ** 2) / (2 * duration * duration)

@@ -9,30 +9,30 @@ import numpy as np
 from springcheck.physics.arrays import Extended
 from springcheck.physics.exact.closedform import (
     CANCELS,
-    LAST,
+    FORM_EPS,
     ClosedForm,
     States,
     one_each,
     wide,
 )
-from springcheck.physics.exact.digits import ENOUGH, digits, exactly, extended
+from springcheck.physics.exact.digits import FEWER_DIGITS, digits, exactly, extended
 from springcheck.physics.system import System
 from springcheck.physics.terms import Morse
 
-MOST = np.log(np.finfo(np.longdouble).max) - 64
-"""Exponents whose exponential, times its factors here, stays finite."""
+MOST_EXPONENT = np.log(np.finfo(np.longdouble).max) - 64
+"""Largest exponent whose exponential, times its factors here, stays finite."""
 
-FAR_OUT = 64.0
-"""A phase whose exponential exceeds 1 by more than any precision that is used here."""
+FAR_PHASE = 64.0
+"""Phase whose exponential is so large that 1 is negligible beside it in any precision used here."""
 
 
 class MorseMotion(ClosedForm):
-    """One bond each that pulls together: with s = exp(steepness u), s'' = w**2 (excess s + 1), a circular or
-    hyperbolic function (Morse 1929).  The centre of mass moves uniformly.
+    """Attractive bonds without other forces: with s = exp(steepness u), s'' = w**2 (excess s + 1), a circular
+    or hyperbolic function (Morse 1929).  The centre of mass moves uniformly.
 
-    Of each bond (s,): masses of both ends, reduced mass, elongation u, relative momentum p, energy E / depth
+    For each bond (s,): masses of both ends, reduced mass, elongation u, relative momentum p, energy E / depth
     and its excess over 1; w**2 = 2 depth steepness**2 / mass; and the phase of the start from the inner
-    turning point, an angle or beyond dissociation its hyperbolic kin, with its rate.
+    turning point, an angle or above dissociation a hyperbolic angle, with its rate.
     """
 
     key = "morse"
@@ -49,10 +49,10 @@ class MorseMotion(ClosedForm):
         mass = m[0] * m[1] / total
         u, pull = _relative(m, q, p, term.rest)
         # where exp(steepness u) overflows there is no force
-        x = np.where(a * u > MOST, 0, np.exp(-np.minimum(a * u, MOST)))
+        x = np.where(a * u > MOST_EXPONENT, 0, np.exp(-np.minimum(a * u, MOST_EXPONENT)))
         kinetic = (pull / total) ** 2 / (2 * mass * depth)
-        # near the bottom of the well the energy is small, near dissociation its excess over 1: neither
-        # follows from the other
+        # near the minimum the energy is small, near dissociation its excess over 1: neither follows from the
+        # other
         excess = kinetic + x * (x - 2)
         near = kinetic + x * (x + 2) > CANCELS * np.abs(excess)
         near |= np.abs(q[1]) + np.abs(q[0]) + np.abs(term.rest) > CANCELS * np.abs(u)
@@ -63,7 +63,7 @@ class MorseMotion(ClosedForm):
                 *([exactly(x[end[j]]) for end in ends] for x in (system.m, system.q, system.p)),
                 *(exactly(x[j]) for x in (term.rest, term.depth, term.steepness)),
             )
-        y = np.minimum(a * u, MOST)
+        y = np.minimum(a * u, MOST_EXPONENT)
         gap, p_ = np.expm1(-y), pull / total
         energy = p_ * p_ / (2 * mass * depth) + gap * gap
         w = np.abs(a) * np.sqrt(2 * depth / mass)
@@ -96,15 +96,15 @@ class MorseMotion(ClosedForm):
     def _stretched(self, a: Extended, t: Extended) -> States:
         """log(s) and its time derivative at times t.
 
-        At the inner turning point s = 1/(1 + root), root**2 = 1 + excess; from there on it grows by
-        root (cosh(phase) - 1) / excess, or root (1 - cos(phase)) / |excess|: nothing cancels.  Far beyond
-        dissociation only root exp(|phase|) / (2 excess) of it is left, whose logarithm cannot overflow.
+        At the inner turning point s = 1/(1 + root), root**2 = 1 + excess; from there on it grows by root
+        (cosh(phase) - 1) / excess, or root (1 - cos(phase)) / |excess|, without cancellation.  Far beyond
+        dissociation only root exp(|phase|) / (2 excess) of it remains, whose logarithm cannot overflow.
         """
         root, bound, edge = np.sqrt(self.energy), self.excess < 0, self.excess == 0
         phase = self.rate * t + self.start
         turn, run = np.where(bound, phase, 0), np.where(bound, 0, phase)
-        far = np.abs(run) > FAR_OUT
-        endless, run = np.where(far, run, FAR_OUT), np.where(far, 0, run)
+        far = np.abs(run) > FAR_PHASE
+        endless, run = np.where(far, run, FAR_PHASE), np.where(far, 0, run)
         half, whole = (
             np.where(bound, np.sin(turn / 2), np.sinh(run / 2)),
             np.where(bound, np.sin(turn), np.sinh(run)),
@@ -112,7 +112,7 @@ class MorseMotion(ClosedForm):
         size = np.where(edge, 1, np.abs(self.excess))
         z, dz = 2 * root * half * half / size - root / (root + 1), root * self.rate * whole / size
         leaving = np.abs(endless) + np.log(np.where(far, root / (2 * size), 1))
-        # at the edge of dissociation a parabola
+        # at exactly the dissociation energy a parabola
         fast = np.where(edge, a * self.p / self.mass, 0)
         slow = np.where(edge, self.w**2 * np.exp(np.where(edge, -a * self.u, 0)), 0)
         grown = fast * t + slow * t * t / 2
@@ -139,8 +139,8 @@ class MorseMotion(ClosedForm):
         far = sum(np.abs(wide(system.q[end])) for end in ends) + np.abs(term.rest)
         far = far + pushed / (system.m[term.a] + system.m[term.b]) * np.abs(t)
         for end in ends:
-            q[end] = LAST * (far + np.abs(self.u) + reach + speed * time)
-            p[end] = LAST * (pushed + self.mass * speed + force * time)
+            q[end] = FORM_EPS * (far + np.abs(self.u) + reach + speed * time)
+            p[end] = FORM_EPS * (pushed + self.mass * speed + force * time)
         return q, p
 
 
@@ -150,10 +150,10 @@ def _relative(m: Any, q: Any, p: Any, rest: Any) -> tuple[Any, Any]:
 
 
 def _of_bonds(m: Any, q: Any, p: Any, rest: Any, depth: Any, a: Any) -> tuple[Extended, Extended, Extended]:
-    """Elongation, relative momentum times both masses, and E / depth - 1, in more digits."""
+    """Elongation, relative momentum times both masses, and E / depth - 1, computed in more digits."""
     with digits():
         u, pull = _relative(m, q, p, rest)
-    with digits(ENOUGH):
+    with digits(FEWER_DIGITS):
         x = np.exp(-a * u)
         excess = pull * pull / (2 * m[0] * m[1] * (m[0] + m[1]) * depth) + x * (x - 2)
         return extended(u), extended(pull), extended(excess)

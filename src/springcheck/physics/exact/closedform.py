@@ -13,11 +13,11 @@ States: TypeAlias = tuple[Extended, Extended]
 PI = 4 * np.arctan(np.longdouble(1))
 
 CANCELS = 16
-"""Sums smaller than their summands by this factor are computed with more digits."""
+"""Least cancellation, summands over sum, for which sums are computed in more digits."""
 
-LAST = 64 * EPS
-"""Roundings of a closed form, relative to each size that it is made of; `validation/exact_check.py` finds
-at most a tenth of them."""
+FORM_EPS = 64 * EPS
+"""Error bound of a closed form, relative to each size that it consists of; `validation/exact_check.py` finds
+at most a tenth of it."""
 
 
 class NoClosedFormError(ValueError):
@@ -27,15 +27,15 @@ class NoClosedFormError(ValueError):
 class ClosedForm:
     """The exact motion of a system.
 
-    Its constructor works out once what all times share, the constants of the motion, or raises
-    NoClosedFormError.  Of a part of a scene it serves the particles on which a term `key` acts, and nothing
-    but `terms`; one that has no `terms` serves a whole scene.
+    Its constructor computes the constants of the motion once, or raises NoClosedFormError.  For a part of a
+    scene it serves the particles on which a term `key` acts, and no terms but `terms`; one without `terms`
+    serves a whole scene.
     """
 
     key: ClassVar[str] = ""
     terms: ClassVar[frozenset[str]] = frozenset()
     growth: float | None = None
-    """The largest derivative of the flow between two times, in the energy norm, where it is known."""
+    """The largest derivative of the flow between two times, in the energy norm; None where unknown."""
 
     def __init__(self, system: System[Any]) -> None:
         self.system = system
@@ -47,7 +47,7 @@ class ClosedForm:
 
     @classmethod
     def of(cls, system: System[Any]) -> Self | None:
-        """That of a system, None where it does not know the motion."""
+        """The closed form of a system, None where it does not apply."""
         try:
             return cls(system)
         except NoClosedFormError:
@@ -58,8 +58,7 @@ class ClosedForm:
         raise NotImplementedError
 
     def doubt(self, t: np.longdouble) -> States:
-        """Bounds (n,) of the errors of q [L] and p [M L/T], from the start to a time [T], which may lie
-        before it."""
+        """Bounds (n,) on the errors of q [L] and p [M L/T] from the start to a time [T], or back to it."""
         raise NotImplementedError
 
 
@@ -74,5 +73,5 @@ def one_each(system: System[Any]) -> bool:
 
 
 def latency(m1: Extended) -> Extended:
-    """Bound of F(phi | m) up to a quarter turn, for any phi that numbers of this width can tell from it."""
+    """Bound on F(phi | m) up to a quarter turn, for any phi that this precision distinguishes from it."""
     return np.asarray(2 + np.log(16 / np.maximum(np.abs(m1), EPS**4)) / 2)

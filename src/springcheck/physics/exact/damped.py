@@ -1,9 +1,9 @@
-"""The exact solution of joined particles that friction slows down unlike, by the matrix exponential.
+"""The exact solution of joined particles with unequal friction rates, by the matrix exponential.
 
-In the modes of the springs alone, with the positions of each times its frequency w, the state z moves by
-z' = A z, A = [[0, W], [-W, -G]], G the friction between modes.  A + A^T = -2 diag(0, G) adds no length: what
-a product of exponentials has lost of its digits grows with the number of factors and no faster.  A mode that
-nothing holds has the position over the time constant of A in place of w.
+In the modes of the springs alone, with the positions of each multiplied by its frequency w, the state z obeys
+z' = A z, A = [[0, W], [-W, -G]], G the friction between modes.  A + A^T = -2 diag(0, G): the exponentials do
+not increase lengths, so that the error of a product of them grows with the number of factors and no faster.
+For a free mode the time constant of A replaces w.
 """
 
 from __future__ import annotations
@@ -25,20 +25,19 @@ SERIES_TERMS = 17
 """Terms of the series of exp(A t) up to |A t| = 1/2: the next one is 2**-18/18!, 6e-22."""
 
 RADIX_OF_STEPS = 16
-"""Radix in which the number of steps |A t| = 1/2 is written: each of its digits is one product."""
+"""Radix of the number of steps |A t| = 1/2: each of its digits is one product."""
 
 MOST_STEP_DIGITS = 15
-"""Digits of that number: up to 2**60 steps, beyond which no digit of a phase is left."""
+"""Most digits of that number: up to 2**60 steps, beyond which no digit of a phase is left."""
 
 
 class UnlikeFriction(ClosedForm):
-    """A whole linear scene whose friction joins modes: A takes z to z' (2n, 2n) [1/T], `scale` (n,) is z over
-    positions, `rate` a bound of |A|, rows or columns, and `free` the scale of modes that nothing holds, 0
-    where there is none.
-    """
+    """A whole linear scene whose friction couples modes: A takes z to z' (2n, 2n) [1/T], `scale` (n,) is z
+    over positions, `rate` a bound of |A|, by rows or columns, and `free` the scale of free modes, 0 where
+    there are none."""
 
     def __init__(self, system: System[Any]) -> None:
-        """Only for springs and friction, without growing modes, and without a constant force on free ones."""
+        """For springs and friction alone, without growing modes or a constant force on free ones."""
         super().__init__(system)
         self.need(system.is_linear and system.n <= MOST_UNLIKE)
         self.need(all(term.kind in ("potential", "friction") for term in system.terms))
@@ -64,12 +63,11 @@ class UnlikeFriction(ClosedForm):
         return self.modes.from_centres(z[:, :n] / self.scale, z[:, n:])
 
     def doubt(self, t: np.longdouble) -> States:
-        """A product of matrices (k, k) of length 1 is off by k**2/2 EPS (Higham, Accuracy and Stability of
-        Numerical Algorithms, 3.13), and a power of a step by the sum of what its factors are at most: each of
-        2 |A| t steps counts, with 4 such products for its series, A and the power.  What modes are off by is
-        a force.  Friction drives backwards in time.  The position of a mode that nothing holds acts on
-        nothing, and adds up velocities.
-        """
+        """A product of matrices (k, k) of norm 1 has an error of k**2/2 EPS (Higham, Accuracy and Stability
+        of Numerical Algorithms, 3.13), and a power of a step at most the sum of the errors of its factors:
+        each of 2 |A| t steps counts, with 4 such products for its series, A and the power.  Errors of modes
+        act as forces.  Backwards in time friction amplifies.  The position of a free mode acts on nothing,
+        and integrates velocities."""
         system, modes, n, duration = self.system, self.modes, self.system.n, np.abs(t)
         of_u, of_v, *_ = modes.start.sizes
         size, begun = (np.sqrt(np.sum(x**2)) for x in (self.start, np.append(self.scale * of_u, of_v)))
@@ -92,14 +90,14 @@ def _series(A: Extended, z: Extended, t: Extended) -> Extended:
 
 
 def _from_start(A: Extended, start: Extended, t: Extended, rate: np.longdouble) -> Extended:
-    """exp(A t) of one state (2n,) at times t (f, 1): where these lie evenly, half of them from the others."""
+    """exp(A t) of one state (2n,) at times t (f, 1); at evenly spaced times by repeated doubling."""
     gaps = np.diff(t[:, 0])
     if len(t) <= RADIX_OF_STEPS or not np.ptp(gaps) <= 8 * EPS * np.max(t) < gaps[0]:
-        return _flown(A, np.broadcast_to(start, (len(t), len(start))), t, rate)
+        return _propagated(A, np.broadcast_to(start, (len(t), len(start))), t, rate)
     out = np.empty((len(t), len(start)), np.longdouble)
-    out[:1] = _flown(A, start[None], t[:1], rate)
+    out[:1] = _propagated(A, start[None], t[:1], rate)
     unit = np.eye(len(A), dtype=np.longdouble)
-    across = _flown(A, unit, np.full((len(A), 1), (t[-1, 0] - t[0, 0]) / (len(t) - 1)), rate).T
+    across = _propagated(A, unit, np.full((len(A), 1), (t[-1, 0] - t[0, 0]) / (len(t) - 1)), rate).T
     done = 1
     while done < len(t):
         more = out[: len(t) - done][:done]
@@ -108,8 +106,8 @@ def _from_start(A: Extended, start: Extended, t: Extended, rate: np.longdouble) 
     return out
 
 
-def _flown(A: Extended, z: Extended, t: Extended, rate: np.longdouble) -> Extended:
-    """exp(A t) z of states (f, 2n) at times t (f, 1), none below 0."""
+def _propagated(A: Extended, z: Extended, t: Extended, rate: np.longdouble) -> Extended:
+    """exp(A t) z of states (f, 2n) at times t (f, 1) >= 0."""
     step = 1 / (2 * rate)
     whole = np.minimum(np.floor(t / step), np.longdouble(RADIX_OF_STEPS) ** MOST_STEP_DIGITS - 1)
     z = _series(A, z, t - whole * step)

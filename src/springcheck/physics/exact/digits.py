@@ -1,8 +1,8 @@
-"""Decimal arithmetic for the few sums that cancel and decide a motion: energies near a barrier, stiff modes.
+"""Decimal arithmetic for the few sums whose cancellation decides a motion: near barriers, and in stiff modes.
 
-They are `decimal` numbers of the standard library in arrays of objects: doubles are exact in them, and +, -,
-*, /, np.sqrt and np.exp are correctly rounded to `DIGITS`.  A formula is written once, for these and for
-extended precision.
+The numbers are `decimal` numbers of the standard library in arrays of objects: doubles convert exactly, and
++, -, *, /, np.sqrt and np.exp are correctly rounded to `DIGITS`.  A formula is written once, for these and
+for extended precision.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ Wide: TypeAlias = NDArray[np.object_]
 DIGITS = 420
 """Digits for sums of products of doubles that differ by 300 decades, and for pi beside the largest angle."""
 
-ENOUGH = 57
-"""Digits where all numbers lie within 17 decades of the largest: three words of libmpdec."""
+FEWER_DIGITS = 57
+"""Digits where all numbers are within 17 decades of the largest: three words of libmpdec."""
 
 
 @contextmanager
@@ -73,11 +73,11 @@ def _arctangent(inverse: int) -> Decimal:
 
 
 def sine_cosine(x: Decimal) -> tuple[Decimal, Decimal]:
-    """Sine and cosine of an angle of size 2 or less, to `ENOUGH` digits of their own size."""
-    with digits(ENOUGH):
+    """Sine and cosine of an angle of size 2 or less, to a relative accuracy of `FEWER_DIGITS` digits."""
+    with digits(FEWER_DIGITS):
         away = pi() / 2 - abs(x)
         if abs(away) < abs(x):
-            # near a quarter turn the cosine is as small as what is left of it
+            # near a quarter turn the cosine is as small as the remaining angle
             return _series(away, even=True).copy_sign(x), _series(away, even=False)
         return _series(x, even=False), _series(x, even=True)
 
@@ -94,11 +94,11 @@ def _series(x: Decimal, *, even: bool) -> Decimal:
         total += term
 
 
-def eigen(symmetric: Wide, count: int = ENOUGH) -> tuple[Wide, Wide]:
+def eigen(symmetric: Wide, count: int = FEWER_DIGITS) -> tuple[Wide, Wide]:
     """Eigenvalues (n,) and eigenvectors (n, n), columns, of a symmetric matrix, by Jacobi's rotations (1846).
 
     Their errors are 10**-count of the largest eigenvalue.  They start from vectors in double precision, and
-    take 1e-5 n**3 seconds with ENOUGH digits.
+    take 1e-5 n**3 seconds with FEWER_DIGITS.
     """
     n = len(symmetric)
     size = np.max(np.abs(symmetric)) or Decimal(1)
@@ -106,7 +106,7 @@ def eigen(symmetric: Wide, count: int = ENOUGH) -> tuple[Wide, Wide]:
     with digits(count):
         _, start = np.linalg.eigh((symmetric / size).astype(np.float64))
         turn = exactly(start)
-        for _ in range(2 + (count // ENOUGH).bit_length()):
+        for _ in range(2 + (count // FEWER_DIGITS).bit_length()):
             # Newton's iteration for the nearest orthogonal matrix: 1e-16, 1e-32, 1e-64, and beyond
             turn = turn @ (3 * exactly(np.eye(n)) - turn.T @ turn) / 2
         a = turn.T @ symmetric @ turn

@@ -14,8 +14,8 @@ import numpy as np
 
 from springcheck.physics.arrays import EPS, Extended
 
-MOST = 40
-"""Rounds of the mean: six for ordinary moduli, a dozen for m1 near the smallest number."""
+MOST_MEANS = 40
+"""Most rounds of the mean: six for ordinary moduli, a dozen for m1 near the smallest number."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -31,7 +31,7 @@ class Jacobi:
 def _means(m: Extended, m1: Extended) -> Iterator[tuple[Extended, Extended, Extended]]:
     """(a, b, c) of each round, from (1, sqrt(m1), sqrt(m)) until c vanishes beside a."""
     a, b, c = np.ones_like(m), np.sqrt(m1), np.sqrt(m)
-    for _ in range(MOST):
+    for _ in range(MOST_MEANS):
         yield a, b, c
         if np.all(c <= EPS * a):
             return
@@ -41,7 +41,7 @@ def _means(m: Extended, m1: Extended) -> Iterator[tuple[Extended, Extended, Exte
 
 
 def jacobi(u: Extended, m: Extended, m1: Extended) -> Jacobi:
-    """am(u | m) and sn, cn, dn, for 0 <= m <= 1 and m1 = 1 - m.  am goes on growing with u."""
+    """am(u | m) and sn, cn, dn, for 0 <= m <= 1 and m1 = 1 - m.  am grows with u, beyond pi."""
     u, m, m1 = np.broadcast_arrays(*(np.asarray(x, np.longdouble) for x in (u, m, m1)))
     edge = m1 == 0
     rounds = list(_means(np.where(edge, 0, m), np.where(edge, 1, m1)))
@@ -60,12 +60,12 @@ def jacobi(u: Extended, m: Extended, m1: Extended) -> Jacobi:
 
 
 def argument(sine: Extended, cosine: Extended, m: Extended, m1: Extended) -> Extended:
-    """F(phi | m) for the phi in (-pi, pi] with this sine and cosine, up to a common factor: am's inverse."""
+    """F(phi | m), the inverse of am, for phi in (-pi, pi] of this sine and cosine, up to a common factor."""
     sine, cosine, m, m1 = np.broadcast_arrays(*(np.asarray(x, np.longdouble) for x in (sine, cosine, m, m1)))
     phi = np.arctan2(sine, cosine)
     edge = m1 == 0
     rounds = list(_means(np.where(edge, 0, m), np.where(edge, 1, m1)))
-    # sine and cosine go along by themselves: at a quarter turn, from where the way out of a separatrix is
+    # sine and cosine are propagated separately: near a quarter turn, where the way out of a separatrix is
     # long, those of the rounded phi would be wrong
     size = np.hypot(sine, cosine)
     s, c = (x / np.where(size > 0, size, 1) for x in (sine, cosine))

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from springcheck.physics.arrays import Extended
-from springcheck.physics.exact.closedform import CANCELS, LAST, ClosedForm, States
+from springcheck.physics.exact.closedform import CANCELS, FORM_EPS, ClosedForm, States
 from springcheck.physics.exact.digits import digits, exactly, extended
 from springcheck.physics.exact.normal import exact_sums, normal_modes
 from springcheck.physics.exact.response import first_difference
@@ -19,12 +19,11 @@ from springcheck.physics.system import System
 
 
 class Gyration(ClosedForm):
-    """A whole scene of charges in a field, each on an isotropic spring or on none: particles (s,) in planes
-    of coordinates a and b, the two roots of their motion, and the start z and v about their centres (n,).
-    """
+    """A whole scene of charges in a field, each on an isotropic spring or free: particles (s,) in planes of
+    coordinates a and b, the two roots of their motion, and the start z and v about their centres (n,)."""
 
     def __init__(self, system: System[Any]) -> None:
-        """Nothing else may act, nor unlike on both coordinates of a plane, or beside them."""
+        """No other terms, and none that is unequal on both coordinates of a plane."""
         super().__init__(system)
         planes = [term for term in system.terms if term.key == "magnetic"]
         self.need(len(planes) == 1 and set(system.acting) <= {"magnetic", "wall-spring", "damping"})
@@ -36,9 +35,9 @@ class Gyration(ClosedForm):
         turn[a] = planes[0].parameters[0] / system.m[a].astype(np.longdouble)
         half = (modes.rate[a] + 1j * turn[a]) / 2
         square = half * half - modes.w2[a]
-        # where a field just holds what a spring pushes away, time makes its cube of what is lost here
+        # where a field barely holds against a repulsive spring, the error here grows with the cube of time
         lost = CANCELS * np.abs(square) < np.abs(half * half) + np.abs(modes.w2[a])
-        # and an orbit may be small beside how far from 0 its centre is
+        # and an orbit may be small beside the distance of its centre from 0
         with digits():
             k, pull, rate = exact_sums(system.without("magnetic"), np.diagonal)
             centre = np.where(k == 0, 0 * k, pull / np.where(k == 0, 1, k))
@@ -66,7 +65,7 @@ class Gyration(ClosedForm):
         return q + self.centre, p * self.system.m
 
     def doubt(self, t: np.longdouble) -> States:
-        """Roundings of its angles, times the largest state."""
+        """Rounding of its angles, times the largest state."""
         one, other, z, v = self.one, self.other, np.abs(self.z), np.abs(self.v)
         grown = np.exp(np.maximum(np.maximum((one * t).real, (other * t).real), 0))
         rate = np.maximum(np.abs(one), np.abs(other))
@@ -75,6 +74,6 @@ class Gyration(ClosedForm):
         far = z * (1 + np.abs(one) * hold) + v * hold
         fast = np.abs(self.z * one * other) * hold + v * (1 + np.abs(other) * hold)
         q, p = np.empty((2, self.system.n), np.longdouble)
-        q[self.a] = q[self.b] = LAST * (1 + rate * np.abs(t)) * grown * far
-        p[self.a] = p[self.b] = LAST * (1 + rate * np.abs(t)) * grown * fast
-        return q + LAST * np.abs(self.centre), p * self.system.m
+        q[self.a] = q[self.b] = FORM_EPS * (1 + rate * np.abs(t)) * grown * far
+        p[self.a] = p[self.b] = FORM_EPS * (1 + rate * np.abs(t)) * grown * fast
+        return q + FORM_EPS * np.abs(self.centre), p * self.system.m

@@ -14,11 +14,11 @@ from springcheck.physics.exact.normal import Modes, split
 
 SMALLEST = np.finfo(np.longdouble).tiny
 ROUNDINGS = 32
-"""Roundings of a motion in extended precision, of each of its summands and of its phase."""
+"""Rounding errors of a motion in extended precision, for each of its summands and for its phase."""
 
 
 class LinearMotion(ClosedForm):
-    """Whatever has normal modes."""
+    """A whole system that has normal modes."""
 
     def __init__(self, system: Any) -> None:
         super().__init__(system)
@@ -31,10 +31,9 @@ class LinearMotion(ClosedForm):
         return found.from_centres(*_moved(start.u, start.v, t, law))
 
     def doubt(self, t: np.longdouble) -> States:
-        """A mode is known to a few roundings of its amplitude, of its phase, and of what its start was taken
-        from.  What is not known of the equations themselves, y'' = -A y - r y' + g, is a force, and a force f
-        moves y by |t f| min(t, 1/w) at most (variation of constants).
-        """
+        """A mode is known to a few roundings of its amplitude, of its phase, and of the summands of its
+        start.  Errors of the equations themselves, y'' = -A y - r y' + g, act as forces, and a force f moves
+        y by at most |t f| min(t, 1/w) (variation of constants)."""
         system, found = self.system, self.modes
         if found.waves:
             y, v, of_y, of_v = self._of_waves(t)
@@ -43,7 +42,7 @@ class LinearMotion(ClosedForm):
         joined = found.vectors is not None
         last, duration = (ROUNDINGS + (system.n if joined else 0)) * EPS, np.abs(t)
         y, v = last * ((1 + phase) * reach + np.abs(found.centre())), last * (1 + phase) * speed
-        # friction is taken for one rate where it is one but for rounding
+        # friction rates that differ by rounding count as one
         force = found.doubt * reach + (np.ptp(found.rate) * speed if joined else 0)
         if np.any(found.doubt):
             zero = np.zeros(system.n, dtype=np.longdouble)
@@ -52,12 +51,12 @@ class LinearMotion(ClosedForm):
             y, v = y + duration * hold * force, v + duration * force
         else:
             kick = duration * _length(force)
-            # what mixes modes may put the errors of all into one
+            # coupling may concentrate the errors of all modes in one
             y, v = found.spread(y) + np.max(hold) * kick, found.spread(v) + kick
         return np.asarray(y / found.root_m), np.asarray(v * found.root_m)
 
     def energy_of_doubt(self, t: np.longdouble) -> np.longdouble | None:
-        """Bound of the energy of the error at time t [M L2/T2]; None where `doubt` says all that is known."""
+        """Bound on the energy of the error at time t [M L2/T2]; None where `doubt` is the tightest bound."""
         if not self.modes.waves:
             return None
         y, v, of_y, of_v = self._of_waves(t)
@@ -67,19 +66,18 @@ class LinearMotion(ClosedForm):
         return known
 
     def _of_waves(self, t: np.longdouble) -> tuple[Extended, Extended, Extended, Extended]:
-        """Error bounds (n,) of each wave's position and velocity in a uniform chain, and those of the
-        transform.
+        """Error bounds (n,) of each wave's position and velocity in a uniform chain, and of the transform.
 
-        A wave is known like any mode.  The transform, an orthogonal one, errs by some log2(n) roundings of
-        the length of what it turns (Higham, Accuracy and Stability of Numerical Algorithms, 24.1), three
-        times that where n + 1 has large factors (Bluestein); the exact motion passes the error of the start
-        on as it is.
+        A wave is known like any mode.  The transform, an orthogonal one, has an error of some log2(n)
+        roundings of the norm of its argument (Higham, Accuracy and Stability of Numerical Algorithms, 24.1),
+        three times that where n + 1 has large factors (Bluestein); the exact motion propagates the error of
+        the start unchanged.
         """
         system, found = self.system, self.modes
         reach, speed, phase, hold = reaches(found, t)
         last, transform = ROUNDINGS * EPS, 24 * np.log2(8 * (system.n + 1)) * EPS
         y, v = last * ((1 + phase) * reach + np.abs(found.centre())), last * (1 + phase) * speed
-        # friction is taken for one rate where it is one but for rounding
+        # friction rates that differ by rounding count as one
         v = v + np.abs(t) * np.ptp(found.rate) * speed
         whole_y, whole_v = (_length(x) for x in found.into(system.q, system.p))
         w, driven = np.sqrt(np.max(found.w2)), np.exp(np.maximum(-t, 0) * np.max(found.rate))
@@ -91,7 +89,7 @@ class LinearMotion(ClosedForm):
 
 
 def flow(w2: Extended, rate: Extended, t: np.longdouble) -> Extended:
-    """What takes (u, u') of u'' = -w2 u - rate u' over a time t [T]: (n, 2, 2), for w2 and rate (n,)."""
+    """Matrices (n, 2, 2) that take (u, u') of u'' = -w2 u - rate u' over a time t [T]; w2, rate (n,)."""
     w2, rate = (np.repeat(x, 2) for x in (w2, rate))
     u, v = np.tile(np.eye(2, dtype=np.longdouble), len(w2) // 2)
     slow, fast, _ = split(u, v, w2, rate)
@@ -108,7 +106,7 @@ def _moved(u: Extended, v: Extended, t: Extended, law: _Law) -> tuple[Extended, 
             (turns & ~slows, _undamped),
             (turns & slows, _damped),
             (~turns & ~slows, _free),
-            (~turns & slows, _dragged),
+            (~turns & slows, _with_friction),
         ):
             if np.any(kind):
                 y[:, kind], z[:, kind] = one(u[kind], v[kind], t, _Law(*(x[kind] for x in law)))
@@ -117,18 +115,18 @@ def _moved(u: Extended, v: Extended, t: Extended, law: _Law) -> tuple[Extended, 
 
 @by_identity
 class _Law(NamedTuple):
-    """u'' = -w2 u - rate u' + pull, the pull only where w2 = 0 (elsewhere u counts from the centre)."""
+    """u'' = -w2 u - rate u' + pull, the pull only where w2 = 0 (elsewhere u is relative to the centre)."""
 
     w2: Extended
     rate: Extended
     pull: Extended
     slow: Extended
     fast: Extended
-    """Shares of the two exponentials, where it is a sum of these (see `Start`)."""
+    """Shares of the two exponentials, where the motion is a sum of these (see `Start`)."""
 
 
 def _undamped(u: Extended, v: Extended, t: Extended, law: _Law) -> tuple[Extended, Extended]:
-    """Hyperbolic for w2 < 0: from |phase| = 1 on as two exponentials, of which one may be all there is."""
+    """Hyperbolic for w2 < 0: from |phase| = 1 on as two exponentials, either of which may be absent."""
     w = np.sqrt(np.abs(law.w2))
     phase = t * w
     turning = law.w2 > 0
@@ -139,7 +137,7 @@ def _undamped(u: Extended, v: Extended, t: Extended, law: _Law) -> tuple[Extende
     sign = np.where(turning, -1, 1)
     y, z = u * cosine + v / w * sine, v * cosine + sign * w * u * sine
     if np.any(apart):
-        # what is not there does not grow, not even beyond all numbers
+        # an absent exponential does not grow, not even beyond the range of numbers
         up, down = (np.where(x == 0, 0, x * np.exp(to)) for x, to in ((law.slow, phase), (law.fast, -phase)))
         y, z = np.where(apart, up + down, y), np.where(apart, w * (up - down), z)
     return np.asarray(y), np.asarray(z)
@@ -148,9 +146,9 @@ def _undamped(u: Extended, v: Extended, t: Extended, law: _Law) -> tuple[Extende
 def _damped(u: Extended, v: Extended, t: Extended, law: _Law) -> tuple[Extended, Extended]:
     """With b = rate/2 and s**2 = w2 - b**2: exp(-b t) (u (cos st + b S) + v S), S = sin(st)/s.
 
-    Hyperbolic beyond critical damping.  There the slow root -b + s would cancel and exp(-b t) cosh(st)
-    would be 0 times infinity; from st = 1 on the two exponentials are taken apart, with the slow root
-    as -w2 / (b + s).  Near critical damping S -> t, and nothing is divided by s.
+    Hyperbolic beyond critical damping.  There the slow root -b + s would cancel and exp(-b t) cosh(st) would
+    be 0 times infinity; from st = 1 on the two exponentials are computed separately, with the slow root as
+    -w2 / (b + s).  Near critical damping S -> t, and nothing is divided by s.
     """
     b = law.rate / 2
     root = np.sqrt(np.abs(law.w2))
@@ -184,7 +182,7 @@ def _free(u: Extended, v: Extended, t: Extended, law: _Law) -> tuple[Extended, E
     return np.asarray(u + v * t + law.pull * t * t / 2), np.asarray(v + law.pull * t)
 
 
-def _dragged(u: Extended, v: Extended, t: Extended, law: _Law) -> tuple[Extended, Extended]:
+def _with_friction(u: Extended, v: Extended, t: Extended, law: _Law) -> tuple[Extended, Extended]:
     x = law.rate * t
     gone = -np.expm1(-x) / law.rate
     # (x - 1 + exp(-x)) / x**2, by its series where it would cancel
@@ -202,8 +200,8 @@ def _length(x: Extended) -> Extended:
 
 
 def reaches(found: Modes, t: np.longdouble) -> tuple[Extended, Extended, Extended, Extended]:
-    """Bounds of |u|, of |v|, of the phase, whose last digits are lost, and of the response of u to a unit
-    kick, from the start to time t, for each mode (n,)."""
+    """Bounds on |u|, |v|, the phase, which is known to rounding, and the response of u to a unit kick, from
+    the start to time t, for each mode (n,)."""
     u, v, slow, fast = found.start.sizes
     duration, b, w = np.abs(t), found.rate / 2, np.sqrt(np.abs(found.w2))
     turns, falls = found.w2 > 0, found.w2 < 0
@@ -218,7 +216,7 @@ def reaches(found: Modes, t: np.longdouble) -> tuple[Extended, Extended, Extende
     if t < 0:
         square = b * b - found.w2
         driven = np.exp((b + np.sqrt(np.maximum(square, 0))) * duration)
-        # near critical damping t exp(b t) grows, and what is not known of the roots with the cube of t
+        # near critical damping t exp(b t) grows, and errors of the roots with the cube of t
         longer = np.minimum(duration, 1 / np.sqrt(np.maximum(np.abs(square), SMALLEST)))
         hold = np.where(turns, np.maximum(hold, longer), hold)
         wider = np.where(turns, np.maximum(1, w * longer), 1)

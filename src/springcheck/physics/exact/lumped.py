@@ -1,4 +1,4 @@
-"""Particles on rods along one line: each group of them is one mass on the springs of all."""
+"""Particles on rods along one line: each group of them is one mass, on which all their springs act."""
 
 from __future__ import annotations
 
@@ -9,18 +9,17 @@ import numpy as np
 
 from springcheck.physics import graph
 from springcheck.physics.arrays import EPS, Extended, Floats, Integers
-from springcheck.physics.exact.closedform import LAST, ClosedForm, States, wide
+from springcheck.physics.exact.closedform import FORM_EPS, ClosedForm, States, wide
 from springcheck.physics.exact.digits import Wide, digits, exactly, extended
 from springcheck.physics.system import System
 from springcheck.physics.term import Term
 
 
 class LumpedMotion(ClosedForm):
-    """A whole scene: `one`, the facts of that without its rods, where each group is a particle; by particle
-    (n,) its `group`, its offset `off` [L], and its `share` of the mass; the largest relative error of a
-    mass or momentum there, sums that are `rounded` to doubles; and of each row that rests somewhere (s,) the
-    stiffness, and by what its rest was rounded [L].
-    """
+    """A whole scene: `one`, the facts of the scene without its rods, where each group is a particle; by
+    particle (n,) its `group`, its offset `off` [L], and its `share` of the mass; the largest relative error
+    of a mass or momentum there, sums that are `rounded` to doubles; and for each row with an origin (s,) the
+    stiffness, and the rounding of that origin [L]."""
 
     one: Any
 
@@ -32,7 +31,7 @@ class LumpedMotion(ClosedForm):
         others = [term for term in system.terms if term.kind != "constraint"]
         first, of = np.unique(graph.lowest_joined(system.n, rods), return_inverse=True)
         self.need(all(rod.bodies == 2 for rod in rods) and all(term.is_linear for term in others))
-        # nothing stretches a spring beside a rod
+        # no spring may be parallel to a rod
         pairs = (of[np.stack(term.particles)] for term in others if term.bodies == 2)
         self.need(all(np.all(a != b) for a, b in pairs))
         with digits():
@@ -60,8 +59,8 @@ class LumpedMotion(ClosedForm):
     def doubt(self, t: np.longdouble) -> States:
         """The bounds of the groups, in which each number counts some four times its rounding by `EPS`.
 
-        A spring that rests off by d sets free k d**2/2 of energy, which moves no particle by more than it can
-        stretch all springs in turn; friction makes it grow backwards in time, a hill always.
+        A rest point that is off by d releases an energy k d**2/2, which moves no particle by more than it can
+        stretch all springs in turn; it grows by friction backwards in time, and by repulsive springs always.
         """
         one, of, time = self.one, self.group, np.abs(t)
         q, p = ((1 + self.rounded / (4 * EPS)) * x for x in one.solution.doubt(float(t)))
@@ -73,11 +72,11 @@ class LumpedMotion(ClosedForm):
         free = free * np.exp(rate * time)
         q = q + np.minimum(time * free / np.sqrt(one.m), 2 * free * np.sum(1 / np.sqrt(k)))
         p = p + free * np.sqrt(one.m)
-        return wide(q[of] + LAST * (np.abs(self.system.q) + np.abs(self.off))), wide(p[of] * self.share)
+        return wide(q[of] + FORM_EPS * (np.abs(self.system.q) + np.abs(self.off))), wide(p[of] * self.share)
 
 
 def _moved(term: Term, of: Integers, off: Wide) -> tuple[Term, Extended]:
-    """The same rows on the groups, and by what their origins are rounded."""
+    """The same rows on the groups, and the rounding of their origins."""
     rows, shift = {name: of[getattr(term, name)] for name in term.ends}, np.zeros(0, np.longdouble)
     if term.origin:
         at = exactly(getattr(term, term.origin)) - term.stretch(off)  # type: ignore[arg-type]

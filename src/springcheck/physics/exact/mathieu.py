@@ -1,7 +1,7 @@
-"""The exact solution of springs of modulated stiffness, by Floquet: Mathieu's equation.
+"""The exact solution of springs of modulated stiffness, by Floquet theory: Mathieu's equation.
 
-The state a period later is a matrix times that of now.  Within a period the matrix from its start to each
-node of a grid is a product of Taylor series in time, whose step turns by less than half a radian.
+The state a period later is a matrix times the present one.  Within a period the matrix from its start to each
+node of a grid is a product of Taylor series in time, whose step has a phase below half a radian.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 from springcheck.physics.arrays import Extended
 from springcheck.physics.driven import ModulatedSpring
 from springcheck.physics.exact.closedform import (
-    LAST,
+    FORM_EPS,
     PI,
     ClosedForm,
     NoClosedFormError,
@@ -28,22 +28,24 @@ from springcheck.physics.system import System
 TAYLOR_ORDER = 22
 """Order of the Taylor series: its next term is (1/2)**23/23!, 5e-30 of the first."""
 
-SCALES = 5
+ERROR_SCALES = 5
 """Coordinates in which the growth of errors is bounded."""
 
 MOST_NODES = 1 << 14
-"""Nodes of a period: a modulation so slow that it takes more is left out."""
+"""Most nodes of a period: a slower modulation has no solution here."""
 
 
 class _Mode:
     """One particle: u'' = -w2 (1 + depth cos(turn t + phase)) u, u = q - at, and its start (u, v).
 
-    `rate` is the largest frequency, that of the spring or of the modulation [1/T], and `nodes` (j + 1, 2, 2)
-    what takes (u, v) from the start to each node of a period, the last its end, which are `node` [T] apart.
+    `rate` is the larger angular frequency, of the spring or of the modulation [1/T], and `nodes` (j + 1, 2,
+    2) are the matrices that take (u, v) from the start to each node of a period, `node` [T] apart, the last
+    to its end.
     """
 
     def __init__(self, found: Extended, row: Sequence[float]) -> None:
-        """Of mass, position and momentum, and a row of its term.  NoClosedFormError: a period is too long."""
+        """From mass, position and momentum, and a row of its term.  NoClosedFormError for too long a
+        period."""
         m, q, p = found
         k, self.depth, self.turn, self.phase, self.at = wide(row)
         self.w2, self.start = k / m, np.array([q - self.at, p / m])
@@ -60,7 +62,7 @@ class _Mode:
         self.nodes = np.stack(nodes)
 
     def steps(self, t: Extended, s: Extended) -> Extended:
-        """What takes (u, v) from the times t (f,) to t + s: (f, 2, 2)."""
+        """Matrices (f, 2, 2) that take (u, v) from the times t (f,) to t + s."""
         angle = self.turn * t + self.phase
         waves, factor = [], np.longdouble(1)
         for j in range(TAYLOR_ORDER):
@@ -98,7 +100,7 @@ class ModulatedMotion(ClosedForm):
             rest = t[:, 0] - n * mode.period
             j = np.clip((rest / mode.node).astype(np.int64), 0, len(mode.nodes) - 2)
             last = mode.steps(mode.node * j, rest - mode.node * j)
-            # what turns by nearly half a turn a period, its negative turns by little
+            # a matrix that rotates by nearly half a turn a period: its negative rotates by little
             sign, begun = np.copysign(1, np.trace(mode.nodes[-1])), np.empty((2, len(t)), np.longdouble)
             (a, b), (c, d) = sign * mode.nodes[-1]
             for matrix, mine in ((np.array([[a, b], [c, d]]), n >= 0), (np.array([[d, -b], [-c, a]]), n < 0)):
@@ -109,26 +111,29 @@ class ModulatedMotion(ClosedForm):
         return q + np.array([mode.at for mode in self.modes]), p * self.system.m
 
     def doubt(self, t: np.longdouble) -> States:
-        """Roundings of the angle turned through, times the largest state.
+        """Rounding of the accumulated phase, times the largest state.
 
-        Of eigenvalues x and y, and the length N of M - x, the matrix M of a period has powers of at most
-        1 + n N or the condition of its eigenvectors, k + root(k**2 - 1) with k = N/|x - y|: close to the edge
-        of a resonance they grow, once with the state and once with what becomes of an error.  That holds in
-        the coordinates (z u, v) for any z, and the least of several is taken; errors begin with rate/z there.
+        With eigenvalues x and y, and N the norm of M - x, the matrix M of a period has powers of at most 1 +
+        n N or the condition of its eigenvectors, k + root(k**2 - 1) with k = N/|x - y|: close to the edge of
+        a resonance they grow, once with the state and once with an error.  That holds in the coordinates (z
+        u, v) for any z, and the least of several is taken; errors begin with rate/z there.
         """
         u, v = np.empty((2, self.system.n), dtype=np.longdouble)
         for i, mode in enumerate(self.modes):
             M = mode.nodes[-1]
             half = np.trace(M) / 2
             root = np.emath.sqrt((half - 1) * (half + 1)) * np.copysign(1, half)
-            radius, gap = max(float(np.abs(np.real(half + root))), 1.0), max(2 * float(np.abs(root)), LAST)
-            # before the start a whole period goes back, and some of it on
+            radius, gap = (
+                max(float(np.abs(np.real(half + root))), 1.0),
+                max(2 * float(np.abs(root)), FORM_EPS),
+            )
+            # a time before the start is whole periods back, and a part of one forward
             turned, periods = (
                 mode.rate * (t if t >= 0 else mode.period - t),
                 float(np.abs(t) / mode.period) + 1,
             )
             sizes = []
-            for z in mode.rate * np.geomspace(1, _balance(M) / mode.rate, SCALES):
+            for z in mode.rate * np.geomspace(1, _balance(M) / mode.rate, ERROR_SCALES):
                 scaled = mode.nodes * [[1, z], [1 / z, 1]]
                 length = float(np.linalg.norm((scaled[-1] - (half + root) * np.eye(2)).astype(complex)))
                 k = max(length / gap, 1.0)
@@ -136,21 +141,21 @@ class ModulatedMotion(ClosedForm):
                 within = np.max(np.linalg.norm(scaled.astype(np.float64), axis=(1, 2)))
                 grown = within * power**2 * max(mode.rate / z, z / mode.rate)
                 sizes.append(grown * np.hypot(z * mode.start[0], mode.start[1]) / np.array([z, 1]))
-            u[i], v[i] = np.min(sizes, axis=0) * radius**periods * LAST * (1 + turned)
-            u[i] += LAST * np.abs(mode.at)
+            u[i], v[i] = np.min(sizes, axis=0) * radius**periods * FORM_EPS * (1 + turned)
+            u[i] += FORM_EPS * np.abs(mode.at)
         return u, v * self.system.m
 
 
 def _balance(M: Extended) -> float:
-    """The z with which M (2, 2) on (z u, v) has elements alike beside its diagonal."""
+    """The z for which M (2, 2) on (z u, v) has off-diagonal elements of equal size."""
     one, other = np.abs(M[0, 1]), np.abs(M[1, 0])
     return float(np.sqrt(other / one)) if one > 0 < other else 1.0
 
 
 def floquet(system: System[Any]) -> tuple[float, float, float] | None:
-    """The factor by which the exact motion grows in a period of the modulation, its larger Floquet multiplier
-    where that is above 1 and else 1, the period [T], and the angle of the multiplier, 0 to pi [rad], of what
-    grows fastest; None of other scenes."""
+    """Growth factor of the exact motion in a period of the modulation (its larger Floquet multiplier, at
+    least 1), the period [T], and the angle of the multiplier, 0 to pi [rad], of the fastest growing particle;
+    None for other scenes."""
     each = []
     found = ModulatedMotion.of(system)
     for mode in found.modes if found else ():

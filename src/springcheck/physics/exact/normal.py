@@ -1,8 +1,7 @@
 """Normal modes of linear scenes.
 
-A linear scene falls apart into modes y'' = -w2 y - r y' + g, one for each eigenvector of
-M^-1/2 K M^-1/2.  Every scheme acts on each mode by itself too, which is why limits and shadow energies are
-read off here as well.
+A linear scene decouples into modes y'' = -w2 y - r y' + g, one for each eigenvector of M^-1/2 K M^-1/2.
+Every scheme acts on each mode separately as well, so that limits and shadow energies follow from them too.
 """
 
 from __future__ import annotations
@@ -16,17 +15,17 @@ import numpy as np
 
 from springcheck.physics.arrays import EPS, Extended, Integers, Reals, by_identity
 from springcheck.physics.exact.closedform import PI
-from springcheck.physics.exact.digits import ENOUGH, Wide, digits, eigen, exactly, extended
+from springcheck.physics.exact.digits import FEWER_DIGITS, Wide, digits, eigen, exactly, extended
 from springcheck.physics.system import System
 from springcheck.physics.terms import Damping, Spring
 
 
 @by_identity
 class Start(NamedTuple):
-    """The start of each mode, (n,) each: u from its centre [M1/2 L], v [M1/2 L/T]; and, where it does not
-    turn, the shares of exp(slow t) and exp(fast t) in its motion (see `split`).
+    """The start of each mode, (n,) each: u from its centre [M1/2 L], v [M1/2 L/T]; and, for non-oscillating
+    modes, the shares of exp(slow t) and exp(fast t) in its motion (see `split`).
 
-    `sizes` are those whose last digits these four are known to; of waves beside those of their transform.
+    `sizes` are those to whose rounding these four are known; for waves without that of the transform.
     """
 
     u: Extended
@@ -38,10 +37,10 @@ class Start(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Modes:
-    """Normal modes: q = M**-1/2 V y.  `vectors` is None where V is not kept: 1, or sines (`waves`).
+    """Normal modes: q = M**-1/2 V y.  `vectors` is None for V = 1 and for sines (`waves`).
 
-    w2 (n,) [1/T2]; vectors (n, n), columns; pull (n,): the constant force on each mode [M1/2 L/T2];
-    rate (n,): that of its friction, c/m [1/T].
+    w2 (n,) [1/T2]; vectors (n, n), columns; pull (n,): the constant force on each mode [M1/2 L/T2]; rate
+    (n,): its friction rate c/m [1/T].
     """
 
     w2: Extended
@@ -50,10 +49,10 @@ class Modes:
     root_m: Extended
     vectors: Extended | None = None
     waves: bool = False
-    """Whether V is of sines, sqrt(2/(n+1)) sin(pi r j/(n+1)): a fast Fourier transform takes its place."""
+    """Whether V consists of sines, sqrt(2/(n+1)) sin(pi r j/(n+1)), applied by a fast Fourier transform."""
     start: Start
     doubt: Extended
-    """Error of w2 (n,) [1/T2] beside its last digits, 0 where the sums that it comes from are exact."""
+    """Error of w2 (n,) [1/T2] beyond its rounding, 0 where the sums that it comes from are exact."""
 
     def into(self, q: Reals, p: Reals) -> tuple[Extended, Extended]:
         """Mode coordinates y [M1/2 L] and velocities [M1/2 L/T] of states (..., n)."""
@@ -65,12 +64,12 @@ class Modes:
         return self._turned(y, True) / self.root_m, self._turned(v, True) * self.root_m
 
     def about_centres(self, q: Reals, p: Reals) -> tuple[Extended, Extended]:
-        """The same as `into`, positions counted from the rest of each mode."""
+        """As `into`, with positions relative to the centre of each mode."""
         y, v = self.into(q, p)
         return y - self.centre(), v
 
     def from_centres(self, u: Extended, v: Extended) -> tuple[Extended, Extended]:
-        """Positions and momenta of states whose mode positions are counted from the rest of each mode."""
+        """Positions and momenta of states whose mode positions are relative to the centre of each mode."""
         return self.out_of(u + self.centre(), v)
 
     def _turned(self, y: Extended, back: bool) -> Extended:
@@ -82,7 +81,7 @@ class Modes:
 
     @property
     def rest(self) -> Extended:
-        """Where every mode is at its centre: positions (n,) [L]."""
+        """Positions (n,) [L] at which every mode is at its centre."""
         return self.out_of(self.centre(), np.zeros_like(self.w2))[0]
 
     def spread(self, reach: Extended) -> Extended:
@@ -92,15 +91,15 @@ class Modes:
         return reach if self.vectors is None else np.abs(self.vectors) @ reach
 
     def centre(self) -> Extended:
-        """Rest position of each mode, 0 for a mode that nothing holds (w2 = 0)."""
+        """Rest position of each mode, 0 for a free mode (w2 = 0)."""
         held = self.w2 != 0
         return np.asarray(np.where(held, self.pull / np.where(held, self.w2, 1), 0))
 
 
 def split(u: Any, v: Any, w2: Any, rate: Any) -> tuple[Any, Any, Any]:
-    """u'' = -w2 u - rate u' beyond critical damping, of any width: shares of exp(slow t) and exp(fast t) in
-    u, and a bound of their summands.  slow = -w2/(b + s), fast = -(b + s), s**2 = b**2 - w2, b = rate/2.
-    """
+    """u'' = -w2 u - rate u' beyond critical damping, in any precision: shares of exp(slow t) and exp(fast
+    t) in u, and a bound on their summands.  slow = -w2/(b + s), fast = -(b + s), s**2 = b**2 - w2, b =
+    rate/2."""
     b = rate / 2
     square = b * b - w2
     s = np.sqrt(np.where(square > 0, square, 0 * b + 1))
@@ -109,22 +108,22 @@ def split(u: Any, v: Any, w2: Any, rate: Any) -> tuple[Any, Any, Any]:
     return (v - fast * u) / (2 * s), (slow * u - v) / (2 * s), size
 
 
-SMALL = 32
-"""Particles up to which modes are computed to high relative accuracy, 0.7 s at most."""
+MOST_PRECISE = 32
+"""Most particles whose modes are computed to high relative accuracy, in 0.7 s at most."""
 
-FEW = 8
-"""Particles up to which that takes 15 ms, and is done whether it is needed or not."""
+ALWAYS_PRECISE = 8
+"""Most particles for which that takes 15 ms, and is always done."""
 
-GRADED = 2.0**10
+GRADED_RATIO = 2.0**10
 """Ratio of squared frequencies from which it is needed."""
 
 
 def normal_modes(system: System[Any]) -> Modes:
     """Normal modes of a linear system.
 
-    w2 and vectors are right to their last digits where no particle is joined to another, for a uniform
-    chain, and up to `SMALL` particles; elsewhere to n EPS max(w2), which `Modes.doubt` says.
-    ValueError: it has none, or they cannot be had (see `System.has_modes`).
+    w2 and vectors are accurate to rounding for separate particles, for a uniform chain, and up to
+    `MOST_PRECISE` particles; otherwise to n EPS max(w2), as `Modes.doubt` states.  ValueError: it has none,
+    or they are too expensive (see `System.has_modes`).
     """
     if not system.has_modes:
         raise ValueError(
@@ -138,21 +137,21 @@ def normal_modes(system: System[Any]) -> Modes:
     if system.is_separate:
         w2, doubt = system.hessian_diagonal(zero) / system.m, system.rigidity * np.longdouble(EPS) / system.m
         return _modes(system, w2=w2, pull=pull, root_m=root_m, rate=rate, doubt=np.asarray(doubt))
-    if system.n > SMALL and system.is_uniform_chain:
+    if system.n > MOST_PRECISE and system.is_uniform_chain:
         w2 = _wave_frequencies(system)
         return _modes(system, w2=w2, pull=_sines(pull), root_m=root_m, rate=rate, waves=True, doubt=none)
     scaled = np.asarray(system.hessian(zero) / root_m[:, None] / root_m, np.longdouble)
     w2, vectors = _eigen(scaled)
     largest = np.max(np.abs(w2))
-    # a free translation has w2 = 0 up to rounding; left as it is it would drift as a slow wave
+    # a free translation has w2 = 0 up to rounding; unless it is set to 0 it would move as a slow wave
     is_zero = np.abs(w2) <= 8 * system.n * EPS * largest
     graded = np.count_nonzero(is_zero) > len(system.free_groups)
-    graded |= bool(np.any(np.abs(w2[~is_zero]) * GRADED < largest))
-    if system.n <= FEW or (system.n <= SMALL and graded):
-        return _precise(system)
+    graded |= bool(np.any(np.abs(w2[~is_zero]) * GRADED_RATIO < largest))
+    if system.n <= ALWAYS_PRECISE or (system.n <= MOST_PRECISE and graded):
+        return _in_many_digits(system)
     w2 = np.where(is_zero, 0, w2)
-    pulls = np.where(is_zero, _drag(system, pull * root_m) @ vectors, pull @ vectors)
-    # translations of free groups have w2 = 0 exactly, where no other mode is taken for one
+    pulls = np.where(is_zero, _of_whole_groups(system, pull * root_m) @ vectors, pull @ vectors)
+    # w2 = 0 is exact for translations of free groups, unless other modes are as slow
     known = is_zero & (np.count_nonzero(is_zero) == len(system.free_groups))
     doubt = np.where(known, none, 4 * system.n * EPS * largest)
     return _modes(system, w2=w2, pull=pulls, root_m=root_m, rate=rate, vectors=vectors, doubt=doubt)
@@ -167,12 +166,12 @@ def _modes(system: System[Any], *, start: Start | None = None, **parts: Any) -> 
 
 
 def _start(system: System[Any], modes: Modes) -> Start:
-    """In extended precision; alone on the way to the top of a barrier in more digits."""
+    """Start in extended precision; for particles that approach the top of a barrier in more digits."""
     y, v = modes.into(system.q, system.p)
     centre = modes.centre()
     u = y - centre
     slow, fast, _ = split(u, v, modes.w2, modes.rate)
-    # a transform that mixes modes may put the last digits of all into one
+    # a transform that mixes modes may concentrate the rounding of all in one
     of_all = modes.vectors is not None
     size_u, size_v = (np.sqrt(np.sum(x * x)) + np.zeros_like(x) if of_all else np.abs(x) for x in (y, v))
     size_u = size_u + np.abs(centre)
@@ -199,7 +198,7 @@ def _zeros(*shape: int) -> Any:
 
 
 def exact_sums(system: System[Any], of: Callable[[Wide], Wide]) -> tuple[Wide, Wide, Wide]:
-    """Stiffness, the part of its matrix `of` which is wanted; force at 0 (n,) and rates of friction (n,)."""
+    """Stiffness, by the part `of` its matrix; force at 0 (n,) and friction rates (n,); without rounding."""
     zero = np.zeros(system.n, dtype=np.longdouble)
     k, force, friction = (_zeros(*shape) for shape in ((system.n, system.n), (system.n,), (system.n,)))
     for term in system.terms:
@@ -213,8 +212,8 @@ def exact_sums(system: System[Any], of: Callable[[Wide], Wide]) -> tuple[Wide, W
     return of(k), force, friction / exactly(system.m)
 
 
-def _precise(system: System[Any]) -> Modes:
-    """Modes in so many digits that stiff and soft ones of a small system keep all of theirs."""
+def _in_many_digits(system: System[Any]) -> Modes:
+    """Modes in so many digits that stiff and soft ones of a small system keep full accuracy."""
     with digits():
         # sums of the terms as they stand: exact
         k, force, rates = exact_sums(system, np.asarray)
@@ -248,18 +247,19 @@ def _precise(system: System[Any]) -> Modes:
 
 
 def _digits_for(system: System[Any], k: Wide) -> int:
-    """Digits that keep those of the slowest mode, as many decades as masses and stiffnesses differ by."""
+    """Digits that resolve the slowest mode: as many decades as masses and stiffnesses span."""
     masses, springs = system.m, np.abs(k[k != 0])
     decades = Decimal(0)
     for of in (exactly(masses), springs):
         decades += (max(of) / min(of)).log10() if len(of) else 0
-    return max(ENOUGH, 40 + int(decades))
+    return max(FEWER_DIGITS, 40 + int(decades))
 
 
-def _drag(system: System[Any], force: Extended) -> Extended:
-    """The part of a force (n,) that moves free groups as a whole, and all of it elsewhere, per root of mass.
+def _of_whole_groups(system: System[Any], force: Extended) -> Extended:
+    """A force (n,) over the root of mass, reduced in free groups to the part that moves them as a whole.
 
-    Springs pull at both ends alike, which rounding does not see: what it leaves would speed the group up.
+    Springs exert opposite forces at both ends, but not after rounding: the remainder would accelerate the
+    group.
     """
     out: Extended = np.asarray(force / np.sqrt(system.m.astype(np.longdouble)))
     for group in system.free_groups:
@@ -277,16 +277,17 @@ def _wave_frequencies(system: System[Any]) -> Extended:
 
 
 def _one_turn(n: int) -> Extended:
-    """sqrt(2/(n+1)) sin(pi j/(n+1)), j = 0 ... 2n + 1: all elements of V, by r j modulo a whole turn."""
+    """sqrt(2/(n+1)) sin(pi j/(n+1)), j = 0 ... 2n + 1: all elements of V, by r j modulo a full period."""
     return np.asarray(np.sin(PI * np.arange(2 * (n + 1)) / (n + 1)) * np.sqrt(np.longdouble(2) / (n + 1)))
 
 
 MOST_EXACT = 4096
-"""Modes up to which |V| is summed element by element; beyond, every element counts as its largest value."""
+"""Most modes for which |V| is summed element by element; beyond, every element counts as its largest
+value."""
 
 
 def _absolute_sines(reach: Extended) -> Extended:
-    """|V| reach (n,) for V of sines, or an upper bound of it for many modes: in memory of O(n)."""
+    """|V| reach (n,) for V of sines, or for many modes an upper bound on it, in memory of O(n)."""
     n = len(reach)
     if n > MOST_EXACT:
         return np.full(n, np.sqrt(np.longdouble(2) / (n + 1)) * np.sum(reach))
@@ -295,7 +296,7 @@ def _absolute_sines(reach: Extended) -> Extended:
 
 
 def _sines(y: Extended) -> Extended:
-    """y (..., n) V for V of sines, by the Fourier transform of its odd continuation."""
+    """y (..., n) V for V of sines, by the Fourier transform of its odd extension."""
     n = y.shape[-1]
     none = np.zeros((*y.shape[:-1], 1), dtype=np.longdouble)
     odd = np.concatenate([none, y, none, -y[..., ::-1]], axis=-1)
@@ -335,6 +336,6 @@ def _eigen(symmetric: Extended) -> tuple[Extended, Extended]:
 
 
 def _clusters(close: np.ndarray) -> list[Integers]:
-    """Runs of neighbouring (sorted) eigenvalues that lie close together."""
+    """Runs of neighbouring (sorted) eigenvalues that are close together."""
     breaks = np.flatnonzero(~np.diagonal(close, offset=1)) + 1
     return [np.asarray(block) for block in np.split(np.arange(len(close)), breaks)]

@@ -1,4 +1,4 @@
-"""Pendulums, swinging and rotating, by Jacobi's elliptic functions; on a rod, too."""
+"""Pendulums, librating and rotating, by Jacobi's elliptic functions; also on rods."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from springcheck.physics.arrays import Extended
 from springcheck.physics.exact.closedform import (
     CANCELS,
-    LAST,
+    FORM_EPS,
     PI,
     ClosedForm,
     States,
@@ -26,8 +26,8 @@ from springcheck.physics.terms import Cosine, Weight
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Swing:
-    """Pendulums of a term: half the angle from below, in (-pi/2, pi/2], its sine and cosine, its rate in
-    units of w, and R**2 = m = 1 - m1 = E / 2 depth, all (s,)."""
+    """Pendulums of a term: half the angle from the lowest point, in (-pi/2, pi/2], its sine and cosine, its
+    rate in units of w, and R**2 = m = 1 - m1 = E / 2 depth, all (s,)."""
 
     length: Extended
     mass: Extended
@@ -47,7 +47,7 @@ class _Swing:
         """
         s, c, r, m, m1 = self.sine, self.cosine, self.rate, self.m, self.m1
         over = m1 < 0
-        # over the top the modulus is 1/m, and the arguments run sqrt(m) times as fast
+        # in rotation the modulus is 1/m, and the arguments grow sqrt(m) times as fast
         fast = np.where(over, np.sqrt(m), 1)
         safe = np.where(m > 0, m, 1)
         modulus, other = np.where(over, 1 / safe, m), np.where(over, -m1 / safe, m1)
@@ -62,14 +62,14 @@ class _Swing:
 
     @property
     def latency(self) -> Extended:
-        """Bound of the time [T] from the bottom to the start, of as much as numbers tell."""
+        """Bound on the time [T] from the lowest point to the start, as far as rounding determines it."""
         return latency(self.m1 / np.maximum(self.m, 1)) / self.w
 
 
 def _swing(system: System[Any], term: Cosine) -> _Swing:
     i, wave, depth = term.i, wide(term.wave), np.abs(wide(term.depth))
     mass, p = wide(system.m[i]), wide(system.p[i])
-    # upside down, the pendulum hangs from the other side
+    # for a negative depth the lowest point is at half a turn
     turned = np.where(term.depth < 0, PI / 2, 0)
     angle = wave * (wide(system.q[i]) - term.at) / 2 + turned
     half = angle - PI * np.round(angle / PI)
@@ -98,7 +98,7 @@ def _of_swing(m: Any, q: Any, p: Any, depth: Any, wave: Any, at: Any) -> Extende
 
 
 class PendulumMotion(ClosedForm):
-    """Pendulums along an axis, swinging and rotating."""
+    """Pendulums along an axis, librating and rotating."""
 
     key = "cosine"
     terms = frozenset({"cosine"})
@@ -125,21 +125,20 @@ class PendulumMotion(ClosedForm):
         speed = 2 * swing.length * swing.w * root
         time = np.abs(t) + swing.latency
         force = swing.mass * swing.w**2 * np.minimum(size, swing.length)
-        q[i] = LAST * (np.abs(self.system.q[i]) + size + speed * time)
-        p[i] = LAST * (swing.mass * speed + force * time)
+        q[i] = FORM_EPS * (np.abs(self.system.q[i]) + size + speed * time)
+        p[i] = FORM_EPS * (swing.mass * speed + force * time)
         return q, p
 
 
 class HangingRods(ClosedForm):
-    """Rods to fixed points in a plane, a weight on each: the angle from the weight swings as that of any
-    pendulum, w**2 = force / (mass length).  Unit vectors along the weight and across it are (c, 2).
-    """
+    """Rods to fixed points in a plane with a weight on each: the angle from the weight is that of a pendulum,
+    w**2 = force / (mass length).  Unit vectors along the weight and across it are (c, 2)."""
 
     key = "weight"
     terms = frozenset({"weight", "wall-rod"})
 
     def __init__(self, system: System[Any]) -> None:
-        """In more digits: near the barrier all hangs on what the energy lacks of it."""
+        """In extra digits: near the barrier the motion depends on the energy's small difference from it."""
         super().__init__(system)
         rods: Any = system.rods
         self.need(rods and not rods.share and all(len(ends) == 1 for ends in rods.ends))
@@ -194,4 +193,4 @@ class HangingRods(ClosedForm):
         time = np.abs(t) + swing.latency
         q = rods.spread(rods.each(swing.length + speed * time))
         p = rods.spread(rods.each(swing.mass * (speed + swing.w**2 * swing.length * time)))
-        return wide(LAST * (np.abs(self.system.q) + q)), wide(LAST * p)
+        return wide(FORM_EPS * (np.abs(self.system.q) + q)), wide(FORM_EPS * p)

@@ -1,4 +1,4 @@
-"""Powers of matrices (2, 2): how they turn or grow, without what a product of many of them would lose."""
+"""Powers of matrices (2, 2) from their rotation or growth, without the rounding of a long product."""
 
 from __future__ import annotations
 
@@ -11,9 +11,8 @@ from springcheck.physics.arrays import Extended, Integers, by_identity
 
 @by_identity
 class Rotation(NamedTuple):
-    """How one-step matrices turn: by `angle`, or where the motion is unbounded by a hyperbolic angle `growth`
-    > 0, `sign` the sign of their eigenvalues' real parts.  `propagate` makes their powers of it.
-    """
+    """Rotation of one-step matrices: by `angle`, or for unbounded motion by a hyperbolic angle `growth` > 0,
+    with `sign` the sign of the real parts of their eigenvalues.  `propagate` computes powers from it."""
 
     determinant: Extended
     angle: Extended
@@ -77,7 +76,7 @@ def propagate(
         a, c = less[:, 0, 0], less[:, 1, 1]
         beyond = a + c + a * c - less[:, 0, 1] * less[:, 1, 0]
         decay = j / 2 * (np.zeros_like(d) if area_preserving else np.log1p(beyond))
-        # with the powers of the root: what grows by cosh and decays by friction is 0 times infinity apart
+        # combined with the powers of the root: growth by cosh and decay by friction would be 0 times infinity
         size, up = sign * np.exp(decay), sign * np.exp(decay + j * g)
         even = np.where(
             turning,

@@ -1,4 +1,4 @@
-"""Springs that harden or soften, and double wells: u'' = -k u - b u**3, by Jacobi's elliptic functions."""
+"""Hardening and softening (Duffing) oscillators, double wells: u'' = -k u - b u**3, by elliptic functions."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from springcheck.physics.arrays import Extended
 from springcheck.physics.exact.closedform import (
     CANCELS,
-    LAST,
+    FORM_EPS,
     ClosedForm,
     States,
     latency,
@@ -51,7 +51,7 @@ class _Duffing:
         return _Duffing(**{name: getattr(self, name)[which] for name in self.__slots__})
 
 
-def _gathered(system: System[Any], of: Callable[[Any], Any]) -> tuple[Any, ...]:
+def _parameters(system: System[Any], of: Callable[[Any], Any]) -> tuple[Any, ...]:
     """m, k, b, q, at, p of each particle (n,), in numbers made by `of`."""
     k, b, at = (of(np.zeros(system.n)) for _ in range(3))
     for term in system.terms:
@@ -64,31 +64,31 @@ def _gathered(system: System[Any], of: Callable[[Any], Any]) -> tuple[Any, ...]:
 
 
 def _sums(m: Any, k: Any, b: Any, u: Any, p: Any) -> tuple[Any, Any, Any]:
-    """k + b u**2, and m**3 root**2 and 4 m**2 E of unit masses: what may cancel."""
+    """k + b u**2, and m**3 root**2 and 4 m**2 E of unit masses: the sums that may cancel."""
     x = k + b * u * u
     return x, m * x * x + 2 * b * p * p, 2 * p * p + m * (2 * k + b * u * u) * u * u
 
 
 class QuarticMotion(ClosedForm):
-    """Single particles in wells of one centre each."""
+    """Single particles in quartic potentials with one centre each."""
 
     key = "quartic"
     terms = frozenset({"quartic", "wall-spring"})
 
     def __init__(self, system: System[Any]) -> None:
         super().__init__(system)
-        m, k, b, q, at, p = _gathered(system, wide)
+        m, k, b, q, at, p = _parameters(system, wide)
         for term in system.terms:
             self.need(not isinstance(term, Quartic | WallSpring) or np.all(term.at == at[term.i]))
         u = q - at
         sums = _sums(m, k, b, u, p)
-        m_, k_, b_, q_, at_, p_ = _gathered(system, lambda x: np.abs(wide(x)))
+        m_, k_, b_, q_, at_, p_ = _parameters(system, lambda x: np.abs(wide(x)))
         sizes = _sums(m_, k_, b_, q_ + at_, p_)
         near = np.any([size > CANCELS * np.abs(x) for x, size in zip(sums, sizes, strict=True)], axis=0)
         if np.any(near):
             chosen = np.flatnonzero(near)
             with digits():
-                m_, k_, b_, q_, at_, p_ = _gathered(system.beside(system.part(chosen)), exactly)
+                m_, k_, b_, q_, at_, p_ = _parameters(system.beside(system.part(chosen)), exactly)
                 for out, x in zip(sums, _sums(m_, k_, b_, q_ - at_, p_), strict=True):
                     out[chosen] = extended(x)
         x, square, energy = sums[0] / m, sums[1] / m**3, sums[2] / m**2
@@ -96,7 +96,7 @@ class QuarticMotion(ClosedForm):
         # a turning point
         self.need(np.all((b > 0) | ((k > 0) & (square >= 0) & (x >= 0))))
         root = np.sqrt(square)
-        # root**2 - k**2 is 4 b E, so that of plus and minus the one that cancels follows from the other
+        # root**2 - k**2 is 4 b E: of plus and minus the one that cancels follows from the other
         large = root + np.abs(k)
         small = b * energy / np.where(large > 0, large, 1)
         minus, plus = np.where(k < 0, large, small), np.where(k < 0, small, large)
@@ -105,11 +105,11 @@ class QuarticMotion(ClosedForm):
         self.well, self.centre = _Duffing(**parts, **_orbit(b, root, minus, plus, energy)), at
 
     def at(self, t: Extended) -> States:
-        """cn, dn or sn, by what holds the particle."""
+        """cn, dn or sn, by the kind of orbit."""
         well = self.well
         u, v = np.empty((2, len(t), self.system.n), dtype=np.longdouble)
         softening = well.b <= 0
-        # the sign of the energy: beside |k| it may be lost in the root
+        # the sign of the energy, which may be lost in the root beside |k|
         caught = ~softening & (well.plus < 0)
         for which, law in ((softening, _sn), (caught, _dn), (~softening & ~caught, _cn)):
             if np.any(which):
@@ -122,16 +122,16 @@ class QuarticMotion(ClosedForm):
         fastest = np.where(hill, well.root**2 / (2 * np.abs(well.b)), np.abs(well.energy) / 2)
         a, speed = well.amplitude, np.sqrt(fastest)
         time = np.abs(t) + latency(well.m1) / np.where(well.w > 0, well.w, 1)
-        q = LAST * (np.abs(self.centre) + a + speed * time)
-        p = LAST * (speed + (np.abs(well.k) + np.abs(well.b) * a * a) * a * time)
+        q = FORM_EPS * (np.abs(self.centre) + a + speed * time)
+        p = FORM_EPS * (speed + (np.abs(well.k) + np.abs(well.b) * a * a) * a * time)
         return np.asarray(q), np.asarray(p * self.system.m)
 
 
 def _orbit(
     b: Extended, root: Extended, minus: Extended, plus: Extended, energy: Extended
 ) -> dict[str, Extended]:
-    """A, w, m and m1: of sn below the barriers of a softening spring, of dn when caught in one of two wells,
-    of cn elsewhere (Byrd & Friedman, Handbook of Elliptic Integrals, 1971)."""
+    """A, w, m and m1: for sn below the barriers of a softening spring, for dn within one of two wells, for cn
+    elsewhere (Byrd & Friedman, Handbook of Elliptic Integrals, 1971)."""
     soft = b <= 0
     caught = ~soft & (plus < 0)
     rest = ~soft & (root == 0)
@@ -148,23 +148,23 @@ def _orbit(
 
 
 def _cn(well: _Duffing, t: Extended) -> States:
-    """Across the middle of a stiffening well: u = A cn(w t + phase), w**2 = root."""
+    """Across the centre of a hardening potential: u = A cn(w t + phase), w**2 = root."""
     amplitude, w, m, m1 = well.amplitude, well.w, well.m, well.m1
     cosine = well.u / np.where(amplitude > 0, amplitude, 1)
     turn = w * np.sqrt(m1 + m * cosine * cosine)
-    # on the top of the barrier nothing turns: it is reached after an infinite time
+    # the top of the barrier is reached after an infinite time
     sine = np.where(turn > 0, -well.v / np.where(turn > 0, turn, 1), 1)
     at = jacobi(t * w + argument(sine, well.u, m, m1), m, m1)
     return np.asarray(amplitude * at.cn), np.asarray(-amplitude * w * at.sn * at.dn)
 
 
 def _dn(well: _Duffing, t: Extended) -> States:
-    """Caught in one of two wells: u = +-A dn(w t + phase), w**2 = (root - k)/2."""
+    """Within one of two wells: u = +-A dn(w t + phase), w**2 = (root - k)/2."""
     m, m1, w = well.m, well.m1, well.w
     amplitude = np.copysign(well.amplitude, well.u)
-    # of twice am(phase) sine and cosine are rational in the start
+    # sine and cosine of 2 am(phase) are rational in the start
     y, x = -np.copysign(np.sqrt(2 * well.b) * well.v, well.u * well.v), well.pull
-    # half of that angle, without the angle: the smaller of sine and cosine follows from the larger
+    # half of that angle, without computing it: the smaller of sine and cosine follows from the larger
     large = np.sqrt((well.root + np.abs(x)) / 2)
     small = np.abs(y) / (2 * np.where(large > 0, large, 1))
     sine, cosine = np.where(x < 0, large, small), np.where(x < 0, small, large)

@@ -1,9 +1,9 @@
 """Van der Pol's oscillator in extended precision: without a closed form, it is integrated once for all times.
 
-With u = (q - at)/width it is u'' = (g (1 - u**2) - r) u' - w2 (u - u0), stiff by g**2/w2.  The velocities
-at the nodes of Radau IIA are solved for (Hairer & Wanner, Solving ODEs II, IV.8): on the slow arcs, where
-its terms cancel, the equation keeps all digits of u', and steps pass over whatever has died out.  They are
-as long as the series of u' in Legendre polynomials ends in roundings.
+With u = (q - at)/width it is u'' = (g (1 - u**2) - r) u' - w2 (u - u0), stiff by g**2/w2.  The unknowns are
+the velocities at the nodes of Radau IIA (Hairer & Wanner, Solving ODEs II, IV.8): on the slow arcs, where
+terms cancel, the equation determines all digits of u', and steps may skip what has decayed.  Steps are as
+long as the Legendre series of u' ends in rounding.
 """
 
 from __future__ import annotations
@@ -14,27 +14,28 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from springcheck.physics.arrays import EPS, Extended, Floats, by_identity
-from springcheck.physics.exact.closedform import LAST, ClosedForm, States, wide
+from springcheck.physics.exact.closedform import FORM_EPS, ClosedForm, States, wide
 from springcheck.physics.exact.digits import digits, exactly, extended
 from springcheck.physics.exact.normal import exact_sums
 from springcheck.physics.system import System
 from springcheck.physics.vanderpol import VanDerPol
 
 RADAU_STAGES = 16
-LATENESS = LAST / 4
-"""Relative error of the time; `validation/van_der_pol.py` finds errors of at most 0.075 of what follows."""
+TIME_ERROR = FORM_EPS / 4
+"""Relative error of the time; `validation/van_der_pol.py` finds errors of at most 0.075 of the resulting
+bound."""
 SERIES_TAIL = 32 * EPS
-"""Part of the largest coefficient of a step's series that its last two may have."""
-FELT = 8 * EPS
-"""Relative change of u at any step that the roundings of all of them come to; near |u| = 1, where the brake
-is nearly 0, and on the way to a jump, it moves all that follows.  Of 300 starts there it is 0.53 at most."""
+"""Largest share of a step's last two series coefficients in its largest one."""
+FELT_ROUNDING = 8 * EPS
+"""Relative change of u at one step that is equivalent to the roundings of all steps; near |u| = 1, where the
+friction is nearly 0, and before a jump, it is amplified. In 300 starts there it was at most 0.53 of this."""
 MOST_RADAU_STEPS = 20_000
 MOST_RADAU_CORRECTIONS = 40
 
 
 @by_identity
 class _Rule(NamedTuple):
-    """Nodes c (s,) on [0, 1], A (s, s), and what makes coefficients of values (s, s)."""
+    """Nodes c (s,) on [0, 1], A (s, s), and the matrix from values to Legendre coefficients (s, s)."""
 
     nodes: Extended
     a: Extended
@@ -61,15 +62,15 @@ class _Path(NamedTuple):
     u: Extended
     series: Extended
     fastest: tuple[float, float, float]
-    """The largest |u|, |u'| and |u''| on the way."""
+    """The largest |u|, |u'| and |u''| along the path."""
     growth: float
     """The largest |D phi| between any two ends of steps, in the energy norm."""
     felt: tuple[float, float]
-    """The largest change of u and of u' by a relative change of u at the start of any step."""
+    """The largest change of u and of u' by a unit relative change of u at the start of any step."""
 
 
 @by_identity
-class _Met(NamedTuple):
+class _Nodes(NamedTuple):
     """u, u' and u'' at the nodes of a step (s,), and the derivative of its end by its start (2, 2)."""
 
     u: Extended
@@ -111,11 +112,12 @@ def _rule() -> _Rule:
     return _Rule((1 + x) / 2, wide(_integrals(x, s) @ series / 2), series)
 
 
-def _step(law: _Law, u: Any, v: Any, h: Any, guess: Extended) -> _Met | None:
-    """A step of h from (u, v), None where Newton's iteration does not get there."""
+def _step(law: _Law, u: Any, v: Any, h: Any, guess: Extended) -> _Nodes | None:
+    """A step of h from (u, v), None where Newton's iteration does not converge."""
     rule = _rule()
     found, last = guess, np.inf
-    # near u = 1 the brake is nearly 0, and cancellation shows the rounding of u: all nodes share one value
+    # near u = 1 the friction is nearly 0, and cancellation amplifies the rounding of u: all nodes share one
+    # value
     first = law.g * ((1 - u) * (1 + u)) - law.r
     for _ in range(MOST_RADAU_CORRECTIONS):
         moved = h * (rule.a @ found)
@@ -136,11 +138,11 @@ def _step(law: _Law, u: Any, v: Any, h: Any, guess: Extended) -> _Met | None:
             change = np.zeros(1)
         off, size = float(np.max(np.abs(change))), float(np.max(np.abs(found)))
         if off <= 4 * EPS * size or (off <= 64 * EPS * size and off > last / 4):
-            # what Newton's iteration makes of a change of u and of v at the start
+            # response of Newton's solution to a change of u and of v at the start
             by = np.linalg.solve(
                 matrix, np.stack([reach @ steep, np.ones(RADAU_STAGES)], axis=-1).astype(np.float64)
             )
-            return _Met(at, found, push, np.stack([np.eye(2)[0] + reach[-1] @ by, by[-1]]))
+            return _Nodes(at, found, push, np.stack([np.eye(2)[0] + reach[-1] @ by, by[-1]]))
         last = off
     return None
 
@@ -184,8 +186,8 @@ def _path(law: _Law, u: Any, v: Any, end: Any) -> tuple[Any, ...] | None:
 
 
 def _growth(maps: Floats, w: float, u: Floats) -> tuple[float, tuple[float, float]]:
-    """The largest |D phi| of steps in a row, from each start to each later end, on (w u, v), and what they
-    make at most of a relative change of u at these starts (j,), of u and of v."""
+    """The largest |D phi| of consecutive steps, from each start to each later end, on (w u, v), and the
+    largest effect on u and on v of a unit relative change of u at these starts (j,)."""
     scaled = maps * np.array([[1, w], [1 / w, 1]])
     whole, most, felt = np.empty((0, 2, 2)), 1.0, np.zeros(2)
     for j, one in enumerate(scaled, 1):
@@ -196,13 +198,13 @@ def _growth(maps: Floats, w: float, u: Floats) -> tuple[float, tuple[float, floa
 
 
 class VanDerPolMotion(ClosedForm):
-    """Single particles with such a friction, on springs to walls."""
+    """Single particles with van der Pol friction, on springs to walls."""
 
     key = "van-der-pol"
     terms = frozenset({"van-der-pol", "wall-spring", "damping"})
 
     def __init__(self, system: System[Any]) -> None:
-        """No particle may have more than one such friction; backwards in time it blows up."""
+        """At most one such friction on a particle; backwards in time the motion diverges."""
         super().__init__(system)
         found: list[_Path] = []
         term = next(term for term in system.terms if isinstance(term, VanDerPol))
@@ -231,7 +233,7 @@ class VanDerPolMotion(ClosedForm):
         self.paths, self.growth = found, max(path.growth for path in found)
 
     def at(self, t: Extended) -> States:
-        """Not known beyond the end of the scene."""
+        """NaN beyond the end of the scene."""
         q, p = np.full((2, len(t), self.system.n), np.nan, dtype=np.longdouble)
         for i, path in enumerate(self.paths):
             inside = np.flatnonzero((t[:, 0] >= 0) & (t[:, 0] <= path.t[-1]))
@@ -249,10 +251,10 @@ class VanDerPolMotion(ClosedForm):
         return q, p
 
     def doubt(self, t: np.longdouble) -> States:
-        """Errors of its size and place, and the larger of a time known to `LATENESS` and of what roundings
-        are felt by."""
+        """Errors of size and position, and the larger of a time known to `TIME_ERROR` and amplified
+        rounding."""
         u, v, a = (np.array([path.fastest[j] * float(path.width) for path in self.paths]) for j in range(3))
-        late, at = LATENESS * np.abs(t), np.array([np.abs(path.at) for path in self.paths])
-        felt = FELT * np.array([path.width * np.array(path.felt) for path in self.paths]).T
-        dq, dv = np.maximum(LAST * u + late * v, felt[0]), np.maximum(LAST * v + late * a, felt[1])
-        return np.asarray(LAST * at + dq), np.asarray(dv * self.system.m)
+        late, at = TIME_ERROR * np.abs(t), np.array([np.abs(path.at) for path in self.paths])
+        felt = FELT_ROUNDING * np.array([path.width * np.array(path.felt) for path in self.paths]).T
+        dq, dv = np.maximum(FORM_EPS * u + late * v, felt[0]), np.maximum(FORM_EPS * v + late * a, felt[1])
+        return np.asarray(FORM_EPS * at + dq), np.asarray(dv * self.system.m)

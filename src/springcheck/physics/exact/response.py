@@ -1,9 +1,9 @@
-"""The exact solution of driven linear scenes: the motion without a drive, and what one adds from rest.
+"""The exact solution of driven linear scenes: the undriven motion, plus the response to each drive from rest.
 
-A mode u'' = -w2 u - r u' + g cos(W t + phi) that starts at rest in its centre answers by the real part of
-g exp(i phi) D(t), D the divided difference of exp(x t) at x = iW and the two roots of x**2 + r x + w2: its
-Laplace transform is 1/((x - iW) (x - x1) (x - x2)).  One formula serves resonance, critical damping and a
-free particle alike, where points coincide (de Boor, Surveys in Approximation Theory 1 (2005) 46).
+A mode u'' = -w2 u - r u' + g cos(W t + phi) that starts at rest in its centre responds by the real part of g
+exp(i phi) D(t), D the divided difference of exp(x t) at x = iW and the two roots of x**2 + r x + w2: its
+Laplace transform is 1/((x - iW) (x - x1) (x - x2)).  One formula covers resonance, critical damping and a
+free particle, where points coincide (de Boor, Surveys in Approximation Theory 1 (2005) 46).
 """
 
 from __future__ import annotations
@@ -29,9 +29,8 @@ _Drive: TypeAlias = tuple[np.longdouble, np.longdouble, Extended]
 
 
 class Response(ClosedForm):
-    """A whole scene of linear springs, friction with modes, and drives: the motion `alone` without these, and
-    of each frequency, phase and force on each mode.
-    """
+    """A whole scene of linear springs, friction that admits modes, and drives: the undriven motion `alone`,
+    and the frequency, phase and force on each mode of every drive."""
 
     def __init__(self, system: System[Any]) -> None:
         super().__init__(system)
@@ -53,9 +52,8 @@ class Response(ClosedForm):
         return q, p
 
     def doubt(self, t: np.longdouble) -> States:
-        """Those of the motion without a drive, and roundings of the angles and of what the force moves: g
-        moves a mode by |t g| min(t, 1/w) at most (variation of constants).
-        """
+        """Errors of the undriven motion, and roundings of the angles and of the response: g moves a mode by
+        at most |t g| min(t, 1/w) (variation of constants)."""
         q, p = self.alone.doubt(t)
         modes, duration = self.modes, np.abs(t)
         _, _, phase, hold = reaches(modes, t)

@@ -1,10 +1,10 @@
-"""The exact solution of a system: normal modes, and closed forms of groups that nothing joins to others.
+"""The exact solution of a system: normal modes, and closed forms of independent groups.
 
-Each closed form serves single particles in a well, or pairs on a bond, that nothing joins to others, all at
-once, at times t (f, 1).  Near a separatrix all hangs on how far the energy lies from that of the barrier, and
-at the start on how far the particle stands from its top.  Where these cancel they are taken in more digits
-(`digits`); nothing that follows loses any.  So every motion is known to a few roundings of its size and of
-its time, near a barrier as elsewhere.
+Each closed form serves single particles in a potential, or pairs on a bond, without other interaction, all at
+once, at times t (f, 1).  Near a separatrix the motion depends on the difference of the energy from the
+barrier, and at the start on the distance from its top.  Where these cancel they are computed in more digits
+(`digits`), and no later step loses any, so that every motion is known to a few roundings of its size and
+time, near a barrier as elsewhere.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from springcheck.physics.system import Fields, System
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Solution:
-    """The exact motion of n particles, in groups (s,) that move by themselves."""
+    """The exact motion of n particles, in independent groups (s,)."""
 
     n: int
     groups: tuple[tuple[Integers, ClosedForm], ...]
@@ -43,24 +43,24 @@ class Solution:
         return q, p
 
     def doubt(self, duration: float) -> tuple[Extended, Extended]:
-        """Bounds (n,) of the errors of q and p from the start to a time [T], which may lie before it."""
+        """Bounds (n,) on the errors of q and p from the start to a time [T], which may precede it."""
         q, p = np.empty((2, self.n), dtype=np.longdouble)
         with np.errstate(all="ignore"):
             for particles, motion in self.groups:
                 q[particles], p[particles] = motion.doubt(np.longdouble(duration))
-        # infinite where the motion itself is; never no number
+        # infinite where the motion itself is; never NaN
         return np.nan_to_num(q, nan=np.inf, posinf=np.inf), np.nan_to_num(p, nan=np.inf, posinf=np.inf)
 
     @property
     def growth(self) -> float | None:
         """The largest derivative of the flow between two times, in the energy norm; None where some closed
-        form does not know it."""
+        form has no bound."""
         each = [motion.growth for _, motion in self.groups]
         return None if None in each else max(x for x in each if x is not None)
 
 
 class SolvedSystem(System[Fields]):
-    """The facts of one scene, its normal modes and its exact motion among them."""
+    """The facts of one scene, with its normal modes and its exact motion."""
 
     @cached_property
     def modes(self) -> Modes:
@@ -74,7 +74,7 @@ class SolvedSystem(System[Fields]):
 
 
 def _solution(system: SolvedSystem[Any]) -> Solution | None:
-    """None where some particles have no closed form here."""
+    """Solution of a system, None where some particles have no closed form here."""
     for law in _of_whole_scenes(system):
         if motion := law.of(system):
             return Solution(n=system.n, groups=((np.arange(system.n), motion),))
@@ -82,7 +82,7 @@ def _solution(system: SolvedSystem[Any]) -> Solution | None:
     nothing = np.zeros(system.n, dtype=bool)
     acting = system.acting
     if system.rods:
-        # what acts along one axis of a rod is felt along all of them
+        # a force along one axis of a rod affects all of its axes
         acting = {key: system.rods.reach(here) for key, here in acting.items()}
     left = ~nothing
     with np.errstate(all="ignore"):
@@ -93,7 +93,7 @@ def _solution(system: SolvedSystem[Any]) -> Solution | None:
             chosen = np.flatnonzero(mine)
             if len(chosen):
                 if any(np.any(mine[x.particles[0]] != mine[x.particles[-1]]) for x in system.terms):
-                    # the end of a pair whose other end something else acts on
+                    # another term acts on the other end of a pair
                     return None
                 motion = law.of(system.beside(system.part(chosen)))
                 if motion is None:
@@ -104,7 +104,7 @@ def _solution(system: SolvedSystem[Any]) -> Solution | None:
 
 
 def _of_whole_scenes(system: SolvedSystem[Any]) -> Iterator[type[ClosedForm]]:
-    """Closed forms of all particles together; what a scene has nothing for is not imported."""
+    """Closed forms of all particles together; those that the scene's terms exclude are not imported."""
     yield LinearMotion
     if "magnetic" in system.acting:
         from springcheck.physics.exact.gyration import Gyration
@@ -126,7 +126,7 @@ def _of_whole_scenes(system: SolvedSystem[Any]) -> Iterator[type[ClosedForm]]:
 
 
 def _of_groups(system: SolvedSystem[Any]) -> Iterator[type[ClosedForm]]:
-    """Closed forms of particles that nothing joins to others, at last that of normal modes for the rest."""
+    """Closed forms of independent particles, and last that of normal modes for the rest."""
     if system.brakes_by_place:
         from springcheck.physics.exact.relaxation import VanDerPolMotion
 

@@ -1,7 +1,8 @@
-"""Pairs on a bond of a rest length that swing along it and do not turn.
+"""Pairs on a bond of a rest length that oscillate along it without rotation.
 
-The length is a spring of the reduced mass about its rest, its direction stays, and the centre of mass goes
-straight on.  Rounding of the start leaves some turning: it is no more than what the ends move by across.
+The length oscillates as a spring of the reduced mass about its rest length, the direction is constant, and
+the centre of mass moves uniformly.  Rounding of the start leaves some rotation, bounded by the transverse
+velocities.
 """
 
 from __future__ import annotations
@@ -11,22 +12,22 @@ from typing import Any
 import numpy as np
 
 from springcheck.physics.arrays import Extended
-from springcheck.physics.exact.closedform import LAST, ClosedForm, States, one_each, wide
+from springcheck.physics.exact.closedform import FORM_EPS, ClosedForm, States, one_each, wide
 from springcheck.physics.exact.digits import Wide, digits, exactly, extended
-from springcheck.physics.rods import UNTRUE
+from springcheck.physics.rods import START_TOLERANCE
 from springcheck.physics.system import System
 
 
 class SwingingMotion(ClosedForm):
     """Arrays by coordinate (n,): signed share of the length, and direction; the centre and its velocity;
-    length less rest and its rate at the start, rest, frequency, amplitude, and the speed across.
-    """
+    excess of the length and its rate at the start, rest length, frequency, amplitude, and the transverse
+    speed."""
 
     key = "bond"
     terms = frozenset({"bond"})
 
     def __init__(self, system: System[Any]) -> None:
-        """No bond may turn, close, or share a particle with another."""
+        """No bond may rotate, reach length 0, or share a particle with another."""
         super().__init__(system)
         term: Any = system.terms[0]
         self.need(one_each(system))
@@ -38,7 +39,7 @@ class SwingingMotion(ClosedForm):
             np.add.at(out, bond, values)
             return out[bond]
 
-        # ways and velocities are differences, which may be small beside what they are of
+        # separations and velocities are differences, which may be small beside their operands
         with digits():
             m, q, p, k, rest = (exactly(x) for x in (system.m, system.q, system.p, term.k, term.rest))
             whole, d, v = m[a] + m[b], q[b] - q[a], p / m
@@ -60,7 +61,7 @@ class SwingingMotion(ClosedForm):
         self.along, self.centre, self.drift, self.u, self.rate, self.rest, self.w, self.across, speed = rows
         with np.errstate(all="ignore"):
             self.most = np.hypot(self.u, self.rate / self.w)
-        self.need(np.all((self.rest > self.most) & (self.across <= UNTRUE * speed)))
+        self.need(np.all((self.rest > self.most) & (self.across <= START_TOLERANCE * speed)))
 
     def at(self, t: Extended) -> States:
         sine, cosine = np.sin(self.w * t), np.cos(self.w * t)
@@ -72,13 +73,13 @@ class SwingingMotion(ClosedForm):
     def doubt(self, t: np.longdouble) -> States:
         time, share, far = np.abs(t), np.abs(self.share), self.rest + self.most
         near, w = self.rest - self.most, self.w
-        # an angle at most, of what keeps its angular momentum, and the way that its turning pushes the ends
-        # apart
+        # a bound on the angle from the conserved angular momentum, and the displacement by its centrifugal
+        # force
         turned = self.across * time * far / near**2 * far
         pushed = (self.across * far / w) ** 2 / near**3
         phase = 2 + w * time
-        q = LAST * (np.abs(self.centre) + np.abs(self.drift) * time + share * (far + self.most * phase))
+        q = FORM_EPS * (np.abs(self.centre) + np.abs(self.drift) * time + share * (far + self.most * phase))
         size = np.abs(self.drift) + share * self.most * w * phase
         swung = w * (turned + pushed * phase) + self.across * far / near
-        p = self.system.m * (LAST * size + share * swung)
+        p = self.system.m * (FORM_EPS * size + share * swung)
         return wide(q + share * (turned + pushed * phase)), wide(p)

@@ -1,8 +1,8 @@
-"""Rods on which nothing else acts: alone, or as flat rigid bodies that turn about an axis across them.
+"""Rods without other forces: alone, or as flat rigid bodies that rotate about a perpendicular axis.
 
-x(t) = x cos(w t) + v sin(w t)/w about a centre of mass that goes straight on, or about a fixed point.  In a
-drift of h such a body turns by asin(h w) under SHAKE and RATTLE: x + h v is x turned by that angle, and what
-is too long, (1 - cos) x, is what pushes along its rods can balance.
+x(t) = x cos(w t) + v sin(w t)/w about a uniformly moving centre of mass, or about a fixed point.  In a drift
+of h such a body rotates by asin(h w) under SHAKE and RATTLE: x + h v is x rotated by that angle plus an
+excess (1 - cos) x, which impulses along its rods can balance.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from springcheck.physics.arrays import Extended, Integers
-from springcheck.physics.exact.closedform import LAST, ClosedForm, States, wide
+from springcheck.physics.exact.closedform import FORM_EPS, ClosedForm, States, wide
 from springcheck.physics.exact.digits import Wide, digits, exactly, extended
-from springcheck.physics.rods import UNTRUE, Rods
+from springcheck.physics.rods import START_TOLERANCE, Rods
 from springcheck.physics.system import System
 
 
@@ -49,7 +49,7 @@ class TurningRods(ClosedForm):
             np.add.at(out, of, values)
             return out[of]
 
-        # in more digits: a body may be small beside where it is, and turn slowly beside how it moves
+        # in more digits: a body may be small beside its distance from 0, and rotate slowly beside its drift
         with digits():
             q, p, m = (exactly(by_axes(x)) for x in (system.q, system.p, system.m))
             q, m = q - exactly(by_axes(at)), np.max(m, axis=1, keepdims=True)
@@ -62,13 +62,13 @@ class TurningRods(ClosedForm):
                 extended(y).reshape(-1)[places] for y in (x, v, np.sqrt(square) + 0 * x, w, drift)
             )
         if rods.share:
-            # momenta are those of such a turn
+            # momenta must be those of such a rotation
             off = rods.projected(wide(system.q), wide(system.p)) / system.m - self.drift - self.v
             body, speed = of[places // 3], self.reach * self.w
             each = (
                 (np.max(np.abs(off[here])), np.max(speed[here])) for here in (body == b for b in set(body))
             )
-            self.need(not any(moved > UNTRUE / 2 * most for moved, most in each))
+            self.need(not any(moved > START_TOLERANCE / 2 * most for moved, most in each))
 
     def at(self, t: Extended) -> States:
         turn, m = self.w * t, wide(self.system.m)
@@ -80,19 +80,19 @@ class TurningRods(ClosedForm):
     def doubt(self, t: np.longdouble) -> States:
         m, time, speed = wide(self.system.m), np.abs(t), np.abs(self.drift)
         turned = self.reach * (2 + self.w * time)
-        q = LAST * (np.abs(self.system.q) + speed * time + turned)
-        return wide(q), wide(LAST * m * (speed + self.w * turned))
+        q = FORM_EPS * (np.abs(self.system.q) + speed * time + turned)
+        return wide(q), wide(FORM_EPS * m * (speed + self.w * turned))
 
 
 class TurningWallRods(TurningRods):
-    """The same of rods to fixed points."""
+    """Flat rigid bodies on rods to fixed points."""
 
     key = "wall-rod"
     terms = frozenset({"wall-rod"})
 
 
 def _bodies(rods: Rods, particles: int) -> Integers | None:
-    """The body of each particle (particles,), None where some could bend, or has more rods than it needs."""
+    """The body of each particle (particles,), None where some body is flexible, or has redundant rods."""
     of = np.arange(particles)
     for ends in rods.ends * (len(rods) if rods.share else 1):
         of[of == max(of[list(ends)])] = min(of[list(ends)])

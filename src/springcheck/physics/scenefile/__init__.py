@@ -1,4 +1,4 @@
-"""Scene files: TOML in, `Scene` out, and every mistake answered with file, field and remedy."""
+"""Scene files: TOML in, `Scene` out; errors name the file, the field and the remedy."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from springcheck.physics.scene import Scene
 from springcheck.physics.scenefile import building, tables
 
 LONGEST_TEXT = 1 << 25
-"""Characters of a scene: parsing so many takes ten seconds and a gigabyte of memory."""
+"""Most characters of a scene: parsing so many takes ten seconds and a gigabyte of memory."""
 
 
 def folder() -> Path:
-    """Where the shipped scenes lie: inside the installed package, or in a checkout's data folder."""
+    """Folder of the shipped scenes: in the installed package, or in a checkout's data folder."""
     packaged = Path(__file__).parents[2] / "data" / "scenes"
     return packaged if packaged.is_dir() else Path(__file__).parents[4] / "data" / "scenes"
 
@@ -34,8 +34,8 @@ def load_scene(name_or_path: str | Path) -> Scene:
     """Read a shipped scene by name, or any scene file by path.
 
     Raises:
-        SceneError: no such scene, or a mistake in the file: says which field, what stands there and
-            what is accepted.
+        SceneError: no such scene, or an error in the file; it names the field, its value and the accepted
+            ones.
     """
     path, text = _read(name_or_path)
     return parse(text, name=path.stem, where=str(path))
@@ -76,7 +76,7 @@ def parse(text: str, *, name: str, where: str | None = None) -> Scene:
     except RecursionError as error:
         raise SceneError(f"{where}: not valid as a scene: it is nested too deep") from error
     except ValueError as error:
-        # an integer of thousands of digits is none of tomllib's own errors
+        # an integer of thousands of digits raises another ValueError than tomllib's
         raise SceneError(f"{where}: not valid TOML: {str(error).partition(';')[0]}") from error
     return from_tables(data, name=name, where=where)
 
@@ -114,7 +114,7 @@ def _numbers(data: Any, path: str = "") -> Iterator[tuple[str, float]]:
 
 
 def _explain(message: str, data: Any) -> str:
-    """msgspec's message with the field first, what was found there, and the fields that exist."""
+    """msgspec's message with the field first, the value found, and the accepted fields."""
     what, _, path = message.partition(" - at `$")
     field = path.rstrip("`").lstrip(".")
     found = data

@@ -31,12 +31,12 @@ from springcheck.physics.terms import (
 
 
 class MistakeError(ValueError):
-    """A value of the right type that makes no sense."""
+    """A value of the right type that is invalid."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class _Bodies:
-    """What moves: m, q, p (n,), and what it is called in the file."""
+    """The moving bodies: m, q, p (n,), and their name in the file."""
 
     m: Floats
     q: Floats
@@ -44,11 +44,11 @@ class _Bodies:
     name: str
     terms: tuple[Term, ...] = ()
     axes: tuple[str, ...] = ()
-    """The axes of each particle, where one of them has more than x."""
+    """The axes of each particle, where some particle has more than x."""
 
     @property
     def places(self) -> Integers | None:
-        """The place of each coordinate, as in `Scene.places`."""
+        """Position of each coordinate, as in `Scene.places`."""
         return np.array([3 * i + "xyz".index(x) for i, x in self._coordinates]) if self.axes else None
 
     @property
@@ -56,7 +56,7 @@ class _Bodies:
         return [(i, x) for i, axes in enumerate(self.axes) for x in axes]
 
     def number(self, value: int, field: str) -> int:
-        """The number of a body, as a field of the file gives it.  MistakeError where there is none."""
+        """The number of a body in a field of the file.  MistakeError where there is no such body."""
         n = len(self.axes) or len(self.m)
         if not 0 <= value < n:
             several = tables.BODIES[self.name].several
@@ -64,7 +64,7 @@ class _Bodies:
         return value
 
     def along(self, field: str, axis: str | None, *bodies: int) -> list[tuple[int, ...]]:
-        """The coordinates of these bodies along an axis, or along each that they have.  MistakeError."""
+        """Coordinates of these bodies along an axis, or along each of their axes.  MistakeError."""
         numbers = [self.number(value, field) for value in bodies]
         if not self.axes:
             if axis not in (None, "x"):
@@ -79,7 +79,7 @@ class _Bodies:
         return [tuple(at[i, x] for i in numbers) for x in (axis or shared[0])]
 
 
-PLACES = {
+FILE_PATHS = {
     "step": "time.step",
     "steps": "time.steps",
     "every": "record.every",
@@ -88,7 +88,7 @@ PLACES = {
     "include": "methods.include",
     "box": "box.lengths",
 }
-"""Where a field of a scene stands in its file, for messages."""
+"""Path in a scene file of each field of a scene, for messages."""
 
 
 def scene(table: Any, *, name: str) -> Scene:
@@ -127,12 +127,12 @@ def scene(table: Any, *, name: str) -> Scene:
             include=table.methods.include,
             quantities=table.record.quantities,
         )
-        # without noise
+        # temperature 0: friction without noise
         return builders.cold(found, table.bath.friction) if table.bath and not bath else found
     except SceneError as error:
         field, separator, rest = str(error).partition(" ")
         head, colon = field.removesuffix(":"), ":" if field.endswith(":") else ""
-        raise MistakeError(f"{PLACES.get(head, head)}{colon}{separator}{rest}") from error
+        raise MistakeError(f"{FILE_PATHS.get(head, head)}{colon}{separator}{rest}") from error
 
 
 def _bodies(table: Any) -> _Bodies:
@@ -183,7 +183,7 @@ def _particles(rows: Sequence[Any]) -> _Bodies:
 
 
 def _chain(table: Any) -> Scene:
-    """The chain of a [chain]; its time grid is of no account."""
+    """The scene of a [chain]; its time grid is irrelevant."""
     n = table.masses
     if table.wave and (table.position or table.momentum):
         raise MistakeError("chain.wave is given beside the position or momentum of each mass; keep one")
@@ -205,7 +205,7 @@ def _chain(table: Any) -> Scene:
 
 
 def _terms(table: Any, bodies: _Bodies) -> Iterator[Term]:
-    """Terms of what moves, and of all other rows by their kinds, fast or not."""
+    """Terms of the bodies, and of all other rows, joined by their kinds, fast or not."""
     yield from bodies.terms
     rows = itertools.chain(
         _springs(table.spring, bodies),
@@ -226,7 +226,7 @@ def _terms(table: Any, bodies: _Bodies) -> Iterator[Term]:
 
 
 _Rows: TypeAlias = Iterator[tuple[type[Term], bool, tuple[float, ...]]]
-"""For each row, its term, whether it is fast, and its ends and columns."""
+"""For each row its term, whether it is fast, and its ends and columns."""
 
 
 def _springs(springs: Sequence[Any], bodies: _Bodies) -> _Rows:
@@ -242,7 +242,7 @@ def _springs(springs: Sequence[Any], bodies: _Bodies) -> _Rows:
 
 
 def _rods(rods: Sequence[Any], bodies: _Bodies) -> _Rows:
-    """A row for each axis of what a rod joins, and its length at the start where none is given."""
+    """A row for each axis of the ends of a rod, with its length at the start where none is given."""
     for j, rod in enumerate(rods):
         if bodies.name not in ("particle", "chain"):
             raise MistakeError(f"rod[{j}]: a rod joins particles")
@@ -274,7 +274,7 @@ def _loose_ends(kind: str, j: int, row: Any, bodies: _Bodies, does: str) -> list
 
 
 def _bonds(bonds: Sequence[Any], bodies: _Bodies) -> _Rows:
-    """A row for each axis of the two particles that a bond joins."""
+    """A row for each axis of the two particles of a bond."""
     for j, bond in enumerate(bonds):
         if bodies.name not in ("particle", "chain"):
             raise MistakeError(f"bond[{j}]: a bond joins particles")
@@ -285,7 +285,7 @@ def _bonds(bonds: Sequence[Any], bodies: _Bodies) -> _Rows:
 
 
 def _magnetic(rows: Sequence[Any], bodies: _Bodies) -> _Rows:
-    """The plane at right angles to each field, its two axes in their cyclic order."""
+    """The plane perpendicular to each field, its two axes in cyclic order."""
     for j, row in enumerate(rows):
         field = f"magnetic[{j}].particle"
         plane = {"x": "yz", "y": "zx", "z": "xy"}[row.axis]
@@ -298,7 +298,7 @@ def _magnetic(rows: Sequence[Any], bodies: _Bodies) -> _Rows:
 
 
 def _one_axis(row: str, places: Mapping[str, float], ends: Sequence[tuple[int, ...]]) -> None:
-    """MistakeError where a row along several axes is at rest anywhere but in 0, which is one number."""
+    """MistakeError where a row along several axes has an origin other than 0, a single number."""
     for name, value in places.items():
         if value and len(ends) > 1:
             raise MistakeError(
@@ -313,7 +313,7 @@ def _two_ends(one: int, other: int, field: str) -> None:
 
 
 def _capacitors(table: Any, bodies: _Bodies) -> _Rows:
-    """A capacitor is a spring of stiffness 1/C: in one loop towards 0, between two towards each other."""
+    """A capacitor as a spring of stiffness 1/C: of one loop to 0, or between two loops."""
     if (table.capacitor or table.resistor) and bodies.name != "inductor":
         raise MistakeError("capacitors and resistors belong to a circuit: give its loops as [[inductor]]")
     for j, capacitor in enumerate(table.capacitor):
@@ -329,7 +329,7 @@ def _resistors(resistors: Sequence[Any], bodies: _Bodies) -> _Rows:
 
 
 def _by_columns(term: Any, rows: Sequence[Any], bodies: _Bodies) -> _Rows:
-    """Rows of a term: what each acts on, and a number for each column."""
+    """Rows of a term: its ends, and a number for each column."""
     origin = next((column.name for column in term.columns if column.field == term.origin), "")
     for j, row in enumerate(rows):
         where, values = f"{term.key}[{j}]", [_value(term, column, j, row) for column in term.columns]
@@ -346,7 +346,7 @@ def _by_columns(term: Any, rows: Sequence[Any], bodies: _Bodies) -> _Rows:
 
 
 def _value(term: Any, column: Column, j: int, row: Any) -> float:
-    """What the field of a column holds: given as such, or as the inverse of what is given."""
+    """Value of a column's field: as given, or the inverse of the given one."""
     given = getattr(row, tables.identifier(column.name))
     if not column.inverse:
         return float(given)

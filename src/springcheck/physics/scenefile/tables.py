@@ -1,4 +1,4 @@
-"""What may stand in a scene file: one struct for each table, fields with their units."""
+"""The tables of a scene file: one struct for each, fields with their units."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ PerAxis = Annotated[tuple[float, ...], msgspec.Meta(min_length=1, max_length=3)]
 
 
 class SceneTable(msgspec.Struct, forbid_unknown_fields=True, kw_only=True, frozen=True):
-    """A table of a scene file: what is not a field of it is refused."""
+    """A table of a scene file; unknown fields are refused."""
 
 
 class ParticleTable(SceneTable, frozen=True):
     """mass [M], position [L] and momentum [M L/T] at the start: numbers, or one for each axis.
 
-    `axes` names the axes of these numbers, "x", "xy" or "xyz" where it is left out.
+    `axes` names the axes of these numbers, by default "x", "xy" or "xyz".
     """
 
     mass: Positive
@@ -35,7 +35,7 @@ class ParticleTable(SceneTable, frozen=True):
 
 
 class RotorTable(SceneTable, frozen=True):
-    """A body that turns: inertia [M L2], angle [rad] and angular momentum [M L2/T] at the start."""
+    """A rotating body: inertia [M L2], angle [rad] and angular momentum [M L2/T] at the start."""
 
     inertia: Positive
     angle: float = 0.0
@@ -43,7 +43,7 @@ class RotorTable(SceneTable, frozen=True):
 
 
 class InductorTable(SceneTable, frozen=True):
-    """The inductor of a loop: inductance [H], charge that has gone round [C] and flux [Wb] at the start."""
+    """The inductor of a loop: inductance [H], circulated charge [C] and flux [Wb] at the start."""
 
     inductance: Positive
     charge: float = 0.0
@@ -51,7 +51,7 @@ class InductorTable(SceneTable, frozen=True):
 
 
 class CapacitorTable(SceneTable, frozen=True):
-    """A capacitor in one loop, or between two loops that go through it in opposite directions [F]."""
+    """A capacitor in one loop, or between two loops that traverse it in opposite directions [F]."""
 
     loops: Annotated[tuple[int, ...], msgspec.Meta(min_length=1, max_length=2)]
     capacitance: Positive
@@ -65,9 +65,9 @@ class ResistorTable(SceneTable, frozen=True):
 
 
 class SpringTable(SceneTable, frozen=True):
-    """A spring of a stiffness [M/T2] and a rest length [L]; a wall end stands at `wall` [L].
+    """A spring of a stiffness [M/T2] and a rest length [L]; a wall end is at `wall` [L].
 
-    `fast` springs are taken in the short step of a method of multiple time steps.  Where particles move along
+    A method of multiple time steps evaluates `fast` springs in its short step.  Where particles move along
     several axes it acts along `axis`, or alike along all of them.
     """
 
@@ -80,7 +80,7 @@ class SpringTable(SceneTable, frozen=True):
 
 
 class RodTable(SceneTable, frozen=True):
-    """A rigid rod of a length [L], left out that at the start; a wall end stands at `wall` [L]."""
+    """A rigid rod of a length [L], by default that at the start; a wall end is at `wall` [L]."""
 
     ends: tuple[End, End]
     length: Positive | None = None
@@ -88,7 +88,7 @@ class RodTable(SceneTable, frozen=True):
 
 
 class BondTable(SceneTable, frozen=True):
-    """A bond of two particles along whatever direction: k/2 (length - rest)**2, k [M/T2], rest [L]."""
+    """A bond of two particles in any direction: k/2 (length - rest)**2, k [M/T2], rest [L]."""
 
     ends: tuple[int, int]
     stiffness: float
@@ -113,7 +113,7 @@ class WaveTable(SceneTable, frozen=True):
 class ChainTable(SceneTable, frozen=True):
     """Equal masses [M] between two walls, neighbours joined by equal springs [M/T2].
 
-    Positions count from the rest of each mass; the start is a sum of standing waves, or the position and
+    Positions are relative to the rest of each mass; the start is a sum of standing waves, or the position and
     the momentum of each mass.
     """
 
@@ -148,20 +148,20 @@ class BathTable(SceneTable, frozen=True):
 
 
 class MethodsTable(SceneTable, frozen=True):
-    """Labels or globs of the methods to run; all that can serve the scene when left out."""
+    """Labels or globs of the methods to run; by default all that can serve the scene."""
 
     include: Annotated[tuple[str, ...], msgspec.Meta(min_length=1)] = ("*",)
 
 
 class RecordTable(SceneTable, frozen=True):
-    """Every how many steps a frame is kept, and what of it."""
+    """Number of steps between recorded frames, and the recorded quantities."""
 
     every: Count | None = None
     quantities: tuple[Quantity, ...] = ("q", "p", "energy")
 
 
 class Body(NamedTuple):
-    """What moves: the kind of its scenes, the word for several, and what its table calls m, q and p."""
+    """A kind of body: the kind of its scenes, the word for several, and its table's names of m, q and p."""
 
     kind: Kind
     several: str
@@ -174,11 +174,11 @@ BODIES = {
     "inductor": Body("circuit", "inductors", InductorTable.__struct_fields__),
     "chain": Body("particles", "masses"),
 }
-"""What moves, by the name of its table."""
+"""Kinds of bodies by the names of their tables."""
 
 
 class SceneBase(SceneTable, frozen=True):
-    """A scene file without the tables of the terms that need no more than their columns."""
+    """A scene file without the tables of the terms that are defined by their columns alone."""
 
     time: TimeTable
     title: str = ""
@@ -205,7 +205,7 @@ _SIGNS: dict[str, Any] = {"any": float, "positive": Positive, "nonnegative": Non
 
 
 def _of_term(term: Any) -> type[SceneTable]:
-    """The table of a term: the particle or the two ends on which it acts, its axis, and its columns."""
+    """The table of a term: its particle or two ends, its axis, and its columns."""
     fields: list[Any] = [("particle", int) if len(term.ends) == 1 else ("ends", tuple[int, int])]
     names = {}
     for column in term.columns:
@@ -230,17 +230,17 @@ def identifier(name: str) -> str:
     return name.replace("-", "_")
 
 
-OTHERWISE = ("wall-spring", "spring", "magnetic", "wall-rod", "rod", "bond")
-"""Terms that have tables of their own."""
+OWN_TABLES = ("wall-spring", "spring", "magnetic", "wall-rod", "rod", "bond")
+"""Keys of the terms with tables of their own."""
 
 
 def of_terms() -> tuple[Any, ...]:
-    """The terms that are read by their columns alone."""
-    return tuple(term for key, term in terms.known().items() if key not in OTHERWISE)
+    """Terms that are read by their columns alone."""
+    return tuple(term for key, term in terms.known().items() if key not in OWN_TABLES)
 
 
 def scene_table() -> Any:
-    """The struct of a whole scene file, with a table for every term that is known by now."""
+    """The struct of a whole scene file, with a table for every registered term."""
     return _scene_table(of_terms())
 
 
@@ -262,11 +262,11 @@ CHOICES: dict[str, tuple[str, ...]] = {
     "record.quantities[]": get_args(Quantity),
     "axis": get_args(Axis),
 }
-"""What a field of a few words accepts, for messages; of a list, what each of its entries does."""
+"""Accepted words of a field, for messages; for a list, of each of its entries."""
 
 
 def named(name: str) -> Any:
-    """The table of a name, for messages that say which fields it has; None for a name that has none."""
+    """The table of this name, for messages that list its fields; None where there is none."""
     if not name:
         return scene_table()
     kind = next((x.type for x in msgspec.structs.fields(scene_table()) if x.encode_name == name), None)

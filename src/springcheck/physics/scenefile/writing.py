@@ -1,4 +1,4 @@
-"""From a `Scene` to the text of a scene file, so that reading it back gives exactly the same numbers."""
+"""From a `Scene` to the text of a scene file that reads back with exactly the same numbers."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from springcheck.physics.term import Term
 from springcheck.physics.terms import Damping, Magnetic, RadialSpring, Rod, Spring, WallRod, WallSpring
 
 MOST_WAVES = 64
-"""Standing waves up to which the start of a chain is written as such."""
+"""Most standing waves by which the start of a chain is written."""
 
 
 def text(system: System[Any]) -> str:
@@ -56,7 +56,7 @@ def text(system: System[Any]) -> str:
 
 
 def _bodies(scene: SceneFields, names: Sequence[str]) -> Iterator[Iterable[tuple[str, Any]]]:
-    """The rows of what moves: one number for each column, or for each of its axes."""
+    """Rows of the bodies: one number for each column, or for each of its axes."""
     rows = list(zip(*(x.tolist() for x in (scene.m, scene.q, scene.p)), strict=True))
     if scene.places is None:
         yield from (zip(names, row, strict=True) for row in rows)
@@ -70,7 +70,7 @@ def _bodies(scene: SceneFields, names: Sequence[str]) -> Iterator[Iterable[tuple
 
 
 def _rests_at_0(scene: SceneFields) -> bool:
-    """Whether the springs of a chain have the rest lengths that [chain] stands for."""
+    """Whether the springs of a chain have the rest lengths that [chain] implies."""
     springs = [term for term in scene.terms if isinstance(term, WallSpring | Spring)]
     return not any(term.fast or np.any(getattr(term, term.origin)) for term in springs)
 
@@ -97,7 +97,7 @@ def _waves(q: Floats) -> list[tuple[int, float]] | None:
     large = np.flatnonzero(np.abs(amplitudes) > 1e-12 * size)
     if len(large) > min(MOST_WAVES, n // 2 + 1):
         return None
-    # an amplitude that was written down has few digits
+    # an amplitude from a file has few digits
     for digits in (3, 6, 9, 12, 15, 17):
         found = [(int(j) + 1, float(f"{amplitudes[j]:.{digits}g}")) for j in large]
         orders: Any = itertools.permutations(found) if len(found) <= 4 else (found, found[::-1])
@@ -118,7 +118,7 @@ def _rows(scene: SceneFields, term: Term) -> Iterator[str]:
         for *at, k, rest in term.rows():
             ends, axis = _ends(scene, at)
             row: dict[str, Any] = {"ends": ["wall", *ends][-2:], "stiffness": k, **axis}
-            # the name of what it is at rest by: wall or rest
+            # the name of its origin: wall or rest
             row |= {term.columns[1].name: rest} if rest else {}
             yield _table("[[spring]]", (row | ({"fast": True} if term.fast else {})).items())
     elif isinstance(term, Magnetic):
@@ -167,7 +167,7 @@ def _by_columns(scene: SceneFields, term: Term) -> Iterator[str]:
         for column in term.columns:
             value = float(getattr(term, column.field)[j])
             inverse = 1 / value if column.inverse and abs(value) > 1e-307 else 0.0
-            # the inverse of the inverse is often, not always, the number again
+            # the inverse of an inverse is often, not always, the same number
             if inverse and 1 / inverse == value:
                 row[column.name] = inverse
             else:

@@ -1,7 +1,7 @@
-"""The row of a thermostat: named by a spring's states in a bath, its two temperatures measured on many.
+"""The row of a thermostat: identified by the states of one spring, its two temperatures measured on many.
 
-One that is for scenes with rods moves dumbbells in space, each of whose masses has its part of the springs:
-these turn no rod, and the centre is a mass on a spring along each axis, whose states are read.
+A thermostat for scenes with rods moves dumbbells in space, each of whose masses has its share of the springs.
+Such springs exert no torque, so that the centre is a mass on a spring along each axis; its states are used.
 """
 
 from __future__ import annotations
@@ -30,19 +30,19 @@ H_OMEGA, GAMMA_H = 0.5, 0.4
 Euler-Maruyama is not stable."""
 
 SIDE_BY_SIDE, COUNTED, UNCOUNTED = 1000, 1000, 100
-"""Springs side by side, steps that count, and those before: exp(-20) of a start is left in its mean."""
+"""Springs side by side, steps averaged over, and steps discarded before: exp(-20) of a start is left then."""
 
 NAMED_BY = 2000
-"""Steps of the spring whose states are named."""
+"""Number of steps of the spring from which the scheme is identified."""
 
 DUMBBELL, NEAR_PART = 12.0, 0.375
-"""Length of a rod [L], which kT turns by 0.07 a step, and the part of the mass at its near end."""
+"""Length of a rod [L], which turns by 0.07 rad a step at kT, and the share of the mass at its near end."""
 
 BLOCKS_OF_STEPS = 20
-"""Blocks of steps from which the standard error of what all springs share is taken."""
+"""Blocks of steps whose means give the standard error of what all springs share."""
 
 SEED_OF_ROWS = 26
-"""The seed of every row: none is chosen."""
+"""Seed of every row; not tuned."""
 
 
 def springs(n: int, steps: int) -> Scene:
@@ -58,7 +58,7 @@ def springs(n: int, steps: int) -> Scene:
 
 
 def rods(n: int, steps: int) -> Scene:
-    """Dumbbells; their centres move as three times as many of these springs."""
+    """Dumbbells whose centres move as three times as many of these springs."""
     centres, parts = springs(3 * n, steps), np.array([[NEAR_PART], [1 - NEAR_PART]])
     way = np.random.default_rng(SEED_OF_ROWS).standard_normal((n, 1, 3))
     way *= DUMBBELL / np.linalg.norm(way, axis=2, keepdims=True)
@@ -71,12 +71,12 @@ def rods(n: int, steps: int) -> Scene:
 
 
 def scene_of(label: Label, n: int, steps: int) -> Scene:
-    """What a thermostat moves: n springs, or as many dumbbells as have at least n coordinates of a centre."""
+    """Scene of a thermostat: n springs, or as many dumbbells as have at least n coordinates of a centre."""
     return rods(-(-n // 3), steps) if Need.RODS in engines.method(label).requires else springs(n, steps)
 
 
 def read(run: Trajectory) -> tuple[Floats, Floats]:
-    """Positions and momenta (f, n) of the springs: of dumbbells those of their centres."""
+    """Positions and momenta (f, n) of the springs; for dumbbells those of their centres."""
     assert run.scene is not None
     if not run.scene.system.rods:
         return run.q, run.p
@@ -101,7 +101,7 @@ def temperatures(q: Floats, p: Floats) -> tuple[tuple[float, float], tuple[float
 
 
 def entry(label: Label) -> Entry:
-    """Identify one thermostat by its states.  Its time, measured here, is of a step of a thousand springs."""
+    """Identify one thermostat by its states, and time a step of a thousand springs."""
     from springcheck.identify.thermal import of_bath
 
     one = scene_of(label, 1, NAMED_BY)

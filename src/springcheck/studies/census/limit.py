@@ -1,4 +1,4 @@
-"""The first limit of stability of a method on the spring, from its states alone."""
+"""First limit of stability of a method on the spring, from its states alone."""
 
 from __future__ import annotations
 
@@ -13,40 +13,41 @@ from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory
 from springcheck.studies.census import rigid
 
-LEAST, MOST, APART = 0.05, 4.0, 0.05
-"""h omega that are tried, the first of them and the last; of no engine is a limit below 0.05 looked for."""
+FIRST_H_OMEGA, LAST_H_OMEGA, H_OMEGA_SPACING = 0.05, 4.0, 0.05
+"""h omega of the first and the last run, and their spacing; no limit below the first is looked for."""
 
-STEPS = 8
+STEPS_OF_A_RUN = 8
 """Steps of each run: more pairs of states than a map of four entries needs, too few to leave a spring's
 range."""
 
 LEAST_STEPS = 3
-"""Steps from which a map of four entries follows, with two numbers over."""
+"""Fewest steps that determine a map of four entries, with two residual degrees of freedom."""
 
-HALVINGS = 12
-"""Halvings of the bracket, to 0.05 / 4096."""
+LIMIT_HALVINGS = 12
+"""Bisections of the bracket, to 0.05 / 4096."""
 
-SMALL = 0.1
-"""Part of the scene's start from which runs begin: near the limit a motion grows, and engines have a largest
-speed."""
+START_FACTOR = 0.1
+"""Factor on the scene's start: near the limit a motion grows, and engines have a largest speed."""
 
-SPREAD = 10
-"""Factor from the standard error of the growth to the error allowed: of eight steps it is poorly known."""
+GROWTH_ERRORS = 10
+"""Standard errors of the growth that are allowed for: eight steps estimate it poorly."""
 
-LOST = 0.1
-"""Error of the growth from which states follow no map, as beyond the range of an engine's spring."""
+LOST_GROWTH = 0.1
+"""Error of the growth from which states follow no linear map, as beyond the range of an engine's spring."""
 
-STEEPEST = 4
-"""Power of h omega by which the growth of a scheme that always grows begins, at most: RK2's."""
+STEEPEST_POWER = 4
+"""Largest leading power of h omega in the growth of a scheme that always grows: RK2's."""
 
 
 def first_limit(scene: Scene, label: Label) -> float:
-    """The least h omega whose one-step map grows, to a part in 1e5; 0: all grow, infinity: none up to 4.
+    """Smallest h omega whose one-step map grows, to a part in 1e5; 0 where all grow, infinity where none up
+    to 4.
 
     One mass on one spring.  NaN where the engine refuses a step, or where its rounding hides a growth that
-    may begin below the first that is seen.
+    may begin below the first that is detected.
     """
-    small = replace(scene, q=scene.q * SMALL, p=scene.p * SMALL, steps=STEPS, every=1, quantities=("q", "p"))
+    run = replace(scene, steps=STEPS_OF_A_RUN, every=1, quantities=("q", "p"))
+    small = replace(run, q=scene.q * START_FACTOR, p=scene.p * START_FACTOR)
     omega = float(np.sqrt(scene.system.hessian_diagonal(scene.q)[0] / scene.m[0]))
 
     def growth(h_omega: float) -> tuple[float, float]:
@@ -54,7 +55,7 @@ def first_limit(scene: Scene, label: Label) -> float:
 
     try:
         low, hidden = 0.0, 0.0
-        for high in np.arange(LEAST, MOST + APART / 2, APART).tolist():
+        for high in np.arange(FIRST_H_OMEGA, LAST_H_OMEGA + H_OMEGA_SPACING / 2, H_OMEGA_SPACING).tolist():
             size, error = growth(high)
             if size > error:
                 break
@@ -63,9 +64,9 @@ def first_limit(scene: Scene, label: Label) -> float:
             return float("inf")
         if low == 0:
             return 0.0
-        if hidden >= size * (low / high) ** STEEPEST:
+        if hidden >= size * (low / high) ** STEEPEST_POWER:
             return float("nan")
-        for _ in range(HALVINGS):
+        for _ in range(LIMIT_HALVINGS):
             middle = (low + high) / 2
             size, error = growth(middle)
             low, high = (low, middle) if size > error else (middle, high)
@@ -75,13 +76,11 @@ def first_limit(scene: Scene, label: Label) -> float:
 
 
 def _growth(run: Trajectory) -> tuple[float, float]:
-    """Spectral radius less 1 of the map (2, 2) that fits the states best, and what its error makes of 0.
-
-    Where the whole run follows no map its first steps are looked at: a rest length is passed later.
-    """
+    """Spectral radius minus 1 of the map (2, 2) that fits the states best, and its error.  Where the whole
+    run follows no linear map, its first steps are used: a rest length is passed later."""
     z = np.stack([run.q[:, 0], run.p[:, 0]])
-    found = [_of_states(z[:, : steps + 1]) for steps in (STEPS, STEPS // 2, LEAST_STEPS)]
-    return next((x for x in found if x[1] < LOST), found[0])
+    found = [_of_states(z[:, : steps + 1]) for steps in (STEPS_OF_A_RUN, STEPS_OF_A_RUN // 2, LEAST_STEPS)]
+    return next((x for x in found if x[1] < LOST_GROWTH), found[0])
 
 
 def _of_states(z: Floats) -> tuple[float, float]:
@@ -95,5 +94,5 @@ def _of_states(z: Floats) -> tuple[float, float]:
     values, vectors = np.linalg.eig(fitted)
     # where eigenvectors coincide, as at a limit, eigenvalues err by the root of the entries' error
     entries = noise * np.linalg.norm(inverse, 2)
-    error = SPREAD * min(entries * np.linalg.cond(vectors), np.sqrt(entries))
+    error = GROWTH_ERRORS * min(entries * np.linalg.cond(vectors), np.sqrt(entries))
     return float(np.abs(values).max()) - 1, max(1e-12, float(error))

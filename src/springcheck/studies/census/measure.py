@@ -30,7 +30,7 @@ from springcheck.studies.choose import LeftOut, sorted_out
 from springcheck.studies.keeper import How, Keeper, each
 
 EVERY = "*:*"
-"""Every method of every engine; of an engine that has default ones, those."""
+"""Every method of every engine; for an engine with default methods, these."""
 
 BLOG, UNEVEN = "spring", "spring-uneven"
 
@@ -67,13 +67,13 @@ def _measure(labels: Sequence[Label], kept: Keeper) -> Census:
     if not usable:
         raise MethodError(f"none of these methods moves a spring: {left[0].method}: {left[0].reason}")
     found = kept.results(each(usable, "", lambda label: partial(entry, label), ENTRIES))
-    # workers have ended: nothing of ours runs beside what is timed
+    # workers have ended: nothing else of this study runs beside the timing
     entries = [_timed(label, one, kept) for label, one in zip(usable, found, strict=True)]
     return Census(entries=tuple(entries), left_out=tuple(left))
 
 
 def _timed(label: Label, one: Entry, kept: Keeper) -> Entry:
-    """The entry with its seconds a step: a short run is timed by its fastest repetition."""
+    """The entry with its seconds per step: the fastest repetition of a short run."""
     if not np.isnan(one.seconds):
         return one
     runs = [rigid.run(load_scene(UNEVEN), label) for _ in range(REPEATS + 1)]
@@ -83,7 +83,7 @@ def _timed(label: Label, one: Entry, kept: Keeper) -> Entry:
 
 
 def _absence(label: Label) -> str | None:
-    """Why an engine cannot be used here: it is not installed, or what it stands on is not."""
+    """Why an engine cannot be used here: it, or a library that it needs, is not installed."""
     try:
         engines.load(label.engine)
     except MethodError as error:
@@ -92,7 +92,7 @@ def _absence(label: Label) -> str | None:
 
 
 def perform(options: Namespace, progress: Progress | None) -> Census:
-    """What `springcheck census` does."""
+    """Carry out `springcheck census`."""
     old = table.load(options.against) if options.against is not None else None
     how = keeper.how(options, progress)
     found = record(options.output or "census.h5", options.method, thermostats=options.thermostats, **how)
@@ -104,7 +104,7 @@ def perform(options: Namespace, progress: Progress | None) -> Census:
 
 @keeper.restoring("census")
 def stored(kept: keeper.Kept) -> Census:
-    """The census that `record` has kept.  StoreError where the file holds none."""
+    """The census that `record` has saved.  StoreError where the file holds none."""
     return Census(
         entries=tuple(kept.found(ENTRIES, one["method"]) for one in kept.document["entries"]),
         left_out=kept.left_out,
@@ -180,12 +180,12 @@ def _name(scene: Scene, run: Trajectory, found: Identification | None) -> str:
 
 
 def _held(scene: Scene, found: Identification | None) -> str:
-    """A force held over n substeps, whose map has the determinant 1 + a (n - 1)/2n, a = h**2 k/m; or ""."""
+    """Name of a force held over n substeps, of the determinant 1 + a (n - 1)/2n, a = h**2 k/m; or ""."""
     m, k = _spring(scene)
     if found is not None and found.scheme == "held-force":
         n = 1 / (1 - 2 * (found.determinant[0] - 1) * m / (scene.step**2 * k))
         return f"force-held-{round(n)}" if 2 <= round(n) <= MOST_SUBSTEPS else ""
-    # over no end of substeps, as RK4 does of a force that is set before the step
+    # held over infinitely many substeps, as by RK4 with a force that is set before the step
     endless = found is not None and found.statement == FAMILIES["fault: old force"].cause
     return "force-held-rk4" if endless else ""
 
@@ -196,7 +196,7 @@ def agrees(scene: Scene, claimed: str, found: str) -> bool:
     try:
         one, other = schemes.scheme(claimed), schemes.scheme(found)
     except MethodError:
-        # several that nothing tells apart, or an adaptive solver
+        # several schemes that the states do not distinguish, or an adaptive solver
         return found == "adaptive" or claimed in found.split(" or ") or claimed == "unknown"
     if not (one.has("one-step") and other.has("one-step")):
         return True

@@ -22,14 +22,14 @@ class Entry:
 
     method: str
     about: str
-    """The library's classes and functions that are called."""
+    """Classes and functions of the library that are called."""
     note: str
     """A caveat that its authors would want, and the thread that asked."""
     version: str
     claimed: str
-    """The scheme that the engine is declared with here."""
+    """The scheme that the engine declares."""
     found: str
-    """The scheme that the states of `spring-uneven` show, or what they show instead of one."""
+    """The scheme that the states of `spring-uneven` show, or a phrase where they show none."""
     agrees: bool
     """Whether the two have the same map; True where nothing can be compared."""
     substeps: int
@@ -37,22 +37,22 @@ class Entry:
     velocity_offset: float = nan
     """Time of the velocities after that of the positions, in steps."""
     area: float = nan
-    """Determinant of the measured map of one step less 1: 0 for a step that keeps area."""
+    """Determinant of the measured one-step map minus 1: 0 where areas are preserved."""
     trace: float = nan
-    """Its trace: with the determinant all that a map shows whatever the units and the time of velocities."""
+    """Its trace: trace and determinant depend neither on units nor on the time of the velocities."""
     friction: float = nan
-    """Friction c/m that nobody asked for, with the stiffness as stated [1/T]."""
+    """Friction c/m [1/T] that was not requested; the stiffness is as stated."""
     precision: str
     limit: float = nan
-    """The least h omega at which the measured map grows; 0: it always does; NaN: not known, or adaptive."""
+    """Smallest h omega at which the measured map grows; 0: it always does; NaN: unknown, or adaptive."""
     bounded: bool = False
     """Whether no map up to h omega = 4 grows; `limit` is infinity then."""
     thermostat: str = ""
-    """The heat bath that is on, as its scheme's title; "" where none is."""
+    """Title of the thermostat's scheme; "" without a thermostat."""
     along: str = "x"
     """Axes along which the engine moves particles, by its states, and whether it serves a periodic box."""
     constraint: str = ""
-    """The rigid part, the angle of a step and the error of its length; "" where nothing is rigid."""
+    """The rigid part, its turn per step and the error of its length; "" where nothing is rigid."""
     configurational: float = nan
     """k <x**2>/kT where a thermostat is on."""
     configurational_error: float = nan
@@ -63,9 +63,9 @@ class Entry:
     amplitude: float = nan
     """Amplitude of the blog's spring after its 200 steps; 1 is exact."""
     force_calls: float
-    """A step, counted by us."""
+    """Force evaluations per step, as counted by springcheck."""
     seconds: float = nan
-    """A step, on `spring-uneven`, every state read; with nothing of ours beside it."""
+    """Seconds per step on `spring-uneven`, every state read, with nothing else of the study running."""
     digest: str
     """Digest of the states of the blog's spring: equal for engines that agree bit for bit."""
     q: Floats = field(default_factory=lambda: np.empty(0))
@@ -87,7 +87,7 @@ class Census(Studied):
     changes: tuple[str, ...] | None = None
     """Differences from an earlier census; None where none was named."""
     since: str = ""
-    """Versions that differ from that census's, each with both."""
+    """Versions that differ from that census's, old and new."""
 
     def __repr__(self) -> str:
         engines = {entry.method.partition(":")[0] for entry in self.entries}
@@ -97,7 +97,7 @@ class Census(Studied):
 
     @property
     def partners(self) -> Mapping[str, tuple[str, ...]]:
-        """For each method the others whose orbits of the blog's spring are the same bit for bit."""
+        """For each method the others whose orbits of the blog's spring are bitwise identical."""
         same: dict[str, list[str]] = {}
         for entry in self.entries:
             same.setdefault(entry.digest, []).append(entry.method)
@@ -113,7 +113,7 @@ class Census(Studied):
 
     @property
     def status(self) -> int:
-        """1: states are not those of a declared scheme, or a row is not what it was; 2: nothing was run."""
+        """Exit status 1: states contradict a declared scheme, or a row has changed; 2: nothing was run."""
         if not self.entries:
             return 2
         return 0 if all(entry.agrees for entry in self.entries) and not self.changes else 1

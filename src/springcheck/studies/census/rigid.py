@@ -1,8 +1,8 @@
 """Constraints in the census: what a method holds rigid, by its states alone.
 
-A method that is for scenes with rods moves the census' springs with each mass in two parts on a rod along
-the line: they are one mass, whose map is read.  Length and turn are those of the scene `dumbbell`, for every
-method that can serve it.
+A method for scenes with rods moves each mass of the census in two parts, joined by a rod along the line:
+together they are one mass, whose map is measured.  Length and turn are those of the scene `dumbbell`, for
+every method that can serve it.
 """
 
 from __future__ import annotations
@@ -22,32 +22,32 @@ from springcheck.physics.terms import Rod
 from springcheck.physics.trajectory import Trajectory
 
 LENGTH, PART = 0.75, 0.375
-"""Length of the rod [L], and part of the mass at its near end: unlike, and sums of few powers of 2."""
+"""Length of the rod [L], and share of the mass at its near end: unequal, and exact in binary."""
 
-TURNS: Mapping[str, Callable[[Floats], Floats]] = {
+ROD_TURNS: Mapping[str, Callable[[Floats], Floats]] = {
     "asin(h w)": np.arcsin,
     "2 asin(h w/2)": lambda x: 2 * np.arcsin(x / 2),
     "atan(h w)": np.arctan,
     "2 atan(h w/2)": lambda x: 2 * np.arctan(x / 2),
     "h w": lambda x: x,
 }
-"""Angle by which a free rod turns in a step: by SHAKE and RATTLE; by these in two drifts of half a step;
-where its length is put right along the rod after the drift; by Cayley's rotation; by the angle itself."""
+"""Turn of a free rod in a step: by SHAKE and RATTLE; by these in two drifts of half a step; where the length
+is restored along the rod after the drift; by Cayley's rotation; exactly."""
 
-WORSE = 4
-"""Residual that the map of a scheme may leave, in residuals of the best linear map."""
+WORSE_FIT = 4
+"""Largest residual of a scheme's map, in residuals of the best linear map."""
 
 NO_SCHEME = "none that is known"
 
-ROUNDED = 1e-13
+ROUNDED_ERROR = 1e-13
 """Largest error that counts as rounding: 400 steps of 2**-52."""
 
-ALIKE = 1e-9
-"""Difference of one-step maps along two axes up to which they are one: fits of 60 states leave 1e-13, solvers
-their tolerance."""
+ALIKE_MAPS = 1e-9
+"""Difference of one-step maps along two axes up to which they count as equal: fits of 60 states leave 1e-13,
+solvers their tolerance."""
 
-UNLIKE = 1e-4
-"""Relative misfit from which a turn is none of these: at h w = 0.15 they differ by 1.9e-3 or more."""
+UNLIKE_TURN = 1e-4
+"""Relative misfit from which a turn follows none of these: at h w = 0.15 they differ by 1.9e-3 or more."""
 
 
 def split(scene: Scene) -> Scene:
@@ -61,13 +61,13 @@ def split(scene: Scene) -> Scene:
 
 
 def is_rigid(label: Label) -> bool:
-    """Whether a method is for scenes with rods alone, and moves a spring in two parts on a line: no noise."""
+    """Whether a method serves scenes with rods alone, without noise, and so moves a mass in two parts."""
     method = engines.method(label)
     return Need.RODS in method.requires and not method.generator
 
 
 def is_hinge(label: Label) -> bool:
-    """Whether a method moves rotors alone: the angle is its coordinate."""
+    """Whether a method serves rotors alone, whose coordinate is an angle."""
     return engines.method(label).kinds == {"rotor"}
 
 
@@ -83,7 +83,7 @@ def refusal(scene: Scene, label: Label) -> str | None:
 
 
 def run(scene: Scene, label: Label) -> Trajectory:
-    """A run of one mass; of a method for rods that of the two parts, as the one mass that they are."""
+    """A run of one mass; a method for rods runs the two parts, which are reported as one mass."""
     both = driver.run(_given(scene, label), label)
     if not is_rigid(label):
         return both
@@ -97,10 +97,8 @@ def fitted(q: Floats, p: Floats) -> Floats:
 
 
 def name(scene: Scene, found: Trajectory) -> str:
-    """The schemes whose map of this spring the states follow as well as any linear map.
-
-    What is left over is the solver's, of no arithmetic that `identify` could know.
-    """
+    """Schemes whose map of this spring fits the states as well as any linear map.  The residuals are the
+    solver's own, of an arithmetic that `identify` does not know."""
     z = np.stack([found.q[:, 0], found.p[:, 0]])
     z = z / np.max(np.abs(z), axis=1, keepdims=True)
     scale = np.max(np.abs(found.q)) / np.max(np.abs(found.p))
@@ -118,13 +116,13 @@ def name(scene: Scene, found: Trajectory) -> str:
     def left(matrix: Floats) -> float:
         return float(np.max(np.abs(z[:, 1:] - matrix @ z[:, :-1])))
 
-    fit = (one for one, matrix in unlike if left(matrix) <= WORSE * left(best))
+    fit = (one for one, matrix in unlike if left(matrix) <= WORSE_FIT * left(best))
     return " or ".join(fit) or NO_SCHEME
 
 
 def axes(label: Label) -> str:
-    """Along which axes a method moves what it serves, as the states of `orbit` show it, of a method for rods
-    those of `rigid-triangle`, and whether it serves a periodic box."""
+    """Axes along which a method moves particles, by the states of `orbit`, or of `rigid-triangle` for rods,
+    and whether it serves a periodic box."""
     if is_hinge(label):
         return "an angle"
     scene = replace(load_scene("rigid-triangle" if is_rigid(label) else "orbit"), steps=60)
@@ -135,16 +133,16 @@ def axes(label: Label) -> str:
     if not is_rigid(label):
         maps = np.stack([fitted(found.q[:, axis], found.p[:, axis]) for axis in range(3)])
         coarse = found.arithmetic.state > 2.0**-53
-        alike = np.ptp(maps, axis=0).max() < (1e-4 if coarse else ALIKE)
-        # steps that follow the forces are no map
+        alike = np.ptp(maps, axis=0).max() < (1e-4 if coarse else ALIKE_MAPS)
+        # steps that depend on the forces are no linear map
         said += " alike" if alike else "" if engines.method(label).adaptive else " unlike"
     boxed = engines.refusal(load_scene("periodic-box"), label)
     return said if boxed else f"{said}; periodic box"
 
 
 def constraint(label: Label) -> str:
-    """What a method holds rigid, as the states of `dumbbell` show it, or of a rotor on which nothing acts; ""
-    where it serves no such scene."""
+    """What a method holds rigid, by the states of `dumbbell` or of a free rotor; "" where it serves
+    neither."""
     if is_hinge(label):
         free = load_scene("hinged-pendulum").derived(terms=())
         each, h_w = np.diff(driver.run(free, label).q[:, 0]), free.step * free.p / free.m
@@ -166,14 +164,14 @@ def _turn(found: Trajectory, rods: Rods, scene: Scene) -> str:
 
 
 def _named(each: Reals, h_w: Floats) -> str:
-    """The turns of every step, as a law of h w (1,) [rad]."""
-    off = {name: float(np.abs(np.mean(each) / turn(h_w) - 1)[0]) for name, turn in TURNS.items()}
+    """The mean turn per step, as a law of h w (1,) [rad]."""
+    off = {name: float(np.abs(np.mean(each) / turn(h_w) - 1)[0]) for name, turn in ROD_TURNS.items()}
     name = min(off, key=lambda one: off[one])
-    if not off[name] < UNLIKE:
+    if not off[name] < UNLIKE_TURN:
         return f"turns by {float(np.mean(each) / h_w[0]):.4f} h w a step"
     return f"turns by {name} a step {to(off[name])}"
 
 
 def to(off: float) -> str:
-    """The distance, rounded up to a power of ten, so that no rounding changes a column that is compared."""
-    return "to rounding" if off < ROUNDED else f"to {10.0 ** np.ceil(np.log10(off)):.0e}"
+    """A deviation rounded up to a power of ten, so that roundings do not change a column that is compared."""
+    return "to rounding" if off < ROUNDED_ERROR else f"to {10.0 ** np.ceil(np.log10(off)):.0e}"

@@ -15,11 +15,11 @@ from springcheck.text.wording import number
 from springcheck.thermal.catalogue import family_of, random_scheme
 
 Cells: TypeAlias = Mapping[str, Mapping[str, str]]
-"""Version, and text of each column, of each method."""
+"""Version, and the text of each column, by method."""
 
 
 def titles(names: str) -> str:
-    """Schemes by their titles, whether an engine here runs them or not; several joined by "or"."""
+    """Titles of schemes, also of those that no engine here runs; several are joined by "or"."""
     return names if names == NO_SCHEME else " or ".join(map(_title, names.split(" or ")))
 
 
@@ -34,7 +34,7 @@ def _velocity(offset: float | None) -> str:
 
 
 def amount(x: float | None, least: float, form: str = "+.3g") -> str:
-    """A signed number, 0 where it is below the least that counts."""
+    """A signed number, or 0 below the least that counts."""
     return "0" if x is not None and abs(x) < least else number(x, form)
 
 
@@ -83,7 +83,7 @@ def changes(before: Cells, after: Cells) -> Iterator[str]:
 
 
 def versions(before: Cells, after: Cells) -> str:
-    """What each engine's version was and is, where methods of both have another."""
+    """Old and new versions of engines, where they differ."""
     pairs = [(before.get(name, row)["version"], row["version"]) for name, row in after.items()]
     return "; ".join(dict.fromkeys(f"{one} -> {other}" for one, other in pairs if one != other))
 

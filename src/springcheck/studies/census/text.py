@@ -62,7 +62,7 @@ def lines(census: Census, options: Namespace | None = None) -> Lines:
 
 
 def _under(census: Census, thermostats: bool, row: Callable[[Entry], Row]) -> list[Row]:
-    """The rows of those with or without a thermostat, under the scheme that was found."""
+    """Rows with or without a thermostat, grouped by the scheme that was found."""
     rows: list[Row] = []
     for name, members in census.grouped.items():
         some = [row(x) for x in members if bool(x.thermostat) is thermostats]

@@ -17,7 +17,7 @@ VARY = (
     argument("--seed", type=int, metavar="S",
              help="of the samples (default 0), or of random methods (default: drawn)"),
 )  # fmt: skip
-"""What is varied."""
+"""Options of what is varied."""
 
 STUDY = Study(
     name="ensemble",

@@ -1,8 +1,8 @@
-"""Ensembles: the same scene over many parameters by many methods, as few runs as the engines allow.
+"""Ensembles: one scene over many parameters by many methods, in as few runs as the engines allow.
 
-Cells of one time grid stand side by side in one run of a method of fixed step, without acting on each other;
-an adaptive solver, which would take one step for all, runs them one by one.  Only numbers of each cell are
-kept, so neither the file nor memory holds trajectories, however many cells there are.
+A method of fixed step runs cells of one time grid side by side, without interaction; an adaptive solver,
+which would choose one step for all, runs them one by one.  Only numbers of each cell are saved, so that
+neither the file nor memory holds trajectories, however many cells there are.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ from springcheck.studies.ensemble.vary import CHUNK, GRID, Plan, Varied, plan, t
 from springcheck.studies.extremes.running import raw
 from springcheck.studies.keeper import How, Keeper, Piece
 
-NUMBERS = 1 << 17
+NUMBERS_PER_ARRAY = 1 << 17
 """Numbers per array of a run: memory does not grow with the number of cells."""
 
 OUTCOMES = ("complete", "diverged", "stopped")
 
 
 def perform(options: Namespace, progress: Progress | None) -> Ensemble:
-    """The work of `springcheck ensemble` and `springcheck run --vary`."""
+    """Carry out `springcheck ensemble` and `springcheck run --vary`."""
     scene = scenefile.load_scene(options.scene)
     text = scenefile.text_of(options.scene)
     cells = plan(options.vary, options.samples, options.seed or 0, text=text)
@@ -47,7 +47,7 @@ def perform(options: Namespace, progress: Progress | None) -> Ensemble:
 def record(
     scene: Scene, cells: Plan, path: str | Path | None, methods: Sequence[str] = (), **how: Unpack[How]
 ) -> Ensemble:
-    """Run every cell by every method and keep its numbers; chunks that are finished are reused.
+    """Run every cell by every method and save its numbers; finished chunks are reused.
 
     Raises SpringcheckError, before anything is run, where a field cannot be varied or no method can serve.
     """
@@ -91,7 +91,7 @@ def _measure(
 
 
 def _joined(chunks: Mapping[str, Columns]) -> dict[str, Columns]:
-    """Chunks by label and number as columns by label."""
+    """Join chunks, given by label and number, into columns by label."""
     found: dict[str, dict[str, list[np.ndarray]]] = {}
     for key in sorted(chunks):
         columns = found.setdefault(key.rpartition("/")[0], {})
@@ -105,7 +105,7 @@ def _joined(chunks: Mapping[str, Columns]) -> dict[str, Columns]:
 
 @keeper.restoring("ensemble")
 def stored(kept: keeper.Kept) -> Ensemble:
-    """The ensemble that `record` has kept.  StoreError where the file holds none."""
+    """The ensemble that `record` has saved.  StoreError where the file holds none."""
     known = kept.document
     return Ensemble(
         scene=kept.scene,
@@ -134,14 +134,14 @@ def measure(scene: Scene, cells: Plan, chunk: int, label: Label) -> Columns:
     for number in range(int(group.max()) + 1):
         mine = np.flatnonzero(group.ravel() == number)
         first = together(scene, changes, mine[:1])
-        size = 1 if engines.method(label).adaptive else max(1, NUMBERS // (first.frames * first.n))
+        size = 1 if engines.method(label).adaptive else max(1, NUMBERS_PER_ARRAY // (first.frames * first.n))
         for start in range(0, len(mine), size):
             _run(scene, changes, mine[start : start + size], label, found)
     return {**values, **found}
 
 
 def _run(scene: Scene, changes: Any, chosen: np.ndarray, label: Label, found: dict[str, Any]) -> None:
-    """Run these cells side by side; where the engine gives up over some, halves find which."""
+    """Run these cells side by side; where the engine stops, bisect to find the cells that stop it."""
     many = together(scene, changes, chosen)
     try:
         q, p, stop = raw(many, label)
@@ -150,7 +150,7 @@ def _run(scene: Scene, changes: Any, chosen: np.ndarray, label: Label, found: di
         if len(chosen) == 1:
             found["outcome"][chosen] = OUTCOMES.index("stopped")
             return
-        # it takes no copies of this scene side by side
+        # the engine refuses copies of this scene side by side
         q, p, stopped = many.q[None], many.p[None], True
     if stopped and len(chosen) > 1:
         half = len(chosen) // 2
@@ -170,14 +170,14 @@ def _run(scene: Scene, changes: Any, chosen: np.ndarray, label: Label, found: di
         error = _errors(scene, changes, chosen, many, q, p)
     held = np.arange(len(q))[:, None] < frames
     drift = np.take_along_axis(drift, np.argmax(np.where(held, np.abs(drift), -1), axis=0)[None], axis=0)[0]
-    # a cell that left no frame but the start has neither: those of the start are nothing
+    # a cell with no frame but the start has neither error nor drift
     left = frames > 1
     found["energy_drift"][chosen] = np.where(left, drift, np.nan)
     found["max_error"][chosen] = np.where(left, np.max(np.where(held, error, 0), axis=0), np.nan)
 
 
 def _of_copies(values: Reals, copies: int) -> Reals:
-    """Sums over what belongs to each copy, (f, copies s) -> (f, copies)."""
+    """Sums over the entries of each copy, (f, copies s) -> (f, copies)."""
     return np.asarray(np.sum(values.reshape(len(values), copies, -1), axis=2))
 
 
@@ -193,7 +193,7 @@ def _energies(many: Scene, q: Reals, p: Reals, copies: int) -> Reals:
 def _solved(
     scene: Scene, changes: Any, chosen: np.ndarray, steps: Integers
 ) -> Iterator[tuple[int, Scene, Extended, Extended]]:
-    """The copies whose exact solution is known by itself: number, scene, q and p (f, n)."""
+    """Copies whose exact solution is known: number, scene, q and p (f, n)."""
     for j in range(len(chosen)):
         one = together(scene, changes, chosen[j : j + 1])
         if exact.has_true_motion(one):
@@ -201,15 +201,13 @@ def _solved(
 
 
 def _drifts(scene: Scene, changes: Any, chosen: np.ndarray, many: Scene, q: Floats, p: Floats) -> Floats:
-    """(H - H0) / |H0| of each copy, absolute where H0 is 0 (f, copies).
-
-    With friction the energy of the exact solution stands for H0, where that is known.
-    """
+    """(H - H0) / |H0| of each copy, absolute where H0 is 0 (f, copies).  With friction or a drive the energy
+    of the exact solution replaces H0, where it is known."""
     copies = len(chosen)
     energy = _energies(many, q, p, copies)
     least, most = np.finfo(np.float64).smallest_normal / np.finfo(np.float64).eps, np.finfo(np.float64).max
     if not np.all((np.abs(energy) > least) & (np.abs(energy) <= most)):
-        # squares beyond the range of double precision, which the states are within
+        # energies overflow or underflow double precision where the states do not
         energy = _energies(many, q.astype(np.longdouble), p.astype(np.longdouble), copies)
     right = np.broadcast_to(energy[0], energy.shape).copy()
     if not many.system.keeps_energy:
@@ -226,7 +224,8 @@ def _drifts(scene: Scene, changes: Any, chosen: np.ndarray, many: Scene, q: Floa
 
 
 def _errors(scene: Scene, changes: Any, chosen: np.ndarray, many: Scene, q: Floats, p: Floats) -> Floats:
-    """Distance of each copy from its exact solution in the energy norm (f, copies); NaN where not known."""
+    """Distance of each copy from its exact solution, relative to the initial energy norm (f, copies); NaN
+    where that is unknown."""
     copies, frames = len(chosen), len(q)
     steps = np.arange(frames) * many.every
     system = many.system

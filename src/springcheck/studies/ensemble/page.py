@@ -32,31 +32,31 @@ TITLES = {
 SIZES = ("max_error", "energy_drift")
 """Quantities drawn by their magnitude, over many powers of ten."""
 
-MOST = 1e3
-"""Largest value of a size relative to the start that a picture shows: beyond it nothing can be read off."""
+MOST_SHOWN_SIZE = 1e3
+"""Largest relative size that a chart shows: beyond it nothing can be read off."""
 
-DRAWN = SIZES
+DRAWN_QUANTITIES = SIZES
 """Quantities that are drawn by default."""
 
 MOST_POINTS, MOST_TILES = 400, 64
-FEW = 100
-"""Points of a curve up to which all are shown as they are."""
-TOGETHER = 9
-"""Fewest random samples that a point or tile puts together, on average."""
+FEW_POINTS = 100
+"""Points up to which a curve shows each of them."""
+FEWEST_BINNED = 9
+"""Fewest random samples in a point or tile, on average."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Line:
-    """Values over one field, by its size; of many cells put together their median and their range."""
+    """Values over one field, in increasing order; bins of many cells have their median and range."""
 
     x: Floats
     y: Floats
     low: Floats
     high: Floats
     joined: bool
-    """Whether neighbours differ in this field alone: else the others differ, too, and no line joins them."""
+    """Whether neighbours differ in this field alone; otherwise no line joins them."""
     fixed: Mapping[str, float]
-    """The other fields of a grid, with their value here."""
+    """Values of the other fields of a grid."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -67,18 +67,18 @@ class Map:
     y: Floats
     values: Floats
     fixed: Mapping[str, float]
-    """The other fields of a grid, with their value here."""
+    """Values of the other fields of a grid."""
 
 
 def _title(quantity: str, scene: Scene) -> str:
-    """The title of a quantity: with friction or a drive the energy is that beside the exact solution's."""
+    """Title of a quantity; with friction or a drive the energy is compared with the exact solution's."""
     if quantity == "energy_drift" and not scene.system.keeps_energy and has_true_motion(scene):
         return "|H - H exact| / |H0| where it is largest"
     return TITLES[quantity]
 
 
 def fields_over(found: Ensemble, over: str | None = None) -> tuple[str, ...]:
-    """The fields that are asked for, else the first one or two.  SpringcheckError where there is none."""
+    """The fields of `over`, or else the first one or two.  SpringcheckError for an unknown field."""
     fields = found.fields[:2] if over is None else tuple(name.strip() for name in over.split(","))
     if not set(fields) <= set(found.fields) or len(fields) != len(set(fields)) or len(fields) > 2:
         raise SpringcheckError(f"--over {over}: one or two of {', '.join(found.fields)} are needed")
@@ -86,7 +86,7 @@ def fields_over(found: Ensemble, over: str | None = None) -> tuple[str, ...]:
 
 
 def reduced(cells: Columns, found: Ensemble, quantity: str, over: Sequence[str]) -> Line | Map:
-    """Cells of one method that are shown; the other fields of a grid have the value in their middle."""
+    """The cells of one method to draw, with the other fields of a grid at their middle value."""
     keep = np.ones(len(cells[quantity]), dtype=bool)
     fixed = {}
     for name in found.fields:
@@ -103,7 +103,7 @@ def reduced(cells: Columns, found: Ensemble, quantity: str, over: Sequence[str])
 
 
 def even_in_logarithm(values: Floats) -> bool:
-    """Whether values are spread over a logarithmic axis rather than over a linear one."""
+    """Whether values are spaced evenly in the logarithm rather than linearly."""
     values = np.unique(values)
     low, high = float(values[0]), float(values[-1])
     if low <= 0 or high < 3 * low:
@@ -115,8 +115,8 @@ def even_in_logarithm(values: Floats) -> bool:
 def _line(x: Floats, y: Floats, fixed: Mapping[str, float], *, joined: bool) -> Line:
     order = np.argsort(x, kind="stable")
     x, y = x[order], y[order]
-    most = MOST_POINTS if joined else len(x) // TOGETHER
-    if len(x) <= max(most, FEW):
+    most = MOST_POINTS if joined else len(x) // FEWEST_BINNED
+    if len(x) <= max(most, FEW_POINTS):
         return Line(x=x, y=y, low=y, high=y, joined=joined, fixed=fixed)
     pieces = [np.array_split(z, min(most, MOST_POINTS)) for z in (x, y)]
     known = [(float(np.median(a)), b[np.isfinite(b)]) for a, b in zip(*pieces, strict=True)]
@@ -127,7 +127,7 @@ def _line(x: Floats, y: Floats, fixed: Mapping[str, float], *, joined: bool) -> 
 
 
 def _map(x: Floats, y: Floats, values: Floats, fixed: Mapping[str, float], *, grid: bool) -> Map:
-    most = MOST_TILES if grid else int(np.clip(np.sqrt(len(values) / TOGETHER), 2, MOST_TILES))
+    most = MOST_TILES if grid else int(np.clip(np.sqrt(len(values) / FEWEST_BINNED), 2, MOST_TILES))
     (us, i), (vs, j) = (_tiles(z, most, grid=grid) for z in (x, y))
     found = np.full(len(us) * len(vs), np.nan)
     good = np.isfinite(values)
@@ -157,7 +157,7 @@ def _tiles(x: Floats, most: int, *, grid: bool) -> tuple[Floats, np.ndarray]:
 
 
 SHADES = 7
-"""Number of shades of a map, from small to large numbers."""
+"""Number of shades of a map, from small to large values."""
 
 SIGNED_SHADES = ("#2166ac", "#67a9cf", "#d1e5f0", "#f7f7f7", "#fddbc7", "#ef8a62", "#b2182b")
 """Shades of a map of numbers of both signs, by Brewer."""
@@ -170,11 +170,11 @@ FIELD_WORDS = {
     "step": ("step h", {"md": "ps", "si": "s"}),
     "steps": ("number of steps", {}),
 }  # fmt: skip
-"""The last part of a field's name in words, and its unit."""
+"""Words for the last part of a field's name, and its unit."""
 
 
 def banks(found: Ensemble, *, quantity: str | None = None, over: str | None = None) -> list[Bank]:
-    """Error and energy, or one `quantity`, over one or two fields: a bank for each.
+    """Charts of error and energy, or of one `quantity`, over one or two fields: a bank for each.
 
     SpringcheckError where there is no such quantity or field.
     """
@@ -182,11 +182,11 @@ def banks(found: Ensemble, *, quantity: str | None = None, over: str | None = No
         close = nearest(quantity, TITLES)
         raise SpringcheckError(f"--quantity {quantity}: {', '.join(TITLES)} can be drawn{close}")
     out, fields = [], fields_over(found, over)
-    for name in DRAWN if quantity is None else (quantity,):
+    for name in DRAWN_QUANTITIES if quantity is None else (quantity,):
         every = (
             (tally.method, reduced(found.of(tally.method), found, name, fields)) for tally in found.tallies
         )
-        # methods without a number are left out
+        # methods without a finite number are left out
         shown = {x: y for x, y in every if np.isfinite(y.y if isinstance(y, Line) else y.values).any()}
         if not shown:
             continue
@@ -228,7 +228,7 @@ def _heading(scene: Scene, quantity: str, over: Sequence[str], shown: Mapping[st
 
 
 def named(field: str, scene: Scene) -> str:
-    """A field as an axis names it: "spring.0.stiffness" is the stiffness k of spring 0."""
+    """Name of a field on an axis: "spring.0.stiffness" is the stiffness k of spring 0."""
     *table, last = field.split(".")
     words, of = FIELD_WORDS.get(last, (last, {}))
     whose = f" of {' '.join(table)}" if table and table[-1].isdigit() else ""
@@ -236,7 +236,7 @@ def named(field: str, scene: Scene) -> str:
 
 
 def _limits(scene: Scene) -> dict[str, float]:
-    """The value of each field at which h omega = 2 on a single spring, where the field changes it."""
+    """Value of each field at which h omega = 2 on a single spring, for the fields that change h omega."""
     walls = [term for term in scene.terms if isinstance(term, WallSpring)]
     if scene.n > 1 or len(scene.terms) != 1 or not walls or len(walls[0]) != 1 or not walls[0].k[0] > 0:
         return {}
@@ -276,16 +276,16 @@ def _lines(scene: Scene, quantity: str, fields: Sequence[str], shown: Mapping[st
 
 
 def _axis(quantity: str, scene: Scene, values: Floats) -> Scale:
-    """The axis of a quantity, cut off where larger values tell nothing."""
+    """The axis of a quantity, truncated where larger values are uninformative."""
     name, good = _title(quantity, scene).partition(",")[0], values[np.isfinite(values)]
     if quantity == "outcome":
         return Scale(name=name, names=OUTCOMES)
     least = good[good > 0]
     low, high = float(np.min(good)), float(np.max(good))
     if low >= 0 and len(least) and high > 100 * (first := float(np.min(least))):
-        return Scale(name=name, log=True, shown=(first / 2, min(2 * high, max(MOST, 4 * first))))
-    if max(-low, high) > MOST:
-        return Scale(name=name, shown=(max(low, -MOST), min(high, MOST)))
+        return Scale(name=name, log=True, shown=(first / 2, min(2 * high, max(MOST_SHOWN_SIZE, 4 * first))))
+    if max(-low, high) > MOST_SHOWN_SIZE:
+        return Scale(name=name, shown=(max(low, -MOST_SHOWN_SIZE), min(high, MOST_SHOWN_SIZE)))
     return Scale(name=name)
 
 
@@ -294,7 +294,7 @@ def _maps(scene: Scene, quantity: str, over: Sequence[str], shown: Mapping[str, 
     charts = []
     for method, one in shown.items():
         rows = np.searchsorted(bounds, one.values, side="right")
-        limit = _across(scene, over, one)
+        limit = _line_of_the_limit(scene, over, one)
         charts.append(
             Chart(
                 title=f"{method}.",
@@ -308,7 +308,7 @@ def _maps(scene: Scene, quantity: str, over: Sequence[str], shown: Mapping[str, 
     return charts
 
 
-def _across(scene: Scene, over: Sequence[str], one: Map) -> list[Curve]:
+def _line_of_the_limit(scene: Scene, over: Sequence[str], one: Map) -> list[Curve]:
     """The line h omega = 2 on a map of stiffness against step, in coordinates of its tiles."""
     if set(over) != set(_limits(scene)):
         return []
@@ -325,17 +325,17 @@ def _across(scene: Scene, over: Sequence[str], one: Map) -> list[Curve]:
 
 
 def _kinds(quantity: str, values: Sequence[Floats]) -> tuple[list[tuple[str, str]], Floats]:
-    """Kinds of numbers, as many as there are shades at most, and the bounds between them."""
+    """Classes of values, at most as many as there are shades, and the bounds between them."""
     every = np.concatenate(values)
     every = every[np.isfinite(every)]
     if quantity == "outcome":
         return list(zip(OUTCOMES, ("good", "limit", "wrong"), strict=False)), np.arange(1.0, len(OUTCOMES))
     if quantity in SIZES:
-        return _decades(np.minimum(every[every > 0], MOST))
+        return _decades(np.minimum(every[every > 0], MOST_SHOWN_SIZE))
     low, high = float(np.min(every)), float(np.max(every))
     shades: Sequence[str] = [f"s{i}" for i in range(SHADES)]
     if low < 0:
-        # a scale to twice the median method's largest value: one that explodes would hide the others
+        # scale to twice the median method's largest value: one that diverges would hide the others
         sizes = sorted(float(np.max(np.abs(x[np.isfinite(x)]), initial=0.0)) for x in values)
         high = min(max(-low, high), 2 * sizes[(len(sizes) - 1) // 2]) or max(-low, high)
         low, shades = -high, SIGNED_SHADES
@@ -345,7 +345,7 @@ def _kinds(quantity: str, values: Sequence[Floats]) -> tuple[list[tuple[str, str
 
 
 def _decades(values: Floats) -> tuple[list[tuple[str, str]], Floats]:
-    """Kinds of numbers by powers of ten, as few as there are shades, and the bounds between them."""
+    """Classes of values by powers of ten, at most one for each shade, and the bounds between them."""
     if not len(values):
         return [("0", "s0")], np.empty(0)
     first, last = (int(np.floor(np.log10(f(values)))) for f in (np.min, np.max))

@@ -15,15 +15,15 @@ from springcheck.studies.tables import Form
 from springcheck.text.wording import count
 
 QUANTITIES = ("max_error", "energy_drift", "steps")
-"""Numbers of each cell that are summed up and drawn: largest distance from the exact solution relative to
-the initial energy norm (NaN where it is not known), (H - H0)/|H0| where it is largest (with friction the
-exact solution's H for H0), and steps with finite numbers."""
+"""Numbers of each cell that are summarised and drawn: largest distance from the exact solution relative to
+the initial energy norm (NaN where it is unknown), (H - H0)/|H0| where it is largest (with friction the exact
+solution's H for H0), and steps with finite numbers."""
 
 Columns = Mapping[str, np.ndarray]
 
 
 class Chunk(Form[Columns]):
-    """Columns as they are: the fields that were varied, and what was found."""
+    """Columns of a chunk: the fields that were varied, and the results."""
 
     def _split(self, found: Columns) -> tuple[dict[str, Any], dict[str, Any]]:
         return dict(found), {}
@@ -41,12 +41,12 @@ CELLS = Chunk(
     "q0, p0: the state at the end of the first particle",
     joined=True,
 )
-"""The table ``ensemble/<label>`` of each method, whose rows are measured and kept chunk by chunk."""
+"""The table ``ensemble/<label>`` of each method, measured and saved chunk by chunk."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tally:
-    """The cells of one method, summed up."""
+    """Summary of the cells of one method."""
 
     method: str
     cells: int = 0
@@ -56,7 +56,7 @@ class Tally:
     """Extremes of each of the `QUANTITIES` over the complete cells."""
 
     def plus(self, found: Columns) -> Tally:
-        """The tally with the cells of another chunk added."""
+        """Copy with the cells of another chunk added."""
         good = found["outcome"] == 0
         low, high = dict(self.smallest), dict(self.largest)
         for name in QUANTITIES:
@@ -79,11 +79,11 @@ class Ensemble(Studied):
 
     scene: Scene
     fields: tuple[str, ...]
-    """What was varied."""
+    """The fields that were varied."""
     grid: bool
     tallies: tuple[Tally, ...]
     columns: Mapping[str, Columns] = field(default_factory=dict)
-    """Where nothing was kept on disk: the cells of each method, in their order."""
+    """The cells of each method, in order, of an ensemble without a store."""
 
     def __repr__(self) -> str:
         cells = f"{count(len(self.tallies), 'method')}, {count(sum(x.cells for x in self.tallies), 'cell')}"

@@ -1,7 +1,7 @@
-"""What is varied: fields of a scene file, over a grid or drawn at random, and the scene of each cell.
+"""Fields of a scene file that are varied, over a grid or at random, and the scene of each cell.
 
-A field is varied in the file itself and the file is read again, so that every field of every term can be
-varied; what that changes in the scene is then put together for all cells at once.
+A field is varied in the file itself, which is read again, so that every field of every term can be varied;
+the resulting changes of the scene are then applied to all cells at once.
 """
 
 from __future__ import annotations
@@ -21,20 +21,20 @@ from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 
 CHUNK = 10_000
-"""Cells that are kept together, and drawn from one state of the random numbers."""
+"""Cells that are saved together, and drawn from one state of the generator."""
 
 CHECKED = 8
-"""Cells of a chunk that are read from the file as a whole, to see that they are what was put together."""
+"""Cells of a chunk that are also read from the file as a whole, and compared."""
 
 MOST_CELLS = 10**8
 
 FORM = "FIELD=LOW:HIGH:COUNT[:log], FIELD=A,B,C, or with --samples FIELD=LOW:HIGH[:log]"
 
 GRID = ("step", "steps", "every", "tolerance")
-"""Numbers that all cells of a run have in common."""
+"""Fields that all cells of a run share."""
 
 Place = tuple[Any, ...]
-"""Where in a scene a number stands: the name of a field, or ("terms", term, field), and the row."""
+"""Position of a number in a scene: the name of a field, or ("terms", term, field), and the row."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,7 +43,7 @@ class Axis:
 
     field: str
     values: tuple[float, ...] = ()
-    """The values of a grid that lists them; empty where they are spaced evenly."""
+    """Values of a grid that are listed; empty where they are spaced evenly."""
     low: float = math.nan
     high: float = math.nan
     count: int = 0
@@ -51,7 +51,7 @@ class Axis:
 
     @property
     def size(self) -> int:
-        """How many values a grid has."""
+        """Number of grid values."""
         return len(self.values) or self.count
 
     def at(self, index: np.ndarray) -> Floats:
@@ -69,16 +69,16 @@ class Plan:
     samples: int | None
     seed: int
     text: str = ""
-    """The scene file in whose fields the axes are named; left out: what the scene writes itself."""
+    """Text of the scene file in which the axes name fields; by default the one that the scene writes."""
 
     @property
     def cells(self) -> int:
-        """How many there are."""
+        """Number of cells."""
         return self.samples if self.samples is not None else math.prod(x.size for x in self.axes)
 
     @property
     def chunks(self) -> range:
-        """Their pieces."""
+        """Indices of the chunks."""
         return range(-(-self.cells // CHUNK))
 
     def values(self, chunk: int) -> dict[str, Floats]:
@@ -98,7 +98,7 @@ class Plan:
 
 
 def plan(given: Sequence[str], samples: int | None = None, seed: int = 0, *, text: str = "") -> Plan:
-    """The plan of `--vary` options.  SpringcheckError where one makes no sense."""
+    """Parse `--vary` options.  SpringcheckError where one is invalid."""
     if not given:
         raise SpringcheckError(f"an ensemble needs --vary {FORM}")
     axes = tuple(_axis(text, random=samples is not None) for text in given)
@@ -147,7 +147,7 @@ def _finite(*values: float) -> None:
 
 
 class Varied:
-    """A scene of which fields are varied, by an option of the command line."""
+    """A scene with varied fields, which an option of the command line names."""
 
     def __init__(self, scene: Scene, plan: Plan, option: str = "--vary") -> None:
         self.scene, self._option = scene, option
@@ -158,7 +158,7 @@ class Varied:
     def substitutions(self, values: Mapping[str, Floats]) -> dict[Place, Floats]:
         """The numbers of the scene that change, with their values in every cell (c,).
 
-        SpringcheckError where a value makes no scene, or two fields change the same number.
+        SpringcheckError where a value gives no valid scene, or two fields change the same number.
         """
         found: dict[Place, Floats] = {}
         numbers = _arrays(self.scene)
@@ -176,7 +176,7 @@ class Varied:
         return found
 
     def _at(self, field: str) -> tuple[Any, Any]:
-        """The table and the key of a field."""
+        """The table that holds a field, and the key in it."""
         found: Any = self._data
         try:
             *parts, last = re.findall(r"[^.\[\]]+", field)
@@ -195,7 +195,7 @@ class Varied:
         return found, key
 
     def whole(self, values: Mapping[str, float]) -> Scene:
-        """The scene with these values in its file.  SpringcheckError where they make no sense."""
+        """The scene with these values in its file.  SpringcheckError where they are invalid."""
         before = []
         try:
             for field, value in values.items():
@@ -214,9 +214,9 @@ class Varied:
                     table[key] = held
 
     def check(self, values: Mapping[str, Floats], changes: Mapping[Place, Floats]) -> None:
-        """Raise SpringcheckError where fields depend on each other, so that cells would differ from the file.
+        """Raise SpringcheckError where fields interact, so that combined changes differ from the file.
 
-        Looked at are the first and the last cell and some between, each read from the file as a whole.
+        The first cell, the last and some between are each read from the file as a whole.
         """
         count = len(next(iter(values.values())))
         for j in sorted({*np.linspace(0, count - 1, CHECKED).astype(int).tolist()}):
@@ -229,7 +229,7 @@ class Varied:
 
 
 def fields(tables: Mapping[str, Any]) -> list[str]:
-    """The fields of a scene file as --vary and --set name them."""
+    """Names of the fields of a scene file, as --vary and --set take them."""
     return [
         f"{name}.{i}.{field}" if isinstance(table, list) else f"{name}.{field}"
         for name, table in tables.items()
@@ -240,7 +240,7 @@ def fields(tables: Mapping[str, Any]) -> list[str]:
 
 
 def _key(table: Any, part: str) -> Any:
-    """The key of this name in a table; ValueError of a row that a list has not, counted from its end too."""
+    """Key of this name in a table, or index into a list; ValueError for an index out of range or negative."""
     return range(len(table)).index(int(part)) if isinstance(table, list) else part
 
 
@@ -261,7 +261,7 @@ def _differences(one: Scene, other: Scene, field: str) -> Iterator[tuple[Place, 
 
 
 def _arrays(scene: Scene) -> dict[Place, np.ndarray]:
-    """All numbers of a scene, by where they stand."""
+    """All numbers of a scene, by their position."""
     names = ("m", "q", "p", *GRID)
     found: dict[Place, np.ndarray] = {(name,): np.atleast_1d(getattr(scene, name)) for name in names}
     for t, term in enumerate(scene.terms):
@@ -270,9 +270,9 @@ def _arrays(scene: Scene) -> dict[Place, np.ndarray]:
 
 
 def together(scene: Scene, changes: Mapping[Place, Floats], chosen: np.ndarray) -> Scene:
-    """The scenes of these cells side by side as one, which do not act on each other.
+    """The scenes of these cells side by side as one, without interaction.
 
-    The cells must be of one time grid.
+    The cells must have one time grid.
     """
     copies = len(chosen)
     many = scene.system.tiled(copies)

@@ -13,28 +13,28 @@ from springcheck.physics.builders import spring
 from springcheck.physics.scene import Scene
 from springcheck.studies.stability.propagators import MASS, STEP
 
-STEPS = 20
+CELL_STEPS = 20
 """Steps of every cell."""
 
-TURNS = (1e-8, 1e-6, 1e-4, 1e-2, 0.1, 1.0, 1.9, 1.99, 2.01, 2.5, 5.0, 10.0)
+CELL_TURNS = (1e-8, 1e-6, 1e-4, 1e-2, 0.1, 1.0, 1.9, 1.99, 2.01, 2.5, 5.0, 10.0)
 """h w of the plane of forces."""
 
-DECADES = (
+FORCE_DECADES = (
     -300, -200, -150, -100, -50, -40, -30, -20, -15, -12, -11, -10, -9, -8, -7, -6, -5, -4, -3, -2, -1, 0,
     1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 15, 20, 30, 40, 50, 100, 150, 200, 300,
 )  # fmt: skip
-"""Powers of ten of the largest force of the start, in the scene's unit: closer where engines differ."""
+"""Powers of ten of the largest initial force, in the scene's unit: denser where engines differ."""
 
-SIZES = (-300, -200, -100, -30, -10, 0, 10, 30, 100, 200, 300)
+SIZE_DECADES = (-300, -200, -100, -30, -10, 0, 10, 30, 100, 200, 300)
 """Powers of ten of masses and stiffnesses."""
 
-STRETCH = (-300, -150, -100, -30, -10, -3, 0, 3, 10, 30, 100, 150, 300)
+STEP_DECADES = (-300, -150, -100, -30, -10, -3, 0, 3, 10, 30, 100, 150, 300)
 """Powers of ten of steps."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Spec:
-    """One spring, one start, one step, one length: a cell before it is run."""
+    """Parameters of a cell: one spring, one start, one step, one length."""
 
     block: str
     m: float
@@ -42,18 +42,18 @@ class Spec:
     q: float
     p: float
     h: float
-    steps: int = STEPS
+    steps: int = CELL_STEPS
     tolerance: float = 1e-9
 
     @property
     def finite(self) -> bool:
-        """Whether every number is one that a scene may hold."""
+        """Whether a scene may hold all these numbers."""
         numbers = (self.m, self.k, self.q, self.p, self.h)
         return bool(np.all(np.isfinite(numbers))) and self.m > 0 and self.h != 0
 
     @property
     def force(self) -> float:
-        """Force of the start, or what the momentum would build up to."""
+        """Scale of the initial force: the larger of k |q| and w |p|."""
         with np.errstate(all="ignore"):
             k, m = np.longdouble(abs(self.k)), np.longdouble(self.m)
             return float(max(k * abs(self.q), np.sqrt(k / m) * abs(self.p)))
@@ -76,12 +76,12 @@ def specs(*, quick: bool = False) -> list[Spec]:
 
 def _forces() -> Iterator[Spec]:
     """The plane of h w and force."""
-    for turn, decade in itertools.product(TURNS, DECADES):
+    for turn, decade in itertools.product(CELL_TURNS, FORCE_DECADES):
         yield force_cell(turn, decade)
 
 
 def force_cell(turn: float, decade: int) -> Spec:
-    """A cell of that plane: mass and step stay, amplitude = force / k."""
+    """A cell of that plane: mass and step are fixed, amplitude = force / k."""
     k = MASS * (turn / STEP) ** 2
     q = float(np.float64(10.0**decade) / np.float64(k))
     return Spec(block="force", m=MASS, k=k, q=q, p=0.6 * MASS * (turn / STEP) * q, h=STEP)
@@ -89,7 +89,7 @@ def force_cell(turn: float, decade: int) -> Spec:
 
 def sizes() -> Iterator[Spec]:
     """The plane of mass and stiffness at h w = 0.3, amplitude 1."""
-    for a, b in itertools.product(SIZES, SIZES):
+    for a, b in itertools.product(SIZE_DECADES, SIZE_DECADES):
         m, k = 3.7 * 10.0**a, 2.9 * 10.0**b
         # a power of 2, so that cells of one ratio share a step
         w = float(2.0 ** np.round(np.log2(2.9 / 3.7) / 2 + (b - a) / 2 * np.log2(10)))
@@ -98,14 +98,14 @@ def sizes() -> Iterator[Spec]:
 
 def steps() -> Iterator[Spec]:
     """Steps of every size and both signs at h w = 0.3, and free motion where no stiffness is large enough."""
-    for decade, sign in itertools.product(STRETCH, (1, -1)):
+    for decade, sign in itertools.product(STEP_DECADES, (1, -1)):
         h = sign * 3.1 * 10.0**decade
         k = 3.7 * np.float64(0.3 / 3.1 / 10.0 ** np.float64(decade)) ** 2
         yield Spec(block="step", m=3.7, k=float(k) if np.isfinite(k) else 0.0, q=0.8, p=0.0, h=h)
 
 
 def special() -> Iterator[Spec]:
-    """k = 0, k < 0, nothing at all, the smallest and the largest numbers; all with one step."""
+    """k = 0, k < 0, a state of rest, the smallest and the largest numbers; all with one step."""
     for k, q, p in (
         (0.0, 0.3, 0.7), (0.0, 0.0, 0.0), (0.0, 1e300, 1e300), (0.0, 1e-300, 1e-300), (2.9, 0.0, 0.0),
         (2.9, 0.0, 0.7), (2.9, 0.3, 0.0), (-2.9, 0.3, 0.7), (-2.9, 0.0, 0.0), (-1e-300, 0.3, 0.7),
@@ -124,7 +124,7 @@ def scene(cells: list[Spec], label: Label, requires: frozenset[Need]) -> Scene:
     m = np.array([x.m for x in cells])
     c = None
     if Need.DAMPING in requires:
-        # the method is there for friction: h c/m = 1/80
+        # methods that require damping get friction: h c/m = 1/80
         rate = min(0.0125 / abs(first.h), 1e300) if first.h > 0 else 0.0
         with np.errstate(over="ignore", under="ignore"):
             c = np.where(first.block == "force", np.minimum(rate * m, 1e300), 0.0)

@@ -1,9 +1,9 @@
-"""One cell's outcome: its steps against the scheme's own, and a named reason where one is off.
+"""Outcome of a cell: each step compared with the scheme's own, and a named reason where one deviates.
 
-Every step from a finite state is judged by itself, in extended precision, whose range (1e4932) holds what
-leaves double's.  A step that is off its bound needs a reason that holds for this very cell: an
-intermediate result outside the range of the engine's numbers, or its fixed-point sum of forces.  A step
-that is off without a reason makes the cell silently wrong.
+Every step from a finite state is judged separately, in extended precision, whose range (1e4932) holds numbers
+that overflow double precision.  A step beyond its bound needs a reason that applies to this very cell: an
+intermediate result outside the range of the engine's numbers, or its fixed-point sum of forces.  A deviation
+without a reason makes the cell silently wrong.
 """
 
 from __future__ import annotations
@@ -26,17 +26,17 @@ Outcome: TypeAlias = Literal[
     "right", "unstable, as theory says", "engine's limit", "silently wrong", "not measured"
 ]
 
-GROWN = 2.0
+UNSTABLE_GROWTH = 2.0
 """Growth of the amplitude over a run from which a cell is called unstable."""
 
-DIGITS = 2.0**-24
-"""A fixed-point sum serves a force that it resolves to single precision at least."""
+FORCE_RESOLUTION = 2.0**-24
+"""Relative resolution that a fixed-point sum must reach to represent a force: single precision's."""
 
 RANGES = {
     "double": (2.0**-1022, float(np.finfo(np.float64).max)),
     "single": (2.0**-126, 3.4028234663852886e38),
 }
-"""Smallest normal and largest number of a width."""
+"""Smallest normal and largest number of each precision."""
 
 
 PARAMETERS = ("m", "k", "q", "p", "h", "steps", "h_w", "force")
@@ -79,22 +79,22 @@ def cell(
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Sizes:
-    """Sizes of what a step forms along the way, over the pair of frames (f-1, n), extended precision."""
+    """Magnitudes of a step's intermediate results over the pair of frames (f-1, n), extended precision."""
 
     largest: Extended
     smallest: Extended
     force: Extended
     moved: Floats
-    """How far the engine moves the position, by forces that it may have cached."""
+    """Displacement by the engine, whose forces may be cached."""
 
 
 def sizes(
     label: Label, scene: Scene, start: tuple[Floats, Floats], end: tuple[Extended, Extended], moved: Floats
 ) -> Sizes:
-    """Intermediates of a step from states q, p (f-1, n) to their exact successors.
+    """Intermediate results of a step from states q, p (f-1, n) to their exact successors.
 
-    Whatever order an engine works in, it forms positions, momenta, velocities, forces, accelerations and
-    the changes that they make.  An engine that squares lengths of bonds also forms 1/m and 1/h.
+    In whatever order an engine works, it forms positions, momenta, velocities, forces, accelerations and
+    their increments.  An engine that squares lengths of bonds also forms 1/m and 1/h.
     """
     m = scene.m.astype(np.longdouble)
     h = np.abs(np.longdouble(scene.step))
@@ -115,10 +115,10 @@ def sizes(
 def judge(
     label: Label, specs: Sequence[Spec], scene: Scene, q: Floats, p: Floats, stop: Stopped | None
 ) -> list[Cell]:
-    """Cells of one run: q, p (f, n) as the engine left them, not finite where it went there or stopped."""
+    """Cells of one run: q, p (f, n) as the engine left them, non-finite where it overflowed or stopped."""
     how, alone = engines.arithmetic(label), len(specs) == 1
     if stop and not alone:
-        # whose step was not taken is not known
+        # which cell stopped the engine is unknown
         q, p = q[:-1], p[:-1]
     with np.errstate(all="ignore"):
         case = checks.Case(trajectory=as_trajectory(label, scene, q, p, how), scene=scene)
@@ -137,7 +137,7 @@ def judge(
         here = from_finite[:, i]
         bad = here & ~(ratio[:, i] <= bound)
         value = float(np.max(np.where(here, np.minimum(ratio[:, i], 1e300), 0), initial=0.0))
-        unstable = bool(growth[i] * spec.steps >= np.log(GROWN)) and spec.k > 0
+        unstable = bool(growth[i] * spec.steps >= np.log(UNSTABLE_GROWTH)) and spec.k > 0
         j = int(np.argmax(bad)) if bad.any() else len(bad)
         outcome: Outcome = "silently wrong"
         reason = f"step {j + 1} is off by {value:.3g} roundings of {bound:g}"
@@ -145,9 +145,9 @@ def judge(
             reason = f"stopped for no reason that is known here: {stop}"
         if not bad.any() and not stop:
             outcome, reason = "unstable, as theory says" if unstable else "right", ""
-            # a force that grows is small at first
+            # an unstable force is small at first
             peak = float(inside.force[0, i] if unstable else np.max(inside.force[:, i], initial=0))
-            coarse = how.quantum > DIGITS * peak > 0
+            coarse = how.quantum > FORCE_RESOLUTION * peak > 0
             if np.any(here & ~(strict[:, i] <= bound)):
                 outcome, reason = "engine's limit", f"numbers below {low:.1e} lose digits to underflow"
             elif coarse:
@@ -169,7 +169,7 @@ def judge(
 def _reason(
     how: Arithmetic, spec: Spec, inside: Sizes, i: int, bad: np.ndarray, low: float, high: float, far: float
 ) -> str | None:
-    """A reason that holds at every step that is off, or None."""
+    """A reason that applies to every step that deviates, or None."""
     if how.parameters == "single":
         with np.errstate(over="ignore", under="ignore"):
             kept = abs(np.float32(spec.k))
@@ -179,7 +179,7 @@ def _reason(
     reasons = {
         overflows(how): inside.force[bad, i] >= how.overflow,
         f"fixed-point forces: a quantum of {how.quantum:.1e} leaves too few digits": np.full(
-            len(bad), how.quantum > DIGITS * peak
+            len(bad), how.quantum > FORCE_RESOLUTION * peak
         ),
         keeps(how): least_moved(inside.moved[:, i])[bad] <= 2 * how.stale,
         f"a joint of length {far:.3g} is passed": how.joints & (inside.force[bad, i] >= abs(spec.k) * far),
@@ -196,7 +196,7 @@ def _reason(
 
 
 def _largest(dq: Extended, dp: Extended, of_q: Extended, of_p: Extended) -> Extended:
-    """The larger of dq/of_q and dp/of_p; nothing off nothing is 0, and what is not a number is infinite."""
+    """The larger of dq/of_q and dp/of_p; 0/0 counts as 0, and NaN as infinite."""
     parts = [np.where(d == 0, 0, d / np.where(of > 0, of, 0)) for d, of in ((dq, of_q), (dp, of_p))]
     ratio = np.maximum(*parts)
     return np.asarray(np.where(np.isnan(ratio), np.inf, ratio))
@@ -206,7 +206,7 @@ def growth_of(case: checks.Case, scene: Scene) -> Floats:
     """Logarithm of the spectral radius of each cell's own one-step matrix."""
     k = scene.system.hessian_diagonal(scene.q)
     w = np.sqrt(np.abs(k) / scene.m.astype(np.longdouble))
-    # in units of the period, so that no entry leaves the range
+    # in units of the period, so that no entry overflows
     turn = np.abs(np.longdouble(scene.step)) * w
     matrices = schemes.matrix(case.scheme, h=1.0, m=np.ones(scene.n), k=turn * turn * np.sign(k))
     found = schemes.rotation(matrices)
@@ -215,7 +215,7 @@ def growth_of(case: checks.Case, scene: Scene) -> Floats:
 
 
 def as_trajectory(label: Label, scene: Scene, q: Floats, p: Floats, how: Arithmetic) -> Trajectory:
-    """Frames as a trajectory that `checks.Case` takes, whatever its numbers are."""
+    """Frames as a trajectory for `checks.Case`, with non-finite numbers too."""
     method = engines.method(label)
     return of_scene(
         scene, q, p, label=str(label), scheme=method.scheme, arithmetic=how,

@@ -1,7 +1,8 @@
 """The atlas of extreme cases: every method over the decades, every cell with an outcome and its reason.
 
-A cell is right (each step within its bound), unstable as theory says, or at the engine's limit (off, and we
-say why).  A cell that is off without a named reason is silently wrong, and fails the study.
+A cell is right (each step within its bound), unstable as theory predicts, or at the engine's limit (a
+deviation with a named reason).  A deviation without a reason makes a cell silently wrong, and fails the
+study.
 """
 
 from __future__ import annotations
@@ -34,20 +35,20 @@ def everything() -> tuple[str, ...]:
     return ("*", *places)
 
 
-CALM = (0.01, 1.9)
-"""h w that count for a window: below, amplitudes decide and hardly any force shows; beyond, stability."""
+CALM_TURNS = (0.01, 1.9)
+"""h w that count for a window: below, hardly any force shows; beyond, stability decides."""
 
 
 def record(
     path: str | Path | None = None, methods: Sequence[str] = (), *, quick: bool = False, **how: Unpack[How]
 ) -> Atlas:
-    """Run the atlas for these labels or globs; left out: every method, and OpenMM's platforms.
+    """Run the atlas for these labels or globs; by default for every method, and for OpenMM's platforms.
 
     A store has a table for each method, and the document (see `keeper.kept`).
 
     Raises:
         MethodError: a label names nothing, or none of the methods is here.
-        SpringcheckError: nothing here has the range to judge numbers at the ends of double's.
+        SpringcheckError: long double has no range beyond double's, by which to judge numbers at its ends.
     """
     if not WIDE:
         raise SpringcheckError(
@@ -63,7 +64,7 @@ def record(
 
 
 def measure(labels: Sequence[Label], kept: Keeper, *, quick: bool = False) -> Atlas:
-    """The cells of these methods, as far as no earlier call has kept them."""
+    """The cells of these methods; those that an earlier call has saved are not measured again."""
     usable, left_out = sorted_out(labels, absence, "has extreme cases here")
     pieces = each(usable, "", lambda label: partial(of_method, label, quick=quick), CELLS)
     work = [replace(piece, cost=_cost(label)) for label, piece in zip(usable, pieces, strict=True)]
@@ -72,7 +73,7 @@ def measure(labels: Sequence[Label], kept: Keeper, *, quick: bool = False) -> At
 
 
 def _cost(label: Label) -> float:
-    """About how long the cells of a method take beside those of another: a platform takes contexts."""
+    """Estimated cost of the cells of a method, relative to others: platforms take contexts."""
     return 100.0 if label.platform not in ("", "Reference") else 1.0
 
 
@@ -87,14 +88,14 @@ def absence(label: Label) -> str | None:
 
 
 def perform(options: Namespace, progress: Progress | None) -> Atlas:
-    """What `springcheck extremes` does."""
+    """Carry out `springcheck extremes`."""
     how = keeper.how(options, progress)
     return record(options.output or "extremes.h5", options.method, quick=options.quick, **how)
 
 
 @keeper.restoring("extremes")
 def stored(kept: keeper.Kept) -> Atlas:
-    """The atlas that `record` has kept.  StoreError where the file holds none."""
+    """The atlas that `record` has saved.  StoreError where the file holds none."""
     known = kept.document
     return Atlas(
         cells=tuple(cell for name in known["tables"] for cell in CELLS.found(kept.tables[name])),
@@ -109,20 +110,20 @@ def of_method(label: Label, *, quick: bool = False) -> list[Cell]:
 
 
 def groups(label: Label, *, quick: bool = False) -> list[list[grid.Spec]]:
-    """Cells of one method of fixed step that can run side by side."""
+    """Groups of cells of one method of fixed step that can run side by side."""
 
     def together(spec: grid.Spec) -> tuple[str, float]:
         return spec.block, spec.h
 
     found = [list(group) for _, group in groupby(sorted(grid.specs(quick=quick), key=together), together)]
     if label.platform not in ("", "Reference"):
-        # a context costs such a platform a quarter of a second: the groups with the most cells
+        # a context of such a platform takes a quarter of a second: only the groups of most cells
         found = sorted(found, key=len)[-3 if quick else -24 :]
     return found
 
 
 def windows(cells: Sequence[Cell]) -> list[Window]:
-    """For each method the decades of force around 1 to 1e6 in which every calm cell is right."""
+    """Decades of force around 1 to 1e6 in which a method's cells within `CALM_TURNS` are all right."""
     found = []
     for method in dict.fromkeys(cell.method for cell in cells):
         calm: dict[int, list[bool]] = {}
@@ -130,7 +131,7 @@ def windows(cells: Sequence[Cell]) -> list[Window]:
             if (
                 cell.method == method
                 and cell.block == "force"
-                and CALM[0] * 0.999 < cell.parameters["h_w"] < CALM[1] * 1.001
+                and CALM_TURNS[0] * 0.999 < cell.parameters["h_w"] < CALM_TURNS[1] * 1.001
             ):
                 calm.setdefault(cell.decade, []).append(cell.outcome in RIGHT)
         right = {x: all(calm[x]) for x in sorted(calm)}

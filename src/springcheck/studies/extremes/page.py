@@ -21,8 +21,8 @@ SHADES = {
 
 
 def _filled(row: list[int]) -> list[int]:
-    """A row of outcomes, each cell as wide as the distance to the next one that was tried: a coarse grid has
-    other forces in every row."""
+    """A row of outcomes, each cell extended half-way to the next one tried: a coarse grid has other forces in
+    every row."""
     tried = np.flatnonzero(np.asarray(row) >= 0)
     if len(tried) < 2:
         return row

@@ -17,7 +17,7 @@ from springcheck.studies.tables import Rows
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Window:
-    """The forces between which a method is right at every h w in `CALM`, as decades of the scene's unit."""
+    """Range of forces in which a method is right at all h w of `CALM_TURNS`, in decades of the unit."""
 
     method: str
     sentence: str
@@ -27,7 +27,7 @@ class Window:
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Atlas(Studied):
-    """All cells, the windows, and the methods that are not here; a row of its table is a cell."""
+    """All cells, the windows, and the methods left out; a row of its table is a cell."""
 
     table_of: ClassVar[str] = "cells"
 
@@ -64,7 +64,7 @@ class Atlas(Studied):
         )  # fmt: skip
 
     def kept_document(self, tables: Sequence[str]) -> dict[str, Any]:
-        """The tables in place of the cells, which they hold exactly."""
+        """The document with the names of tables in place of the cells, which these hold exactly."""
         return {"tables": tables, **{key: x for key, x in self.document().items() if key != "cells"}}
 
 

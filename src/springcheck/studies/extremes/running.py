@@ -1,4 +1,4 @@
-"""Running cells: many of one step in one run, as far as an engine that gives up lets them."""
+"""Runs of cells: many of one step in one run, as far as an engine that stops allows it."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from springcheck.studies.extremes.judging import Cell
 
 
 def raw(scene: Scene, label: Label) -> tuple[Floats, Floats, Stopped | None]:
-    """Every frame as the engine leaves it, the start first, finite or not, and how it stopped if it did: the
-    frame that it did not reach is then the last, and is no number.
+    """Every frame as the engine left it, from the start on, finite or not, and how the engine stopped, if it
+    did: the frame that it did not reach is then the last, NaN.
 
-    The driver ends a run at the first number that is not finite; here that is one cell among many.
+    The driver ends a run at the first non-finite number; here that is one cell among many.
     """
     with np.errstate(all="ignore"):
         started = engines.load(label.engine).start(scene, engines.method(label), label, scene.step)
@@ -45,14 +45,14 @@ def cells(label: Label, specs: Sequence[Spec]) -> list[Cell]:
         q, p, stop = raw(scene, label)
     except MethodError as error:
         if half:
-            # it may refuse all for the sake of one
+            # the engine may refuse all because of one
             return cells(label, specs[:half]) + cells(label, specs[half:])
         return [judging.cell(label, specs[0], "engine's limit", f"it refuses: {error}")]
     found = judging.judge(label, specs, scene, q, p, stop)
     if len(specs) == 1:
         return found
     if stale := engines.arithmetic(label).stale:
-        # in company of a larger motion an engine computes forces anew that it would keep for the cell alone
+        # beside a larger motion an engine recomputes forces that it would reuse for the cell alone
         with np.errstate(invalid="ignore"):
             # a state that has overflowed (inf or nan) does not count as slow
             slow = np.any(np.abs(np.diff(q, axis=0)) <= 2 * stale, axis=0)
@@ -62,7 +62,7 @@ def cells(label: Label, specs: Sequence[Spec]) -> list[Cell]:
         ]
     if not stop:
         return found
-    # the engine gave up over some: those that had left its numbers are done, the others run again
+    # the engine stopped: cells with a reason are done, the others run again
     over = [x.outcome not in ("silently wrong", "right") and bool(x.reason) for x in found]
     if not any(over) or all(over):
         return cells(label, specs[:half]) + cells(label, specs[half:])

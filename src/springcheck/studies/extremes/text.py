@@ -15,7 +15,7 @@ SHORT = {
     "engine's limit": "limit",
     "silently wrong": "wrong",
 }
-"""Outcomes, and their columns."""
+"""Outcomes, and the titles of their columns."""
 
 
 def lines(atlas: Atlas, options: Namespace | None = None) -> Lines:

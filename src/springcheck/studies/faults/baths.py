@@ -1,4 +1,4 @@
-"""Thermostats that are right but for their draws, their seeds, their numbers or their stages."""
+"""Thermostats with wrong draws, seeds, parameters or stages."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ from springcheck.thermal.catalogue import Act
 from springcheck.thermal.stepper import forces
 
 Draws: TypeAlias = Callable[[Sequence[Floats]], Any]
-"""Right draws so far, each (n,) and the last one due -> what is used in place of the last."""
+"""Correct draws so far, each (n,), the last one due -> the draw that is used in place of the last."""
 
 OF_THERMOSTATS: tuple[str, ...] = (*(one.name for one in checks.RANDOM), *(one.name for one in SEEDED))
-"""What judges thermostats."""
+"""Names of the checks that judge thermostats."""
 
 
 def springs(n: int, *, name: str = "bath", steps: int = 1200) -> Scene:
-    """Unlike particles on unlike springs in a bath: nothing is 1."""
+    """Unequal particles on unequal springs in a bath; no parameter is 1."""
     m, k = np.geomspace(0.7, 9.0, n), np.geomspace(5.0, 1.9, n)
     walls = WallSpring(i=np.arange(n), k=k, at=np.zeros(n))
     return Scene(
@@ -43,7 +43,7 @@ def springs(n: int, *, name: str = "bath", steps: int = 1200) -> Scene:
 
 
 def subject(fault: Fault, size: float | None, scene: Scene | None = None, seed: int = 20261122) -> Seeded:
-    """A fault as what experiments with seeds look at, on three springs or another scene."""
+    """A fault as subject of the experiments with seeds, on three springs or another scene."""
     return Seeded(
         scene=scene or springs(3), label=fault.name, seed=seed,
         play=partial(fault.run, size=size),
@@ -55,9 +55,8 @@ def played(
     seed: Callable[[Any], Any] = lambda seed: seed, hold: Rods | None = None, h: float = 1.0,
     m: Floats | float = 1.0, k: float = 1.0, rate: float = 1.0, thermal: float = 1.0, collision: float = 1.0,
 ) -> Trajectory:  # fmt: skip
-    """A thermostat with other draws, under another scheme (by name, or by its stages), from another seed,
-    with other rods, or with other numbers: factors of the step, masses, forces, friction, kT and the chance
-    of a collision."""
+    """A thermostat with other draws, another scheme (by name, or by its stages), another seed, other rods, or
+    other parameters: factors of the step, masses, forces, friction, kT and the probability of a collision."""
     scene, claims = c.scene, THERMOSTATS[c.scheme.name]
     assert scene.bath is not None
     of = THERMOSTATS[runs or claims.name] if isinstance(runs, str) else replace(
@@ -71,7 +70,7 @@ def played(
         freedoms=claims.freedoms(scene.n, scene.particles),
         hold=hold or scene.system.rods,
     )  # fmt: skip
-    # a script of draws stands for every generator
+    # a scripted generator replaces every other
     source = c.seed if hasattr(c.seed, "standard_normal") else seed(c.seed)
     rng = source if hasattr(source, "standard_normal") else np.random.default_rng(source)
     right: list[Floats] = []
@@ -100,12 +99,12 @@ def played(
 
 
 def by(factor: Any) -> Draws:
-    """Draws that are too large by a factor."""
+    """Draws too large by a factor."""
     return lambda right: right[-1] * factor
 
 
 def of_rank(change: Callable[[Floats], Any]) -> Draws:
-    """Draws of another distribution: of a number in (0, 1) that is uniform."""
+    """Draws of another distribution, by a function of uniform numbers in (0, 1)."""
 
     def draws(right: Sequence[Floats]) -> Any:
         from scipy.special import ndtr
@@ -129,7 +128,7 @@ def forgetting(scene: Scene) -> float:
 
 
 class Row:
-    """One stream of numbers for all seeds, each of which begins at its own place."""
+    """One stream of numbers for all seeds, each of which starts at an offset of its own."""
 
     def __init__(self, seed: Any) -> None:
         self._rng, self._at, self._ahead = np.random.default_rng(1), int(seed) % 1000, np.empty(0)
@@ -144,12 +143,12 @@ class Row:
 
 
 class Each:
-    """A generator of its own for each particle, of the seed and the number of the particle."""
+    """A generator for each particle, seeded by the seed plus the number of the particle."""
 
     def __init__(self, seed: Any) -> None:
         self._seed, self._rngs = int(seed), list[np.random.Generator]()
 
     def standard_normal(self, n: int) -> Floats:
-        """One number of each."""
+        """One number from each generator."""
         self._rngs = self._rngs or [np.random.default_rng(self._seed + i) for i in range(n)]
         return np.array([rng.standard_normal() for rng in self._rngs])

@@ -1,4 +1,4 @@
-"""The study of the faults: what rejects each of them, and how small it may be."""
+"""The study of the faults: which checks reject each of them, and from which size on."""
 
 from __future__ import annotations
 
@@ -56,27 +56,27 @@ SCENES: Mapping[str, Callable[[], Scene]] = {
     "bath": lambda: baths.springs(40),
     "wide bath": lambda: baths.springs(250),
 }  # fmt: skip
-"""The scenes of the faults: no mass, stiffness, rest point or step that is 1, h w about 0.1."""
+"""The scenes of the faults: no mass, stiffness, rest point or step is 1, and h w is about 0.1."""
 
 
 @cache
 def scene(where: str) -> Scene:
-    """One of them, by its name.  SceneError where there is none."""
+    """A scene by its name.  SceneError where there is none."""
     if where not in SCENES:
         raise SceneError(f"a fault's scene {where!r} is none of {', '.join(SCENES)}{nearest(where, SCENES)}")
     return replace(SCENES[where](), name=where)
 
 
-SLOW = frozenset(check.name for check in checks.THOROUGH if check.family == "law")
-"""Experiments that do not look at the scene, and take most of the time."""
+SLOW_CHECKS = frozenset(check.name for check in checks.THOROUGH if check.family == "law")
+"""Experiments that do not depend on the scene, and take most of the time."""
 SMALLEST, LARGEST = 1e-20, 0.3
 """Sizes between which a detection limit is looked for."""
-HALVINGS = 4
+DECADE_HALVINGS = 4
 """Halvings of a decade: limits are known to a factor 10**(1/16) = 1.15."""
 
 
 Passed = Callable[[str, float | None], bool | None]
-"""Whether a fault of this size passes this check; None where that does not apply."""
+"""Check and size -> whether a fault of this size passes; None where the check does not apply."""
 
 
 def checks_of(fault: Fault) -> tuple[str, ...]:
@@ -85,7 +85,7 @@ def checks_of(fault: Fault) -> tuple[str, ...]:
 
 
 def probe(fault: Fault) -> Passed:
-    """One fault on its scene, judged at any size; what is computed once is kept."""
+    """Verdicts on one fault on its scene, at any size; cached."""
     where = scene(fault.scene)
 
     @cache
@@ -108,7 +108,7 @@ def probe(fault: Fault) -> Passed:
 
 
 def smallest(passed: Passed, check: str, size: float) -> float | None:
-    """The smallest size that the check rejects, by bisection from one on; None where it rejects none."""
+    """Smallest size that the check rejects, by bisection from `size`; None where it rejects none."""
     seen = passed(check, size) is False
     while SMALLEST < size < LARGEST:
         following = size / 10 if seen else size * 10
@@ -118,7 +118,7 @@ def smallest(passed: Passed, check: str, size: float) -> float | None:
     else:
         return None
     low, high = sorted((size, following))
-    for _ in range(HALVINGS):
+    for _ in range(DECADE_HALVINGS):
         middle = float(np.sqrt(low * high))
         if passed(check, middle) is False:
             high = middle
@@ -143,7 +143,7 @@ def examine(fault: Fault, *, limits: bool = True) -> Result:
     found: dict[str, float] = {}
     if limits and fault.size is not None:
         for name in every:
-            if passed(name, fault.size) is None or (name in SLOW and name not in fault.caught_by):
+            if passed(name, fault.size) is None or (name in SLOW_CHECKS and name not in fault.caught_by):
                 continue
             limit = smallest(passed, name, fault.size)
             if limit is not None:
@@ -159,12 +159,12 @@ def examine(fault: Fault, *, limits: bool = True) -> Result:
 
 
 def perform(options: Namespace, progress: Progress | None) -> FaultReport:
-    """What `springcheck faults` does."""
+    """Carry out `springcheck faults`."""
     return record(options.output, **keeper.how(options, progress))
 
 
 def record(path: str | Path | None = None, **how: Unpack[How]) -> FaultReport:
-    """All faults and their limits, kept in a store where there is a path."""
+    """Examine all faults and their detection limits, with a store where there is a path."""
     pieces = [
         Piece(key=one.name, what=one.name, measure=partial(_examine, one.name), form=RESULTS)
         for one in FAULTS
@@ -180,7 +180,7 @@ def record(path: str | Path | None = None, **how: Unpack[How]) -> FaultReport:
 
 @keeper.restoring("faults")
 def stored(kept: keeper.Kept) -> FaultReport:
-    """The study that a store holds: its document has everything."""
+    """The study that a store holds, from its document alone."""
     known = kept.document
     limits = known["limits"]
     results = tuple(Result(**one, limits=limits.get(one["name"], {})) for one in known["faults"])

@@ -16,7 +16,7 @@ KINDS = (
 
 
 ROWS_OF_A_MAP, MAPS_BESIDE = 60, 3
-"""Faults up to which one map holds all; maps of more, side by side."""
+"""Most faults in one map, and the number of maps, side by side, of more."""
 
 
 def banks(found: FaultReport) -> list[Bank]:
@@ -38,14 +38,14 @@ def banks(found: FaultReport) -> list[Bank]:
 
 
 def _checks(results: Sequence[Result]) -> list[str]:
-    """The checks that see any of these faults, or should."""
+    """The checks that reject any of these faults, or should."""
     return list(
         dict.fromkeys(name for one in results for name in (*one.rejected_by, *one.missed_by, *one.limits))
     )
 
 
 def _map(part: Sequence[Result], *, many: bool) -> Chart:
-    """Some of the faults, the first one above, and the checks that see any of them."""
+    """Some of the faults, the first one above, and the checks that reject any of them."""
     checks, results = _checks(part), part[::-1]
     of = f": {part[0].name} to {part[-1].name}" if many else ""
     return Chart(
@@ -70,7 +70,7 @@ def _heading(found: FaultReport, checks: int) -> str:
 
 
 def _limits(results: Sequence[Result]) -> Bank:
-    """A row a fault, a mark for each check that sees it, where it begins to; the sharpest is named."""
+    """A row for each fault, a mark at the detection limit of each check; the most sensitive one is named."""
     shown = [one for one in results if one.limits]
     points = [
         (size, float(j), name)

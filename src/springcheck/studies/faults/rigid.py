@@ -1,5 +1,5 @@
-"""Faults of engines that keep lengths: SHAKE and RATTLE of one dumbbell in a plane, written out, and the rods
-of a triangle solved wrongly."""
+"""Faults of engines with constraints: SHAKE and RATTLE of one dumbbell in a plane, written out, and wrong
+solutions for the rods of a triangle."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from springcheck.studies.faults.seeded import Case, Fault, braked, each, single
 from springcheck.studies.faults.steppers import State, Step, textbook
 
 Solver: TypeAlias = Callable[[Reals, Reals, float], Reals]
-"""(r, s, length) -> by which part of r the way s is brought back to the length."""
+"""(r, s, length) -> the multiplier k with which s + k r has the length."""
 
 
 def quadratic(r: Reals, s: Reals, length: float) -> Reals:
@@ -27,7 +27,7 @@ def quadratic(r: Reals, s: Reals, length: float) -> Reals:
 
 
 def iterated(rounds: int, part: float = 1.0, enough: float = 0.0) -> Solver:
-    """So many rounds of SHAKE's own iteration, each of which takes this part of what is lacking, until the
+    """So many rounds of SHAKE's own iteration, each of which applies `part` of the correction, until the
     length is right to a relative tolerance."""
 
     def solve(r: Reals, s: Reals, length: float) -> Reals:
@@ -44,15 +44,15 @@ def iterated(rounds: int, part: float = 1.0, enough: float = 0.0) -> Solver:
 
 @dataclass(frozen=True, kw_only=True)
 class Rattle:
-    """One step of RATTLE for a dumbbell, each part of it open to a fault."""
+    """One step of RATTLE for a dumbbell, each part of which can be replaced by a fault."""
 
     solve: Solver = quadratic
     way: Callable[[Reals, Reals, Reals], Reals] = lambda r, s, older: r
-    """Direction in which the ends are pushed, from the rod before and after the drift, and a step before."""
+    """Direction of the impulse, from the rod before and after the drift, and a step before."""
     ends: Callable[[Reals, Floats], tuple[Reals, Reals]] = lambda push, m: (-push / m[0], push / m[1])
-    """Displacements of both ends by a push."""
+    """Displacements of both ends by the impulse."""
     impulse: float = 1.0
-    """Factor of the push where it is applied to the momenta."""
+    """Factor of the impulse that is applied to the momenta."""
     across: Callable[[Reals, Reals], Reals | None] = lambda r, s: s
     """Direction along which velocities are projected, from the rod before and after the drift."""
     reduced: Callable[[Floats], float] = lambda m: float(m[0] * m[1] / (m[0] + m[1]))
@@ -89,14 +89,14 @@ def leaking(push: Reals, m: Floats) -> tuple[Reals, Reals]:
 
 
 def restarted_halves(c: Case, i: int, q: Floats, p: Floats) -> State:
-    """After a restart in the middle momenta of half a step before are taken for those of the step."""
+    """A restart in the middle: momenta of half a step before are taken for those of the step."""
     new, after = c.right(i, q, p)
     early = bool(c.scene.system.rods) and i == c.scene.steps // 2
     return new, c.scene.m * (new - q) / c.scene.step if early else after
 
 
 def stiff(c: Case) -> Step:
-    """A stiff spring for the rod, with h w = 1 of its own."""
+    """A stiff spring of h w = 1 in place of the rod."""
     rods = c.scene.system.rods
     if rods is None:
         return c.right
@@ -112,7 +112,7 @@ def stiff(c: Case) -> Step:
 
 
 def late_halves(c: Case, r: Trajectory) -> Trajectory:
-    """Momenta of half a step later, as SHAKE has them before they are projected."""
+    """Momenta half a step late, as SHAKE has them before projection."""
     p = r.p.copy()
     if c.scene.system.rods:
         p[1:-1] = c.scene.m * np.diff(r.q, axis=0)[1:] / c.scene.step
@@ -120,7 +120,7 @@ def late_halves(c: Case, r: Trajectory) -> Trajectory:
 
 
 class OneByOne(Rods):
-    """Every rod is solved by itself, as if its ends had no other."""
+    """Rods that are solved independently, as if their ends had no other."""
 
     def __init__(self, m: Floats, places: Integers | None, terms: Sequence[Term]) -> None:
         super().__init__(m, places, terms)
@@ -128,14 +128,14 @@ class OneByOne(Rods):
 
 
 class Late(Rods):
-    """Ends are pushed along the way after the drift."""
+    """Rods whose impulses act along their direction after the drift."""
 
     def drifted(self, before: Reals, q: Reals, p: Reals, x: Any) -> tuple[Reals, Reals]:
         return super().drifted(q, q, p, x)
 
 
 class Once(Rods):
-    """One iteration of Newton's for all."""
+    """Rods that are solved by a single Newton iteration."""
 
     def multiplier(self, r: Reals, s: Reals) -> Reals:
         gap = (self.dot(s, s) - self.length**2) / 2
@@ -150,7 +150,7 @@ def alike(m: Floats) -> Floats:
 def solved(
     c: Case, kind: type[Rods] = Rods, *, masses: Callable[[Floats], Floats] = lambda m: m, longer: float = 0.0
 ) -> Rods | None:
-    """Rods of this kind, of these masses of coordinates and these lengths in the place of the scene's."""
+    """Rods of this class, with other masses of coordinates and other lengths than the scene's."""
     rods = [term for term in c.scene.terms if isinstance(term, Rod | WallRod)]
     terms = [replace(one, length=one.length * (1 + longer)) for one in rods]
     return kind(masses(c.scene.m), c.scene.places, terms) if terms else None

@@ -1,4 +1,4 @@
-"""A fault: a plain right engine of which a hook changes one thing."""
+"""A fault: a plain correct engine with a hook that changes one thing."""
 
 from __future__ import annotations
 
@@ -35,22 +35,22 @@ class Case:
 
     @property
     def force(self) -> Force:
-        """The right force."""
+        """The correct force."""
         return self.scene.system.force
 
     @cached_property
     def right(self) -> Step:
-        """The right step."""
+        """The correct step."""
         return textbook(self.scene, self.scheme)
 
     @cached_property
     def alone(self) -> Step:
-        """The right step of the particles without any term."""
+        """The correct step of the particles without any term."""
         return textbook(self.scene.derived(terms=()), self.scheme)
 
     @cached_property
     def largest(self) -> float:
-        """The largest force that the energy of the start allows [M L/T2]."""
+        """The largest force at the energy of the start [M L/T2]."""
         system, q = self.scene.system, self.scene.q
         stiff = float(np.max(np.abs(np.diag(system.hessian(q)))))
         return float(np.sqrt(2 * float(system.energy(q, self.scene.p)) * stiff)) or 1.0
@@ -68,29 +68,29 @@ class Case:
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """An engine broken on purpose: right, but for what its hooks say."""
+    """An engine broken on purpose: correct except for its hooks."""
 
     name: str
     about: str
     caught_by: tuple[str, ...] = ()
-    """Checks that must reject it at its size: a test holds them to it."""
+    """Checks that must reject it at its size, as a test requires."""
     make: Callable[[Case], Trajectory] | None = None
-    """Another engine altogether, in the place of the hooks."""
+    """A complete engine in place of the hooks."""
     _: KW_ONLY
     moves: Callable[[Case], Scene] | None = None
-    """The scene that it moves in the place of the one given."""
+    """The scene that it moves instead of the given one."""
     runs: str = ""
-    """The scheme that it runs in the place of the one claimed."""
+    """The scheme that it runs instead of the claimed one."""
     force: Callable[[Case, Reals, Reals, Reals], Reals] | None = None
-    """(case, right force, q, p) -> its force."""
+    """(case, correct force, q, p) -> its force."""
     textbook: Callable[[Case], Step] | None = None
-    """Its step, as a textbook's with something else in it."""
+    """Its step, as a modified textbook step."""
     step: Callable[[Case, int, Floats, Floats], State] | None = None
     """Its step by hand: the number of the step from 0, q, p -> the next (q, p)."""
     after: Callable[[Case, int, Floats, Floats], State] | None = None
-    """Changes the state after each right step: the number of the step, q, p -> the next (q, p)."""
+    """Changes the state after each correct step: the number of the step, q, p -> the next (q, p)."""
     reports: Callable[[Case, Trajectory], Trajectory] | None = None
-    """What it records of its motion; energies are computed anew unless they are changed here."""
+    """Changes the recorded motion; energies are recomputed unless they are changed here."""
     scheme: str = "velocity-verlet"
     """The scheme that the engine claims."""
     size: float | None = None
@@ -131,7 +131,7 @@ class Fault:
 
 
 def each(*faults: Fault, **alike: Any) -> tuple[Fault, ...]:
-    """Faults that have these fields alike, but for those that a row names itself."""
+    """Faults with these fields, except where a row sets its own."""
     known = Fault("", "")
     return tuple(
         replace(one, **{k: v for k, v in alike.items() if getattr(one, k) == getattr(known, k)})
@@ -140,13 +140,13 @@ def each(*faults: Fault, **alike: Any) -> tuple[Fault, ...]:
 
 
 def shifted(scene: Scene, size: float) -> Scene:
-    """Rest points moved by a fraction of the amplitude."""
+    """The scene with rest points moved by a fraction of the amplitude."""
     reach = float(np.max(np.abs(scene.q)) + np.max(np.abs(scene.p)))
     return replace(scene, terms=tuple(term.shifted(size * reach) for term in scene.terms))
 
 
 def braked(case: Case, i: int, q: Floats, p: Floats) -> State:
-    """Momenta lose a fraction."""
+    """Momenta reduced by a fraction."""
     return q, p * (1 - case.x)
 
 
@@ -156,7 +156,7 @@ def single(x: Reals) -> Floats:
 
 
 def half_step(case: Case, sign: int, made: Trajectory) -> Trajectory:
-    """Momenta half a step early (-1) or late (1), the start's as asked for."""
+    """Momenta half a step early (-1) or late (1), except in the first frame."""
     p = np.asarray(made.p + sign * case.scene.step / 2 * case.force(made.q, made.p), np.float64)
     p[0] = case.scene.p
     return replace(made, p=p)

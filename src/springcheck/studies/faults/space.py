@@ -1,5 +1,5 @@
-"""Faults along y and z and in a periodic box, where a scene along x sees nothing; of drives, taken at another
-time or others; and of magnetic fields, Boris' rotation written out."""
+"""Faults along y and z and in a periodic box, to which a scene along x is blind; of drives at another time or
+with other parameters; and of magnetic fields, with Boris' rotation written out."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from springcheck.studies.faults.steppers import State, Step, textbook
 
 
 def stiffer(c: Case, axis: str) -> Scene:
-    """Springs too stiff by a fraction along one axis."""
+    """The scene with springs too stiff by a fraction along one axis."""
     factor = np.where(c.on(axis), 1 + c.x, 1.0)
     return c.scene.derived(terms=tuple(term.scaled(factor[term.particles[0]]) for term in c.scene.terms))
 
@@ -31,7 +31,7 @@ def swapped(c: Case, x: Reals, one: int, other: int) -> Floats:
 
 
 def turned(c: Case, x: Reals, to: Reals, part: float) -> Floats:
-    """Vectors (..., n) and so much of others at right angles to them, in the plane of x and y."""
+    """Vectors (..., n) plus a part of others rotated by 90 degrees in the plane of x and y."""
     out, (i, j, _) = x.astype(np.float64), c.axes
     out[..., i] -= part * to[..., j]
     out[..., j] += part * to[..., i]
@@ -88,17 +88,16 @@ _IN_SPACE = each(
     caught_by=(*FRAME_CHECKS, "angular-momentum"),
 )  # fmt: skip
 AXES = tuple(one if "orientation" in one.caught_by else replace(one, scene="orbit") for one in _IN_SPACE)
-"""What a turn shows stands on a line."""
+"""Faults that only a rotation of the scene shows are on a line, the others on an orbit."""
 
 
 def crossed(scene: Scene, q: Reals) -> Reals:
-    """Borders of the box that positions (..., n) have crossed, counted from the box; none without one."""
+    """Number of borders of the box that positions (..., n) have crossed; 0 without a box."""
     return np.zeros_like(q) if scene.box is None else np.floor(q / scene.periods)
 
 
 def imaged(c: Case, q: Reals, p: Reals, nearest: Callable[[Reals, Floats], Reals]) -> Reals:
-    """The force on bonds between positions that are put back into the box: nearest(difference, box) instead
-    of the one that is."""
+    """Force on bonds between wrapped positions, whose images are given by nearest(difference, box)."""
     box, y = c.scene.periods, q.copy()
     x = q - box * crossed(c.scene, q)
     for term in c.scene.terms:
@@ -138,12 +137,12 @@ BOX = each(
 
 
 def late(c: Case, part: float) -> Step:
-    """The drive is taken later by this part of the step."""
+    """The step with a drive that is late by this part of it."""
     return textbook(c.scene, c.scheme, clock=lambda i: ((i + part) * c.scene.step, 1.0))
 
 
 def held(c: Case) -> Step:
-    """The drive of the step's start is held over all of its stages."""
+    """The step with the drive at its start held over all stages."""
     return textbook(c.scene, c.scheme, clock=lambda i: (i * c.scene.step, 0.0))
 
 
@@ -172,7 +171,7 @@ DRIVES = each(
 
 
 def cayley(t: float, v: complex) -> complex:
-    """Boris' rotation by -2 atan(t), in a form without functions."""
+    """Boris' rotation by -2 atan(t), without transcendental functions."""
     return v * (1 - 1j * t) / (1 + 1j * t)
 
 
@@ -180,8 +179,8 @@ def turning(
     c: Case, i: int, q: Floats, p: Floats, turn: Callable[[float, complex], complex] = cayley, *,
     first: float = 0.5, mass: bool = True,
 ) -> State:  # fmt: skip
-    """Boris' scheme with another turn, of the tangent of half the angle and v_x + i v_y; with another part of
-    the kick before it; or with a field not over the mass."""
+    """Boris' scheme with another rotation, as a function of the tangent of half the angle and v_x + i v_y;
+    with another share of the kick before it; or with a field not divided by the mass."""
     m, h = float(c.scene.m[0]), c.scene.step
     term = next((term for term in c.scene.terms if isinstance(term, Magnetic)), None)
     if term is None:

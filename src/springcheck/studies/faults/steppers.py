@@ -23,7 +23,7 @@ Step: TypeAlias = Callable[[int, Floats, Floats], State]
 
 
 Clock: TypeAlias = Callable[[int], tuple[float, float]]
-"""Number of a step from 0 -> the time at which it starts, and by how much that moves on a unit of time."""
+"""Number of a step from 0 -> the time at its start, and the rate of that clock."""
 
 
 def textbook(
@@ -34,7 +34,7 @@ def textbook(
     clock: Clock | None = None,
     hold: Rods | None = None,
 ) -> Step:
-    """The scheme's own step in double precision, with the scene's force or another; a clock for a drive, and
+    """The scheme's own step in double precision, with the scene's force or another, a clock for a drive, or
     other rods than the scene's."""
     n, scene = scene.n, scene.system.clocked
     pull = force or scene.system.force
@@ -69,7 +69,7 @@ def record(
     arithmetic: Arithmetic | None = None,
     label: str = "plain",
 ) -> Trajectory:
-    """Carry the start through `scene.steps` steps and keep every `scene.every`-th state."""
+    """Advance the start by `scene.steps` steps and keep every `scene.every`-th state."""
     q = np.empty((scene.frames, scene.n))
     p = np.empty_like(q)
     a, b = start or (scene.q, scene.p)
@@ -93,7 +93,7 @@ def trajectory(
     tolerance: float | None = None,
     calls: int | None = None,
 ) -> Trajectory:
-    """Recorded states with the times and energies that belong to them, up to the last finite one."""
+    """The trajectory of recorded states up to the last finite one, with their times and energies."""
     finite = np.isfinite(q).all(axis=1) & np.isfinite(p).all(axis=1)
     f = len(q) if finite.all() else int(np.argmin(finite))
     q, p = q[:f], p[:f]

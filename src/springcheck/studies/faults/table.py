@@ -62,7 +62,7 @@ PARAMETERS = (
 
 
 def unpaired(c: Case, f: Reals, q: Reals, p: Reals) -> Reals:
-    """The force of springs on their second particle is too large."""
+    """Force of springs that is too large on their second particle."""
     for term in c.scene.terms:
         if term.kind == "potential":
             np.subtract.at(f, term.particles[-1], c.x * term.pull(q))
@@ -113,21 +113,21 @@ def verlet(
 
 
 def swapped_halves(c: Case, i: int, q: Floats, p: Floats) -> State:
-    """h/2 where h*h/2 belongs, in the position form of velocity Verlet."""
+    """Velocity Verlet in its position form, with h/2 in place of h*h/2."""
     h, m, f = c.scene.step, c.scene.m, c.force(q, p)
     q = np.asarray(q + h * (p / m) + h / 2 * (f / m), np.float64)
     return q, np.asarray(p + h / 2 * (f + c.force(q, p)), np.float64)
 
 
 def one_iteration(c: Case, i: int, q: Floats, p: Floats) -> State:
-    """Implicit Euler by one fixed-point iteration instead of a solution."""
+    """Implicit Euler by one fixed-point iteration, so that its equation is not solved."""
     h, m = c.scene.step, c.scene.m
     p = np.asarray(p + h * c.force(q + h * (p / m), p), np.float64)
     return q + h * (p / m), p
 
 
 def coefficient(c: Case, size: float) -> Step:
-    """The second coefficient of a splitting is wrong in a digit."""
+    """A splitting whose second coefficient is wrong in a digit."""
     (a, x), (b, y), *rest = c.scheme.stages
     wrong = str(np.longdouble(schemes.number(y, np.longdouble)) * (1 + np.longdouble(size)))
     return textbook(c.scene, replace(c.scheme, stages=((a, x), (b, wrong), *rest)))
@@ -139,7 +139,7 @@ def last_of_1000(i: int) -> bool:
 
 
 def rescaled(c: Case, i: int, q: Floats, p: Floats) -> State:
-    """A thermostat left on: momenta scaled so that the energy stays what it was."""
+    """A thermostat left on: momenta are rescaled to the initial energy."""
     system = c.scene.system
     kinetic = system.kinetic_energy(p)
     wanted = system.energy(c.scene.q, c.scene.p) - (system.energy(q, p) - kinetic)
@@ -147,7 +147,7 @@ def rescaled(c: Case, i: int, q: Floats, p: Floats) -> State:
 
 
 def significant(x: Floats, size: float) -> Floats:
-    """Rounded to a relative spacing, like text of so many digits."""
+    """Round to a relative spacing, as text of so many digits does."""
     with np.errstate(divide="ignore"):
         unit = np.where(x == 0, 1, 10 ** np.floor(np.log10(np.abs(np.where(x == 0, 1, x))))) * size
     return np.asarray(np.round(x / unit) * unit)
@@ -198,7 +198,7 @@ STEPS = (
 
 
 def towards_zero(c: Case, i: int, q: Floats, p: Floats) -> State:
-    """Every result is rounded towards zero: no step is off by more than one unit in the last place."""
+    """A step rounded towards zero: no result is off by more than one unit in the last place."""
     start = q.astype(np.longdouble), p.astype(np.longdouble)
     wide = schemes.step(c.scheme, *start, h=c.scene.step, m=c.scene.m, force=c.force)
     near = [np.asarray(x, np.float64) for x in wide]
@@ -223,14 +223,14 @@ ARITHMETIC = (
 
 
 def kept_force(c: Case, f: Reals, q: Reals, p: Reals) -> Reals:
-    """The force is kept while no position has moved by more than a part of the start's farthest."""
+    """Reuse the force while no position has moved by more than a fraction of the largest initial one."""
     if not c.kept or np.max(np.abs(q - c.kept[0])) > c.x * float(np.max(np.abs(c.scene.q))):
         c.kept[:] = [q, f]
     return np.asarray(c.kept[1])
 
 
 def swapped_frames(c: Case, r: Trajectory) -> Trajectory:
-    """The two frames in the middle have changed places."""
+    """Exchange the two frames in the middle."""
     order = np.arange(len(r.t))
     middle = slice(len(order) // 2, len(order) // 2 + 2)
     order[middle] = order[middle][::-1]
@@ -238,13 +238,13 @@ def swapped_frames(c: Case, r: Trajectory) -> Trajectory:
 
 
 def given_up(c: Case, r: Trajectory) -> Trajectory:
-    """The run ends half-way."""
+    """End the run half-way."""
     half = slice(len(r.t) // 2)
     return replace(r.at(half), outcome=Outcome(status="stopped", step=(half.stop - 1) * r.every))
 
 
 def late_start(c: Case) -> Trajectory:
-    """The first frame is the state after the first step."""
+    """Record the state after the first step as the first frame."""
     return record(c.scene, c.scheme, c.right, start=c.right(0, c.scene.q, c.scene.p))
 
 
@@ -281,7 +281,7 @@ REPORTS = (
 
 
 def slow_time(c: Case, part: float) -> Trajectory:
-    """The exact solution, too slow by this part of its time."""
+    """The exact solution with its time scaled down by this part."""
     steps = np.arange(c.scene.frames) * c.scene.every
     q, p = (np.asarray(x, np.float64) for x in exact.true_motion(c.scene, steps, c.scene.step * (1 - part)))
     return trajectory(c.scene, c.scheme, q, p, tolerance=c.scene.tolerance, calls=2 * c.scene.steps)

@@ -1,4 +1,4 @@
-"""Faults of engines that choose the lengths of their steps: another rule, or another state."""
+"""Faults of methods with variable steps: another rule, or another state."""
 
 from __future__ import annotations
 
@@ -17,28 +17,28 @@ from springcheck.studies.faults.steppers import trajectory
 
 
 def looser(rule: Rule, x: float) -> Rule:
-    """Another tolerance."""
+    """The rule with another tolerance."""
     return lambda push, before, tolerance: rule(push, before, tolerance * (1 + x))
 
 
 def grows(rule: Rule) -> Rule:
-    """Steps grow by any little, and are not held."""
+    """The rule without its threshold for growth."""
     return lambda push, before, tolerance: min(rule(push, 0.0, tolerance), 2 * before or np.inf)
 
 
 def jumps(rule: Rule) -> Rule:
-    """After a short step the next one may be of any length."""
+    """The rule without its limit on growth from one step to the next."""
     return lambda push, before, tolerance: max(rule(push, 0.0, tolerance), rule(push, before, tolerance))
 
 
 def doubles(rule: Rule) -> Rule:
-    """The hundredth step is twice as long."""
+    """The rule with its hundredth step twice as long."""
     number = itertools.count(1)
     return lambda push, before, tolerance: (1 + (next(number) == 100)) * rule(push, before, tolerance)
 
 
 def one_other(last: Floats, x: float) -> Floats:
-    """The step before the frame in the middle is another one."""
+    """The last steps (f,), changed at the frame in the middle."""
     return np.asarray(last * np.where(np.arange(len(last)) == len(last) // 2, 1 + x, 1.0))
 
 
@@ -46,8 +46,8 @@ def varying(
     c: Case, other: Callable[[Rule], Rule] = lambda rule: rule, *, braked: float = 0.0,
     told: Callable[[Floats], Floats] | None = None,
 ) -> Trajectory:  # fmt: skip
-    """Steps by another rule, momenta that lose a part after each frame, and what is told of the last steps
-    (f,), if anything is."""
+    """Steps by another rule, with momenta that lose a part after each frame; `told` maps the last steps (f,)
+    to those that are recorded, if any are."""
     scene, rule = c.scene, c.scheme.rule
     assert rule is not None
     broken, before, calls = replace(c.scheme, rule=other(rule)), 0.0, 0

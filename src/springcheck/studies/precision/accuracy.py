@@ -1,7 +1,7 @@
-"""How far a run is from the exact solution, taken as it streams by: nothing of it is kept but a few numbers.
+"""Distance of a run from the exact solution, taken as it streams by: only a few numbers are stored.
 
-Error, phase and energy are three answers.  A symplectic method keeps its energy while its phase runs
-away (Rein, Brown & Tamayo, MNRAS 489 (2019) 4632), so none of them stands for another.
+Error, phase and energy are independent: a symplectic method conserves its energy while its phase drifts
+(Rein, Brown & Tamayo, MNRAS 489 (2019) 4632), so that none of them can replace another.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from springcheck.physics.arrays import WIDE, Extended, Floats, Integers, Reals
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Spring, WallSpring
 
-CARRIES = 1e-3
-"""Modes whose amplitude is at least this part of the largest have a phase worth naming: in a mode that
-hardly moves, the rounding of the others is a large angle."""
+LEAST_AMPLITUDE = 1e-3
+"""Least amplitude, relative to the largest, of modes whose phase is reported: in a mode that hardly moves,
+the rounding of the others is a large angle."""
 
-FRAMES = 4096
-"""Most frames at which a run is compared with the exact solution.  They stand closer than a 250th of a
-period as long as the run has fewer than 16, and every finer step meets the same instants."""
+MOST_COMPARED_FRAMES = 4096
+"""Most frames at which a run is compared with the exact solution.  Their spacing is below a 250th of a period
+as long as the run has fewer than 16 periods, and every finer step hits the same instants."""
 
 
 Motion = Callable[[Integers], tuple[Extended, Extended]]
@@ -34,13 +34,12 @@ Motion = Callable[[Integers], tuple[Extended, Extended]]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Accuracy:
-    """Errors of one run, over its whole trajectory unless it says otherwise.
+    """Errors of one run, over its whole trajectory unless stated otherwise.
 
     `max_error` and `end_error` are relative to the initial energy norm (`System.norm`); `phase_error` is the
-    angle [rad] that a mode is ahead (> 0) or behind where that is largest, None where nothing turns;
-    `energy_error` is the largest |H - true H| in units of the start's kinetic plus absolute potential energy;
-    `rounding_error` is the largest distance from the scheme's own motion in exact arithmetic, None where that
-    has no closed form.
+    largest phase lead (> 0) or lag of a mode [rad], None where nothing oscillates; `energy_error` is the
+    largest |H - H exact| in units of the start's kinetic plus absolute potential energy; `rounding_error` is
+    the largest distance from the scheme's own motion in exact arithmetic, None where that has no closed form.
     """
 
     max_error: float
@@ -52,13 +51,13 @@ class Accuracy:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Truth:
-    """The exact solution of a scene, and what is worth computing once for all runs of it."""
+    """The exact solution of a scene, with quantities that all its runs share."""
 
     scene: Scene
     turning: exact.Modes
     """Normal modes of its springs alone, in which the phase is measured."""
     w: float
-    """Largest frequency along the motion [1/T], 0 where nothing turns."""
+    """Largest angular frequency along the motion [1/T], 0 where nothing oscillates."""
 
     @property
     def duration(self) -> float:
@@ -67,7 +66,7 @@ class Truth:
 
     @property
     def angle(self) -> float:
-        """w T: the largest angle through which the motion turns."""
+        """w T: the largest phase that the motion accumulates."""
         return abs(self.duration) * self.w
 
 
@@ -93,7 +92,7 @@ def truth(scene: Scene) -> Truth:
 
 
 def _frequency(scene: Scene) -> float:
-    """The largest w along the motion: from the modes, or from the stiffness on the true path."""
+    """The largest w along the motion: from the modes, or from the curvature along the exact path."""
     if scene.system.has_modes:
         return float(np.sqrt(np.maximum(np.max(scene.system.modes.w2), 0)))
     if scene.system.rods:
@@ -109,12 +108,12 @@ def _frequency(scene: Scene) -> float:
 
 
 class Errors:
-    """A sink for `driver.play` that adds up the errors of one run of steps `h`."""
+    """A sink for `driver.play` that accumulates the errors of one run of steps `h`."""
 
     def __init__(
         self, known: Truth, h: float, every: int, *, scheme: schemes.Scheme, judged: Scene | None = None
     ) -> None:
-        """`judged` is the scene with its parameters as the engine keeps them, for the rounding alone."""
+        """`judged` is the scene with parameters as the engine stores them, for the rounding error alone."""
         self._truth, self._h, self._every = known, h, every
         self._frame = 0
         self._largest = self._end = self._energy = 0.0
@@ -122,13 +121,13 @@ class Errors:
         modes = known.turning
         u, v = self._turned(known.scene.q[None], known.scene.p[None])
         size = np.hypot(u, v)[0]
-        self._clear = (modes.w2 > 0) & (size >= CARRIES * np.max(size)) & (size > 0)
+        self._clear = (modes.w2 > 0) & (size >= LEAST_AMPLITUDE * np.max(size)) & (size > 0)
         self._last = np.zeros(int(np.count_nonzero(self._clear)), dtype=np.longdouble)
         self._own = _own_motion(judged or known.scene, scheme, h)
         self._rounded = 0.0
 
     def __call__(self, t: Floats, q: Floats, p: Floats, *_: Floats | None) -> None:
-        """Take frames into account."""
+        """Accumulate the errors of these frames."""
         known, norm = self._truth, self._truth.scene.system.norm
         steps = np.arange(self._frame, self._frame + len(t)) * self._every
         self._frame += len(t)
@@ -144,7 +143,7 @@ class Errors:
                 own_q, own_p = self._own(steps)
                 rounded = float(np.max(norm(q - own_q, p - own_p)))
                 self._rounded = float(np.fmax(self._rounded, rounded))
-        # not max(), which leaves out what is no number
+        # np.maximum propagates NaN, which max() drops
         self._largest = float(np.maximum(self._largest, np.max(error)))
         self._end = float(error[-1])
         self._energy = float(np.maximum(self._energy, np.max(off)))
@@ -152,7 +151,7 @@ class Errors:
 
     @property
     def result(self) -> Accuracy:
-        """Errors so far."""
+        """Errors accumulated so far."""
         return Accuracy(
             max_error=self._largest,
             end_error=self._end,
@@ -162,7 +161,7 @@ class Errors:
         )
 
     def _turned(self, q: Reals, p: Reals) -> tuple[Extended, Extended]:
-        """Mode coordinates in which the exact solution turns clockwise on circles, (f, n) each."""
+        """Mode coordinates (f, n) in which the exact solution moves clockwise on circles."""
         modes = self._truth.turning
         y, v = modes.about_centres(q, p)
         return np.sqrt(np.abs(modes.w2)) * y, v
@@ -174,7 +173,7 @@ class Errors:
         u, v, true_u, true_v = (x[:, self._clear] for x in (u, v, true_u, true_v))
         with np.errstate(over="ignore", invalid="ignore"):
             ahead = np.arctan2(u * true_v - v * true_u, u * true_u + v * true_v)
-            # an angle is followed from frame to frame, across pieces, past half a turn
+            # the phase is unwrapped from frame to frame, across pieces
             ahead = np.unwrap(np.concatenate([self._last[None], ahead]), axis=0)
         self._last = ahead[-1]
         worst = ahead.flat[int(np.argmax(np.abs(ahead)))]
@@ -183,7 +182,7 @@ class Errors:
 
 
 def _own_motion(scene: Scene, scheme: schemes.Scheme, h: float) -> Motion | None:
-    """The scheme's own motion in exact arithmetic: what differs from it is rounding, at any step.
+    """The scheme's own motion in exact arithmetic, from which a run departs by rounding alone, at any step.
 
     None for an adaptive solver, and without a closed form that rounds less than the engine.
     """
@@ -193,7 +192,7 @@ def _own_motion(scene: Scene, scheme: schemes.Scheme, h: float) -> Motion | None
     if np.any((modes.w2 == 0) & (modes.pull != 0)):
         return None
     matrices = schemes.matrix(scheme, h=h, m=np.ones(1), k=modes.w2, c=modes.rate)
-    # below that, friction contracts area in one step more than extended precision has digits for
+    # below that, friction contracts areas in one step by more than the digits of extended precision
     if np.any(schemes.rotation(matrices).determinant < CONTRACTED):
         return None
     start = modes.about_centres(scene.q, scene.p)

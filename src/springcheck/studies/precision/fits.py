@@ -23,7 +23,7 @@ Place = tuple[str, int | None, float | None]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Point:
-    """One method at one step or tolerance: what it cost and how far it was off, or why there is nothing."""
+    """One method at one step or tolerance: its cost and its errors, or why there are none."""
 
     method: str
     step: float | None
@@ -31,27 +31,27 @@ class Point:
     tolerance: float | None
     steps: int | None
     outcome: str
-    """"complete", or what else happened."""
+    """"complete", or another status."""
     message: str = ""
     accuracy: Accuracy | None = None
     run_seconds_repeats: tuple[float, ...] = ()
-    """Seconds inside the engine's stepping, nothing recorded."""
+    """Seconds of the engine's stepping alone, nothing recorded."""
     start_seconds_repeats: tuple[float, ...] = ()
-    """Seconds until the engine stood ready, its library imported and its code compiled before."""
+    """Seconds of a start, its library already imported and its code compiled."""
     read_seconds_repeats: tuple[float, ...] = ()
-    """Seconds of the same steps with each of them read."""
+    """Seconds of the same steps, each of them read."""
     force_calls: int | None = None
     spent_seconds: float = 0.0
-    """Seconds that all of its runs took, with their starts and comparisons."""
+    """Seconds of all its runs, with starts and comparisons."""
 
     @property
     def place(self) -> Place:
-        """Which point of all it is."""
+        """Key of the point among all."""
         return self.method, self.steps, self.tolerance
 
     @property
     def complete(self) -> bool:
-        """Whether there are errors to look at."""
+        """Whether its errors were measured."""
         return self.outcome == "complete"
 
     @property
@@ -61,7 +61,7 @@ class Point:
 
     @property
     def rounding(self) -> float | None:
-        """The part of the error that is rounding, where it is known."""
+        """The part of the error that is rounding, or None."""
         return self.accuracy.rounding_error if self.accuracy else None
 
     @property
@@ -113,32 +113,32 @@ POINTS: Rows[Point] = Rows(
     about="error against run time; errors relative to the initial energy norm; -1 and NaN: not known",
     extra=lambda points: {"run_seconds": np.array([point.seconds for point in points])},
 )
-"""A table for each method, its points from coarse to fine; the attribute `study_seconds`: what the study
-had taken by then."""
+"""A table for each method, its points from coarse to fine; the attribute `study_seconds` is the time that the
+study had taken by then."""
 
 
 def points_of(scene: Scene) -> Rows[Point]:
-    """The same, with the scene's unit of time."""
+    """`POINTS` with the scene's unit of time."""
     time = {"reduced": "1", "md": "ps", "si": "s"}[scene.units]
     return replace(POINTS, units={**POINTS.units, "step": time})
 
 
-ASYMPTOTIC = 2e-2
-"""Errors from here down are led by the first term of their expansion.  The next term over the first is about
-as large as the error: a fiftieth here, and a quarter or a half of that at each halving of the step."""
+ASYMPTOTIC_ERROR = 2e-2
+"""Largest error that the leading term of its expansion dominates.  The next term relative to it is about as
+large as the error: a fiftieth here, and a quarter or a half of that at each halving of the step."""
 
 ABOVE_FLOOR = 100.0
-"""Points of a fit lie this far above their rounding, which then shifts no error by more than 1 %."""
+"""Least ratio of a fitted error to its rounding, which then shifts it by at most 1 %."""
 
-FITTED = 8
-"""The finest points that a fit takes, where there are more: the steps span a factor of 128."""
+MOST_FITTED = 8
+"""Most points in a fit, the finest ones: their steps span a factor of 128."""
 
 FEWEST_FITTED = 4
 """Points below which no order is claimed."""
 
 
-BENT = 3.0
-"""Standard errors of a curvature from which the coarsest points are led by more than the first term."""
+MOST_CURVATURE = 3.0
+"""Standard errors of a curvature from which the coarsest points are not asymptotic."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -156,36 +156,36 @@ def turned(errors: Sequence[float], *, by: int = 1) -> int | None:
     if not errors or np.all(np.isnan(errors)):
         return None
     best = int(np.nanargmin(errors))
-    return best if best < len(errors) - by and errors[best] < ASYMPTOTIC else None
+    return best if best < len(errors) - by and errors[best] < ASYMPTOTIC_ERROR else None
 
 
 def order(points: Sequence[Point]) -> Fit | None:
-    """Order of a method of fixed step from points by ever finer steps; None with fewer than four to go by."""
+    """Order of a method of fixed step from points of ever finer steps; None with fewer than four usable."""
     best = turned([point.error for point in points])
     floor = points[best].error if best is not None else 0.0
     chosen = [
         point
         for point in points[: None if best is None else best]
-        if 0 < point.error <= ASYMPTOTIC
+        if 0 < point.error <= ASYMPTOTIC_ERROR
         and point.error >= ABOVE_FLOOR * (floor if point.rounding is None else point.rounding)
-    ][-FITTED:]
+    ][-MOST_FITTED:]
     if len(chosen) < FEWEST_FITTED:
         return None
     x, y = np.log([abs(x.step or 0.0) for x in chosen]), np.log([x.error for x in chosen])
-    while len(x) > FEWEST_FITTED and _bent(x, y) > BENT:
+    while len(x) > FEWEST_FITTED and _curvature(x, y) > MOST_CURVATURE:
         x, y = x[1:], y[1:]
     found = line(x, y)
     return Fit(
         order=found.slope,
-        # what is left of the bend is an error that repeats, and no scatter
+        # the remaining curvature is a systematic error, not scatter
         standard_error=max(found.standard_error, abs(found.slope - (y[-1] - y[-2]) / (x[-1] - x[-2]))),
         constant=float(np.exp(found.intercept)),
         points=len(x),
     )
 
 
-def _bent(x: Floats, y: Floats) -> float:
-    """Curvature of y(x) in standard errors of a parabola's; of a few points without scatter it is large."""
+def _curvature(x: Floats, y: Floats) -> float:
+    """Curvature of y(x) in standard errors of a fitted parabola; large for a few points without scatter."""
     away = x - np.mean(x)
     found = line(away**2, y, away)
     return abs(found.slope) / found.standard_error if found.standard_error else np.inf
@@ -196,34 +196,34 @@ Growth: TypeAlias = Literal["sqrt(N)", "N", "N**1.5/(w T)", "w T"]
 POWERS: Mapping[Growth, tuple[float, float]] = {
     "sqrt(N)": (0.5, 0), "N": (1, 0), "N**1.5/(w T)": (1.5, -1), "w T": (0, 1),
 }  # fmt: skip
-"""Powers of the number of steps and of w T."""
+"""Exponents of the number of steps and of w T."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Condition:
-    """Final error by one rounding a step: eps times `value(steps)`, with its name and reason."""
+    """Growth of one rounding per step into the final error: eps times `value(steps)`, and the reason."""
 
     name: Growth
     why: str
     eps: float
-    """Relative spacing of the numbers that are rounded."""
+    """Relative spacing of the rounded numbers."""
     angle: float
-    """w T, the largest angle through which the motion turns."""
+    """w T, the largest phase that the motion accumulates."""
 
     def value(self, steps: float) -> float:
-        """The condition of a run of so many steps."""
+        """Amplification of rounding over a run of so many steps."""
         of_steps, of_angle = POWERS[self.name]
         return float(steps**of_steps * self.angle**of_angle)
 
 
 def condition(method: Method, arithmetic: Arithmetic, angle: float) -> Condition | None:
-    """How rounding adds up over a run whose phase advances by `angle`; None for an adaptive solver.
+    """Growth of rounding over a run whose phase advances by `angle`; None for an adaptive solver.
 
-    Each step rounds the state once, up or down as it falls, and the motion carries that on: a random
-    walk, eps sqrt(N).  Two things are worse.  A velocity rebuilt as (x' - x)/h takes on eps x / h at each
-    step, a walk of eps sqrt(N) / (h w).  A divisor 1 + (h w)**2 that is rounded once and used in every
-    step turns the same way every time, eps N.  Parameters kept in single precision detune the motion by
-    their own eps, whatever the step.
+    Each step rounds the state once, in either direction, and the motion propagates that: a random walk, eps
+    sqrt(N).  Two cases are worse.  A velocity rebuilt as (x' - x)/h acquires eps x / h in each step, a walk
+    of eps sqrt(N) / (h w).  A divisor 1 + (h w)**2 that is rounded once and used in every step shifts the
+    phase the same way each time, eps N.  Parameters in single precision detune the motion by their own eps,
+    whatever the step.
     """
     scheme = schemes.scheme(method.scheme)
     if not scheme.has("one-step") or angle <= 0:
@@ -241,19 +241,19 @@ def condition(method: Method, arithmetic: Arithmetic, angle: float) -> Condition
     return Condition(name=name, why=why, eps=eps, angle=angle)
 
 
-TYPICAL = 0.25
-"""Rounding over eps times its condition, where it cannot be measured: of the order of the standard
-deviation of a rounding, eps/sqrt(12), in a sum whose size changes sign."""
+TYPICAL_ROUNDING = 0.25
+"""Rounding over eps times its condition, where it cannot be measured: about the standard deviation of a
+rounding, eps/sqrt(12), in a sum that changes sign."""
 
 
 def expected_floor(points: Sequence[Point], fit: Fit, how: Condition, duration: float) -> tuple[float, float]:
-    """Where the fitted error meets the rounding -> (steps, error there)."""
+    """Intersection of the fitted error with the rounding -> (steps, error there)."""
     seen = [
         point.rounding / (how.eps * how.value(point.steps))
         for point in points[-4:]
         if point.rounding and point.steps
     ]
-    per = how.eps * (float(np.median(seen)) if seen else TYPICAL)
+    per = how.eps * (float(np.median(seen)) if seen else TYPICAL_ROUNDING)
     # both are powers of the number of steps
     of_steps, _ = POWERS[how.name]
     ratio, power = fit.constant * abs(duration) ** fit.order / (per * how.value(1)), fit.order + of_steps
@@ -273,10 +273,10 @@ def front(points: Sequence[Point]) -> list[Point]:
 
 
 def cheapest(points: Sequence[Point], target: float) -> Point | None:
-    """The fastest way to an error within the target, or None.
+    """The point of the least time with an error within the target, or None.
 
-    Where a sweep passes the target from one number of steps to the next, it is the least number in between,
-    by a power law through both points (see `_between`); elsewhere a point as it was measured.
+    Where a sweep crosses the target between two numbers of steps, that is the least number in between, by a
+    power law through both points (see `_between`); elsewhere it is a point as measured.
     """
     timed = [point for point in points if not np.isnan(point.seconds)]
     reaching = [point for point in timed if point.error <= target]
@@ -289,7 +289,7 @@ def cheapest(points: Sequence[Point], target: float) -> Point | None:
 def _between(before: Point, after: Point, target: float) -> Point:
     """The point at the least number of steps whose error is within the target, by log error over log steps.
 
-    What grows with the steps is interpolated alike; `after` itself where nothing does (adaptive solvers).
+    Quantities that grow with the steps are interpolated likewise; `after` itself for adaptive solvers.
     """
     if not (before.steps and after.steps and before.force_calls and after.force_calls and after.accuracy):
         return after
@@ -297,7 +297,7 @@ def _between(before: Point, after: Point, target: float) -> Point:
         return after
     share = np.log(before.error / target) / np.log(before.error / after.error)
     steps = int(np.ceil(before.steps * (after.steps / before.steps) ** share))
-    # the rounded number of steps takes its own share of calls and seconds
+    # calls and seconds follow from the rounded number of steps
     share = np.log(steps / before.steps) / np.log(after.steps / before.steps)
     calls = before.force_calls * (after.force_calls / before.force_calls) ** share
     return replace(

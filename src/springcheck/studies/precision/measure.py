@@ -1,12 +1,10 @@
-"""Error against run time: how much accuracy a method gives for how much work, down to rounding.
+"""Error against run time: the accuracy of a method for its work, down to rounding.
 
 Every method of fixed step takes the same duration T in N steps of the double h = T/N, N doubling from the
-edge of stability until the error turns up again on its rounding, or the time budget ends.  An adaptive
-solver's tolerance falls instead.  What is compared with the exact solution and what is timed are separate
-runs.  Timed runs record nothing; methods take turns, so that a machine that slows down slows all alike.
-
-The design follows the work-precision diagrams of DiffEqDevTools (SciML): one warm-up, the minimum of the
-repeats to quote.
+limit of stability until rounding makes the error grow again, or the time budget ends.  An adaptive solver's
+tolerance decreases instead.  Errors and times are measured in separate runs.  Timed runs record nothing;
+methods take turns, so that a machine that slows down slows all alike.  The design follows the work-precision
+diagrams of DiffEqDevTools (SciML): one warm-up, and the minimum of the repeats is quoted.
 """
 
 from __future__ import annotations
@@ -45,7 +43,7 @@ BUDGET = 75.0
 """Default budget of a study [s]."""
 
 CUT_OFF = "cut off"
-"""Outcome of the first point that a study did not come to."""
+"""Outcome of the first point for which the budget did not suffice."""
 
 
 def record(
@@ -57,13 +55,13 @@ def record(
     left: Sequence[LeftOut] = (),
     **how: Unpack[How],
 ) -> PrecisionStudy:
-    """Measure these methods on a scene within about `budget` seconds, not counting imports, compilation and a
-    first run of each method, which shows what its points will take.
+    """Measure these methods on a scene within about `budget` seconds, without imports, compilation and a
+    first run of each method, by which the times of its points are estimated.
 
-    A method that cannot run, a run that diverges and a sweep that the budget cuts off are points with
-    their reason; methods that were `left` out are named beside them.  A store has a table
-    /precision/<label> for each method, kept point by point.  Points that an earlier call has finished are
-    reused, and the time that they took counts for the budget.
+    A method that cannot run, a run that diverges and a sweep that the budget cuts off are points with their
+    reason; methods `left` out are listed beside them.  A store has a table /precision/<label> for each
+    method, saved point by point.  Points that an earlier call has finished are reused, and their time counts
+    for the budget.
 
     Raises:
         SceneError: the exact solution of the scene is not known, or nothing moves in it.
@@ -83,7 +81,7 @@ def _measure(
     spent = max(before, default=0.0)
     if kept.team.workers > 1:
         spent += _errors_first(scene, able, kept, budget, spent)
-    # imports and compilation are paid once, by the first method that needs them, and charged to none
+    # the first method that needs an import or a compilation pays for it, outside its points
     began = perf_counter() - spent
 
     def tell(what: str) -> None:
@@ -129,8 +127,8 @@ def _measure(
 def _errors_first(scene: Scene, sweeps: list[Sweep], kept: Keeper, budget: float, before: float) -> float:
     """Measure the errors of these sweeps on the workers, within half of the budget -> seconds that each took.
 
-    Workers measure no run times.  They have ended when this returns: times are measured with no other process
-    of ours at work.
+    Workers measure no run times.  They have ended when this returns, so that times are measured with no other
+    process of the study running.
     """
     left = [x for x in sweeps if x.scene is not None and x.known is None]
     share = budget / 2 * kept.team.workers / max(1, len(left))
@@ -149,7 +147,7 @@ def _errors_first(scene: Scene, sweeps: list[Sweep], kept: Keeper, budget: float
 
 
 def errors_ahead(scene: Scene, label: Label, done: Sequence[Point], seconds: float) -> list[Point]:
-    """The points of a method that follow on those that are done, with errors and without times."""
+    """Points of a method after those that are done, with errors and without times."""
     known = truth(scene)
     sweep = begin(scene, label, known)
     for point in done:
@@ -170,7 +168,7 @@ def errors_ahead(scene: Scene, label: Label, done: Sequence[Point], seconds: flo
 
 
 def _resume(sweep: Sweep, kept: Keeper) -> float:
-    """Resume a sweep from the points of an earlier call -> the seconds that this had taken."""
+    """Resume a sweep from the points of an earlier call -> the seconds that these had taken."""
     points = kept.finished(POINTS, str(sweep.label))
     if points is None:
         return 0.0
@@ -184,7 +182,7 @@ def _resume(sweep: Sweep, kept: Keeper) -> float:
 
 
 def perform(options: Namespace, progress: Progress | None) -> PrecisionStudy:
-    """What `springcheck precision` does."""
+    """Carry out `springcheck precision`."""
     budget = BUDGET if options.budget is None else options.budget
     if not (isfinite(budget) and budget > 0):
         raise SpringcheckError(f"--budget {budget}: a number of seconds above 0 is needed")
@@ -199,7 +197,7 @@ def _open(sweeps: list[Sweep]) -> list[Sweep]:
 
 
 def _level(sweeps: list[Sweep], known: Truth, tell: Callable[[str], None]) -> None:
-    """The next point of each of these sweeps: errors one by one, then timings in turn."""
+    """Measure the next point of each of these sweeps: errors one by one, then timings in turn."""
     points: list[Point] = []
     spent: list[float] = []
     for sweep in sweeps:
@@ -245,7 +243,7 @@ def _errors(sweep: Sweep, known: Truth) -> Point:
 
 @keeper.restoring("precision")
 def stored(kept: keeper.Kept) -> PrecisionStudy:
-    """The study that `record` has kept.  StoreError where the file holds none."""
+    """The study that `record` has saved.  StoreError where the file holds none."""
     scene, known = kept.scene, kept.document
     methods = [
         MethodSummary(

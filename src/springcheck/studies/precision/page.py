@@ -15,7 +15,7 @@ from springcheck.text.wording import seconds
 FORCE_CALLS = "force calls"
 
 MOST_SHOWN = 30.0
-"""Errors above this are out of the picture at first: nothing is read off them."""
+"""Largest error that is shown at first: larger ones are uninformative."""
 
 
 WAYS: tuple[tuple[str, str, Callable[[Point], float]], ...] = (
@@ -26,7 +26,7 @@ WAYS: tuple[tuple[str, str, Callable[[Point], float]], ...] = (
 
 
 def banks(study: PrecisionStudy) -> list[Bank]:
-    """Two charts of all points."""
+    """Charts of all points, against run time and against force calls."""
     points = [x for x in study.points if x.complete and x.error > 0]
     if not points:
         return []
@@ -53,7 +53,7 @@ def banks(study: PrecisionStudy) -> list[Bank]:
 
 
 def _heading(study: PrecisionStudy) -> str:
-    """The cheapest way to the smallest error that somebody reached."""
+    """The cheapest way to the smallest target that any method reached."""
     reached = [(target, point) for target, point in study.cheapest if point is not None]
     if not reached:
         return f"{study.scene.name}: error against cost, to the same final time"
@@ -63,7 +63,7 @@ def _heading(study: PrecisionStudy) -> str:
 
 
 def _floors(study: PrecisionStudy) -> list[Rule]:
-    """The lowest rounding floor that was found of each scheme."""
+    """The lowest rounding floor of each scheme."""
     found: dict[str, float] = {}
     for one in study.methods:
         if one.floor is not None:
@@ -76,7 +76,7 @@ def _floors(study: PrecisionStudy) -> list[Rule]:
 
 
 def _slopes(study: PrecisionStudy, points: Sequence[Point], cost: Callable[[Point], float]) -> list[Curve]:
-    """Guides with the slopes of the orders found, from one point at the left, clear of all curves."""
+    """Guides with the slopes of the fitted orders, from one point at the left, away from all curves."""
     orders = sorted({round(x.fit.order) for x in study.methods if x.fit})
     left, errors = min(map(cost, points)), [math.log10(x.error) for x in points]
     start = 10 ** (min(errors) + 0.35 * (min(1.5, max(errors)) - min(errors)))

@@ -18,36 +18,36 @@ from springcheck.text.wording import count
 
 @dataclass(frozen=True, kw_only=True)
 class MethodSummary:
-    """The points of one method, coarse to fine, and the numbers that follow from them; None: not known."""
+    """Points of one method, coarse to fine, and the numbers that follow from them; None where unknown."""
 
     method: str
     points: tuple[Point, ...]
     duration: float
     """Time from the first frame to the last [T]."""
     condition: Condition | None
-    """How rounding adds up in this method."""
+    """Growth of rounding in this method."""
     first_start_seconds: float | None
-    """The first start in this process and its first short run, with import and compilation [s]."""
+    """Seconds of the first start in this process and its first short run, with import and compilation."""
 
     @cached_property
     def complete(self) -> list[Point]:
-        """The points that have errors."""
+        """Points with errors."""
         return [point for point in self.points if point.complete]
 
     @property
     def is_adaptive(self) -> bool:
-        """Whether the method follows a tolerance, and has no step to fit an order to."""
+        """Whether the method follows a tolerance, so that there is no step to fit an order to."""
         return any(point.tolerance is not None for point in self.complete)
 
     @cached_property
     def fit(self) -> Fit | None:
-        """Error = constant * step**order; None with too few points as well."""
+        """Error = constant * step**order; None also with too few points."""
         return None if self.is_adaptive else fits.order(self.complete)
 
     @cached_property
     def lowest(self) -> Point | None:
-        """The point of the smallest error, where a finer step has made it larger again."""
-        # an adaptive solver's error does not fall smoothly: its floor is one that a decade has not improved
+        """The point of the smallest error, where a finer step has a larger one."""
+        # an adaptive solver's error falls irregularly: its floor is one that a decade has not improved
         best = fits.turned([point.error for point in self.complete], by=2 if self.is_adaptive else 1)
         return None if best is None else self.complete[best]
 
@@ -58,22 +58,23 @@ class MethodSummary:
 
     @property
     def floor_ratio(self) -> float | None:
-        """The floor over eps times the condition there."""
+        """The floor divided by eps times the condition there."""
         if self.lowest is None or self.condition is None or self.lowest.steps is None:
             return None
         return self.lowest.error / (self.condition.eps * self.condition.value(self.lowest.steps))
 
     @cached_property
     def expected_floor(self) -> tuple[float, float] | None:
-        """Where the floor would be, (steps, error), from the fit and the rounding so far; None if reached."""
+        """Predicted floor, (steps, error), from the fit and the rounding so far; None if it is reached."""
         if self.lowest or not (self.fit and self.condition):
             return None
         return fits.expected_floor(self.complete, self.fit, self.condition, self.duration)
 
     def least(self, seconds: str, over: str = "") -> float | None:
-        """The smallest of these repeated timings over all points, each `over` this count of its run.
+        """The smallest of these repeated timings over all points, each divided by the count `over` of its
+        run.
 
-        The overhead of a call only lengthens short runs, so the minimum is the step's own time.
+        The overhead of a call only lengthens short runs, so that the minimum is the step's own time.
         """
         costs = ((getattr(x, f"{seconds}_seconds_repeats"), getattr(x, over) if over else 1)
                  for x in self.complete if x.run_seconds_repeats)  # fmt: skip
@@ -101,7 +102,7 @@ class MethodSummary:
 
 
 TARGETS = (1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
-"""Errors for which the cheapest way is looked up."""
+"""Target errors for which the cheapest point is reported."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
@@ -116,7 +117,7 @@ class PrecisionStudy(Studied):
     methods: tuple[MethodSummary, ...]
     machine: dict[str, str]
     tick: float
-    """The smallest difference that the clock shows [s]."""
+    """Resolution of the clock [s]."""
 
     def __repr__(self) -> str:
         best = min((p.error for p in self.points if p.error > 0), default=np.nan)
@@ -130,19 +131,20 @@ class PrecisionStudy(Studied):
 
     @property
     def timed(self) -> list[Point]:
-        """Those that have both an error and a run time."""
+        """Points with both an error and a run time."""
         return [point for point in self.points if point.complete and point.run_seconds_repeats]
 
     @property
     def front(self) -> list[Point]:
-        """Points that no other beats in both error and run time, the fastest first."""
+        """The Pareto front of error and run time, the fastest first."""
         return fits.front(self.timed)
 
     @property
     def cheapest(self) -> list[tuple[float, Point | None]]:
-        """The cheapest way to each of the `TARGETS`, None where no method reaches it.
+        """The cheapest point for each of the `TARGETS`, None where no method reaches it.
 
-        Its message says between which numbers of steps it is interpolated; it has none where it was measured.
+        Its message gives the numbers of steps between which it is interpolated; it is empty where it was
+        measured.
         """
         return [(target, fits.cheapest(self.timed, target)) for target in TARGETS]
 
@@ -156,7 +158,7 @@ class PrecisionStudy(Studied):
         return tuple(point for point in self.points if point.method == method)
 
     def document(self) -> dict[str, Any]:
-        """The study as plain data for JSON; what is not known is None."""
+        """The study as plain data for JSON; unknown values are None."""
         return document(
             scene=self.scene.name,
             budget_seconds=self.budget,
@@ -170,7 +172,7 @@ class PrecisionStudy(Studied):
         )
 
     def summary(self) -> Table:
-        """The table of the methods, for readers of the file."""
+        """Table of the methods, for readers of the file."""
         rows = [method.document() for method in self.methods]
         numbers = ("order", "order_standard_error", "constant", "floor")
         names = [name for name in rows[0] if name in numbers or "seconds" in name]

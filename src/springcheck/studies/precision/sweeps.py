@@ -15,48 +15,48 @@ from springcheck.errors import MethodError
 from springcheck.physics.arrays import Arithmetic
 from springcheck.physics.scene import Scene
 from springcheck.studies.precision import fits
-from springcheck.studies.precision.accuracy import FRAMES, Truth
+from springcheck.studies.precision.accuracy import MOST_COMPARED_FRAMES, Truth
 from springcheck.studies.precision.fits import Place, Point
 
 TOLERANCES = (1e-3, *(float(f"{mantissa}e-{e}") for e in range(4, 17) for mantissa in (3, 1)))
-"""Relative tolerances of adaptive solvers, two a decade, from 1e-3 to 1e-16, which is beyond double
-precision: how a solver answers that is a row too."""
+"""Relative tolerances of adaptive solvers, two a decade, from 1e-3 to 1e-16: a solver's response to one
+beyond double precision is a row as well."""
 
-RESERVED = 0.75
-"""Part of the time left that may be set aside for the methods that can reach their floor."""
+RESERVED_SHARE = 0.75
+"""Largest part of the remaining time that is reserved for methods that can reach their floor."""
 
 PLANNED = 1_000_000_000
-"""Steps that an engine may take to lie before it: a sweep to the floor is worth compiling for."""
+"""Number of steps announced to engines: a sweep to the floor is worth compiling for."""
 
 
 @dataclass(kw_only=True, eq=False)
 class Sweep:
-    """The sweep of one method from coarse to fine; the only state that changes while a study runs."""
+    """The sweep of one method from coarse to fine; the only mutable state of a study."""
 
     label: Label
     scenes: Iterator[Scene]
-    """Scenes of the finer steps that are still to be run."""
+    """Scenes of the finer steps that remain to be run."""
     scene: Scene | None = None
-    """The next one, None at the end."""
+    """Scene of the next point, None at the end."""
     points: list[Point]
     arithmetic: Arithmetic
     condition: fits.Condition | None
-    """How rounding adds up in it."""
+    """Growth of rounding in the method."""
     cost: float = 0.0
-    """Seconds that one bare run at the next point will take."""
+    """Estimated seconds of one bare run at the next point."""
     start: float = 0.0
     """Seconds of a start."""
     overhead: float = 0.0
-    """Seconds that the last point took beside its runs: starts, comparisons, reading."""
+    """Seconds that the last point took besides its runs: starts, comparisons, reading."""
     read: float = 0.0
-    """Seconds that a run with every step read will take."""
+    """Estimated seconds of a run with every step read."""
     first_start: float | None = None
     ahead: dict[Place, Point] = field(default_factory=dict)
-    """Points whose errors were measured before their turn to be timed."""
+    """Points whose errors were measured before they are timed."""
 
     @property
     def known(self) -> Point | None:
-        """The next point, where its errors are known."""
+        """The next point, if its errors were measured beforehand; None otherwise."""
         return self.ahead.get(blank(self, "").place)
 
     @property
@@ -66,12 +66,12 @@ class Sweep:
 
     @property
     def complete(self) -> list[Point]:
-        """The points that have errors."""
+        """Points with errors."""
         return [point for point in self.points if point.complete]
 
 
 MOST_STEPS = 2**31
-"""Steps from which on no point is measured: seconds of the fastest method here, days of the slowest."""
+"""Largest number of steps of a point: seconds of the fastest method here, days of the slowest."""
 
 
 def begin(scene: Scene, label: Label, known: Truth) -> Sweep:
@@ -80,7 +80,7 @@ def begin(scene: Scene, label: Label, known: Truth) -> Sweep:
     plain = replace(scene, quantities=("q", "p"))
     limit = schemes.scheme(method.scheme).limit
     if scene.system.rods:
-        # at h w = 1 the two solutions for a rod meet, which iterations do not find beside it
+        # at h w = 1 the two solutions for a rod coincide, and near it iterations do not converge
         limit = min(limit, 0.9 / schemes.scheme(method.scheme).longest_drift)
     sweep = Sweep(
         label=label,
@@ -106,7 +106,7 @@ def begin(scene: Scene, label: Label, known: Truth) -> Sweep:
         except MethodError as error:
             reason = str(error)
         except Stopped:
-            # the run for the errors meets this again and makes a row of it
+            # the run for the errors stops likewise and reports it as a row
             pass
     if reason is not None:
         sweep.scene = None
@@ -115,7 +115,7 @@ def begin(scene: Scene, label: Label, known: Truth) -> Sweep:
 
 
 def take(sweep: Sweep, point: Point) -> None:
-    """Append a measured point, estimate the cost of the next one from it, and advance to that."""
+    """Append a measured point, estimate the cost of the next one from it, and advance to it."""
     sweep.points.append(point)
     if point.run_seconds_repeats:
         *_, before, run = [0.0, *(x.seconds for x in sweep.points if x.run_seconds_repeats)]
@@ -127,40 +127,40 @@ def take(sweep: Sweep, point: Point) -> None:
 
 
 def coarsest(known: Truth, limit: float) -> int:
-    """Number of steps of the coarsest point: the least with h w below the limit of stability, or without one
-    with h w <= 1."""
+    """Number of steps of the coarsest point: the least with h w below the limit of stability, or without a
+    limit with h w <= 1."""
     if 0 < limit < np.inf:
         return max(1, floor(known.angle / limit) + 1)
     return max(1, ceil(known.angle))
 
 
 def by_step(scene: Scene, limit: float, known: Truth) -> Iterator[Scene]:
-    """The scene in ever more steps, read at the same instants from some 4096 steps on."""
+    """The scene with ever more steps, read at the same instants from some 4096 steps on."""
     steps, every = coarsest(known, limit), 1
     while steps < MOST_STEPS:
         yield replace(scene, step=known.duration / steps, steps=steps, every=every)
         steps *= 2
-        every = every * 2 if steps // every > FRAMES else every
+        every = every * 2 if steps // every > MOST_COMPARED_FRAMES else every
 
 
 def by_tolerance(scene: Scene) -> Iterator[Scene]:
-    """The scene at ever smaller tolerances, on a time grid fine enough to see its largest error."""
-    finer = max(1, FRAMES // scene.steps)
+    """The scene at ever smaller tolerances, on a time grid that resolves its largest error."""
+    finer = max(1, MOST_COMPARED_FRAMES // scene.steps)
     h = scene.step / finer
     for tolerance in TOLERANCES:
         yield replace(scene, step=h, steps=scene.steps * finer, every=1, tolerance=tolerance)
 
 
 def fitting(sweeps: list[Sweep], known: Truth, left: float) -> list[Sweep]:
-    """The sweeps whose next point fits into the seconds left; where none does, the cheapest that still fits.
+    """The sweeps whose next point fits into the seconds left; where none does, the cheapest if that fits.
 
     Seconds are reserved for the methods that can reach their floor; the others share the rest equally.  A
-    sweep that waits goes on when others have finished.
+    sweep that waits resumes when others have finished.
     """
     needs = sorted((_need(sweep, known.duration), i) for i, sweep in enumerate(sweeps))
     aside, reserved = set(), 0.0
     for need, i in needs:
-        if reserved + need <= RESERVED * left:
+        if reserved + need <= RESERVED_SHARE * left:
             aside.add(i)
             reserved += need
     share = (left - reserved) / max(1, len(sweeps) - len(aside))
@@ -176,7 +176,7 @@ def fitting(sweeps: list[Sweep], known: Truth, left: float) -> list[Sweep]:
 
 
 def _need(sweep: Sweep, duration: float) -> float:
-    """Seconds until a method of fixed step has passed its floor; infinite while that is not known."""
+    """Seconds until a method of fixed step has passed its floor; infinite while these cannot be estimated."""
     points = sweep.complete
     fit = fits.order(points) if not sweep.method.adaptive else None
     if fit is None or sweep.condition is None:
@@ -190,41 +190,41 @@ def _need(sweep: Sweep, duration: float) -> float:
 
 
 def runs(seconds: float) -> int:
-    """Runs that a point takes where one takes so many seconds: errors, warm-up and repeats."""
+    """Number of runs for a point of which one takes so many seconds: errors, warm-up and repeats."""
     return 1 + warm_ups(seconds) + repeats(seconds)
 
 
 def repeats(seconds: float) -> int:
-    """Timed runs: fewer where one is long and averages over the machine's noise by itself."""
+    """Number of timed runs: fewer where one is long, which averages over the machine's noise."""
     return 9 if seconds < 0.02 else 5 if seconds < 0.1 else 3 if seconds < 1 else 2
 
 
 def warm_ups(seconds: float) -> int:
-    """A long run is warm after its first thousandth, and after the run for the errors before it."""
+    """Number of warm-up runs: a long run is warm after its first thousandth, and the errors' run before."""
     return 1 if seconds < 0.1 else 0
 
 
 def _seconds(sweep: Sweep, run: float) -> float:
-    """Seconds that a point will take of which one bare run takes so many."""
+    """Seconds for a point of which one bare run takes so many."""
     return sweep.overhead + run * runs(run + sweep.start)
 
 
 def price(sweep: Sweep) -> float:
-    """Seconds that the next point will take."""
+    """Seconds for the next point."""
     return _seconds(sweep, sweep.cost)
 
 
 def is_finished(sweep: Sweep) -> bool:
-    """Whether the error of a method of fixed step has turned up.
+    """Whether the error of a method of fixed step has begun to grow.
 
-    Where the first term leads, a smaller step makes it smaller; nothing but rounding can turn it up.
+    While the leading term dominates, a smaller step reduces it; only rounding can make it grow.
     """
     errors = [point.error for point in sweep.complete]
     return not sweep.method.adaptive and fits.turned(errors) is not None
 
 
 def to_time(scene: Scene, sweep: Sweep) -> Scene:
-    """The run timed at a point: an adaptive solver on the scene's own time grid, else the point itself."""
+    """The run that is timed at a point: an adaptive solver's on the scene's own time grid, or the point's."""
     assert sweep.scene is not None
     if sweep.method.adaptive:
         return replace(scene, tolerance=sweep.scene.tolerance)

@@ -13,24 +13,24 @@ from springcheck.physics.scene import Scene
 from springcheck.studies.precision.fits import Point
 from springcheck.studies.precision.sweeps import PLANNED, Sweep, repeats, warm_ups
 
-TICKS = 1000
-"""A timing lasts at least so many ticks of the clock, which then blurs it by a thousandth."""
+FEWEST_TICKS = 1000
+"""Clock ticks that a timing lasts at least, so that the clock's resolution is a thousandth of it."""
 
-STARTS = 0.02
-"""Seconds that starting several short runs for one timing may take."""
+MOST_START_SECONDS = 0.02
+"""Seconds that the starts of several short runs in one timing may take."""
 
-READS = 3
-"""Timings of a run with every step read; one where starting is slow."""
+READ_TIMINGS = 3
+"""Timings of a run with every step read; one where a start is slow."""
 
 MOST_LOOKS = 10_000_000
-"""Looks at the clock within which it goes on: those of a second."""
+"""Readings of the clock within which it must advance: those of a second."""
 
 READ_SECONDS = 0.1
 """Longest run that is also timed with every step read: reading costs the same at each step."""
 
 
 def tick() -> float:
-    """The smallest difference that the clock shows [s]."""
+    """Resolution of the clock [s]."""
     seen = []
     for _ in range(100):
         began = perf_counter()
@@ -47,7 +47,7 @@ def tick() -> float:
 
 @dataclass(kw_only=True, eq=False)
 class Clock:
-    """The timings of one point while they are taken."""
+    """Timings of one point while they are measured."""
 
     sweep: Sweep
     scene: Scene
@@ -59,21 +59,21 @@ class Clock:
     spent: float = 0.0
 
     def warm_up(self, shortest: float) -> None:
-        """Find how many runs fit into one timing, and how many timings are worth taking."""
+        """Determine how many runs fit into one timing, and how many timings to take."""
         expected = self.sweep.cost
         if warm_ups(expected + self.sweep.start):
             warm = self._bare()
             expected = warm.timing.run if warm else 0.0
-        most = ceil(STARTS / max(self.sweep.start, 1e-9))
+        most = ceil(MOST_START_SECONDS / max(self.sweep.start, 1e-9))
         self.copies = max(1, min(64, most, ceil(shortest / max(expected, 1e-9))))
         self.count = repeats(expected + self.sweep.start)
 
     def turn(self, number: int) -> None:
-        """One repeat."""
+        """Measure one repeat."""
         run = self._bare(copies=self.copies)
         if run:
             self.runs.append(run)
-        reads = READS if self.sweep.start < STARTS else 1
+        reads = READ_TIMINGS if self.sweep.start < MOST_START_SECONDS else 1
         if number < reads and self.sweep.read <= READ_SECONDS:
             read = self._bare(copies=self.copies, read=True)
             if read:
@@ -104,7 +104,7 @@ class Clock:
 
 def take_turns(clocks: list[Clock]) -> None:
     """Warm up, then repeat in turn: A B C A B C."""
-    shortest = TICKS * tick()
+    shortest = FEWEST_TICKS * tick()
     for clock in clocks:
         clock.warm_up(shortest)
     for number in range(max((clock.count for clock in clocks), default=0)):

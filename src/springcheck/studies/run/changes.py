@@ -1,4 +1,4 @@
-"""A scene of which some numbers are set anew on the command line: --set, --step and --steps."""
+"""A scene with numbers changed on the command line: --set, --step and --steps."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from springcheck.studies.ensemble.vary import Axis, Plan, Varied, fields
 def changed(options: Namespace) -> Scene:
     """The scene that the options name, with their changes, which its title lists.
 
-    SpringcheckError where a field is none of the scene's, or its value makes no sense.
+    SpringcheckError where the scene has no such field, or its value is invalid.
     """
     scene, text = scenefile.load_scene(options.scene), scenefile.text_of(options.scene)
     named = [(f"--set {one}", *one.partition("=")[::2]) for one in options.set]
@@ -64,15 +64,15 @@ def _float(text: str) -> float | None:
         return None
 
 
-MEMORY = 0.1
-"""Friction rate times step of a bath whose friction is not stated: momenta forget in some ten steps."""
+BATH_MEMORY = 0.1
+"""Friction rate times step of a bath without a stated friction: momenta decorrelate in some ten steps."""
 
 
 def bathed(scene: Scene, options: Namespace) -> Scene:
-    """The scene in the bath of --temperature and --friction, each in the place of the scene's own.
+    """The scene in the bath of --temperature and --friction, which replace the scene's own.
 
     A temperature is in kelvin where it says so (300K) or where the scene's units have them.  In reduced units
-    it is kT, and kelvin count as kJ/mol for 1, as the store has them.
+    it is kT, and kelvin are converted with kJ/mol as the unit of energy, as in the store.
     """
     text, friction = options.temperature, options.friction
     if text is None and friction is None:
@@ -96,7 +96,7 @@ def bathed(scene: Scene, options: Namespace) -> Scene:
         assert bath is not None
         temperature, text = bath.temperature, f"{bath.temperature:g}"
     if friction is None:
-        friction = bath.friction if bath else MEMORY / abs(scene.step)
+        friction = bath.friction if bath else BATH_MEMORY / abs(scene.step)
     if temperature == 0:
         return builders.cold(replace(scene, bath=None), friction)
     made = Bath(temperature=temperature, friction=friction)

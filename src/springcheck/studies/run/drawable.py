@@ -1,4 +1,4 @@
-"""The frames of a stored run that are drawn, in memory that does not grow with its trajectories."""
+"""Frames of a stored run to draw, in memory that does not grow with its trajectories."""
 
 from __future__ import annotations
 
@@ -14,35 +14,35 @@ from springcheck.studies import keeper
 from springcheck.text.wording import ordinal
 
 MOST_FRAMES = 4001
-"""Most frames of one trajectory that are drawn; of a longer one every so many, which a note says."""
+"""Most frames of one trajectory that are drawn; a longer one is strided, with a note."""
 
 FEWEST_FRAMES, MOST_NUMBERS = 16, 1 << 22
-"""Frames that are drawn however many particles there are, and positions above which frames are left out."""
+"""Frames that are drawn for any number of particles, and positions above which frames are left out."""
 
 FIGURE_BYTES, RUN_BYTES = 160, 64
-"""Memory for a frame of one particle: of the exact solution, and of each run."""
+"""Bytes for a frame of one particle: of the exact solution, and of each run."""
 
 END_FRAMES = 500
-"""Frames that are drawn of the end of a run whose motion is too fast for all of it."""
+"""Frames that are drawn of the end of a run whose motion is too fast to draw as a whole."""
 
-RESOLVED = 0.25
-"""Largest way between two drawn frames, as a part of the whole, that still shows the motion: half a radian
-of an oscillation.  Beyond, lines between them are chords, and a slow wave is seen that is not there."""
+RESOLVED_WAY = 0.25
+"""Largest displacement between two drawn frames, relative to the range, that still resolves the motion: half
+a radian of an oscillation.  Beyond, lines between frames are chords, and aliasing shows a slow wave."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Drawable:
-    """Trajectories to draw: over their whole length, and the part whose motion can be followed."""
+    """Trajectories to draw: over their whole length, and the part in which the motion is resolved."""
 
     scene: Scene
     runs: dict[str, Trajectory]
     followed: dict[str, Trajectory]
     notes: list[str]
-    """What was left out."""
+    """Notes on what was left out."""
 
 
 def drawable(path: Path, most: int = MOST_FRAMES) -> Drawable:
-    """Scene and trajectories of a store to draw, of each so many frames at the most."""
+    """Scene and trajectories of a store to draw, with at most so many frames of each."""
     summary = keeper.summary(path)
     scene = keeper.stored_scene(path)
     frames = max(FEWEST_FRAMES, min(most, MOST_NUMBERS // scene.n))
@@ -70,8 +70,8 @@ def drawable(path: Path, most: int = MOST_FRAMES) -> Drawable:
 
 
 def _shows_motion(run: Trajectory, end: Trajectory, stride: int) -> bool:
-    """Whether its frames stand close enough to be joined by lines: what moves round and back to its place
-    between two of them is seen by the frames of its end, none of which are left out."""
+    """Whether its frames are close enough to be joined by lines.  Aliasing, a return between two of them, is
+    detected by the frames of its end, none of which are left out."""
     with np.errstate(over="ignore"):
         moved, each = (np.max(np.abs(np.diff(one.q[:, 0])), initial=0.0) for one in (run, end))
-        return bool(max(moved, stride * each) <= RESOLVED * np.ptp(run.q[:, 0]))
+        return bool(max(moved, stride * each) <= RESOLVED_WAY * np.ptp(run.q[:, 0]))

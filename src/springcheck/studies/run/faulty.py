@@ -17,12 +17,12 @@ from springcheck.studies.keeper import Draft, attributes
 from springcheck.studies.run.result import FAULT
 
 MOST_NUMBERS = 10**7
-"""Steps times particles that a run with a fault may have: loops in Python record it in memory."""
+"""Most steps times particles of a run with a fault: Python loops record it in memory."""
 
 
 @dataclass(frozen=True, slots=True)
 class Broken:
-    """A fault, of its size in the table or of another."""
+    """A fault, with its size in the table or another."""
 
     fault: Fault
     size: float | None
@@ -39,7 +39,8 @@ class Broken:
         return self.fault.about + ("" if size is None else f" ({size:.0e})")
 
     def play(self, scene: Scene, draft: Draft, seed: int | None = None) -> None:
-        """Record it; `seed` is that of a run in a bath.  MethodError where it makes no sense of the scene."""
+        """Record it, with the `seed` of a run in a bath.  MethodError where it does not apply to the
+        scene."""
         option = f"--fault {self.fault.name}"
         if self.fault.random != (scene.bath is not None):
             needed = "a bath: --temperature or [bath] gives one" if self.fault.random else "no bath"
@@ -60,7 +61,7 @@ class Broken:
         draft.finish(attributes(replace(made, origin=origin)))
 
     def _is_right(self, scene: Scene, made: Trajectory) -> bool:
-        """Whether the scene has nothing that this fault breaks: the right engine would be taken for it."""
+        """Whether the fault has no effect on this scene, so that its run equals the correct engine's."""
         if self.fault.random or schemes.scheme(self.fault.scheme).has("adaptive"):
             return False
         right = Fault("", "", scheme=self.fault.scheme).run(scene)

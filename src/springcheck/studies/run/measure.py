@@ -31,27 +31,28 @@ if TYPE_CHECKING:
     from springcheck.studies.run.faulty import Broken
 
 RUN_BYTES, MORE_BYTES = 2300, 700
-"""Peak memory of a run for each particle of a chain, and for each method after the first: what runs of
-uniform chains of 60,000 to 1,000,000 masses took, rounded down."""
+"""Peak memory [bytes] of a run for each particle of a chain, and for each further method: as measured for
+uniform chains of 60,000 to 1,000,000 masses, rounded down."""
 
-PIECE = 1 << 16
+PIECE_NUMBERS = 1 << 16
 """Numbers per array that are judged at a time, so that memory does not grow with the run."""
 
 MOST_PIECES = 16
-"""Pieces of a long run that are judged where a closed form tells what became of it between them: the first,
-the last, and some between at equal distances."""
+"""Pieces of a long run that are judged where a closed form determines the motion between them: the first, the
+last, and some between at equal distances."""
 
 MOST_NUMBERS = 1 << 24
-"""Numbers per array of each run that are judged where none does: 17 s for many particles, which take 1 us a
-number, two minutes for a single one.  Of a longer run pieces are judged, and no pass is made of them."""
+"""Numbers per array up to which a run without a closed form is judged as a whole: 17 s for many particles,
+at 1 us a number, two minutes for a single one.  Of a longer run pieces are judged, and none of these
+passes it."""
 
-LONG_PIECE = PIECE // 4
+LONG_PIECE = PIECE_NUMBERS // 4
 """Numbers per array in each of them.  Judging takes 8 us a frame, a hundred times as long as making it: two
 seconds in all."""
 
 
 def perform(options: Namespace, progress: Progress | None) -> Report | Repeats | Ensemble:
-    """What `springcheck run` does."""
+    """Carry out `springcheck run`."""
     if (options.scene is None) == (options.source is None):
         raise SpringcheckError(
             "run needs a SCENE, or --from FILE, and not both; `springcheck list` shows scenes"
@@ -89,7 +90,7 @@ def perform(options: Namespace, progress: Progress | None) -> Report | Repeats |
 
 def stored(path: Path) -> Stored:
     """Data of a run that are stored beside its trajectories."""
-    # an unfinished run has trajectories beside the file that it will write
+    # an unfinished run has trajectories in its journal, and no file yet
     if not path.is_file():
         return Stored(path=path, verdicts=(), comparison=None)
     return Stored(path=path, verdicts=keeper.verdicts(path), comparison=keeper.comparison(path))
@@ -108,12 +109,11 @@ def run(
 ) -> Report:
     """Run, compare, store, judge.  Work that an interrupted call has stored is reused.
 
-    `thorough` adds the experiments, whose runs are made on the side and not stored; `faults` engines broken
-    on purpose, as NAME or NAME=SIZE; `seed` is that of the random methods, drawn where it is left out.
-
-    Raises SpringcheckError for everything that a user can mend; what is finished then stays in the
-    journal, and an existing file stays as it was.  So it does where a method that was asked for fails beside
-    others: their report has it under `broke`.
+    `thorough` adds the experiments, whose runs are not stored; `faults` adds engines broken on purpose, as
+    NAME or NAME=SIZE; `seed` is that of the random methods, drawn by default. Raises SpringcheckError for all
+    errors that a user can correct; finished work then stays in the journal, and an existing file is
+    unchanged.  So it is where a method that was requested fails beside others: their report lists it under
+    `broke`.
     """
     path = Path(path)
     if seed is not None and not scene.bath:
@@ -149,7 +149,7 @@ def run(
                     made = driver.play(scene, label, draft.append, progress=told, **seeds)
                     draft.finish(keeper.attributes(made))
             except MethodError as error:
-                # this shows only when the engine starts; the one method that was asked for must not vanish
+                # this shows only when the engine starts; a method that was requested alone must not vanish
                 if len(labels) == 1:
                     raise
                 labels.remove(label)
@@ -180,13 +180,13 @@ def run(
 
 
 class _Bar:
-    """Progress over several methods, each a part of the whole."""
+    """Progress over several methods, each an equal part of the whole."""
 
     def __init__(self, progress: Progress | None, parts: int) -> None:
         self._progress, self._parts, self._begun = progress, parts, -1
 
     def of(self, label: Label, size: int) -> driver.Progress | None:
-        """Where the progress of the next part goes, in units of `size` for all of it."""
+        """Callback for the progress of the next part, in units of `size` for all of it."""
         if self._progress is None:
             return None
         self._begun += 1
@@ -229,7 +229,7 @@ def judge(
         if len(pieces) == len(sources):
             parts.append(compare.compare(scene, pieces))
         else:
-            # where some run has ended early nothing more can be said of the pairs
+            # where some run has ended early, pairs cannot be compared any further
             nothing = np.full_like(parts[-1].max_difference, np.nan)
             parts.append(replace(parts[-1], max_difference=nothing))
     comparison = compare.merge(parts)
@@ -237,7 +237,7 @@ def judge(
     worst = {name: checks.worst(verdicts[name]) for name in sources}
     if stride > 1:
         worst = {name: _bridged(mine, verdicts[name], judged_frames) for name, mine in worst.items()}
-    # states are explained for deterministic motion only
+    # causes are derived from states for deterministic motion only
     if failed and not scene.bath:
         from springcheck.identify import files
 
@@ -259,11 +259,11 @@ def judge(
 
 def _pieces(scene: Scene, sources: Mapping[str, Path]) -> tuple[int, int]:
     """Frames of a piece of the stored runs, and the stride: of so many pieces one is judged."""
-    rows = max(2, PIECE // scene.n)
+    rows = max(2, PIECE_NUMBERS // scene.n)
     if scene.frames - 1 <= MOST_PIECES * rows:
         return rows, 1
     first = (next(keeper.windows(source, name, rows)) for name, source in sources.items())
-    # draws are judged in each piece by itself
+    # draws are judged in each piece separately
     bridged = scene.bath is not None or all(
         checks.bridges(checks.Case(trajectory=one, scene=scene)) for one in first
     )
@@ -274,8 +274,8 @@ def _pieces(scene: Scene, sources: Mapping[str, Path]) -> tuple[int, int]:
 
 
 def _bridged(worst: Sequence[Verdict], pieces: Sequence[Sequence[Verdict]], frames: int) -> list[Verdict]:
-    """The verdicts on a run of which so many frames were judged: none passes on its motion unless the closed
-    form did so in every piece, and so tells what happened between them."""
+    """Verdicts on a run of which so many frames were judged: none passes on its motion unless the closed
+    form, which covers the motion between pieces, was applied to every piece."""
     closed = [v for piece in pieces for v in piece if v.check == checks.closed_form.name]
     if all(v.passed is not None for v in closed):
         return list(worst)
@@ -303,7 +303,7 @@ def _together(streams: Mapping[str, Iterator[Trajectory]]) -> Iterator[dict[str,
 
 
 def repeat(path: Path, *, methods: Sequence[str] = (), progress: Progress | None = None) -> list[Repeat]:
-    """Run every trajectory of a store again, and say whether the numbers are the same bit for bit.
+    """Run every trajectory of a store again, and report whether the numbers are bitwise the same.
 
     `methods` are globs of labels.  Raises SpringcheckError where the file or an engine cannot be used.
     """
@@ -320,7 +320,7 @@ def repeat(path: Path, *, methods: Sequence[str] = (), progress: Progress | None
     scene = keeper.stored_scene(path)
     found = []
     beside = path.absolute().parent
-    # where there was room for the store there is room for its repetition, unless it is kept read-only
+    # beside the store there is space for its repetition, unless that folder is read-only
     place = beside if os.access(beside, os.W_OK) else None
     with interrupts.folder(dir=place, prefix=".springcheck-") as folder:
         again = folder / "again.h5"
@@ -357,7 +357,7 @@ def repeat(path: Path, *, methods: Sequence[str] = (), progress: Progress | None
 
 
 def _seed(path: Path, name: str, kept: object) -> int:
-    """The seed that a store keeps of a random run.  StoreError where it keeps none."""
+    """The seed that a store holds for a random run.  StoreError where it holds none."""
     try:
         return driver.checked_seed(int(str(kept)))
     except (ValueError, MethodError):
@@ -368,7 +368,7 @@ def _seed(path: Path, name: str, kept: object) -> int:
 def _difference(scene: Scene, one: Path, other: Path, label: str) -> float:
     norm = scene.system.norm
     worst = 0.0
-    rows = max(2, PIECE // scene.n)
+    rows = max(2, PIECE_NUMBERS // scene.n)
     for a, b in zip_longest(keeper.windows(one, label, rows), keeper.windows(other, label, rows)):
         if a is None or b is None or len(a.t) != len(b.t):
             return float("nan")

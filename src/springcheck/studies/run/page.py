@@ -1,5 +1,5 @@
-"""The charts of a run, in figures and in the report page: phase portrait, position, energy and error, the
-engines laid over each other; of a chain also its modes and its wave, of a bath the temperatures."""
+"""Charts of a run, in figures and in the report page: phase portrait, position, energy and error, with the
+engines overlaid; for a chain also its modes and its wave, in a bath the temperatures."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from springcheck.studies.run.result import Report, Stored
 from springcheck.thermal.heat import Heated, heated_of
 
 POSITIONS_IN_BATH = 4
-"""Schemes in a bath whose positions are drawn: more hide one another."""
+"""Most schemes in a bath whose positions are drawn: more would hide one another."""
 
 TWO_ERRORS = "two standard errors"
 
 
 def banks(found: Stored | Report, *, particle: int | None = None) -> list[Bank]:
-    """The charts of trajectories, or of the motion of one particle."""
+    """Charts of the trajectories, or of the motion of one particle."""
     shown = found.drawable
     failed = {verdict.method for verdict in found.verdicts if verdict.passed is False}
     heated = temperatures(shown.scene, found.path) if found.path else ()
@@ -54,10 +54,10 @@ def of_runs(
 ) -> list[Bank]:
     """The charts, none where no run has more than its start.
 
-    `followed`: the parts of the runs in which the motion itself is shown; `particle`: this one's motion
-    alone; `failed`: labels of runs that some verdict rejects, drawn in red; `points`: of the exact
-    solution's line; `heated`: temperatures by all frames, left out by those of `runs`.  SpringcheckError
-    where there is no such particle.
+    `followed`: the parts of the runs in which the motion itself is shown; `particle`: draw this one's motion
+    alone; `failed`: labels of runs with a failed verdict, drawn in red; `points`: number of points of the
+    exact solution's line; `heated`: temperatures by all frames, by default by those of `runs`.
+    SpringcheckError where there is no such particle.
     """
     if not any(len(run.t) > 1 for run in runs.values()):
         return []
@@ -107,7 +107,7 @@ def _temperatures(runs: Runs, heated: Sequence[Heated]) -> list[Bank]:
 
 
 def _of_kind(kind: str, found: Sequence[Heated]) -> Chart:
-    """One of the two temperatures: a row a method, with two standard errors, and that of its law."""
+    """One of the two temperatures: a row for each method, with two standard errors, and its law's value."""
     bars, marks, every = [], [], [1.0]
     for j, one in enumerate(found):
         value, error = getattr(one, kind), getattr(one, f"{kind}_error")
@@ -129,14 +129,14 @@ def _of_kind(kind: str, found: Sequence[Heated]) -> Chart:
     return Chart(
         title=f"{name.capitalize()}, two standard errors to either side.", short=name,
         x=Scale(name=f"{name} / that of the bath", shown=(low - room, high + room)),
-        # the name of the rule has a row of its own
+        # a row of its own for the name of the rule
         y=Scale(name="method", names=[one.method for one in found], shown=(-0.6, len(found) + 0.1)),
         curves=[*bars, *marks, law], rules=[Rule(axis="x", at=1.0, name="the bath", look="here")],
     )  # fmt: skip
 
 
 def _farthest(found: Sequence[Heated]) -> str:
-    """What scheme is farthest from its bath by its law; where none has one, what run is by its frames."""
+    """The scheme farthest from its bath by its law, or else the run that is by its frames, in a sentence."""
     kinds, measured = ("configurational", "kinetic"), ""
     both = [(getattr(one, f"{kind}_law"), kind, one.method) for one in found for kind in kinds]
     if not np.any(np.isfinite([x for x, *_ in both])):

@@ -27,7 +27,7 @@ FAULT = "fault"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MethodRun:
-    """One line of the report."""
+    """One row of the report."""
 
     method: str
     scheme: str
@@ -36,12 +36,12 @@ class MethodRun:
     """Steps that were taken."""
     message: str
     max_error: float
-    """Largest distance from the exact solution (`Norm`); NaN where that is not known."""
+    """Largest distance from the exact solution (`Norm`); NaN where that is unknown."""
     error_below: bool
-    """Whether the error is only known to be below `max_error`: the exact solution is no better known."""
+    """Whether `max_error` is only an upper bound: the uncertainty of the exact solution."""
     energy_drift: float
     """(H - H0) / |H0| where it is largest, > 0 where energy is gained; absolute for H0 = 0.  With friction
-    H - H of the exact solution in the place of H - H0, where that is known."""
+    the exact solution's H replaces H0, where it is known."""
     start_seconds: float
     run_seconds: float
     force_calls: int
@@ -49,12 +49,12 @@ class MethodRun:
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Report(StudyResult):
-    """Everything that `springcheck run` says."""
+    """The result of `springcheck run`."""
 
     table_of: ClassVar[str] = "runs"
     scene: Scene
     path: Path | None
-    """Where it was stored; None where nothing was asked to be kept."""
+    """Path of the store; None without one."""
     runs: tuple[MethodRun, ...]
     left_out: tuple[LeftOut, ...]
     verdicts: tuple[Verdict, ...]
@@ -66,14 +66,14 @@ class Report(StudyResult):
     """Measured temperatures of every run in a bath, beside those of its scheme."""
     resumed: tuple[str, ...] = ()
     others: tuple[str, ...] = ()
-    """Methods that could have served the scene and were not among those that run by default."""
+    """Methods that can serve the scene and do not run by default."""
     broke: Mapping[str, str] = field(default_factory=dict)
-    """Methods that were asked for and failed, and why: then nothing is stored."""
+    """Methods that were requested and failed, and why: then nothing is stored."""
     faults: Mapping[str, str] = field(default_factory=dict)
     """The fault of each run of an engine that is broken on purpose."""
 
     trajectories: Mapping[str, Trajectory] = field(default_factory=dict)
-    """Where nothing was kept on disk: the runs by label."""
+    """Runs by label, of a report without a store."""
 
     def __repr__(self) -> str:
         kept = f"; {str(self.path)!r}" if self.path else ""
@@ -85,7 +85,7 @@ class Report(StudyResult):
 
     @property
     def drawable(self) -> Drawable:
-        """Its trajectories, as far as they are drawn."""
+        """The part of its trajectories that is drawn."""
         from springcheck.studies.run.drawable import Drawable, drawable
 
         if self.path is not None:
@@ -100,12 +100,12 @@ class Report(StudyResult):
 
     @property
     def status(self) -> Literal[0, 1, 2]:
-        """Exit status of these verdicts; 2 where a method that was asked for failed."""
+        """Exit status of these verdicts; 2 where a method that was requested failed."""
         return 2 if self.broke else checks.status(self.verdicts)
 
     @property
     def not_judged(self) -> tuple[str, ...]:
-        """Methods whose scheme no check that applied could tell from another: a pass proves nothing."""
+        """Methods for which no check that applied distinguishes schemes: a pass proves nothing."""
         return checks.not_judged(self.verdicts)
 
     def document(self) -> dict[str, Any]:
@@ -133,18 +133,18 @@ class Repeat:
 
     method: str
     equal: bool
-    """Bit for bit the numbers that the store holds."""
+    """Bitwise equal to the numbers in the store."""
     as_written: bool
-    """Bit for bit those that it held when it was written, by their digest."""
+    """Bitwise equal to the numbers originally written, by their digest."""
     difference: float
-    """Largest, relative to the initial energy norm; NaN where the two do not have the same frames."""
+    """Largest difference, relative to the initial energy norm; NaN where the two have different frames."""
     changed: tuple[str, ...]
-    """Versions that are not what they were, as ``numpy 2.0.1 -> 2.4.6``."""
+    """Versions that have changed, as ``numpy 2.0.1 -> 2.4.6``."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Repeats(StudyResult):
-    """Everything that `springcheck run --from` says."""
+    """The result of `springcheck run --from`."""
 
     repeats: tuple[Repeat, ...]
 
@@ -169,14 +169,14 @@ class Stored(StudyResult):
 
     @cached_property
     def drawable(self) -> Drawable:
-        """Its trajectories, as far as they are drawn."""
+        """The part of its trajectories that is drawn."""
         from springcheck.studies.run.drawable import drawable
 
         return drawable(self.path)
 
     @property
     def notes(self) -> list[str]:
-        """What a picture leaves out."""
+        """Notes on what the figures leave out."""
         return self.drawable.notes
 
     def document(self) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Error and energy of a run, piece by piece, and its line in the report."""
+"""Error and energy of a run, accumulated piece by piece, and its row in the report."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Tally:
         self.drift: float = 0.0
 
     def add(self, piece: Trajectory, known: tuple[Extended, Extended] | None = None) -> None:
-        """Take a piece into account; `known` is the exact solution from its first frame on, or further."""
+        """Add a piece; `known` is the exact solution from its first frame on, or further."""
         scene, right = self._scene, self._start
         if self.heat:
             self.heat.add(piece)
@@ -55,7 +55,7 @@ class Tally:
             q, p = (x[: len(piece.t)] for x in known or solution(scene, [piece]))
             if not scene.system.keeps_energy:
                 right = self._energy(q, p)
-            # not max(), which leaves out what is no number
+            # np.maximum propagates NaN, which max() drops
             here = np.max(self._norm(piece.q - q, piece.p - p))
             self.error = float(np.maximum(self.error, here))
             last = int(checks.Case(trajectory=piece, scene=scene).steps[-1])
@@ -67,15 +67,15 @@ class Tally:
             self.drift = worst
 
     def _energy(self, q: Reals, p: Reals) -> Reals:
-        """Energies in double precision, unless that of the start leaves its range."""
+        """Energies in double precision, or in extended where that of the start leaves the range of double."""
         if not self._wide:
             return np.asarray(self._scene.system.energy(q, p), np.float64)
         return self._scene.system.energy(q.astype(np.longdouble), p.astype(np.longdouble))
 
 
 def line(piece: Trajectory, tally: Tally) -> MethodRun:
-    """The row of the report for a run, from its last piece and the tally of all of them."""
-    # a run that left no frame but the start has no error: that of the start is nothing
+    """Row of the report for a run, from its last piece and the tally of all of them."""
+    # a run with no frame but the start has no error: that of the start proves nothing
     ended = piece.outcome.status != "complete" and piece.outcome.step == 0
     return MethodRun(
         method=piece.label,
@@ -83,7 +83,7 @@ def line(piece: Trajectory, tally: Tally) -> MethodRun:
         outcome=piece.outcome.status,
         steps=piece.outcome.step,
         message=piece.outcome.message,
-        # differences below the uncertainty of the exact solution are no errors of the engine
+        # differences below the uncertainty of the exact solution are not reported as errors
         max_error=np.nan if ended else tally.error + (tally.doubt if tally.error < tally.doubt else 0.0),
         error_below=not ended and tally.error < tally.doubt,
         energy_drift=np.nan if ended else tally.drift,

@@ -84,13 +84,13 @@ def _report(report: Report) -> Lines:
 
 
 def _beyond(report: Report) -> Lines:
-    """The methods for which the step is too long: their motion grows without bound, whoever runs them."""
+    """Warnings for methods whose step is beyond the limit of stability: their motion grows without bound."""
     system, h, known = report.scene.system, abs(report.scene.step), schemes.known()
     ran = [known[name] for name in {run.scheme for run in report.runs} if name in known]
     ours = schemes.SCHEMES | schemes.ATTACHED
     plainly = all(one is ours.get(one.name) and not one.has("mixes") for one in ran)
     if system.has_modes and not system.is_damped and plainly:
-        # no scan is needed: the catalogue's limits are those of springs without friction, 0 where it has none
+        # no scan is needed: the catalogue's limits are those of undamped springs, 0 where a scheme has none
         least = min((one.limit for one in ran if one.limit), default=np.inf)
         if h * np.sqrt(np.max(np.abs(system.modes.w2))) < least:
             return []
@@ -107,7 +107,7 @@ def _beyond(report: Report) -> Lines:
 
 
 def _fractions(verdicts: Sequence[Verdict], question: str = "") -> Lines:
-    """Findings of each check for each method."""
+    """Value over bound of each check for each method."""
     return [
         plain(),
         plain(f"{question}Largest value of each check, as a fraction of its bound:"),
@@ -118,7 +118,7 @@ def _fractions(verdicts: Sequence[Verdict], question: str = "") -> Lines:
 
 
 def _runs(runs: Sequence[MethodRun]) -> TextTable:
-    """One line a method, under the scheme that it runs."""
+    """One row for each method, grouped by scheme."""
     rows: list[Row] = []
     for scheme in dict.fromkeys(run.scheme for run in runs):
         rows.append(plain(schemes.title(scheme), "italic"))
@@ -139,14 +139,14 @@ def _runs(runs: Sequence[MethodRun]) -> TextTable:
 
 
 def _error(x: float) -> str:
-    """Three digits in eight columns, two where the exponent takes three places."""
+    """Three digits in eight columns, two where the exponent has three digits."""
     if np.isnan(x):
         return "-"
     return f"{x:.2e}" if x < 1e100 else f"{x:.1e}"
 
 
 def _same_motions(report: Report) -> Lines:
-    """Which trajectories are one motion, and how closely."""
+    """Which trajectories are one motion, and how closely they agree."""
     if not report.same:
         return []
     out: Lines = []
@@ -162,7 +162,7 @@ def _same_motions(report: Report) -> Lines:
 
 
 def _temperatures(report: Report) -> Lines:
-    """The temperatures of runs in a bath, each beside what its scheme has exactly."""
+    """Temperatures of runs in a bath, each beside the exact one of its scheme."""
     if not report.temperatures:
         return []
     rows: list[Row] = [
@@ -196,7 +196,7 @@ def ratio(verdict: Verdict) -> float:
 
 
 def matrices(verdicts: Sequence[Verdict]) -> Lines:
-    """The checks of the recorded states, and below them the experiments where there are any."""
+    """Tables of the checks of recorded states, and of the experiments where there are any."""
     tried = {check.name for check in checks.THOROUGH}
     short = _names("motion") | {one.name: one.short for one in checks.RANDOM if one.family == "noise"}
     out: Lines = [verdict_matrix([v for v in verdicts if v.check not in tried], short)]
@@ -208,12 +208,12 @@ def matrices(verdicts: Sequence[Verdict]) -> Lines:
 
 
 def _names(family: str) -> dict[str, str]:
-    """Names in narrow columns of the checks of a family, by their names."""
+    """Short names, for narrow columns, of the checks of a family."""
     return {check.name: check.short for check in checks.ALL if check.family == family}
 
 
 def verdict_matrix(verdicts: Sequence[Verdict], short: Mapping[str, str]) -> TextTable:
-    """A line a method, a column a check; the checks whose bound is 0 share the column `exact`."""
+    """A row for each method, a column for each check; checks whose bound is 0 share the column `exact`."""
     named = [c for c in dict.fromkeys(v.check for v in verdicts) if c in short]
     shown = [c for c in named if any(v.check == c and v.passed is not None for v in verdicts)]
     exact = any(v.check not in short for v in verdicts)
@@ -238,7 +238,7 @@ def _cell(verdict: Verdict | None) -> Text:
 
 
 def sights(verdicts: Sequence[Verdict]) -> Lines:
-    """The smallest error of a stiffness that would have been seen, in the best and the worst method."""
+    """The smallest detectable error of a stiffness, in the best and the worst method."""
     methods = dict.fromkeys(v.method for v in verdicts if v.passed)
     best = {name: Limits.least(v.sees for v in verdicts if v.passed and v.method == name) for name in methods}
     known = {name: sees.stiffness for name, sees in best.items() if sees.stiffness is not None}
@@ -252,7 +252,7 @@ def sights(verdicts: Sequence[Verdict]) -> Lines:
 
 
 def failures(verdicts: Iterable[Verdict]) -> Lines:
-    """Every failed verdict with value, bound, ratio and why."""
+    """Every failed verdict with value, bound, ratio and reason."""
     out: Lines = []
     for v in verdicts:
         if v.passed is False:
@@ -272,8 +272,8 @@ def _faults(report: Report) -> Lines:
 
 
 def unjudged(verdicts: Sequence[Verdict], store: Path | None) -> Lines:
-    """Methods whose scheme no check that applied could tell from another, with the reasons; and the parts of
-    other methods that no check could judge."""
+    """Methods for which no check that applied distinguishes schemes, with the reasons; and the parts of other
+    methods that no check could judge."""
     out: Lines = []
     for v in verdicts:
         said = [part for part in v.why.split("; ") if part.endswith(checks.BLIND)] if v.passed else []
@@ -289,7 +289,7 @@ def unjudged(verdicts: Sequence[Verdict], store: Path | None) -> Lines:
             name = shlex.quote(str(store)) if store else "FILE"
             file = f"{name} --trajectory {methods[0]}"
             if methods[0].startswith("stepper:"):
-                # a function is tried on springs of its own, whatever the forces of the scene are
+                # a function is tried on separate springs, whatever the forces of the scene are
                 file = f"--stepper FILE.py:{methods[0].partition(':')[2]}"
             line += f"; springcheck identify {file} looks for it"
         out.append(plain(line, "bold yellow"))
@@ -297,7 +297,7 @@ def unjudged(verdicts: Sequence[Verdict], store: Path | None) -> Lines:
 
 
 def verdict_line(v: Verdict) -> str:
-    """Value, bound, ratio and why."""
+    """Value, bound, ratio and reason."""
     if v.passed is None:
         return f"not applicable: {v.why}"
     return f"{v.value:.3g} of {v.bound:.3g} {v.unit} (ratio {ratio(v):.2g}): {v.reason}"
@@ -325,9 +325,9 @@ def _repeat(one: Repeat) -> Text:
 
 
 def _summary(report: Report) -> Lines:
-    """How many verdicts passed, where the store is, and what to do with it."""
+    """Counts of the verdicts, the path of the store, and the next command."""
     if report.broke:
-        # why stands in the message
+        # the message gives the reason
         names = " and ".join(report.broke)
         return [plain(f"{report.counts}; nothing is stored: {names} did not run", "bold red")]
     failed, left = any(v.passed is False for v in report.verdicts), checks.not_exercised(report.scene)

@@ -1,4 +1,4 @@
-"""Thermostats on a thousand springs: temperatures, precision, and limits, each beside its law."""
+"""Thermostats on a thousand springs: temperatures, statistical errors and limits, each beside its law."""
 
 from __future__ import annotations
 
@@ -28,29 +28,29 @@ from springcheck.thermal import THERMOSTATS, Law
 
 OMEGA = float(np.sqrt(STIFFNESS / MASS))
 
-TURNS = np.array([0.2, 0.5, 0.8, 1.0, 1.2, 1.4])
-"""h omega of the temperatures."""
+SAMPLED_TURNS = np.array([0.2, 0.5, 0.8, 1.0, 1.2, 1.4])
+"""h omega at which temperatures are measured."""
 
 RATE = 0.4
-"""Friction over omega there."""
+"""Friction over omega at which temperatures are measured."""
 
-FRAMES = np.array([10.0, 20.0, 50.0, 100.0, 200.0, 500.0])
-"""Steps over which <q**2> is taken, at the second h omega."""
+AVERAGED_STEPS = np.array([10.0, 20.0, 50.0, 100.0, 200.0, 500.0])
+"""Steps over which <q**2> is averaged, at the second h omega."""
 
 FRICTIONS = np.array([0.03, 0.1, 0.3, 1.0, 3.0, 10.0])
-"""Friction over omega of the limits."""
+"""Friction over omega at which limits are measured."""
 
 WIDE, WAIT = 1000, 5.0
-"""Springs side by side, and times over which the motion has decayed before frames count."""
+"""Springs side by side, and decay times of the motion before frames are used."""
 
-LONGEST = 8.0
-"""h omega above which no limit is looked for."""
+LARGEST_H_OMEGA = 8.0
+"""Largest h omega up to which a limit is looked for."""
 
 HOTTEST_LAW = 100.0
-"""Over the bath's: above it, and at a limit, motion is not bounded within these steps."""
+"""Largest temperature of a law, over the bath's: above it, motion is not bounded within these steps."""
 
 SEED_OF_ALL = 27
-"""One seed for all methods; none was selected."""
+"""Seed of all methods; not tuned."""
 
 
 def bathed(scene: Scene, turn: float, friction: float) -> Scene:
@@ -67,33 +67,33 @@ def law_at(scheme: str, turn: float, friction: float) -> Law:
 
 
 def measured(label: Label) -> Sampled:
-    """One thermostat."""
+    """Measure one thermostat."""
     method = engines.method(label)
     linear = not THERMOSTATS[method.scheme].rescales
     rows, run, q = [], None, np.empty(0)
-    for i, turn in enumerate(TURNS):
+    for i, turn in enumerate(SAMPLED_TURNS):
         law = law_at(method.scheme, turn, RATE) if linear else None
         exact = (nan, nan) if law is None else (float(law.configurational[0]), float(law.kinetic[0]))
         if linear and not max(exact) < HOTTEST_LAW:
             rows.append((nan,) * 6)
             continue
-        wait = round(WAIT / _memory(law)) if law else 100
+        wait = round(WAIT / _slowest_decay(law)) if law else 100
         made = driver.run(bathed(springs(WIDE, wait + 500), turn, RATE), label, seed=SEED_OF_ALL)
         found = temperatures(made.q[wait:], made.p[wait:])
         rows.append((*found[0], exact[0], *found[1], exact[1]))
         if i <= 1:
             run, q = made, STIFFNESS * made.q[wait:] ** 2 / KT
     if run is None:
-        raise MethodError(f"{label}: no step is stable from h omega {TURNS[0]} on")
-    law = law_at(method.scheme, TURNS[1], RATE) if linear else None
+        raise MethodError(f"{label}: no step is stable from h omega {SAMPLED_TURNS[0]} on")
+    law = law_at(method.scheme, SAMPLED_TURNS[1], RATE) if linear else None
     columns = np.array(rows).T
     steps = max(run.outcome.step, 1)
     return Sampled(
-        method=str(label), scheme=method.scheme, title=schemes.title(method.scheme), turn=TURNS,
+        method=str(label), scheme=method.scheme, title=schemes.title(method.scheme), turn=SAMPLED_TURNS,
         configurational=columns[0], configurational_error=columns[1], configurational_law=columns[2],
-        kinetic=columns[3], kinetic_error=columns[4], kinetic_law=columns[5], frames=FRAMES,
-        off=np.array([np.sqrt(np.mean((np.mean(q[: int(n)], axis=0) - 1) ** 2)) for n in FRAMES]),
-        off_law=np.array([_off(law, int(n)) for n in FRAMES]), friction=FRICTIONS,
+        kinetic=columns[3], kinetic_error=columns[4], kinetic_law=columns[5], frames=AVERAGED_STEPS,
+        off=np.array([np.sqrt(np.mean((np.mean(q[: int(n)], axis=0) - 1) ** 2)) for n in AVERAGED_STEPS]),
+        off_law=np.array([_error_of_average(law, int(n)) for n in AVERAGED_STEPS]), friction=FRICTIONS,
         limit=np.array([_last_stable(partial(_radius_of_engine, label, x)) for x in FRICTIONS])
         if linear and not THERMOSTATS[method.scheme].collides else np.full(len(FRICTIONS), nan),
         limit_law=np.array([_last_stable(partial(_radius, method.scheme, x)) for x in FRICTIONS])
@@ -102,12 +102,12 @@ def measured(label: Label) -> Sampled:
     )  # fmt: skip
 
 
-def _memory(law: Law) -> float:
-    """Logarithm of the decay of the slowest part of the motion in a step."""
+def _slowest_decay(law: Law) -> float:
+    """Decay rate per step of the slowest part of the motion."""
     return max(-np.log(law.slowest), 0.02) if law.slowest > 0 else 1.0
 
 
-def _off(law: Law | None, frames: int) -> float:
+def _error_of_average(law: Law | None, frames: int) -> float:
     """Error of k <q**2>/kT over so many frames: systematic and statistical."""
     if law is None or law.scheme.collides:
         # with collisions the motion is a mixture, not Gaussian
@@ -123,14 +123,14 @@ def _radius(scheme: str, friction: float, turn: float) -> float:
 
 
 def _radius_of_engine(label: Label, friction: float, turn: float) -> float:
-    """Spectral radius of an engine's own map; one seed and three starts cancel the noise."""
+    """Spectral radius of second moments under an engine's map; with one seed, three starts cancel noise."""
     one = bathed(springs(1, 1), turn, friction)
     rest = np.zeros(1)
     runs = [
         driver.run(replace(one, q=q, p=p, steps=2), label, seed=SEED_OF_ALL)
         for q, p in ((rest, rest), (rest + 1, rest), (rest, rest + MASS * OMEGA))
     ]
-    # from the first step to the second, as some begin otherwise than they go on
+    # from the first step to the second, because some engines begin with another step
     (q0, p0), *moved = [(run.q[1:, 0], run.p[1:, 0]) for run in runs]
     if not all(len(q) == 2 for q, _ in moved) or len(q0) != 2:
         return np.inf
@@ -144,7 +144,7 @@ def _radius_of_engine(label: Label, friction: float, turn: float) -> float:
 def _last_stable(radius: Callable[[float], float]) -> float:
     """The largest h omega up to which no map grows, to a part in 1e4; infinity where none up to 8 does.
 
-    The rounding of a map is 1e-15, and where both its eigenvalues coincide, the root of that.
+    The rounding of a map is 1e-15; where its two eigenvalues coincide it acts by its square root.
     """
     slack = 1 + 1e-7
 
@@ -152,7 +152,7 @@ def _last_stable(radius: Callable[[float], float]) -> float:
         return not radius(turn) <= slack
 
     try:
-        tried = np.geomspace(0.02, LONGEST, 25)
+        tried = np.geomspace(0.02, LARGEST_H_OMEGA, 25)
         first = next((i for i, turn in enumerate(tried) if grows(float(turn))), None)
         if first is None:
             return float("inf")
@@ -166,7 +166,7 @@ def _last_stable(radius: Callable[[float], float]) -> float:
 
 
 def record(path: str | Path | None, methods: Sequence[str] = (), **how: Unpack[How]) -> Sampling:
-    """Measure thermostats, of these labels or globs, the default ones where left out; kept in a store."""
+    """Measure thermostats with these labels or globs, by default the default ones; saved in a store."""
     labels, left, _ = choose(replace(springs(1, 1), include=("*",)), methods)
     pieces = each(labels, "", lambda label: partial(measured, label), SAMPLED)
 
@@ -177,13 +177,13 @@ def record(path: str | Path | None, methods: Sequence[str] = (), **how: Unpack[H
 
 
 def perform(options: Namespace, progress: Progress | None) -> Sampling:
-    """What `springcheck sampling` does."""
+    """Carry out `springcheck sampling`."""
     return record(options.output or "sampling.h5", options.method, **keeper.how(options, progress))
 
 
 @keeper.restoring("sampling")
 def stored(kept: keeper.Kept) -> Sampling:
-    """The study that `record` has kept.  StoreError where the file holds none."""
+    """The study that `record` has saved.  StoreError where the file holds none."""
     return Sampling(
         methods=tuple(kept.found(SAMPLED, one["method"]) for one in kept.document["methods"]),
         left_out=kept.left_out, path=kept.path,
@@ -191,7 +191,7 @@ def stored(kept: keeper.Kept) -> Sampling:
 
 
 def curve(scheme: str, turns: Floats, of: str) -> Floats:
-    """The law's temperature over these h omega, NaN where the step is not stable."""
+    """The law's temperature at these h omega, NaN where the step is unstable."""
     with np.errstate(all="ignore"):
         found = np.array([float(getattr(law_at(scheme, x, RATE), of)[0]) for x in turns])
     return np.where(np.isfinite(found), found, nan)

@@ -16,14 +16,14 @@ from springcheck.studies.sampling.result import Sampled, Sampling
 
 W_SIGN = "\N{GREEK SMALL LETTER OMEGA}"
 IS_RIGHT = 0.01
-"""Part of a temperature within which it is called right."""
+"""Relative deviation of a temperature up to which it is called right."""
 
-FINE = np.linspace(0.02, 1.5, 75)
+LINE_H_W = np.linspace(0.02, 1.5, 75)
 """h omega of the lines."""
 
 
 def banks(study: Sampling) -> list[Bank]:
-    """The two temperatures against the step; what an error costs; where steps are stable."""
+    """The two temperatures against the step; error against cost; limits of stability."""
     if not study.methods:
         return []
     turn = Scale(name="step times frequency, h \N{GREEK SMALL LETTER OMEGA}", shown=(0.0, 1.5))
@@ -87,7 +87,7 @@ def banks(study: Sampling) -> list[Bank]:
 
 
 def _temperatures(methods: Sequence[Sampled]) -> str:
-    """How many sample the right configurations at the step nearest to h omega = 1, and who errs most."""
+    """How many schemes sample right configurations at the step nearest to h omega = 1, and the worst."""
     i = int(np.argmin(np.abs(methods[0].turn - 1)))
     off = {title(x.scheme): float(x.configurational[i]) - 1 for x in methods}
     law = {title(x.scheme): float(x.configurational_law[i]) - 1 for x in methods}
@@ -108,7 +108,7 @@ def _costs(methods: Sequence[Sampled]) -> str:
 
 
 def _limits(methods: Sequence[Sampled]) -> str:
-    """The largest step that is stable at every friction, of the best and of the worst."""
+    """The largest step that is stable at every friction, of the best scheme and of the worst."""
     least = {title(x.scheme): float(np.nanmin(x.limit_law)) for x in methods}
     low, high = min(least, key=lambda name: least[name]), max(least.values())
     few = sum(x < 0.99 * high for x in least.values())
@@ -119,7 +119,7 @@ def _limits(methods: Sequence[Sampled]) -> str:
 def _laws(methods: Sequence[Sampled], of: str) -> list[Curve]:
     """One line for each scheme that has a law."""
     found = dict.fromkeys(one.scheme for one in methods if np.any(np.isfinite(one.configurational_law)))
-    return [Curve(name=title(name), group=name, x=FINE, y=curve(name, FINE, of)) for name in found]
+    return [Curve(name=title(name), group=name, x=LINE_H_W, y=curve(name, LINE_H_W, of)) for name in found]
 
 
 def _marks(one: Sampled, x: np.ndarray, y: np.ndarray, law: np.ndarray) -> Curve:

@@ -13,13 +13,13 @@ from springcheck.studies.study import Studied
 from springcheck.studies.tables import RecordForm
 from springcheck.text.wording import count
 
-APART = 6.0
-"""Standard errors from which on a measured number is not its law's: chance 2e-9."""
+DEPARTING_ERRORS = 6.0
+"""Standard errors from which a measured number contradicts its law: chance 2e-9."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Sampled:
-    """One thermostat on springs.  Numbers without a law, and those of motion that is not bounded, are NaN."""
+    """One thermostat on springs.  Numbers without a law, and those of unbounded motion, are NaN."""
 
     method: str
     scheme: str
@@ -27,7 +27,7 @@ class Sampled:
     turn: Floats
     """h omega, ascending (g,), at friction 0.4 omega."""
     configurational: Floats
-    """k <q**2>/kT as measured (g,)."""
+    """k <q**2>/kT, measured (g,)."""
     configurational_error: Floats
     configurational_law: Floats
     kinetic: Floats
@@ -35,9 +35,9 @@ class Sampled:
     kinetic_error: Floats
     kinetic_law: Floats
     frames: Floats
-    """Steps over which <q**2> is taken, at the second h omega (g,)."""
+    """Steps over which <q**2> is averaged, at the second h omega (g,)."""
     off: Floats
-    """Root of the mean square of what k <q**2>/kT is off from 1 (g,)."""
+    """Root mean square deviation of k <q**2>/kT from 1 (g,)."""
     off_law: Floats
     friction: Floats
     """gamma/omega (g,)."""
@@ -45,19 +45,19 @@ class Sampled:
     """The largest h omega of stable steps, by the engine's own map, at each friction (g,)."""
     limit_law: Floats
     force_calls: float
-    """A step."""
+    """Force evaluations per step."""
     seconds: float
-    """A step and spring, of a thousand side by side."""
+    """Seconds per step and spring, with a thousand side by side."""
 
     @property
     def departs(self) -> bool:
-        """Whether a temperature is not the law's."""
+        """Whether a temperature contradicts its law."""
         pairs = (
             (self.configurational, self.configurational_law, self.configurational_error),
             (self.kinetic, self.kinetic_law, self.kinetic_error),
         )
         with np.errstate(all="ignore"):
-            return any(bool(np.any(np.abs(x - law) > APART * error)) for x, law, error in pairs)
+            return any(bool(np.any(np.abs(x - law) > DEPARTING_ERRORS * error)) for x, law, error in pairs)
 
 
 SAMPLED: RecordForm[Sampled] = RecordForm(
@@ -79,7 +79,7 @@ class Sampling(Studied):
 
     @property
     def status(self) -> int:
-        """1: a temperature is not its law's; 2: nothing was run."""
+        """Exit status 1: a temperature contradicts its law; 2: nothing was run."""
         if not self.methods:
             return 2
         return 1 if any(x.departs for x in self.methods) else 0

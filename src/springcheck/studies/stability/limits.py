@@ -14,27 +14,27 @@ from springcheck.physics.arrays import Extended, Floats
 from springcheck.studies.stability import propagators
 from springcheck.studies.stability.propagators import STEP, Springs, first
 
-FIRST, LAST, COARSE = 1e-9, 1e6, 4096
-"""The scan: h w from FIRST to LAST in COARSE springs, 1.008 from one to the next."""
+FIRST_H_W, LAST_H_W, COARSE_SPRINGS = 1e-9, 1e6, 4096
+"""The scan: `COARSE_SPRINGS` values of h w from `FIRST_H_W` to `LAST_H_W`, in a ratio of 1.008."""
 
-FINE = 1024
-"""Springs in each refinement of the bracket, each 1/1000 of the one before."""
+FINE_SPRINGS = 1024
+"""Springs in each refinement, which divides the bracket by 1000."""
 
-AGREED = 1e-6
+AGREED_LIMIT = 1e-6
 """Relative tolerance of every limit in double precision."""
 
-BLUR = 16
-"""Times the rounding at which what it hides is looked for again: the growth beyond a limit is of some power
-n of the distance, so rounding hides a distance r**(1/n), and the exit moves by 16**(1/n) - 1 of it, a quarter
-at least up to n = 12."""
+BLURRED_ROUNDING = 16
+"""Factor on the rounding in a second search.  Growth beyond a limit is of some power n of the distance, so
+that rounding hides a distance r**(1/n), which changes by 16**(1/n) - 1 of itself, at least a quarter up to n
+= 12."""
 
-NEXT = 1e-3
+NEAR_LIMIT = 1e-3
 """Relative distance from the limit at which stepping confirms it."""
 
-ROUGH = 0.1
+GROWING_H_W = 0.1
 """h w at which growth is stepped where the limit is 0."""
 
-LARGE = 1e3
+DECAYING_H_W = 1e3
 """h w at which decay is stepped where there is no limit."""
 
 
@@ -45,15 +45,15 @@ class Limit:
     method: str
     scheme: str
     limit: float
-    """Largest h w with a bounded propagator; infinity where none up to `LAST` is unbounded."""
+    """Largest h w with a bounded propagator; infinity where none up to `LAST_H_W` is unbounded."""
     theory: float
     bound: float
-    """How far `limit` may be from `theory`: what one step's rounding hides, `AGREED` at least."""
+    """Allowed |limit - theory|: what one step's rounding hides, `AGREED_LIMIT` at least."""
     growth_above: float
     """Measured growth of the amplitude per step just above the limit (its logarithm); NaN: no limit."""
     growth_predicted: float
     growth_below: float
-    """The same just below it, or at `LARGE` where there is no limit."""
+    """Growth just below the limit, or at `DECAYING_H_W` where there is none."""
     growth_below_predicted: float
     h_w: Floats
     """h w of the points drawn (j,)."""
@@ -63,37 +63,37 @@ class Limit:
 
     @property
     def agrees(self) -> bool:
-        """Whether the limit is where theory puts it."""
+        """Whether the limit agrees with theory."""
         return self.limit == self.theory or abs(self.limit - self.theory) <= self.bound
 
     @property
     def follows(self) -> bool:
-        """Whether the spectral radii drawn are those of the scheme, to `AGREED`."""
-        return np.allclose(self.radius, self.radius_predicted, rtol=AGREED, atol=0, equal_nan=True)
+        """Whether the measured spectral radii are those of the scheme, to `AGREED_LIMIT`."""
+        return np.allclose(self.radius, self.radius_predicted, rtol=AGREED_LIMIT, atol=0, equal_nan=True)
 
 
 def measure(label: Label) -> Limit:
-    """Find a method's limit, step to both sides of it and at it, and compare with its scheme."""
+    """Measure a method's limit, step on both sides of it and at it, and compare with its scheme."""
     scheme = schemes.scheme(engines.method(label).scheme)
     limit = first_exit(label, propagators.measured)
     theory = scheme.limit
-    bound = AGREED
+    bound = AGREED_LIMIT
     if not np.isinf(theory):
-        # the scheme's map at its own rounding shows what cannot be told; the roundings of k and of the step
-        # come on top.  It moves by more where rounding hides its exit, not where the stated limit is wrong
-        hidden, blurred = (first_exit(label, propagators.theory, times) for times in (1, BLUR))
+        # the scheme's map at its own rounding shows what is undecidable, to which the roundings of k and of
+        # the step add.  The limit moves by more where rounding hides it, not where the stated limit is wrong
+        hidden, blurred = (first_exit(label, propagators.theory, times) for times in (1, BLURRED_ROUNDING))
         off = 0.0 if hidden == blurred else min(abs(hidden - theory), abs(hidden - blurred))
-        bound = max(AGREED, 4 * off + 4 * propagators.noise(label) * theory)
+        bound = max(AGREED_LIMIT, 4 * off + 4 * propagators.noise(label) * theory)
     turn = _points(theory)
     springs = Springs(label=label, turn=turn)
     rounding = propagators.noise(label)
     above, below = (np.nan, np.nan), (np.nan, np.nan)
     if theory == 0:
-        above = _growth(label, ROUGH)
+        above = _growth(label, GROWING_H_W)
     elif np.isinf(theory):
-        below = _growth(label, LARGE)
+        below = _growth(label, DECAYING_H_W)
     else:
-        above, below = _growth(label, theory * (1 + NEXT)), _growth(label, theory * (1 - NEXT))
+        above, below = _growth(label, theory * (1 + NEAR_LIMIT)), _growth(label, theory * (1 - NEAR_LIMIT))
     return Limit(
         method=str(label),
         scheme=scheme.title,
@@ -111,8 +111,8 @@ def measure(label: Label) -> Limit:
 
 
 def first_exit(label: Label, matrices: Callable[[Springs], Floats | Extended], times: float = 1) -> float:
-    """Where the propagator first stops being bounded, to a part in 1e10, at so many `times` the rounding of
-    the engine; infinity where it does not."""
+    """First h w at which the propagator is unbounded, to a part in 1e10, at `times` the rounding of the
+    engine; infinity where there is none."""
     rounding = times * propagators.noise(label)
 
     def grows(turn: Floats) -> tuple[np.ndarray, Floats]:
@@ -121,11 +121,12 @@ def first_exit(label: Label, matrices: Callable[[Springs], Floats | Extended], t
         return wild, np.asarray(springs.true_turn, np.float64)
 
     single = engines.arithmetic(label).parameters == "single"
-    return first(grows, np.geomspace(FIRST, LAST, COARSE), FINE, 5, 2.0**-22 if single else 1e-10)
+    h_w = np.geomspace(FIRST_H_W, LAST_H_W, COARSE_SPRINGS)
+    return first(grows, h_w, FINE_SPRINGS, 5, 2.0**-22 if single else 1e-10)
 
 
 def _points(theory: float) -> Floats:
-    """Where the spectral radius is drawn: over the decade around the limit, closer near it."""
+    """h w at which the spectral radius is drawn: over the decade around the limit, denser near it."""
     centre = theory if 0 < theory < np.inf else 2.0
     wide = np.geomspace(centre / 20, centre * 5, 41)
     near = centre * (1 + np.array([-0.02, -0.005, 0.0, 0.005, 0.02]))
@@ -141,11 +142,11 @@ def stepped(springs: Springs, steps: int) -> tuple[Floats, Floats]:
 
 
 def _growth(label: Label, turn: float) -> tuple[float, float]:
-    """Logarithm of the growth per step: stepped, and that of the largest eigenvalue.
+    """Logarithm of the growth per step: measured by stepping, and that of the largest eigenvalue.
 
-    The slope of log amplitude over the last quarter of a run that is long enough for the growing
-    eigenvector to stand alone by 1e-7, as far as amplitudes reach; over whole turns where the motion
-    is an ellipse.
+    The slope of log amplitude over the last quarter of a run that is long enough for the growing eigenvector
+    to dominate by 1e7, as far as amplitudes allow; of the invariant quadratic form where the motion is an
+    ellipse.
     """
     springs = Springs(label=label, turn=np.array([turn]))
     matrix = propagators.theory(springs)
@@ -162,7 +163,7 @@ def _growth(label: Label, turn: float) -> tuple[float, float]:
     if found.angle[0] != 0:
         form = schemes.invariant(matrix, h=STEP)[0]
         x, y = x[n], y[n]
-        # along the invariant ellipse the amplitude does not waver
+        # along the invariant ellipse the amplitude does not oscillate
         ellipse = np.abs(form[0] * x * x + form[1] * x * y + form[2] * y * y)
         logs = 0.5 * np.log(ellipse.astype(np.float64))
     else:

@@ -1,8 +1,8 @@
 """The longest step at which a scheme stays bounded on a scene, from the spectral radius of its one-step map.
 
-The map is that of the scene's linearisation where its motion is stiffest, with its friction, and with slow
-and fast springs apart for a scheme that parts them.  Where nothing couples the modes, each has a 2 x 2
-matrix of its own; elsewhere all eigenvalues are those of one 2n x 2n matrix.
+The map is that of the scene linearised where its motion is stiffest, with its friction, and with slow and
+fast springs separate for a scheme that treats them differently.  Uncoupled modes have a 2 x 2 matrix each;
+otherwise all eigenvalues are those of one 2n x 2n matrix.
 """
 
 from __future__ import annotations
@@ -23,34 +23,34 @@ from springcheck.physics.terms import WallSpring
 from springcheck.schemes import Scheme
 from springcheck.studies.stability import propagators
 
-FIRST, LAST = 1e-9, 1e6
-"""Steps between which a limit is looked for, in units of the fastest angular frequency or friction rate."""
+FIRST_STEP, LAST_STEP = 1e-9, 1e6
+"""Steps between which a limit is searched, in units of the fastest angular frequency or friction rate."""
 
-NEIGHBOURS = 4096
+SCANNED_STEPS = 4096
 """Steps of the first scan, 1.008 from one to the next."""
 
-FINE = 256
+REFINED_STEPS = 256
 """Steps of each refinement of the bracket."""
 
-SAMPLES = 512
-"""States of an anharmonic motion among which the stiffest is looked for."""
+SAMPLED_STATES = 512
+"""States of an anharmonic motion among which the stiffest is searched."""
 
-BETWEEN = 64
-"""States in place of each interval about the stiffest, twice: what a maximum is missed by falls with
-the square of the interval, from 1e-5 of it to 1e-12."""
+REFINEMENT = 64
+"""States in place of each interval about the stiffest, twice: the error of a maximum falls with the square of
+the interval, from 1e-5 of it to 1e-12."""
 
 MOST_MODES = 64
-"""Modes of a long chain that are looked at: the fastest, the slowest, and some between."""
+"""Modes of a long chain that are examined: the fastest, the slowest, and some between."""
 
 MOST_COUPLED = 16
-"""Particles whose modes a scheme or friction couples: a scan is of NEIGHBOURS matrices of 2n x 2n."""
+"""Most particles whose modes a scheme or friction couples: a scan has SCANNED_STEPS matrices of 2n x 2n."""
 
-GROWTH = 1e-7
-"""Growth per step from which coupled modes count as growing: eigenvalues of their matrix that are nearly
-equal are known to the square root of the rounding only."""
+COUPLED_GROWTH = 1e-7
+"""Growth per step from which coupled modes count as growing: nearly equal eigenvalues of their matrix are
+known to the square root of the rounding only."""
 
 LEAST_DECAY = 2.0**-80
-"""Decay below which a mode has none, over the largest friction rate: the square of 2**12 roundings."""
+"""Relative decay below which a mode counts as undamped: the square of 2**12 roundings."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -66,14 +66,14 @@ class Linear:
 
     @classmethod
     def of_modes(cls, w2: Reals, rate: Reals) -> Linear:
-        """Modes (g,) that nothing couples."""
+        """Uncoupled modes (g,)."""
         a = np.asarray(w2, np.longdouble)[:, None, None]
         return cls(slow=a, fast=np.zeros_like(a), rate=np.asarray(rate, np.longdouble)[:, None])
 
 
 @lru_cache(maxsize=8)
 def _at_its_stiffest(scene: Scene) -> Scene:
-    """The scene with each spring of modulated stiffness as it is where that is largest."""
+    """The scene with each spring of modulated stiffness at its largest stiffness."""
     terms = tuple(
         WallSpring(i=x.i, k=x.k + np.abs(x.k * x.depth), at=x.at) if isinstance(x, ModulatedSpring) else x
         for x in scene.terms
@@ -83,12 +83,12 @@ def _at_its_stiffest(scene: Scene) -> Scene:
 
 @lru_cache(maxsize=8)
 def stiffest(scene: Scene) -> Floats:
-    """Positions (n,) where the exact solution of an anharmonic scene is stiffest; elsewhere the start."""
+    """Positions (n,) where the exact solution of an anharmonic scene is stiffest; otherwise the start."""
     system = scene.system
     if system.is_linear or scene.n > MOST_MODES or not exact.has_true_motion(scene):
         return np.asarray(scene.q)
-    found, number = np.asarray(scene.q), SAMPLES
-    steps = np.arange(SAMPLES + 1)
+    found, number = np.asarray(scene.q), SAMPLED_STATES
+    steps = np.arange(SAMPLED_STATES + 1)
     for _ in range(3):
         q, _ = exact.true_motion(scene, steps, scene.step * scene.steps / number)
         finite = np.isfinite(q).all(axis=-1)
@@ -99,14 +99,14 @@ def stiffest(scene: Scene) -> Floats:
         if system.brakes_by_place:
             stiff = stiff + np.max(np.maximum(system.friction_at(here)[0], 0), axis=-1) ** 2
         found = here[int(np.argmax(stiff))]
-        # closer about the stiffest, from the sample before it to the one after
-        first, number = (int(steps[finite][int(np.argmax(stiff))]) - 1) * BETWEEN, number * BETWEEN
-        steps = np.arange(max(first, 0), min(first + 2 * BETWEEN, number) + 1)
+        # refine about the stiffest, from the sample before it to the one after
+        first, number = (int(steps[finite][int(np.argmax(stiff))]) - 1) * REFINEMENT, number * REFINEMENT
+        steps = np.arange(max(first, 0), min(first + 2 * REFINEMENT, number) + 1)
     return found
 
 
 def _largest(system: System[Scene], q: Floats) -> float:
-    """The largest eigenvalue of M**-1/2 K M**-1/2 at q (n,), or its bound of Gershgorin [1/T2]."""
+    """The largest eigenvalue of M**-1/2 K M**-1/2 at q (n,), or its Gershgorin bound [1/T2]."""
     if system.is_separate:
         return float(np.max(system.hessian_diagonal(q) / system.m))
     if system.n > MOST_DENSE:
@@ -124,8 +124,8 @@ def _scaled(system: System[Scene], q: Reals) -> Extended:
 def fastest(scene: Scene) -> float:
     """Largest angular frequency of a scene without its friction [1/T], 0 where nothing oscillates.
 
-    Of an anharmonic scene that of small oscillations where it is `stiffest`.  SceneError where forces
-    overflow there.
+    For an anharmonic scene, of small oscillations where it is `stiffest`.  SceneError where forces overflow
+    there.
     """
     system = _at_its_stiffest(scene).system
     largest = float(np.max(system.modes.w2)) if system.has_modes else _largest(system, stiffest(scene))
@@ -135,10 +135,10 @@ def fastest(scene: Scene) -> float:
 
 
 def linear(scene: Scene, scheme: Scheme) -> Linear | None:
-    """The linearised motion that decides a scheme's stability on a scene.
+    """The linearised motion that determines a scheme's stability on a scene.
 
-    None for more coupled particles than are looked at, in a magnetic field, which is no stiffness, and where
-    friction that depends on positions joins them.
+    None for more coupled particles than are examined, in a magnetic field, which is no stiffness, and where
+    position-dependent friction acts on joined particles.
     """
     system = _at_its_stiffest(scene).system
     if "magnetic" in system.acting or (system.brakes_by_place and not system.is_separate):
@@ -152,7 +152,7 @@ def linear(scene: Scene, scheme: Scheme) -> Linear | None:
             for terms in (system.slow, system.fast)
         ]
         squares, turned = np.linalg.eigh(np.asarray(parts[0][0] + parts[1][0], np.float64))
-        if scheme.b and squares[0] >= -GROWTH * squares[-1]:
+        if scheme.b and squares[0] >= -COUPLED_GROWTH * squares[-1]:
             return _oscillators(squares, turned, np.asarray(system.friction_rates, np.float64))
         return Linear(slow=parts[0], fast=parts[1], rate=system.friction_rates[None])
     if system.has_modes:
@@ -172,16 +172,16 @@ def linear(scene: Scene, scheme: Scheme) -> Linear | None:
 
 
 def _oscillators(w2: Floats, modes: Floats, rate: Floats) -> Linear:
-    """Oscillators with the eigenvalues of modes that friction joins: a Runge-Kutta step needs no more.
+    """Oscillators with the eigenvalues of modes that friction couples: a Runge-Kutta step needs no more.
 
-    Between the modes the motion is a skew matrix less C, so the decay of an eigenvector (u, v) is
-    v* C v/(u* u + v* v), which no frequency beside it hides.
+    In the modes the motion is a skew matrix minus C, so that an eigenvector (u, v) decays at the rate v* C
+    v/(u* u + v* v), which is accurate even beside large frequencies.
     """
     w, c = np.diag(np.sqrt(np.maximum(w2, 0))), modes.T @ (rate[:, None] * modes)
     values, vectors = np.linalg.eig(np.block([[np.zeros_like(w), w], [-w, -c]]))
     size, v = np.abs(vectors) ** 2, vectors[len(w) :]
     decay = np.real(np.sum(v.conj() * (c @ v), axis=0)) / size.sum(axis=0)
-    # a vector is off by some roundings: so the decay of one on which no friction acts is off by their square
+    # a vector is off by some roundings, so that an undamped one has a decay of their square
     decay = np.where(decay > LEAST_DECAY * np.max(rate), decay, 0.0)
     turns, alone = values.imag > 0, np.sort(decay[values.imag == 0])
     one, other = alone[::2], alone[1::2]
@@ -192,8 +192,7 @@ def _oscillators(w2: Floats, modes: Floats, rate: Floats) -> Linear:
 
 
 def grows(scheme: Scheme, of: Linear, h: Floats) -> np.ndarray:
-    """Whether a step of h (j,) [T] makes some mode grow; modes on a barrier (A < 0) grow by themselves and do
-    not count."""
+    """Whether a step of h (j,) [T] makes some mode grow; modes on a barrier (A < 0) grow anyway."""
     g, n = of.rate.shape
     # in units of each step: A h**2 and r h
     t = np.asarray(h, np.longdouble)[:, None, None, None]
@@ -216,13 +215,13 @@ def grows(scheme: Scheme, of: Linear, h: Floats) -> np.ndarray:
         return np.asarray(np.any(wild & ((of.slow + of.fast)[:, 0, 0] >= 0), axis=-1))
     finite = np.isfinite(maps).all(axis=(-1, -2))
     values = np.linalg.eigvals(np.where(finite[..., None, None], maps, 0).astype(np.float64))
-    return np.asarray(np.any(~finite | (np.max(np.abs(values), axis=-1) > 1 + GROWTH), axis=-1))
+    return np.asarray(np.any(~finite | (np.max(np.abs(values), axis=-1) > 1 + COUPLED_GROWTH), axis=-1))
 
 
 @lru_cache(maxsize=64)
 def limit_of(scheme: Scheme) -> float:
-    """The largest h w of a scheme on a spring: by the catalogue; of another by its own map, as it may state a
-    wrong one, unless its step has more than one map (multiple time steps) or none."""
+    """The largest h w of a scheme on a spring: by the catalogue, or for another scheme by its own map, as it
+    may state a wrong limit, unless its step has more than one map (multiple time steps) or none."""
     ours = scheme in (schemes.SCHEMES.get(scheme.name), schemes.ATTACHED.get(scheme.name))
     if ours or scheme.has("random") or scheme.has("mixes") or not scheme.has("one-step"):
         return scheme.limit
@@ -230,10 +229,10 @@ def limit_of(scheme: Scheme) -> float:
 
 
 def longest(scheme: Scheme, scene: Scene, limit: float | None = None) -> float:
-    """The largest h [T] up to which every step is bounded: 0 none is, infinity all are, NaN not known here.
+    """The largest h [T] up to which every step is bounded: 0 none is, infinity all are, NaN unknown.
 
-    For a scheme of multiple time steps that is where its first resonance begins.  `limit` is that of an
-    engine that leaves its scheme's map.
+    For a scheme of multiple time steps that is where its first resonance begins.  `limit` replaces the
+    scheme's for an engine that departs from its map.
     """
     limit = limit_of(scheme) if limit is None else limit
     if not scheme.has("one-step") or np.isinf(limit):
@@ -244,12 +243,12 @@ def longest(scheme: Scheme, scene: Scene, limit: float | None = None) -> float:
         return np.nan
     w2, known = np.linalg.eigvalsh(np.asarray(of.slow + of.fast, np.float64)), np.inf
     if scheme.has("mixes") or w2.shape[1] > 1:
-        if np.min(w2) < -GROWTH * np.max(np.abs(w2)):
+        if np.min(w2) < -COUPLED_GROWTH * np.max(np.abs(w2)):
             return np.nan
     else:
         alone = (w2[:, 0] > 0) & (of.rate[:, 0] == 0)
         if np.any(alone):
-            # without friction the catalogue knows, in digits that a scan has not
+            # without friction the catalogue's limit has more digits than a scan
             known = limit / float(np.sqrt(np.max(w2[alone])))
         of = Linear(slow=of.slow[~alone], fast=of.fast[~alone], rate=of.rate[~alone])
         w2 = w2[~alone]
@@ -258,8 +257,8 @@ def longest(scheme: Scheme, scene: Scene, limit: float | None = None) -> float:
 
 
 def too_long(name: str, scene: Scene) -> float | None:
-    """The largest step of a scheme where that of the scene is longer, None where it is not; nor for a scheme
-    that has none at all, as explicit Euler without friction, or whose map is not known."""
+    """The largest step of a scheme where the scene's is longer, otherwise None; also for a scheme without
+    stable steps, as explicit Euler without friction, or whose map is unknown."""
     scheme = schemes.known().get(name)
     if scheme is None or not scheme.has("one-step") or scheme.has("random"):
         return None
@@ -273,10 +272,10 @@ def too_long(name: str, scene: Scene) -> float | None:
 
 
 def _first(scheme: Scheme, of: Linear, scale: float) -> float:
-    """Where a scan finds the first step that grows, to a part in 1e10."""
-    h = np.geomspace(FIRST, LAST, NEIGHBOURS) / scale
+    """The first growing step of a scan, to a part in 1e10."""
+    h = np.geomspace(FIRST_STEP, LAST_STEP, SCANNED_STEPS) / scale
     if scheme.has("mixes"):
-        # a resonance may be narrow: up to the limit of the fast springs alone at even distances
-        h = np.linspace(0, scheme.limit, NEIGHBOURS + 1)[1:] / scale
+        # a resonance may be narrow: equal spacing up to the limit of the fast springs alone
+        h = np.linspace(0, scheme.limit, SCANNED_STEPS + 1)[1:] / scale
     with np.errstate(all="ignore"):
-        return propagators.first(lambda h: (grows(scheme, of, h), h), h, FINE, 6)
+        return propagators.first(lambda h: (grows(scheme, of, h), h), h, REFINED_STEPS, 6)

@@ -1,8 +1,8 @@
-"""Where methods stop being stable, measured on the engines' own propagators and set beside theory.
+"""Limits of stability, measured on the engines' own propagators and compared with theory.
 
-Every method of fixed step gets its limit on a spring (`limits`).  A scene with friction adds the region
-of stability of a damped spring (`regions`), one with springs marked fast the resonances of multiple time
-steps (`resonance`), a modulated spring the Floquet multipliers of methods (`multipliers`).
+Every method of fixed step has its limit on a spring measured (`limits`).  A scene with friction adds the
+region of stability of a damped spring (`regions`), one with springs marked fast the resonances of multiple
+time steps (`resonance`), a modulated spring the Floquet multipliers of methods (`multipliers`).
 """
 
 from __future__ import annotations
@@ -87,7 +87,7 @@ def _measure(scene: Scene, labels: Sequence[Label], kept: Keeper) -> Stability:
 
 
 def perform(options: Namespace, progress: Progress | None) -> Stability:
-    """What `springcheck stability` does."""
+    """Carry out `springcheck stability`."""
     scene = scenefile.load_scene(options.scene)
     path = options.output or f"{scene.name}-stability.h5"
     return record(scene, path, options.method, **keeper.how(options, progress))
@@ -95,10 +95,10 @@ def perform(options: Namespace, progress: Progress | None) -> Stability:
 
 @keeper.restoring("stability")
 def stored(kept: keeper.Kept) -> Stability:
-    """The study that `record` has kept.  StoreError where the file holds none."""
+    """The study that `record` has saved.  StoreError where the file holds none."""
 
     def under(form: Form[Any], name: str) -> tuple[Any, ...]:
-        # the document knows the order in which they were measured
+        # the document has the order in which they were measured
         methods = dict.fromkeys(one["method"] for one in kept.document.get(name, ()))
         return tuple(kept.found(form, method) for method in methods)
 

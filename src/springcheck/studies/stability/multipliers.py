@@ -1,8 +1,9 @@
-"""Floquet multipliers of methods on a spring of modulated stiffness: of so many steps as make a period.
+"""Floquet multipliers of methods on a spring of modulated stiffness, with a whole number of steps in a
+period.
 
-The state a period later is a matrix times that of now, of the exact motion and of every method whose steps
-fit the period.  Its eigenvalues say whether the motion grows, and by which angle it turns (Nayfeh & Mook,
-Nonlinear Oscillations, 1979, 5.2).
+The state a period later is a matrix times the present one, for the exact motion and for every method whose
+steps divide the period.  Its eigenvalues give the growth and the rotation angle (Nayfeh & Mook, Nonlinear
+Oscillations, 1979, 5.2).
 """
 
 from __future__ import annotations
@@ -18,13 +19,13 @@ from springcheck.physics.exact.mathieu import floquet
 from springcheck.physics.scene import Scene
 
 MOST_STEPS = 4096
-"""Largest number of steps in a period: where the step is shorter, multipliers are measured with this many."""
+"""Largest number of steps in a period: for a shorter step, multipliers are measured with this many."""
 
-INVERTIBLE = 2.0**500
-"""Size of a matrix up to which, and down to its inverse, all products of two elements are doubles."""
+INVERTIBLE_NORM = 2.0**500
+"""Largest norm of a matrix for which products of two elements, of it and of its inverse, are doubles."""
 
-LOST = 2.0**60
-"""Size of states from which on an engine in single precision may overflow: their squares do."""
+OVERFLOWING_SIZE = 2.0**60
+"""Size of states from which an engine in single precision may overflow: their squares do."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -35,30 +36,30 @@ class Multiplier:
     steps: int
     """Steps in a period of the modulation."""
     grown: float
-    """Factor of a period, measured: two starts, a period each."""
+    """Growth factor over a period, measured from two starts."""
     turned: float
-    """Angle of a period [rad], from 0 to pi, measured by the same; NaN, as all, where nothing was."""
+    """Rotation angle over a period [rad], from 0 to pi, likewise measured; all are NaN where nothing was."""
     grown_predicted: float
-    """Growth that the scheme's own steps have."""
+    """Growth factor of the scheme's own steps."""
     turned_predicted: float
     off: float
-    """Distance of both in the complex plane."""
+    """Distance of the two multipliers in the complex plane."""
     bound: float
-    """Roundings of each step, carried to the end of the period, by the condition of the eigenvectors: of a
-    state of size 1 + |place of rest|, as each is rounded with its distance from 0."""
+    """Rounding of each step, propagated to the end of the period, times the condition of the eigenvectors.
+    States have size 1 + |rest position|, as each is rounded with its distance from 0."""
     why: str = ""
     """Why nothing was measured."""
 
 
 def serves(scene: Scene, label: Label) -> bool:
-    """Whether a method of fixed step takes the scene, one modulated spring whose exact motion is known."""
+    """Whether a method of fixed step can serve the scene, one modulated spring with a known exact motion."""
     one = scene.n == 1 and floquet(scene.system) is not None and not engines.refusal(scene, label)
     return one and _scheme(label).has("one-step")
 
 
 def measure(scene: Scene, label: Label) -> Multiplier:
-    """Run a period from two starts, in at most `MOST_STEPS` whole steps that come nearest to that of the
-    scene."""
+    """Run a period from two starts, with the whole number of steps, `MOST_STEPS` at most, that is nearest to
+    the scene's step."""
     found = floquet(scene.system)
     assert found is not None
     _, period, _ = found
@@ -68,10 +69,10 @@ def measure(scene: Scene, label: Label) -> Multiplier:
     starts = [(rest + 1, 0.0), (rest, size)]
     right = _powers(scene, label, starts, rest, size)
     largest_seen = np.max(np.abs(right), axis=(1, 2))
-    if not np.all((largest_seen <= INVERTIBLE) & (largest_seen >= 1 / INVERTIBLE)):
+    if not np.all((largest_seen <= INVERTIBLE_NORM) & (largest_seen >= 1 / INVERTIBLE_NORM)):
         return _unknown(label, steps, "the products of its scheme's steps are beyond what doubles can invert")
     try:
-        # a rounding of the state after each step, carried on to the end
+        # a rounding of the state after each step, propagated to the end
         carried = [
             np.linalg.norm(right[-1] @ np.linalg.inv(one), 2) * np.linalg.norm(one, 2) for one in right
         ]
@@ -79,15 +80,15 @@ def measure(scene: Scene, label: Label) -> Multiplier:
         return _unknown(label, steps, "doubles cannot invert the products of its scheme's steps")
     runs = [driver.run(replace(scene, q=np.array([q]), p=np.array([p])), label) for q, p in starts]
     lost = next((run.outcome for run in runs if run.outcome.status != "complete"), None)
-    if lost and np.max(largest_seen) > LOST:
+    if lost and np.max(largest_seen) > OVERFLOWING_SIZE:
         return _unknown(label, steps, f"its run {lost.status} as its scheme grows: {lost.message}")
     ends = np.array([[run.q[-1, 0] - rest, run.p[-1, 0] / size] for run in runs]).T
     values, vectors = np.linalg.eig(right[-1])
     own, largest = _largest(values), complex(np.nan) if lost else _largest(np.linalg.eigvals(ends))
     law, method = schemes.Law(scheme=_scheme(label), scene=scene, h=scene.step), engines.method(label)
-    # a velocity rebuilt from positions has the rounding of these over the step
+    # a velocity rebuilt from positions has their rounding divided by the step
     each = law.roundings * (1 + steps / (2 * np.pi) * method.rebuilds_velocity)
-    # each position is rounded as it is, beside a displacement of 1 from the place of rest
+    # each position is rounded as a whole, its displacement from the rest position being 1
     each *= 1 + abs(rest)
     allowed = engines.arithmetic(label).state * each * float(np.sum(carried)) * float(np.linalg.cond(vectors))
     return Multiplier(

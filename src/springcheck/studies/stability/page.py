@@ -15,15 +15,15 @@ from springcheck.studies.stability.regions import Region
 from springcheck.studies.stability.resonance import Resonance
 from springcheck.studies.stability.result import Stability
 
-TURN = "step times frequency, h \N{GREEK SMALL LETTER OMEGA}"
+TURN_AXIS = "step times frequency, h \N{GREEK SMALL LETTER OMEGA}"
 
 
 LEAST_SHOWN = 0.05
-"""h w of a scene below which its line would stand left of the curves."""
+"""Least h w of a scene that is marked by a line: smaller ones are left of the curves."""
 
 
 def banks(study: Stability) -> list[Bank]:
-    """What was measured."""
+    """Charts of the limits, regions and resonances that were measured."""
     found = []
     if study.limits:
         here = abs(study.scene.step) * fastest(study.scene)
@@ -48,7 +48,7 @@ def banks(study: Stability) -> list[Bank]:
 
 
 def _limits_said(limits: Sequence[Limit]) -> str:
-    """How many methods are stable up to where."""
+    """How many methods are stable up to which h w, in a sentence."""
     count: dict[float, int] = {}
     for x in limits:
         count[x.theory] = count.get(x.theory, 0) + 1
@@ -77,7 +77,7 @@ def _limits(limits: Sequence[Limit], here: float) -> Chart:
         rules.append(Rule(axis="x", at=here, name=f"this scene: {here:.3g}", look="here"))
     return labelled(Chart(
         title="Spectral radius of one step, measured on engines' own propagators; bounded up to 1.",
-        x=Scale(name=TURN, log=True),
+        x=Scale(name=TURN_AXIS, log=True),
         y=Scale(name="spectral radius of one step", log=True, shown=(0.1, 100.0)),
         curves=[*theories.values(), *measured], rules=rules,
     ))  # fmt: skip
@@ -96,10 +96,10 @@ def _region(x: Region) -> Chart:
     critical = float(np.interp(0.0, np.log(x.damping_ratio), np.arange(len(x.damping_ratio))))
     return Chart(
         title=f"{x.method}: {x.points} points, {x.wrong} against theory, {x.undecided} decided by rounding.",
-        x=Scale(name=TURN, values=x.h_w.tolist()),
+        x=Scale(name=TURN_AXIS, values=x.h_w.tolist()),
         y=Scale(name="damping ratio, c / 2\N{SQUARE ROOT}(k m)", values=x.damping_ratio.tolist()),
         tiles=Tiles(kinds=KINDS, rows=kinds.tolist()),
-        # by the number of its row: critical damping
+        # critical damping, as an index of rows
         rules=[Rule(axis="y", at=critical, look="one")],
         short=f"{x.method}: {x.wrong} against theory",
     )

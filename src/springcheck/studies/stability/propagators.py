@@ -1,9 +1,9 @@
-"""One-step propagators read off an engine: springs of any frequency, two starts each, one step.
+"""One-step propagators measured on an engine: springs of any frequency, two starts each, one step.
 
-A scan is one scene of many independent springs, so thousands of frequencies cost one run.  Everything is
-in scaled coordinates (q/A, p/(m w A)): entries are of the size of h w and powers of it, whatever the
-units, and A is chosen so that the largest force of every spring is `FORCE`, where fixed-point sums of
-forces have digits to both sides.
+A scan is one scene of many independent springs, so that thousands of frequencies cost one run.  All is in
+scaled coordinates (q/A, p/(m w A)): entries are of the order of h w and its powers, in any units.  A is
+chosen so that the largest force of every spring is `FORCE`, at which fixed-point sums of forces have digits
+to spare on both sides.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ STEP = 0.125
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Springs:
-    """Springs side by side under one method: h w (n,), and friction rate times step, one number or (n,)."""
+    """Uncoupled springs under one method: h w (n,), and friction rate times step, one number or (n,)."""
 
     label: Label
     turn: Floats
@@ -45,25 +45,25 @@ class Springs:
 
     @property
     def k(self) -> Floats:
-        """Stiffness of each; rounded to single where the engine would round it."""
+        """Stiffness of each spring; rounded to single precision where the engine does so."""
         k = MASS * (self.turn / STEP) ** 2
         return np.asarray(k.astype(np.float32).astype(np.float64) if self.single else k)
 
     @property
     def true_turn(self) -> Extended:
-        """h w of the stiffnesses that the engine is given."""
+        """h w of the stiffnesses given to the engine."""
         return np.asarray(STEP * np.sqrt(self.k.astype(np.longdouble) / MASS))
 
 
 def noise(label: Label) -> float:
-    """Relative rounding of an entry of a propagator: all roundings of one step, of one sign."""
+    """Relative rounding of an entry of a propagator: all roundings of one step, with one sign."""
     how = engines.arithmetic(label)
     scheme = schemes.scheme(engines.method(label).scheme)
     return schemes.roundings(scheme) * (how.unit + how.quantum / FORCE)
 
 
 def scene(springs: Springs, q: Floats, p: Floats, *, steps: int = 1) -> Scene:
-    """A scene of these springs side by side, from q, p (n,)."""
+    """A scene of these uncoupled springs, started at q, p (n,)."""
     requires = engines.method(springs.label).requires
     has_friction = np.any(springs.brake) or Need.DAMPING in requires
     c = np.broadcast_to(springs.brake, springs.turn.shape) * (MASS / STEP)
@@ -90,12 +90,12 @@ def units(springs: Springs) -> tuple[Floats, Floats]:
 
 
 def measured(springs: Springs) -> Floats:
-    """The engine's own one-step matrices (n, 2, 2); not a number where a step does not end finite."""
+    """The engine's own one-step matrices (n, 2, 2); NaN where a step does not end finite."""
     n = len(springs.turn)
     of_q, of_p = units(springs)
     out = matrices(scene(springs, of_q, of_p), springs.label, of_q[:, None], of_p[:, None])
     if n > 1 and np.isnan(out).all():
-        # an engine that gives up over one spring takes the others with it: halves find which
+        # an engine that stops over one spring loses all the others: bisect to find it
         for half in (slice(None, n // 2), slice(n // 2, None)):
             brake = springs.brake if np.ndim(springs.brake) == 0 else np.asarray(springs.brake)[half]
             out[half] = measured(Springs(label=springs.label, turn=springs.turn[half], brake=brake))
@@ -107,7 +107,7 @@ Stepper = Callable[[Scene, Label], tuple[Reals, Reals]]
 
 
 def by_engine(scene: Scene, label: Label) -> tuple[Floats, Floats]:
-    """The engine's own step; not a number where it does not end finite."""
+    """The engine's own step; NaN where it does not end finite."""
     run = driver.run(scene, label)
     if len(run.t) < 2:
         return np.full(scene.n, np.nan), np.full(scene.n, np.nan)
@@ -139,10 +139,10 @@ def theory(springs: Springs) -> Extended:
 
 
 def radius(matrices: Floats | Extended, rounding: float) -> tuple[Floats, Floats]:
-    """Spectral radii (n,) of 2 x 2 matrices, and how far rounding of the entries can move each.
+    """Spectral radii (n,) of 2 x 2 matrices, and bounds on the effect of rounding of the entries.
 
-    Where the discriminant is within its rounding of 0 the two eigenvalues are taken for equal: at an
-    edge of stability a change of eps in the trace would move them by sqrt(eps).
+    Where the discriminant is within its rounding of 0 the two eigenvalues count as equal: at a limit of
+    stability a change of eps in the trace would move them by sqrt(eps).
     """
     a, b = matrices[:, 0, 0], matrices[:, 0, 1]
     c, d = matrices[:, 1, 0], matrices[:, 1, 1]
@@ -164,7 +164,7 @@ def radius(matrices: Floats | Extended, rounding: float) -> tuple[Floats, Floats
 
 
 def bounded(matrices: Floats | Extended, rounding: float) -> np.ndarray:
-    """Whether powers of each matrix stay bounded, to rounding of its entries; what is not finite does not."""
+    """Whether powers of each matrix stay bounded, to rounding of its entries; False for non-finite ones."""
     found, moved = radius(matrices, rounding)
     with np.errstate(invalid="ignore"):
         return np.asarray(found <= 1 + np.where(np.isfinite(moved), np.minimum(moved, 1), 0))
@@ -174,9 +174,9 @@ def first(
     grows: Callable[[Floats], tuple[np.ndarray, Floats]], grid: Floats, fine: int, rounds: int,
     enough: float = 1e-10,
 ) -> float:  # fmt: skip
-    """Where growth begins on a grid (j,), refined `rounds` times by so many points to a part `enough`.
+    """Where growth begins on a grid (j,), refined `rounds` times by `fine` points to a relative `enough`.
 
-    `grows` says at which points, and where these really are.  0: at the first; infinity: nowhere.
+    `grows` returns at which points, and their exact positions.  0: at the first; infinity: nowhere.
     """
     for _ in range(rounds):
         wild, at = grows(grid)

@@ -12,8 +12,8 @@ from springcheck.physics.arrays import Floats
 from springcheck.studies.stability import propagators
 from springcheck.studies.stability.propagators import Springs
 
-TURN = (0.05, 20.0)
-"""h w from and to."""
+REGION_TURNS = (0.05, 20.0)
+"""Range of h w."""
 
 RATIO_FROM = 0.025
 """The smallest damping ratio; the largest follows, because both axes have the same ratio of neighbours."""
@@ -33,29 +33,29 @@ class Region:
     radius_predicted: Floats
     stable: np.ndarray
     stable_predicted: np.ndarray
-    """Theory without the allowance for rounding that `stable` has."""
+    """Theory, without the allowance for rounding of `stable`."""
     off: float
-    """Largest distance of the radii, in units of what rounding of the propagator's entries can do."""
+    """Largest difference of the radii, in units of the effect of rounding of the propagator's entries."""
     undecided: int
-    """Points whose predicted radius differs from the border by less than the rounding of the entries."""
+    """Points whose predicted radius differs from 1 by less than the rounding of the entries."""
     wrong: int
-    """Points, not among these, at which measurement and theory disagree."""
+    """Further points at which measurement and theory disagree."""
 
     @property
     def points(self) -> int:
-        """How many were measured."""
+        """Number of points measured."""
         return int(self.radius.size)
 
 
 def measure(label: Label, points: int = 200) -> Region:
-    """Measure points * points damped springs: one run, or one for each friction rate where a run has one."""
-    turn = np.geomspace(*TURN, points)
+    """Measure points * points damped springs in one run, or in one for each rate where a run has only one."""
+    turn = np.geomspace(*REGION_TURNS, points)
     ratio = RATIO_FROM * turn / turn[0]
     row, column = (x.ravel() for x in np.indices((points, points)))
     brake = 2 * ratio[row] * turn[column]
     measured = np.empty((points * points, 2, 2))
     if engines.method(label).one_friction:
-        # on axes of the same ratio the rate 2 ratio h w is constant where row + column is
+        # axes of equal ratios: the rate 2 ratio h w is constant along row + column
         for total in range(2 * points - 1):
             these = np.flatnonzero(row + column == total)
             rate = float(brake[these[0]])
@@ -68,7 +68,7 @@ def measure(label: Label, points: int = 200) -> Region:
     radius, moved = propagators.radius(measured, rounding)
     truth, moved_truth = propagators.radius(predicted, rounding)
     allowed = np.maximum(moved, moved_truth)
-    # with a friction of many steps the product h c/m may differ by its own rounding
+    # for a method of one friction the product h c/m has a rounding of its own
     allowed += rounding * (1 + brake)
     stable = propagators.bounded(measured, rounding)
     inside = truth <= 1

@@ -1,8 +1,8 @@
-"""The resonances of multiple time steps: where r-RESPA grows although both of its steps are short enough.
+"""Resonances of multiple time steps: where r-RESPA grows although both of its steps are short enough.
 
-A slow kick every half turn of the fast spring finds it always at the same phase.  The bands are measured
-on copies of a chain in one run: every copy has all stiffnesses scaled by one factor, which is the same as
-another step.  Biesiadecki & Skeel, J. Comput. Phys. 109 (1993) 318.
+A slow kick every half turn of the fast spring acts always at the same phase.  The bands are measured on
+copies of a chain in one run: every copy has all stiffnesses scaled by one factor, which is equivalent to
+another step. Biesiadecki & Skeel, J. Comput. Phys. 109 (1993) 318.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from springcheck.physics.scene import Scene
 from springcheck.studies.stability import propagators
 from springcheck.studies.stability.propagators import Stepper, by_engine
 
-TURN = (1.0, 7.0)
-"""h w of the fast spring, from and to."""
+RESONANCE_TURNS = (1.0, 7.0)
+"""Range of h w of the fast spring."""
 
-COPIES = 1200
+CHAIN_COPIES = 1200
 """Copies of the chain in the first scan: a band of 0.01 holds two of them."""
 
-GROWTH = 1e-7
-"""Growth per step from which a step counts as growing: eigenvalues of a 4 x 4 matrix that are nearly equal
-are known to the square root of the rounding only."""
+RESONANT_GROWTH = 1e-7
+"""Growth per step from which a step counts as growing: nearly equal eigenvalues of a 4 x 4 matrix are known
+to the square root of the rounding only."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -49,7 +49,7 @@ def fast_frequency(scene: Scene) -> float:
 
 
 def serves(scene: Scene, label: Label) -> bool:
-    """Whether a method takes the scene's fast springs in steps of their own, and nothing acts but springs."""
+    """Whether a method takes the scene's fast springs in substeps, and nothing acts but springs."""
     marked = engines.method(label).requires == {Need.FAST_SPRINGS}
     springs = scene.system.is_linear and not scene.system.is_damped
     return marked and springs and not engines.refusal(scene, label)
@@ -57,7 +57,7 @@ def serves(scene: Scene, label: Label) -> bool:
 
 def measure(scene: Scene, label: Label) -> Resonance:
     """Scan the bands of a scene with springs marked fast, and find their edges to 1e-9."""
-    turn = np.linspace(*TURN, COPIES)
+    turn = np.linspace(*RESONANCE_TURNS, CHAIN_COPIES)
 
     def scanned(step: Stepper) -> tuple[Floats, tuple[tuple[float, float], ...]]:
         radius = radii(scene, label, turn, step)
@@ -79,9 +79,9 @@ def radii(scene: Scene, label: Label, turn: Floats, step: Stepper) -> Floats:
     """Spectral radii of one step (j,) of copies of the scene at these h w of the fast spring."""
     copies = len(turn)
     scale = (turn / (abs(scene.step) * fast_frequency(scene))) ** 2
-    # coordinates in which q and p/(m w) are alike
+    # coordinates in which q and p/(m w) have one scale
     w = fast_frequency(scene) * np.sqrt(scale)
-    # a displacement from equilibrium moves as if every spring were at rest in 0
+    # displacements from equilibrium move as if every spring's rest point were 0
     linear = replace(scene, terms=tuple(term.centred() for term in scene.terms))
     many = linear.system.tiled(copies)
     terms = tuple(term.scaled(np.repeat(scale, len(term) // copies)) for term in many.terms)
@@ -98,8 +98,8 @@ def _by_scheme(scene: Scene, label: Label) -> tuple[Reals, Reals]:
 def _bands(
     turn: Floats, radius: Floats, again: Callable[[Floats], Floats]
 ) -> tuple[tuple[float, float], ...]:
-    """Edges of the runs of growing points, refined until they are known to 1e-9."""
-    growing = radius > 1 + GROWTH
+    """Edges of the ranges of growing points, refined to 1e-9."""
+    growing = radius > 1 + RESONANT_GROWTH
     edges = np.flatnonzero(growing[1:] != growing[:-1])
     found = [_edge(turn[j], turn[j + 1], again) for j in edges]
     if growing[0]:
@@ -112,7 +112,7 @@ def _bands(
 def _edge(low: float, high: float, again: Callable[[Floats], Floats]) -> float:
     while high - low > 1e-9:
         turn = np.linspace(low, high, 66)
-        growing = again(turn) > 1 + GROWTH
+        growing = again(turn) > 1 + RESONANT_GROWTH
         j = int(np.flatnonzero(growing[1:] != growing[:-1])[0])
         low, high = float(turn[j]), float(turn[j + 1])
     return (low + high) / 2

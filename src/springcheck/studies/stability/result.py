@@ -1,4 +1,4 @@
-"""What a study of stability has found: plain data, what of it fails, and the forms in which it is kept."""
+"""Result of a study of stability: plain data, its failures, and its stored forms."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from springcheck.studies.study import Studied
 from springcheck.studies.tables import RecordForm
 from springcheck.text.wording import count
 
-GROWTH = 1e-6
-"""Relative difference allowed between measured and predicted growth in double precision: what is left of
-the decaying eigenvector in the fitted quarter of a run."""
+GROWTH_AGREES = 1e-6
+"""Relative difference allowed between measured and predicted growth in double precision: the decaying
+eigenvector's part in the fitted quarter of a run."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Stability(Studied):
-    """All that was measured, and what was left out and why; a row of its table is a method's limit."""
+    """All measurements, and the methods left out and why; a row of its table is a method's limit."""
 
     table_of: ClassVar[str] = "methods"
 
@@ -45,7 +45,7 @@ class Stability(Studied):
 
     @property
     def passed(self) -> bool:
-        """Whether limits, growth, regions and bands are where theory puts them, and any was measured."""
+        """Whether limits, growth, regions and bands agree with theory, and any was measured."""
         return bool(self.limits) and not self.failures
 
     @property
@@ -55,7 +55,7 @@ class Stability(Studied):
 
     @property
     def failures(self) -> list[str]:
-        """What is not where theory puts it, one sentence each."""
+        """Disagreements with theory, one sentence each."""
         out = []
         for x in self.limits:
             if not x.agrees:
@@ -63,7 +63,7 @@ class Stability(Studied):
                 whose = "; its steps are its scheme's, whose stated limit is wrong" if x.follows else ""
                 out.append(f"{x.method}: {said}{whose}")
             if np.isfinite(x.theory):
-                # a limit stated too low has none there
+                # a limit stated too low shows no growth there
                 of = x.growth_predicted
                 off = abs(x.growth_above / of - 1) if of else abs(x.growth_above)
                 if not off <= growth_allowed(x):
@@ -92,7 +92,7 @@ class Stability(Studied):
             return np.nan
         if found.agrees:
             return longest(scheme, self.scene)
-        # by what was measured: of an engine that leaves its scheme's own map, as much less as there
+        # an engine that departs from its scheme's map: its measured limit scales the scheme's step
         own = limits.first_exit(label, propagators.theory)
         own = own if 0 < own < np.inf else found.limit
         here = longest(scheme, self.scene, own)
@@ -100,7 +100,7 @@ class Stability(Studied):
 
     @property
     def sentences(self) -> list[str]:
-        """What was found beside the table of limits, in sentences."""
+        """Results beside the table of limits, in sentences."""
         out = [
             f"{x.method}: stable in {np.count_nonzero(x.stable)} of {x.points} points of the damped plane, "
             f"{x.wrong} against theory; radii within {x.off:.2f} of what rounding allows"
@@ -149,12 +149,12 @@ def _points(x: Limit) -> list[dict[str, float]]:
 def growth_allowed(limit: Limit) -> float:
     """Relative difference allowed between measured and predicted growth above the limit.
 
-    Growth is the square root of the distance from the limit, so a limit known to `bound` moves it by half
-    of bound over that distance; in double precision the limit is known to far better than `AGREED`.
+    Growth is the square root of the distance from the limit, so that a limit known to `bound` changes it by
+    half of bound over that distance; in double precision it is known far better than `AGREED_LIMIT`.
     """
-    if limit.theory in (0.0, np.inf) or limit.bound <= limits.AGREED:
-        return GROWTH
-    return GROWTH + 0.5 * limit.bound / (limit.theory * limits.NEXT)
+    if limit.theory in (0.0, np.inf) or limit.bound <= limits.AGREED_LIMIT:
+        return GROWTH_AGREES
+    return GROWTH_AGREES + 0.5 * limit.bound / (limit.theory * limits.NEAR_LIMIT)
 
 
 def _apart(x: Resonance) -> float:
@@ -177,7 +177,7 @@ REGIONS: RecordForm[Region] = RecordForm(
     axes=("log10_damping_ratio", "log10_h_w"),
     auxiliary=("radius_predicted",),
     log=("radius",),
-    # H5Web draws every image on even axes
+    # H5Web draws every image on evenly spaced axes
     extra=lambda x: {"log10_damping_ratio": np.log10(x.damping_ratio), "log10_h_w": np.log10(x.h_w)},
 )
 RESONANCES: RecordForm[Resonance] = RecordForm(
@@ -188,4 +188,4 @@ RESONANCES: RecordForm[Resonance] = RecordForm(
     auxiliary=("radius_predicted",),
 )
 MULTIPLIERS: RecordForm[Multiplier] = RecordForm(kind=Multiplier, beginning="stability/multipliers/")
-"""How each kind of measurement is kept: a table for each method."""
+"""Stored form of each kind of measurement: a table for each method."""

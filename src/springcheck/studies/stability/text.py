@@ -48,7 +48,7 @@ def lines(study: Stability, options: Namespace | None = None) -> Lines:
 
 
 def _of_scene(study: Stability) -> Lines:
-    """The scene's fastest motion, its step, and the methods for which that is too long."""
+    """The scene's fastest motion, its step, and the methods for which it is too long."""
     scene, w = study.scene, fastest(study.scene)
     if not w and scene.system.is_linear and not scene.system.is_damped:
         return [plain("  nothing in this scene oscillates: no step is too long for its stability")]
