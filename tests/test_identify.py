@@ -289,6 +289,35 @@ def test_an_adaptive_solver_is_not_forced_into_a_scheme(method: str) -> None:
     assert "adaptive" in found.statement
 
 
+@pytest.mark.parametrize("digits", [17, 9])
+@pytest.mark.parametrize("c", [0.3, 1.1])
+@pytest.mark.parametrize(
+    ("share", "velocity"),
+    [(0, "the old velocity"), (0.65, "v + 0.65 h a"), (1, "v + h a"), (0.5, ""), (0.3, None)],
+)
+def test_the_velocity_whose_friction_acts_in_the_second_half_kick_is_named(
+    share: float, velocity: str | None, c: float, digits: int
+) -> None:
+    """Written down most often with the velocity at hand or a predicted one: those were no scheme's maps."""
+    q, v, h, m, k, rows = 1.3, 0.4, 0.2, 2.3, 5.1, []
+    for _ in range(120):
+        rows.append((q, v))
+        a = -(k * q + c * v) / m
+        q += h * v + h * h / 2 * a
+        v += h / 2 * (a - (k * q + c * (v + share * h * a)) / m)
+    qs, vs = np.vectorize(lambda x: float(f"{x:.{digits - 1}e}"))(np.array(rows).T)
+    found = identify(h * np.arange(120), qs, v=vs, mass=m)
+    place = f" of {velocity} in the second half kick" if velocity else ""
+    if velocity is None:
+        assert (found.scheme, found.fits) == (None, False)
+        return
+    assert found.scheme == "velocity-verlet"
+    assert f"with {f'explicit friction in the force{place}' if place else 'friction'}:" in found.statement
+    # with one half several laws of friction have the map, each at a rate of its own
+    friction = c / m if place else np.nan
+    assert found.friction == pytest.approx((friction,), rel=1e-12 if digits == 17 else 1e-6, nan_ok=True)
+
+
 @pytest.mark.parametrize("w", [0.0217, 0.03499, 0.035], ids=["over", "nearly", "critically"])
 def test_friction_up_to_the_critical_and_beyond_is_found_at_any_stride(w: float) -> None:
     # gamma h = 0.07, so that w h = 0.035 is critical; two real rates or hardly any phase show a stride badly

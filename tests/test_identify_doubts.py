@@ -210,8 +210,12 @@ def test_methods_with_an_acceleration_of_their_own_are_told_with_their_parameter
     [
         ([0, 1], [2, 0], "the leapfrog of two steps"),
         ([4 / 3, -1 / 3], [2 / 3], "the two before it, and not from one: a scheme with memory, of second"),
-        ([18 / 11, -9 / 11, 2 / 11], [6 / 11], "several before it, and not from one: a scheme with memory, "
+        ([18 / 11, -9 / 11, 2 / 11], [6 / 11], "the three before it, and not from one: a scheme with memory, "
          "of third order, BDF3"),
+        ([1], [23 / 12, -16 / 12, 5 / 12], "the three before it, and not from one: a scheme with memory, "
+         "of third order, Adams-Bashforth (AB3)"),
+        ([1], [55 / 24, -59 / 24, 37 / 24, -9 / 24], "the four before it, and not from one: a scheme with "
+         "memory, of fourth order, Adams-Bashforth (AB4)"),
     ],
 )  # fmt: skip
 def test_methods_of_several_steps_are_told_with_their_number(
@@ -222,7 +226,7 @@ def test_methods_of_several_steps_are_told_with_their_number(
     rate = h * np.array([[0, 1], [-K / M, 0]])
     ahead = np.linalg.inv(np.eye(2) - slopes[0] * rate) if len(slopes) == 1 else np.eye(2)
     z = [np.array([1.3, 0.4])]
-    while len(z) < len(old):
+    while len(z) < max(len(old), len(slopes)):
         z.append(z[-1] + rate @ (z[-1] + rate @ z[-1] / 2))
     while len(z) < 101:
         new = sum(c * z[-1 - i] for i, c in enumerate(old))
@@ -231,6 +235,64 @@ def test_methods_of_several_steps_are_told_with_their_number(
         z.append(ahead @ new)
     q, v = np.array(z).T
     assert said in identify(h * np.arange(101), q, v=v, mass=M).statement
+
+
+PREDICT = {
+    "second order": ([3 / 2, -1 / 2], [1 / 2, 1 / 2]),
+    "third order": ([23 / 12, -16 / 12, 5 / 12], [5 / 12, 8 / 12, -1 / 12]),
+    "fourth order": ([55 / 24, -59 / 24, 37 / 24, -9 / 24], [9 / 24, 19 / 24, -5 / 24, 1 / 24]),
+}
+
+
+@pytest.mark.parametrize("stated", [{}, {"stiffness": K}], ids=["", "stiffness"])
+@pytest.mark.parametrize("order", PREDICT)
+def test_predictors_with_a_corrector_are_told_with_their_order(order: str, stated: dict[str, float]) -> None:
+    h, (explicit, implicit) = 0.17, PREDICT[order]
+    rate = h * np.array([[0, 1], [-K / M, 0]])
+    z = [np.array([1.3, 0.4])]
+    for _ in range(150):
+        if len(z) < len(explicit):
+            z.append(z[-1] + rate @ (z[-1] + rate @ z[-1] / 2))
+            continue
+        ahead = z[-1] + rate @ sum(c * z[-1 - i] for i, c in enumerate(explicit))
+        z.append(
+            z[-1] + rate @ sum((c * x for c, x in zip(implicit, [ahead, *z[::-1]], strict=False)), 0 * ahead)
+        )
+    q, v = np.array(z).T
+    found = identify(h * np.arange(151), q, v=v, mass=M, **stated)
+    assert f"a scheme with memory, of {order}, Adams-Bashforth-Moulton (PECE)," in found.statement
+
+
+@pytest.mark.parametrize("c", [0.0, 0.4])
+@pytest.mark.parametrize(("h", "frames"), [(0.05, 100), (0.25, 100), (0.25, 400)])
+def test_a_scheme_of_several_steps_whose_memory_lasts_is_no_motion_that_a_force_drives(
+    h: float, frames: int, c: float
+) -> None:
+    """Milne's predictor and corrector: what it remembers alternates, and hardly fades or grows."""
+    rate = h * np.array([[0, 1], [-K / M, -c / M]])
+    z = [np.array([1.3, 0.4])]
+    while len(z) <= frames:
+        if len(z) < 4:
+            z.append(z[-1] + rate @ (z[-1] + rate @ z[-1] / 2))
+            continue
+        ahead = z[-4] + rate @ (8 * z[-1] - 4 * z[-2] + 8 * z[-3]) / 3
+        z.append(z[-2] + rate @ (z[-2] + 4 * z[-1] + ahead) / 3)
+    q, v = np.array(z).T
+    found = identify(h * np.arange(frames + 1), q, v=v, mass=M)
+    assert found.statement.startswith("Each state follows from the four before it, and not from one, and ")
+    assert "does not fade: a scheme of several steps" in found.statement
+
+
+def test_a_force_that_drives_a_motion_is_no_memory_that_lasts() -> None:
+    """A drive by one cosine follows from two states too."""
+    q, v, h, rows = 1.3, 0.4, 0.2, []
+    for i in range(200):
+        rows.append((q, v))
+        v -= h * (K * q - 0.8 * np.cos(2.1 * i * h)) / M
+        q += h * v
+    q, v = np.array(rows).T
+    assert "memory" not in (said := identify(h * np.arange(200), q, v=v, mass=M).statement)
+    assert "remembered" not in said
 
 
 def test_steps_that_alternate_are_told_with_what_they_alternate_by_and_are_no_drive() -> None:

@@ -25,7 +25,7 @@ from springcheck.identify.interrupted import few_bad_frames
 from springcheck.identify.laws import Regression, alone, explained_by, regression
 from springcheck.identify.misplaced import misplaced, turned
 from springcheck.identify.result import Explanation
-from springcheck.identify.unknown import memory, misfit
+from springcheck.identify.unknown import lasting, memory, misfit
 from springcheck.identify.wrong import wrong_map
 from springcheck.text.wording import count
 
@@ -203,6 +203,7 @@ def _unexplained(e: Evidence, counted: float) -> Explanation:
 
 
 SEARCHED = (
-    misplaced, partial(alone, laws.DRY), memory, few_bad_frames, partial(alone, laws.COUPLED), _solver, _law
+    misplaced, partial(alone, laws.DRY), memory, few_bad_frames, partial(alone, laws.COUPLED), lasting,
+    _solver, _law,
 )  # fmt: skip
 """Causes of what one map leaves over, in the order in which they are looked for; the last is always one."""

@@ -9,7 +9,7 @@ stiffness k/(1 + a).  `search.coincident` finds such identities by matching fami
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import zip_longest
 from typing import Any, TypeAlias
@@ -161,6 +161,14 @@ EULER, EULER_LATE, VERLET, POSITION = (
     "semi-implicit-euler", "semi-implicit-euler-drift-kick", "velocity-verlet", "position-verlet",
 )  # fmt: skip
 
+PREDICTED = {
+    "of the old velocity in the second half kick": Fraction(0),
+    "of v + 0.65 h a in the second half kick": Fraction(13, 20),
+    "of v + h a in the second half kick": ONE,
+}
+"""Places of friction by lambda of Groot & Warren, J. Chem. Phys. 107 (1997) 4423: the force at the step's end
+has the friction of v + lambda h a.  At 1/2 the map is that of explicit friction in both half kicks."""
+
 OF_HALF_A_STEP_AGO = f"{VERLET}, friction of the velocity half a step ago"
 
 DAMPED = (
@@ -173,6 +181,7 @@ DAMPED = (
             ("explicit", HALF), DRIFT, ("implicit", HALF)),
     _placed(VERLET, "of the velocity half a step ago", (EXPLICIT,),
             ("remembered", HALF), DRIFT, ("explicit", HALF)),
+    *(replace(_placed(VERLET, place, (EXPLICIT,)), formula=place) for place in PREDICTED),
     _placed(VERLET, "before the first half kick", DECAY, DECAYS, HALF_KICK, DRIFT, HALF_KICK),
     _placed(VERLET, "after the first half kick", DECAY, HALF_KICK, DECAYS, DRIFT, HALF_KICK),
     _placed(VERLET, "before the second half kick", DECAY, HALF_KICK, DRIFT, DECAYS, HALF_KICK),
@@ -198,16 +207,10 @@ def _tableau(*rows: tuple[int | str, ...]) -> tuple[tuple[Fraction, ...], ...]:
 RK4_ROWS = ((0,), ("1/2",), (0, "1/2"), (0, 0, 1))
 RK4_WEIGHTS = ("1/6", "1/3", "1/3", "1/6")
 WRONG_RK4: tuple[tuple[str, tuple[Any, ...], tuple[Any, ...]], ...] = (
-    (
-        "RK4 whose fourth stage uses the slope of the second stage",
-        ((0,), ("1/2",), (0, "1/2"), (0, 1)),
-        RK4_WEIGHTS,
-    ),
-    (
-        "RK4 whose third stage uses the slope of the first stage",
-        ((0,), ("1/2",), ("1/2",), (0, 0, 1)),
-        RK4_WEIGHTS,
-    ),
+    ("RK4 whose fourth stage uses the slope of the second stage",
+     ((0,), ("1/2",), (0, "1/2"), (0, 1)), RK4_WEIGHTS),
+    ("RK4 whose third stage uses the slope of the first stage",
+     ((0,), ("1/2",), ("1/2",), (0, 0, 1)), RK4_WEIGHTS),
     ("RK4 whose second stage takes a full step", ((0,), (1,), (0, "1/2"), (0, 0, 1)), RK4_WEIGHTS),
     ("RK4 whose third stage takes a full step", ((0,), ("1/2",), (0, 1), (0, 0, 1)), RK4_WEIGHTS),
     ("RK4 whose fourth stage takes half a step", ((0,), ("1/2",), (0, "1/2"), (0, 0, "1/2")), RK4_WEIGHTS),
@@ -219,7 +222,7 @@ WRONG_RK4: tuple[tuple[str, tuple[Any, ...], tuple[Any, ...]], ...] = (
     ("RK4 without its fourth stage", RK4_ROWS, ("1/6", "1/3", "1/3", 0)),
     ("Heun's method whose weights add up to 2", ((0,), (1,)), (1, 1)),
     ("the midpoint method whose first stage takes a full step", ((0,), (1,)), (0, 1)),
-)
+)  # fmt: skip
 """What is written down wrongly in Runge-Kutta methods, as tableaux."""
 
 _FAULTS: tuple[tuple[Any, ...], ...] = (

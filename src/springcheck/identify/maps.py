@@ -11,7 +11,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from springcheck.identify.families import EULER, FAMILIES, POSITION, VERLET, Family, Stage
+from springcheck.identify.families import EULER, FAMILIES, POSITION, PREDICTED, VERLET, Family, Stage
 from springcheck.physics.arrays import Extended, Floats, Integers, Reals
 from springcheck.schemes import SCHEMES, Scheme, matrix, number, rotation
 
@@ -124,7 +124,7 @@ class MapTable:
             out = np.empty((2, 2, len(a)), a.dtype)
             for i in np.unique(n):
                 at = n == i if np.ndim(n) else slice(None)
-                out[:, :, at] = _formula(self.families[i].formula)(a[at])
+                out[:, :, at] = _formula(self.families[i].formula)(a[at], g[at])
             return out
         over, under, inside = (x[a.dtype][..., n] for x in (self.over, self.under, self.inside))
         return _rational(over, under, a, g * inside)
@@ -301,9 +301,9 @@ def powers(entries: Extended, frames: int) -> Extended:
     return np.asarray(out[:frames])
 
 
-def _lagging(a: Reals, base: str, steps: int) -> Reals:
+def _lagging(a: Reals, g: Reals, base: str, steps: int) -> Reals:
     """Map of (q_n, v_(n + steps)): the same motion, with velocities of another frame."""
-    m = unit(FAMILIES[base], a, np.zeros_like(a))
+    m = unit(FAMILIES[base], a, g)
     det = (m[:, 0, 0] * m[:, 1, 1] - m[:, 0, 1] * m[:, 1, 0])[:, None]
     row = m[:, 1, :] if steps > 0 else np.stack([-m[:, 1, 0], m[:, 0, 0]], axis=1) / det
     turn = np.zeros_like(m)
@@ -313,11 +313,20 @@ def _lagging(a: Reals, base: str, steps: int) -> Reals:
     return np.moveaxis(turn @ m @ back, 0, -1)
 
 
-FORMULAS: dict[str, Callable[[Reals], Reals]] = {
-    "old force": lambda a: _matrices(1 - a / 2, 1 + 0 * a, -a, 1 + 0 * a),
-    "halves swapped": lambda a: _matrices(1 - a, 0.5 + 0 * a, -a * (1 - a / 2), 1 - a / 4),
-    "implicit velocity": lambda a: _matrices(1 + 0 * a, 1 + 0 * a, -a / (1 + a), 1 / (1 + a)),
-    "one iteration": lambda a: _matrices(1 - a, 1 - a, -a, 1 - a),
+def _predicted(a: Reals, g: Reals, share: Fraction) -> Reals:
+    """Velocity Verlet whose second force has the friction of the velocity v + share h a."""
+    part = a.dtype.type(share.numerator) / share.denominator
+    return _matrices(
+        1 - a / 2, 1 - g / 2, -a + a * a / 4 + part * a * g / 2, 1 - g - a / 2 + a * g / 4 + part * g * g / 2
+    )
+
+
+FORMULAS: dict[str, Callable[[Reals, Reals], Reals]] = {
+    "old force": lambda a, g: _matrices(1 - a / 2, 1 + 0 * a, -a, 1 + 0 * a),
+    "halves swapped": lambda a, g: _matrices(1 - a, 0.5 + 0 * a, -a * (1 - a / 2), 1 - a / 4),
+    "implicit velocity": lambda a, g: _matrices(1 + 0 * a, 1 + 0 * a, -a / (1 + a), 1 / (1 + a)),
+    "one iteration": lambda a, g: _matrices(1 - a, 1 - a, -a, 1 - a),
+    **{name: partial(_predicted, share=share) for name, share in PREDICTED.items()},
     **{
         f"{name} {'behind' if n < 0 else 'ahead'}": partial(_lagging, base=name, steps=n)
         for name in (EULER, VERLET, POSITION, "rk4", "exact")
@@ -327,11 +336,11 @@ FORMULAS: dict[str, Callable[[Reals], Reals]] = {
 """Maps of faults, (2, 2, c), that stages do not give."""
 
 
-def _formula(name: str) -> Callable[[Reals], Reals]:
-    """The map of a fault, or of a scheme that is stepped, as a function of a."""
+def _formula(name: str) -> Callable[[Reals, Reals], Reals]:
+    """The map of a fault, or of a scheme that is stepped, as a function of a and g."""
     return FORMULAS.get(name) or partial(_stepped, SCHEMES[name])
 
 
-def _stepped(scheme: Scheme, a: Reals) -> Reals:
+def _stepped(scheme: Scheme, a: Reals, g: Reals) -> Reals:
     found = matrix(scheme, h=1.0, m=np.ones(1), k=np.asarray(a, np.longdouble))
     return np.moveaxis(found, 0, -1).astype(a.dtype)

@@ -14,7 +14,7 @@ from springcheck.identify.evidence import FALLS, LEFT_BY_ROUNDING, Evidence, dis
 from springcheck.identify.families import title
 from springcheck.identify.fit import Map, fit
 from springcheck.identify.hypothesis import STRIDES, SURE, distinct
-from springcheck.identify.laws import Cause, explained_by, regression
+from springcheck.identify.laws import LAWS, Cause, Regression, explained_by, regression
 from springcheck.identify.result import Explanation
 from springcheck.physics.arrays import Floats
 from springcheck.text.wording import either
@@ -139,13 +139,49 @@ def by_parameter(e: Evidence) -> str:
     return kind.removeprefix(MAP_OF) if kind.startswith(MAP_OF) else ""
 
 
-TWO_STEPS = Cause(
-    kind="is remembered", columns=lambda e: [*np.vstack([[math.nan] * 2, e.states[:-2]]).T],
-    cause="Each state is the last but one and a linear map of the last: the leapfrog of two steps, "
-    "z[n+1] = z[n-1] + 2 h f(z[n]), whose even and odd frames part",
-    remedy="judge it as a scheme of two steps; a first step of second order parts them less",
+def _before(e: Evidence, steps: int) -> list[Floats]:
+    """The states before each pair's own, those of `steps` together."""
+    lost = np.full((len(e.states), 2), math.nan)
+    return [x for i in range(1, steps) for x in np.vstack([lost[:i], e.states[: -1 - i]]).T]
+
+
+REMEMBERED = TWO_STEPS, *_ = tuple(
+    Cause(
+        kind="is remembered", columns=partial(_before, steps=steps),
+        cause="Each state is the last but one and a linear map of the last: the leapfrog of two steps, "
+        "z[n+1] = z[n-1] + 2 h f(z[n]), whose even and odd frames part",
+        remedy="judge it as a scheme of two steps; a first step of second order parts them less",
+    )
+    for steps in (2, 3, 4)
 )  # fmt: skip
-"""The state before the last."""
+"""States before the last."""
+
+
+def _remembering(e: Evidence) -> tuple[str, Regression] | None:
+    """How many states before it each follows from to rounding, where one is too few."""
+    for name, law in zip(("the two", "the three", "the four"), REMEMBERED, strict=True):
+        found = regression(e, law)
+        if found.exact and found.above > found.rank:
+            return name, found
+    return None
+
+
+def lasting(e: Evidence) -> list[Explanation]:
+    """Several states that together give the next, where what they remember does not fade.
+
+    What disturbs a linear motion by a share d in a few waves follows from few states to d**2, and a drive by
+    one wave does so at any size.
+    """
+    if e.size**2 < LEFT_BY_ROUNDING * np.max(e.unit) or not (found := _remembering(e)):
+        return []
+    if any(regression(e, law).exact for law in LAWS):
+        return []
+    return [Explanation(
+        cause=f"Each state follows from {found[0]} before it, and not from one, and what is remembered does "
+        "not fade: a scheme of several steps (as Milne's), or a coupled oscillator not recorded",
+        remedy="give all coordinates; a scheme of several steps whose memory lasts is not stable",
+        misfit=found[1].left,
+    )]  # fmt: skip
 
 
 def memory(e: Evidence) -> list[Explanation]:
@@ -162,6 +198,7 @@ def memory(e: Evidence) -> list[Explanation]:
     off_by = AS_IT_WAS * np.max(np.abs(twice - np.eye(2)))
     if found.exact and np.max(np.abs(found.x[-2:] - np.eye(2))) < off_by:
         return [explained_by(e, found)]
+    several, found = _remembering(e) or ("several", found)
     # where the motion grows, a lasting disturbance falls relative to it too: its own size has to fall
     fading = relative, np.maximum(off - 8 * e.unit, 0)
     if any(x[e.pairs // 4 :].max() > FORGOTTEN * x.max() for x in fading):
@@ -173,8 +210,7 @@ def memory(e: Evidence) -> list[Explanation]:
     if before < rounding or weighted < FALLS * found.worst:
         return []
     whose = either(_remembered(e, later))
-    kind = "two steps or with an acceleration of its own (Adams-Bashforth, BDF2, generalised alpha)"
-    several = "the two" if found.exact else "several"
+    kind = "several steps or with an acceleration of its own (Adams, BDF, generalised alpha, Gear)"
     return [
         Explanation(
             cause=f"Each state follows from {several} before it, and not from one: a scheme with memory, "
@@ -185,13 +221,25 @@ def memory(e: Evidence) -> list[Explanation]:
     ]  # fmt: skip
 
 
-def _many_steps(rho: list[float], sigma: list[float], x: Floats) -> Floats:
-    """Map of (q, v h) of a linear multistep method, rho(E) y = h L sigma(E) y, after its start-up transient,
-    by the root of rho - z sigma nearest to exp(z); x is (h w)**2."""
+def _many_steps(*rows: Floats) -> Floats:
+    """Map of (q, v h) of a linear multistep method, after its start-up transient: by the root nearest to
+    exp(z) of the sum of its polynomials (rho, -sigma, a corrector's) times 1, z, z**2; x is (h w)**2."""
+    *polynomials, x = rows
     z = 1j * math.sqrt(max(x[0], 1e-300))
-    roots = np.roots(np.array(rho) - z * np.array(sigma))
+    roots = np.roots(sum(z**i * row for i, row in enumerate(polynomials)))
     r = roots[np.argmin(np.abs(roots - np.exp(z)))]
     return np.array([r.real, r.imag / z.imag, -z.imag * r.imag, r.real])
+
+
+def _adams(*sigma: int, corrector: tuple[int, ...] = ()) -> Callable[[Floats], Floats]:
+    """Adams' method of these weights over their sum, the newest first; alone, or as a corrector's predictor
+    (PECE)."""
+    weights, last = np.array(sigma) / sum(sigma), np.eye(len(sigma))[1]
+    rho = np.eye(len(sigma))[0] - last
+    if not corrector:
+        return partial(_many_steps, rho, -weights)
+    new, *old = np.pad(corrector, (0, len(sigma) - len(corrector))) / sum(corrector)
+    return partial(_many_steps, rho, -new * last - [0, *old], -new * weights)
 
 
 def _generalised(shares: Callable[[float], tuple[float, float]], x: Floats) -> Floats:
@@ -211,9 +259,16 @@ def _generalised(shares: Callable[[float], tuple[float, float]], x: Floats) -> F
 
 
 WITH_MEMORY: dict[str, Callable[[Floats], Floats]] = {
-    "second order, Adams-Bashforth (AB2)": partial(_many_steps, [1, -1, 0], [0, 1.5, -0.5]),
-    "second order, BDF2": partial(_many_steps, [1, -4 / 3, 1 / 3], [2 / 3, 0, 0]),
-    "third order, BDF3": partial(_many_steps, [1, -18 / 11, 9 / 11, -2 / 11], [6 / 11, 0, 0, 0]),
+    "second order, Adams-Bashforth (AB2)": _adams(0, 3, -1),
+    "third order, Adams-Bashforth (AB3)": _adams(0, 23, -16, 5),
+    "fourth order, Adams-Bashforth (AB4)": _adams(0, 55, -59, 37, -9),
+    "third order, Adams-Moulton": _adams(5, 8, -1),
+    "fourth order, Adams-Moulton": _adams(9, 19, -5, 1),
+    "second order, Adams-Bashforth-Moulton (PECE)": _adams(0, 3, -1, corrector=(1, 1)),
+    "third order, Adams-Bashforth-Moulton (PECE)": _adams(0, 23, -16, 5, corrector=(5, 8, -1)),
+    "fourth order, Adams-Bashforth-Moulton (PECE)": _adams(0, 55, -59, 37, -9, corrector=(9, 19, -5, 1)),
+    "second order, BDF2": partial(_many_steps, np.array([3, -4, 1]), np.array([-2, 0, 0])),
+    "third order, BDF3": partial(_many_steps, np.array([11, -18, 9, -2]), np.array([-6, 0, 0, 0])),
     "second order, HHT with alpha = -{:.6g}": partial(_generalised, lambda x: (0.0, x)),
     "second order, generalised alpha with rho_infinity = {:.6g}": partial(
         _generalised, lambda x: ((2 * x - 1) / (x + 1), x / (x + 1))
