@@ -143,16 +143,9 @@ def _entries(curves: Sequence[Curve]) -> list[Line2D]:
             line: Any = look.linestyle if any(one.line or one.dots for one in mine) else "none"
             mark = looks.mark(looks.engine(name))[0] if line == "none" and not methods else None
             found.append(
-                Line2D(
-                    [],
-                    [],
-                    color=look.color,
-                    linestyle=line,
-                    marker=mark,
-                    markerfacecolor="white",
-                    label=label,
-                )
-            )
+                Line2D([], [], color=look.color, linestyle=line, marker=mark, markerfacecolor="white",
+                       label=label)
+            )  # fmt: skip
     return sorted(found, key=lambda entry: not str(entry.get_label()).startswith("FAILED"))
 
 
@@ -232,7 +225,9 @@ def _curve(axes: Axes, curve: Curve, number: int, most: int, chart: Chart) -> No
         how: dict[str, Any] = {"textcoords": "offset points", "fontsize": 8, "color": "#333333"}
         # in a map there is nothing beside it
         at = len(x) // 3 if tiled else -1
-        axes.annotate(curve.name, (x[at], y[at]), xytext=(3, -4), path_effects=white, zorder=5, **how)
+        side = "right" if tiled and x[at] > len(chart.x.values) / 2 else "left"
+        near = (3 if side == "left" else -3, -4)
+        axes.annotate(curve.name, (x[at], y[at]), xytext=near, ha=side, path_effects=white, zorder=5, **how)
         return
     drawn: dict[str, Any] = {"color": look.color, "label": curve.name, "zorder": 2 + 1.2 * high}
     if curve.band is not None:
