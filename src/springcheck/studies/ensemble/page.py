@@ -237,7 +237,7 @@ def named(field: str, scene: Scene) -> str:
 
 
 def _limits(scene: Scene, method: str) -> dict[str, float]:
-    """The limit of h omega of a method's scheme on a single spring, and each field's value where it is met."""
+    """The limit of h omega of a method's scheme on a single spring, and each field's value that meets it."""
     walls, found = [x for x in scene.terms if isinstance(x, WallSpring)], known().get(scheme_of(method))
     alone = scene.n == len(scene.terms) == len(walls) == 1 and len(walls[0]) == 1 and walls[0].k[0] > 0
     if not alone or found is None or not 0 < found.limit < np.inf:
