@@ -344,7 +344,7 @@ def test_the_name_of_a_limit_stands_within_its_map() -> None:
     for over in (dict(fields), dict(reversed(fields.items()))):
         found = springcheck.ensemble("spring-uneven", over, ["own:velocity-verlet"])
         (axes,) = found.figures()["ensemble-max_error"].axes
-        axes.figure.canvas.draw()
+        axes.figure.draw_without_rendering()
         words = next(x for x in axes.texts if x.get_text().startswith("limit")).get_window_extent()
         frame = axes.get_window_extent()
         assert frame.x0 <= words.x0 < words.x1 <= frame.x1

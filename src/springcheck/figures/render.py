@@ -13,7 +13,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.ticker import NullFormatter
+from matplotlib.ticker import LogFormatterSciNotation
 
 from springcheck.figures import looks
 from springcheck.figures.charts import (
@@ -306,7 +306,8 @@ def _scale(axes: Axes, scale: Scale, which: Literal["x", "y"], *, tiled: bool) -
     else:
         if scale.log:
             (axes.set_xscale if which == "x" else axes.set_yscale)("log")
-            (axes.xaxis if which == "x" else axes.yaxis).set_minor_formatter(NullFormatter())
+            between = LogFormatterSciNotation(labelOnlyBase=False, minor_thresholds=(1.5, 0.4))
+            (axes.xaxis if which == "x" else axes.yaxis).set_minor_formatter(between)
         if scale.shown:
             (axes.set_xlim if which == "x" else axes.set_ylim)(*(scale.factor * x for x in scale.shown))
     (axes.set_xlabel if which == "x" else axes.set_ylabel)(scale.name)
