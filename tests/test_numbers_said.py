@@ -50,6 +50,14 @@ def test_the_table_of_engines_has_the_rows_that_are_said() -> None:
     assert said in VALIDATION
 
 
+def test_the_table_of_schemes_and_the_figure_of_the_census_have_the_same_methods() -> None:
+    part = RAW.partition("| scheme, from the states | methods |")[2].partition("\n\n")[0]
+    methods = [one for row in re.findall(r"^\| .+? \| (.+?) \|", part, re.M) for one in row.split(", ")]
+    methods = [one for one in methods if ":" in one]
+    assert len(set(methods)) == len(methods)
+    assert f"by {len(set(methods)) + 2 + 6} methods of 14 engines, grouped by scheme" in README
+
+
 def test_the_findings_are_as_many_as_are_said() -> None:
     notes = {path.stem for path in (ROOT / "validation/upstream").glob("*.md")} - {"README"}
     shown = README.partition("## What it found")[2].partition("Each has a program")[0]
