@@ -328,11 +328,39 @@ def test_a_figure_says_what_was_found_and_where_the_limit_is() -> None:
     grid = springcheck.ensemble(
         "spring", {"spring.0.stiffness": [1, 9, 25], "time.step": [0.1, 0.5, 0.9]}, two
     )
-    curve = grid.figures()["ensemble-max_error"].axes[0].lines[0]
+    euler, verlet = grid.figures()["ensemble-max_error"].axes
+    assert not euler.lines, "explicit Euler is stable at no step"
+    (curve,) = verlet.lines
     k = np.interp(np.asarray(curve.get_xdata(), float), [0, 1, 2], [1, 9, 25])
     h = np.interp(np.asarray(curve.get_ydata(), float), [0, 1, 2], [0.1, 0.5, 0.9])
     assert len(k) > 9
     np.testing.assert_allclose(h * np.sqrt(k), 2, rtol=1e-12)
+
+
+def test_the_name_of_a_limit_stands_within_its_map() -> None:
+    import springcheck
+
+    fields = {"spring.0.stiffness": "0.5:5:20", "time.step": "0.02:1.9:25"}
+    for over in (dict(fields), dict(reversed(fields.items()))):
+        found = springcheck.ensemble("spring-uneven", over, ["own:velocity-verlet"])
+        (axes,) = found.figures()["ensemble-max_error"].axes
+        axes.figure.draw_without_rendering()
+        words = next(x for x in axes.texts if x.get_text().startswith("limit")).get_window_extent()
+        frame = axes.get_window_extent()
+        assert frame.x0 <= words.x0 < words.x1 <= frame.x1
+
+
+def test_the_limit_that_a_figure_shows_is_that_of_the_scheme() -> None:
+    import springcheck
+
+    some = ["own:euler", "own:rk4", "own:forest-ruth", "own:velocity-verlet", "own:position-verlet"]
+    found = springcheck.ensemble("spring-uneven", {"time.step": "0.5:4.5:9"}, some)
+    (error,) = page.banks(found, quantity="max_error")
+    omega = np.sqrt(2.9 / 3.7)
+    limits = {rule.name: rule.at * omega for rule in error.charts[0].rules}
+    # RK4: 2 sqrt(2); Forest-Ruth: 1.573, measured by `stability`
+    assert list(limits) == ["limit h ω = 2.83", "limit h ω = 1.57", "limit h ω = 2"]
+    np.testing.assert_allclose(list(limits.values()), [2 * np.sqrt(2), 1.573401947, 2], rtol=1e-9)
 
 
 @pytest.mark.parametrize(("name", "said"), [("overdamped", "H exact"), ("spring-uneven", "H0")])

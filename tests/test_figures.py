@@ -519,3 +519,15 @@ def test_names_of_axes_of_equal_scales_stay_inside_the_picture(tmp_path: Path, w
         figure = render.picture(Bank(title="", charts=[chart]))
         style.save(figure, tmp_path, "a")
     assert figure.axes[0].yaxis.label.get_window_extent().x0 >= 0
+
+
+@pytest.mark.parametrize(("high", "labels"), [(1.2, 3), (1e4, 5)])
+def test_a_logarithmic_axis_can_be_read_however_short_it_is(high: float, labels: int) -> None:
+    """From 0.14 to 1.2, as what <q**2> is off by thermostats, there is one power of ten alone."""
+    y = np.geomspace(0.14, high, 9)
+    curves = [Curve(name="own:euler", group="explicit-euler", x=np.arange(9), y=y, line=True)]
+    chart = Chart(title="", x=Scale(name="t"), y=Scale(name="error", log=True), curves=curves)
+    (axes,) = render.picture(Bank(title="", charts=[chart])).axes
+    axes.figure.draw_without_rendering()
+    (low, top), ticks = axes.get_ylim(), (*axes.yaxis.get_major_ticks(), *axes.yaxis.get_minor_ticks())
+    assert len([x for x in ticks if low <= x.get_loc() <= top and x.label1.get_text()]) >= labels

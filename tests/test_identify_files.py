@@ -221,6 +221,16 @@ def test_an_adaptive_solver_of_our_own_store_is_called_that_and_is_no_failure(
     assert "an adaptive solver or one of high order" in " ".join(capsys.readouterr().out.split())
 
 
+@pytest.mark.parametrize("method", ["own:aboba", "own:bbk"])
+def test_a_thermostat_of_our_own_store_is_no_adaptive_solver(
+    method: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Of joined particles neither is found, and the store knows both for schemes of a fixed step."""
+    assert main(["run", "bath-uneven", "--method", method, "--seed", "1", "--quiet"]) == 0
+    assert main(["identify", "bath-uneven.h5", "--json"]) == 1
+    assert document(capsys)["verdict"] == "none"
+
+
 def test_a_trajectory_that_is_not_in_the_file_is_one_line_with_those_that_are(
     capsys: pytest.CaptureFixture[str],
 ) -> None:

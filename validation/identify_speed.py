@@ -9,11 +9,10 @@ once. With SRC, the folder `src` of another checkout, the same trajectories go t
 this one, twice each, and the ratio of the two is printed; the shortest time of each trajectory counts,
 after one call that is not timed.
 
-Printed for 15 calls on two idle cores (median and most):
-    plain 17.4 and 32.5 ms.  damped 36.2 and 99.3.  held 21.8 and 50.7.  single 61.9 and 1794.8
-    text 64.0 and 476.5.  systematic error 144.9 and 341.1.  16 oscillators 128.3.  as drawn 34.9 and 757.6
-    mean as drawn 56.2 ms: 1.28e+05 calls an hour on two cores
-Commit 49ded500: 21.7 (plain), 41.8, 31.1 (held), 78.3, 49.5, 106.4 and 189.2 (16 oscillators); 41.9 as drawn.
+Printed for 15 calls on two busy cores of an AMD EPYC (median and most):
+    plain 5.7 and 17.2 ms.  damped 9.8 and 31.1.  held 7.9 and 20.8.  single 18.9 and 531.9
+    text 16.7 and 122.3.  systematic error 35.8 and 132.5.  16 oscillators 47.1.  as drawn 12.9 and 306.9
+    mean as drawn 20.3 ms: 3.55e+05 calls an hour on two cores
 """
 
 from __future__ import annotations

@@ -25,6 +25,10 @@ in brackets the ratio to C):
     chain of 100,000 masses          1.2 (0.82)      1.1 (0.80)      5.4 (1.26)
     chain of 1,000,000 masses        1.8 (1.01)      1.8 (1.10)      6.9 (1.24)
 
+On two busy cores of an AMD EPYC (gcc 12) ratios were 0.61 to 1.00 on one spring, 0.93 to 1.23 on 4096 and
+0.70 to 1.70 on chains; two of them are above the claim: implicit Euler on 4096 springs, explicit Euler on a
+chain of 10,000.
+
 Exit status 0 when every ratio holds, 1 otherwise.
 """
 

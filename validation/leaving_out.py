@@ -6,7 +6,7 @@ than what was asked for.
 
 Command: python validation/leaving_out.py
 
-Expected, on one core of a shared machine of 2025: memory 1.46 times, time 2.8 times that of the two imports.
+Expected, on one core of a shared machine of 2025: memory 1.46 times, time 2.7 times that of the two imports.
 
 Each figure is the least of seven runs, taken in turn; compiled bytecode is there from a run before.
 """

@@ -2,7 +2,7 @@
 
 Claims, as ratios side by side in one run (the smaller the better):
     OpenMM read at every step: at most 8 us a frame, where the obvious loop with
-        getPositions(asNumpy=True) and getVelocities(asNumpy=True) takes about 24
+        getPositions(asNumpy=True) and getVelocities(asNumpy=True) takes about 16
     ASE and SUNDIALS read at every step: at most 1.05 times a hand-written loop over the same engine
     `springcheck --help` and `list`: at most 0.3 s, and no engine is imported
     `springcheck run spring`: at most 1.5 times what importing its engines and running them bare takes

@@ -13,7 +13,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.ticker import NullFormatter
+from matplotlib.ticker import LogFormatterSciNotation
 
 from springcheck.figures import looks
 from springcheck.figures.charts import (
@@ -143,16 +143,9 @@ def _entries(curves: Sequence[Curve]) -> list[Line2D]:
             line: Any = look.linestyle if any(one.line or one.dots for one in mine) else "none"
             mark = looks.mark(looks.engine(name))[0] if line == "none" and not methods else None
             found.append(
-                Line2D(
-                    [],
-                    [],
-                    color=look.color,
-                    linestyle=line,
-                    marker=mark,
-                    markerfacecolor="white",
-                    label=label,
-                )
-            )
+                Line2D([], [], color=look.color, linestyle=line, marker=mark, markerfacecolor="white",
+                       label=label)
+            )  # fmt: skip
     return sorted(found, key=lambda entry: not str(entry.get_label()).startswith("FAILED"))
 
 
@@ -232,7 +225,9 @@ def _curve(axes: Axes, curve: Curve, number: int, most: int, chart: Chart) -> No
         how: dict[str, Any] = {"textcoords": "offset points", "fontsize": 8, "color": "#333333"}
         # in a map there is nothing beside it
         at = len(x) // 3 if tiled else -1
-        axes.annotate(curve.name, (x[at], y[at]), xytext=(3, -4), path_effects=white, zorder=5, **how)
+        side = "right" if tiled and x[at] > len(chart.x.values) / 2 else "left"
+        near = (3 if side == "left" else -3, -4)
+        axes.annotate(curve.name, (x[at], y[at]), xytext=near, ha=side, path_effects=white, zorder=5, **how)
         return
     drawn: dict[str, Any] = {"color": look.color, "label": curve.name, "zorder": 2 + 1.2 * high}
     if curve.band is not None:
@@ -311,7 +306,8 @@ def _scale(axes: Axes, scale: Scale, which: Literal["x", "y"], *, tiled: bool) -
     else:
         if scale.log:
             (axes.set_xscale if which == "x" else axes.set_yscale)("log")
-            (axes.xaxis if which == "x" else axes.yaxis).set_minor_formatter(NullFormatter())
+            between = LogFormatterSciNotation(labelOnlyBase=False, minor_thresholds=(1.5, 0.4))
+            (axes.xaxis if which == "x" else axes.yaxis).set_minor_formatter(between)
         if scale.shown:
             (axes.set_xlim if which == "x" else axes.set_ylim)(*(scale.factor * x for x in scale.shown))
     (axes.set_xlabel if which == "x" else axes.set_ylabel)(scale.name)

@@ -135,7 +135,7 @@ def _adaptive(run: store.Run) -> str:
     except MethodError:
         # the scheme is one of an engine that is not installed here
         return ""
-    return "" if scheme.has("one-step") or scheme.has("flow") else scheme.title
+    return scheme.title if scheme.has("adaptive") else ""
 
 
 def _velocity_factor(units: Mapping[str, str], notes: list[str]) -> float:

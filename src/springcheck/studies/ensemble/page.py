@@ -16,6 +16,7 @@ from springcheck.physics.arrays import Floats
 from springcheck.physics.exact import has_true_motion
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import WallSpring
+from springcheck.schemes import known
 from springcheck.studies.ensemble.measure import OUTCOMES
 from springcheck.studies.ensemble.result import Columns, Ensemble
 
@@ -162,7 +163,7 @@ SHADES = 7
 SIGNED_SHADES = ("#2166ac", "#67a9cf", "#d1e5f0", "#f7f7f7", "#fddbc7", "#ef8a62", "#b2182b")
 """Shades of a map of numbers of both signs, by Brewer."""
 
-LIMIT_NAME = "limit h \N{GREEK SMALL LETTER OMEGA} = 2"
+LIMIT = "limit h \N{GREEK SMALL LETTER OMEGA}"
 
 FIELD_WORDS = {
     "stiffness": ("stiffness k", {"md": "kJ/mol/nm2", "si": "N/m"}),
@@ -235,22 +236,19 @@ def named(field: str, scene: Scene) -> str:
     return with_unit(f"{words}{whose}", of.get(scene.units, ""))
 
 
-def _limits(scene: Scene) -> dict[str, float]:
-    """Value of each field at which h omega = 2 on a single spring, for the fields that change h omega."""
-    walls = [term for term in scene.terms if isinstance(term, WallSpring)]
-    if scene.n > 1 or len(scene.terms) != 1 or not walls or len(walls[0]) != 1 or not walls[0].k[0] > 0:
+def _limits(scene: Scene, method: str) -> dict[str, float]:
+    """The limit of h omega of a method's scheme on a single spring, and each field's value that meets it."""
+    walls, found = [x for x in scene.terms if isinstance(x, WallSpring)], known().get(scheme_of(method))
+    alone = scene.n == len(scene.terms) == len(walls) == 1 and len(walls[0]) == 1 and walls[0].k[0] > 0
+    if not alone or found is None or not 0 < found.limit < np.inf:
         return {}
-    m, k, h = float(scene.m[0]), float(walls[0].k[0]), abs(scene.step)
-    return {"spring.0.stiffness": 4 * m / h**2, "time.step": float(2 * np.sqrt(m / k))}
+    k, longest = float(walls[0].k[0]), found.limit * float(np.sqrt(scene.m[0] / walls[0].k[0]))
+    return {LIMIT: found.limit, "spring.0.stiffness": k * (longest / scene.step) ** 2, "time.step": longest}
 
 
 def _lines(scene: Scene, quantity: str, fields: Sequence[str], shown: Mapping[str, Line]) -> Chart:
     title, (over,) = _title(quantity, scene), fields
-    y = _axis(
-        quantity,
-        scene,
-        np.concatenate([x for one in shown.values() for x in (one.low, one.y, one.high)]),
-    )
+    every = np.concatenate([x for one in shown.values() for x in (one.low, one.y, one.high)])
     seen: set[str] = set()
     curves = []
     for method, one in shown.items():
@@ -264,14 +262,14 @@ def _lines(scene: Scene, quantity: str, fields: Sequence[str], shown: Mapping[st
             )
         )  # fmt: skip
         seen.add(scheme)
-    at = _limits(scene).get(over)
+    limits = {at[over]: f"{LIMIT} = {at[LIMIT]:.3g}" for x in shown if over in (at := _limits(scene, x))}
     low, high = (f([f(one.x) for one in shown.values()]) for f in (np.min, np.max))
     return Chart(
         title=f"{title[:1].upper()}{title[1:]}, over {over}.",
         x=Scale(name=named(over, scene), log=all(even_in_logarithm(one.x) for one in shown.values())),
-        y=y,
+        y=_axis(quantity, scene, every),
         curves=curves,
-        rules=[Rule(axis="x", at=at, name=LIMIT_NAME)] if at is not None and low < at < high else [],
+        rules=[Rule(axis="x", at=at, name=name) for at, name in limits.items() if low < at < high],
     )
 
 
@@ -294,7 +292,6 @@ def _maps(scene: Scene, quantity: str, over: Sequence[str], shown: Mapping[str, 
     charts = []
     for method, one in shown.items():
         rows = np.searchsorted(bounds, one.values, side="right")
-        limit = _line_of_the_limit(scene, over, one)
         charts.append(
             Chart(
                 title=f"{method}.",
@@ -302,26 +299,26 @@ def _maps(scene: Scene, quantity: str, over: Sequence[str], shown: Mapping[str, 
                 x=Scale(name=named(over[0], scene), values=one.x.tolist()),
                 y=Scale(name=named(over[1], scene), values=one.y.tolist()),
                 tiles=Tiles(kinds=kinds, rows=np.where(np.isnan(one.values), -1, rows).tolist()),
-                curves=limit,
+                curves=_across(scene, over, one, _limits(scene, method)),
             )
         )
     return charts
 
 
-def _line_of_the_limit(scene: Scene, over: Sequence[str], one: Map) -> list[Curve]:
-    """The line h omega = 2 on a map of stiffness against step, in coordinates of its tiles."""
-    if set(over) != set(_limits(scene)):
+def _across(scene: Scene, over: Sequence[str], one: Map, at: Mapping[str, float]) -> list[Curve]:
+    """The line at the limit of h omega on a map of stiffness against step, in coordinates of its tiles."""
+    if {*over, LIMIT} != set(at):
         return []
     flat = over[0] == "time.step"
     steps, ks = (one.x, one.y) if flat else (one.y, one.x)
     k = np.geomspace(float(ks[0]), float(ks[-1]), 200)
-    h = 2 * np.sqrt(float(scene.m[0]) / k)
+    h = at[LIMIT] * np.sqrt(float(scene.m[0]) / k)
     inside = (h >= steps[0]) & (h <= steps[-1])
     if np.count_nonzero(inside) < 2:
         return []
     at_k, at_h = (np.interp(v[inside], z, np.arange(len(z))) for v, z in ((k, ks), (h, steps)))
     x, y = (at_h, at_k) if flat else (at_k, at_h)
-    return [Curve(name=LIMIT_NAME, group=GUIDE, x=x, y=y)]
+    return [Curve(name=f"{LIMIT} = {at[LIMIT]:.3g}", group=GUIDE, x=x, y=y)]
 
 
 def _kinds(quantity: str, values: Sequence[Floats]) -> tuple[list[tuple[str, str]], Floats]:
