@@ -84,13 +84,10 @@ def matches(
         roots.error += terms.rounding * 20 * float(np.max(roots.s))
         roots.error += float(np.max(np.abs(terms.scales), initial=0.0))
         free_scale = terms.mass_unknown
-        x = polished(
-            every,
-            roots,
-            first(every, roots, growing=terms.growing, free_scale=free_scale, far=far),
-            free_scale=free_scale,
-            far=far,
-        )
+        x = first(every, roots, growing=terms.growing, free_scale=free_scale, far=far)
+        if not all(family.flow for family in families):
+            # an exact solution has the phase and the determinant of the root from the start
+            x = polished(every, roots, x, free_scale=free_scale, far=far)
         if not len(x.a):
             return []
         return solved(every, Target(found, terms), roots, x, far=far)

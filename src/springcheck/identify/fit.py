@@ -329,17 +329,21 @@ def _constant_part(
         return old.cost - new.cost > least_gain * max(new.chi2 / spare, least)
 
     best = _minimum(z, sigma, process, start, 0, None)
+    unknown, wide = 4, None
+    if record.fine and not constant:
+        removed = _removed_at_most(z, process, best, record.slips)
+        if removed <= CONSTANT_SHOWS * max((best.chi2 - removed) / max(numbers - 6, 1), least):
+            return best, 0, None
     if record.slips is not None and numbers > FEWEST_SLIPPING:
         wide = _minimum(z, sigma, process, best, 1, None)
         sliding = _minimum(z, sigma, process, wide, 1, record.slips)
         if gains(wide, sliding, 2 * CONSTANT_SHOWS):
-            slips = record.slips
+            slips, unknown, wide = record.slips, 8, None
             best = _minimum(z, sigma, process, best, 0, slips)
-    unknown = 4 if slips is None else 8
     plain = best.chi2 <= (numbers - unknown) * least
     if numbers <= unknown + 2 or (plain and not constant):
         return best, centred, slips
-    wide = _minimum(z, sigma, process, best, 1, slips)
+    wide = wide or _minimum(z, sigma, process, best, 1, slips)
     if constant or gains(best, wide, CONSTANT_SHOWS if record.fine else CONSTANT_LIKELY):
         best, centred = wide, 1
     if record.fine and numbers > unknown + 3 and best.chi2 > (numbers - unknown) * least:
@@ -352,6 +356,17 @@ def _constant_part(
         if clean and gains(best, widest, CONSTANT_SHOWS) and shift > 64 * ROUNDING * np.max(np.abs(z)):
             best, centred = widest, 2
     return best, centred, slips
+
+
+def _removed_at_most(z: Extended, process: Floats, best: _Solution, slips: Extended | None) -> float:
+    """Chi-squared that a constant part of any kind and a clock's slips together remove from a fit without:
+    all of them lie among maps that are linear in the state, 1, and both times the slips."""
+    state, weight = np.column_stack([z[:-1], np.ones(len(process))]), 1 / process[:, None]
+    every = state if slips is None else np.column_stack([state, slips[:, None] * state])
+    size = np.max(np.abs(every), axis=0)
+    columns = (every / np.where(size > 0, size, 1)).astype(np.float64) * weight
+    left = np.asarray(z[1:] - z[:-1] @ best.entries.T, np.float64) * weight
+    return float(np.sum((np.linalg.qr(columns)[0].T @ left) ** 2))
 
 
 def _fed_back(
