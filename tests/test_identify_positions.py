@@ -150,6 +150,37 @@ def test_damped_motion_names_no_scheme() -> None:
     assert not identify(*positions("damped"), mass=M, friction=0.0).fits
 
 
+def written(q: Floats, digits: int) -> Floats:
+    return np.array([float(f"{x:.{digits}g}") for x in q])
+
+
+def test_an_orbit_written_to_few_digits_names_a_scheme_that_neighbouring_frames_do_not() -> None:
+    """Implicit midpoint with friction at the end of each step, on its stated spring."""
+    k, h, q, v, kept = 2.9, 0.05, 1.1, 0.4, [1.1]
+    x = k / M * h * h
+    for _ in range(100):
+        old = v
+        v = (v * (1 - x / 4) - h * k / M * q) / (1 + x / 4)
+        q += h * (old + v) / 2
+        v *= 0.99
+        kept.append(q)
+    found = identify(h * np.arange(101), written(np.array(kept), 6), mass=M, stiffness=k)
+    assert (found.scheme, found.fits, found.precision) == ("implicit-midpoint", True, "text, 6 digits")
+
+
+@pytest.mark.parametrize("form", ["text", "single"])
+def test_positions_of_few_digits_under_a_force_that_is_not_linear_are_no_scheme_s(form: str) -> None:
+    q, v, kept = 1.1, 0.4, []
+    for _ in range(200):
+        kept.append(q)
+        v -= H * K / M * (q + 0.02 * q**3)
+        q += H * v
+    x = np.array(kept)
+    found = identify(H * np.arange(200), written(x, 6) if form == "text" else np.float32(x), mass=M)
+    assert not found.fits
+    assert found.statement.startswith("The positions are not those of one linear scheme")
+
+
 @pytest.mark.parametrize("noise", [1e-13, 1e-6])
 def test_noise_is_no_scheme(noise: float) -> None:
     found = identify(*positions("velocity-verlet", noise=noise), mass=M)

@@ -173,7 +173,7 @@ def _unlike(record: Record, found: Map, matches: list[Match]) -> Floats:
     for i, match in enumerate(matches):
         if match.stride in even:
             continue
-        ways = powers(one[i], match.stride).astype(np.float64)
+        ways = powers(one[i], match.stride)
         each = ways[::-1] @ change[i] @ ways
         apart = np.sum(np.abs(each - np.mean(each, axis=0)), axis=(0, 2))
         # where steps differ alike in every frame another stiffness takes a part of it, and is off by as much

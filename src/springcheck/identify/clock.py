@@ -17,11 +17,8 @@ ROUNDING = 2.0**-53
 FEWEST_STATES = 5
 """Frames: four pairs leave one number to spare above the three unknowns of each row of the map."""
 
-ADDED_UP = 64
-"""Roundings of a clock that adds up its steps from frame to frame, half of one for each."""
-
 MOST_ADDED = 100
-"""Steps to a frame at which a clock that adds up is looked for."""
+"""Steps to a frame at which a clock that adds up is looked for; each of them rounds by half a quantum."""
 
 SHORT_STEP = 9
 """Digits of a step that a program was given."""
@@ -60,7 +57,7 @@ def clock_of(t: Floats) -> Clock:
     # two rounded times make a difference, and a clock that adds its step up rounds once more each time
     quantum = next((x for x in grids if off[worst] <= 4 * x), None)
     if quantum is None:
-        quantum = next((x for x in grids[: 1 + single] if off[worst] <= ADDED_UP * x), None)
+        quantum = next((x for x in grids[: 1 + single] if off[worst] <= (4 + MOST_ADDED / 2) * x), None)
     if quantum is None:
         raise IdentificationError(
             f"the states are not at a constant interval: frames {worst} and {worst + 1} are "

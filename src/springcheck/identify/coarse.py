@@ -14,7 +14,7 @@ import numpy as np
 
 from springcheck.identify.families import FAMILIES
 from springcheck.identify.fit import Map
-from springcheck.identify.hypothesis import Match, most
+from springcheck.identify.hypothesis import CHANCE, Match, most
 from springcheck.identify.maps import power, unit
 from springcheck.identify.record import Record
 from springcheck.physics.arrays import Extended, Floats, Reals
@@ -26,9 +26,6 @@ QUANTUM = 2.0**-32
 
 EXCESS = 2.0**-32
 """Relative excess of the fixed-point forces of OpenMM's CustomIntegrator, which divides by 2**32 - 1."""
-
-CHANCE = 1e-9
-"""Chance that errors which are not those of cut-off forces leave as little as these do."""
 
 LEAST = 1 / 100
 """Share of its bound that an error must reach in the mean square for the bound to be what explains it."""

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from springcheck.errors import IdentificationError
 from springcheck.identify.compare import compare
-from springcheck.identify.evidence import Evidence
+from springcheck.identify.evidence import AGREES, Evidence
 from springcheck.identify.fit import fit
 from springcheck.identify.hypothesis import FEW, Match, distinct
 from springcheck.physics.arrays import Extended, Floats
@@ -64,14 +64,8 @@ TUNING_STEPS = 12
 STARTS_BESIDE, FEW_FRAMES = 6, 2000
 """Starts on either side, a quarter turn over the run apart, and frames up to which they are looked at."""
 
-UNDAMPED = 1e-6
-"""Largest distance from 1 of the moduli of a frictionless step's eigenvalues, beside a drive."""
-
 MOST_SCHEMES = 3
 """Schemes that a sentence names at most: on a spring of unknown stiffness several have one map."""
-
-AGREES = 1e-6
-"""Share of b by which that of a scheme may miss it: what rounding leaves of b is less by decades."""
 
 
 def _best(z: Floats, carrier: Floats, turn: float) -> tuple[float, Floats]:
@@ -120,7 +114,7 @@ def said(e: Evidence, forced: bool, turn: float) -> str:
     of = "" if e.record.mass is not None else " for each unit of mass"
     drives = [(turn, rows)]
     own = np.linalg.eigvals(rows[:2])
-    if np.all(np.abs(np.abs(own) - 1) <= UNDAMPED):
+    if np.all(np.abs(np.abs(own) - 1) <= AGREES):
         # without friction the spring may as well turn as the drive does, and the drive as the spring
         drives.append(_best(z, np.ones(e.pairs), float(abs(np.angle(own[0])))))
         if e.stated:

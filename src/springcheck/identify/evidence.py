@@ -25,6 +25,9 @@ LEFT_BY_ROUNDING = 64
 FIXED = LEFT_BY_ROUNDING * 2.0**-52
 """Residual of a map, relative to the states, that is still rounding."""
 
+AGREES = 1e-6
+"""Relative difference up to which a number that is read from a map is one that is known or stated."""
+
 SINGLE_ROOM = 8 * 2.0**-24
 """Relative difference of stiffnesses that a step, a mass and a stiffness in single precision may make."""
 

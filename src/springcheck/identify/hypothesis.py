@@ -17,7 +17,7 @@ ERRORS = 5.0
 """Standard errors that chance does not exceed: 6e-7."""
 
 CHANCE = 1e-7
-"""Probability with which a right hypothesis may be refused: five standard errors."""
+"""Probability with which a right hypothesis may be refused, or a wrong one pass: five standard errors."""
 
 SOLVED = 1e-4
 """Chi-squared of unknowns that solve as many equations: Gauss-Newton's rest."""

@@ -13,11 +13,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from springcheck.identify import driven
-from springcheck.identify.coarse import CHANCE
 from springcheck.identify.evidence import FALLS, LEFT_BY_ROUNDING, Evidence, matched
 from springcheck.identify.families import title
 from springcheck.identify.fit import fit
-from springcheck.identify.hypothesis import ERRORS, Match
+from springcheck.identify.hypothesis import CHANCE, ERRORS, Match
 from springcheck.identify.result import Explanation
 from springcheck.physics.arrays import Floats
 

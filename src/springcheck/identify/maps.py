@@ -293,9 +293,9 @@ def power(matrices: Reals, strides: Floats) -> Reals:
     return np.asarray(out * (root**s * np.where(np.mod(s, 2) == 0, 1, sign))[:, None, None])
 
 
-def powers(entries: Extended, frames: int) -> Extended:
+def powers(entries: Reals, frames: int) -> Reals:
     """entries (2, 2) to the powers 0 to frames - 1, (frames, 2, 2), by doubling."""
-    out, last = np.eye(2, dtype=np.longdouble)[None], entries
+    out, last = np.eye(2, dtype=entries.dtype)[None], entries
     while len(out) < frames:
         out = np.concatenate([out, out @ last])
         last = last @ last

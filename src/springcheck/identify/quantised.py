@@ -14,10 +14,10 @@ from typing import TypeAlias
 import numpy as np
 
 from springcheck.identify import coarse
-from springcheck.identify.coarse import CHANCE, EXCESS, QUANTUM, over_single
+from springcheck.identify.coarse import EXCESS, QUANTUM, over_single
 from springcheck.identify.families import FAMILIES
 from springcheck.identify.fit import Map
-from springcheck.identify.hypothesis import Match
+from springcheck.identify.hypothesis import CHANCE, Match
 from springcheck.identify.record import Record
 from springcheck.physics.arrays import Floats
 from springcheck.schemes import SCHEMES, Scheme, number
@@ -57,7 +57,7 @@ def coarse_forces(record: Record, j: int, found: Map, match: Match, signed: Floa
     """Precision of forces that leave these misses (f - 1, 2), a note, and whether it is certain; "" where
     none explains them."""
     name, note = coarse.sized(record, j, found, match, signed)
-    for each in FORCES if name == "mixed" else [name] if name else []:
+    for each in FORCES if name else ():
         if _reproduced(record, j, found, match, each):
             return each, "states are double, and the steps redone with such forces are those recorded", True
     seen = coarse.kinematic(record, j, found, match)
@@ -69,7 +69,7 @@ def coarse_forces(record: Record, j: int, found: Map, match: Match, signed: Floa
 def _reproduced(record: Record, j: int, found: Map, match: Match, precision: str) -> bool:
     """Whether forces of a precision, in an explicit scheme without friction, explain what frames miss."""
     family = FAMILIES[match.family]
-    if record.mass is None or family.damped or SCHEMES[family.scheme].has("implicit"):
+    if record.mass is None:
         return False
     mass, h = float(record.mass[j]), float(record.interval) / match.stride
     # about the equilibrium; velocities as lengths
@@ -104,9 +104,6 @@ def _reproduced(record: Record, j: int, found: Map, match: Match, precision: str
     without = missed(plain, exact) * scale
     before = float(np.sqrt(np.mean(without**2)))
     counted = float(np.sum(without**2) ** 2 / np.sum(without**4)) - 1
-    if counted <= 0:
-        return False
-    most = min(EXPLAINED, CHANCE ** (1 / counted))
     single = float(over_single(mass))
     factors = [x * y for x in (1.0, 1.0 + EXCESS) for y in dict.fromkeys((1.0, single))]
     quanta = kick * np.array(factors)[:, None]
@@ -123,10 +120,9 @@ def _reproduced(record: Record, j: int, found: Map, match: Match, precision: str
         for _ in range(REFINED):
             left = missed(values, cut, leaps=leaps) * scale
             share = np.sqrt(np.mean(left**2, axis=1)) / before
-            if np.any(share <= most):
+            # of one miss alone any stiffness leaves nothing
+            if np.any((share <= EXPLAINED) & (share**counted <= CHANCE)):
                 return True
-            if not np.any(np.isfinite(share)):
-                break
             values = values - left @ inverse
     return False
 

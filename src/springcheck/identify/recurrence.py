@@ -63,16 +63,14 @@ class Recurrence:
 def recurrence(record: Record, j: int, steps: int) -> Recurrence:
     """The recurrence of oscillator j, `steps` to a frame at most."""
     q = record.q[:, j]
-    stored = np.maximum(record.q_quantum[:, j] / np.sqrt(12.0), 0.0)
+    stored = record.q_quantum[:, j] / np.sqrt(12.0)
     size = np.abs(q).astype(np.float64)
     size = size[2:] + 2 * size[1:-1] + size[:-2]
     size = np.maximum(size, 1e-30 * np.max(size))
-    noise = ROUNDING * size
+    noise = np.sqrt((ROUNDING * size) ** 2 + stored[2:] ** 2 + 4 * stored[1:-1] ** 2 + stored[:-2] ** 2)
+    noise = np.maximum(noise, 1e-30 * np.max(noise))
     # a frame may lie off by the rounding of its time, on its way of up to a turn more than it shows
     amplitude = _around(np.abs(q - np.mean(q)).astype(np.float64))[1:-1]
-    if not record.fine:
-        noise = np.sqrt(noise**2 + stored[2:] ** 2 + 4 * stored[1:-1] ** 2 + stored[:-2] ** 2)
-    noise = np.maximum(noise, 1e-30 * np.max(noise))
     alpha, beta, covariance, left = _neighbours(q, noise, record.slips)
     scale = float(np.std(q.astype(np.float64)))
     residual = float(np.sqrt(np.mean(left**2))) / scale
@@ -162,8 +160,6 @@ def _orbit(
     n = np.arange(frames, dtype=np.float64)
     unit_ = np.maximum(unit_, _around(unit_) / 64)
     phase = _phase(alpha, beta)
-    if not phase:
-        return None
     x = np.array([0.5 * math.log1p(-float(beta)), phase])
     for _ in range(30):
         wave = np.exp(np.clip(x[0] * n, -60, 60))
@@ -215,9 +211,9 @@ def classes() -> tuple[tuple[Family, ...], ...]:
     out: list[list[Family]] = []
     for family in distinct(damped=False):
         own = _shape(family)
-        same = next((x for x in out if np.allclose(_shape(x[0]), own, rtol=0, atol=1e-13)), None)
-        out = out if same is not None else [*out, []]
-        (same if same is not None else out[-1]).append(family)
+        same = next((x for x in out if np.allclose(_shape(x[0]), own, rtol=0, atol=1e-13)), [])
+        out += [] if same else [same]
+        same.append(family)
     return tuple(tuple(x) for x in out)
 
 
@@ -257,7 +253,7 @@ def matches(found: Recurrence, families: tuple[Family, ...], strides: range) -> 
     s, i = np.array(ways, np.float64).T
     turns = (i + 1) // 2
     phases = (np.where(i % 2, -1.0, 1.0) * found.phase + 2 * np.pi * turns) / s
-    keep = (phases > 0) & ((phases <= np.pi) | (s == 1))
+    keep = phases > 0
     s, turns, phases = s[keep], turns[keep], phases[keep]
     each = found.log_det / s
     det, trace = np.exp(each), 2 * np.exp(each / 2) * np.cos(phases)
@@ -272,6 +268,4 @@ def matches(found: Recurrence, families: tuple[Family, ...], strides: range) -> 
             room = 0.02 * np.abs(own) + 1e-4 + 100 * math.sqrt(found.covariance[1, 1])
             near = np.flatnonzero(np.abs(own - found.log_det) <= room)
             x = x[near]
-        if not len(x.a):
-            return []
         return solved(every, PositionTarget(found), roots, x, every_turn=True)

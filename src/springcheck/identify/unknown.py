@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 
 from springcheck.identify.compare import nearest
-from springcheck.identify.evidence import FALLS, LEFT_BY_ROUNDING, Evidence, distance
+from springcheck.identify.evidence import AGREES, FALLS, LEFT_BY_ROUNDING, Evidence, distance
 from springcheck.identify.families import title
 from springcheck.identify.fit import Map, fit
 from springcheck.identify.hypothesis import STRIDES, SURE, distinct
@@ -29,8 +29,8 @@ FORGOTTEN = 0.1
 """Share of the initial residual that is left in the last three quarters of the frames, of a memory that
 dies."""
 
-READ, CHOSEN = 1e-6, 1200
-"""Error up to which a parameter is read from a map, and a denominator of what people choose for one."""
+CHOSEN = 1200
+"""Denominator of what people choose for a parameter."""
 
 ONE_MAP = "One linear map explains the states"
 MAP_OF = "if every step was recorded, it is that of a one-step method, "
@@ -104,7 +104,7 @@ def _class(e: Evidence) -> str:
     # any map that keeps areas and is symmetric is one of gamma = 1/2 on some spring, or in some mass
     other = stated is None or symmetric
     own = (chosen or not other) and (stated is None or abs(stated - a) < room)
-    if own and abs(z + a * (1 - gamma + gamma * x)) < room < READ * a and e.record.fine:
+    if own and abs(z + a * (1 - gamma + gamma * x)) < room < AGREES * a and e.record.fine:
         return f"{MAP_OF}Newmark's method with beta = {beta:.6g}, gamma = {gamma:.6g}"
     keeps = abs(det - 1) <= SURE * float(np.max(error) * max(size, 1 / size)) + 1e-13
     growing = f"multiplies areas by 1 {det - 1:+.2e}"
@@ -114,11 +114,11 @@ def _class(e: Evidence) -> str:
     if not symmetric:
         return f"{UNKNOWN_METHOD} {'keeps areas' if keeps else growing}"
     step = math.sqrt(turn)
-    if stated is not None and abs(stated / turn - 1) > 1e-6:
+    if stated is not None and abs(stated / turn - 1) > AGREES:
         return ""
     w, r = 1j * step, complex(x, step * y)
     theta = (r - 1 - w) / (w * (r - 1))
-    if abs(theta.imag) * turn < room < READ * turn and e.record.fine:
+    if abs(theta.imag) * turn < room < AGREES * turn and e.record.fine:
         return f"{MAP_OF}the theta method with theta = {theta.real:.6g} (implicit Euler 1, trapezoidal 1/2)"
     wrong = r - cmath.exp(1j * step)
     found = {n: wrong / (1j * step) ** n for n in ORDERS}
@@ -252,7 +252,7 @@ def _remembered(e: Evidence, found: Map) -> list[str]:
             if not np.all(np.isfinite(left(np.array(start)))):
                 continue
             best = least_squares(left, start, x_scale="jac", xtol=1e-15, ftol=1e-15, gtol=1e-15)
-            other = stated is not None and abs(best.x[0] * turn - stated) > READ * abs(stated)
+            other = stated is not None and abs(best.x[0] * turn - stated) > AGREES * abs(stated)
             if np.max(np.abs(best.fun)) > 1 or other:
                 continue
             known = [round(float(y), DIGITS) + 0.0 for y in best.x[1:]]

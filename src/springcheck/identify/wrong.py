@@ -9,7 +9,7 @@ from functools import cache
 import numpy as np
 
 from springcheck.identify.compare import compare
-from springcheck.identify.evidence import Evidence, Measured, matched
+from springcheck.identify.evidence import AGREES, Evidence, Measured, matched
 from springcheck.identify.families import FAMILIES, FAULTS, G_ROUNDING, SUBTRACTED, Family, title
 from springcheck.identify.hypothesis import SURE, Joint, distinct, same_map
 from springcheck.identify.record import ROUNDING
@@ -99,9 +99,6 @@ def _negative_friction(e: Evidence) -> list[Explanation]:
     return [_found(cause, "change the sign of the damping force", best)]
 
 
-UNSCALED = 1e-6
-"""Factor of velocities less 1 below which it is none of units."""
-
 SHOWN = 4
 """How many of the schemes that would fit at another scale a sentence names."""
 
@@ -171,7 +168,7 @@ def _scales(e: Evidence) -> tuple[list[Explanation], bool]:
         )
     advice = "look at the mass, at the units of velocities and times, and at whether dq/dt = p/m"
     alone = of_stated if e.stated is not None else fitting if e.record.fine else []
-    return [_found(cause, advice, x)], len(alone) == 1 and abs(one - 1) > UNSCALED
+    return [_found(cause, advice, x)], len(alone) == 1 and abs(one - 1) > AGREES
 
 
 def _meaning(e: Evidence, x: Joint) -> tuple[bool, str, str] | None:
@@ -185,8 +182,8 @@ def _meaning(e: Evidence, x: Joint) -> tuple[bool, str, str] | None:
     stiffer = part.a * x.stride**2 / e.stated if e.stated else math.nan
     agrees = any(abs(stiffer / scale**n - 1) <= known for n in range(3))
     for factor, power, meaning, remedy in _meanings(scale, mass, h, stated=bool(e.stated)):
-        room = known + (UNSCALED if power in (None, 0) else 0.0)
-        if (factor is None or abs(scale / factor - 1) <= UNSCALED + known) and (
+        room = known + (AGREES if power in (None, 0) else 0.0)
+        if (factor is None or abs(scale / factor - 1) <= AGREES + known) and (
             power is None or abs(stiffer / scale**power - 1) <= room
         ):
             return agrees, meaning, remedy
