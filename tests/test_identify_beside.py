@@ -138,6 +138,22 @@ def test_dry_friction_that_holds_a_motion_in_the_end_or_of_few_frames_is_told(
     assert found.statement.startswith(f"Dry (Coulomb) friction acts: a force of one size, {1.7 * share:.6g} ")
 
 
+@pytest.mark.parametrize(("share", "long"), [(0.05, 0.2), (0.1, 0.1), (0.1, 0.2), (0.3, 0.1)])
+def test_strong_dry_friction_whose_stages_cancel_where_it_holds_is_told(
+    share: float, long: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """There Heun's two stages push either way, and the velocity changes its sign no more."""
+    monkeypatch.setitem(globals(), "H", long)
+
+    def force(q: Any, v: Any, t: float) -> Any:
+        return -1.7 * (q + share * np.sign(v))
+
+    t, q, v = march(heun, 1.1, 0.4, force, 200)
+    found = identify(t, q, v=v, mass=1.0)
+    assert (found.scheme, found.fits) == (None, False)
+    assert found.statement.startswith("Dry (Coulomb) friction acts")
+
+
 def test_what_misses_by_the_size_of_the_state_is_no_exact_solution() -> None:
     def force(q: Any, v: Any, t: float) -> Any:
         return -1.7 * q - 0.17 * np.sign(v)

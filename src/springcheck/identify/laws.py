@@ -139,13 +139,16 @@ def _alternating(e: Evidence) -> list[Floats]:
 
 def _directions(e: Evidence) -> list[Floats]:
     """Sign of the velocity (f - 1,); NaN near where it turns round, in a step or in a stage of one, and from
-    where it does so in every frame on, or rests: there friction holds it."""
+    where friction holds it: it does so in every frame, or stays below its largest change in a frame."""
     old, new = e.states[:-1, 1], e.states[1:, 1]
     clear = (old * new > 0) & (2 * np.minimum(np.abs(old), np.abs(new)) > np.abs(new - old))
     held = np.flatnonzero((old[:-1] * new[:-1] <= 0) & (old[1:] * new[1:] <= 0))
-    clear[held[0] if len(held) else len(clear) :] = False
-    both = np.unique(np.sign(old[clear])).size > 1
-    return [np.where(clear & both, np.sign(old), math.nan)]
+    fast = np.flatnonzero(np.abs(new) > np.max(np.abs(new - old)))
+    for end in (fast[-1] + 1 if len(fast) else 0, held[0] if len(held) else len(clear)):
+        moves = np.where(clear & (np.arange(len(clear)) < end), np.sign(old), math.nan)
+        if {-1.0, 1.0} <= set(moves.tolist()):
+            return [moves]
+    return [np.full(len(clear), math.nan)]
 
 
 def _pushed(e: Evidence, found: Regression) -> Floats:
