@@ -515,6 +515,23 @@ def test_the_document_is_json_with_the_fields_of_the_command() -> None:
         identify(made.t, made.q, made.p, mass=-1.0)
 
 
+def test_a_damped_spring_that_has_the_very_same_map_is_said_until_the_stiffness_excludes_it() -> None:
+    """Implicit Euler of k is semi-implicit Euler of k/(1 + a) with a friction c/m of h k/m/(1 + a)."""
+    k, m, h, q, v = 2.9, 1.3, 0.31, 1.1, 0.4
+    a, rows = k / m * h * h, []
+    for _ in range(101):
+        rows.append((q, v))
+        v = (v - h * k / m * q) / (1 + a)
+        q += h * v
+    x, u = np.array(rows).T
+    found = identify(h * np.arange(101), x, v=u, mass=m)
+    assert (found.scheme, found.aliases) == ("implicit-euler", ("semi-implicit-euler with friction",))
+    other = f"stiffness {k / (1 + a):.9g} and friction c/m {h * k / m / (1 + a):.6g}: the stiffness"
+    assert [other in note for note in found.notes if note.startswith("the same map is")] == [True]
+    stated = identify(h * np.arange(101), x, v=u, mass=m, stiffness=k)
+    assert not any(note.startswith("the same map is") for note in stated.notes)
+
+
 def test_aliases_are_the_schemes_with_the_same_matrix() -> None:
     assert aliases("implicit-midpoint") == ("trapezoidal",)
     assert aliases("rk2-heun") == ("rk2-midpoint",)

@@ -143,6 +143,21 @@ def test_a_spring_of_another_stiffness_does_not_fit() -> None:
     assert "another spring" in found.statement
 
 
+@pytest.mark.parametrize(("name", "areas"), [("velocity-verlet", "are kept"), ("damped", "shrink")])
+def test_what_areas_do_and_what_would_tell_more_is_said_with_the_mass_and_without(
+    name: str, areas: str
+) -> None:
+    without = identify(*positions(name))
+    assert f"areas {areas}" in without.statement
+    assert any(note.startswith("what would tell more: mass and stiffness") for note in without.notes)
+    known = identify(*positions(name), mass=M)
+    assert any(note.startswith("what would tell more: the stiffness") for note in known.notes)
+    stated = identify(*positions(name), mass=M, stiffness=K)
+    assert not any(note.startswith("what would tell more") for note in stated.notes)
+    if name == "damped":
+        assert any("every scheme has a spring that fits" in note for note in known.notes)
+
+
 def test_damped_motion_names_no_scheme() -> None:
     found = identify(*positions("damped"), mass=M)
     assert found.verdict == "not told apart"

@@ -381,10 +381,6 @@ def roots_of(
         log_det = np.log(np.abs(found.determinant)).astype(np.float64)
         ones = np.ones(len(steps))
         roots = Roots(ones, 0 * ones, phase, log_det, steps, room / NEAR[1], {})
-        x = polished(
-            every,
-            roots,
-            first(every, roots, growing=False, free_scale=True, far=True),
-            free_scale=free_scale,
-        )
+        x = first(every, roots, growing=False, free_scale=True, far=True)
+        x = polished(every, roots, x, free_scale=free_scale)
     return x.which, x.root, x.a, x.g

@@ -194,9 +194,6 @@ def _orbit(
     return np.longdouble((1 - r) ** 2 + bent), np.longdouble(1 - r * r), slope @ covariance @ slope.T
 
 
-# families ------------------------------------------------------------------------------------------------
-
-
 def recurrence_of(m: Reals) -> tuple[Reals, Reals]:
     """1 + det - trace and 1 - det of maps (c, 2, 2)."""
     # (1 - M11)(1 - M22) - M12 M21 is 1 + det - trace without the cancellation

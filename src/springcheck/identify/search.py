@@ -17,16 +17,7 @@ from springcheck.identify.evidence import Measured
 from springcheck.identify.families import DAMPED_ELSEWHERE, FAMILIES, HELD, KNOWN_ELSEWHERE, Family
 from springcheck.identify.fit import Map, fit
 from springcheck.identify.guesses import roots_of
-from springcheck.identify.hypothesis import (
-    EXCLUDED,
-    FEW,
-    MANY,
-    STRIDES,
-    Joint,
-    Terms,
-    distinct,
-    likely,
-)
+from springcheck.identify.hypothesis import EXCLUDED, FEW, MANY, STRIDES, Joint, Terms, distinct, likely
 from springcheck.identify.interrupted import remembered
 from springcheck.identify.maps import unit
 from springcheck.identify.record import ROUNDING, Record
@@ -53,7 +44,6 @@ AS_NEAR = 1.5
 
 SAME_MAP = 1e-12
 """Distance of the entries of two steps that are the same, in double precision."""
-
 
 Explained: TypeAlias = dict[Joint, list[Defect]]
 """Hypotheses, the plainest first, and the defects of their steps, which a known arithmetic explains."""
