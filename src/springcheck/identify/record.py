@@ -8,9 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from springcheck.errors import IdentificationError
-from springcheck.identify.clock import FEWEST_STATES, ROUNDING, clock_of
+from springcheck.identify.clock import FEWEST_STATES, clock_of
 from springcheck.identify.storage import BINARY, Storage, storage
 from springcheck.physics.arrays import Extended, Floats
+
+ROUNDING = 2.0**-53
 
 LEAST = 2.0**-102
 """Smallest number of which single precision keeps all 24 digits in products with others of up to 2**24."""
