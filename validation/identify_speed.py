@@ -9,11 +9,12 @@ once. With SRC, the folder `src` of another checkout, the same trajectories go t
 this one, twice each, and the ratio of the two is printed; the shortest time of each trajectory counts,
 after one call that is not timed.
 
-Printed for 15 calls on two idle cores (median and most):
-    plain 17.4 and 32.5 ms.  damped 36.2 and 99.3.  held 21.8 and 50.7.  single 61.9 and 1794.8
-    text 64.0 and 476.5.  systematic error 144.9 and 341.1.  16 oscillators 128.3.  as drawn 34.9 and 757.6
-    mean as drawn 56.2 ms: 1.28e+05 calls an hour on two cores
-Commit 49ded500: 21.7 (plain), 41.8, 31.1 (held), 78.3, 49.5, 106.4 and 189.2 (16 oscillators); 41.9 as drawn.
+Printed for 15 calls on two cores that others used as well (median and most):
+    plain 5.3 and 12.0 ms.  damped 10.4 and 34.0.  held 7.2 and 15.4.  single 24.8 and 533.4
+    text 17.2 and 122.8.  systematic error 36.1 and 127.5.  16 oscillators 31.0.  as drawn 12.0 and 274.0
+    mean as drawn 19.7 ms: 3.66e+05 calls an hour on two cores
+Commit 93225b79 in turn with it: 5.2 (plain), 10.4, 7.8 (held), 22.9, 17.3, 35.0, 47.6 (16 oscillators); 12.7
+as drawn.
 """
 
 from __future__ import annotations
