@@ -228,6 +228,30 @@ def test_a_right_trajectory_of_arrays_passes_whatever_the_scene_records(known: b
         moved.error()
 
 
+@pytest.mark.parametrize("known", [True, False])
+@pytest.mark.parametrize("name", ["spring-uneven", "chain", "pendulum"])
+def test_arrays_of_single_precision_are_judged_to_their_digits(name: str, known: bool) -> None:
+    scene = springcheck.load_scene(name)
+    run = springcheck.simulate(scene, "own:velocity-verlet")
+    more = {"scene": scene} if known else {"every": scene.every, "mass": scene.m}
+    t, q, v = (x.astype(np.float32) for x in (run.t, run.q, run.p / scene.m))
+
+    def judged(t: Any = t, q: Any = q, scheme: str = "velocity-verlet") -> dict[str, bool | None]:
+        made = springcheck.Trajectory.from_arrays(t, q, v=v, scheme=scheme, **more)
+        assert made.arithmetic.state == 2.0**-24
+        return {verdict.check: verdict.passed for verdict in springcheck.judge(scene, made)}
+
+    found = judged()
+    assert False not in found.values()
+    assert {"start", "times", "grid", "step-defect"} <= {name for name, passed in found.items() if passed}
+    # two roundings more are another start, and one is another time
+    off = q.copy()
+    off[0] = q[0] + 2 * np.spacing(np.abs(q[0]))
+    assert judged(q=off)["start"] is False
+    assert judged(t=np.nextafter(t, np.float32(np.inf)))["times"] is False
+    assert judged(scheme="semi-implicit-euler")["step-defect"] is False
+
+
 def test_wrong_arguments_are_answered_in_words() -> None:
     scene, t = springcheck.load_scene("spring"), np.arange(4.0)
     made = springcheck.Trajectory.from_arrays

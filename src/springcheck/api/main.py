@@ -111,7 +111,7 @@ def judge(scene: Scene | str | Path, trajectory: Trajectory) -> Verdicts:
     if run.every < 1 or run.step == 0:
         raise SpringcheckError(f"{run.label}: every = {run.every} by step = {run.step:g} lie no frames apart")
     # what is made of arrays has the energies of its states
-    return Verdicts(checks.judge(found, run if run.scene or run.origin else run.with_energies(found)))
+    return Verdicts(checks.judge(found, run if run.scene or run.origin else run.of_scene(found)))
 
 
 def compare(

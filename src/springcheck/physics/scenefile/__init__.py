@@ -125,9 +125,8 @@ def _explain(message: str, data: Any) -> str:
             found = None
     what = (what[0].lower() + what[1:]).replace("missing required field", "lacks the field")
     what = what.replace("contains unknown field", "has the unknown field")
-    accepted = tables.CHOICES.get(re.sub(r"\[\d+\]$", "[]", field)) or tables.CHOICES.get(
-        field.rpartition(".")[2]
-    )
+    names = re.sub(r"\[\d+\]$", "[]", field), field.rpartition(".")[2]
+    accepted = next((one for name in names if (one := tables.CHOICES.get(name))), None)
     if accepted:
         return f"{field} = {found!r}: one of {', '.join(accepted)} is needed"
     if "unknown field" in what or "lacks the field" in what:
