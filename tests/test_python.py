@@ -270,6 +270,26 @@ def test_wrong_arguments_are_answered_in_words() -> None:
         (lambda: springcheck.identify(run, step="a"), "step: real numbers"),
         (lambda: springcheck.identify(run, mass="a"), "mass: real numbers"),
         (lambda: springcheck.simulate(scene, None), "a method's label or a function"),
+        (lambda: springcheck.simulate(scene, "own:euler", progress=5), "progress: a function is needed"),
+        *(
+            (lambda x=x: springcheck.load_scene(x), "the name or path of a scene is needed, not")
+            for x in (5, None, b"x", [1])
+        ),
+        *(
+            (lambda f=f, x=x: f(x), "the path of a file is needed, not")
+            for x in (5, [1], "")
+            for f in (springcheck.read, springcheck.report)
+        ),
+        (lambda: springcheck.precision(scene, "own:rk4", path=5), "the path of a file is needed, not int"),
+        (lambda: springcheck.run(scene, "own:rk4", path=5), "the path of a file is needed, not int"),
+        (lambda: springcheck.report("x.h5", 5), "the path of a file is needed, not int"),
+        (lambda: springcheck.identify(""), "the path of a file is needed"),
+        (lambda: springcheck.explain(5), "a word is needed, not int"),
+        (lambda: springcheck.compare(scene, 5), "a Trajectory is needed, not int"),
+        (lambda: springcheck.ensemble(scene, 5, "own:rk4"), "vary: a dict of fields and values is needed"),
+        (lambda: springcheck.chain(3, k="x"), "k: real numbers"),
+        (lambda: springcheck.chain(3, waves=5), "pairs of a mode and an amplitude are needed"),
+        (lambda: springcheck.chain(3, waves=[1]), "pairs of a mode and an amplitude are needed"),
         (lambda: springcheck.simulate(scene, lambda q, p, h, force, mass: (q + 1j, p)), "real numbers"),
         (lambda: springcheck.precision(scene, "own:rk4", workers=0), "number of processes"),
         (lambda: springcheck.precision(scene, "own:rk4", budget="a"), "number of seconds"),

@@ -237,7 +237,7 @@ def _of_one(
         often = close > COARSE or float(np.quantile(np.abs(changes), 0.05)) > close
         struck, state = np.abs(changes) > close, np.stack([q[:-1], v[:-1], np.ones(len(v) - 1)], axis=1)
         collides = are_drawn(changes[struck, None], state[struck])
-        names = ("andersen", "andersen-after-kick") if collides else ()
+        names: tuple[str, ...] = ("andersen", "andersen-after-kick") if collides else ()
         names += ("bussi", "bussi-unsigned") if often and is_a_factor(v[:-1], drawn) else ()
         if not names:
             return None
