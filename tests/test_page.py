@@ -421,6 +421,15 @@ def test_a_browser_sees_one_changed_bit(content: page.Content, opened: Any) -> N
     assert "each q and p the same double (201 frames): own:euler" in said
 
 
+def test_a_browser_counts_the_frames_of_every_run(content: page.Content, opened: Any) -> None:
+    runs = json.loads(json.dumps(content.data["runs"]))
+    runs[0] |= {name: runs[0][name][:50] for name in ("t", "q", "p")}
+    runs[2] |= {name: runs[2][name][:100] for name in ("t", "q", "p")}
+    found, said = _checked(opened(replace(content, data={**content.data, "runs": runs})))
+    assert found == "equal"
+    assert f"each q and p the same double (50 to 201 frames): {', '.join(OWN)}" in said
+
+
 EVERY = ("own:*", "openmm:*", "ase:*", "sundials:*", "scipy:*")
 
 

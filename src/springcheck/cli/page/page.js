@@ -33,7 +33,9 @@ function selfCheck() {
     said[kind].push(run.label);
     lines.push(text);
   }
-  put(`each q and p the same double (${runs.length && runs[0].t.length} frames)`, said.equal);
+  const lengths = runs.filter((run) => said.equal.includes(run.label)).map((run) => run.t.length);
+  const frames = [...new Set([Math.min(...lengths), Math.max(...lengths)])].join(" to ");
+  put(`each q and p the same double (${frames} frames)`, said.equal);
   put("the scheme's motion to rounding, or the exact one to tolerance", said.near);
   put("not computed again here", said.not);
   const { equal, near, wrong } = said, list = lines.filter(Boolean).map((text) => html("li", {}, text));
