@@ -10,7 +10,7 @@ from springcheck.engines.contract import Label
 from springcheck.errors import MethodError
 from springcheck.physics.scene import Scene
 
-EACH, EXPLICIT = (3.0, 40e-6), (1 / 6, 250e-6)
+OF_CVODE, OF_DOP853 = (3.0, 40e-6), (1 / 6, 250e-6)
 """Internal steps a radian, at least, and seconds of one: of CVODE, and of DOP853 where friction bounds steps:
 its limit on the negative real axis is 6.  Steps of RK45 are half as long, and take half of the time."""
 
@@ -55,9 +55,9 @@ def refuse_hours(scene: Scene, label: Label, step: float, *, explicit: bool = Fa
 
     The steps of an `explicit` one stay as short as the fastest rate, though nothing moves as fast any more.
     """
-    found = [(followed(scene, step), "motion", *EACH), (driven(scene, step), "drive", *EACH)]
+    found = [(followed(scene, step), "motion", *OF_CVODE), (driven(scene, step), "drive", *OF_CVODE)]
     if explicit and np.isfinite(fastest := turned(scene, step)):
-        found.append((fastest, "fastest rate, which bounds the steps of an explicit solver,", *EXPLICIT))
+        found.append((fastest, "fastest rate, which bounds the steps of an explicit solver,", *OF_DOP853))
     radians, what, each, seconds = max(found, key=lambda one: one[0] * one[2] * one[3])
     if (took := radians * each * seconds) > MOST_SECONDS:
         raise MethodError(

@@ -68,7 +68,7 @@ SHIFTED = frozenset(
 FAST_STEPS = {"mts": 8} | {f"mts-langevin-{n}": n for n in (2, 3, 4)}
 """Evaluations of the fast springs in a step, beside one of the others, by method."""
 
-STEPS = {
+CUSTOM_STAGES = {
     "euler": (["v0"], [("v0", "v"), ("v", "v + dt*(f/m)"), ("x", "x + dt*v0")]),
     "semi-implicit-euler": ([], [("v", "v + dt*(f/m)"), ("x", "x + dt*v")]),
     "boris": (["turn", "half"], [
@@ -228,7 +228,7 @@ def _integrator(scene: Scene, name: str, step: float) -> mm.Integrator:
         integrator.addGlobalVariable("done", 0)
         integrator.addComputeGlobal("time", f"(done+{0.5 * (name == 'boris')})*({signed!r})")
         integrator.addComputeGlobal("done", "done+1")
-    own, stages = STEPS[name]
+    own, stages = CUSTOM_STAGES[name]
     for variable in own:
         integrator.addPerDofVariable(variable, 0)
     for variable, value in stages:
