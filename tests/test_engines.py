@@ -176,6 +176,32 @@ def test_opencl_keeps_force_constants_in_single_precision(need: Need) -> None:
     assert "step-defect" not in judged(scene, run)
 
 
+@pytest.mark.parametrize("precision", ["single", "mixed", "double"])
+@pytest.mark.parametrize(
+    ("given", "what", "holds"),
+    [
+        ({"m": 1e50, "step": 1e24}, "mass", {"mixed", "double"}),
+        ({"m": 1e-50, "step": 1e-26}, "mass", {"mixed", "double"}),
+        ({"m": 1e50, "k": 1e50}, "stiffness of a wall-spring", set()),
+        ({"m": 1e-46, "k": 1e-46}, "stiffness of a wall-spring", set()),
+        ({"q": 1e25, "m": 1e-25, "k": 1e-25}, "bond's length", {"double"}),
+        ({"m": 1e20, "k": 1e-30, "q": 1e12, "step": 1e40}, "step", {"mixed", "double"}),
+        ({"m": 1e-30, "p": 1e10, "k": 1e30}, "speed", {"mixed", "double"}),
+    ],
+)  # fmt: skip
+def test_a_scene_beyond_single_precision_is_refused_by_opencl_before_it_runs(
+    precision: str, given: dict[str, float], what: str, holds: set[str], need: Need
+) -> None:
+    label = f"openmm:verlet@OpenCL-{precision}"
+    need(label)
+    scene = springcheck.spring(**{"q": 1.0, "p": 0.0, "steps": 20, **given})
+    if precision in holds:
+        assert "outside" not in springcheck.simulate(scene, label).outcome.message
+        return
+    with pytest.raises(MethodError, match=f"a {what} of .* is outside what it computes with.*other units"):
+        springcheck.simulate(scene, label)
+
+
 def test_a_custom_integrator_on_opencl_takes_two_to_the_32_for_one_less(need: Need) -> None:
     """OpenMM 8.6.1 divides the fixed-point force by 0xFFFFFFFF in CustomIntegrator's kernel, and by
     0x100000000 in VerletIntegrator's: every force is too large by one part in 2**32 - 1."""

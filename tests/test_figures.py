@@ -405,6 +405,18 @@ def test_an_engine_far_off_the_others_of_its_scheme_has_its_line_in_its_panel() 
         assert re.search(r"by at most 0\.\d+ %", bank.heading), bank.heading
 
 
+def test_a_title_of_the_frames_drawn_says_so() -> None:
+    """Of a run of more frames than are drawn the rest may be further off than "at most"."""
+    scene = scenefile.load_scene("spring-uneven")
+    (made,) = runs(scene, "own:semi-implicit-euler").values()
+    few = replace(made.at(slice(None, None, 4)), every=4 * made.every)
+    for run in (made, few):
+        said = [bank.heading for bank in of_runs(scene, {run.label: run}, {run.label: run})]
+        most = [heading for heading in said if "at most" in heading]
+        assert len(most) >= 2
+        assert all(("of the frames drawn" in heading) == (run is few) for heading in most), most
+
+
 def test_frames_too_far_apart_to_be_joined_are_dots() -> None:
     for name, dots in (("spring", False), ("ch-bond", True)):
         scene = scenefile.load_scene(name)

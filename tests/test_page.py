@@ -398,7 +398,7 @@ def test_a_browser_gets_the_same_doubles(content: page.Content, opened: Any) -> 
     found, said = _checked(opened(content))
     assert found == "equal"
     assert "Your browser = this file: 4 of 4 methods to the last bit, 0 to rounding" in said
-    assert f"each q and p the same double (201 frames): {', '.join(OWN)}" in said
+    assert f"q and p the same doubles (201 frames): {', '.join(OWN)}" in said
 
 
 def test_a_browser_gets_the_same_doubles_of_another_spring(tmp_path: Path, opened: Any) -> None:
@@ -418,7 +418,15 @@ def test_a_browser_sees_one_changed_bit(content: page.Content, opened: Any) -> N
     found, said = _checked(opened(replace(content, data={**content.data, "runs": runs})))
     assert found == "differs"
     assert "own:semi-implicit-euler differs first in frame 150, t = 15" in said
-    assert "each q and p the same double (201 frames): own:euler" in said
+    assert "q and p the same doubles (201 frames): own:euler" in said
+
+
+def test_a_browser_counts_the_frames_of_every_run(content: page.Content, opened: Any) -> None:
+    runs = json.loads(json.dumps(content.data["runs"]))
+    runs[0] |= {name: runs[0][name][:50] for name in ("t", "q", "p")}
+    found, said = _checked(opened(replace(content, data={**content.data, "runs": runs})))
+    assert found == "equal"
+    assert f"q and p the same doubles (50, 201 frames): {', '.join(OWN)}" in said
 
 
 EVERY = ("own:*", "openmm:*", "ase:*", "sundials:*", "scipy:*")

@@ -228,6 +228,30 @@ def test_a_right_trajectory_of_arrays_passes_whatever_the_scene_records(known: b
         moved.error()
 
 
+@pytest.mark.parametrize("known", [True, False])
+@pytest.mark.parametrize("name", ["spring-uneven", "chain", "pendulum"])
+def test_arrays_of_single_precision_are_judged_to_their_digits(name: str, known: bool) -> None:
+    scene = springcheck.load_scene(name)
+    run = springcheck.simulate(scene, "own:velocity-verlet")
+    more = {"scene": scene} if known else {"every": scene.every, "mass": scene.m}
+    t, q, v = (x.astype(np.float32) for x in (run.t, run.q, run.p / scene.m))
+
+    def judged(t: Any = t, q: Any = q, scheme: str = "velocity-verlet") -> dict[str, bool | None]:
+        made = springcheck.Trajectory.from_arrays(t, q, v=v, scheme=scheme, **more)
+        assert made.arithmetic.state == 2.0**-24
+        return {verdict.check: verdict.passed for verdict in springcheck.judge(scene, made)}
+
+    found = judged()
+    assert False not in found.values()
+    assert {"start", "times", "grid", "step-defect"} <= {name for name, passed in found.items() if passed}
+    # two roundings more are another start, and one is another time
+    off = q.copy()
+    off[0] = q[0] + 2 * np.spacing(np.abs(q[0]))
+    assert judged(q=off)["start"] is False
+    assert judged(t=np.nextafter(t, np.float32(np.inf)))["times"] is False
+    assert judged(scheme="semi-implicit-euler")["step-defect"] is False
+
+
 def test_wrong_arguments_are_answered_in_words() -> None:
     scene, t = springcheck.load_scene("spring"), np.arange(4.0)
     made = springcheck.Trajectory.from_arrays
@@ -246,6 +270,26 @@ def test_wrong_arguments_are_answered_in_words() -> None:
         (lambda: springcheck.identify(run, step="a"), "step: real numbers"),
         (lambda: springcheck.identify(run, mass="a"), "mass: real numbers"),
         (lambda: springcheck.simulate(scene, None), "a method's label or a function"),
+        (lambda: springcheck.simulate(scene, "own:euler", progress=5), "progress: a function is needed"),
+        *(
+            (lambda x=x: springcheck.load_scene(x), "the name or path of a scene is needed, not")
+            for x in (5, None, b"x", [1])
+        ),
+        *(
+            (lambda f=f, x=x: f(x), "the path of a file is needed, not")
+            for x in (5, [1], "")
+            for f in (springcheck.read, springcheck.report)
+        ),
+        (lambda: springcheck.precision(scene, "own:rk4", path=5), "the path of a file is needed, not int"),
+        (lambda: springcheck.run(scene, "own:rk4", path=5), "the path of a file is needed, not int"),
+        (lambda: springcheck.report("x.h5", 5), "the path of a file is needed, not int"),
+        (lambda: springcheck.identify(""), "the path of a file is needed"),
+        (lambda: springcheck.explain(5), "a word is needed, not int"),
+        (lambda: springcheck.compare(scene, 5), "a Trajectory is needed, not int"),
+        (lambda: springcheck.ensemble(scene, 5, "own:rk4"), "vary: a dict of fields and values is needed"),
+        (lambda: springcheck.chain(3, k="x"), "k: real numbers"),
+        (lambda: springcheck.chain(3, waves=5), "pairs of a mode and an amplitude are needed"),
+        (lambda: springcheck.chain(3, waves=[1]), "pairs of a mode and an amplitude are needed"),
         (lambda: springcheck.simulate(scene, lambda q, p, h, force, mass: (q + 1j, p)), "real numbers"),
         (lambda: springcheck.precision(scene, "own:rk4", workers=0), "number of processes"),
         (lambda: springcheck.precision(scene, "own:rk4", budget="a"), "number of seconds"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -258,6 +259,49 @@ def test_dry_friction_is_no_collision(start: float) -> None:
     q, v = np.array(frames).T
     assert between_collisions(q, v, h) == []
     assert not identify(h * np.arange(400), q, v=v).fits
+
+
+ALTERNATING: dict[str, Callable[[int], float]] = {
+    "alternating": lambda i: 0.3 * (-1) ** i,
+    "in pairs": lambda i: 0.3 * (-1) ** (i // 2),
+    "in fives": lambda i: 0.3 * (-1) ** (i // 5),
+    "of changing size": lambda i: 0.3 * (-1) ** i * (1 + 0.3 * np.sin(0.7 * i)),
+    "at some steps": lambda i: 0.3 * (-1) ** i * (1 + 0.3 * np.sin(0.7 * i)) * ((i**3 + 3 * i) % 11 < 4),
+    "by the sign of a wave": lambda i: 0.3 * np.sign(np.cos(1.3 * i)),
+}
+
+
+@pytest.mark.parametrize("frames", [400, 2000])
+@pytest.mark.parametrize("at", ["start", "half", "end"])
+@pytest.mark.parametrize("name", ALTERNATING)
+def test_forces_that_alternate_are_no_draws(name: str, at: str, frames: int) -> None:
+    """A push at every step leaves the combination free of noise that a collision leaves, or a factor of all
+    momenta: they were Andersen's and Bussi's."""
+    h, q, v, rows = 0.35, 0.7, -1.1, []
+    for i in range(frames):
+        rows.append((q, v))
+        push = ALTERNATING[name](i)
+        v += push * (at == "start") - h / 2 * K / M * q + push * (at == "half")
+        q += h * v
+        v += push * (at == "end") - h / 2 * K / M * q
+    q, v = np.array(rows).T
+    assert between_collisions(q, v, h) == []
+    found = identify_thermal(h * np.arange(frames), q, v)
+    assert found is None or not found.candidates
+    assert "thermostat" not in identify(h * np.arange(frames), q, v=v).statement
+
+
+@pytest.mark.parametrize(
+    "name", ["andersen", "andersen-after-kick", "bussi", "bussi-unsigned", "bussi-after"]
+)
+@pytest.mark.parametrize("rate", [0.4, 8.0])
+def test_draws_of_collisions_and_of_factors_are_white(name: str, rate: float) -> None:
+    for seed in range(1, 5):
+        bath = Bath(temperature=THERMAL, friction=rate)
+        made = driver.run(replace(scene(1000), bath=bath), f"own:{name}", seed=seed)
+        found = identify_thermal(made.t, made.q[:, 0], made.p[:, 0] / M)
+        assert found is not None
+        assert name in [one.scheme for one in found.candidates]
 
 
 def test_a_stop_of_all_noise_halfway_is_no_collision() -> None:

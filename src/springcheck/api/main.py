@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -12,7 +12,7 @@ import numpy as np
 
 from springcheck import checks, driver
 from springcheck.api.showing import Verdicts
-from springcheck.api.taking import Step, labels_of, scene_of, spoken, trajectory_of
+from springcheck.api.taking import Step, labels_of, needed, path_of, scene_of, spoken, trajectory_of
 from springcheck.checks import compare as comparing
 from springcheck.errors import MethodError, SpringcheckError
 from springcheck.physics import exact as solutions
@@ -48,7 +48,7 @@ def run(
 
     found = scene_of(scene)
     with spoken(), labels_of(methods, scheme) as named, TemporaryDirectory(prefix="springcheck-") as folder:
-        place = Path(folder, "run.h5") if path is None else Path(path)
+        place = Path(folder, "run.h5") if path is None else path_of(path)
         report = measure.run(
             found, place, methods=named, force=force, thorough=thorough, faults=faults, seed=seed
         )
@@ -74,6 +74,7 @@ def simulate(
     its engine is not installed, or the seed is no such number.
     """
     found = scene_of(scene)
+    needed(print if progress is None else progress, Callable, "progress: a function")
     if seed is not None:
         driver.checked_seed(seed)
     with labels_of(method, scheme) as (label,):
@@ -87,12 +88,8 @@ def judge(scene: Scene | str | Path, trajectory: Trajectory) -> Verdicts:
     """
     found, run = scene_of(scene), trajectory_of(trajectory)
     frames = len(run.t)
-    for name, shape in {
-        "t": (frames,),
-        "q": (frames, found.n),
-        "p": (frames, found.n),
-        "energy": (frames,),
-    }.items():
+    shapes = {"t": (frames,), "q": (frames, found.n), "p": (frames, found.n), "energy": (frames,)}
+    for name, shape in shapes.items():
         values = getattr(run, name)
         kind = getattr(values, "dtype", None)
         if values is not None and (kind is None or kind.kind != "f"):
@@ -108,18 +105,16 @@ def judge(scene: Scene | str | Path, trajectory: Trajectory) -> Verdicts:
     if run.every < 1 or run.step == 0:
         raise SpringcheckError(f"{run.label}: every = {run.every} by step = {run.step:g} lie no frames apart")
     # trajectories made from arrays get the energies of their states
-    return Verdicts(checks.judge(found, run if run.scene or run.origin else run.with_energies(found)))
+    return Verdicts(checks.judge(found, run if run.scene or run.origin else run.of_scene(found)))
 
 
 def compare(
     scene: Scene | str | Path, trajectories: Mapping[str, Trajectory] | Sequence[Trajectory]
 ) -> Comparison:
     """Largest differences of every pair of trajectories, and from the exact solution where it is known."""
-    several = [trajectories] if isinstance(trajectories, Trajectory) else trajectories
-    if isinstance(several, Mapping):
-        named = {label: trajectory_of(one) for label, one in several.items()}
-    else:
-        named = {trajectory_of(one).label: one for one in several}
+    several: Any = trajectories if isinstance(trajectories, Sequence | Mapping) else [trajectories]
+    each = several.items() if isinstance(several, Mapping) else [(trajectory_of(x).label, x) for x in several]
+    named = {label: trajectory_of(one) for label, one in each}
     if len(named) < max(1, len(several)):
         raise SpringcheckError(
             "compare needs trajectories of unlike labels, or a dict of them by other names"
@@ -152,7 +147,7 @@ def identify(
 
     if isinstance(found, str | Path):
         stated = {"mass": mass, "stiffness": stiffness, "friction": friction, "step": step}
-        return {one.label: files.identify_states(one, **stated) for one in files.read(Path(found))}
+        return {one.label: files.identify_states(one, **stated) for one in files.read(path_of(found))}
     if callable(found):
         return identify_stepper(found)
     t = found
@@ -191,5 +186,5 @@ def read(path: str | Path) -> dict[str, Trajectory]:
     """The trajectories of a store by label.  StoreError where it cannot be read."""
     from springcheck.studies import keeper
 
-    scene = keeper.stored_scene(Path(path))
+    scene = keeper.stored_scene(path_of(path))
     return {label: replace(one, scene=scene) for label, one in keeper.read(path).items()}

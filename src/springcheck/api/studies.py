@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from springcheck.api.showing import Said, Shelf
-from springcheck.api.taking import Step, scene_of, spoken, taken
+from springcheck.api.taking import Step, needed, path_of, scene_of, spoken, taken
 from springcheck.errors import SpringcheckError
 from springcheck.physics import scenefile
 from springcheck.physics.arrays import reals
@@ -36,7 +36,7 @@ def precision(
     from springcheck.studies.precision import measure
 
     found = scene_of(scene)
-    with taken(methods, force, workers) as (named, how):
+    with taken(methods, force, workers, path) as (named, how):
         if not (isinstance(budget, Real) and 0 < budget < math.inf):
             raise SpringcheckError(f"budget={budget}: a number of seconds above 0 is needed")
         from springcheck.studies.choose import choose
@@ -53,7 +53,7 @@ def stability(
     and the largest step [T] on this scene."""
     from springcheck.studies.stability import measure
 
-    with taken(methods, force, workers) as (named, how):
+    with taken(methods, force, workers, path) as (named, how):
         return measure.record(scene_of(scene), path, named, **how)
 
 
@@ -67,7 +67,7 @@ def extremes(
     """
     from springcheck.studies.extremes import measure
 
-    with taken(methods, force, workers) as (named, how):
+    with taken(methods, force, workers, path) as (named, how):
         return measure.record(path, named, quick=quick, **how)
 
 
@@ -75,7 +75,7 @@ def faults(*, path: str | Path | None = None, force: bool = False, workers: int 
     """Engines broken on purpose: which checks reject each, and their detection limits.  It takes minutes."""
     from springcheck.studies.faults import measure
 
-    with taken((), force, workers) as (_, how):
+    with taken((), force, workers, path) as (_, how):
         return measure.record(path, **how)
 
 
@@ -90,7 +90,7 @@ def census(
     """
     from springcheck.studies.census import measure
 
-    with taken(methods, force, workers) as (named, how):
+    with taken(methods, force, workers, path) as (named, how):
         return measure.record(path, named, thermostats=thermostats, **how)
 
 
@@ -101,7 +101,7 @@ def sampling(
     """How well thermostats sample a spring: temperatures, precision and limits, each beside its law."""
     from springcheck.studies.sampling import measure
 
-    with taken(methods, force, workers) as (named, how):
+    with taken(methods, force, workers, path) as (named, how):
         return measure.record(path, named, **how)
 
 
@@ -120,12 +120,13 @@ def ensemble(
     from springcheck.studies.ensemble.vary import plan
 
     found = scene_of(scene)
+    needed(vary, Mapping, "vary: a dict of fields and values")
     several = {x: y if isinstance(y, str) else reals("vary", **{x: y})[0].ravel() for x, y in vary.items()}
     given = [
         f"{field}={values if isinstance(values, str) else ','.join(map(repr, values.tolist()))}"
         for field, values in several.items()
     ]
-    with taken(methods, force, workers) as (named, how):
+    with taken(methods, force, workers, path) as (named, how):
         text = found.to_toml() if isinstance(scene, Scene) else scenefile.text_of(scene)
         cells = plan(given, samples, seed, text=text)
         return measure.record(found, cells, path, named, **how)
@@ -143,7 +144,7 @@ def explain(word: str) -> Said:
     """Explain a check, scheme, method, fault, finding or term.  SpringcheckError for an unknown word."""
     from springcheck.cli import explain as explaining
 
-    return Said("\n".join(explaining.lines(word)))
+    return Said("\n".join(explaining.lines(needed(word, str, "a word"))))
 
 
 def report(path: str | Path, output: str | Path | None = None) -> Path:
@@ -154,7 +155,7 @@ def report(path: str | Path, output: str | Path | None = None) -> Path:
     """
     from springcheck.cli import page
 
-    into = Path(output or f"{Path(path).stem}.html")
+    into = path_of(f"{path_of(path).stem}.html" if output is None else output)
     with spoken():
         page.write(page.gather(Path(path)), into)
     return into

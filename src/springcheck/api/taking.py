@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from numbers import Integral
+from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -55,10 +56,12 @@ def spoken() -> Iterator[None]:
 
 
 @contextmanager
-def taken(methods: Any, force: bool, workers: int) -> Iterator[tuple[list[str], How]]:
+def taken(methods: Any, force: bool, workers: int, path: Any = None) -> Iterator[tuple[list[str], How]]:
     """Labels of these methods for a study, and its `How`; functions of yours are measured by this process."""
     from springcheck.studies.team import MOST_PROCESSES, Processes
 
+    if path is not None:
+        path_of(path)
     if not (isinstance(workers, Integral) and 1 <= workers <= MOST_PROCESSES):
         raise SpringcheckError(
             f"workers={workers!r}: a number of processes from 1 to {MOST_PROCESSES} is needed"
@@ -73,17 +76,22 @@ def taken(methods: Any, force: bool, workers: int) -> Iterator[tuple[list[str], 
 
 def scene_of(scene: Scene | str | Path) -> Scene:
     """The scene itself, or the one of this name or path.  SpringcheckError for anything else."""
-    if isinstance(scene, Scene):
-        return scene
-    if isinstance(scene, str | Path):
-        return scenefile.load_scene(scene)
-    raise SpringcheckError(f"a Scene, or the name or path of one, is needed, not {type(scene).__name__}")
+    return scene if isinstance(scene, Scene) else scenefile.load_scene(scene)
 
 
 def trajectory_of(found: Any) -> Trajectory:
     """The argument, if it is a trajectory.  SpringcheckError for anything else."""
-    if isinstance(found, Trajectory):
-        return found
-    raise SpringcheckError(
-        f"a Trajectory is needed, not {type(found).__name__}: simulate gives one, read many"
-    )
+    return needed(found, Trajectory, "a Trajectory")  # type: ignore[no-any-return]
+
+
+def path_of(given: Any) -> Path:
+    """The path of a file; "" is none.  SpringcheckError for anything else."""
+    named = given if not isinstance(given, str) or given else None
+    return Path(needed(named, str | PathLike, "the path of a file"))
+
+
+def needed(given: Any, kind: Any, what: str) -> Any:
+    """The argument, if it is of this kind.  SpringcheckError for anything else."""
+    if isinstance(given, kind):
+        return given
+    raise SpringcheckError(f"{what} is needed, not {type(given).__name__}")

@@ -62,11 +62,10 @@ def _of_rods(case: Case) -> str:
     ways = rods.ways(q)
     if np.all(np.sqrt(rods.dot(moved, moved)) <= allowed) or along(ways):
         return ""
-    title = case.scheme.title
     if along(rods.ways(loose)):
         return (
             "SHAKE pushes the ends of a rod along it as it lies after the drift, where "
-            f"{title} takes it as it lay before"
+            f"{case.scheme.title} takes it as it lay before"
         )
     if along(np.concatenate([ways[:1], ways[:-1]])):
         return "SHAKE pushes the ends of a rod along it as it lay a step before"

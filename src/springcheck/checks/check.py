@@ -132,15 +132,13 @@ def check(
         )
 
     def made(judge: Judge) -> Check:
+        sentence = " ".join((judge.__doc__ or "").partition("\n\n")[0].split()).partition(". ")[0]
         return Check(
             name=judge.__name__.replace("_", "-"),
             short=short,
             family=family,
             requires=frozenset(requires),
-            sentence=" ".join((judge.__doc__ or "").partition("\n\n")[0].split())
-            .partition(". ")[0]
-            .rstrip(".")
-            + ".",
+            sentence=sentence.rstrip(".") + ".",
             judge=judge,
             telling=family not in ("record", "repeat") if telling is None else telling,
         )

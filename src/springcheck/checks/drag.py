@@ -33,8 +33,7 @@ def drag(case: Case, told: NDArray[np.bool_]) -> tuple[float, float, str] | None
     """Sum of the residuals along the momenta, in allowances without rebuilt velocities, its bound, and both
     in words, for the particle farthest off; None where velocities are not rebuilt, or steps are few."""
     run, ahead = case.trajectory, case.ahead
-    rebuilds = run.rebuilds_velocity and not run.arithmetic.keeps_displacement
-    rebuilds = rebuilds and case.law.has("explicit")
+    rebuilds = run.rebuilds_velocity and not run.arithmetic.keeps_displacement and case.law.has("explicit")
     if not rebuilds or ahead is None or np.count_nonzero(told) < BLOCKS * FEWEST_STEPS:
         return None
     plain = Case(trajectory=replace(run, rebuilds_velocity=False), scene=case.scene).ahead

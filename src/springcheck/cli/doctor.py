@@ -84,8 +84,7 @@ def _said(data: dict[str, Any]) -> Iterator[str]:
     yield f"long double has {wide['bits']} bits of mantissa: {wide['means']}"
     here = [f"{name} {found}" for name, found in data["libraries"].items() if found]
     yield f"libraries: {', '.join(here)}"
-    missing = [name for name, found in data["libraries"].items() if not found]
-    if missing:
+    if missing := [name for name, found in data["libraries"].items() if not found]:
         yield f"not here, and not needed: {', '.join(missing)}"
     good = [one for one in data["engines"] if one["problem"] is None]
     yield f"{len(good)} of {len(data['engines'])} engines can be used"

@@ -8,9 +8,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from springcheck.engines.bonds import walls
+from springcheck.engines.bonds import walls, within
 from springcheck.engines.contract import Label, Method, Stopped
-from springcheck.errors import MethodError
 from springcheck.physics.arrays import Arithmetic, Floats
 from springcheck.physics.scene import Scene
 
@@ -65,12 +64,7 @@ class Bodies(ABC):
         if not ours:
             sizes += [(max(least**0.5, self.shortest), "joint's length", scene.system.far, most**0.5)]
             sizes += [(0.0, "stiffness", k, most) for _, k, _ in walls(scene, label)]
-        for lowest, what, size, highest in sizes:
-            if not lowest <= size <= highest:
-                raise MethodError(
-                    f"{label}: a {what} of {size:.3g} is outside what it computes with, {lowest:.3g} to "
-                    f"{highest:.3g}; the scene in other units, its numbers nearer to 1, is inside"
-                )
+        within(label, sizes)
 
     @abstractmethod
     def begin(self, label: Label, step: float) -> None:

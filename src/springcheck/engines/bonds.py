@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import TypeAlias
 
 import numpy as np
@@ -124,6 +124,17 @@ def without_push(rods: Rods, q: Floats, p: Floats, reach: Floats, row: int) -> F
             row, "no push along its rods leads to the next step, and momenta have lost their digits"
         )
     return np.asarray(projected, np.float64)
+
+
+@np.errstate(over="ignore")
+def within(label: Label, sizes: Iterable[tuple[float, str, float, float]]) -> None:
+    """MethodError where a number (least, its name, number, most) is none that an engine computes with."""
+    for lowest, what, size, highest in sizes:
+        if not lowest <= size <= highest:
+            raise MethodError(
+                f"{label}: a {what} of {size:.3g} is outside what it computes with, {lowest:.3g} to "
+                f"{highest:.3g}; the scene in other units, its numbers nearer to 1, is inside"
+            )
 
 
 def cells(scene: Scene, origins: Floats) -> Floats:

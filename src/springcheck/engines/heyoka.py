@@ -19,7 +19,6 @@ from springcheck.schemes import solver
 SMALLEST_TOLERANCE = float(np.finfo(np.float64).eps)
 """heyoka takes no tolerance below the spacing of double precision at 1."""
 
-
 MOST_PARTICLES = 200
 """Compiling takes a time that grows faster than the number of equations."""
 
@@ -64,10 +63,9 @@ class _Series:
         v = heyoka.make_vars(*(f"v{i}" for i in range(scene.n)))
         q, v = (x if isinstance(x, list) else [x] for x in (q, v))
         force = _forces(scene, heyoka, q, v)
-        moved = [(x, y) for x, y in zip(q, v, strict=True)]
         pushed = [(y, f / float(m)) for y, f, m in zip(v, force, scene.m, strict=True)]
         self._integrator = heyoka.taylor_adaptive(
-            moved + pushed,
+            [*zip(q, v, strict=True), *pushed],
             state=np.concatenate([scene.q, scene.p / scene.m]).tolist(),
             tol=max(scene.tolerance, SMALLEST_TOLERANCE),
         )

@@ -28,7 +28,7 @@ from springcheck.engines.contract import (
 from springcheck.physics.arrays import Floats
 from springcheck.physics.driven import timed
 from springcheck.physics.scene import Scene
-from springcheck.schemes import Scheme, solver
+from springcheck.schemes import solver
 
 SOLVERS = {"rk45": "RK45", "dop853": "DOP853", "radau": "Radau", "bdf": "BDF", "lsoda": "LSODA"}
 
@@ -89,19 +89,16 @@ class _Solver:
                 self._done += every
 
 
-def _scheme(name: str, title: str, source: str) -> Scheme:
-    return solver(f"scipy-{name}", title, source)
-
-
 SCHEMES = (
-    _scheme("rk45", "Dormand-Prince 5(4), adaptive", "Dormand & Prince, J. Comput. Appl. Math. 6 (1980) 19"),
-    _scheme("dop853", "DOP853, order 8, adaptive", "Hairer, Norsett & Wanner, Solving ODEs I, II.5"),
-    _scheme("radau", "Radau IIA, order 5, adaptive", "Hairer & Wanner, Solving ODEs II, IV.8"),
-    _scheme(
-        "bdf", "quasi-constant step BDF, orders 1-5", "Shampine & Reichelt, SIAM J. Sci. Comput. 18 (1997) 1"
-    ),
-    _scheme("lsoda", "LSODA, Adams and BDF by turns", "Petzold, SIAM J. Sci. Stat. Comput. 4 (1983) 136"),
-)
+    solver("scipy-rk45", "Dormand-Prince 5(4), adaptive",
+           "Dormand & Prince, J. Comput. Appl. Math. 6 (1980) 19"),
+    solver("scipy-dop853", "DOP853, order 8, adaptive", "Hairer, Norsett & Wanner, Solving ODEs I, II.5"),
+    solver("scipy-radau", "Radau IIA, order 5, adaptive", "Hairer & Wanner, Solving ODEs II, IV.8"),
+    solver("scipy-bdf", "quasi-constant step BDF, orders 1-5",
+           "Shampine & Reichelt, SIAM J. Sci. Comput. 18 (1997) 1"),
+    solver("scipy-lsoda", "LSODA, Adams and BDF by turns",
+           "Petzold, SIAM J. Sci. Stat. Comput. 4 (1983) 136"),
+)  # fmt: skip
 
 ENGINE = Engine(
     name="scipy",
@@ -110,12 +107,8 @@ ENGINE = Engine(
     methods=named(
         *(
             by_name(
-                name,
-                f"scipy-{name}",
-                f"scipy.integrate.{solver}, as solve_ivp steps it",
-                EVERY_FORCE | DRIVEN | FIELD | BRAKES,
-                adaptive=True,
-                kinds=EVERY_KIND,
+                name, f"scipy-{name}", f"scipy.integrate.{solver}, as solve_ivp steps it",
+                EVERY_FORCE | DRIVEN | FIELD | BRAKES, adaptive=True, kinds=EVERY_KIND,
             )
             for name, solver in SOLVERS.items()
         )
@@ -124,4 +117,4 @@ ENGINE = Engine(
     start=_Solver,
     version=version_of("scipy"),
     any_axis=True,
-)
+)  # fmt: skip

@@ -10,8 +10,12 @@ from springcheck.engines.contract import Label
 from springcheck.errors import MethodError
 from springcheck.physics.scene import Scene
 
-MOST_RADIANS = 3e7
-"""Between two outputs.  Each takes three internal steps or more: 1e8 of them, an hour at 40 us."""
+OF_CVODE, OF_DOP853 = (3.0, 40e-6), (1 / 6, 250e-6)
+"""Internal steps a radian, at least, and seconds of one: of CVODE, and of DOP853 where friction bounds steps:
+its limit on the negative real axis is 6.  Steps of RK45 are half as long, and take half of the time."""
+
+MOST_SECONDS, MOST_RADIANS = 3600.0, 3e7
+"""Between two outputs: an hour, and the radians of CVODE in it."""
 
 
 def turned(scene: Scene, step: float) -> float:
@@ -47,18 +51,17 @@ def driven(scene: Scene, step: float) -> float:
 
 
 def refuse_hours(scene: Scene, label: Label, step: float, *, explicit: bool = False) -> None:
-    """MethodError where a solver would not come to its first output in an hour.
+    """MethodError where a solver would not come to its first output in `MOST_SECONDS`.
 
     The steps of an `explicit` one stay as short as the fastest rate, though nothing moves as fast any more.
     """
-    found = [(followed(scene, step), "motion", 3.0), (driven(scene, step), "drive", 3.0)]
+    found = [(followed(scene, step), "motion", *OF_CVODE), (driven(scene, step), "drive", *OF_CVODE)]
     if explicit and np.isfinite(fastest := turned(scene, step)):
-        # the limit of DOP853 on the negative real axis is 6, that of RK45 3
-        found.append((fastest, "fastest rate, which bounds the steps of an explicit solver,", 1 / 6))
-    radians, what, each = max(found)
-    if radians > MOST_RADIANS:
+        found.append((fastest, "fastest rate, which bounds the steps of an explicit solver,", *OF_DOP853))
+    radians, what, each, seconds = max(found, key=lambda one: one[0] * one[2] * one[3])
+    if (took := radians * each * seconds) > MOST_SECONDS:
         raise MethodError(
             f"{label}: the {what} turns through {radians:.3g} radians between two frames, which takes "
-            f"{each * radians:.0e} internal steps or more, hours and longer; {MOST_RADIANS:.0e} radians are "
-            "the most, take shorter steps or record more frames"
+            f"{each * radians:.0e} internal steps or more, some {took / 3600:.2g} hours; one is the "
+            "most, take shorter steps or record more frames"
         )

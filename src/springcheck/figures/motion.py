@@ -40,11 +40,8 @@ def smooth(scene: Scene, first: float, last: float, points: int = SMOOTH) -> Mot
     close = begin * finer + np.geomspace(1, CLOSE * max(1, even[1] - even[0]), min(CLOSE * 10, points))
     steps = np.unique(np.rint(np.concatenate([even, close[close < even[-1]]])).astype(np.int64))
     q, p = exact.true_motion(scene, steps, scene.step / finer)
-    return (
-        np.asarray(steps * (scene.step / finer), np.float64),
-        np.asarray(q, np.float64),
-        np.asarray(p, np.float64),
-    )
+    t, where, speed = (np.asarray(x, np.float64) for x in (steps * (scene.step / finer), q, p))
+    return t, where, speed
 
 
 BOUNDS = 17

@@ -167,14 +167,12 @@ class Runs:
         self, name: str, charts: Sequence[Chart], said: str, size: tuple[float, float], *, columns: int = 1
     ) -> Bank:
         """The charts of a figure, under what is said of them."""
+        # of a long run every so many frames, between which it may be further off
+        few = "at most" in said and any(run.every > self.scene.every for run in self.every)
         return Bank(
-            name=name,
-            title="Methods drawn",
-            charts=charts,
-            heading=f"{self.scene.title}: {self.wrong}{said}",
-            size=size,
-            columns=columns,
-        )
+            name=name, title="Methods drawn", charts=charts, size=size, columns=columns,
+            heading=f"{self.scene.title}: {self.wrong}{said}{' (of the frames drawn)' * few}",
+        )  # fmt: skip
 
     def leaving(self, when: Callable[[Trajectory], int | None]) -> str:
         """Which schemes leave the axes for good, and at which frame, None where they do not."""

@@ -224,7 +224,7 @@ def positions(runs: Runs, shown: Sequence[View], truth: Motion | None, whole: Ru
     off = _off(whole, shown[0]) if runs.scene.bath is None else bath
     said = _heading(f"{shown[0].what}{_of(runs, shown)}{runs.part}", off) + parts
     size = (7.6 if len(spans) == 1 else 5.0, 3.8 if len(shown) == 1 else 1.9)
-    return runs.bank("position", charts, said, size, columns=len(spans))
+    return whole.bank("position", charts, said, size, columns=len(spans))
 
 
 def _off(runs: Runs, view: View) -> str:

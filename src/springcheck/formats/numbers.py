@@ -14,6 +14,7 @@ import numpy as np
 from springcheck.errors import StoreError, nearest, plain
 from springcheck.formats.columns import States, kind, kinds, listed, named, split
 from springcheck.formats.lines import MOST_NUMBERS
+from springcheck.physics.arrays import roundoff
 
 LARGEST = 16 * MOST_NUMBERS
 """Bytes of all arrays of a file, unpacked."""
@@ -36,11 +37,6 @@ def _load(path: Path) -> Any:
     raise StoreError(
         f"{path}: {found / 1e6:.0f} MB of arrays, {most / 1e6:.0f} can be read: keep fewer frames"
     )
-
-
-def _roundoff(arrays: Sequence[Any]) -> float:
-    widths = [np.finfo(a.dtype).eps / 2 for a in arrays if np.issubdtype(a.dtype, np.floating)]
-    return float(max([2.0**-53, *widths]))
 
 
 def read_npz(path: Path, columns: list[str], step: float | None) -> States:
@@ -91,7 +87,7 @@ def states_of(path: Path, arrays: Mapping[str, Any], names: Sequence[str] = ()) 
         for name, a in numbers.items()
         if kind(name) == "m" and name not in columns
     ]
-    states = split(path, columns, _roundoff([numbers[name] for name in columns]))
+    states = split(path, columns, roundoff(*(numbers[name] for name in columns)))
     return replace(states, mass=masses[0]) if masses else states
 
 
@@ -147,4 +143,4 @@ def of_table(path: Path, found: Any, names: Sequence[str]) -> States:
     """The states in the unnamed columns (f, c) of an array, named by `names`."""
     if not names:
         raise StoreError(f"{path}: its columns have no names; give all {found.shape[1]}, as --columns t,q,v")
-    return split(path, named(path, np.asarray(found, np.float64), names), _roundoff([found]))
+    return split(path, named(path, np.asarray(found, np.float64), names), roundoff(found))

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from springcheck.errors import SceneError
 from springcheck.physics import graph, memory
-from springcheck.physics.arrays import Floats
+from springcheck.physics.arrays import Floats, reals
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Damping, Spring, Term, WallSpring
 
@@ -72,19 +72,16 @@ def chain(
         raise SceneError(f"masses = {masses}: a whole number >= 1 is needed")
     memory.need(masses * SCENE_BYTES, f"{masses} masses", "a shorter chain has the same waves")
     _, m, q, p = _together(masses=np.zeros(masses), m=m, q=q, p=p)
-    links, walls = _between(masses, np.asarray(k, np.float64))
-    if not (len(waves) or np.any(q) or np.any(p)):
+    links, walls = _between(masses, reals("chain", k=k)[0])
+    try:
+        waves = [(mode, float(amplitude)) for mode, amplitude in waves]
+    except (TypeError, ValueError):
+        raise SceneError(f"waves = {waves!r}: pairs of a mode and an amplitude are needed") from None
+    if not (waves or np.any(q) or np.any(p)):
         waves = [(1, 1.0)]
     words = {"name": "chain", "title": f"Chain of {masses:,} masses between two walls", **rest}
-    return Scene(
-        m=m,
-        q=q + graph.standing(masses, waves),
-        p=p,
-        terms=(walls, links),
-        step=step,
-        steps=steps,
-        **words,
-    )
+    words |= {"q": q + graph.standing(masses, waves), "p": p, "step": step, "steps": steps}
+    return Scene(m=m, terms=(walls, links), **words)
 
 
 def cold(scene: Scene, friction: float) -> Scene:

@@ -22,13 +22,8 @@ def is_uniform_chain(system: Any) -> bool:
         return False
     wall, link = walls[0], links[0]
     row = np.arange(len(m) - 1)
-    return bool(
-        np.array_equal(wall.i, [0, len(m) - 1])
-        and np.array_equal(link.a, row)
-        and np.array_equal(link.b, row + 1)
-        and np.all(wall.k == wall.k[0])
-        and np.all(link.k == wall.k[0])
-    )
+    joined = np.array_equal(wall.i, [0, len(m) - 1]) and np.array_equal([link.a, link.b], [row, row + 1])
+    return bool(joined and np.all(np.append(wall.k, link.k) == wall.k[0]))
 
 
 def free_groups(system: Any) -> tuple[Integers, ...]:
@@ -83,22 +78,20 @@ def rest_positions(n: int, terms: Sequence[Term]) -> Floats | None:
         for a, b, rest in zip(term.a.tolist(), term.b.tolist(), term.rest.tolist(), strict=True):
             neighbours.setdefault(a, []).append((b, rest))
             neighbours.setdefault(b, []).append((a, -rest))
-    found = np.zeros(n)
-    seen: set[int] = set()
+    placed: dict[int, float] = {}
     for root in sorted(neighbours):
-        if root in seen:
-            continue
-        seen.add(root)
-        front = [root]
+        front = [] if root in placed else [root]
+        placed.setdefault(root, 0.0)
         while front:
             a = front.pop()
             for b, rest in neighbours[a]:
-                if b not in seen:
-                    seen.add(b)
-                    found[b] = found[a] + rest
+                if b not in placed:
+                    placed[b] = placed[a] + rest
                     front.append(b)
-                elif found[b] != found[a] + rest and found[a] != found[b] - rest:
+                elif placed[b] != placed[a] + rest and placed[a] != placed[b] - rest:
                     return None
+    found = np.zeros(n)
+    found[list(placed)] = list(placed.values())
     return found
 
 
@@ -119,11 +112,8 @@ def alike(system: Any) -> tuple[tuple[Integers, Integers], ...]:
     their plane.
     """
     places, parts = system.scene.places, system.terms
-    if not all(
-        term.is_linear or term.kind == "constraint" or isinstance(term, RadialSpring) for term in parts
-    ):
-        return ()
-    if places is None or any(term.origin and np.any(getattr(term, term.origin)) for term in parts):
+    kept = (x.is_linear or x.kind == "constraint" or isinstance(x, RadialSpring) for x in parts)
+    if places is None or not all(kept) or any(x.origin and np.any(getattr(x, x.origin)) for x in parts):
         return ()
     found = []
     for a, b in ((0, 1), (1, 2), (0, 2)):

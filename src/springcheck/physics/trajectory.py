@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal, Self
 import numpy as np
 
 from springcheck.errors import SpringcheckError
-from springcheck.physics.arrays import Arithmetic, Extended, Floats, reals
+from springcheck.physics.arrays import AS_WRITTEN, Arithmetic, Extended, Floats, reals, roundoff
 
 if TYPE_CHECKING:
     from springcheck.physics.scene import Scene
@@ -84,7 +84,8 @@ class Trajectory:
 
         `every` is the number of steps between frames, `mass` (n,) or one for all [M] converts v to p; a
         `scene` gives masses, step, `every`, the energies of these states, and the reference for `judge` and
-        `error`. SpringcheckError where the arrays are inconsistent.
+        `error`. Arrays of single precision are judged to their digits. SpringcheckError where the arrays are
+        inconsistent.
         """
         if p is None and v is None:
             raise SpringcheckError(f"{label}: momenta p or velocities v= are needed beside t and q")
@@ -110,16 +111,26 @@ class Trajectory:
         steps = (len(time) - 1) * int(every)
         step = scene.step if scene is not None else float(time[-1] - time[0]) / steps
         more: Any = {"scene": scene, "outcome": Outcome(status="complete", step=steps)}
+        unit = roundoff(q, *(x for x in (v, mass) if x is not None) if p is None else (p,))
+        if unit > Arithmetic().state:
+            more["arithmetic"] = Arithmetic(name=AS_WRITTEN, state=unit)
         made = cls(
             label=label, scheme=scheme, t=time, q=where, p=speed * m, step=step, every=int(every), **more
         )
-        return made if scene is None else made.with_energies(scene)
+        return made if scene is None else made.of_scene(scene)
 
-    def with_energies(self, scene: Scene) -> Self:
-        """Copy with the energies of its states, where they are missing and this scene records them."""
-        if self.energy is not None or "energy" not in scene.quantities:
-            return self
-        return replace(self, energy=np.asarray(scene.system.energy(self.q, self.p), np.float64))
+    def of_scene(self, scene: Scene) -> Self:
+        """The same with the energies of its states, where this scene asks for them, and with times in single
+        precision as the whole steps of it that they are."""
+        more: dict[str, Any] = {}
+        if self.energy is None and "energy" in scene.quantities:
+            more["energy"] = np.asarray(scene.system.energy(self.q, self.p), np.float64)
+        t = np.rint(self.t / scene.step) * scene.step
+        with np.errstate(over="ignore"):
+            single = t.astype(np.float32)
+        if np.any(self.t != t) and np.array_equal(self.t, single):
+            more |= {"t": t, "step": scene.step}
+        return replace(self, **more)
 
     @property
     def v(self) -> Floats:
@@ -212,11 +223,9 @@ class Trajectory:
     def to_dataframe(self) -> Any:
         """A pandas DataFrame: a row for each frame, columns q0, p0, q1 ..., energy if recorded; index t."""
         pandas = library("pandas")
-        columns: dict[str, Floats] = {}
-        for i in range(self.q.shape[1]):
-            columns |= {f"q{i}": self.q[:, i], f"p{i}": self.p[:, i]}
-        if self.energy is not None:
-            columns["energy"] = self.energy
+        n = self.q.shape[1]
+        columns = {f"{name}{i}": getattr(self, name)[:, i] for i in range(n) for name in "qp"}
+        columns |= {} if self.energy is None else {"energy": self.energy}
         return pandas.DataFrame(columns, index=pandas.Index(self.t, name="t"))
 
     def to_xarray(self) -> Any:
@@ -239,8 +248,7 @@ def html_table(title: str, rows: Iterable[Sequence[str]]) -> str:
 
 
 def _few(values: Floats) -> str:
-    text = ", ".join(f"{x:.6g}" for x in values[:3])
-    return text + (" ..." if len(values) > 3 else "")
+    return ", ".join(f"{x:.6g}" for x in values[:3]) + " ..." * (len(values) > 3)
 
 
 def library(name: str) -> Any:

@@ -63,7 +63,6 @@ def _saddlepoint(value: float, n: int) -> float:
     """Two-sided chance of a mean of n values of the fourth Legendre polynomial at uniform numbers."""
     if not -3 / 7 < value < 1 or n < 8:
         return 1.0 if n < 8 else 0.0
-
     values, parts = _quadrature()
 
     def moments(t: float) -> tuple[float, float, float]:
@@ -191,9 +190,11 @@ def normal_scores(x: Any) -> Floats:
 
 def together(x: Floats) -> float:
     """Chance of the correlations of x (f,) over `FACTOR_LAGS` steps together (Ljung & Box, Biometrika 65
-    (1978) 297)."""
+    (1978) 297); 1 of a few."""
     from scipy.special import gammaincc
 
     n, size = len(x), float(x @ x)
+    if n < 4 * FACTOR_LAGS:
+        return 1.0
     squares = [float(x[j:] @ x[:-j]) ** 2 / (n - j) for j in range(1, FACTOR_LAGS + 1)]
     return float(gammaincc(FACTOR_LAGS / 2, n * (n + 2) * sum(squares) / size**2 / 2)) if size else 0.0

@@ -25,8 +25,8 @@ FEWEST_OF_EACH = 10
 TIMES_LEFT_OVER = 10.0
 """Error allowed for the entries of a map, in units of its mean residual."""
 
-TOGETHER_BY_CHANCE = 1e-9
-"""Chance below which frames with a collision stand together, as a part that moves otherwise does."""
+LEAST_CHANCE = 1e-9
+"""Chance below which collisions stand together, or what they change tells of the next, and are none."""
 
 MOST_A_FRAME = 20
 """Steps from frame to frame at most."""
@@ -49,10 +49,7 @@ def between_collisions(q: Floats, v: Floats, h: float) -> list[Candidate]:
     if not FEWEST_OF_EACH <= np.sum(still) <= n - FEWEST_OF_EACH:
         return []
     spread = (still - share) / np.sqrt(share * (1 - share))
-    # a force that jumps, such as dry friction, changes a momentum by the same again and again: no draw does
-    jumps = np.sort(left[np.abs(left[:, 1]) > TIMES_LEFT_OVER * NO_COLLISION, 1])
-    again = len(jumps) > FEWEST_OF_EACH and np.median(np.diff(jumps)) < NO_COLLISION
-    if again or not chance.neighbours(spread[:, None]) > TOGETHER_BY_CHANCE:
+    if not (chance.neighbours(spread[:, None]) > LEAST_CHANCE and are_drawn(left[~still], known[~still])):
         return []
     entries = np.linalg.lstsq(known[still], after[still], rcond=None)[0]
     off = max(float(np.sqrt(np.mean((known[still] @ entries - after[still]) ** 2))), 2.0**-52)
@@ -67,6 +64,32 @@ def between_collisions(q: Floats, v: Floats, h: float) -> list[Candidate]:
     close = room * (1 / abs(A[0, 1]) + 1 / abs(A[1, 0]))
     A = A * sizes[:, None] / sizes
     return [y for name in names for y in _of_scheme(name, A, h, share, n, float(np.var(v)), close)]
+
+
+def are_drawn(changes: Floats, known: Floats) -> bool:
+    """Whether changes (f, k) are draws, beside what follows from the state (f, 3) before each: no rounding is
+    left of them, and what is left tells nothing of the next."""
+    if len(changes) < FEWEST_OF_EACH:
+        return False
+    rest = changes - known @ np.linalg.lstsq(known, changes, rcond=None)[0]
+    sizes = np.std(rest, axis=0)
+    if not np.max(sizes) > NO_COLLISION:
+        return False
+    for x in (rest / sizes).T[sizes > NO_COLLISION]:
+        one = min(chance.neighbours(x[:, None]), chance.repeats(x[:, None]), chance.together(x))
+        if not one > LEAST_CHANCE:
+            return False
+    return True
+
+
+def is_a_factor(before: Floats, after: Floats) -> bool:
+    """Whether one factor made momenta (f,) of others: kinetic energies are then draws of mean c K + b and
+    variance 2 b**2 + 4 c b K, of whatever sign the factor is (Bussi, Donadio & Parrinello, equation A7)."""
+    K, made = ((x / np.std(after)) ** 2 for x in (before, after))
+    known = np.stack([K, np.ones(len(K))], axis=1)
+    c, b = np.linalg.lstsq(known, made, rcond=None)[0]
+    size = np.sqrt(2 * b * b + 4 * max(c, 0) * max(b, 0) * K)[:, None]
+    return bool(b > 0) and are_drawn(made[:, None] / size, known / size)
 
 
 def _of_scheme(

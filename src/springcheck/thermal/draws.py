@@ -23,7 +23,6 @@ from springcheck.thermal.stepper import Met, Stepper, forces
 PER_ACT, IN_AND_OUT = 6, 4
 """Roundings of a stage at most (a force 4, its product and sum 2), and of the first and last state."""
 
-
 HOTTEST = 1e4
 """Noncentrality of a chi-squared distribution up to which its rank is computed to all digits."""
 
@@ -302,7 +301,7 @@ class _Reader:
             those = np.tensordot(self.directions, draws, axes=1)
             return np.stack(self.stepper(*start, self._force, list(those), hit, end[0]))
 
-        target, none = np.stack(end), at(found)
+        target, none, linear = np.stack(end), at(found), self.scene.system.is_linear
         each = np.stack([at(_unit(u, j, found)) - none for j in range(u)])
         for _ in range(6):
             now = at(found)
@@ -315,9 +314,7 @@ class _Reader:
                 x, y = target - now
                 change = np.stack([d * x - b * y, a * y - c * x]) / (a * d - b * c)
             found = found + change
-            if np.all(np.abs(change) <= 1e-17 * (1 + np.abs(found))) or (
-                self.scene.system.is_linear and _ == 1
-            ):
+            if np.all(np.abs(change) <= 1e-17 * (1 + np.abs(found))) or (linear and _ == 1):
                 break
         of = np.stack(self._allowed(start, np.tensordot(self.directions, found, axes=1)))
         if u == 1:
@@ -333,9 +330,7 @@ class _Reader:
         unseen = ~(self.roundings * np.max(unit, axis=0) <= 1)
         if np.any(unseen):
             # what no draw explains is then at most the largest one
-            of = np.stack(
-                self._allowed(start, np.zeros((self.scheme.draws, *found.shape[1:]), np.longdouble))
-            )
+            of = np.stack(self._allowed(start, np.zeros((self.scheme.draws, *found.shape[1:]))))
             noise = LARGEST_DRAW * np.sum(np.abs(each), axis=0) / self.roundings
             across = np.where(unseen, np.max(np.abs(target - none) / (of + noise), axis=0), across)
         return found, across, unit, unseen

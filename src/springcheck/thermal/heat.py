@@ -84,7 +84,6 @@ class Heat:
     def add(self, piece: Trajectory) -> None:
         """Take a piece into account."""
         scene, first = self._scene, round(float(piece.t[0]) / piece.step)
-        assert scene.bath is not None
         if not self._scheme:
             self._begin(piece)
         # the last frame of a piece is the first of the next

@@ -60,8 +60,7 @@ class Law:
         q, p = np.zeros((2, 2 + r, n), np.longdouble)
         q[0], p[1] = 1, 1
         draws = np.zeros((r, 2 + r, n), np.longdouble)
-        for i in range(r):
-            draws[i, 2 + i] = 1
+        draws[range(r), range(2, 2 + r)] = 1
         stepper = Stepper(
             self.scheme, h=self.h, m=m, rate=self.rate, thermal=self.thermal, width=np.longdouble
         )
@@ -116,9 +115,8 @@ class Law:
         left = np.eye(d * d) - self._moments
         rough, bound = left.astype(np.float64), np.atleast_1d(np.asarray(self.k)) != 0
         # at a limit of stability three roots of a map meet, and are known to the third root of a rounding
-        out = np.where(bound & ~(self.growth > 1 + AT_A_LIMIT), np.nan, np.inf)[:, None, None] * np.ones(
-            (d, d)
-        )
+        none = np.where(bound & ~(self.growth > 1 + AT_A_LIMIT), np.nan, np.inf)
+        out = none[:, None, None] * np.ones((d, d))
         i = np.flatnonzero(np.isfinite(rough).all(axis=(1, 2)))
         i = i[np.linalg.det(rough[i]) != 0]
         inverse = np.linalg.inv(rough[i])
@@ -191,9 +189,8 @@ class Law:
             ((_, _, G),) = self._state
             return np.asarray(G @ G.transpose(0, 2, 1))
         parts = [(chance, A - self._mean, G) for chance, A, G in self._state]
-        each = (
-            c * (D @ self._covariance @ D.transpose(0, 2, 1) + G @ G.transpose(0, 2, 1)) for c, D, G in parts
-        )
+        S = self._covariance
+        each = (c * (D @ S @ D.transpose(0, 2, 1) + G @ G.transpose(0, 2, 1)) for c, D, G in parts)
         return np.asarray(sum(each))
 
     def autocovariance(self, steps: int) -> Floats:
@@ -272,9 +269,8 @@ class Law:
         """
         with np.errstate(all="ignore"):
             n, d = self._mean.shape[:2]
-            one = np.linalg.matrix_power(
-                self._mean * self._scale[:, None, :] / self._scale[:, :, None], every
-            )
+            even = self._mean * self._scale[:, None, :] / self._scale[:, :, None]
+            one = np.linalg.matrix_power(even, every)
             M = np.einsum("nij,nkl->nikjl", one, one).reshape(n, d * d, d * d).astype(np.float64)
             total, by_lag, power, count = np.eye(d * d) + 0 * M, 0 * M, M, 1
             for bit in f"{frames:b}"[1:]:

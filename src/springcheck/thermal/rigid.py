@@ -62,9 +62,7 @@ class _Reader:
         met: list[Met] = []
         self._at(x, met)
         sizes = np.split(np.abs(x), self._scheme.draws, axis=-1)
-        of = one_rounding(
-            self._scene, self._sizer, self._start, sizes, None, self._how, self._rebuilt, met
-        )  # fmt: skip
+        of = one_rounding(self._scene, self._sizer, self._start, sizes, None, self._how, self._rebuilt, met)
         return np.concatenate(of, axis=-1)
 
     def read(self, q: Floats, p: Floats) -> Reading:
@@ -111,8 +109,8 @@ class _Reader:
             assert rods is not None
             one, other = (rods.projected(wide[0][1:-1], root * y) / root for y in (x[1:, :n], x[:-1, n:]))
             unit = np.sum(np.abs(inverse), axis=-1)
-            sizes = (np.sqrt(np.sum(y**2, axis=-1)) for y in (one - other, unit[1:, :n], unit[:-1, n:]))
-            off, *units = sizes
+            sizes = one - other, unit[1:, :n], unit[:-1, n:]
+            off, *units = (np.sqrt(np.sum(y**2, axis=-1)) for y in sizes)
             across = np.maximum(across[1:], (off / sum(units))[:, None])
         basis = V[1] if c else np.concatenate(V, axis=-1)
         turned = np.swapaxes(basis, -1, -2)

@@ -17,7 +17,7 @@ import numpy as np
 from springcheck.physics.arrays import Floats
 from springcheck.thermal import chance
 from springcheck.thermal.catalogue import random_scheme
-from springcheck.thermal.collisions import between_collisions
+from springcheck.thermal.collisions import are_drawn, between_collisions, is_a_factor
 from springcheck.thermal.decays import GJ
 from springcheck.thermal.likelihood import ODDS, Candidate, likely, likely_apart
 
@@ -125,11 +125,9 @@ def identify_thermal(
         digits = misfit < 1e-9 or _is_of_digits(rest[::2])
         # of one draw the position and the momentum leave the same; a joint to what is beside may not show
         several = mixed or (beside is not None and beside.size > 0)
-        return (
-            clear(_of_one(q, v, h, free / free[0], misfit, left[1], even, several))
-            if free[0] and digits
-            else None
-        )
+        if not (free[0] and digits):
+            return None
+        return clear(_of_one(q, v, h, free / free[0], misfit, left[1], even, several))
     jump = (x[2:] - x[:-2]) - 2 * h * sizes[1] / sizes[0] * u[1:-1]
     off = float(np.std(jump))
     # and of what frames two steps apart share none three steps apart do
@@ -201,12 +199,14 @@ def _of_one(
     """Schemes of one draw a step whose null vector this is."""
     _, b, c, d = free
     close = max(1e-9, 100 * misfit)
+    # that combination is 0 of a centre at rest, and both half kicks are -h w**2/2 (q + q') about it
+    centre = float(np.mean(q[1:] + b * v[1:] + c * q[:-1] + d * v[:-1])) / (1 + c or nan)
+    kicks = h / 2 * (q[1:] + q[:-1] - 2 * centre)
 
     def near(value: float, wanted: float) -> bool:
         return bool(abs(value - wanted) <= close * max(abs(wanted), abs(d), h))
 
-    found: list[Candidate] = []
-    added = False
+    found, added = list[Candidate](), False
     if near(b, d) and near(c, -1):
         half, (decay, slow, error) = near(b, -h / 2), _decay(q, v)
         turn = 4 * (1 + h / (2 * b))
@@ -215,8 +215,7 @@ def _of_one(
         if half:
             # without a spring these are all the same
             more = ("baoab", "baoa") if slow < error else ("baoab",) if blurred else ()
-            names = ("aboba", "aoboa", *more)
-            found = likely(names, q, v, h)
+            found = likely(("aboba", "aoboa", *more), q, v, h)
         if -b > h / 2 and not half and decay + error > 0 and abs(turn - slow) <= 4 * error:
             found = likely(("baoab",), q, v, h, turn=turn)
         if not half or close > 1e-6 or slow < error:
@@ -233,9 +232,15 @@ def _of_one(
         w = float(np.sqrt(2 * (1 + 1 / c)) / h)
         known: dict[str, Any] = {"omega": w, "omega_error": 0.0}
         # some steps have no collision, unless these are many; a factor acts in every step, if little
-        still = np.abs(v[1:] - (v[:-1] - h * w * w / 2 * (q[1:] + q[:-1] - 2 * np.mean(q))))
-        often = close > COARSE or float(np.quantile(still, 0.05)) > close * float(np.std(v))
-        names = ("andersen", "andersen-after-kick", *(("bussi", "bussi-unsigned") if often else ()))
+        drawn = v[1:] + w * w * kicks
+        changes = (drawn - v[:-1]) / np.std(v)
+        often = close > COARSE or float(np.quantile(np.abs(changes), 0.05)) > close
+        struck, state = np.abs(changes) > close, np.stack([q[:-1], v[:-1], np.ones(len(v) - 1)], axis=1)
+        collides = are_drawn(changes[struck, None], state[struck])
+        names: tuple[str, ...] = ("andersen", "andersen-after-kick") if collides else ()
+        names += ("bussi", "bussi-unsigned") if often and is_a_factor(v[:-1], drawn) else ()
+        if not names:
+            return None
         found = [Candidate(scheme=name, **known) for name in names]
         left = np.empty(0)
     elif abs(b) <= close * h and near(d, -h) and -1 < c < 1:
@@ -243,6 +248,8 @@ def _of_one(
         added = even and _decay(q, v)[0] >= 1 - UNIT_ROOT / len(q) and _is_white(left)
         known = {"omega": float(np.sqrt(2 * (1 + c)) / h), "omega_error": 0.0}
         found = [] if added else [Candidate(scheme="bussi-after", **known)]
+        if found and not is_a_factor(v[:-1] - known["omega"] ** 2 * kicks, v[1:]):
+            return None
         left = left if added else np.empty(0)
     elif near(c, -1) and abs(d) <= close * h:
         roots = {n: (lambda x, c2=c2: np.sqrt((1 - c2(x)) / x)) for n, c2 in GJ.items()}
@@ -261,17 +268,12 @@ def _of_one(
                 found = likely((one,), q, v, h) if one in names else []
                 found += [Candidate(scheme=name) for name in names if name != one]
         elif -b < h and _is_correlated(left):
-            rates = {n: _rate(root, -b / h) for n, root in roots.items()}
-            found = [
-                Candidate(scheme=f"gj-{n}-half", friction=x / h, friction_error=0.0)
-                for n, x in rates.items()
-                if x
-            ]
+            rates = {f"gj-{n}-half": _rate(root, -b / h) for n, root in roots.items()}
+            found = [Candidate(scheme=n, friction=x / h, friction_error=0.0) for n, x in rates.items() if x]
             left = np.empty(0)
     if len(left) and not _is_white(left):
         return None
-    now_and_then = any(x.scheme == "andersen-leapfrog" for x in found)
-    if len(left) and not now_and_then and not even:
+    if len(left) and not even and not any(x.scheme == "andersen-leapfrog" for x in found):
         return None
     if not found and float(np.median(np.abs(left))) < SPARSE:
         # few steps are off, and all others are not
@@ -354,8 +356,7 @@ def _of_no_memory(q: Floats, v: Floats, close: float) -> tuple[str, ...]:
         if np.any(together < 1e-6 * np.abs(slopes[2:-2])):
             return ("andersen-leapfrog",)
     entries, _, errors = _regressed(np.stack([v[:-1], q[:-1], np.ones(len(v) - 1)], axis=1), v[1:])
-    memory = entries[0] / errors[0]
-    if abs(memory) > 5:
+    if abs(entries[0] / errors[0]) > 5:
         # digits may hide that five steps of leapfrog have one slope, and few frames that a draw is carried on
         return ("gj-iii-half", *(() if close < 1e-6 else ("andersen-leapfrog",)))
     # a collision in every step leaves what Brownian motion does

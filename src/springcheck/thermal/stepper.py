@@ -80,16 +80,9 @@ class Stepper:
             self._acts.append((kind, c * sizes.get(kind, 1), noise, number))
 
     def __call__(
-        self,
-        q: Reals,
-        p: Reals,
-        force: Any,
-        draws: Sequence[Any],
-        hit: Any = None,
-        end: Reals | None = None,
-        met: list[Met] | None = None,
-        loose: float = 0.0,
-    ) -> tuple[Reals, Reals]:
+        self, q: Reals, p: Reals, force: Any, draws: Sequence[Any], hit: Any = None, end: Reals | None = None,
+        met: list[Met] | None = None, loose: float = 0.0,
+    ) -> tuple[Reals, Reals]:  # fmt: skip
         """One step from (q, p), each (..., n), by what `forces` gives.
 
         `draws` are `scheme.draws` arrays of the shape of q; `hit` is the mask of collisions, or the factor
@@ -102,9 +95,10 @@ class Stepper:
         for i, (kind, c, noise, number) in enumerate(self._acts):
             if kind == "drift":
                 q = q + c * (p / m)
-            elif kind in ("kick", "slow", "fast"):
-                push = force if kind == "kick" else force[kind]
-                last = push(q if end is None or i < self._moved else end, np.zeros_like(p))
+            elif kind in ("kick", "slow", "fast", "held"):
+                if kind != "held":
+                    push = force if kind == "kick" else force[kind]
+                    last = push(q if end is None or i < self._moved else end, np.zeros_like(p))
                 p = p + (c * h) * last
             elif kind == "exchange":
                 p = c * p + noise * draws[number]
@@ -116,14 +110,11 @@ class Stepper:
                 p = p / (np.abs(1 + c) if self._sign > 0 else 1 + c)
             elif kind == "jump":
                 q = q + c * draws[number]
-            elif kind == "held":
-                p = p + (c * h) * last
             elif kind == "creep":
                 q = q + c * force(q, np.zeros_like(p)) / m
             elif kind == "chain" and hit is None:
-                self.chain, factor = self._swing(
-                    self.chain, np.sum(p * p / m, axis=-1), c * h, **self.of_chain
-                )
+                twice = np.sum(p * p / m, axis=-1)
+                self.chain, factor = self._swing(self.chain, twice, c * h, **self.of_chain)
                 p = p * np.expand_dims(factor, -1)
             elif kind in ("rescale", "scale", "chain"):
                 p = p * (self._factor(p, c, noise, draws[number], kind == "rescale") if hit is None else hit)

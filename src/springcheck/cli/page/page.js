@@ -1,14 +1,14 @@
-// The stored motion, the loops of loops.js on opening and by the sliders, and the charts of the studies.
+// The stored motion, the loops of loops.js on opening and by the sliders, and charts of studies.
 
 // rows of numbers stand once: [rows, data], and {"#": i} for the i-th of them, {"$": i} where it is text;
-// infinities and not-a-numbers are words in JSON
+// infinities and NaN are words in JSON
 const TEXT = by("data").textContent, [ROWS] = JSON.parse(TEXT);
 const [, DATA] = JSON.parse(TEXT, (_, x) => {
   if (x === null || typeof x !== "object") return x;
   return "$" in x ? ROWS[x.$] : "#" in x ? ROWS[x["#"]].map(Number) : x;
 });
 
-// What a run is here by its scheme's loop: equal, near or not computed, and what differs.
+// A run by its scheme's loop here: equal, near or not computed; and what differs.
 function compared(run) {
   const law = DATA.laws[run.scheme], { label, t, q, p } = run;
   if (!law) return ["not"];
@@ -26,14 +26,15 @@ function compared(run) {
 function selfCheck() {
   const place = by("selfcheck"), said = { wrong: [], equal: [], near: [], not: [], told: [] };
   if (!place) return;
-  const lines = [changed()], { runs } = DATA;
+  const lines = [changed()], { runs } = DATA, frames = new Set();
   const put = (words, labels) => labels.length && lines.push(`${words}: ${labels.join(", ")}`);
   for (const run of DATA.linear ? runs : []) {
     const [kind, text] = compared(run);
     said[kind].push(run.label);
+    if (kind === "equal") frames.add(run.t.length);
     lines.push(text);
   }
-  put(`each q and p the same double (${runs.length && runs[0].t.length} frames)`, said.equal);
+  put(`q and p the same doubles (${[...frames].join(", ")} frames)`, said.equal);
   put("the scheme's motion to rounding, or the exact one to tolerance", said.near);
   put("not computed again here", said.not);
   const { equal, near, wrong } = said, list = lines.filter(Boolean).map((text) => html("li", {}, text));
@@ -46,7 +47,7 @@ function selfCheck() {
   place.replaceChildren(html("p", { class: look }, head), html("ul", {}, ...list));
 }
 
-// What of the counts and verdicts in this page is not as it was written; "" where all is.
+// A count or verdict that is not as it was written; "" where none is.
 function changed() {
   const cells = "#counts, .method summary b + span, .method tbody :is(th, td:not(.why))", { words } = DATA;
   const texts = [...document.querySelectorAll(cells), html("p", {})].map((cell) => cell.textContent.trim());
@@ -86,7 +87,7 @@ function live() {
   tell();
 }
 
-// Mass and spring by each scheme after a step, a row each, and their places on the orbits of the chart.
+// Mass and spring by each scheme, a row each, and their places on the orbits.
 function moving(s, chart, step) {
   const size = 1.5 * Math.hypot(s.q - s.at, s.p / Math.sqrt(Math.abs(s.k * s.m) || 1)) || 1;
   const drawn = chart.spec.curves.slice(1).map((curve, j) => {
@@ -107,7 +108,7 @@ function moving(s, chart, step) {
 
 const dampingOf = (s) => (s.k > 0 ? (Math.sign(s.h) * s.c) / (2 * Math.sqrt(s.k * s.m)) : 0);
 
-// The orbits by these numbers, and by what factor a step multiplies the motion at any h omega.
+// The orbits by these numbers, and the growth a step at any h omega.
 function tried(s) {
   const [orbits, factors] = DATA.live.charts, steps = Math.min(DATA.steps, 1000), far = [];
   const energy = (s.p * s.p) / (2 * s.m) + (s.k * (s.q - s.at) ** 2) / 2, bound = s.k > 0 && energy > 0;
@@ -152,7 +153,7 @@ live();
 drop();
 for (const [name, bank] of Object.entries(DATA.banks)) new Bank(by(name), bank);
 
-// a link to what is folded opens it
+// a link to a fold opens it
 addEventListener("hashchange", () => {
   const there = by(location.hash.slice(1));
   if (there && there.tagName === "DETAILS") there.open = true;

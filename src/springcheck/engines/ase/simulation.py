@@ -121,14 +121,9 @@ class _Dynamics:
         positions, momenta = np.zeros((2, scene.particles + len(fixed), 3))
         positions.reshape(-1)[scene.where] = scene.q * length
         momenta.reshape(-1)[scene.where] = scene.p * (length / time)
-        if fixed:
-            positions[scene.particles :] = np.array(fixed) * length
-        self._atoms = Atoms(
-            numbers=np.zeros(len(positions), dtype=int),
-            positions=positions,
-            masses=[*scene.masses, *[ANCHOR_MASS] * len(fixed)],
-            momenta=momenta,
-        )
+        positions[scene.particles :] = np.reshape(fixed, (-1, 3)) * length
+        masses = [*scene.masses, *[ANCHOR_MASS] * len(fixed)]
+        self._atoms = Atoms(numbers=[0] * len(masses), positions=positions, masses=masses, momenta=momenta)
         if rods:
             anchor = itertools.count(scene.particles)
             pairs = [ends if len(ends) == 2 else (next(anchor), *ends) for ends, _, _ in rods]

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
+
+import numpy as np
 
 from springcheck.engines.contract import Label
 from springcheck.physics.arrays import Arithmetic
+from springcheck.physics.scene import Scene
 
 FIXED_POINT = 2.0**-32
 """GPU-type platforms sum forces as 64-bit integers in units of 2**-32 kJ/mol/nm in every precision
@@ -15,20 +19,13 @@ converted by itself, by `(long)(x * 0x100000000)`, which C leaves open out of ra
 
 _PRECISIONS = {
     name: Arithmetic(
-        name=name,
-        state=state,
-        force=force,
-        quantum=FIXED_POINT,
-        overflow=2.0**31,
-        parameters="single",
+        name=name, state=state, force=force, quantum=FIXED_POINT, overflow=2.0**31, parameters="single",
         keeps_displacement=True,
     )
     for name, state, force in (
-        ("single", 2.0**-24, 2.0**-24),
-        ("mixed", 2.0**-48, 2.0**-24),
-        ("double", 2.0**-53, 2.0**-53),
+        ("single", 2.0**-24, 2.0**-24), ("mixed", 2.0**-48, 2.0**-24), ("double", 2.0**-53, 2.0**-53),
     )
-}
+}  # fmt: skip
 """Bond parameters are kept in single precision in every mode: 2.9 becomes 2.9000000954.  k = 1 hides it.
 "mixed" keeps positions as a float and a float of correction, together 48 bits.  The velocity is the
 displacement of the step times 1/h, so it does not lose the digits of x' - x as on Reference."""
@@ -53,6 +50,25 @@ SHAKE = 2.0**-24
 """GPU-type platforms keep SHAKE's squared lengths and inverse masses in single precision in every mode
 (`params` in `IntegrationUtilities.cpp`).  Rounded masses make a free molecule's momentum fluctuate: that is
 no tolerance, and fails."""
+
+
+def sizes(scene: Scene, step: float, how: Arithmetic) -> Iterator[tuple[float, str, float, float]]:
+    """Numbers of a scene that GPU-type platforms keep in single precision, for `bonds.within`.
+
+    A force is multiplied by step/2**32 and by 1/mass; a length is the root of a square.
+    """
+    least, most = float(np.finfo(np.float32).smallest_normal), float(np.finfo(np.float32).max)
+    for term in scene.terms:
+        for column in term.columns:
+            values = np.abs(getattr(term, column.field)) if column.single else np.zeros(0)
+            for x in np.sort(values[values > 0])[[0, -1]] if np.any(values) else ():
+                yield least, f"{column.name} of a {term.key}", float(x), most
+    if how.force == 2.0**-24:
+        yield least**0.5, "bond's length", scene.system.far, most**0.5
+    if how.state == 2.0**-24:
+        yield least * 2.0**32, "step", abs(step), most
+        yield 0.0, "speed", float(np.max(np.abs(scene.p / scene.m))), most
+        yield from ((1 / most, "mass", float(m), 1 / least) for m in (np.min(scene.m), np.max(scene.m)))
 
 
 def arithmetic(label: Label) -> Arithmetic:

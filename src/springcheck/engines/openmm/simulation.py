@@ -33,7 +33,7 @@ import openmm as mm
 
 from springcheck.engines import bonds, quiet
 from springcheck.engines.contract import Label, Method, Stopped
-from springcheck.engines.openmm.rounding import CUSTOM, LENGTHS, arithmetic
+from springcheck.engines.openmm.rounding import CUSTOM, LENGTHS, arithmetic, sizes
 from springcheck.engines.openmm.thermostats import thermostat
 from springcheck.errors import MethodError
 from springcheck.physics.arrays import Floats
@@ -67,6 +67,17 @@ SHIFTED = frozenset(
 
 FAST_STEPS = {"mts": 8} | {f"mts-langevin-{n}": n for n in (2, 3, 4)}
 """Evaluations of the fast springs in a step, beside one of the others, by method."""
+
+CUSTOM_STAGES = {
+    "euler": (["v0"], [("v0", "v"), ("v", "v + dt*(f/m)"), ("x", "x + dt*v0")]),
+    "semi-implicit-euler": ([], [("v", "v + dt*(f/m)"), ("x", "x + dt*v")]),
+    "boris": (["turn", "half"], [
+        ("x", "x + 0.5*dt*v"), ("v", "v + 0.5*dt*f/m"),
+        ("half", "v + cross(v, turn)"), ("v", "v + cross(half, turn)*2/(1 + dot(turn, turn))"),
+        ("v", "v + 0.5*dt*f/m"), ("x", "x + 0.5*dt*v"),
+    ]),
+}  # fmt: skip
+"""Variables and stages of methods by a `CustomIntegrator`."""
 
 ATTENTIVE = 500
 """Steps in one call, which cannot be interrupted: 1.5 ms on Reference, 0.1 s on OpenCL; a call takes 1 us."""
@@ -217,23 +228,11 @@ def _integrator(scene: Scene, name: str, step: float) -> mm.Integrator:
         integrator.addGlobalVariable("done", 0)
         integrator.addComputeGlobal("time", f"(done+{0.5 * (name == 'boris')})*({signed!r})")
         integrator.addComputeGlobal("done", "done+1")
-    if name == "euler":
-        integrator.addPerDofVariable("v0", 0)
-        integrator.addComputePerDof("v0", "v")
-        integrator.addComputePerDof("v", "v + dt*(f/m)")
-        integrator.addComputePerDof("x", "x + dt*v0")
-    elif name == "boris":
-        for variable in ("turn", "half"):
-            integrator.addPerDofVariable(variable, 0)
-        for variable, value in (
-            ("x", "x + 0.5*dt*v"), ("v", "v + 0.5*dt*f/m"), ("half", "v + cross(v, turn)"),
-            ("v", "v + cross(half, turn)*2/(1 + dot(turn, turn))"), ("v", "v + 0.5*dt*f/m"),
-            ("x", "x + 0.5*dt*v"),
-        ):  # fmt: skip
-            integrator.addComputePerDof(variable, value)
-    else:
-        integrator.addComputePerDof("v", "v + dt*(f/m)")
-        integrator.addComputePerDof("x", "x + dt*v")
+    own, stages = CUSTOM_STAGES[name]
+    for variable in own:
+        integrator.addPerDofVariable(variable, 0)
+    for variable, value in stages:
+        integrator.addComputePerDof(variable, value)
     return integrator
 
 
@@ -285,6 +284,7 @@ class _Context:
         if step < 0 and scene.system.is_damped:
             raise MethodError(f"{label}: no negative step is taken, so friction runs forwards in time only")
         if arithmetic(label).parameters == "single":
+            bonds.within(label, sizes(scene, step, arithmetic(label)))
             # the half kicks below must be those of the springs as OpenMM rounds them
             scene = scene.system.in_single
         if scene.system.is_driven and arithmetic(label).state > 2.0**-53:
@@ -332,11 +332,7 @@ class _Context:
         self._context.setVelocities(velocities)
 
     def advance(self, every: int, q: Floats, p: Floats) -> None:
-        take, get = self._integrator.step, self._context.getState
-        x, v, where = self._x, self._v, self._where
-        x_row, v_row = x.reshape(-1), v.reshape(-1)
-        positions, velocities = mm.State.Positions, mm.State.Velocities
-        row = 0
+        take, row = self._integrator.step, 0
         try:
             for row in range(len(q)):
                 if self._set_time:
@@ -345,11 +341,7 @@ class _Context:
                     take(ATTENTIVE)
                 if every % ATTENTIVE and not self._set_time:
                     take(every % ATTENTIVE)
-                state = get(positions=True, velocities=True)
-                state._getVectorAsNumpy(positions, x)
-                state._getVectorAsNumpy(velocities, v)
-                q[row] = x_row[where]
-                p[row] = v_row[where]
+                self._read(q[row], p[row])
             row += 1
         except mm.OpenMMException as error:
             raise Stopped(row, str(error)) from error
@@ -358,7 +350,14 @@ class _Context:
             self._done += every * row
             self.force_calls += every * row * self._each
             if self._on_a_line:
-                self.off_axis = max(self.off_axis, bonds.off_axis(x, self._elsewhere))
+                self.off_axis = max(self.off_axis, bonds.off_axis(self._x, self._elsewhere))
+
+    def _read(self, q: Floats, p: Floats) -> None:
+        """Fill positions and velocities (n,) with what OpenMM stores."""
+        state = self._context.getState(positions=True, velocities=True)
+        state._getVectorAsNumpy(mm.State.Positions, self._x)
+        state._getVectorAsNumpy(mm.State.Velocities, self._v)
+        q[:], p[:] = self._x.reshape(-1)[self._where], self._v.reshape(-1)[self._where]
 
     def _take_each(self, done: int, steps: int) -> None:
         """Take these steps one by one, setting the time before each."""

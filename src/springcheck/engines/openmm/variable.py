@@ -111,10 +111,7 @@ class Variable(_Context):
             while row < len(q):
                 self._integrator.stepTo((self._done + every) * abs(self._step))
                 lasts[row] = self._integrator.getStepSize()._value
-                state = self._context.getState(positions=True, velocities=True)
-                state._getVectorAsNumpy(mm.State.Positions, self._x)
-                state._getVectorAsNumpy(mm.State.Velocities, self._v)
-                q[row], p[row] = (x.reshape(-1)[self._where] for x in (self._x, self._v))
+                self._read(q[row], p[row])
                 self.off_axis = max(self.off_axis, bonds.off_axis(self._x, self._elsewhere))
                 self._done += every
                 row += 1

@@ -41,13 +41,9 @@ def solver(scene: Scene, atol: Floats, most_steps: int, called: Callable[[float]
 
     pull = force(scene.q, scene.p)
     found = IDA(
-        residual,
-        rtol=scene.tolerance,
-        atol=np.concatenate([atol, atol[n:] / m]),
-        jacfn=jacobian,
-        algebraic_idx=list(range(2 * n, 3 * n)),
-        max_num_steps=most_steps,
-    )
+        residual, rtol=scene.tolerance, atol=np.concatenate([atol, atol[n:] / m]), jacfn=jacobian,
+        algebraic_idx=list(range(2 * n, 3 * n)), max_num_steps=most_steps,
+    )  # fmt: skip
     current = scene.p / m
     found.init_step(
         0.0, np.concatenate([scene.q, scene.p, current]), np.concatenate([current, pull, pull / m])

@@ -138,11 +138,10 @@ class Solver:
                 done += every
                 try:
                     result = take(done * step)
+                    failure = "" if result.success else str(result.message)
                 except RuntimeError as error:
                     failure = str(error)
-                    break
-                if not result.success:
-                    failure = str(result.message)
+                if failure:
                     break
                 states.append(result.y)
         self._done = done

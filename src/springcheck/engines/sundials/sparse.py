@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -43,5 +42,4 @@ def options(scene: Scene) -> dict[str, Any]:
 
     pattern = matrix(np.ones(len(where[0])))
     pattern.data[:] = 1
-    fill: Callable[..., None] = jacobian
-    return {"linsolver": "sparse", "sparsity": pattern, "jacfn": fill}
+    return {"linsolver": "sparse", "sparsity": pattern, "jacfn": jacobian}

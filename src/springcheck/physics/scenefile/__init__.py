@@ -6,6 +6,7 @@ import math
 import re
 import tomllib
 from collections.abc import Iterator
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
@@ -47,6 +48,8 @@ def text_of(name_or_path: str | Path) -> str:
 
 
 def _read(name_or_path: str | Path) -> tuple[Path, str]:
+    if not isinstance(name_or_path, str | PathLike):
+        raise SceneError(f"the name or path of a scene is needed, not {type(name_or_path).__name__}")
     path = Path(name_or_path)
     if path.suffix != ".toml" and path.parent == Path() and not path.is_file():
         path = folder() / f"{name_or_path}.toml"
@@ -125,9 +128,8 @@ def _explain(message: str, data: Any) -> str:
             found = None
     what = (what[0].lower() + what[1:]).replace("missing required field", "lacks the field")
     what = what.replace("contains unknown field", "has the unknown field")
-    accepted = tables.CHOICES.get(re.sub(r"\[\d+\]$", "[]", field)) or tables.CHOICES.get(
-        field.rpartition(".")[2]
-    )
+    names = re.sub(r"\[\d+\]$", "[]", field), field.rpartition(".")[2]
+    accepted = next((one for name in names if (one := tables.CHOICES.get(name))), None)
     if accepted:
         return f"{field} = {found!r}: one of {', '.join(accepted)} is needed"
     if "unknown field" in what or "lacks the field" in what:
