@@ -23,7 +23,6 @@ from springcheck.thermal.stepper import Met, Stepper, forces
 PER_ACT, IN_AND_OUT = 6, 4
 """Roundings of a stage at most (a force 4, its product and sum 2), and of the first and last state."""
 
-
 HOTTEST = 1e4
 """Noncentrality of a chi-squared distribution up to which its rank is computed to all digits."""
 
