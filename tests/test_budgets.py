@@ -12,7 +12,7 @@ HOME = Path(springcheck.__file__).parent
 BUDGETS = {
     ("physics",): 6981,
     ("schemes",): 1620,
-    ("thermal",): 2876,
+    ("thermal",): 2875,
     ("engines/own",): 1648,
     ("engines/openmm", "engines/ase", "engines/sundials"): 1324,
     ("engines",): 2827,
@@ -21,7 +21,7 @@ BUDGETS = {
     ("identify",): 8690,
     ("formats", "store"): 5266,
     ("studies",): 1477,
-    ("studies/*",): 9804,
+    ("studies/*",): 9803,
     ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 7103,
 }
 """Lines of each room, or of several: of an engine in one file, and of what all studies share, in the first

@@ -3,6 +3,8 @@ mean is over the freedoms in which forces change, k <u**2> / kT = 1 of each (equ
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -63,3 +65,18 @@ def test_a_start_far_hotter_than_the_bath_is_left_out_until_it_has_decayed() -> 
         found = heated_of(each, [driver.run(each, "own:obabo", seed=3)])
         assert abs(found.configurational - found.configurational_law) < 5 * found.configurational_error
         assert abs(found.kinetic - found.kinetic_law) < 5 * found.kinetic_error < 1
+
+
+def test_collisions_of_particles_mix_modes_which_then_have_no_law_of_their_own() -> None:
+    """Leapfrog's momenta of two particles are correlated by (h w)**2 where a spring joins them, and a
+    collision of one of them ends that: 2 x 2 moments of a mode alone miss it."""
+    scene = springcheck.load_scene("chain").derived(step=0.3, steps=3000)
+    scene = scene.derived(bath=replace(three().bath, friction=0.7))
+    for name, known in (("own:andersen-leapfrog", False), ("own:baoa", True)):
+        found = heated_of(scene, [driver.run(scene, name, seed=4)])
+        assert np.isfinite([found.configurational, found.kinetic]).all()
+        laws = [found.configurational_law, found.kinetic_law, found.configurational_error]
+        assert np.array_equal(np.isfinite(laws), [known] * 3)
+    alone = springcheck.load_scene("bath-spring")
+    found = heated_of(alone, [driver.run(alone, "own:andersen-leapfrog", seed=4)])
+    assert abs(found.kinetic - found.kinetic_law) < 5 * found.kinetic_error < 1

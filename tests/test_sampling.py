@@ -77,3 +77,9 @@ def test_the_study_is_kept_shown_and_drawn(capsys: pytest.CaptureFixture[str]) -
     assert [x.name for x in limits.charts[0].curves] == ["BAOA", "own:baoa"]
     assert main(["plot", "s.h5"]) == 0
     assert Path("figures/s/sampling-temperatures.png").stat().st_size > 10_000
+
+
+def test_what_collisions_cost_has_a_law_too() -> None:
+    """The motion is a mixture of maps, and no Gaussian one: its squares forget as collisions come."""
+    one = measure.measured(engines.parse("own:andersen-after-kick"))
+    assert np.abs(one.off / one.off_law - 1).max() < 5 / np.sqrt(2 * 100)

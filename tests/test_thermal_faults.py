@@ -5,6 +5,8 @@ A test of all faults holds each of them to the checks that must reject it.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 
@@ -39,6 +41,21 @@ def test_right_thermostats_raise_no_alarm_in_random_baths() -> None:
         found = clean_bath(seed)
         assert found.alarms == ()
         assert found.verdicts >= 4
+
+
+def test_skewed_draws_are_rejected_whose_even_moments_are_all_right() -> None:
+    """Draws of a normal number's size, positive where that exceeds sqrt(2 log 2) and negative below, have a
+    mean of 0, as half of exp(-x**2/2) lies beyond, and no even moment tells them from normal ones."""
+
+    def lopsided(right: Sequence[np.ndarray]) -> np.ndarray:
+        return np.copysign(right[-1], np.abs(right[-1]) - np.sqrt(2 * np.log(2)))
+
+    for name in ("baoab", "obabo", "bbk", "andersen"):
+        fault = Fault(name, "", (), lambda c: baths.played(c, lopsided), scheme=name, scene="bath")
+        found = {v.check: v.passed for v in checks.judge(scene("bath"), fault.run(scene("bath")))}
+        assert found["draws-shape"] is False
+        assert found["draws-mean"] is not False
+        assert found["draws-variance"] is not False
 
 
 def test_noise_below_rounding_hides_the_draws_and_not_the_map() -> None:

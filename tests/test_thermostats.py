@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -120,11 +121,12 @@ def test_an_anharmonic_well_leaves_the_direction_of_the_noise_to_rounding(label:
 def test_chances_are_those_of_their_null() -> None:
     rng = np.random.default_rng(8)
     x = rng.standard_normal((2000, 60))
-    for of in (chance.mean, chance.variance, chance.shape, chance.neighbours):
+    skewed = partial(chance.shape, degree=3)
+    for of in (chance.mean, chance.variance, chance.shape, skewed, chance.neighbours):
         # a saddlepoint is sought for each, which takes a millisecond
-        found = np.array([of(row) for row in (x[:500] if of is chance.shape else x)])
+        found = np.array([of(row) for row in (x[:500] if of in (chance.shape, skewed) else x)])
         for level in (0.5, 0.1, 0.01):
-            assert abs(np.mean(found <= level) - level) < 5 * np.sqrt(level / len(found)), of.__name__
+            assert abs(np.mean(found <= level) - level) < 5 * np.sqrt(level / len(found)), of
     for n, p in ((9, 0.3), (1, 0.6)):
         each = np.array([math.comb(n, i) * p**i * (1 - p) ** (n - i) for i in range(n + 1)])
         for i in range(n + 1):
@@ -132,6 +134,7 @@ def test_chances_are_those_of_their_null() -> None:
             assert chance.count(i, n, p) == pytest.approx(min(1, 2 * min(sides)), rel=1e-12)
     assert chance.shape(np.sqrt(12) * (rng.random(2000) - 0.5)) < 1e-15
     assert chance.shape(rng.standard_t(3, 2000)) < 1e-15
+    assert chance.shape(rng.standard_exponential(2000) - 1, 3) < 1e-15
     assert chance.variance(1.01 * rng.standard_normal(1_000_000)) < 1e-30
     assert chance.neighbours(np.repeat(rng.standard_normal(500), 2)) < 1e-15
     assert np.mean([chance.pairs(rng.standard_normal((300, 5))) <= 0.05 for _ in range(1000)]) < 0.085

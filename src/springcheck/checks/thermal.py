@@ -140,15 +140,15 @@ def draws_variance(case: Case) -> Chance | str:
 
 @check("shape", family="noise", requires={"every-step"})
 def draws_shape(case: Case) -> Chance | str:
-    """The draws have the tails of their distribution, as their fourth moment shows.
+    """The draws have the tails and the symmetry of their distribution, as fourth and third moment show.
 
-    Judged by the fourth Legendre polynomial of their ranks, which no single draw decides.
+    Judged by these Legendre polynomials of their ranks, which no single draw decides.
     """
     if case.scene.system.rods and THERMOSTATS[case.trajectory.scheme].uniform:
         return "a rod mixes uniform draws of its ends, and the tails of such sums are others"
-    return _of(
-        case, thermal.chance.shape, lambda x: f"fourth moment {np.mean(x**4) / np.mean(x * x) ** 2:.4f}"
-    )
+    likely = lambda x: min(1.0, *(2 * thermal.chance.shape(x, degree) for degree in (3, 4)))  # noqa: E731
+    moments = "third moment {:+.4f}, fourth {:.4f}".format
+    return _of(case, likely, lambda x: moments(*(np.mean(x**i) / np.mean(x * x) ** (i / 2) for i in (3, 4))))
 
 
 @check("lag 1", family="noise", requires={"every-step"})

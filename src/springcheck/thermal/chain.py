@@ -77,11 +77,6 @@ class Chain:
             after, factor = np.where(rests, np.stack([*state]), after), np.where(rests, 1, factor)
         return after, factor
 
-    def energy(self, state: Any, *, freedoms: int, thermal: Any, Q: Any) -> Any:
-        """Energy of the chain [M L2/T2]; its sum with the energy of the motion is conserved."""
-        s, y = state[: self.length], state[self.length :]
-        return np.sum(s * s / (2 * Q), axis=0) + thermal * (freedoms * y[0] + np.sum(y[1:], axis=0))
-
     def rounding(self, state: Any, twice: Any, x: Any, *, freedoms: int, thermal: Any, Q: Any) -> Any:
         """Bound on the rounding of each momentum in a propagation (M,), over the unit roundoff."""
         s = np.abs(state[: self.length])

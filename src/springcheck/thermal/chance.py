@@ -12,6 +12,7 @@ from functools import cache
 from typing import Any
 
 import numpy as np
+from numpy.polynomial.legendre import Legendre, leggauss
 
 from springcheck.physics.arrays import Floats
 
@@ -39,31 +40,31 @@ def variance(x: Floats) -> float:
     return min(1.0, 2 * float(min(gammainc(x.size / 2, half), gammaincc(x.size / 2, half))))
 
 
-def shape(x: Floats) -> float:
-    """Chance of the weight of the tails (the fourth moment), whatever the variance.
+def shape(x: Floats, degree: int = 4) -> float:
+    """Chance of the weight of the tails, or by degree 3 of the skewness, whatever the variance.
 
-    The mean of the fourth Legendre polynomial of the rank 2 Phi(x) - 1 (Neyman's smooth test), of draws
-    normalised to variance 1: bounded, so that no single draw decides.
+    The mean of the Legendre polynomial of the rank 2 Phi(x) - 1 (Neyman's smooth test), of draws normalised
+    to variance 1: bounded, so that no single draw decides.
     """
     from scipy.special import erf
 
     u = erf(x.ravel() / math.sqrt(2 * max(float(np.mean(x * x)), 1e-300)))
-    value = float(np.mean(((35 * u * u - 30) * u * u + 3) / 8))
-    return _saddlepoint(value, x.size) if math.isfinite(value) else 0.0
+    value = float(np.mean(Legendre.basis(degree)(u)))
+    return _saddlepoint(value, x.size, degree) if math.isfinite(value) else 0.0
 
 
 @cache
-def _quadrature() -> tuple[Floats, Floats]:
-    """The fourth Legendre polynomial at Gauss's nodes, and their weights of a mean."""
-    nodes, weights = np.polynomial.legendre.leggauss(64)
-    return ((35 * nodes**2 - 30) * nodes**2 + 3) / 8, weights / 2
+def _quadrature(degree: int) -> tuple[Floats, Floats]:
+    """The Legendre polynomial at Gauss's nodes, and their weights of a mean."""
+    nodes, weights = leggauss(64)
+    return Legendre.basis(degree)(nodes), weights / 2
 
 
-def _saddlepoint(value: float, n: int) -> float:
-    """Two-sided chance of a mean of n values of the fourth Legendre polynomial at uniform numbers."""
-    if not -3 / 7 < value < 1 or n < 8:
+def _saddlepoint(value: float, n: int, degree: int) -> float:
+    """Two-sided chance of a mean of n values of the Legendre polynomial at uniform numbers."""
+    values, parts = _quadrature(degree)
+    if not np.min(values) < value < np.max(values) or n < 8:
         return 1.0 if n < 8 else 0.0
-    values, parts = _quadrature()
 
     def moments(t: float) -> tuple[float, float, float]:
         weights = parts * np.exp(t * values)

@@ -128,6 +128,9 @@ class Heat:
             y, v = modes.about_centres(scene.q.astype(np.longdouble), scene.p.astype(np.longdouble))
             lasts = self._settling(modes.w2 * y * y + v * v)
             self._from = round(lasts / -np.log(left)) if 0 < left < 1 else 0
+            if THERMOSTATS[piece.scheme].collides and not scene.system.is_separate:
+                # a collision is one particle's, and mixes modes
+                self._law = None
 
     def _settling(self, squares: Reals) -> float:
         """Times of decay before frames count: more where the squares of the start (n,) are larger than kT,

@@ -3,7 +3,7 @@
 One step of a linear random scheme is z' = A z + G xi with z = (q, p) and draws xi of variance 1; one with
 collisions takes one of several such maps, each with a probability.  A and G come from stepping unit states
 and unit draws, so a scheme is written down once.  The covariance is then S = A S A' + G G' (discrete
-Lyapunov), averaged over the maps; the autocovariance A**n S; the rest follows.
+Lyapunov), averaged over the maps; the rest follows.
 """
 
 from __future__ import annotations
@@ -24,6 +24,19 @@ AT_A_LIMIT = 1e-5
 """Growth that may be due to rounding."""
 REFINEMENTS = 6
 """Steps of refinement, each of which gains the digits that 1 - A A' has in double precision."""
+
+
+def _squared(a: Any) -> Any:
+    """What matrices (n, d, d) make of products of two numbers, (n, d d, d d)."""
+    n, d = a.shape[:2]
+    return np.einsum("nij,nkl->nikjl", a, a).reshape(n, d * d, d * d)
+
+
+def _gaussian(S: Any) -> Any:
+    """Fourth moments (n, d d, d d) of Gaussian numbers of covariances (n, d, d) (Isserlis)."""
+    n, d = S.shape[:2]
+    pairs = sum(np.einsum(f"n{x},n{y}->nijkl", S, S) for x, y in (("ij", "kl"), ("ik", "jl"), ("il", "jk")))
+    return np.reshape(pairs, (n, d * d, d * d))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -57,16 +70,13 @@ class Law:
     def _branch(self, chance: Any, *, hit: bool) -> tuple[Any, Extended, Extended]:
         m, k = (np.atleast_1d(np.asarray(x, np.longdouble)) for x in (self.m, self.k))
         r, n = self.scheme.draws, len(m)
-        q, p = np.zeros((2, 2 + r, n), np.longdouble)
-        q[0], p[1] = 1, 1
-        draws = np.zeros((r, 2 + r, n), np.longdouble)
-        draws[range(r), range(2, 2 + r)] = 1
+        q, p, *draws = np.eye(2 + r, dtype=np.longdouble)[:, :, None] * np.ones(n)
         stepper = Stepper(
             self.scheme, h=self.h, m=m, rate=self.rate, thermal=self.thermal, width=np.longdouble
         )
         parts = {"slow": lambda q, p: (self.fast - k) * q, "fast": lambda q, p: -self.fast * q}
         whole = parts if self.scheme.splits else lambda q, p: -k * q
-        a, b = stepper(q, p, whole, list(draws), hit)
+        a, b = stepper(q, p, whole, draws, hit)
         both = np.stack([a, b], axis=0).transpose(2, 0, 1)
         return chance, both[:, :, :2], both[:, :, 2:]
 
@@ -89,15 +99,10 @@ class Law:
             n = len(of_state)
             A, G = (np.zeros((n, d + c, x), np.longdouble) for x in (d + c, r - c))
             A[:, :d, :d], A[:, :d, d:], G[:, :d] = of_state, noise[:, :, :c], noise[:, :, c:]
-            for i in range(c):
-                # the last draws of this step are the first of the next
-                G[:, d + i, r - 2 * c + i] = 1
+            # the last draws of this step are the first of the next
+            G[:, d + np.arange(c), r - 2 * c + np.arange(c)] = 1
             out.append((chance, A, G))
         return tuple(out)
-
-    @cached_property
-    def _state(self) -> tuple[tuple[Any, Floats, Floats], ...]:
-        return tuple(tuple(np.asarray(x, np.float64) for x in one) for one in self._maps)  # type: ignore[misc]
 
     @cached_property
     def _even(self) -> Floats:
@@ -108,10 +113,7 @@ class Law:
         the residuals of the iterative refinement.  The carried draws keep their unit covariance.
         """
         n, d = self._maps[0][1].shape[:2]
-        right = np.zeros((n, d * d), np.longdouble)
-        for chance, _, G in self._maps:
-            g = G / self._scale[:, :, None]
-            right += (chance * (g @ g.transpose(0, 2, 1))).reshape(n, d * d)
+        right = np.asarray(sum(c * (g @ g.transpose(0, 2, 1)) for c, _, g in self._scaled)).reshape(n, d * d)
         left = np.eye(d * d) - self._moments
         rough, bound = left.astype(np.float64), np.atleast_1d(np.asarray(self.k)) != 0
         # at a limit of stability three roots of a map meet, and are known to the third root of a rounding
@@ -144,12 +146,32 @@ class Law:
     @cached_property
     def _moments(self) -> Extended:
         """The map of second moments of (q, p, carried draws), without noise (n, d d, d d)."""
-        n, d = self._maps[0][1].shape[:2]
-        scale, total = self._scale, np.zeros((n, d * d, d * d), np.longdouble)
-        for chance, A, _ in self._maps:
-            a = A * scale[:, None, :] / scale[:, :, None]
-            total += chance * np.einsum("nij,nkl->nikjl", a, a).reshape(n, d * d, d * d)
-        return total
+        return np.asarray(sum(chance * _squared(a) for chance, a, _ in self._scaled))
+
+    @cached_property
+    def _scaled(self) -> list[tuple[Any, Extended, Extended]]:
+        """The maps of `_maps` in units of `_scale`."""
+        scale = self._scale[:, :, None]
+        return [(chance, A * self._scale[:, None, :] / scale, G / scale) for chance, A, G in self._maps]
+
+    @property
+    def _excess(self) -> Floats:
+        """Stationary <z_i z_j z_k z_l> beyond a Gaussian's (n, d d, d d), in units of `_scale`; NaN where it
+        is unbounded.  A map leaves a Gaussian motion Gaussian, with its own covariance S_b: a mixture has
+        K = sum chance (A x A x A x A K + Gaussian(S_b)) - Gaussian(S).
+        """
+        S, (n, d) = self._even, self._scale.shape
+        if len(self._scaled) == 1:
+            return np.zeros((n, d * d, d * d))
+        kept, added, out = 0 * np.eye(d**4), -_gaussian(S), np.full((n, d**4, 1), np.nan)
+        for chance, a, g in self._scaled:
+            kept = kept + chance * _squared(_squared(a))
+            added = added + chance * _gaussian(a @ S @ a.transpose(0, 2, 1) + g @ g.transpose(0, 2, 1))
+        kept, added = np.asarray(kept, np.float64), np.asarray(added, np.float64).reshape(n, d**4, 1)
+        i = np.flatnonzero(np.isfinite(S).all(axis=(1, 2)))
+        i = i[np.max(np.abs(np.linalg.eigvals(kept[i])), axis=-1, initial=0) < 1]
+        out[i] = np.linalg.solve(np.eye(d**4) - kept[i], added[i])
+        return out.reshape(n, d * d, d * d)
 
     @property
     def growth(self) -> Floats:
@@ -180,22 +202,17 @@ class Law:
     @cached_property
     def _mean(self) -> Floats:
         """The map of the means of (q, p, carried draws), (n, d, d)."""
-        return np.asarray(sum(chance * A for chance, A, _ in self._state))
+        return np.asarray(sum(chance * A for chance, A, _ in self._maps), np.float64)
 
     @cached_property
     def _noise(self) -> Floats:
         """Covariance (n, d, d) of what a step adds to that: by its draws, and by the choice of its map."""
-        if not self.scheme.collides:
-            ((_, _, G),) = self._state
-            return np.asarray(G @ G.transpose(0, 2, 1))
-        parts = [(chance, A - self._mean, G) for chance, A, G in self._state]
-        S = self._covariance
-        each = (c * (D @ S @ D.transpose(0, 2, 1) + G @ G.transpose(0, 2, 1)) for c, D, G in parts)
-        return np.asarray(sum(each))
-
-    def autocovariance(self, steps: int) -> Floats:
-        """<z(t + steps h) z(t)'> of (q, p), (n, 2, 2)."""
-        return np.asarray((np.linalg.matrix_power(self._mean, steps) @ self._covariance)[:, :2, :2])
+        S, mean, total = self._covariance, self._mean, 0 * self._mean
+        for chance, A, G in self._maps:
+            # of one map alone none of the latter, whether it has a covariance or not
+            choice = (A - mean) @ S @ (A - mean).transpose(0, 2, 1) if self.scheme.collides else 0
+            total += np.asarray(chance * (G @ G.transpose(0, 2, 1) + choice), np.float64)
+        return total
 
     def apart(self, steps: Any) -> tuple[Floats, Floats]:
         """Map (n, 2, 2) of so many steps (n,), and covariance of their noise (n, 2, 2), with the part of the
@@ -224,16 +241,6 @@ class Law:
         """<p**2> / m kT (n,): the kinetic temperature over the bath's, by the momenta that are stored."""
         return self._even[:, 1, 1]
 
-    def displacement(self, steps: int) -> Floats:
-        """<(q(t + steps h) - q(t))**2> of a bound particle (n,)."""
-        A, W = self._mean, self._noise
-        B, Q = np.eye(A.shape[1]) + np.zeros_like(A), np.zeros_like(A)
-        for _ in range(steps):
-            B, Q = A @ B, A @ Q @ A.transpose(0, 2, 1) + W
-        # for a slow motion 2 (C(0) - C(steps)) would cancel
-        moved = B - np.eye(A.shape[1])
-        return np.asarray((moved @ self._covariance @ moved.transpose(0, 2, 1) + Q)[:, 0, 0])
-
     @property
     def diffusion(self) -> Floats:
         """D m gamma / kT of particles that no spring holds (n,); 1 is exact.
@@ -248,14 +255,14 @@ class Law:
         mean = sum(chance * A for chance, A, _ in maps)
         noise = sum(chance * (G @ G.transpose(0, 2, 1)) for chance, _, G in maps)
         n, _, d = mean.shape
-        pairs = sum(chance * np.einsum("nij,nkl->nikjl", A[:, 1:], A[:, 1:]) for chance, A, _ in maps)
+        pairs = sum(chance * _squared(A[:, 1:]) for chance, A, _ in maps)
 
         def without(map_: Any, right: Any) -> Floats:
             """What adds up to the right-hand side where a step keeps so much of it."""
             left = np.eye(map_.shape[-1]) - map_
             return np.linalg.solve(left.astype(np.float64), right.astype(np.float64))
 
-        S = without(pairs.reshape(n, d * d, d * d), noise[:, 1:, 1:].reshape(n, d * d, 1)).reshape(n, d, d)
+        S = without(pairs, noise[:, 1:, 1:].reshape(n, d * d, 1)).reshape(n, d, d)
         # moments of q' - q and (p', carried draws)
         N = sum(chance * (A @ S @ A.transpose(0, 2, 1)) for chance, A, _ in maps) + noise
         rate = (N[:, :1, :1] + 2 * mean[:, :1] @ without(mean[:, 1:], N[:, 1:, :1]))[:, 0, 0]
@@ -264,23 +271,22 @@ class Law:
     def error_of_variances(self, frames: int, every: int = 1) -> Floats:
         """Relative standard errors of <q**2> and <p**2> over so many frames, `every` steps apart, (n, 2).
 
-        Var of the mean of x**2 is 2/N sum (1 - |j|/N) C(j)**2 / C(0)**2 for a Gaussian x.  C(j)**2 is a
-        moment of pairs, which a power of one map M makes: sums of M**j and j M**j over j < N, by doubling.
+        Var of the mean of x**2 is 1/N sum (1 - |j|/N) c(j), c(j) the covariance of squares j frames apart:
+        what M**j, of second moments, makes of c(0), 2 C(0)**2 of a Gaussian x.  The sums go by doubling.
         """
         with np.errstate(all="ignore"):
             n, d = self._mean.shape[:2]
-            even = self._mean * self._scale[:, None, :] / self._scale[:, :, None]
-            one = np.linalg.matrix_power(even, every)
-            M = np.einsum("nij,nkl->nikjl", one, one).reshape(n, d * d, d * d).astype(np.float64)
+            M = np.linalg.matrix_power(self._moments, every).astype(np.float64)
             total, by_lag, power, count = np.eye(d * d) + 0 * M, 0 * M, M, 1
             for bit in f"{frames:b}"[1:]:
                 by_lag = by_lag + power @ (by_lag + count * total)
                 total, power, count = total + power @ total, power @ power, 2 * count
                 if bit == "1":
                     total, by_lag, power, count = total + power, by_lag + count * power, power @ M, count + 1
-            S, out = self._even, np.empty((n, 2))
+            S, K, out = self._even, self._excess, np.empty((n, 2))
             for i in range(2):
-                pair = np.einsum("ni,nj->nij", S[:, :, i], S[:, :, i]).reshape(n, d * d, 1)
-                lags = ((total - by_lag / frames) @ pair)[:, i * d + i, 0] / S[:, i, i] ** 2
-                out[:, i] = np.sqrt(2 * (2 * lags - 1) / frames)
+                j = i * d + i
+                pair = 2 * np.einsum("ni,nj->nij", S[:, :, i], S[:, :, i]).reshape(n, d * d) + K[:, :, j]
+                lags = ((total - by_lag / frames) @ pair[..., None])[:, j, 0]
+                out[:, i] = np.sqrt((2 * lags - pair[:, j]) / frames) / S[:, i, i]
         return out

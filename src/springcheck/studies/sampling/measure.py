@@ -109,8 +109,7 @@ def _slowest_decay(law: Law) -> float:
 
 def _error_of_average(law: Law | None, frames: int) -> float:
     """Error of k <q**2>/kT over so many frames: systematic and statistical."""
-    if law is None or law.scheme.collides:
-        # with collisions the motion is a mixture, not Gaussian
+    if law is None:
         return nan
     ratio = float(law.configurational[0])
     return float(np.hypot(ratio - 1, ratio * law.error_of_variances(frames)[0, 0]))
