@@ -52,7 +52,7 @@ def _said(name: str, own: float, value: float) -> str:
         return f"{name}: {value:.6g}, not {own:.6g}"
     digits, kept = 3 - int(np.floor(np.log10(abs(value / own - 1)))), float(np.float32(own))
     single = ", as in single precision" if own != kept and abs(value / kept - 1) < SINGLE else ""
-    return f"{name}: {value:.{max(6, min(17, digits))}g}, not {own:.{max(6, min(17, digits))}g}{single}"
+    return f"{name}: {value:.{max(6, min(17, digits))}g}, not {own:.15g}{single}"
 
 
 def _off(case: Case, unit: Extended, at: Integers) -> Extended:
