@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -53,9 +54,9 @@ def other(scene: Scene, number: int, field: str, row: int, value: float) -> Scen
 
 
 def said(scene: Scene, run: Trajectory) -> str:
-    """What a failed judgement says that the states show."""
+    """What a failed judgement says that the states show; "" of one that did not fail."""
     verdicts = checks.explained(scene, run, checks.judge(scene, run), files.shown)
-    why = next(v.why for v in verdicts if v.passed is False and v.check in checks.TELLING)
+    why = next((v.why for v in verdicts if v.passed is False and v.check in checks.TELLING), "")
     return why.partition(checks.STATES_SHOW)[2]
 
 
@@ -139,6 +140,19 @@ def test_a_frame_that_is_there_twice_or_lost_is_named(name: str) -> None:
     fewer = replace(run, q=run.q[lost], p=run.p[lost], t=run.t[:-1])
     shorter = scene.derived(steps=scene.steps - 1)
     assert "a frame is missing before frame 80" in said(shorter, fewer)
+
+
+@pytest.mark.parametrize(
+    ("name", "words"), [("van-der-pol", "another number"), ("mathieu-stable", "drive is taken")]
+)
+def test_noise_of_a_few_roundings_is_no_number_and_no_time(name: str, words: str) -> None:
+    """A number that roundings of one sign would move as far explains nothing."""
+    scene = replace(scenefile.load_scene(name), quantities=("q", "p"), steps=300, every=1)
+    run = driver.run(scene, "own:rk4")
+    for seed, size in product(range(4), (3e-15, 6e-15)):
+        rng = np.random.default_rng(seed)
+        q, p = (x * (1 + size * rng.normal(size=x.shape)) for x in (run.q, run.p))
+        assert words not in said(scene, replace(run, q=q, p=p))
 
 
 def test_what_no_number_explains_is_not_said_to_be_the_scheme() -> None:

@@ -62,7 +62,7 @@ def found(case: Case) -> str:
     if _fits(case, _Clock(summed=True), 1.0):
         return "the time of the drive is a sum of steps, rounded at each; take their number times the step"
     later = _later(case)
-    if later and _fits(case, _Clock(later=later)):
+    if abs(later) > _delay(case)[1] and _fits(case, _Clock(later=later)):
         way = f"{'of a step' if abs(later) <= 1 else 'steps'} {'later' if later > 0 else 'earlier'}"
         return f"the drive is taken {abs(later):.6g} {way} than {title} takes it"
     return ""

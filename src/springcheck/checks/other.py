@@ -25,7 +25,7 @@ NEWTON_STEPS = 8
 SLACK = 2.0
 """Bounds that steps keep by the value found: one of the engine's roundings, one of what these do to it."""
 FALLS = 4.0
-"""Factor by which the squares of what steps miss have to fall: chance explains one part in their number."""
+"""Factor by which the squares of what steps miss have to fall from one Newton step to the next."""
 MOST_ROWS = 16
 """Rows of a term, or masses, that are looked at one by one; of more of them, all together alone."""
 SINGLE = 2.0**-40
@@ -66,17 +66,19 @@ def _value(case: Case, own: float, size: float, of: Callable[[float], Case]) -> 
     """The value of a number by which all steps are the scheme's own, or None."""
     assert case.ahead is not None
     unit, every = case.roundings * case.ahead.allowance, np.arange(len(case.trajectory.t) - 1)
-    at, x = sight.rows(case, len(every)), own
+    at, x, left = sight.rows(case, len(every)), own, np.inf
     for _ in range(NEWTON_STEPS):
-        change = sight.CHANGE * max(abs(x), size)
-        here = _off(of(x), unit, at)
+        change, here = sight.CHANGE * max(abs(x), size), _off(of(x), unit, at)
         slope = (_off(of(x + change), unit, at) - here) / change
-        x -= float(np.sum(here * slope) / np.sum(slope * slope))
-        if not np.isfinite(x):
-            return None
-    before, after = (_off(of(y), unit, every) for y in (own, x))
-    fits = np.max(np.abs(after)) <= SLACK and FALLS * np.sum(after * after) <= np.sum(before * before)
-    return (x if abs(x) * np.sum(slope * slope) > np.sum(np.abs(slope)) else 0.0) if fits else None
+        # what roundings, all of the sign that hurts, do to the value
+        error = SLACK * float(np.sum(np.abs(slope)) / np.sum(slope * slope))
+        if not FALLS * np.sum(here * here) < left:
+            break
+        left, x = np.sum(here * here), x - float(np.sum(here * slope) / np.sum(slope * slope))
+    if not (np.max(np.abs(here)) <= SLACK and abs(x - own) > error):
+        return None
+    fits = np.max(np.abs(_off(of(x), unit, every))) <= SLACK
+    return (x if abs(x) > error else 0.0) if fits else None
 
 
 def _with(case: Case, number: int, field: str, values: Floats) -> Case:
