@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
 
-from springcheck import driver
+from springcheck import checks, driver
 from springcheck.checks import Case, causes
+from springcheck.identify import files
 from springcheck.physics import scenefile
+from springcheck.physics.scene import Scene
+from springcheck.physics.trajectory import Trajectory
 from springcheck.studies.faults import baths
 from springcheck.studies.faults.table import FAULTS
 
@@ -38,3 +42,124 @@ def test_right_thermostats_show_nothing_and_a_wrong_temperature_shows(name: str)
     if name == "baoab":
         size = float(shown.split(" +- ")[0].split()[-1])
         assert np.isclose(size, 2 / 3, rtol=0.1)
+
+
+def other(scene: Scene, number: int, field: str, row: int, value: float) -> Scene:
+    """The scene with one number of a term's other than it is there."""
+    terms = list(scene.terms)
+    numbers = getattr(terms[number], field).copy()
+    numbers[row] = value
+    terms[number] = replace(terms[number], **{field: numbers})
+    return scene.derived(terms=tuple(terms))
+
+
+def said(scene: Scene, run: Trajectory) -> str:
+    """What a failed judgement says that the states show; "" of one that did not fail."""
+    verdicts = checks.explained(scene, run, checks.judge(scene, run), files.shown)
+    why = next((v.why for v in verdicts if v.passed is False and v.check in checks.TELLING), "")
+    return why.partition(checks.STATES_SHOW)[2]
+
+
+VERLET = "own:velocity-verlet"
+SPRING = "the stiffness of the spring of particle"
+
+
+@pytest.mark.parametrize(
+    ("name", "number", "field", "row", "value", "method", "words"),
+    [
+        ("chain", 1, "k", 0, 1.1 + 1.1e-6, VERLET, f"{SPRING}s 0 and 1: 1.1000011, not 1.1"),
+        (
+            "chain",
+            1,
+            "rest",
+            1,
+            1.0 + 1e-10,
+            VERLET,
+            "rest of the spring of particles 1 and 2: 1.0000000001,",
+        ),
+        ("chain", 0, "k", 1, 0.0, "own:rk4", f"{SPRING} 2: 0, not 0.9"),
+        ("spring-uneven", 0, "at", 0, 1e-6, VERLET, "place of the spring of particle 0: 1e-06, not 0"),
+        (
+            "pendulum",
+            0,
+            "depth",
+            2,
+            7.9 * (1 + 1e-9),
+            VERLET,
+            "depth of the cosine of particle 2: 7.9000000079,",
+        ),
+        ("morse-bond", 0, "rest", 0, 0.12747, VERLET, "rest of the morse of particles 0 and 1: 0.12747,"),
+        ("driven-spring", 1, "c", 0, 0.11 * 3.7, "own:euler", "damping of particle 0: 0.407, not 0.11"),
+        (
+            "driven-spring",
+            2,
+            "amplitude",
+            0,
+            0.43 * (1 + 1e-8),
+            "own:rk4",
+            "of particle 0: 0.4300000043, not",
+        ),
+    ],
+)
+def test_one_number_that_is_another_is_named(
+    name: str, number: int, field: str, row: int, value: float, method: str, words: str
+) -> None:
+    """Each step then is the scheme's own with another number: the sentence names it and both its values."""
+    scene = scenefile.load_scene(name)
+    run = driver.run(other(scene, number, field, row, value), method)
+    assert words in said(scene, run)
+
+
+def test_masses_and_steps_that_are_others_are_named() -> None:
+    scene = scenefile.load_scene("chain")
+    m = scene.m * np.array([1, 1 + 1e-6, 1])
+    run = driver.run(scene.derived(m=m), "own:velocity-verlet")
+    assert "the mass of particle 1: 0.7000007, not 0.7" in said(scene, run)
+    # a program that keeps velocities, of which the judge makes momenta by the scene's masses
+    kept = driver.run(scene.derived(m=m, p=scene.p * m / scene.m), "own:velocity-verlet")
+    run = replace(kept, p=kept.p * scene.m / m)
+    assert "the mass that divides the force on particle 1: 0.7000007, not 0.7" in said(scene, run)
+    run = driver.run(scene.derived(m=scene.m * 1.0001), "own:velocity-verlet")
+    assert "a factor to each mass: 1.0001, not 1" in said(scene, run)
+    pendulum = scenefile.load_scene("pendulum")
+    run = driver.run(pendulum.derived(step=float(np.float32(0.05))), "own:velocity-verlet")
+    run = replace(run, step=0.05, t=pendulum.step * np.arange(len(run.t)))
+    assert "the step: 0.050000000745, not 0.05, as in single precision" in said(pendulum, run)
+
+
+@pytest.mark.parametrize("name", ["chain", "pendulum"])
+def test_a_frame_that_is_there_twice_or_lost_is_named(name: str) -> None:
+    """Of joined masses a repeated frame was called a thermostat's noise; of pendulums nothing was said."""
+    scene = replace(scenefile.load_scene(name), quantities=("q", "p"))
+    run = driver.run(scene, "own:velocity-verlet")
+    at = np.arange(len(run.t))
+    twice, lost = np.sort(np.append(at[:-1], 80)), np.delete(np.append(at, at[-1]), 80)[: len(at) - 1]
+    assert "frame 81 is the one before it once more" in said(
+        scene, replace(run, q=run.q[twice], p=run.p[twice])
+    )
+    fewer = replace(run, q=run.q[lost], p=run.p[lost], t=run.t[:-1])
+    shorter = scene.derived(steps=scene.steps - 1)
+    assert "a frame is missing before frame 80" in said(shorter, fewer)
+
+
+@pytest.mark.parametrize(
+    ("name", "words"), [("van-der-pol", "another number"), ("mathieu-stable", "drive is taken")]
+)
+def test_noise_of_a_few_roundings_is_no_number_and_no_time(name: str, words: str) -> None:
+    """A number that roundings of one sign would move as far explains nothing."""
+    scene = replace(scenefile.load_scene(name), quantities=("q", "p"), steps=300, every=1)
+    run = driver.run(scene, "own:rk4")
+    for seed, size in product(range(4), (3e-15, 6e-15)):
+        rng = np.random.default_rng(seed)
+        q, p = (x * (1 + size * rng.normal(size=x.shape)) for x in (run.q, run.p))
+        assert words not in said(scene, replace(run, q=q, p=p))
+
+
+def test_what_no_number_explains_is_not_said_to_be_the_scheme() -> None:
+    """A verdict that failed ended in: velocity Verlet, double arithmetic explains every step."""
+    for name in ("chain", "spring-uneven", "pendulum"):
+        scene = scenefile.load_scene(name)
+        run = driver.run(scene, "own:velocity-verlet")
+        p = run.p.copy()
+        p[77] *= 1 + 1e-13
+        assert "every step" not in said(scene, replace(run, p=p)).lower()

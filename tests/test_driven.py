@@ -209,6 +209,20 @@ MISPLACED = {
 }
 
 
+def test_a_time_that_is_summed_up_is_no_shift() -> None:
+    """A program of t += h was said to take the drive 1e-14 of a step later."""
+    scene = scenes.load_scene("driven-spring")
+    t = 0.0
+
+    def euler(q: Any, p: Any, h: Any, force: Any, mass: Any) -> Any:
+        nonlocal t
+        now, t = t, t + h
+        return q + h * p / mass, p + h * force(q, p, now)
+
+    run = springcheck.simulate(scene, euler, scheme="explicit-euler")
+    assert "the time of the drive is a sum of steps, rounded at each" in sentence(scene, run)
+
+
 @pytest.mark.parametrize("fault", table.DRIVES, ids=lambda fault: fault.name)
 def test_a_drive_that_is_wrong_is_rejected_and_named(fault: Any) -> None:
     scene = measure.scene(fault.scene)

@@ -745,3 +745,29 @@ def test_names_that_are_wrong_are_one_line(capsys: pytest.CaptureFixture[str]) -
     assert "did you mean rk4?" in capsys.readouterr().err
     assert main(["judge", "nowhere.csv", "--scene", "spring", "--scheme", "rk4"]) == 2
     assert "nowhere.csv" in capsys.readouterr().err
+
+
+def test_a_table_of_counted_steps_takes_its_time_step_from_the_command(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """`--step` was left aside by tables: their steps had to be called t, and were taken for times."""
+    run = driver.run(SCENE, "own:velocity-verlet")
+    path = tmp_path / "a.csv"
+    rows = np.column_stack([np.arange(len(run.t)), run.q, run.p])
+    np.savetxt(path, rows, fmt="%.17g", delimiter=",", header="step,q,p", comments="")
+    judged = ["judge", str(path), "--scene", "spring-uneven", "--scheme", "velocity-verlet"]
+    assert main(judged) == 2
+    assert "counts steps and knows no times; give its time step, as --step H" in capsys.readouterr().err
+    assert main([*judged, "--step", "0.1"]) == 0
+    assert main(["identify", str(path), "--mass", "3.7", "--step", "0.1"]) == 0
+    assert "velocity-verlet" in capsys.readouterr().out
+    # beside times the number of the step is no time
+    np.savetxt(
+        path,
+        np.c_[rows[:, 0], run.t, rows[:, 1:]],
+        fmt="%.17g",
+        delimiter=",",
+        header="step,t,q,p",
+        comments="",
+    )
+    assert main(judged) == 0

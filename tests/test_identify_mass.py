@@ -82,6 +82,11 @@ def test_a_mass_that_is_not_the_stated_one_is_named(step: Any, name: str, factor
     assert "Newmark" not in found.statement
 
 
+def test_a_mass_a_ten_trillionth_off_is_not_said_to_be_the_stated_one() -> None:
+    """It was 1 times the stated one."""
+    assert "in a mass 1.0000000000001 times the stated one" in told(verlet, 1 + 1e-13, stiffness=K).statement
+
+
 def test_without_a_stated_stiffness_mass_and_units_are_both_possible() -> None:
     for factor, scale in ((2.0, "0.5"), (1.027027, "0.973684")):
         statement = told(kicking, factor).statement

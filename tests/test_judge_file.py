@@ -161,6 +161,9 @@ T, Q, P = table().T
         ("t,q,p", (T[1:], Q[1:], P[1:]), "the scene's state after 1 step of velocity Verlet; write"),
         ("t,q,p", (T[7:], Q[7:], P[7:]), "the scene's state after 7 steps of velocity Verlet"),
         ("t,q,p", (T, Q + 0.01, P), r"q\[0\] is 0.31 there, and 0.3 in the scene"),
+        # near the start a unit, a mass or a kick explains nothing
+        ("t,q,p", (T, Q, P * (1 + 1e-6)), r"p\[0\] is 0.7000007 there, and 0.7 in the scene"),
+        ("t,q,p", (T, Q + 1e-8, P), r"q\[0\] is 0.30000001 there, and 0.3 in the scene"),
     ],
 )  # fmt: skip
 def test_a_start_that_is_not_the_scenes_is_named(
@@ -168,6 +171,14 @@ def test_a_start_that_is_not_the_scenes_is_named(
 ) -> None:
     with pytest.raises(StoreError, match=f"off the start of spring-uneven: .*{said}"):
         verdicts(tmp_path, np.column_stack(columns), header)
+
+
+def test_a_start_that_is_nearly_right_is_no_matter_of_a_mass_of_one(tmp_path: Path) -> None:
+    """Of a mass of 1 momenta 1e-8 off were said to be divided by the mass."""
+    rows = np.array([[0.0, 0.0, 1 + 1e-8], [0.1, 0.1, 1.0]])
+    np.savetxt(tmp_path / "a.csv", rows, fmt="%.17g", delimiter=",", header="t,q,p", comments="")
+    with pytest.raises(StoreError, match=r"p\[0\] is 1.00000001 there, and 1 in the scene"):
+        file.judge(tmp_path / "a.csv", scene="spring", scheme="velocity-verlet")
 
 
 def test_momenta_and_velocities_that_contradict_the_mass_are_refused(tmp_path: Path) -> None:

@@ -9,9 +9,11 @@ import runpy
 import subprocess
 import sys
 import zipfile
+from collections.abc import Callable
 from importlib.metadata import version
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 import pytest
@@ -212,6 +214,54 @@ def test_the_functions_of_temperature_are_not_yet_right_and_their_solutions_are(
 def test_a_common_mistake_about_temperature_gets_its_sentence(name: str, said: str) -> None:
     right, _, look = _module("grade").answered(QUESTIONS[name].slips[said], QUESTIONS[name])
     assert (right, look) == (False, said)
+
+
+def _baoab_of_a_negative_root(q, p, h, force, mass, gamma, kT, xi):  # type: ignore[no-untyped-def]
+    c = np.exp(-gamma * h)
+    p = p + h / 2 * force(q)
+    q = q + h / 2 * p / mass
+    p = c * p - np.sqrt(mass * kT * (1 - c * c)) * xi
+    q = q + h / 2 * p / mass
+    return q, p + h / 2 * force(q)
+
+
+def _obabo_of_the_second_draw_first(q, p, h, force, mass, gamma, kT, xi):  # type: ignore[no-untyped-def]
+    c = np.exp(-gamma * h / 2)
+    s = np.sqrt(mass * kT * (1 - c * c))
+    p = c * p + s * xi[1] + h / 2 * force(q)
+    q = q + h * p / mass
+    return q, c * (p + h / 2 * force(q)) + s * xi[0]
+
+
+def _error_of_any_number(n, r):  # type: ignore[no-untyped-def]
+    return (2 / n * (1 + 2 * sum((1 - j / n) * r ** (2 * j) for j in range(1, n)))) ** 0.5
+
+
+@pytest.mark.parametrize(
+    ("name", "answer"),
+    [
+        ("baoab", _baoab_of_a_negative_root),
+        ("obabo", _obabo_of_the_second_draw_first),
+        ("error", _error_of_any_number),
+    ],
+)
+def test_another_right_answer_about_temperature_is_right(name: str, answer: Callable[..., Any]) -> None:
+    """Draws are as likely as their opposites, and in either order; the law of few states holds for many."""
+    right, said, _ = _module("grade").answered(answer, QUESTIONS[name])
+    assert right, said
+
+
+def test_an_implicit_step_that_is_solved_for_springs_alone_is_told_so() -> None:
+    """It was told to iterate further, and has no iteration."""
+
+    def solved(q, p, h, force, mass):  # type: ignore[no-untyped-def]
+        k = force(0.0) - force(1.0)
+        q = (q + h * p / mass) / (1 + h * h * k / mass)
+        return q, p + h * force(q)
+
+    right, _, look = _module("grade").judge(solved, "implicit-euler", look=True)
+    assert not right
+    assert look == "it is right for a force that is proportional to q; solve the equation for any force"
 
 
 def test_what_the_grader_holds_for_right_is_what_the_laws_of_thermostats_say() -> None:

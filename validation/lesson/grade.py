@@ -103,12 +103,14 @@ SLIPS: dict[str, Callable[[Step], Step]] = {
 """What the function does after all, once this is undone."""
 
 
-def hint(step: Step, aim: str) -> str:
-    """Where to look."""
+def hint(step: Step, aim: str, seen: str) -> str:
+    """Where to look, after what the states of the function show."""
     for said, undone in SLIPS.items():
         if shows(undone(step), aim)[0]:
             return said
     scheme = schemes.scheme(aim)
+    if scheme.has("implicit") and " on a spring, and another scheme on forces that are not linear" in seen:
+        return "it is right for a force that is proportional to q; solve the equation for any force"
     if scheme.has("implicit"):
         return "iterate further: the equation of the step is solved when another round changes nothing"
     stages = " then ".join(
@@ -160,7 +162,7 @@ def judge(function: Any, asked: Any, *, look: bool) -> tuple[bool, str, str]:
     if not isinstance(asked, str):
         return answered(function, asked)
     right, said = shows(function, asked)
-    return right, said, hint(function, asked) if look and not right else ""
+    return right, said, hint(function, asked, said) if look and not right else ""
 
 
 def main(arguments: list[str]) -> int:

@@ -31,6 +31,8 @@ class Question:
     right: Law
     slips: dict[str, Law]
     look: str
+    also: tuple[Law, ...] = ()
+    """Other answers that are right as well."""
     residual: Callable[[Cases, list[Any]], bool] | None = None
     """Whether answers solve an equation to rounding, in the place of being those of `right`."""
 
@@ -49,7 +51,8 @@ class Question:
 
     def slip(self, answers: list[Any]) -> str | None:
         """What is wrong with answers: a common mistake, or where to look; None where they are right."""
-        if self.residual(self.cases, answers) if self.residual else self.same(answers, self.right):
+        of_laws = any(self.same(answers, law) for law in (self.right, *self.also))
+        if self.residual(self.cases, answers) if self.residual else of_laws:
             return None
         if self.same(answers, self.right, NEAR):
             return "right to nine digits, not to rounding: is a constant cut short, or an iteration?"
@@ -173,6 +176,17 @@ def _steps(letters: str, others: dict[str, str]) -> dict[str, Law]:
     return slips
 
 
+def _of_opposite(law: Law) -> Law:
+    """A step with the opposite draws, which are as likely: s may be a negative root."""
+    return lambda *a: law(*a[:-1], -np.asarray(a[-1]))
+
+
+def _of_few(n: int, r: float) -> float:
+    """The relative error of a mean of n squares, for any n: two of them are j apart n - j times."""
+    j = np.arange(1, n)
+    return math.sqrt(2 / n * (1 + 2 * float(np.sum((1 - j / n) * float(r) ** (2 * j)))))
+
+
 def _springs(draws: int) -> Cases:
     """Scripted states, draws and parameters; the force is not linear: every kick shows where it was."""
     script = np.random.default_rng(7)
@@ -221,6 +235,7 @@ QUESTIONS: dict[str, Question] = {
         right=splitting("BAOAB"),
         slips=_steps("BAOAB", {"this is ABOBA: kicks come first and last": "ABOBA",
                                "this is BAOA, whose kick is whole: BAOAB ends with half a kick": "BAOA"}),
+        also=(_of_opposite(splitting("BAOAB")),),
         look=f"kick h/2, drift h/2, friction and noise h, drift h/2, kick h/2; {_WHERE}",
     ),
     "kinetic": Question(
@@ -317,12 +332,16 @@ QUESTIONS: dict[str, Question] = {
                 lambda n, r: math.sqrt(2 / n / (1 - r * r))
             ),
         },
+        also=(_of_few,),
         look="sqrt(2/N), N independent states of n: 1/N = (1 + 2 sum of the correlations of q**2)/n",
     ),
     "obabo": Question(
         cases=_springs(2),
         right=splitting("OBABO"),
         slips=_steps("OBABO", {}),
+        # the draws of a pair are independent, and each is as likely as its opposite
+        also=tuple(law for one in (splitting("OBABO"), lambda *a: splitting("OBABO")(*a[:-1], a[-1][::-1]))
+                   for law in (one, _of_opposite(one))),
         look=f"O h/2, kick h/2, drift h, kick h/2, O h/2; {_WHERE}",
     ),
 }  # fmt: skip

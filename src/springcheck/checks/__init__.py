@@ -109,10 +109,7 @@ def summary(verdicts: Sequence[Verdict]) -> str:
 
 @np.errstate(all="ignore")
 def explained(
-    scene: Scene,
-    run: Trajectory,
-    verdicts: Sequence[Verdict],
-    shown: Callable[[Scene, Trajectory, int], str],
+    scene: Scene, run: Trajectory, verdicts: Sequence[Verdict], shown: Callable[[Scene, Trajectory, int], str]
 ) -> list[Verdict]:
     """The verdicts, the first failed one with its cause appended, as the states around its first step off
     show.
@@ -124,9 +121,13 @@ def explained(
         return list(verdicts)
     case = Case(trajectory=run, scene=scene)
     # imported here: only failures are explained
-    from springcheck.checks import causes, driven
+    from springcheck.checks import causes, driven, other
 
-    said = driven.found(case) or causes.found(case) or shown(scene, run, first_off(case) or 0)
+    # of one particle by itself states show more than which number is another
+    looks = [lambda: shown(scene, run, first_off(case) or 0), lambda: other.found(case)]
+    if not (scene.system.is_linear and scene.system.is_separate):
+        looks.reverse()
+    said = driven.found(case) or causes.found(case) or looks[0]() or looks[1]()
     why = f"{first.why}{STATES_SHOW}{said}" if said else first.why
     return [replace(v, why=why) if v is first else v for v in verdicts]
 
@@ -141,14 +142,9 @@ def experiments_of(scene: Scene) -> tuple[Check, ...]:
 
 
 def judge_thoroughly(
-    scene: Scene,
-    label: str,
-    run: Callable[..., Trajectory],
-    experiments: Sequence[Check] | None = None,
-    *,
-    seed: int = 0,
-    progress: Callable[[int], None] | None = None,
-) -> list[Verdict]:
+    scene: Scene, label: str, run: Callable[..., Trajectory], experiments: Sequence[Check] | None = None, *,
+    seed: int = 0, progress: Callable[[int], None] | None = None,
+) -> list[Verdict]:  # fmt: skip
     """Every experiment with a method, whose runs `run(scene, label)` carries out.
 
     In a bath it is `run(scene, label, seed=)`, with `seed` and others.  `progress(1)` is called after each

@@ -320,13 +320,9 @@ REPEATED = 2000
 
 
 def advance(
-    case: Case,
-    q: Extended,
-    p: Extended,
-    steps: int,
-    *,
+    case: Case, q: Extended, p: Extended, steps: int, *,
     forces: Callable[[Iterable[Term]], Force] | None = None,
-) -> tuple[Extended, Extended]:
+) -> tuple[Extended, Extended]:  # fmt: skip
     """The scheme's own steps from states (f, n), in extended precision; `forces` computes the forces."""
     if steps > REPEATED and case.linear:
         return _leap(case, q, p, steps)

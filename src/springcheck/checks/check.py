@@ -115,11 +115,7 @@ class Check:
 
 
 def check(
-    short: str,
-    *,
-    family: Family,
-    requires: Collection[str] = (),
-    telling: bool | None = None,
+    short: str, *, family: Family, requires: Collection[str] = (), telling: bool | None = None
 ) -> Callable[[Judge], Check]:
     """Make a check of a function, with its name and the first sentence of its docstring.
 
@@ -132,16 +128,12 @@ def check(
         )
 
     def made(judge: Judge) -> Check:
-        sentence = " ".join((judge.__doc__ or "").partition("\n\n")[0].split()).partition(". ")[0]
+        first = " ".join((judge.__doc__ or "").partition("\n\n")[0].split()).partition(". ")[0]
+        tells = family not in ("record", "repeat") if telling is None else telling
         return Check(
-            name=judge.__name__.replace("_", "-"),
-            short=short,
-            family=family,
-            requires=frozenset(requires),
-            sentence=sentence.rstrip(".") + ".",
-            judge=judge,
-            telling=family not in ("record", "repeat") if telling is None else telling,
-        )
+            name=judge.__name__.replace("_", "-"), short=short, family=family, requires=frozenset(requires),
+            sentence=f"{first.rstrip('.')}.", judge=judge, telling=tells,
+        )  # fmt: skip
 
     return made
 

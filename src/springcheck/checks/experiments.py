@@ -37,13 +37,8 @@ def propagator(bench: Bench) -> Finding | str:
         return np.asarray(most / case.roundings)
 
     sees, hidden = sight.of_steps(case, np.ones(1, dtype=bool), part, copies=2 * bench.scene.n + 1)
-    return Finding(
-        np.max(off),
-        case.roundings,
-        "roundings",
-        f"{2 * bench.scene.n} unit pushes, one step of {case.scheme.title} each{hidden}",
-        sees,
-    )
+    why = f"{2 * bench.scene.n} unit pushes, one step of {case.scheme.title} each{hidden}"
+    return Finding(np.max(off), case.roundings, "roundings", why, sees)
 
 
 ENDED = "the engine made no step that ends in finite numbers"
@@ -102,14 +97,9 @@ def determinant(bench: Bench) -> Finding | str:
     limit = float(np.sum(np.abs(inverse).T * allowed))
     if abs(change) <= limit and limit >= 1:
         return "rounding of the entries may be as large as all of the area"
-    return Finding(
-        abs(change),
-        limit,
-        "relative",
-        f"roundings of every entry, each of the sign that hurts; the scheme's own is "
-        f"{float(np.linalg.det(ideal)):.6g}",
-        Limits(area=limit / bench.scene.n),
-    )
+    own = float(np.linalg.det(ideal))
+    why = f"roundings of every entry, each of the sign that hurts; the scheme's own is {own:.6g}"
+    return Finding(abs(change), limit, "relative", why, Limits(area=limit / bench.scene.n))
 
 
 @check("sympl", family="map", requires=MATRIX | {"symplectic", "undamped"})
@@ -129,13 +119,9 @@ def symplecticity(bench: Bench) -> Finding | str:
     worst = largest(ratio)
     if ratio[worst] <= 1 and not np.any(limit[form != 0] < 1):
         return "rounding of the entries may be as large as the form"
-    return Finding(
-        off[worst],
-        limit[worst],
-        "of an action",
-        "roundings of every entry, each of the sign that hurts",
-        Limits(area=float(np.min(limit[form != 0]))),
-    )
+    why = "roundings of every entry, each of the sign that hurts"
+    sees = Limits(area=float(np.min(limit[form != 0])))
+    return Finding(off[worst], limit[worst], "of an action", why, sees)
 
 
 def _shifted(
@@ -184,13 +170,8 @@ def reversibility(bench: Bench) -> Finding | str:
     moved = case.system.norm.size(out.q - bench.scene.q, bench.scene.p - out.p)
     if off <= bound * size and moved[-1] <= bound * size and np.any(moved > 0):
         return "standing still on the way back would pass"
-    return Finding(
-        float(off / size),
-        bound,
-        "roundings",
-        f"{count(steps, 'step')} out and {steps} back, each rounded, all of one sign",
-        _sees(case, steps, bound * size),
-    )
+    why = f"{count(steps, 'step')} out and {steps} back, each rounded, all of one sign"
+    return Finding(float(off / size), bound, "roundings", why, _sees(case, steps, bound * size))
 
 
 SMALL_PART = 2.0**-10
@@ -258,17 +239,11 @@ def orientation(bench: Bench) -> Finding | str:
         return ENDED
     places = scene.all_places
     base = replace(scene, steps=steps, every=1)
-    turned = [
-        bench.run(
-            replace(
-                base,
-                places=places - places % 3 + (places + turn) % 3,
-                box=None if base.box is None else tuple(np.roll(base.box, turn).tolist()),
-            ),
-            bench.label,
-        )
-        for turn in (1, 2)
-    ]
+    turned = []
+    for turn in (1, 2):
+        box = None if base.box is None else tuple(np.roll(base.box, turn).tolist())
+        there = replace(base, places=places - places % 3 + (places + turn) % 3, box=box)
+        turned.append(bench.run(there, bench.label))
     if any(len(run.t) != len(alone.t) for run in turned):
         return Finding(np.inf, 0.0, "frames", "one of the runs ended early")
     differ = np.any([(x.q != alone.q) | (x.p != alone.p) for x in turned], axis=(0, 2))
@@ -313,9 +288,6 @@ def repeatability(bench: Bench) -> Finding | str:
         return Finding(np.inf, 0.0, "frames", "the runs differ in length")
     if len(first.t) < 2:
         return ENDED
-    same = (first.q.view(np.int64) == again.q.view(np.int64)) & (
-        first.p.view(np.int64) == again.p.view(np.int64)
-    )
-    return Finding(
-        np.count_nonzero(~np.all(same, axis=1)), 0.0, "frames", "the same operations in the same order"
-    )
+    one, other = (np.stack([run.q, run.p]).view(np.int64) for run in (first, again))
+    differ = np.count_nonzero(np.any(one != other, axis=(0, 2)))
+    return Finding(differ, 0.0, "frames", "the same operations in the same order")

@@ -78,14 +78,9 @@ def _order(bench: Bench, scene: Scene, where: str) -> Finding | str:
         floor.append(float(norm(*(x[0] for x in case.allowance))) * steps)
     slope, se, rounding = fitted(h, error, floor, second=2 if scheme.has("reversible") else 1)
     bound = min(student(HALVINGS - 3, CHANCE) * se + rounding, UNRESOLVED)
-    return Finding(
-        abs(slope - scheme.order),
-        bound,
-        "orders",
-        f"slope {slope:.5f} +- {se:.1g} on the {where}, h from {h[0]:.3g} to {h[-1]:.3g}; "
-        f"{scheme.title} has order {scheme.order}",
-        Limits(order=bound),
-    )
+    seen = f"slope {slope:.5f} +- {se:.1g} on the {where}, h from {h[0]:.3g} to {h[-1]:.3g}"
+    why = f"{seen}; {scheme.title} has order {scheme.order}"
+    return Finding(abs(slope - scheme.order), bound, "orders", why, Limits(order=bound))
 
 
 def fitted(
@@ -189,14 +184,9 @@ def rounding_bias(bench: Bench) -> Finding | str:
     )
     if limit[worst] < off[worst] <= ROUNDED_MATRIX:
         seen += "; a one-step matrix whose elements are rounded drifts by as much"
-    return Finding(
-        off[worst],
-        limit[worst],
-        "a step",
-        f"{SIGMAS:g} standard errors over {MEMBERS} springs and {LONG} steps; {seen}",
-        # momenta times 1 + x at each step raise the energy by x of it: half of it is kinetic, and squared
-        Limits(area=float(np.min(limit))),
-    )
+    why = f"{SIGMAS:g} standard errors over {MEMBERS} springs and {LONG} steps; {seen}"
+    # momenta times 1 + x at each step raise the energy by x of it: half of it is kinetic, and squared
+    return Finding(off[worst], limit[worst], "a step", why, Limits(area=float(np.min(limit))))
 
 
 SHORT = "a run of it ended early"
@@ -230,15 +220,9 @@ def rounding_growth(bench: Bench) -> Finding | str:
     slope, se = _growth(steps, change)
     if slope <= 0.5 + SIGMAS * se and 0.5 + SIGMAS * se >= 1:
         return f"an exponent of {slope:.3f} +- {se:.3f} does not tell a walk from a bias"
-    return Finding(
-        slope,
-        0.5 + SIGMAS * se,
-        "exponent",
-        f"rounding errors that walk at random have 1/2, a bias 1; "
-        f"{slope:.3f} +- {se:.3f} by the jackknife, {MEMBERS} springs, "
-        f"{LONG} steps of {ODD:g}",
-        Limits(area=_seen_bias(steps, change)),
-    )
+    seen = f"{slope:.3f} +- {se:.3f} by the jackknife, {MEMBERS} springs, {LONG} steps of {ODD:g}"
+    why = f"rounding errors that walk at random have 1/2, a bias 1; {seen}"
+    return Finding(slope, 0.5 + SIGMAS * se, "exponent", why, Limits(area=_seen_bias(steps, change)))
 
 
 def _growth(steps: Floats, change: Floats) -> tuple[float, float]:
@@ -290,11 +274,8 @@ def convergence(bench: Bench) -> Finding | str:
     bound = student(len(error) - 2, CHANCE) * se
     if abs(slope - law) <= bound and bound >= law:
         return f"an exponent of {slope:.3f} +- {se:.2g} does not tell its law from no law at all"
-    return Finding(
-        abs(slope - law),
-        bound,
-        "exponent",
+    why = (
         f"exponent {slope:.3f} +- {se:.2g} over {len(error)} decades of tolerance; {bench.scheme.title} "
-        f"has {power}: what a step of its highest order leaves, times the number of steps",
-        Limits(order=bound),
+        f"has {power}: what a step of its highest order leaves, times the number of steps"
     )
+    return Finding(abs(slope - law), bound, "exponent", why, Limits(order=bound))

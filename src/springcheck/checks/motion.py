@@ -38,14 +38,11 @@ def closed_form(case: Case) -> Finding | str:
     def part(at: Integers, right: sight.States, change: sight.States) -> Reals:
         return np.where(late[at], case.system.norm.size(*modes.out_of(*change)) / allowed[at], 0)
 
-    return Finding(
-        distance[worst] / unit[worst],
-        bound[worst],
-        "roundings",
+    why = (
         f"roundings of {count(int(case.steps[worst]), 'step')}, carried on by the map: {_how(case)}"
-        + _untold(case, np.maximum.accumulate(moved) <= allowed, "motion"),
-        sight.of_modes(case, part),
+        + _untold(case, np.maximum.accumulate(moved) <= allowed, "motion")
     )
+    return Finding(distance[worst] / unit[worst], bound[worst], "roundings", why, sight.of_modes(case, part))
 
 
 def _how(case: Case) -> str:
@@ -108,21 +105,15 @@ def shadow_energy(case: Case) -> Finding | str:
 
     def part(at: Integers, right: sight.States, change: sight.States) -> Reals:
         (u, v), (du, dv) = right, change
-        of_u, of_v = (
-            form[:, 0] * (2 * u + du) + form[:, 1] * v,
-            form[:, 1] * (u + du) + form[:, 2] * (2 * v + dv),
-        )
+        of_u = form[:, 0] * (2 * u + du) + form[:, 1] * v
+        of_v = form[:, 1] * (u + du) + form[:, 2] * (2 * v + dv)
         most = np.max(np.abs(of_u * du + of_v * dv), axis=1)
         return np.where(late[at], most / (limit * scale)[at], 0)
 
-    return Finding(
-        seen[worst],
-        limit[worst],
-        "roundings",
-        f"roundings of {count(int(case.steps[worst]), 'step')}: {_how(case)}"
-        + _untold(case, drowned, "energy"),
-        sight.of_modes(case, part),
+    why = f"roundings of {count(int(case.steps[worst]), 'step')}: {_how(case)}" + _untold(
+        case, drowned, "energy"
     )
+    return Finding(seen[worst], limit[worst], "roundings", why, sight.of_modes(case, part))
 
 
 @check("freq", family="motion", requires=CLOSED | {"undamped"})
@@ -174,13 +165,8 @@ def frequency(case: Case) -> Finding | str:
     true = float(turn.angle[j] / (abs(np.longdouble(case.trajectory.step)) * case.w[j]) - 1)
     more = "" if abs(off) <= angle else "; whole turns are not counted, it may be off by more"
     own = f"the scheme itself is off the true frequency by {true:.2e}"
-    return Finding(
-        abs(off) / abs(expected),
-        limit,
-        "relative",
-        f"the closed form's bound as an angle; {own}{more}",
-        sight.of_modes(case, part),
-    )
+    why = f"the closed form's bound as an angle; {own}{more}"
+    return Finding(abs(off) / abs(expected), limit, "relative", why, sight.of_modes(case, part))
 
 
 _LOW_TWO_PI = 2.4492935982947064e-16
@@ -238,13 +224,9 @@ def momentum(case: Case) -> Finding | str:
     known = gained > limit * unit
     off_by = np.min((limit * unit)[known] / gained[known], initial=np.inf)
     along = "" if len(axes) == 1 else f" along {'xyz'[axes[axis]]}"
-    return Finding(
-        float(seen[worst, axis]),
-        float(limit[worst, 0]),
-        "roundings",
-        f"forces cancel in pairs{along}; {count(int(steps[worst + 1]), 'step')}, each rounded, of one sign",
-        Limits(reaction=float(off_by) if np.isfinite(off_by) else None),
-    )
+    why = f"forces cancel in pairs{along}; {count(int(steps[worst + 1]), 'step')}, each rounded, of one sign"
+    sees = Limits(reaction=float(off_by) if np.isfinite(off_by) else None)
+    return Finding(float(seen[worst, axis]), float(limit[worst, 0]), "roundings", why, sees)
 
 
 @check("angular", family="motion", requires=MAP | {"alike", "one-area"}, telling=False)
@@ -267,23 +249,15 @@ def angular_momentum(case: Case) -> Finding | str:
     if seen[worst] <= limit[worst] and not np.any(told):
         return "rounding may be as large as all of it"
     share = (limit * unit)[told] / (size * np.tile(np.maximum(steps[1:], 1), len(parts)))[told]
-    return Finding(
-        seen[worst],
-        limit[worst],
-        "roundings",
-        f"roundings of {count(int(np.tile(steps[1:], len(parts))[worst]), 'step')}, all of one sign",
-        Limits(area=float(np.min(share, initial=np.inf))) if np.any(told) else Limits(),
-    )
+    why = f"roundings of {count(int(np.tile(steps[1:], len(parts))[worst]), 'step')}, all of one sign"
+    sees = Limits(area=float(np.min(share, initial=np.inf))) if np.any(told) else Limits()
+    return Finding(seen[worst], limit[worst], "roundings", why, sees)
 
 
 def _areas(
-    case: Case,
-    pair: tuple[Integers, Integers],
-    states: tuple[Reals, Reals],
-    start: tuple[Extended, Extended],
-    noise: tuple[Extended, Extended],
-    steps: Integers,
-) -> tuple[Extended, Extended, Extended]:
+    case: Case, pair: tuple[Integers, Integers], states: tuple[Reals, Reals],
+    start: tuple[Extended, Extended], noise: tuple[Extended, Extended], steps: Integers,
+) -> tuple[Extended, Extended, Extended]:  # fmt: skip
     """Error of the angular momentum in the plane of two axes, its largest change in one step by a rounding of
     each coordinate, and its right size, at every frame but the first, (f-1,) each."""
     x, y = pair
@@ -336,10 +310,6 @@ def gyration(case: Case) -> Finding | str:
         if before[worst]
         else "makes a velocity out of none"
     )
-    return Finding(
-        seen[worst],
-        case.roundings,
-        "roundings",
-        f"roundings along one step of {scheme.title}; step {int(case.steps[worst[0] + 1])} {did}",
-        Limits(step=None if np.isinf(longer) else float(longer)),
-    )
+    why = f"roundings along one step of {scheme.title}; step {int(case.steps[worst[0] + 1])} {did}"
+    sees = Limits(step=None if np.isinf(longer) else float(longer))
+    return Finding(seen[worst], case.roundings, "roundings", why, sees)

@@ -55,10 +55,8 @@ def grid(case: Case) -> Finding:
     status = run.outcome.status
     if last > asked or (status == "complete" and last != asked):
         wrong.append(f"{last} of {count(asked, 'step')}, and the run is called {status}")
-    elif (
-        status in ("stopped", "diverged")
-        and not case.law.has("random")
-        and not (_gives_up(case) or _explodes(case))
+    elif status in ("stopped", "diverged") and not (
+        case.law.has("random") or _gives_up(case) or _explodes(case)
     ):
         wrong.append(f"{status} after {last} of {count(asked, 'step')} for no reason that is known here")
         if status == "stopped" and run.outcome.message:

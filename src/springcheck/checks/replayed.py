@@ -225,9 +225,8 @@ def _hidden(case: Case, found: _Replayed) -> str:
     part = float(2 * np.max(room) / np.max(p))
     if not part < 1:
         return ""
-    rebuilt = (
-        ", a velocity being rebuilt from positions at every step" if case.trajectory.rebuilds_velocity else ""
-    )
+    at_every = ", a velocity being rebuilt from positions at every step"
+    rebuilt = at_every if case.trajectory.rebuilds_velocity else ""
     return (
         f"; a momentum off by {part:.1e} of the largest shows at each of these frames, less may not{rebuilt}"
     )
@@ -250,15 +249,13 @@ def replay(case: Case) -> Finding | str:
     if seen[worst] <= number and not np.any(np.max(still, axis=0) > number):
         return "rounding may be as large as the way from frame to frame"
     lengths = np.abs(np.diff(run.t[: len(seen) + 1])) / found.counts
-    return Finding(
-        seen[worst],
-        number,
-        "roundings",
+    why = (
         f"roundings of {count(int(found.counts[worst]), 'step')} from the frame before, each carried on, and "
         f"of the time{_told(case, found)}; {count(int(np.sum(found.counts)), 'step')} by the rule, "
         f"{np.min(lengths):.3g} to {np.max(lengths):.3g} long in the mean between two frames"
-        f"{_hidden(case, found)}{_until(case, found)}",
+        f"{_hidden(case, found)}{_until(case, found)}"
     )
+    return Finding(seen[worst], number, "roundings", why)
 
 
 @check("gain", family="motion", requires={"rule", "two-frames", "linear"})
@@ -279,9 +276,8 @@ def energy_gain(case: Case) -> Finding | str:
         return "nothing moves"
     force = case.system.force(q, p)
     of_q, of_p = (number * one + late for one, late in zip(found.bounds, found.late, strict=True))
-    each = (
-        np.sum(np.abs(force[1:]) * of_q + (np.abs(p[1:]) + of_p) / case.judged.m * of_p, axis=1) + found.loose
-    )
+    moved = np.abs(force[1:]) * of_q + (np.abs(p[1:]) + of_p) / case.judged.m * of_p
+    each = np.sum(moved, axis=1) + found.loose
     law = np.cumsum(found.gains)
     off, bound = np.abs(energy[1:] - energy[0] - law), np.cumsum(each)
     ratio = off / bound
@@ -295,10 +291,8 @@ def energy_gain(case: Case) -> Finding | str:
     turns = abs(float(run.t[held][-1])) * float(np.sqrt(np.max(np.abs(case.system.modes.w2)))) / (2 * np.pi)
     span = "a period of the fastest mode" if turns > 0 else "the run"
     grown, said = (float(x / size / (turns or 1)) for x in (energy[-1] - energy[0], law[-1]))
-    return Finding(
-        off[worst] / size,
-        bound[worst] / size,
-        "of the energy",
+    why = (
         f"(h**2/8) (F'**2 - F**2)/m at each step; {span} adds {grown:.6g} of the "
-        f"energy, by the sum over the steps {said:.6g}{told}{_until(case, found)}",
+        f"energy, by the sum over the steps {said:.6g}{told}{_until(case, found)}"
     )
+    return Finding(off[worst] / size, bound[worst] / size, "of the energy", why)

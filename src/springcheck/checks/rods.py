@@ -121,11 +121,9 @@ def turn(case: Case) -> Finding | str:
     whole = n[1:] * np.abs(each)
     if ratio[worst] <= 1 and not np.any(whole > bound):
         return "rounding may be as large as all of the turn"
-    return Finding(
-        off[worst],
-        bound[worst],
-        "rad",
+    why = (
         f"roundings of {count(int(steps[1:][worst[0]]), 'step')}, of angle and rate, all of one sign; "
-        f"a step turns by {float(each[worst[1]]):.6g} where h w = {float(abs(run.step) * w[worst[1]]):.6g}",
-        Limits(step=float(np.min(np.where(w > 0, bound / whole, np.inf)))),
+        f"a step turns by {float(each[worst[1]]):.6g} where h w = {float(abs(run.step) * w[worst[1]]):.6g}"
     )
+    sees = Limits(step=float(np.min(np.where(w > 0, bound / whole, np.inf))))
+    return Finding(off[worst], bound[worst], "rad", why, sees)

@@ -21,15 +21,9 @@ what is left beyond the rest length."""
 
 
 def of_step(
-    case: Claim,
-    q: Reals,
-    p: Reals,
-    places: list[Reals] | None,
-    *,
-    smallest: np.longdouble = SMALLEST,
-    recorded: bool = False,
-    paired: bool = False,
-) -> tuple[Extended, Extended]:
+    case: Claim, q: Reals, p: Reals, places: list[Reals] | None, *,
+    smallest: np.longdouble = SMALLEST, recorded: bool = False, paired: bool = False,
+) -> tuple[Extended, Extended]:  # fmt: skip
     """One rounding of everything that one step from states (..., n) adds up, (..., n) each.
 
     `places` are the positions at which the scheme evaluates the force on its way: a nonlinear force is
@@ -42,17 +36,10 @@ def of_step(
     q, p = q.astype(np.longdouble), p.astype(np.longdouble)
     h, m = np.longdouble(abs(run.step)), scene.m.astype(np.longdouble)
     size_q, size_p = schemes.magnitude_step(
-        case.scheme,
-        q,
-        p,
-        h=run.step,
-        m=m,
-        rate=case.law.rate,
-        turns=case.law.turns,
-        met=_evaluations(case, places, recorded),
-        hold=case.system.rods,
+        case.scheme, q, p, h=run.step, m=m, rate=case.law.rate, turns=case.law.turns,
+        met=_evaluations(case, places, recorded), hold=case.system.rods,
         loose=0.0 if paired else how.lengths / (how.state * case.roundings),
-    )
+    )  # fmt: skip
     # the reference step rounds as well
     state = how.state + ROUNDOFF
     # an engine may count positions from the rest points of springs, and so round those
@@ -75,6 +62,7 @@ def _evaluations(case: Claim, places: list[Reals] | None, recorded: bool) -> lis
     joints = OF_LENGTH / np.longdouble(case.roundings) * pulls
     acting = {"slow": scene.system.slow, "fast": scene.system.fast, "magnetic": sum(case.law.fields, ())}
     found: list[Met] = []
+    brakes = scene.system.brakes_by_place
     made: dict[tuple[str, float], Met] = {}
     for number, (terms, part, at_end) in enumerate(scheme.evaluations):
         # an engine may take a step's kick in one piece, with the whole error of its force
@@ -92,9 +80,7 @@ def _evaluations(case: Claim, places: list[Reals] | None, recorded: bool) -> lis
                 joined=not scene.system.is_separate,
                 joints=joints,
                 q=near,
-                friction=scene.system.friction_at(near)
-                if near is not None and scene.system.brakes_by_place
-                else None,
+                friction=None if near is None or not brakes else scene.system.friction_at(near),
                 pull=None if near is None else scene.system.potential_force(near, np.zeros_like(near)),
             )
         found.append(made[known])

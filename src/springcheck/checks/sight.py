@@ -22,6 +22,7 @@ from springcheck import schemes
 from springcheck.checks.case import Case, advance
 from springcheck.physics import exact
 from springcheck.physics.arrays import ROUNDOFF, Arithmetic, Extended, Integers, Reals
+from springcheck.physics.scene import Scene
 from springcheck.physics.term import Term
 from springcheck.physics.trajectory import NOT_KNOWN, Limits
 from springcheck.text.wording import count
@@ -49,23 +50,17 @@ NUMBERS = 1 << 16
 States: TypeAlias = tuple[Extended, Extended]
 Part: TypeAlias = Callable[[States], Reals | np.floating]
 OF_A_DRIVE = {
-    "amplitude": ("amplitude", "depth"),
-    "frequency": ("frequency",),
-    "phase": ("phase",),
-    "late": ("phase",),
-}
+    "amplitude": ("amplitude", "depth"), "frequency": ("frequency",), "phase": ("phase",), "late": ("phase",),
+}  # fmt: skip
 """Limits of a drive, and the fields that are changed; the last one is a phase of W h a step."""
 NAMES = ("stiffness", "step", "friction", *OF_A_DRIVE)
 """Limits that are changes of a scene's own numbers, relative except for phases."""
 
 
 def limits(
-    right: States,
-    motions: Callable[[str], Sequence[States]],
-    change: float,
-    part: Part,
+    right: States, motions: Callable[[str], Sequence[States]], change: float, part: Part,
     coarse: Callable[[str], Sequence[States]] | None = None,
-) -> tuple[Limits, int]:
+) -> tuple[Limits, int]:  # fmt: skip
     """The limits of a check, and how many springs and frictions are invisible however far they are off.
 
     `motions(name)` are the right one with a parameter larger by `change`, one for each spring or friction,
@@ -119,13 +114,10 @@ MOST_ROWS = 8
 def changed(case: Case, name: str, change: float, rows: Rows | None = None) -> Case:
     """The case with its step, or some rows of terms, larger by a fraction."""
     run, scene = case.trajectory, case.judged
-    # the parameters are the judged ones already: they are not rounded once more
-    how = replace(run.arithmetic, parameters=Arithmetic().parameters, excess=0.0)
-    run = replace(run, arithmetic=how)
     if name == "step":
         # the times too, from which the number of the first frame follows
-        run = replace(run, step=run.step * (1 + change), t=run.t * (1 + change))
-        return Case(trajectory=run, scene=scene)
+        longer = replace(run, step=run.step * (1 + change), t=run.t * (1 + change))
+        return of_scene(replace(case, trajectory=longer), scene)
     assert rows is not None
     number, chosen = rows
     terms = list(scene.terms)
@@ -140,7 +132,13 @@ def changed(case: Case, name: str, change: float, rows: Rows | None = None) -> C
     else:
         # friction by the rule of all terms: by its own it is no part of what is scaled
         terms[number] = Term.scaled(terms[number], 1 + more)
-    return Case(trajectory=run, scene=scene.derived(terms=tuple(terms)))
+    return of_scene(case, scene.derived(terms=tuple(terms)))
+
+
+def of_scene(case: Case, scene: Scene) -> Case:
+    """The case with another scene, whose parameters are those of the engine: they are not rounded again."""
+    how = replace(case.trajectory.arithmetic, parameters=Arithmetic().parameters, excess=0.0)
+    return Case(trajectory=replace(case.trajectory, arithmetic=how), scene=scene)
 
 
 Rows: TypeAlias = tuple[int, slice]
@@ -179,12 +177,9 @@ def _weakest(case: Case, every: list[Rows], at: Integers) -> list[Rows]:
 
 
 def of_steps(
-    case: Case,
-    told: NDArray[np.bool_],
-    part: Callable[[Integers, States], Reals | np.floating],
-    *,
+    case: Case, told: NDArray[np.bool_], part: Callable[[Integers, States], Reals | np.floating], *,
     copies: int = 1,
-) -> tuple[Limits, str]:
+) -> tuple[Limits, str]:  # fmt: skip
     """Limits of detection of the steps from each frame to the next, of those that are told (f-1,), and what
     is invisible, in words.  `copies` of one scene side by side have their springs changed together."""
     at = rows(case, len(told), told)
@@ -192,14 +187,14 @@ def of_steps(
 
     def motions(name: str, change: float = change) -> list[States]:
         if name == "step":
-            return [_ends(changed(case, name, change), at)]
+            return [ends(changed(case, name, change), at)]
         some = _weakest(case, every_row(case, name, copies), at)
-        return [_ends(changed(case, name, change, one), at) for one in some]
+        return [ends(changed(case, name, change, one), at) for one in some]
 
     def coarse(name: str) -> list[States]:
         return motions(name, COARSER * change)
 
-    found, hidden = limits(_ends(case, at), motions, change, lambda off: part(at, off), coarse)
+    found, hidden = limits(ends(case, at), motions, change, lambda off: part(at, off), coarse)
     said = f"; {count(hidden, 'spring')} could be off by any part and not be seen in a step" if hidden else ""
     return found, said
 
@@ -231,7 +226,7 @@ def _solution(case: Case, at: Integers) -> States | None:
     return exact.true_motion(case.scene, case.steps[at], case.trajectory.step)
 
 
-def _ends(case: Case, at: Integers) -> States:
+def ends(case: Case, at: Integers) -> States:
     """The scheme's own next frame after these frames."""
     run = case.trajectory
     q, p = (x[at].astype(np.longdouble) for x in (run.q, run.p))
@@ -253,38 +248,15 @@ def _mode_motions(case: Case) -> tuple[Integers, float, States, dict[str, list[S
     at = rows(case, len(case.steps))
     steps = case.steps[at]
     change = change_of(int(steps[-1]))
-    if case.undriven is not case:
-        drives = {name: every_row(case, name)[:MOST_ROWS] for name in OF_A_DRIVE}
-        motions = {
-            name: [changed(case, name, change, one).closed_at(steps) for one in some]
-            for name, some in drives.items()
-        }
-        return at, change, case.closed_at(steps), motions
-
-    def states(matrices: Extended) -> States:
-        return schemes.propagate(matrices, *case.mode_start, steps, area_preserving=case.area_preserving)
-
-    found = ((name, changed_matrices(case, name, change)) for name in NAMES[:3])
-    # near a step without a solution the changed map may reverse orientation
-    # the modes of several springs change otherwise with each of them
-    motions = {
-        name: [states(matrices)]
-        for name, matrices in found
-        if matrices is not None
-        and np.all(schemes.rotation(matrices).determinant > 0)
-        and (name == "step" or len(every_row(case, name)) <= 1)
-    }
-    return at, change, states(case.matrices), motions
-
-
-def changed_matrices(case: Case, name: str, change: float) -> Extended | None:
-    """One-step matrices of the modes with one parameter larger by a fraction; None where it is none."""
-    more = {key: 1 + np.longdouble(change if key == name else 0) for key in NAMES[:3]}
-    modes = case.system.modes
-    if not (name == "step" or np.any({"stiffness": modes.w2, "friction": modes.rate}[name] != 0)):
-        return None
-    one = np.ones(1, dtype=np.longdouble)
-    h: Any = np.longdouble(case.trajectory.step) * more["step"]
-    return schemes.matrix(
-        case.scheme, h=h, m=one, k=modes.w2 * more["stiffness"], c=modes.rate * more["friction"]
-    )
+    driven, motions = case.undriven is not case, {}
+    for name in OF_A_DRIVE if driven else NAMES[:3]:
+        some = [None] if name == "step" else every_row(case, name)[:MOST_ROWS]
+        # the modes of several springs change otherwise with each of them
+        others = [changed(case, name, change, one) for one in (some if driven or len(some) == 1 else [])]
+        # near a step without a solution the changed map may reverse orientation
+        motions[name] = [
+            one.closed_at(steps)
+            for one in others
+            if driven or np.all(schemes.rotation(one.matrices).determinant > 0)
+        ]
+    return at, change, case.closed_at(steps), motions

@@ -32,17 +32,15 @@ def tolerance(case: Case) -> Finding | str:
     moved = np.max(case.system.norm(q - case.scene.q, p - case.scene.p))
     if value <= bound and 0 < moved <= bound:
         return "standing still would pass: it allows all of the motion"
-    return Finding(
-        value,
-        bound,
-        "initial energy norms",
+    why = (
         f"{run.tolerance:g} a step of every component, at most {most_steps(case):.0f} internal steps, "
         f"each error enlarged by the exact flow at most {flow_growth(case):.3g} times"
         + (f", and {begun:.2g} of the first step, as its rule has it" if begun else "")
         + (f"; {rebuilt:.2g} rounding of velocities rebuilt from positions" if rebuilt else "")
-        + _not_believed(case),
-        sight.of_exact(case, lambda change: case.system.norm(*change) / bound),
+        + _not_believed(case)
     )
+    sees = sight.of_exact(case, lambda change: case.system.norm(*change) / bound)
+    return Finding(value, bound, "initial energy norms", why, sees)
 
 
 @np.errstate(all="ignore")

@@ -29,12 +29,8 @@ def line(x: Floats, y: Floats, *terms: Floats) -> Line:
     left = y - design @ best
     freedom = len(x) - len(best)
     variance = float(left @ left) / freedom if freedom else np.nan
-    return Line(
-        slope=float(best[1]),
-        standard_error=float(np.sqrt(variance) * np.linalg.norm(inverse[1])),
-        intercept=float(best[0]),
-        leverage=inverse[1],
-    )
+    error = float(np.sqrt(variance) * np.linalg.norm(inverse[1]))
+    return Line(float(best[1]), error, float(best[0]), inverse[1])
 
 
 def student(freedom: int, chance: float) -> float:

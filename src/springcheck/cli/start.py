@@ -50,14 +50,11 @@ def differs(scene: Scene, scheme: str, q: Floats, p: Floats, *, velocities: bool
     """Explain a first frame (n,) that is not the scene's start, with a remedy; `velocities` says that the
     file holds these."""
     with np.errstate(all="ignore"):
-        return (
-            _single(scene, q, p)
-            or _weighted(scene, q, p, velocities)
-            or _kicked(scene, q, p)
-            or _later(scene, scheme, q, p)
-            or _scaled(scene, q, p, velocities)
-            or _largest(scene, q, p)
-        )
+        found = _single(scene, q, p)
+        if not (found or _is_at(scene, q, p, scene.q, scene.p)):
+            found = _weighted(scene, q, p, velocities) or _kicked(scene, q, p)
+            found = found or _later(scene, scheme, q, p) or _scaled(scene, q, p, velocities)
+        return found or _largest(scene, q, p)
 
 
 def _is_at(scene: Scene, q: Floats, p: Floats, there_q: Reals, there_p: Reals) -> bool:
@@ -150,4 +147,4 @@ def _largest(scene: Scene, q: Floats, p: Floats) -> str:
     sizes = [scene.system.norm(q - scene.q, none), scene.system.norm(none, p - scene.p)]
     name, x, own = parts[int(np.argmax(sizes))]
     i = int(np.argmax(np.abs(x - own)))
-    return f"{name}[{i}] is {x[i]:.9g} there, and {own[i]:.9g} in the scene; give a scene that starts so"
+    return f"{name}[{i}] is {x[i]:.15g} there, and {own[i]:.15g} in the scene; give a scene that starts so"

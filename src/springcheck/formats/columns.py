@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal, TypeAlias
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -66,6 +66,14 @@ def fitting(path: Path, found: States) -> States:
     if found.mass is not None and (not len(found.mass) or found.q.shape[1] % len(found.mass)):
         raise StoreError(f"{path}: masses: {len(found.mass)}, columns of q: {found.q.shape[1]}")
     return found
+
+
+def times(path: Path, steps: Any, step: float | None, unit: str = "") -> Floats:
+    """Times of counted steps; StoreError where the time step is not stated."""
+    if step is None:
+        how = f"as --step H{unit and f' in {unit}'}"
+        raise StoreError(f"{path}: counts steps and knows no times; give its time step, {how}")
+    return np.asarray(np.asarray(steps, np.float64) * step)
 
 
 def moving(path: Path, found: States) -> States:
@@ -163,14 +171,9 @@ def split(path: Path, columns: Columns, roundoff: float = 2.0**-53) -> States:
     if mass is not None and np.any(mass != mass[:1]):
         raise StoreError(f"{path}: the masses change from row to row")
     return States(
-        t=t[:, 0],
-        q=states["q"],
-        p=states.get("p"),
-        v=states.get("v"),
-        mass=None if mass is None else mass[0],
-        roundoff=roundoff,
-        notes=_left_out(columns, meant),
-    )
+        t=t[:, 0], q=states["q"], p=states.get("p"), v=states.get("v"), roundoff=roundoff,
+        mass=None if mass is None else mass[0], notes=_left_out(columns, meant),
+    )  # fmt: skip
 
 
 def _left_out(columns: Columns, meant: Mapping[str, Kind]) -> tuple[str, ...]:

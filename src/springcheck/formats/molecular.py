@@ -16,17 +16,9 @@ from typing import Any
 import numpy as np
 
 from springcheck.errors import StoreError
-from springcheck.formats.columns import ALONE, Floats, States, kind, listed
+from springcheck.formats.columns import ALONE, Floats, States, kind, listed, times
 from springcheck.formats.lines import MOST_NUMBERS, Lines, number
 from springcheck.formats.tables import SHOWN, of_rows, roundoff
-
-
-def times(path: Path, steps: Any, step: float | None, unit: str = "") -> Floats:
-    """Times of counted steps; StoreError where the time step is not stated."""
-    if step is None:
-        how = f"as --step H{unit and f' in {unit}'}"
-        raise StoreError(f"{path}: counts steps and knows no times; give its time step, {how}")
-    return np.asarray(np.asarray(steps, np.float64) * step)
 
 
 def clock(path: Path, said: Sequence[float | None], step: float | None, unit: str = "") -> Floats:

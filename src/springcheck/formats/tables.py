@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from springcheck.errors import StoreError
-from springcheck.formats.columns import Floats, States, kinds, named, split
+from springcheck.formats.columns import Floats, States, kinds, named, split, times
 from springcheck.formats.lines import Lines, number
 
 SHOWN = 1000
@@ -60,12 +60,13 @@ def read_table(path: Path, columns: list[str], step: float | None) -> States:
                 first.append(cells)
     if not width:
         raise StoreError(f"{path}: holds no row of numbers")
-    return of_rows(path, np.frombuffer(numbers).reshape(-1, width), first, columns, header)
+    return of_rows(path, np.frombuffer(numbers).reshape(-1, width), first, columns, header, step)
 
 
 def of_rows(
-    path: Path, values: Floats, first: Sequence[Sequence[str]], names: list[str], header: list[str]
-) -> States:
+    path: Path, values: Floats, first: Sequence[Sequence[str]], names: list[str], header: list[str],
+    step: float | None = None,
+) -> States:  # fmt: skip
     """The states in the rows of a table, the first of which are also given as text."""
     width = values.shape[1]
     if not names and len(header) == width - 1 and _are_counted(values[:, 0]):
@@ -73,6 +74,10 @@ def of_rows(
     chosen = names or header
     if not chosen:
         raise StoreError(f"{path}: its columns have no names; give all {width}, as --columns t,q,v")
+    counted = [i for i, name in enumerate(chosen[:width]) if re.fullmatch(r"(?i)\s*(time)?steps?\s*", name)]
+    if counted and "t" not in kinds(chosen).values():
+        i, values, chosen = counted[0], values.copy(), [*chosen]
+        values[:, i], chosen[i] = times(path, values[:, i], step), "t"
     meant = kinds(chosen)
     states = [i for i, name in enumerate(chosen[:width]) if meant.get(name) in ("q", "p", "v")]
     return split(path, named(path, values, chosen), roundoff(first, states))

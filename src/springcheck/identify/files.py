@@ -13,6 +13,7 @@ import numpy as np
 from springcheck import formats, schemes, store
 from springcheck.errors import IdentificationError, MethodError, SpringcheckError, StoreError
 from springcheck.formats import columns as columns_of
+from springcheck.identify.laws import COUPLED
 from springcheck.identify.record import ROUNDING, of_size
 from springcheck.identify.report import identify_arrays
 from springcheck.identify.result import Identification
@@ -100,17 +101,11 @@ def of_arrays(name: str, found: formats.States) -> FileStates:
     chosen, remarks = _chosen(found.q[kept], speed[kept], notes)
     if mass is not None and len(mass) != found.q.shape[1]:
         mass = np.repeat(mass, found.q.shape[1] // len(mass))
+    p, v = (None if x is None else x[kept][:, chosen] for x in (p, v))
     return FileStates(
-        label=name,
-        t=found.t[kept],
-        q=found.q[kept][:, chosen],
-        p=None if p is None else p[kept][:, chosen],
-        v=None if v is None else v[kept][:, chosen],
-        mass=None if mass is None else mass[chosen],
-        notes=remarks,
-        roundoff=found.roundoff,
-        whole=found.q[kept],
-    )
+        label=name, t=found.t[kept], q=found.q[kept][:, chosen], p=p, v=v, notes=remarks, whole=found.q[kept],
+        mass=None if mass is None else mass[chosen], roundoff=found.roundoff,
+    )  # fmt: skip
 
 
 def _ours(path: Path, runs: Sequence[store.Run], wanted: str | None) -> Iterator[FileStates]:
@@ -240,22 +235,25 @@ def sentence(run: Trajectory, mass: Floats, stiffness: Floats | None = None, *, 
     chosen, _ = _chosen(run.q, run.p, [])
     first = max(0, min(about - MOST_FAILED // 2, len(run.t) - MOST_FAILED))
     frames = slice(first, first + MOST_FAILED)
+    q, p = (x[frames, chosen] for x in (run.q, run.p))
     k = None if stiffness is None else stiffness[chosen]
     try:
-        return identify_arrays(
-            run.t[frames], run.q[frames, chosen], run.p[frames, chosen], mass=mass[chosen], stiffness=k
-        ).statement
+        found = identify_arrays(run.t[frames], q, p, mass=mass[chosen], stiffness=k)
     except IdentificationError:
         return ""
+    # that they are of the scheme which they failed to be is no cause
+    return "" if found.fits and run.scheme in (found.scheme, *found.aliases) else found.statement
 
 
 def shown(scene: Scene, run: Trajectory, about: int) -> str:
     """One sentence that identifies a run around a frame; "" where nothing is known of it."""
     if not scene.system.is_linear:
         return seen_to_take(scene, run, about)
-    springs = scene.system.hessian(scene.q).astype(np.float64) if scene.n <= MOST_OSCILLATORS else None
-    alone = springs is not None and not np.any(springs - np.diag(np.diag(springs)))
-    return sentence(run, scene.m, np.diag(springs) if springs is not None and alone else None, about=about)
+    alone = scene.system.is_separate
+    k = scene.system.hessian_diagonal(scene.q).astype(np.float64) if alone else None
+    said = sentence(run, scene.m, k, about=about)
+    # springs couple the particles of a scene that has them
+    return said if alone or not said.startswith(str(COUPLED.cause).partition(":")[0]) else ""
 
 
 def titled(file: Path | str, label: str) -> str:

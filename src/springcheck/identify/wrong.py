@@ -125,7 +125,7 @@ CONSTANTS = (
 
 
 def _times(factor: float) -> str:
-    return f"{factor:.6g}" if abs(factor - 1) > 1e-4 else f"{factor:.12g}"
+    return f"{factor:.{6 if abs(factor - 1) > 1e-4 else 12 if abs(factor - 1) > 1e-10 else 15}g}"
 
 
 def _scales(e: Evidence) -> tuple[list[Explanation], bool]:

@@ -1,0 +1,150 @@
+"""The one number of a scene, or the one frame, that is another than it should be where steps are off.
+
+Of each number the value is sought by which all steps are the scheme's own: Newton's method on the sum of
+squares of what the steps miss.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from functools import partial
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from springcheck.checks import sight
+from springcheck.checks.case import Case
+from springcheck.checks.requires import MAP, missing
+from springcheck.physics.arrays import Extended, Floats, Integers
+from springcheck.text.wording import either
+
+NEWTON_STEPS = 8
+"""Newton steps to a value: a force is proportional to its strength, and bends with lengths."""
+SLACK = 2.0
+"""Bounds that steps keep by the value found: one of the engine's roundings, one of what these do to it."""
+FALLS = 4.0
+"""Factor by which the squares of what steps miss have to fall from one Newton step to the next."""
+MOST_ROWS = 16
+"""Rows of a term, or masses, that are looked at one by one; of more of them, all together alone."""
+SINGLE = 2.0**-40
+"""Relative distance from a number's single precision, 2**-24 off it at most, within which a value is that."""
+SAME = "each step is the scheme's own"
+
+Number: TypeAlias = tuple[str, float, float, Callable[[float], Case]]
+"""A number in words, its value, the least size of changes of it, and the case where it has another value."""
+
+
+def found(case: Case) -> str:
+    """The cause in one sentence, or "" where neither one number nor one frame explains the states."""
+    if missing(case, MAP) or case.ahead is None or case.scene.kind != "particles":
+        return ""
+    case = case.clocked
+    with np.errstate(all="ignore"):
+        values = ((name, own, _value(case, own, size, of)) for name, own, size, of in _numbers(case))
+        shown = dict.fromkeys(_said(name, own, x) for name, own, x in values if x is not None)
+        return f"{SAME} with another number, {either([*shown])}" if shown else _frame(case)
+
+
+def _said(name: str, own: float, value: float) -> str:
+    if not own or not value:
+        return f"{name}: {value:.6g}, not {own:.6g}"
+    digits, kept = 3 - int(np.floor(np.log10(abs(value / own - 1)))), float(np.float32(own))
+    single = ", as in single precision" if own != kept and abs(value / kept - 1) < SINGLE else ""
+    return f"{name}: {value:.{max(6, min(17, digits))}g}, not {own:.15g}{single}"
+
+
+def _off(case: Case, unit: Extended, at: Integers) -> Extended:
+    """What the steps after these frames miss, in bounds (2, r, n), but for a clock."""
+    run, n = case.trajectory, case.scene.n - case.scene.system.is_driven
+    ends = np.stack(sight.ends(case, at)) - np.stack([run.q[at + 1], run.p[at + 1]])
+    return np.asarray(np.where(unit[:, at] > 0, ends / unit[:, at], 0)[..., :n])
+
+
+def _value(case: Case, own: float, size: float, of: Callable[[float], Case]) -> float | None:
+    """The value of a number by which all steps are the scheme's own, or None."""
+    assert case.ahead is not None
+    unit, every = case.roundings * case.ahead.allowance, np.arange(len(case.trajectory.t) - 1)
+    at, x, left = sight.rows(case, len(every)), own, np.inf
+    for _ in range(NEWTON_STEPS):
+        change, here = sight.CHANGE * max(abs(x), size), _off(of(x), unit, at)
+        slope = (_off(of(x + change), unit, at) - here) / change
+        # what roundings, all of the sign that hurts, do to the value
+        error = SLACK * float(np.sum(np.abs(slope)) / np.sum(slope * slope))
+        if not FALLS * np.sum(here * here) < left:
+            break
+        left, x = np.sum(here * here), x - float(np.sum(here * slope) / np.sum(slope * slope))
+    if not (np.max(np.abs(here)) <= SLACK and abs(x - own) > error):
+        return None
+    fits = np.max(np.abs(_off(of(x), unit, every))) <= SLACK
+    return (x if abs(x) > error else 0.0) if fits else None
+
+
+def _with(case: Case, number: int, field: str, values: Floats) -> Case:
+    """The case with other numbers in a field of a term."""
+    terms: list[Any] = list(case.judged.terms)
+    terms[number] = replace(terms[number], **{field: values})
+    return sight.of_scene(case, case.judged.derived(terms=tuple(terms)))
+
+
+def _numbers(case: Case) -> Iterator[Number]:
+    """The numbers of a scene, each by itself, and those of one kind together by a factor."""
+    run, scene = case.trajectory, case.judged
+    n, of = scene.n - scene.system.is_driven, [str(j // 3) for j in scene.all_places]
+    reach = float(np.max(np.ptp(run.q[:, :n], axis=0)))
+    for number, term in enumerate(scene.terms):
+        ends = [dict.fromkeys(of[j] for j in row) for row in zip(*term.particles, strict=True)]
+        where = [f"particle{'s' if len(one) > 1 else ''} {' and '.join(one)}" for one in ends]
+        for column in term.columns:
+            place = column.field == term.origin and term.bodies == 1
+            kind = f"{'place' if place else column.name} of the {term.key.removeprefix('wall-')}"
+            numbers = getattr(term, column.field)
+            if numbers.dtype.kind == "f":
+                other = partial(_with, case, number, column.field)
+                yield from _each(kind, " of ", numbers, other, where, reach, -1 if column.inverse else 1)
+
+    def heavier(m: Floats) -> Case:
+        # no mass is below 0
+        return sight.of_scene(case, scene.derived(m=np.append(np.where(m > 0, m, np.nan), scene.m[n:])))
+
+    def quicker(m: Floats) -> Case:
+        # of a program that keeps velocities, from which momenta were made by the scene's masses
+        there = heavier(m)
+        return replace(there, trajectory=replace(there.trajectory, p=run.p * (there.scene.m / scene.m)))
+
+    where = [f"particle {one}" for one in of[:n]]
+    yield from _each("mass", " of ", scene.m[:n], heavier, where)
+    yield from _each("mass", " that divides the force on ", scene.m[:n], quicker, where)
+    yield "the step", run.step, 0.0, lambda x: sight.changed(case, "step", x / run.step - 1)
+
+
+def _each(
+    kind: str, of: str, numbers: Floats, other: Callable[[Floats], Case], where: list[str],
+    size: float = 0.0, power: int = 1,
+) -> Iterator[Number]:  # fmt: skip
+    """The numbers (s,) of a kind; `power` is -1 where a scene file has their inverse."""
+
+    def changed(here: NDArray[np.bool_], x: float) -> Case:
+        return other(np.where(here, x**power, numbers))
+
+    for row, own in enumerate(numbers.tolist() if len(numbers) <= MOST_ROWS else []):
+        here = np.arange(len(numbers)) == row
+        yield f"the {kind}{of}{where[row]}", own**power, size, partial(changed, here)
+    if len(numbers) > 1:
+        yield f"a factor to each {kind}", 1.0, 0.0, lambda x: other(numbers * x**power)
+
+
+def _frame(case: Case) -> str:
+    """The one frame from which on states are a step too late or too early, or ""."""
+    assert case.ahead is not None
+    run, unit = case.trajectory, case.roundings * case.ahead.allowance
+    off = np.flatnonzero(~np.all(np.abs(_off(case, unit, np.arange(len(run.t) - 1))) <= 1, axis=(0, 2)))
+    if len(off) != 1 or run.every > 1:
+        return ""
+    i, states = int(off[0]), np.stack([run.q, run.p])
+    if np.array_equal(states[:, i], states[:, i + 1]):
+        return f"{SAME}, but frame {i + 1} is the one before it once more"
+    twice = np.stack(case.step(*case.step(*states[:, i : i + 1].astype(np.longdouble))))
+    missed = np.all(np.abs(twice - states[:, i + 1 : i + 2]) <= SLACK * unit[:, i : i + 1])
+    return f"{SAME}, but a frame is missing before frame {i + 1}" if missed else ""
