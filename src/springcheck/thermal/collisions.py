@@ -87,8 +87,11 @@ def is_a_factor(before: Floats, after: Floats) -> bool:
     variance 2 b**2 + 4 c b K, of whatever sign the factor is (Bussi, Donadio & Parrinello, equation A7)."""
     K, made = ((x / np.std(after)) ** 2 for x in (before, after))
     known = np.stack([K, np.ones(len(K))], axis=1)
-    c, b = np.linalg.lstsq(known, made, rcond=None)[0]
-    size = np.sqrt(2 * b * b + 4 * max(c, 0) * max(b, 0) * K)[:, None]
+    coefficients = np.linalg.lstsq(known, made, rcond=None)[0]
+    # b of little friction shows in the variance alone
+    c, square = max(float(coefficients[0]), 0.0), float(np.mean((made - known @ coefficients) ** 2))
+    b = square / 2 / (np.hypot(c * np.mean(K), np.sqrt(square / 2)) + c * np.mean(K))
+    size = np.sqrt(2 * b * b + 4 * c * b * K)[:, None]
     return bool(b > 0) and are_drawn(made[:, None] / size, known / size)
 
 
