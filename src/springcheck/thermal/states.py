@@ -58,8 +58,8 @@ class Thermal:
     uniform: bool
     """Whether the draws are uniform rather than normal."""
     known: bool = True
-    """Whether the kind of noise is known: one momentum shows no factor, but any change of it that ends a
-    step."""
+    """Whether the kind of noise is known: one momentum shows no factor, but any change of it that begins or
+    ends a step."""
     added: bool = False
     """Whether draws are added to momenta after velocity Verlet, without friction: no scheme's."""
 
@@ -232,9 +232,9 @@ def _of_one(
         # what a collision has left of the momentum, the rest of the step takes on without noise
         w = float(np.sqrt(2 * (1 + 1 / c)) / h)
         known: dict[str, Any] = {"omega": w, "omega_error": 0.0}
-        # some steps have no collision, unless these are many; a factor acts in every step, if little
-        still = np.abs(v[1:] - (v[:-1] - h * w * w / 2 * (q[1:] + q[:-1] - 2 * np.mean(q))))
-        often = close > COARSE or float(np.quantile(still, 0.05)) > close * float(np.std(v))
+        # steps without a collision share one change, wherever the centre is; a factor acts in every step
+        change, some = np.sort(np.diff(v) + h * w * w / 2 * (q[1:] + q[:-1])), len(q) // 20
+        often = close > COARSE or np.min(change[some:] - change[:-some]) > 2 * close * float(np.std(v))
         names = ("andersen", "andersen-after-kick", *(("bussi", "bussi-unsigned") if often else ()))
         found = [Candidate(scheme=name, **known) for name in names]
         left = np.empty(0)
@@ -281,7 +281,7 @@ def _of_one(
     return Thermal(
         candidates=tuple(found), free=tuple(map(float, free)), misfit=misfit,
         uniform=bool(len(left)) and _is_uniform(left), added=added,
-        known=alike not in ({"bussi-after"}, {"gj-iii-half"}) and bool(close <= COARSE),
+        known=alike not in ({"bussi-after"}, {"gj-iii-half"}) and "bussi" not in alike and close <= COARSE,
     )  # fmt: skip
 
 
