@@ -423,3 +423,23 @@ def test_a_friction_that_does_not_show_leaves_bare_kicks_open(decays: int, shows
     q, v = np.array(rows).T
     statement = identify(h * np.arange(1000), q, v=v, mass=1.0).statement
     assert ("random kicks without" not in statement) == shows
+
+
+@pytest.mark.parametrize("frames", [300, 3000])
+def test_friction_and_noise_before_velocity_verlet_are_no_scheme_that_is_known(frames: int) -> None:
+    """OBAB: a step leaves of the momentum that it begins with what a collision or a factor would as well."""
+    rng, h, w2, c, q, v = np.random.default_rng(6), 0.35, 1.3, 0.9, 0.4, 0.2
+    states = np.empty((frames, 2))
+    for i in range(frames):
+        v = c * v + np.sqrt(1 - c * c) * rng.standard_normal() - h / 2 * w2 * q
+        q += h * v
+        v -= h / 2 * w2 * q
+        states[i] = q, v
+    found = springcheck.identify(h * np.arange(frames), states[:, :1], v=states[:, 1:], mass=1.0)
+    assert found.verdict == "not told apart"
+    assert "or one that is not known here" in found.statement
+    assert not found.fits
+    # steps without a collision have no factor either, wherever the spring is at rest
+    found = springcheck.identify(*run("andersen", frames)[:2], v=run("andersen", frames)[2], mass=M)
+    assert [one.scheme for one in found.candidates] == ["andersen", "andersen-after-kick"]
+    assert found.fits

@@ -20,15 +20,15 @@ from springcheck.checks.requires import MAP, missing
 from springcheck.physics.arrays import Extended, Floats, Integers
 from springcheck.text.wording import either
 
-NEWTON_STEPS = 8
+VALUE_STEPS = 8
 """Newton steps to a value: a force is proportional to its strength, and bends with lengths."""
-SLACK = 2.0
+VALUE_SLACK = 2.0
 """Bounds that steps keep by the value found: one of the engine's roundings, one of what these do to it."""
-FALLS = 4.0
+SQUARES_FALL = 4.0
 """Factor by which the squares of what steps miss have to fall from one Newton step to the next."""
-MOST_ROWS = 16
+MOST_ALONE = 16
 """Rows of a term, or masses, that are looked at one by one; of more of them, all together alone."""
-SINGLE = 2.0**-40
+NEAR_SINGLE = 2.0**-40
 """Relative distance from a number's single precision, 2**-24 off it at most, within which a value is that."""
 SAME = "each step is the scheme's own"
 
@@ -51,7 +51,7 @@ def _said(name: str, own: float, value: float) -> str:
     if not own or not value:
         return f"{name}: {value:.6g}, not {own:.6g}"
     digits, kept = 3 - int(np.floor(np.log10(abs(value / own - 1)))), float(np.float32(own))
-    single = ", as in single precision" if own != kept and abs(value / kept - 1) < SINGLE else ""
+    single = ", as in single precision" if own != kept and abs(value / kept - 1) < NEAR_SINGLE else ""
     return f"{name}: {value:.{max(6, min(17, digits))}g}, not {own:.15g}{single}"
 
 
@@ -67,17 +67,17 @@ def _value(case: Case, own: float, size: float, of: Callable[[float], Case]) -> 
     assert case.ahead is not None
     unit, every = case.roundings * case.ahead.allowance, np.arange(len(case.trajectory.t) - 1)
     at, x, left = sight.rows(case, len(every)), own, np.inf
-    for _ in range(NEWTON_STEPS):
+    for _ in range(VALUE_STEPS):
         change, here = sight.CHANGE * max(abs(x), size), _off(of(x), unit, at)
         slope = (_off(of(x + change), unit, at) - here) / change
         # what roundings, all of the sign that hurts, do to the value
-        error = SLACK * float(np.sum(np.abs(slope)) / np.sum(slope * slope))
-        if not FALLS * np.sum(here * here) < left:
+        error = VALUE_SLACK * float(np.sum(np.abs(slope)) / np.sum(slope * slope))
+        if not SQUARES_FALL * np.sum(here * here) < left:
             break
         left, x = np.sum(here * here), x - float(np.sum(here * slope) / np.sum(slope * slope))
-    if not (np.max(np.abs(here)) <= SLACK and abs(x - own) > error):
+    if not (np.max(np.abs(here)) <= VALUE_SLACK and abs(x - own) > error):
         return None
-    fits = np.max(np.abs(_off(of(x), unit, every))) <= SLACK
+    fits = np.max(np.abs(_off(of(x), unit, every))) <= VALUE_SLACK
     return (x if abs(x) > error else 0.0) if fits else None
 
 
@@ -128,7 +128,7 @@ def _each(
     def changed(here: NDArray[np.bool_], x: float) -> Case:
         return other(np.where(here, x**power, numbers))
 
-    for row, own in enumerate(numbers.tolist() if len(numbers) <= MOST_ROWS else []):
+    for row, own in enumerate(numbers.tolist() if len(numbers) <= MOST_ALONE else []):
         here = np.arange(len(numbers)) == row
         yield f"the {kind}{of}{where[row]}", own**power, size, partial(changed, here)
     if len(numbers) > 1:
@@ -146,5 +146,5 @@ def _frame(case: Case) -> str:
     if np.array_equal(states[:, i], states[:, i + 1]):
         return f"{SAME}, but frame {i + 1} is the one before it once more"
     twice = np.stack(case.step(*case.step(*states[:, i : i + 1].astype(np.longdouble))))
-    missed = np.all(np.abs(twice - states[:, i + 1 : i + 2]) <= SLACK * unit[:, i : i + 1])
+    missed = np.all(np.abs(twice - states[:, i + 1 : i + 2]) <= VALUE_SLACK * unit[:, i : i + 1])
     return f"{SAME}, but a frame is missing before frame {i + 1}" if missed else ""

@@ -58,8 +58,8 @@ class Thermal:
     uniform: bool
     """Whether the draws are uniform rather than normal."""
     known: bool = True
-    """Whether the kind of noise is known: one momentum shows no factor, but any change of it that ends a
-    step."""
+    """Whether the kind of noise is known: one momentum shows no factor, but any change of it that begins or
+    ends a step."""
     added: bool = False
     """Whether draws are added to momenta after velocity Verlet, without friction: no scheme's."""
 
@@ -283,7 +283,7 @@ def _of_one(
     return Thermal(
         candidates=tuple(found), free=tuple(map(float, free)), misfit=misfit,
         uniform=bool(len(left)) and _is_uniform(left), added=added,
-        known=alike not in ({"bussi-after"}, {"gj-iii-half"}) and bool(close <= COARSE),
+        known=alike not in ({"bussi-after"}, {"gj-iii-half"}) and "bussi" not in alike and close <= COARSE,
     )  # fmt: skip
 
 
