@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from documented import words_of
 from springcheck import checks, driver, engines, schemes
 from springcheck.cli import main
 from springcheck.errors import MethodError, SceneError
@@ -387,3 +388,8 @@ def test_a_file_of_points_in_space_is_judged_by_a_scene_in_a_plane(
     dump(path, q, v, scene.masses, np.asarray(scene.box))
     assert main(given) == 2
     assert "is along axes that scene periodic-box leaves out" in capsys.readouterr().err
+
+
+def test_the_mistakes_are_as_many_as_are_said() -> None:
+    assert len(WRONG) == 10
+    assert "Ten mistakes (a spring along each axis" in words_of("validation/README.md")

@@ -12,15 +12,15 @@ from pathlib import Path
 import pytest
 
 import constraints
+from documented import ROOT, words_of
 from springcheck.cli import main
 from springcheck.studies.faults import heat, measure, rigid, space, table
 from springcheck.thermal import THERMOSTATS
 
 Need = Callable[[str], None]
-ROOT = Path(__file__).parents[1]
-README, VALIDATION, UPSTREAM = (
-    " ".join((ROOT / name).read_text(encoding="utf-8").split())
-    for name in ("README.md", "validation/README.md", "validation/upstream/README.md")
+README, VALIDATION, UPSTREAM, CHANGES = (
+    words_of(name)
+    for name in ("README.md", "validation/README.md", "validation/upstream/README.md", ".github/CHANGELOG.md")
 )
 RAW = (ROOT / "validation/README.md").read_text(encoding="utf-8")
 
@@ -86,25 +86,9 @@ def test_the_faults_are_as_many_as_are_said() -> None:
         assert said.format(word) in VALIDATION or said.format(word.capitalize()) in VALIDATION, said
 
 
-def test_the_schemes_of_baths_are_as_many_as_are_said(need: Need) -> None:
-    import test_bond
-    import test_thermal_laws
-    import test_thermostats
-    import test_van_der_pol
-
-    assert f"{len(test_thermal_laws.LINEAR)} linear random schemes" in VALIDATION
-    assert (len(test_van_der_pol.FAULTS), len(test_bond.WRONG)) == (6, 10)
-    assert "and the six faults of such a friction are rejected" in VALIDATION
-    assert "Ten mistakes (a spring along each axis" in VALIDATION
-    for label in ("openmm:langevin-middle-bath", "ase:langevin", "lammps:langevin"):
-        need(label)
-    four = {label.split(":")[0] for label in test_thermostats.LABELS}
-    assert len(four) == 4
-    assert f"{len(test_thermostats.LABELS)} methods of four engines run them" in VALIDATION
+def test_the_schemes_of_baths_are_as_many_as_are_said() -> None:
     chains = sum(name.startswith("nose-hoover") for name in THERMOSTATS)
-    assert f"limits of {len(THERMOSTATS) - chains} schemes" in " ".join(
-        (ROOT / ".github/CHANGELOG.md").read_text(encoding="utf-8").split()
-    )
+    assert f"limits of {len(THERMOSTATS) - chains} schemes" in CHANGES
 
 
 def test_the_corpus_of_trajectories_is_what_is_said() -> None:

@@ -13,6 +13,7 @@ import mpmath as mp
 import numpy as np
 import pytest
 
+from documented import words_of
 from springcheck.thermal import THERMOSTATS, Law, Stepper
 from springcheck.thermal.decays import GJ
 
@@ -337,3 +338,7 @@ def test_exact_temperatures_are_right_at_extremes_or_not_given(m: float, thermal
             assert np.isnan(value) or value == pytest.approx(exact, rel=2e-6), (name, a, x)
             given += bool(np.isfinite(value))
     assert given > 1.5 * len(EXTREMES)
+
+
+def test_the_linear_schemes_are_as_many_as_are_said() -> None:
+    assert f"{len(LINEAR)} linear random schemes" in words_of("validation/README.md")

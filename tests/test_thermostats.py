@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 
 import springcheck
+from documented import words_of
 from springcheck import checks, driver, engines
 from springcheck.cli import main
 from springcheck.engines import Label
@@ -563,3 +564,10 @@ def test_the_error_of_a_temperature_is_that_of_the_frames_it_is_of() -> None:
         heat.add(some)
         errors.append(heat.line(run.label).configurational_error)
     assert errors[0] < errors[1] / 1.5, "as many frames further apart tell more"
+
+
+def test_the_methods_of_all_engines_are_as_many_as_are_said(need: Any) -> None:
+    for label in ("openmm:langevin-middle-bath", "ase:langevin", "lammps:langevin"):
+        need(label)
+    assert len({label.split(":")[0] for label in LABELS}) == 4
+    assert f"{len(LABELS)} methods of four engines run them" in words_of("validation/README.md")

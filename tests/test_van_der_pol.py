@@ -18,6 +18,7 @@ import pytest
 
 import springcheck
 import stiffness_costs
+from documented import words_of
 from springcheck import checks, engines
 from springcheck.physics import builders, exact
 from springcheck.physics import scenefile as scenes
@@ -251,3 +252,8 @@ def test_near_the_jump_no_error_is_larger_than_stated(mu: float, start: float, e
                 high = float(found[0, 0])
                 off = abs(mp.mpf(high) + mp.mpf(float(found[0, 0] - np.longdouble(high))) - exactly)
                 assert off <= mp.mpf(float(bound[0]))
+
+
+def test_the_faults_of_its_friction_are_as_many_as_are_said() -> None:
+    assert len(FAULTS) == 6
+    assert "and the six faults of such a friction are rejected" in words_of("validation/README.md")

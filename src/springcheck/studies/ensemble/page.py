@@ -163,7 +163,7 @@ SHADES = 7
 SIGNED_SHADES = ("#2166ac", "#67a9cf", "#d1e5f0", "#f7f7f7", "#fddbc7", "#ef8a62", "#b2182b")
 """Shades of a map of numbers of both signs, by Brewer."""
 
-SCHEME_LIMIT = "limit h \N{GREEK SMALL LETTER OMEGA}"
+H_LIMIT = "limit h \N{GREEK SMALL LETTER OMEGA}"
 
 FIELD_WORDS = {
     "stiffness": ("stiffness k", {"md": "kJ/mol/nm2", "si": "N/m"}),
@@ -244,7 +244,7 @@ def _limits(scene: Scene, method: str) -> dict[str, float]:
         return {}
     k, longest = float(walls[0].k[0]), found.limit * float(np.sqrt(scene.m[0] / walls[0].k[0]))
     return {
-        SCHEME_LIMIT: found.limit,
+        H_LIMIT: found.limit,
         "spring.0.stiffness": k * (longest / scene.step) ** 2,
         "time.step": longest,
     }
@@ -266,11 +266,7 @@ def _lines(scene: Scene, quantity: str, fields: Sequence[str], shown: Mapping[st
             )
         )  # fmt: skip
         seen.add(scheme)
-    limits = {
-        at[over]: f"{SCHEME_LIMIT} = {at[SCHEME_LIMIT]:.3g}"
-        for x in shown
-        if over in (at := _limits(scene, x))
-    }
+    limits = {at[over]: f"{H_LIMIT} = {at[H_LIMIT]:.3g}" for x in shown if over in (at := _limits(scene, x))}
     low, high = (f([f(one.x) for one in shown.values()]) for f in (np.min, np.max))
     return Chart(
         title=f"{title[:1].upper()}{title[1:]}, over {over}.",
@@ -315,18 +311,18 @@ def _maps(scene: Scene, quantity: str, over: Sequence[str], shown: Mapping[str, 
 
 def _across(scene: Scene, over: Sequence[str], one: Map, at: Mapping[str, float]) -> list[Curve]:
     """The line at the limit of h omega on a map of stiffness against step, in coordinates of its tiles."""
-    if {*over, SCHEME_LIMIT} != set(at):
+    if {*over, H_LIMIT} != set(at):
         return []
     flat = over[0] == "time.step"
     steps, ks = (one.x, one.y) if flat else (one.y, one.x)
     k = np.geomspace(float(ks[0]), float(ks[-1]), 200)
-    h = at[SCHEME_LIMIT] * np.sqrt(float(scene.m[0]) / k)
+    h = at[H_LIMIT] * np.sqrt(float(scene.m[0]) / k)
     inside = (h >= steps[0]) & (h <= steps[-1])
     if np.count_nonzero(inside) < 2:
         return []
     at_k, at_h = (np.interp(v[inside], z, np.arange(len(z))) for v, z in ((k, ks), (h, steps)))
     x, y = (at_h, at_k) if flat else (at_k, at_h)
-    return [Curve(name=f"{SCHEME_LIMIT} = {at[SCHEME_LIMIT]:.3g}", group=GUIDE, x=x, y=y)]
+    return [Curve(name=f"{H_LIMIT} = {at[H_LIMIT]:.3g}", group=GUIDE, x=x, y=y)]
 
 
 def _kinds(quantity: str, values: Sequence[Floats]) -> tuple[list[tuple[str, str]], Floats]:
