@@ -82,3 +82,15 @@ def test_identify_says_that_all_momenta_have_one_factor() -> None:
     alone = particles(1, steps=500)
     found = springcheck.identify(driver.run(alone, "own:nose-hoover", seed=4), mass=alone.m)
     assert "shows in two particles or more" in found.explanations[0].remedy
+
+
+@pytest.mark.parametrize("name", ["orbit", "periodic-box"])
+@pytest.mark.parametrize("noise", [3e-15, 1e-12, 1e-9, 0.0], ids=["3e-15", "1e-12", "1e-9", "a frame twice"])
+def test_noise_or_a_frame_that_stands_twice_is_no_factor(name: str, noise: float) -> None:
+    """Velocities that are linear in the positions leave the constants of the forces open: any would do."""
+    scene = springcheck.load_scene(name)
+    run = driver.run(scene, "own:velocity-verlet")
+    q, v = run.q * (1 + noise * np.random.default_rng(1).normal(size=run.q.shape)), run.p / scene.m
+    if not noise:
+        q[40], v[40] = q[39], v[39]
+    assert one_factor(scene.step, q, v) is None

@@ -41,8 +41,12 @@ def one_factor(h: float, q: Floats, v: Floats) -> tuple[str, float, Floats] | No
             c = np.linalg.lstsq(columns, one - other, rcond=None)[0]
             misfit = max(misfit, float(np.linalg.norm(one - other - columns @ c)) / size)
             pulled[:, 0], pulled[:, j] = b[:, 0] + F @ c[: n + 1], b[:, j] + F @ c[n + 1 :]
-        factor = np.sum(a * pulled, axis=1) / np.sum((pulled if i else a) ** 2, axis=1)
-        if misfit < SHARP_FACTOR * np.subtract(*np.quantile(factor, [0.9, 0.1])):
+        of, made = (pulled, a) if i else (a, pulled)
+        factor = np.sum(of * made, axis=1) / np.sum(of**2, axis=1)
+        # of velocities that are linear in the positions any c would do: there the factor makes none of them
+        off = np.linalg.norm(made - factor[:, None] * of, axis=0) / np.linalg.norm(made, axis=0)
+        high, low = np.quantile(factor, [0.9, 0.1])
+        if max(misfit, *off) < SHARP_FACTOR * (high - low) / max(abs(high), abs(low)):
             return PLACES_OF_FACTOR[i], misfit, np.asarray(factor)
     return None
 

@@ -172,9 +172,8 @@ def lasting(e: Evidence) -> list[Explanation]:
     What disturbs a linear motion by a share d in a few waves follows from few states to d**2, and a drive by
     one wave does so at any size.
     """
-    if e.size**2 < LEFT_BY_ROUNDING * np.max(e.unit) or not (found := _remembering(e)):
-        return []
-    if any(regression(e, law).exact for law in LAWS):
+    found = None if e.size**2 < LEFT_BY_ROUNDING * np.max(e.unit) else _remembering(e)
+    if found is None or any(regression(e, law).exact for law in LAWS):
         return []
     return [Explanation(
         cause=f"Each state follows from {found[0]} before it, and not from one, and what is remembered does "
