@@ -62,7 +62,7 @@ def test_kicks_of_one_number_alone_are_noise_and_no_factor_of_momenta(where: str
 
     found = identify(step)
     assert "noise" in found.statement.lower()
-    assert "no noise" not in found.statement
+    assert "white noise" not in found.statement
     assert "bussi" not in found.statement
     assert found.candidates == ()
 

@@ -186,8 +186,8 @@ def _unexplained(e: Evidence, counted: float) -> Explanation:
     linear = np.column_stack([e.states[:-1], np.ones(e.pairs)])
     if not (irregular(left * e.weight[:, None]) or (left.shape[1] == 1 and irregular(left, linear))):
         return Explanation(
-            cause="No known cause alone explains what one map leaves over, and it is no noise: it comes back "
-            f"from frame to frame, {e.size:.1e} of the state's size in each, in {where}",
+            cause="No known cause alone explains what one map leaves over, and it is no white noise: it "
+            f"comes back from frame to frame, {e.size:.1e} of the state's size in each, in {where}",
             remedy="look for several errors at once, and take them out one by one; a solver that chooses its "
             "steps has no fixed scheme to find"
             + "; a bath of one factor for all momenta, as a Nose-Hoover chain, shows in two particles or more"
