@@ -443,3 +443,22 @@ def test_friction_and_noise_before_velocity_verlet_are_no_scheme_that_is_known(f
     found = springcheck.identify(*run("andersen", frames)[:2], v=run("andersen", frames)[2], mass=M)
     assert [one.scheme for one in found.candidates] == ["andersen", "andersen-after-kick"]
     assert found.fits
+
+
+@pytest.mark.parametrize("stride", [1, 2, 3])
+@pytest.mark.parametrize("kind", ["shot", "collision"])
+def test_shots_of_noise_that_add_to_a_momentum_are_no_collisions_that_draw_it_anew(
+    kind: str, stride: int
+) -> None:
+    """Both act in some steps alone, by what is drawn: shots were said to be Andersen's thermostat."""
+    rng, m, k, h, q, v, rows = np.random.default_rng(5), 2.3, 1.7, 0.35, 1.0, 0.3, []
+    for _ in range(1000 * stride):
+        rows.append((q, v))
+        if rng.random() < 0.1:
+            v = 0.3 * rng.normal() + v if kind == "shot" else rng.normal()
+        v -= h / 2 * k / m * q
+        q += h * v
+        v -= h / 2 * k / m * q
+    x, u = np.array(rows[::stride]).T
+    found = identify(stride * h * np.arange(1000), x, v=u, mass=m)
+    assert ("andersen" in [one.scheme for one in found.candidates]) == (kind == "collision")

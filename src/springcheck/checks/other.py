@@ -99,7 +99,7 @@ def _numbers(case: Case) -> Iterator[Number]:
         for column in term.columns:
             place = column.field == term.origin and term.bodies == 1
             kind = f"{'place' if place else column.name} of the {term.key.removeprefix('wall-')}"
-            numbers = getattr(term, column.field)
+            numbers = term.arrays[column.field]
             if numbers.dtype.kind == "f":
                 other = partial(_with, case, number, column.field)
                 yield from _each(kind, " of ", numbers, other, where, reach, -1 if column.inverse else 1)

@@ -49,7 +49,7 @@ def between_collisions(q: Floats, v: Floats, h: float) -> list[Candidate]:
     if not FEWEST_OF_EACH <= np.sum(still) <= n - FEWEST_OF_EACH:
         return []
     spread = (still - share) / np.sqrt(share * (1 - share))
-    if not (chance.neighbours(spread[:, None]) > LEAST_CHANCE and are_drawn(left[~still], known[~still])):
+    if not (chance.neighbours(spread[:, None]) > LEAST_CHANCE and collide(left[~still], known[~still])):
         return []
     entries = np.linalg.lstsq(known[still], after[still], rcond=None)[0]
     off = max(float(np.sqrt(np.mean((known[still] @ entries - after[still]) ** 2))), 2.0**-52)
@@ -64,6 +64,16 @@ def between_collisions(q: Floats, v: Floats, h: float) -> list[Candidate]:
     close = room * (1 / abs(A[0, 1]) + 1 / abs(A[1, 0]))
     A = A * sizes[:, None] / sizes
     return [y for name in names for y in _of_scheme(name, A, h, share, n, float(np.var(v)), close)]
+
+
+def collide(changes: Floats, known: Floats) -> bool:
+    """Whether changes (f, k) are draws in place of the state (f, 3) before each, in units of its sizes.
+
+    A collision forgets half of a state or more, wherever in a frame it is; a shot of noise adds to it.
+    """
+    lost, square = np.linalg.lstsq(known, changes, rcond=None)[:2]
+    error = np.sqrt(np.trace(np.linalg.pinv(known.T @ known)[:2, :2]) * np.sum(square) / len(known))
+    return are_drawn(changes, known) and not np.linalg.norm(lost[:2]) < 5 * error < 0.5
 
 
 def are_drawn(changes: Floats, known: Floats) -> bool:

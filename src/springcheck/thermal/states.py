@@ -17,7 +17,7 @@ import numpy as np
 from springcheck.physics.arrays import Floats
 from springcheck.thermal import chance
 from springcheck.thermal.catalogue import random_scheme
-from springcheck.thermal.collisions import are_drawn, between_collisions, is_a_factor
+from springcheck.thermal.collisions import between_collisions, collide, is_a_factor
 from springcheck.thermal.decays import GJ
 from springcheck.thermal.likelihood import ODDS, Candidate, likely, likely_apart
 
@@ -235,8 +235,9 @@ def _of_one(
         drawn = v[1:] + w * w * kicks
         changes = (drawn - v[:-1]) / np.std(v)
         often = close > COARSE or float(np.quantile(np.abs(changes), 0.05)) > close
-        struck, state = np.abs(changes) > close, np.stack([q[:-1], v[:-1], np.ones(len(v) - 1)], axis=1)
-        collides = are_drawn(changes[struck, None], state[struck])
+        state = np.stack([(q[:-1] - q[0]) / np.std(q), v[:-1] / np.std(v), np.ones(len(v) - 1)], axis=1)
+        struck = np.abs(changes) > close
+        collides = collide(changes[struck, None], state[struck])
         names: tuple[str, ...] = ("andersen", "andersen-after-kick") if collides else ()
         names += ("bussi", "bussi-unsigned") if often and is_a_factor(v[:-1], drawn) else ()
         if not names:

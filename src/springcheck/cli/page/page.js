@@ -1,6 +1,6 @@
-// The stored motion, the loops of loops.js on opening and by the sliders, and charts of studies.
+// The stored motion, the loops of loops.js at once and by sliders, and charts of studies.
 
-// rows of numbers stand once: [rows, data], and {"#": i} for the i-th of them, {"$": i} where it is text;
+// rows of numbers stand once: [rows, data]; {"#": i} for the i-th of them, {"$": i} where it is text;
 // infinities and NaN are words in JSON
 const TEXT = by("data").textContent, [ROWS] = JSON.parse(TEXT);
 const [, DATA] = JSON.parse(TEXT, (_, x) => {
@@ -8,7 +8,7 @@ const [, DATA] = JSON.parse(TEXT, (_, x) => {
   return "$" in x ? ROWS[x.$] : "#" in x ? ROWS[x["#"]].map(Number) : x;
 });
 
-// A run by its scheme's loop here: equal, near or not computed; and what differs.
+// A run by its scheme's loop here: equal, near, not computed; what differs.
 function compared(run) {
   const law = DATA.laws[run.scheme], { label, t, q, p } = run;
   if (!law) return ["not"];

@@ -64,7 +64,9 @@ def sizes(scene: Scene, step: float, how: Arithmetic) -> Iterator[tuple[float, s
             for x in np.sort(values[values > 0])[[0, -1]] if np.any(values) else ():
                 yield least, f"{column.name} of a {term.key}", float(x), most
     if how.force == 2.0**-24:
-        yield least**0.5, "bond's length", scene.system.far, most**0.5
+        # of the start, and, of a start at rest, of where the motion goes
+        yield 0.0, "bond's length", float(np.max(np.abs(scene.q))), most**0.5
+        yield least**0.5, "bond's length", scene.system.far, np.inf
     if how.state == 2.0**-24:
         yield least * 2.0**32, "step", abs(step), most
         yield 0.0, "speed", float(np.max(np.abs(scene.p / scene.m))), most
