@@ -229,10 +229,9 @@ def _of_one(
         found = [*likely(("euler-maruyama",), q, v, h), *[Candidate(scheme="bussi-after")] * (slow < error)]
     elif c < -1 - close and abs(d) <= close * h and near(b, h * c):
         # what a collision has left of the momentum, the rest of the step takes on without noise
-        w = float(np.sqrt(2 * (1 + 1 / c)) / h)
-        known: dict[str, Any] = {"omega": w, "omega_error": 0.0}
+        known: dict[str, Any] = {"omega": float(np.sqrt(2 * (1 + 1 / c)) / h), "omega_error": 0.0}
         # some steps have no collision, unless these are many; a factor acts in every step, if little
-        drawn = v[1:] + w * w * kicks
+        drawn = v[1:] + known["omega"] ** 2 * kicks
         changes = (drawn - v[:-1]) / np.std(v)
         often = close > COARSE or float(np.quantile(np.abs(changes), 0.05)) > close
         state = np.stack([(q[:-1] - q[0]) / np.std(q), v[:-1] / np.std(v), np.ones(len(v) - 1)], axis=1)

@@ -1,5 +1,5 @@
 // Charts as SVG: curves or tiles in a box, read by pointer or arrow keys, zoomed by dragging or + and -.
-// A bank is charts with one legend.  What is drawn is described in springcheck/figures/charts.py.
+// A bank is charts with one legend.  springcheck/figures/charts.py describes what is drawn.
 
 const CLOSE = 40; // pixels within which a pointer reads a point
 const FAR = 1e4; // pixels beyond which nothing is drawn
@@ -246,7 +246,7 @@ class Chart {
   }
 }
 
-// Charts with one legend: a box for each curve, or for each chart where charts are tiles.
+// Charts with one legend: a box for each curve, or for each chart of tiles.
 class Bank {
   constructor(place, bank) {
     const on = new Set(bank.on), grid = html("div", { class: bank.charts.length > 1 ? "pair" : "one" });

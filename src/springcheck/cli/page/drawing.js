@@ -1,4 +1,4 @@
-// What charts are made of: elements, lines and marks, ticks.  Looks come with the data.
+// What charts are made of: elements, lines, marks, ticks.  Looks come with the data.
 
 const DARK = matchMedia("(prefers-color-scheme: dark)");
 
@@ -32,8 +32,7 @@ function tile(name, shade, attributes) {
   return element(name, { class: "tile", ...attributes, style: { fill } });
 }
 
-// `now` follows sliders and their fields where a value is `right`.  Returns what puts a value into them, and
-// what shows all.
+// `now` follows sliders and their fields where a value is `right`.  Returns what sets one, what shows all.
 function sliding(prefix, places, now, right, show) {
   const [slide, field] = ["slide", "show"].map((kind) => (name) => by(`${kind}-${prefix}${name}`));
   const put = (name, value) => {
