@@ -14,6 +14,7 @@ from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -264,8 +265,8 @@ jobqueue:
 @pytest.fixture
 def queue(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder with a `sbatch` that starts jobs on this machine, and a `scancel`."""
-    if not os.environ.get("SPRINGCHECK_REQUIRE_TOOLS"):
-        pytest.importorskip("dask_jobqueue")
+    if not os.environ.get("SPRINGCHECK_REQUIRE_TOOLS") and not find_spec("dask_jobqueue"):
+        pytest.skip("dask-jobqueue is not installed")
     for name, text in (("sbatch", SBATCH), ("scancel", SCANCEL)):
         (tmp_path / name).write_text(text)
         (tmp_path / name).chmod(0o755)
@@ -286,6 +287,19 @@ def runs(job: str) -> bool:
     with contextlib.suppress(OSError):
         return Path(f"/proc/{job}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     return False
+
+
+def test_what_describes_a_queue_leaves_ctrl_c_as_it_is(queue: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """To import dask-jobqueue makes of it an exit with status 0."""
+    place = described(queue)
+    code = (
+        "import signal, sys; signal.signal(2, signal.default_int_handler); import on_a_queue; "
+        f"on_a_queue._checked({place!r}, *on_a_queue.description({place!r})); "
+        "assert 'dask_jobqueue' in sys.modules; assert signal.getsignal(2) is signal.default_int_handler"
+    )
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(sys.path))
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
 
 
 def test_jobs_of_a_queue_measure_and_are_submitted_again_and_none_is_left(

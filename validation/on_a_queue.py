@@ -107,11 +107,14 @@ def _patient(kind: Any, refused: list[str]) -> Any:
 
 def _checked(place: str, queue: str, options: dict[str, Any]) -> tuple[Any, dict[str, Any]]:
     """The class of the queue's clusters and what it is called with."""
+    kept = signal.getsignal(signal.SIGINT)
     try:
         import dask
         import dask_jobqueue
     except ModuleNotFoundError:
         raise SpringcheckError(MISSING.format(place)) from None
+    # its import makes of Ctrl-C an exit with status 0
+    signal.signal(signal.SIGINT, kept)
     found: dict[str, Any] = vars(dask_jobqueue)
     kinds = {x.job_cls.config_name: x for x in found.values() if hasattr(x, "job_cls")}
     if queue not in kinds:
