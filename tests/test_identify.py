@@ -305,7 +305,7 @@ def test_the_velocity_whose_friction_acts_in_the_second_half_kick_is_named(
         a = -(k * q + c * v) / m
         q += h * v + h * h / 2 * a
         v += h / 2 * (a - (k * q + c * (v + share * h * a)) / m)
-    qs, vs = np.vectorize(lambda x: float(f"{x:.{digits - 1}e}"))(np.array(rows).T)
+    qs, vs = text(np.array(rows).T, f"%.{digits}g")
     found = identify(h * np.arange(120), qs, v=vs, mass=m)
     place = f" of {velocity} in the second half kick" if velocity else ""
     if velocity is None:

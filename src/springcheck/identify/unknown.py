@@ -197,11 +197,11 @@ def memory(e: Evidence) -> list[Explanation]:
     off_by = AS_IT_WAS * np.max(np.abs(twice - np.eye(2)))
     if found.exact and np.max(np.abs(found.x[-2:] - np.eye(2))) < off_by:
         return [explained_by(e, found)]
-    several, found = _remembering(e) or ("several", found)
     # where the motion grows, a lasting disturbance falls relative to it too: its own size has to fall
     fading = relative, np.maximum(off - 8 * e.unit, 0)
     if any(x[e.pairs // 4 :].max() > FORGOTTEN * x.max() for x in fading):
         return []
+    several, found = _remembering(e) or ("several", found)
     # the first frames alone show the other map, but for which all follow one
     later = fit(e.record, e.j, kept=np.arange(e.pairs) >= e.pairs // 2)
     start = np.max(np.abs(later.misses(e.found)), axis=1)

@@ -60,7 +60,7 @@ def sizes(scene: Scene, step: float, how: Arithmetic) -> Iterator[tuple[float, s
     least, most = float(np.finfo(np.float32).smallest_normal), float(np.finfo(np.float32).max)
     for term in scene.terms:
         for column in term.columns:
-            values = np.abs(getattr(term, column.field)) if column.single else np.zeros(0)
+            values = np.abs(term.arrays[column.field]) if column.single else np.zeros(0)
             for x in np.sort(values[values > 0])[[0, -1]] if np.any(values) else ():
                 yield least, f"{column.name} of a {term.key}", float(x), most
     if how.force == 2.0**-24:
