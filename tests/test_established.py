@@ -382,6 +382,31 @@ def test_what_a_library_does_not_take_is_refused_in_its_words(
         run(replace(load_scene("spring-uneven"), **changes), label)
 
 
+@pytest.mark.parametrize(("label", "fast"), [("box2d:force", 0.3), ("rapier:force", 60.0)])
+def test_a_declared_limit_of_speed_is_a_known_reason_and_no_other_stop_is(
+    label: str, fast: float, need: Need
+) -> None:
+    need(label)
+    scene = replace(load_scene("spring-uneven"), step=0.1, steps=400, every=1)
+    scene = replace(scene, q=0 * scene.q, p=-scene.m * fast, terms=(WallSpring(i=[0], k=[-3.0], at=[0.0]),))
+    made = run(scene, label)
+    assert made.outcome.status == "stopped"
+    limit = made.outcome.fastest
+    (grid,) = (v for v in checks.judge(scene, made) if v.check == "grid")
+    assert grid.passed
+    assert f"its declared limit of speed, {limit:g}" in grid.why
+    # the same stop without the declaration, one long before the limit, and one that frames have exceeded
+    early = made.at(slice(len(made.t) - 4))
+    for other in (
+        replace(made, outcome=replace(made.outcome, fastest=np.inf)),
+        replace(early, outcome=replace(made.outcome, step=made.outcome.step - 4)),
+        replace(made, outcome=replace(made.outcome, fastest=0.8 * limit)),
+    ):
+        (grid,) = (v for v in checks.judge(scene, other) if v.check == "grid")
+        assert grid.passed is False
+        assert "for no reason that is known here" in grid.why
+
+
 @pytest.mark.parametrize(("label", "fast"), [("box2d:force", 0.9), ("rapier:force", 390.0)])
 def test_force_calls_before_a_stop_are_counted(label: str, fast: float, need: Need) -> None:
     need(label)

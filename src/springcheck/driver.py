@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from time import perf_counter
-from typing import Any, Literal, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -137,9 +137,8 @@ def play(
     while frame < scene.frames:
         f = min(ready, scene.frames - frame)
         q[f - 1], p[f - 1] = UNTOUCHED, UNTOUCHED
-        status, good, message, seconds = _advance(
-            label, simulation, scene.every, piece, q[:f], p[:f], progress
-        )
+        ended, seconds = _advance(label, simulation, scene.every, piece, q[:f], p[:f], progress)
+        good = ended.step // scene.every
         run_seconds += seconds
         ready = min(rows, 4 * ready) if whole and seconds < QUICK else ready
         if good:
@@ -148,8 +147,8 @@ def play(
                 last = _said(label, simulation, "last_steps", f"{good} lengths", partial(_rows, good))
             _hand_over(scene, sink, frame, q[:good], p[:good], last)
         frame += good
-        if status != "complete":
-            outcome = Outcome(status=status, step=(frame - 1) * scene.every, message=message)
+        if ended.status != "complete":
+            outcome = replace(ended, step=(frame - 1) * scene.every)
             break
         if 0 < max(np.max(np.abs(q[f - 1])), np.max(np.abs(p[f - 1]))) < TINY:
             outcome = Outcome(status="complete", step=scene.steps, message=SUBNORMAL)
@@ -198,9 +197,6 @@ def _count(said: Any) -> int:
     return whole
 
 
-Ending = Literal["complete", "diverged", "stopped"]
-
-
 def _advance(
     label: Label,
     simulation: Simulation,
@@ -209,13 +205,12 @@ def _advance(
     q: Floats,
     p: Floats,
     progress: Progress | None,
-) -> tuple[Ending, int, str, float]:
-    """Fill q and p (f, n): how it ended, the number of good rows, why no more, and the seconds it took.
+) -> tuple[Outcome, float]:
+    """Fill q and p (f, n): how it ended, after how many steps of this call, and the seconds it took.
 
     Where a call takes fewer steps than lie between frames there is one row; `progress` is called after each.
     """
-    status: Ending = "complete"
-    good, message, told = len(q), "", 0
+    outcome, good, told = Outcome(status="complete", step=0), len(q), 0
     began = perf_counter()
     try:
         for left in range(every, 0, -piece):
@@ -228,7 +223,8 @@ def _advance(
         if stop.rows not in range(len(q) + 1):
             raise MethodError(f"{label}: Stopped after {stop.rows!r} rows of {len(q)}") from stop
         # a row that is filled before its last piece is no frame
-        status, good, message = "stopped", stop.rows if left <= piece else 0, str(stop)
+        good = stop.rows if left <= piece else 0
+        outcome = Outcome(status="stopped", step=0, message=str(stop), fastest=stop.fastest)
     seconds = perf_counter() - began
     finite = np.isfinite(q[:good]).all(axis=1) & np.isfinite(p[:good]).all(axis=1)
     if not finite.all():
@@ -239,12 +235,12 @@ def _advance(
                 f"{label} failed: its advance(every, q, p) has left row {good} of "
                 f"{' and '.join(unfilled)} as it was; it writes every row into these arrays: q[row] = ..."
             )
-        status, message = "diverged", "not finite from the next frame on"
-    elif status == "stopped" and "nan" in message.lower():
-        status = "diverged"
+        outcome = Outcome(status="diverged", step=0, message="not finite from the next frame on")
+    elif outcome.status == "stopped" and "nan" in outcome.message.lower():
+        outcome = replace(outcome, status="diverged")
     if progress:
         progress(good * every - told)
-    return status, good, message, seconds
+    return replace(outcome, step=good * every), seconds
 
 
 def _hand_over(scene: Scene, sink: Sink, frame: int, q: Floats, p: Floats, last: Floats | None) -> None:

@@ -56,12 +56,14 @@ def grid(case: Case) -> Finding:
     if last > asked or (status == "complete" and last != asked):
         wrong.append(f"{last} of {count(asked, 'step')}, and the run is called {status}")
     elif status in ("stopped", "diverged") and not (
-        case.law.has("random") or _gives_up(case) or _explodes(case)
+        case.law.has("random") or _gives_up(case) or _ends_beyond(case)
     ):
         wrong.append(f"{status} after {last} of {count(asked, 'step')} for no reason that is known here")
         if status == "stopped" and run.outcome.message:
             wrong[-1] += f"; the engine says: {run.outcome.message}"
     why = "; ".join(wrong) or "every fact of the grid is the scene's own"
+    if not wrong and run.outcome.fastest < np.inf:
+        why += f"; the next step would exceed its declared limit of speed, {run.outcome.fastest:g}"
     return Finding(len(wrong), 0.0, "facts", why)
 
 
@@ -102,13 +104,14 @@ def _gives_up(case: Case) -> bool:
     return solves and outcome.status == "stopped" and bool(outcome.message)
 
 
-HALF_RANGE = np.sqrt(np.finfo(np.float64).max)
-"""Sizes from which a product of two numbers of a step may leave the range of a double, as the squared
-length of a bond does."""
+HALF_RANGE, SINGLE_RANGE = (float(np.sqrt(np.finfo(x).max)) for x in (np.float64, np.float32))
+"""Sizes from which a product of two numbers of a step may leave the range of a double, or of a number of
+single precision, as the squared length of a bond does."""
 
 
-def _explodes(case: Case) -> bool:
-    """Whether the motion itself comes near the engine's overflow between the last frame and the next."""
+def _ends_beyond(case: Case) -> bool:
+    """Whether the motion itself comes near the engine's overflow between the last frame and the next, or to
+    its declared limit of speed, which no frame has exceeded."""
     run, scene = case.trajectory, case.judged
     q, p = (x[-1:].astype(np.longdouble) for x in (run.q, run.p))
     limit = SINGLE_RANGE if run.arithmetic.force >= np.finfo(np.float32).eps / 2 else HALF_RANGE
@@ -119,17 +122,20 @@ def _explodes(case: Case) -> bool:
         ends = exact.true_motion(case.scene, case.steps[-1:] + run.every, run.step)
         return not max(float(np.max(np.abs(x))) for x in (*ends, q, p)) <= limit
     sizes = scene.system.magnitude(None if case.system.is_linear else q)
-    for _ in range(min(run.every, REPEATED) + 1):
+    kept = bool(np.max(np.abs(run.p / scene.m)) <= run.outcome.fastest)
+    for step in range(min(run.every, REPEATED) + 1):
         largest = max(float(np.max(np.abs(x))) for x in (q, p, p / scene.m, sizes(np.abs(q), np.abs(p))))
-        if not largest <= limit:
+        slow = np.max(np.abs(p / scene.m)) < OF_FASTEST * run.outcome.fastest
+        if not largest <= limit or (kept and step and not slow):
             return True
         q, p = case.step(q, p)
         sizes = scene.system.magnitude(None if case.system.is_linear else q)
     return False
 
 
-SINGLE_RANGE = float(np.sqrt(np.finfo(np.float32).max))
-"""The same for single precision."""
+OF_FASTEST = 0.998
+"""Part of a declared limit of speed to which a step comes that may exceed it: engines in single precision
+stop at 0.999 of it, so as not to take a speed that was cut down to the limit for the scheme's own."""
 
 
 @check("line", family="record", requires={"three-dimensions"})

@@ -33,8 +33,6 @@ class Bodies(ABC):
     numbers: ClassVar[type] = np.float32
     fastest: float = np.inf
     """Largest speed that the world gives a body [L/T]."""
-    limit: str = ""
-    """The message where a body would exceed that speed."""
     shortest: ClassVar[float] = 0.0
     """Length up to which a joint of the world has no direction, and no force [L]."""
 
@@ -113,4 +111,5 @@ class Bodies(ABC):
     def _within(self, row: int, speeds: Floats, part: float) -> None:
         """Stopped(row, ...) where the world does not move as it was told, at this part of its limit."""
         if np.any(np.abs(speeds) > part * self.fastest):
-            raise Stopped(row, self.limit, is_limit=True)
+            said = f"the engine moves no body faster than {self.fastest:g}"
+            raise Stopped(row, said, fastest=float(self.fastest))

@@ -31,7 +31,6 @@ class _World(Bodies):
 
     x, y, v = "position.x", "position.y", "linearVelocity.x"
     shortest = 0.005
-    limit = f"Box2D moves no body by more than {FURTHEST:g} in a step"
 
     def begin(self, label: Label, step: float) -> None:
         import Box2D

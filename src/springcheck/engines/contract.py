@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from importlib import import_module
+from math import inf
 from typing import Any, Protocol
 
 from springcheck.physics.arrays import Arithmetic, Floats
@@ -131,12 +132,13 @@ class Simulation(Protocol):
 class Stopped(Exception):  # noqa: N818 - an outcome, not an error
     """An engine gave up: the rows that it had filled, and its message.
 
-    `is_limit`: it moves nothing beyond a limit of its own, which the message names.
+    `fastest`: the largest speed that it gives a body [L/T], where that is why.  `is_limit`: it moves nothing
+    beyond a limit of its own, which the message names.
     """
 
-    def __init__(self, rows: int, message: str, *, is_limit: bool = False) -> None:
+    def __init__(self, rows: int, message: str, *, fastest: float = inf, is_limit: bool = False) -> None:
         super().__init__(message)
-        self.rows, self.is_limit = rows, is_limit
+        self.rows, self.fastest, self.is_limit = rows, fastest, is_limit or fastest < inf
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

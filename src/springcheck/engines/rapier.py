@@ -43,7 +43,6 @@ class _World(Bodies):
         self._world = rapier3d.PhysicsWorld(gravity=(0, 0, 0))
         self._world.integration_parameters.dt = step
         self.fastest = self._world.integration_parameters.normalized_max_linear_velocity
-        self.limit = f"Rapier moves no body faster than {self.fastest:g}"
 
     def add(self, m: float, q: float, v: float) -> Any:
         body = self._library.RigidBody.dynamic(

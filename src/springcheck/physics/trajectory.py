@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
+from html import escape
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Self
@@ -26,6 +27,8 @@ class Outcome:
     step: int
     """Steps done with finite numbers."""
     message: str = ""
+    fastest: float = float("inf")
+    """The largest speed that the engine gives a body, where it stopped at that [L/T]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,7 +79,7 @@ class Trajectory:
         v: Any = None,
         scene: Scene | None = None,
         mass: Any = None,
-        scheme: str = "unknown",
+        scheme: str = "",
         label: str = "data",
         every: int = 1,
     ) -> Trajectory:
@@ -235,14 +238,11 @@ class Trajectory:
         if self.energy is not None:
             kept["energy"] = (("t",), self.energy)  # type: ignore[assignment]
         about = {"method": self.label, "scheme": self.scheme, "step": self.step}
-        coordinates = {"t": self.t, "particle": range(self.q.shape[1])}
-        return xarray.Dataset(kept, coords=coordinates, attrs=about)
+        return xarray.Dataset(kept, coords={"t": self.t, "particle": range(self.q.shape[1])}, attrs=about)
 
 
 def html_table(title: str, rows: Iterable[Sequence[str]]) -> str:
     """Rows of cells, the first of them the titles, under a line of text."""
-    from html import escape
-
     body = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)
     return f"<p>{escape(title)}</p><table>{body}</table>"
 

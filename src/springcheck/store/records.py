@@ -29,6 +29,7 @@ KEPT = {
     "outcome": "outcome.status",
     "outcome_step": "outcome.step",
     "outcome_message": "outcome.message",
+    "outcome_fastest": "outcome.fastest",
     "start_seconds": "timing.start",
     "run_seconds": "timing.run",
     "force_calls": "force_calls",
@@ -73,6 +74,7 @@ class RunRecord(msgspec.Struct, frozen=True, kw_only=True):
     outcome: Literal["complete", "diverged", "stopped"] = "complete"
     outcome_step: Count = 0
     outcome_message: Message = ""
+    outcome_fastest: float = math.inf
     start_seconds: float = math.nan
     run_seconds: float = math.nan
     force_calls: Count = 0
@@ -113,8 +115,7 @@ def record(place: str, known: Mapping[str, Any]) -> RunRecord:
 def attributes(trajectory: Trajectory) -> dict[str, Scalar | None]:
     """Metadata of a trajectory that `Draft.finish` stores; its numbers are not looked at."""
     kept = {name: attrgetter(field)(trajectory) for name, field in KEPT.items()}
-    origin = {f"origin.{key}": value for key, value in trajectory.origin.items()}
-    return {"method": trajectory.label, **kept, **origin}
+    return {"method": trajectory.label, **kept, **{f"origin.{x}": y for x, y in trajectory.origin.items()}}
 
 
 def trajectory(
@@ -126,12 +127,10 @@ def trajectory(
         part, _, own = field.rpartition(".")
         parts[part][own] = getattr(x, name)
     parts[""]["every"] *= stride
-    empty = np.empty((0, x.particles))
     return Trajectory(
         label=label,
         t=arrays["time"],
-        q=arrays.get("q", empty),
-        p=arrays.get("p", empty),
+        **{name: arrays.get(name, np.empty((0, x.particles))) for name in "qp"},
         energy=arrays.get("energy"),
         last_step=arrays.get("last_step"),
         outcome=Outcome(**parts["outcome"]),
