@@ -150,7 +150,7 @@ def test_a_way_out_that_ends_where_it_began_says_nothing_of_the_way_back() -> No
     """h w = 1: six steps of semi-implicit Euler are the identity, in binary numbers to the last bit."""
     scene = spring(m=1.0, k=1.0, q=1.0, p=0.5, step=1.0, steps=6, title="")
     bench = checks.Bench(scene=scene, label="", run=plain("semi-implicit-euler"))
-    assert bench.forwards.q[-1] == scene.q
+    assert bench.trajectory.q[-1] == scene.q
     verdict = experiments.reversibility(bench)
     assert verdict.passed is None
     assert "standing still" in verdict.why

@@ -25,6 +25,7 @@ from springcheck.checks import experiments, laws, thermal
 from springcheck.checks.bench import Bench, Run
 from springcheck.checks.case import Case
 from springcheck.checks.check import DECADES, Check, shared
+from springcheck.checks.driven import drive
 from springcheck.checks.motion import (
     angular_momentum,
     closed_form,
@@ -38,14 +39,14 @@ from springcheck.checks.replayed import energy_gain, replay
 from springcheck.checks.requires import CONTRACTED, REQUIREMENTS
 from springcheck.checks.rods import rod_length, rod_velocity, turn
 from springcheck.checks.solver import tolerance, tolerance_bound
-from springcheck.checks.steps import BLIND, arithmetic, border, bridges, drive, first_off, step_defect
+from springcheck.checks.steps import BLIND, arithmetic, border, bridges, first_off, step_defect
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Limits, Trajectory, Verdict
 from springcheck.text.wording import STATES_SHOW
 
 __all__ = [
     "ALL", "BLIND", "CHECKS", "CONTRACTED", "RANDOM", "SPECIAL", "STATES_SHOW", "TELLING", "THOROUGH",
-    "Bench", "Case", "Check", "Run", "angular_momentum", "arithmetic", "bridges",
+    "Bench", "Case", "Check", "Run", "angular_momentum", "arithmetic", "bridges", "cause_of",
     "closed_form", "energies", "experiments_of", "first_off", "frequency", "judge", "judge_thoroughly",
     "momentum", "not_judged", "shadow_energy", "shared", "start", "status", "step_defect", "summary",
     "tolerance", "tolerance_bound", "worst",
@@ -107,7 +108,6 @@ def summary(verdicts: Sequence[Verdict]) -> str:
     return f"{len(failed)} of {judged} failed: {', '.join(names[:MOST_NAMED])}{more}{beside}"
 
 
-@np.errstate(all="ignore")
 def explained(
     scene: Scene, run: Trajectory, verdicts: Sequence[Verdict], shown: Callable[[Scene, Trajectory, int], str]
 ) -> list[Verdict]:
@@ -119,17 +119,18 @@ def explained(
     first = next((v for v in verdicts if v.passed is False and v.check in TELLING), None)
     if first is None:
         return list(verdicts)
-    case = Case(trajectory=run, scene=scene)
     # imported here: only failures are explained
-    from springcheck.checks import causes, driven, other
+    from springcheck.checks import causes
 
-    # of one particle by itself states show more than which number is another
-    looks = [lambda: shown(scene, run, first_off(case) or 0), lambda: other.found(case)]
-    if not (scene.system.is_linear and scene.system.is_separate):
-        looks.reverse()
-    said = driven.found(case) or causes.found(case) or looks[0]() or looks[1]()
+    case = Case(trajectory=run, scene=scene)
+    said = causes.found(case, lambda: shown(scene, run, first_off(case) or 0))
     why = f"{first.why}{STATES_SHOW}{said}" if said else first.why
     return [replace(v, why=why) if v is first else v for v in verdicts]
+
+
+def cause_of(verdicts: Sequence[Verdict]) -> str:
+    """What the states show to be the cause of a failure; "" where that is unknown, or nothing failed."""
+    return next((v.why.partition(STATES_SHOW)[2] for v in verdicts if STATES_SHOW in v.why), "")
 
 
 def experiments_of(scene: Scene) -> tuple[Check, ...]:

@@ -39,19 +39,14 @@ class Bench:
         return self.kept[id(scene)]
 
     @cached_property
-    def forwards(self) -> Trajectory:
+    def trajectory(self) -> Trajectory:
         """The scene's own run, of at most 200 steps, every step recorded."""
         return self.run(replace(self.scene, every=1, steps=min(self.scene.steps, 200)), self.label)
 
     @property
-    def trajectory(self) -> Trajectory:
-        """The same run, by the name that requirements use."""
-        return self.forwards
-
-    @property
     def scheme(self) -> schemes.Scheme:
         """The scheme that the method claims to run."""
-        return schemes.scheme(self.forwards.scheme)
+        return schemes.scheme(self.trajectory.scheme)
 
     @cached_property
     def law(self) -> schemes.Law:
@@ -78,6 +73,4 @@ class Bench:
         state[:, :n] = scene.system.modes.rest.astype(np.float64)
         state[1:] += np.diag(pushes)
         start = scene.system.from_states(state[:, :n], state[:, n:])
-        return Case(trajectory=self.run(start, self.label), scene=start), state[
-            np.arange(1, 2 * n + 1), np.arange(2 * n)
-        ] - state[0]
+        return Case(trajectory=self.run(start, self.label), scene=start), np.diag(state[1:]) - state[0]

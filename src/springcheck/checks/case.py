@@ -65,6 +65,14 @@ class Case(Claim):
         ) * self.trajectory.every
 
     @property
+    def begun(self) -> tuple[Integers, tuple[Extended, Extended]]:
+        """Steps since the start (f,), and its q and p (n,); of a later piece of a long run, before which
+        nothing bounds the motion, since its own first frame."""
+        first, steps = self.trajectory if self.steps[0] else self.scene, self.steps - self.steps[0]
+        q, p = (x.reshape(-1, self.scene.n)[0].astype(np.longdouble) for x in (first.q, first.p))
+        return steps, (q, p)
+
+    @property
     def linear(self) -> bool:
         """Whether each normal mode has a one-step matrix of its own."""
         return self.scene.system.has_modes and not self.law.has("mixes")

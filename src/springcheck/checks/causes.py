@@ -6,8 +6,11 @@ from the positions.  The effect of a bath is in the draws that the states imply,
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
+from springcheck.checks import driven, other
 from springcheck.checks.case import Case
 from springcheck.checks.requires import MAP, missing
 from springcheck.checks.thermal import reading
@@ -31,11 +34,15 @@ SAME_DRAWS = 1e-6
 """Relative difference up to which two draws count as one number."""
 
 
-def found(case: Case) -> str:
-    """The cause in one sentence, or "" where no cause that is known here explains the states."""
-    if case.trajectory.scheme in THERMOSTATS:
-        return _of_bath(case) if case.trajectory.every == 1 else ""
-    return _of_rods(case)
+@np.errstate(all="ignore")
+def found(case: Case, shown: Callable[[], str] = str) -> str:
+    """The cause in one sentence, or "" where nothing known here, nor what the states show, explains them."""
+    # of one particle by itself states show more than which number is another
+    looks = [shown, lambda: other.found(case)]
+    if not (case.scene.system.is_linear and case.scene.system.is_separate):
+        looks.reverse()
+    here = _of_bath if case.trajectory.scheme in THERMOSTATS else _of_rods
+    return driven.found(case) or here(case) or looks[0]() or looks[1]()
 
 
 def _of_rods(case: Case) -> str:
@@ -74,6 +81,8 @@ def _of_rods(case: Case) -> str:
 
 def _of_bath(case: Case) -> str:
     """Draws that two coordinates share, or noise whose size is not the bath's."""
+    if case.trajectory.every > 1:
+        return ""
     seen = reading(case)
     if seen.rescaled is not None:
         return _rescaled(case, seen.rescaled)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from springcheck.checks.case import Case
-from springcheck.checks.check import Finding
+from springcheck.checks.check import Finding, check
 from springcheck.checks.requires import MAP, missing
 from springcheck.physics.arrays import Extended, Reals
 from springcheck.physics.driven import CLOCK
@@ -52,7 +52,7 @@ def found(case: Case) -> str:
         taken = {clock.later} if clock.held else {c + clock.later for c in right}
         if taken != right and _fits(case, clock):
             held = ", held over it," if clock.held and len(right) > 1 else ""
-            of = "" if taken <= {-1.0, 2.0} else " of the step"
+            of = "" if max(taken) in (-1.0, 2.0) else " of the step"
             return (
                 f"the drive is taken at {_words(taken)}{of}{held} where {title} takes it at {_words(right)}"
             )
@@ -116,12 +116,16 @@ def _delay(case: Case, later: float = 0.0) -> tuple[float, float]:
     return float(more), float(case.roundings * np.sum(np.abs(slope)) / weight)
 
 
-def time_taken(case: Case) -> Finding | str:
-    """Delay of all drives, in steps, by linear least squares over all steps.
+@check("drive", family="motion", requires=MAP | {"driven", "resolved"}, telling=False)
+def drive(case: Case) -> Finding | str:
+    """The time of a drive is that at which the scheme takes it within its step.
 
-    Each residual may be off by the scheme's roundings, which are added up with the worst signs.  Where no
-    time and no other drive explains the states, the cause is not the drive.
+    The delay of all drives, in steps, by linear least squares over all steps.  Each residual may be off by
+    the scheme's roundings, which are added up with the worst signs.  Where no time and no other drive
+    explains the states, the cause is not the drive.
     """
+    if case.trajectory.every > 1:
+        return f"{case.trajectory.every} steps lie between frames"
     later, bound = _delay(case.clocked)
     if not bound < 1:
         return "rounding may be as large as what a drive a whole step later does"

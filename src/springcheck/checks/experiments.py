@@ -15,7 +15,7 @@ from springcheck.checks.steps import step_defect
 from springcheck.checks.stretch import follow, known
 from springcheck.physics.arrays import Extended, Floats, Integers, Reals
 from springcheck.physics.scene import Scene
-from springcheck.physics.trajectory import NOT_KNOWN, Limits
+from springcheck.physics.trajectory import NOT_KNOWN, Limits, Trajectory
 from springcheck.text.wording import count
 
 MATRIX = frozenset({"named", "one-step", "linear", "modes", "few", "resolved"})
@@ -142,7 +142,7 @@ def reversibility(bench: Bench) -> Finding | str:
     """Run, momenta flipped, and run again, the scene is back where it started, to rounding."""
     scheme = bench.scheme
     two_stage = len(scheme.stages) == 2
-    out = bench.forwards
+    out = bench.trajectory
     steps = len(out.t) - 1
     case = Case(trajectory=out, scene=bench.scene)
     if out.outcome.status != "complete" or not steps:
@@ -216,73 +216,72 @@ def _enlarged(case: Case, steps: int, turned: tuple[Floats, Floats], size: np.fl
     return float(ends / size) if size > 0 else 0.0
 
 
+def _against(
+    why: str, scene: Scene, first: Trajectory, *others: Trajectory, rounding: str = ""
+) -> Finding | str:
+    """Number of frames at which other runs of a scene differ from the first, bit for bit; `rounding` where
+    each of them is the scheme's own."""
+    if any(len(run.t) != len(first.t) for run in others):
+        return Finding(np.inf, 0.0, "frames", "one of the runs ended early")
+    differ = np.any([(run.q != first.q) | (run.p != first.p) for run in others], axis=(0, 2))
+    if rounding and np.any(differ):
+        runs = (first, *(replace(first, q=run.q, p=run.p) for run in others))
+        if all(step_defect(Case(trajectory=run, scene=scene)).passed for run in runs):
+            return rounding
+    return Finding(np.count_nonzero(differ), 0.0, "frames", why)
+
+
 @check("mirror", family="repeat", requires={"one-step", "undamped", "autonomous"})
 def mirror(bench: Bench) -> Finding | str:
     """A negative step does what flipped momenta do, bit for bit."""
-    steps = min(bench.scene.steps, 20)
-    flipped = bench.run(replace(bench.scene, p=-bench.scene.p, steps=steps, every=1), bench.label)
-    backwards = bench.run(replace(bench.scene, step=-bench.scene.step, steps=steps, every=1), bench.label)
-    if len(flipped.t) != len(backwards.t):
-        return Finding(np.inf, 0.0, "frames", "one of the two runs ended early")
-    if len(flipped.t) < 2:
+    scene = replace(bench.scene, steps=min(bench.scene.steps, 20), every=1)
+    flipped = bench.run(replace(scene, p=-scene.p), bench.label)
+    back = bench.run(replace(scene, step=-scene.step), bench.label)
+    if len(flipped.t) == len(back.t) < 2:
         return ENDED
-    differ = np.any((flipped.q != backwards.q) | (flipped.p != -backwards.p), axis=1)
-    return Finding(np.count_nonzero(differ), 0.0, "frames", "rounding to nearest does not know the sign")
+    return _against("rounding to nearest does not know the sign", scene, flipped, replace(back, p=-back.p))
 
 
 @check("turned", family="repeat", requires={"three-dimensions", "one-step"})
 def orientation(bench: Bench) -> Finding | str:
     """The scene turned, x to y to z to x, does the same, bit for bit."""
-    alone, scene = bench.forwards, bench.scene
+    alone, places = bench.trajectory, bench.scene.all_places
     steps = len(alone.t) - 1
     if steps < 1:
         return ENDED
-    places = scene.all_places
-    base = replace(scene, steps=steps, every=1)
+    base = replace(bench.scene, steps=steps, every=1)
     turned = []
     for turn in (1, 2):
         box = None if base.box is None else tuple(np.roll(base.box, turn).tolist())
         there = replace(base, places=places - places % 3 + (places + turn) % 3, box=box)
         turned.append(bench.run(there, bench.label))
-    if any(len(run.t) != len(alone.t) for run in turned):
-        return Finding(np.inf, 0.0, "frames", "one of the runs ended early")
-    differ = np.any([(x.q != alone.q) | (x.p != alone.p) for x in turned], axis=(0, 2))
-    if np.any(differ):
-        runs = [alone, *(replace(alone, q=x.q, p=x.p) for x in turned)]
-        if all(step_defect(Case(trajectory=run, scene=base)).passed for run in runs):
-            return "the runs differ by rounding alone, as lengths that are sums in another order do"
+    rounding = "the runs differ by rounding alone, as lengths that are sums in another order do"
+    found = _against("no axis is another one's better", base, alone, *turned, rounding=rounding)
     left = max(float(run.off_axis or 0.0) for run in turned)
-    if left:
+    if left and isinstance(found, Finding) and found.value < np.inf:
         return Finding(left, 0.0, "L", "coordinates that the turned scene leaves out stay exactly 0")
-    return Finding(np.count_nonzero(differ), 0.0, "frames", "no axis is another one's better")
+    return found
 
 
 @check("company", family="repeat", requires={"one-step", "explicit", "linear"})
 def company(bench: Bench) -> Finding | str:
     """A livelier copy beside it, which acts on nothing of it, changes no number of the motion."""
-    alone, scene = bench.forwards, bench.scene
+    alone, scene, n = bench.trajectory, bench.scene, bench.scene.n
     steps = len(alone.t) - 1
     if steps < 1:
         return ENDED
-    two = scene.system.tiled(2)
     lively = 3 * scene.p + np.sqrt(2 * scene.m) * float(scene.system.norm.unit)
-    beside = replace(two, p=np.concatenate([scene.p, lively]), steps=steps, every=1)
+    beside = replace(scene.system.tiled(2), p=np.concatenate([scene.p, lively]), steps=steps, every=1)
     both = bench.run(beside, bench.label)
-    if len(both.t) != len(alone.t):
-        return Finding(np.inf, 0.0, "frames", "the two runs differ in length")
-    n = scene.n
-    differ = np.any((both.q[:, :n] != alone.q) | (both.p[:, :n] != alone.p), axis=1)
-    if np.any(differ):
-        part = replace(alone, q=both.q[:, :n].copy(), p=both.p[:, :n].copy())
-        if all(step_defect(Case(trajectory=run, scene=scene)).passed for run in (alone, part)):
-            return "the two runs differ by rounding alone, as sums of another length do"
-    return Finding(np.count_nonzero(differ), 0.0, "frames", "systems side by side share nothing")
+    part = replace(both, q=both.q[:, :n].copy(), p=both.p[:, :n].copy())
+    rounding = "the two runs differ by rounding alone, as sums of another length do"
+    return _against("systems side by side share nothing", scene, alone, part, rounding=rounding)
 
 
 @check("repeat", family="repeat")
 def repeatability(bench: Bench) -> Finding | str:
     """A second run of the same scene gives the same numbers, bit for bit."""
-    first = bench.forwards
+    first = bench.trajectory
     again = bench.run(replace(bench.scene, every=1, steps=min(bench.scene.steps, 200)), bench.label)
     if first.q.shape != again.q.shape:
         return Finding(np.inf, 0.0, "frames", "the runs differ in length")

@@ -204,9 +204,8 @@ def momentum(case: Case) -> Finding | str:
     unit = np.maximum.accumulate(summed(of_p))[1:]
     if steps[0] != 0 and case.linear:
         unit = np.maximum(unit, summed(case.allowance_at(*case.envelope)[1]))
-    elif steps[0] != 0:
-        # nothing bounds the motion before this piece: it is judged from its own first frame on
-        steps, first = steps - steps[0], run.p[0].astype(np.longdouble)
+    else:
+        steps, (_, first) = case.begun
     off = np.abs(total - summed(first))[1:]
     limit = (case.roundings * steps[1:].astype(np.float64))[:, None]
     # a step from a state near the overflow threshold may exceed even its own bound
@@ -234,12 +233,8 @@ def angular_momentum(case: Case) -> Finding | str:
     """Angular momentum q_x p_y - q_y p_x is kept where a step keeps area, and changes by its determinant."""
     # a step that is one linear map A on both axes changes the area that they span, summed over particles, by
     # det A, or not at all where A is symplectic: Hairer, Lubich & Wanner, chapter VI.2
-    run, steps = case.trajectory, case.steps
-    start = case.scene.q.astype(np.longdouble), case.scene.p.astype(np.longdouble)
+    run, (steps, start) = case.trajectory, case.begun
     noise = case.allowance_at(run.q, run.p, paired=True)
-    if steps[0] != 0:
-        # nothing bounds the motion before this piece: it is judged from its own first frame on
-        steps, start = steps - steps[0], (run.q[0].astype(np.longdouble), run.p[0].astype(np.longdouble))
     parts = [_areas(case, pair, (run.q, run.p), start, noise, steps) for pair in case.scene.system.alike]
     off, unit, size = (np.concatenate(x) for x in zip(*parts, strict=True))
     limit = np.tile(case.roundings * np.maximum(steps[1:], 1).astype(np.float64), len(parts))

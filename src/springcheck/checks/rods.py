@@ -91,12 +91,8 @@ def turn(case: Case) -> Finding | str:
     """A rod that turns freely turns by asin(h w) in a drift of h, w that of the start, at every step."""
     # SHAKE pushes along the rod as it lay before the drift, of length l, and the drift moves its ends apart
     # by h v across it: the rod rotates by the angle with the sine h |v| / l = h w. The projection keeps w
-    rods, run, steps = _rods(case), case.trajectory, case.steps
-    m = case.judged.m
-    q0, p0 = case.scene.q.astype(np.longdouble), case.scene.p.astype(np.longdouble)
-    if steps[0] != 0:
-        # a later piece of a long run: from its own first frame on
-        steps, (q0, p0) = steps - steps[0], (x[0].astype(np.longdouble) for x in (run.q, run.p))
+    rods, run, m = _rods(case), case.trajectory, case.judged.m
+    steps, (q0, p0) = case.begun
     w = rods.rates(q0, p0)
     # rounding errors of momenta along a line are no rotation
     w = np.where(w * rods.length > START_TOLERANCE * rods.spans(np.abs(p0) / m), w, 0)

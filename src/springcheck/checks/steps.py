@@ -105,17 +105,6 @@ def border(case: Case) -> Finding | str:
     return Finding(seen[worst], bound[worst], "roundings", why + _where(case, off & across))
 
 
-@check("drive", family="motion", requires=MAP | {"driven", "resolved"}, telling=False)
-def drive(case: Case) -> Finding | str:
-    """The time of a drive is that at which the scheme takes it within its step."""
-    if case.trajectory.every > 1:
-        return f"{case.trajectory.every} steps lie between frames"
-    # scenes without a drive do without what looks for its time
-    from springcheck.checks import driven
-
-    return driven.time_taken(case)
-
-
 def _allowed(case: Case) -> tuple[Floats, NDArray[np.bool_]]:
     """Bound in roundings of each frame but the first, and whether it is known there (f-1,).  Frames very many
     steps apart are judged in the energy norm over all particles."""
