@@ -6,6 +6,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,9 @@ import pytest
 
 import springcheck
 from springcheck import api, engines
+from springcheck.cli import file
 from springcheck.errors import MethodError, SceneError, SpringcheckError, StoreError
+from springcheck.text.wording import STATES_SHOW
 
 
 def leapfrog(q: Any, p: Any, h: Any, force: Callable[..., Any], mass: Any) -> tuple[Any, Any]:
@@ -181,7 +184,7 @@ def test_verdicts_have_a_summary_and_name_what_failed() -> None:
     )
     assert not bad.passed
     assert bad.summary.split()[1:4:2] == ["of", "failed:"]
-    assert len(repr(bad).splitlines()) == len(bad.failed) + 1
+    assert len(repr(bad).splitlines()) == len(bad.failed) + 2
     assert bad._repr_html_().count("FAILED") == len(bad.failed)
     assert not api.Verdicts().passed
     if need("pandas"):
@@ -404,3 +407,33 @@ def test_a_study_hands_what_it_is_told_to_its_record(
     assert getattr(springcheck, name)(**arguments, force=True, workers=2) == "found"
     assert told["given"] == expected
     assert (told["force"], told["team"].workers) == (True, 2)
+
+
+def test_judge_says_what_the_states_show_as_the_command_does(tmp_path: Path) -> None:
+    scene = springcheck.load_scene("spring-uneven")
+
+    def heavy(q: Any, p: Any, h: float, force: Any, mass: Any) -> Any:
+        p = p + h * force(q)
+        return q + h * p / (1.25 * mass), p
+
+    run = springcheck.simulate(scene, heavy, scheme="semi-implicit-euler")
+    verdicts = springcheck.judge(scene, run)
+    (why,) = (v.why for v in verdicts if STATES_SHOW in v.why)
+    run.save(tmp_path / "run.csv")
+    found = file.judge(tmp_path / "run.csv", scene=scene, scheme="semi-implicit-euler")
+    (said,) = (v.why for v in found.verdicts if STATES_SHOW in v.why)
+    assert verdicts.cause == why.partition(STATES_SHOW)[2] == said.partition(STATES_SHOW)[2]
+    assert "mass" in verdicts.cause
+    assert verdicts.cause in repr(verdicts)
+    assert springcheck.judge(scene, springcheck.simulate(scene, "own:euler")).cause == ""
+
+
+def test_judge_without_a_scheme_says_in_a_line_how_to_find_it() -> None:
+    scene = springcheck.load_scene("spring")
+    run = springcheck.simulate(scene, "own:velocity-verlet")
+    made = springcheck.Trajectory.from_arrays(run.t, run.q, run.p)
+    with pytest.raises(SpringcheckError, match=r"identify.*which scheme.*scheme=") as error:
+        springcheck.judge(scene, made)
+    assert "forest-ruth" not in str(error.value)
+    with pytest.raises(SpringcheckError, match="did you mean velocity-verlet or position-verlet or"):
+        springcheck.judge(scene, replace(made, scheme="verlet"))

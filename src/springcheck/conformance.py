@@ -89,15 +89,13 @@ def assert_right(scene: Scene, run: Trajectory) -> None:
     verdicts = checks.explained(scene, run, checks.judge(scene, run), _shown)
     wrong = [verdict for verdict in verdicts if verdict.passed is False]
     if wrong:
-        _, _, shown = next((v.why for v in wrong if checks.STATES_SHOW in v.why), "").partition(
-            checks.STATES_SHOW
-        )
+        cause = checks.cause_of(wrong)
         lines = [
             f"  {verdict.check}: {verdict.value:.3g} where {verdict.bound:.3g} {verdict.unit} is allowed; "
             f"{verdict.why.partition(checks.STATES_SHOW)[0]}"
             for verdict in wrong
         ]
-        said = f": {shown}" if shown else ""
+        said = f": {cause}" if cause else ""
         raise AssertionError(
             f"{run.label} is not {run.scheme} on {scene.name}{said}\n"
             + "\n".join([*lines, checks.summary(verdicts)])

@@ -10,8 +10,8 @@ from pathlib import Path
 LONGEST_MESSAGE = 480
 """Characters of a message, which is one line: what a file says in it may be longer."""
 
-LONGEST_WORD, MOST_WORDS = 100, 2000
-"""Characters of a word that may be mistyped, and the number of words it is compared with."""
+LONGEST_WORD, MOST_WORDS, MOST_LIKELY = 100, 2000, 4
+"""Characters of a word that may be mistyped, the words it is compared with, and the most that contain it."""
 
 _STRANGE = ("Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp")
 """Unicode's controls, formats (which turn the direction of writing), surrogates, and ends of lines."""
@@ -82,14 +82,15 @@ def told(error: BaseException, file: object = "") -> str:
 
 
 def nearest(word: str, known: Iterable[str], before: str = "") -> str:
-    """ ", did you mean ...?" where one of the known words is close, else ""."""
+    """ ", did you mean ...?" where one of the known words is close, or a few contain it, else ""."""
     from difflib import get_close_matches
 
     # the time that a comparison takes grows with the square of the lengths
     short = (one for one in known if len(one) <= LONGEST_WORD)
-    folded = {one.casefold(): one for one in islice(short, MOST_WORDS)}
-    close = get_close_matches(word[:LONGEST_WORD].casefold(), folded, n=1)
-    return f", did you mean {before}{folded[close[0]]}?" if close else ""
+    folded, given = {one.casefold(): one for one in islice(short, MOST_WORDS)}, word[:LONGEST_WORD].casefold()
+    close = get_close_matches(given, folded, n=1) or [one for one in folded if given in one]
+    likely = " or ".join(folded[one] for one in close)
+    return f", did you mean {before}{likely}?" if given and 0 < len(close) <= MOST_LIKELY else ""
 
 
 class StoreWarning(UserWarning):

@@ -82,11 +82,17 @@ def simulate(
 
 
 def judge(scene: Scene | str | Path, trajectory: Trajectory) -> Verdicts:
-    """Verdicts of all checks on a trajectory of this scene; `passed` is None for those that do not apply.
+    """Verdicts of all checks on a trajectory of this scene; `passed` is None for those that do not apply, and
+    the first failed one says what the states show.
 
-    Raises SpringcheckError for frames of another shape, or without a step.
+    Raises SpringcheckError for frames of another shape, or without a step, or of no scheme.
     """
     found, run = scene_of(scene), trajectory_of(trajectory)
+    if not run.scheme:
+        raise SpringcheckError(
+            f"{run.label}: identify(trajectory, mass=...) says which scheme its states show; judge it "
+            "by that or by its own, as Trajectory.from_arrays(..., scheme='velocity-verlet')"
+        )
     frames = len(run.t)
     shapes = {"t": (frames,), "q": (frames, found.n), "p": (frames, found.n), "energy": (frames,)}
     for name, shape in shapes.items():
@@ -105,7 +111,13 @@ def judge(scene: Scene | str | Path, trajectory: Trajectory) -> Verdicts:
     if run.every < 1 or run.step == 0:
         raise SpringcheckError(f"{run.label}: every = {run.every} by step = {run.step:g} lie no frames apart")
     # trajectories made from arrays get the energies of their states
-    return Verdicts(checks.judge(found, run if run.scene or run.origin else run.of_scene(found)))
+    run = run if run.scene or run.origin else run.of_scene(found)
+    verdicts = checks.judge(found, run)
+    if checks.status(verdicts) == 1:
+        from springcheck.identify import files
+
+        verdicts = checks.explained(found, run, verdicts, files.shown)
+    return Verdicts(verdicts)
 
 
 def compare(

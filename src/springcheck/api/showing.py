@@ -26,8 +26,14 @@ class Verdicts(list[Verdict]):
         """How many passed, or which failed, in one line."""
         return checks.summary(self)
 
+    @property
+    def cause(self) -> str:
+        """What the states show to be the cause of a failure, in a sentence; "" where nothing is known."""
+        return checks.cause_of(self)
+
     def __repr__(self) -> str:
-        return "\n".join([f"Verdicts({self.summary})", *(f"  {verdict!r}" for verdict in self.failed)])
+        said = [f"  What the states show: {self.cause}"] if self.cause else []
+        return "\n".join([f"Verdicts({self.summary})", *said, *(f"  {verdict!r}" for verdict in self.failed)])
 
     def _repr_html_(self) -> str:
         words = {True: "passed", False: "FAILED", None: "does not apply"}

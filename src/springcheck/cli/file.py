@@ -102,8 +102,7 @@ def judge(
     found = load_scene(scene) if isinstance(scene, str) else scene
     known = schemes.scheme(scheme)
     states = states_in(path, columns, step, trajectory)
-    judged, run, notes = as_trajectory(path, states, found, known.name)
-    taken = _taken(states, judged, run, found)
+    judged, run, notes, taken = as_trajectory(path, states, found, known.name)
     verdicts = [
         replace(v, passed=None, value=np.nan, bound=np.nan, why=taken[v.check]) if v.check in taken else v
         for v in checks.explained(judged, run, checks.judge(judged, run), files.shown)
@@ -114,27 +113,6 @@ def judge(
         path=path, scene=found.name, scheme=known.name, frames=len(run.t), notes=notes,
         verdicts=tuple(verdicts),
     )  # fmt: skip
-
-
-def _taken(states: States, judged: Scene, run: Trajectory, asked: Scene) -> dict[str, str]:
-    """Data that replace the scene's and are therefore not judged, by the name of the check of the record."""
-    out: dict[str, str] = {}
-    if np.any(states.t != run.t):
-        off = float(np.max(np.abs(states.t - states.t[0] - run.t)))
-        out["times"] = f"{TIMES}; they are up to {off:.2g} beside them" if off else TIMES
-    if np.any(judged.q != asked.q) or np.any(judged.p != asked.p):
-        q = judged.q
-        if _beside_start(q[None], asked, 1e-6):
-            # displaced along its line
-            q = q - np.mean(q - asked.q)
-        size = float(asked.system.norm(q - asked.q, judged.p - asked.p))
-        out["start"] = f"the start was taken as it is written in the file, {size:.2g} of the amplitude off"
-    if (judged.every, judged.steps) != (asked.every, asked.steps):
-        out["grid"] = (
-            f"the file has {count(len(run.t), 'frame')}, {count(run.every, 'step')} apart, and the scene "
-            f"asks for {asked.frames}, {asked.every} apart: what is there was judged"
-        )
-    return out
 
 
 def _shown(scene: Scene, run: Trajectory, states: States) -> Verdict:
@@ -201,14 +179,14 @@ def _recorded(path: Path) -> dict[str, States]:
 
 def as_trajectory(
     path: Path, states: States, scene: Scene, scheme: str
-) -> tuple[Scene, Trajectory, tuple[str, ...]]:
-    """States as a trajectory of a scene with the file's grid and start, and notes on the changes made.
+) -> tuple[Scene, Trajectory, tuple[str, ...], dict[str, str]]:
+    """States as a trajectory of a scene with the file's grid and start, notes on the changes made, and what
+    was taken from the file and is therefore not judged, by the name of the check of the record.
 
     StoreError where they are not of the scene: another number of particles, other times, another start.
     """
     start.contradicted(path, states, scene)
-    notes = [*states.notes]
-    q = states.q
+    notes, taken, q, moved = [*states.notes], dict[str, str](), states.q, 0.0
     other = states.p if states.p is not None else np.asarray(states.v)
     for name, values in (("positions", q), ("momenta" if states.p is not None else "velocities", other)):
         good = np.isfinite(values).all(axis=1)
@@ -227,7 +205,8 @@ def as_trajectory(
         if moved := _beside_start(q, scene, off):
             # displaced from 0 by as much as the points are, since they are rounded there
             notes.append(f"positions counted from {moved:.6g} along it, where the scene has its 0")
-            q, scene = q - moved + far, _moved(scene, far)
+            terms = tuple(term.shifted(far) if term.bodies == 1 else term for term in scene.terms)
+            q, scene = q - moved + far, replace(scene, q=scene.q + far, terms=terms)
             beside /= max(1.0, far / (float(np.ptp(q)) or 1.0))
     if q.shape[1] != scene.n:
         raise StoreError(f"{path}: positions in a frame: {q.shape[1]}, in scene {scene.name}: {scene.n}")
@@ -256,6 +235,7 @@ def as_trajectory(
         )
     if np.any(states.t != t):
         notes.append(TIMES)
+        taken["times"] = f"{TIMES}; they are up to {np.max(off):.2g} beside them" if np.any(off) else TIMES
     size = scene.system.norm(q[0] - scene.q, p[0] - scene.p)
     # far from 0 the rounding of a coordinate is larger relative to the amplitude
     rounded = scene.system.norm.most(*(states.roundoff * np.abs(x) for x in (q[0], p[0])))
@@ -264,10 +244,9 @@ def as_trajectory(
             f"{path}: its first frame is {float(size):.2g} of the amplitude off the start of {scene.name}: "
             + start.differs(scene, scheme, q[0], p[0], velocities=states.p is None)
         )
-    if size > 0:
-        notes.append(
-            f"the start was taken as it is written in the file, {float(size):.2g} of the amplitude off"
-        )
+    if size > 0 or moved:
+        taken["start"] = f"the start was taken as it is written in the file, {size:.2g} of the amplitude off"
+        notes += [taken["start"]] if size > 0 else []
     if states.roundoff > 2.0**-53:
         notes.append(f"numbers are written to {states.roundoff:.1g}, and judged to that")
     steps = (len(q) - 1) * every
@@ -275,6 +254,11 @@ def as_trajectory(
         notes.append(f"ends after step {steps:,}, the scene after {scene.steps:,}")
     if every != scene.every:
         notes.append(f"frames are {count(every, 'step')} apart, {scene.every} in the scene")
+    if (steps, every) != (scene.steps, scene.every):
+        taken["grid"] = (
+            f"the file has {count(len(q), 'frame')}, {count(every, 'step')} apart, and the scene asks for "
+            f"{scene.frames}, {scene.every} apart: what is there was judged"
+        )
     ours = states.run if isinstance(states, Recorded) else None
     if ours is not None and ours.rebuilds_velocity:
         notes.append("velocities are rebuilt from positions, as its run declared, and judged so")
@@ -301,7 +285,7 @@ def as_trajectory(
             tolerance=ours.tolerance if ours.scheme == scheme else None, force_calls=ours.force_calls,
             last_step=ours.last_step,
         )  # fmt: skip
-    return judged, run, tuple(notes)
+    return judged, run, tuple(notes), taken
 
 
 def _in_plane(path: Path, q: Floats, other: Floats, scene: Scene, off: float) -> tuple[Floats, Floats, float]:
@@ -323,12 +307,6 @@ def _beside_start(q: Floats, scene: Scene, off: float) -> float:
     moved, size = float(np.mean(apart)), float(np.ptp(scene.q))
     alike = scene.n > 1 and np.ptp(apart) <= off * size < abs(moved)
     return moved if alike else 0.0
-
-
-def _moved(scene: Scene, length: float) -> Scene:
-    """The scene displaced along its line."""
-    terms = tuple(term.shifted(length) if term.bodies == 1 else term for term in scene.terms)
-    return replace(scene, q=scene.q + length, terms=terms)
 
 
 def _along(
