@@ -118,13 +118,12 @@ def _explodes(case: Case) -> bool:
             return True
         ends = exact.true_motion(case.scene, case.steps[-1:] + run.every, run.step)
         return not max(float(np.max(np.abs(x))) for x in (*ends, q, p)) <= limit
-    sizes = scene.system.magnitude(None if case.system.is_linear else q)
     for _ in range(min(run.every, REPEATED) + 1):
+        sizes = scene.system.magnitude(None if case.system.is_linear else q)
         largest = max(float(np.max(np.abs(x))) for x in (q, p, p / scene.m, sizes(np.abs(q), np.abs(p))))
         if not largest <= limit:
             return True
         q, p = case.step(q, p)
-        sizes = scene.system.magnitude(None if case.system.is_linear else q)
     return False
 
 

@@ -151,11 +151,6 @@ class System(Generic[Fields]):
         """The force of the potential: all but friction."""
         return self.force_of(term for term in self.terms if term.kind == "potential")
 
-    @cached_property
-    def parts(self) -> tuple[Force, Force]:
-        """The forces of the slow and of the fast terms."""
-        return self.force_of(self.slow), self.force_of(self.fast)
-
     def force_of(self, terms: Iterable[Term]) -> Force:
         """The force of some terms on the scene's particles."""
         parts = tuple(terms)
@@ -207,7 +202,8 @@ class System(Generic[Fields]):
         """Friction rates at q (..., n) [1/T], and their derivatives by each particle's position."""
         rates = self.friction_rates.astype(q.dtype) + np.zeros_like(q), np.zeros_like(q)
         for term in (term for term in self.terms if isinstance(term, VanDerPol)):
-            term.add_rates(q, self.m, rates)
+            for values, each in zip(term.resistance(q), rates, strict=True):
+                term.scatter(values / self.m[term.i].astype(q.dtype), each)
         return rates
 
     def elements(self, q: Reals) -> Iterator[tuple[Integers, Integers, Reals]]:
