@@ -32,7 +32,7 @@ KINDS: dict[str, tuple[str, Callable[[Any], bool]]] = {
     "Path": ("a path", lambda x: isinstance(x, PathLike)),
     "Scene": ("a Scene", lambda x: type(x).__name__ == "Scene"),
     "Trajectory": ("a Trajectory", lambda x: type(x).__name__ == "Trajectory"),
-    "None": ("None", lambda x: x is None),
+    "None": ("", lambda x: x is None),
 }
 """What an annotation says in words, and whether an argument is of it."""
 
@@ -41,7 +41,8 @@ def of_kind(what: str, value: Any, *kinds: str) -> Any:
     """The value, if it is of one of these kinds.  SceneError, in one line, if it is not."""
     if any(KINDS[kind][1](value) for kind in kinds):
         return value
-    shown, words = " ".join(repr(value).split()), " or ".join(KINDS[kind][0] for kind in kinds)
+    words = " or ".join(KINDS[kind][0] for kind in kinds if kind != "None")
+    shown = " ".join(repr(value).split())
     raise SceneError(f"{what} = {shown:.60}: {words} is needed")
 
 

@@ -236,11 +236,7 @@ def _quantities(given: Any) -> tuple[str, ...]:
 
 
 def _check_text(given: Any, field: str) -> None:
-    for text in (given,) if isinstance(given, str) else given if isinstance(given, tuple) else (None,):
-        try:
-            right = text.isprintable() or field != "name"
-            text.encode()
-        except (AttributeError, UnicodeEncodeError):
-            right = False
-        if not right or (field == "name" and not text):
+    for text in given if isinstance(given, tuple) else (given,):
+        right = isinstance(text, str) and not any("\ud800" <= c <= "\udfff" for c in text)
+        if not right or (field == "name" and not (text and text.isprintable())):
             raise SceneError(f"{field} = {text!r}: a text is needed, without unpaired surrogates")
