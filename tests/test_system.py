@@ -51,7 +51,7 @@ def test_the_hessian_is_the_derivative_of_the_force_and_the_force_that_of_the_en
     assert np.all(np.sum(np.abs(found.hessian(q)), axis=-1) <= found.gershgorin(q))
     friction = found.force(q, p) - found.potential_force(q, p)
     assert friction == pytest.approx(-(found.friction_rates * p).astype(float))
-    slow, fast = (found.force_of(terms) for terms in (found.slow, found.fast))
+    slow, fast = found.parts
     assert np.max(np.abs(slow(q, p) + fast(q, p) - found.force(q, p))) < 1e-17
 
 

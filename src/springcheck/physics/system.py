@@ -151,6 +151,11 @@ class System(Generic[Fields]):
         """The force of the potential: all but friction."""
         return self.force_of(term for term in self.terms if term.kind == "potential")
 
+    @cached_property
+    def parts(self) -> tuple[Force, Force]:
+        """The forces of the slow and of the fast terms."""
+        return self.force_of(self.slow), self.force_of(self.fast)
+
     def force_of(self, terms: Iterable[Term]) -> Force:
         """The force of some terms on the scene's particles."""
         parts = tuple(terms)
