@@ -12,12 +12,23 @@ import pytest
 import springcheck
 from springcheck import checks, engines, schemes
 from springcheck.doors import function
+from springcheck.engines.own.simulation import prepare
+from springcheck.engines.own.vectors import Vectors
 from springcheck.errors import MethodError, SceneError
 from springcheck.physics import exact
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.exact.mathieu import floquet
 from springcheck.physics.scene import Scene
-from springcheck.physics.terms import Damping, Drive, ModulatedSpring, Spring, Term, WallSpring
+from springcheck.physics.terms import (
+    Cosine,
+    Damping,
+    Drive,
+    ModulatedSpring,
+    Quartic,
+    Spring,
+    Term,
+    WallSpring,
+)
 from springcheck.studies.faults import measure, space, steppers, table
 from springcheck.studies.faults.seeded import Case
 
@@ -124,6 +135,47 @@ def test_every_own_method_takes_a_driven_scene_to_rounding(name: str, label: str
     verdicts = {v.check: v for v in checks.judge(scene, springcheck.simulate(scene, label))}
     assert verdicts["step-defect"].passed is True
     assert not [v.check for v in verdicts.values() if v.passed is False]
+
+
+def beside(name: str) -> Scene:
+    """A driven scene beside springs that join particles, a quartic potential, a pendulum and friction."""
+    i = np.arange(4)
+    brake = Damping(i=i, c=0.1 * i)
+    drives = Drive(i=[0, 2, 2], amplitude=[0.3, 0.2, 0.4], frequency=[1.7, 0.6, 2.3], phase=0.3)  # type: ignore[arg-type]
+    walls = WallSpring(i=i, k=1 + 0.3 * i, at=0.1 * i)
+    terms: dict[str, tuple[Term, ...]] = {
+        "chain": (walls, Spring(a=i[:-1], b=i[1:], k=0.7 + 0.1 * i[:-1], rest=0.2 * i[1:]), drives),
+        "ring": (Spring(a=i, b=np.roll(i, 1), k=0.7 + 0.1 * i, rest=0.3 - 0.2 * i), drives, brake),
+        "well": (
+            Quartic(i=i, b=0.4 + 0.1 * i, at=0.1 * i), Cosine(i=i, depth=0.3 + 0.0 * i, wave=1.3, at=0.2),
+            drives, brake, ModulatedSpring(i=i, k=0.2 * i, depth=0.4, frequency=2.1, phase=0.1, at=0.3),
+        ),
+    }  # fmt: skip
+    q, p = np.cos(1.0 + i), np.sin(2.0 * i)
+    return Scene(
+        m=1 + 0.37 * i, q=q, p=p, terms=terms[name], step=-0.07 if name == "chain" else 0.07, steps=40
+    )
+
+
+@pytest.mark.parametrize("name", [*SCENES, "chain", "ring", "well"])
+@pytest.mark.parametrize("label", OWN)
+def test_the_loops_move_a_driven_scene_to_the_bit_as_numpy_does(name: str, label: str) -> None:
+    scene = beside(name) if name not in SCENES else replace(scenes.load_scene(name), steps=40)
+    scheme = schemes.scheme(engines.method(engines.parse(label)).scheme)
+    if scheme.has("implicit"):
+        assert isinstance(prepare(scene, scheme, scene.step)._how, Vectors)
+        return
+    runs = [
+        Vectors(scheme, scene, scene.step),
+        *(prepare(scene, scheme, scene.step, compiled=x) for x in (False, True)),
+    ]
+    states = np.empty((3, 2, 20, scene.n))
+    for run, (q, p) in zip(runs, states, strict=True):
+        run.advance(2, q[:7], p[:7])
+        run.advance(2, q[7:], p[7:])
+    assert all(run.compiled is x for run, x in zip(runs[1:], (False, True), strict=True))  # type: ignore[union-attr]
+    assert np.array_equal(states[0], states[1])
+    assert np.array_equal(states[1], states[2])
 
 
 @pytest.mark.parametrize("name", SCENES)

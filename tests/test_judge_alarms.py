@@ -16,7 +16,7 @@ from springcheck import checks, schemes
 from springcheck.physics import exact
 from springcheck.physics.arrays import Arithmetic, Floats
 from springcheck.physics.scene import Scene
-from springcheck.physics.terms import Cosine, Morse, Quartic, Spring, Term, WallSpring
+from springcheck.physics.terms import Cosine, Damping, Morse, Quartic, Spring, Term, WallSpring
 from springcheck.physics.trajectory import Trajectory, Verdict
 from springcheck.studies.faults import steppers
 
@@ -49,6 +49,19 @@ def test_binary_numbers_leave_no_rounding_and_no_alarm(name: str, k: float, p: f
     verdicts = checks.judge(scene, plain(scene, name))
     assert alarms(verdicts) == []
     assert not any(np.isnan(v.value) or np.isinf(v.value) for v in verdicts if v.passed is not None)
+
+
+@pytest.mark.parametrize("name", ["explicit-euler", "velocity-verlet", "implicit-midpoint", "rk4", "ruth3"])
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+def test_springs_that_nearly_cancel_put_a_centre_beyond_the_digits_of_a_reference(
+    name: str, friction: float
+) -> None:
+    """Of k = 1 and 1e-16 less the sum is 1e-16, and with it the particle rests 2e15 away."""
+    brake = Damping(i=np.array([0]), c=np.array([friction]))
+    scene = one(wall(1.0, 0.3), wall(2.0**-53 - 1, 0.1), brake, m=2.0, q=1.0, p=0.5, step=0.1, steps=200)
+    verdicts = checks.judge(scene, plain(scene, name))
+    assert alarms(verdicts) == []
+    assert any(v.check == "step-defect" and v.passed for v in verdicts)
 
 
 @pytest.mark.parametrize("label", ["own:semi-implicit-euler", "openmm:euler", "ase:velocity-verlet"])

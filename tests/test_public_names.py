@@ -106,8 +106,8 @@ def test_what_is_no_scene_and_no_trajectory_is_refused_in_one_line() -> None:
     )
     run = springcheck.simulate("spring", "own:euler")
     for call, words in (
-        (lambda: springcheck.simulate(3, "own:euler"), "the name or path of a scene is needed, not int"),
-        (lambda: springcheck.judge("spring", "spring.h5"), "a Trajectory is needed, not str"),
+        (lambda: springcheck.simulate(3, "own:euler"), "scene = 3: a Scene or a text or a path is needed"),
+        (lambda: springcheck.judge("spring", "spring.h5"), "a Trajectory is needed"),
         (lambda: springcheck.judge("sprung", run), "spring"),
         (lambda: springcheck.identify(run.t), "needs t, q and p"),
         (lambda: springcheck.exact(coupled), "no closed form"),

@@ -270,7 +270,7 @@ def test_wrong_arguments_are_answered_in_words() -> None:
         (lambda: made(t, [t] * 4, [t] * 4, scene=scene), "do not fit together"),
         (lambda: springcheck.compare(scene, [run, run]), "unlike labels"),
         (lambda: springcheck.compare(scene, []), "unlike labels"),
-        (lambda: springcheck.identify(run, step="a"), "step: real numbers"),
+        (lambda: springcheck.identify(run, step="a"), "step = 'a': a number"),
         (lambda: springcheck.identify(run, mass="a"), "mass: real numbers"),
         (lambda: springcheck.simulate(scene, None), "a method's label or a function"),
         (lambda: springcheck.simulate(scene, "own:euler", progress=5), "progress: a function is needed"),
@@ -279,15 +279,15 @@ def test_wrong_arguments_are_answered_in_words() -> None:
             for x in (5, None, b"x", [1])
         ),
         *(
-            (lambda f=f, x=x: f(x), "the path of a file is needed, not")
+            (lambda f=f, x=x: f(x), "path.* is needed")
             for x in (5, [1], "")
             for f in (springcheck.read, springcheck.report)
         ),
-        (lambda: springcheck.precision(scene, "own:rk4", path=5), "the path of a file is needed, not int"),
-        (lambda: springcheck.run(scene, "own:rk4", path=5), "the path of a file is needed, not int"),
-        (lambda: springcheck.report("x.h5", 5), "the path of a file is needed, not int"),
+        (lambda: springcheck.precision(scene, "own:rk4", path=5), "path = 5: a text or a path"),
+        (lambda: springcheck.run(scene, "own:rk4", path=5), "path = 5: a text or a path"),
+        (lambda: springcheck.report("x.h5", 5), "output = 5: a text or a path"),
         (lambda: springcheck.identify(""), "the path of a file is needed"),
-        (lambda: springcheck.explain(5), "a word is needed, not int"),
+        (lambda: springcheck.explain(5), "word = 5: a text"),
         (lambda: springcheck.compare(scene, 5), "a Trajectory is needed, not int"),
         (lambda: springcheck.ensemble(scene, 5, "own:rk4"), "vary: a dict of fields and values is needed"),
         (lambda: springcheck.chain(3, k="x"), "k: real numbers"),
@@ -295,7 +295,7 @@ def test_wrong_arguments_are_answered_in_words() -> None:
         (lambda: springcheck.chain(3, waves=[1]), "pairs of a mode and an amplitude are needed"),
         (lambda: springcheck.simulate(scene, lambda q, p, h, force, mass: (q + 1j, p)), "real numbers"),
         (lambda: springcheck.precision(scene, "own:rk4", workers=0), "number of processes"),
-        (lambda: springcheck.precision(scene, "own:rk4", budget="a"), "number of seconds"),
+        (lambda: springcheck.precision(scene, "own:rk4", budget="a"), "budget = 'a': a number"),
         (lambda: springcheck.ensemble(scene, {"time.step": ["a"]}, "own:rk4"), "real numbers"),
         (
             lambda: springcheck.ensemble(scene, {"time.step": "1:2"}, samples=2, seed=-1),

@@ -95,7 +95,7 @@ def test_what_is_asked_twice_is_worked_out_once() -> None:
     assert replace(scene, step=0.2).system is not scene.system
 
 
-def test_rest_positions_in_a_row_are_those_that_the_search_finds() -> None:
+def test_rest_positions_are_the_same_however_springs_are_turned() -> None:
     rng = np.random.default_rng(2)
     for a in (np.arange(40), np.array([0, 1, 2, 5, 6, 9, 20, 21])):
         row = Spring(a=a, b=a + 1, k=np.ones(len(a)), rest=rng.normal(size=len(a)))

@@ -12,7 +12,7 @@ import numpy as np
 
 from springcheck import checks, driver
 from springcheck.api.showing import Verdicts
-from springcheck.api.taking import Step, labels_of, needed, path_of, scene_of, spoken, trajectory_of
+from springcheck.api.taking import Step, labels_of, needed, path_of, scene_of, spoken
 from springcheck.checks import compare as comparing
 from springcheck.errors import MethodError, SpringcheckError
 from springcheck.physics import exact as solutions
@@ -77,7 +77,8 @@ def simulate(
     needed(print if progress is None else progress, Callable, "progress: a function")
     if seed is not None:
         driver.checked_seed(seed)
-    with labels_of(method, scheme) as (label,):
+    with labels_of(method, scheme) as named:
+        label = needed(named[0] if len(named) == 1 else named, str, "one method")
         return replace(driver.run(found, label, progress=progress, seed=seed), scene=found)
 
 
@@ -87,7 +88,7 @@ def judge(scene: Scene | str | Path, trajectory: Trajectory) -> Verdicts:
 
     Raises SpringcheckError for frames of another shape, or without a step, or of no scheme.
     """
-    found, run = scene_of(scene), trajectory_of(trajectory)
+    found, run = scene_of(scene), trajectory
     if not run.scheme:
         raise SpringcheckError(
             f"{run.label}: identify(trajectory, mass=...) says which scheme its states show; judge it "
@@ -124,10 +125,10 @@ def compare(
     scene: Scene | str | Path, trajectories: Mapping[str, Trajectory] | Sequence[Trajectory]
 ) -> Comparison:
     """Largest differences of every pair of trajectories, and from the exact solution where it is known."""
-    several: Any = trajectories if isinstance(trajectories, Sequence | Mapping) else [trajectories]
-    each = several.items() if isinstance(several, Mapping) else [(trajectory_of(x).label, x) for x in several]
-    named = {label: trajectory_of(one) for label, one in each}
-    if len(named) < max(1, len(several)):
+    runs: Any = trajectories if isinstance(trajectories, Sequence | Mapping) else [trajectories]
+    each = runs.items() if isinstance(runs, Mapping) else [(getattr(x, "label", ""), x) for x in runs]
+    named = {label: needed(one, Trajectory, "a Trajectory") for label, one in each}
+    if len(named) < max(1, len(runs)):
         raise SpringcheckError(
             "compare needs trajectories of unlike labels, or a dict of them by other names"
         )
@@ -169,7 +170,7 @@ def identify(
         states = files.of_table(found)
         t, q, p, v = states.t, states.q, states.p, states.v
         mass = states.mass if mass is None else mass
-    if q is None or (p is None and v is None):
+    if t is None or q is None or (p is None and v is None):
         raise SpringcheckError(
             "identify needs t, q and p (or v=), a Trajectory, a DataFrame, or the path of a file"
         )

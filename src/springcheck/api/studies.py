@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from numbers import Real
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -37,7 +36,7 @@ def precision(
 
     found = scene_of(scene)
     with taken(methods, force, workers, path) as (named, how):
-        if not (isinstance(budget, Real) and 0 < budget < math.inf):
+        if not 0 < budget < math.inf:
             raise SpringcheckError(f"budget={budget}: a number of seconds above 0 is needed")
         from springcheck.studies.choose import choose
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from numbers import Integral
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 from springcheck.errors import SpringcheckError
 from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
-from springcheck.physics.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from springcheck.studies.keeper import How
@@ -26,7 +24,8 @@ gives the force at q."""
 @contextmanager
 def labels_of(methods: str | Step | Sequence[str | Step], scheme: str = "") -> Iterator[list[str]]:
     """Labels of these methods; functions among them form an engine that exists within this context only."""
-    several = list(methods) if isinstance(methods, Iterable) and not isinstance(methods, str) else [methods]
+    is_one = isinstance(methods, str) or not isinstance(methods, Iterable) or not getattr(methods, "ndim", 1)
+    several = [methods] if is_one else list(methods)
     steps = [one for one in several if not isinstance(one, str)]
     if wrong := [one for one in steps if not callable(one)]:
         raise SpringcheckError(f"a method's label or a function is needed, not {wrong[0]!r}")
@@ -62,9 +61,9 @@ def taken(methods: Any, force: bool, workers: int, path: Any = None) -> Iterator
 
     if path is not None:
         path_of(path)
-    if not (isinstance(workers, Integral) and 1 <= workers <= MOST_PROCESSES):
+    if not 1 <= workers <= MOST_PROCESSES:
         raise SpringcheckError(
-            f"workers={workers!r}: a number of processes from 1 to {MOST_PROCESSES} is needed"
+            f"workers={workers}: a number of processes from 1 to {MOST_PROCESSES} is needed"
         )
     with spoken(), labels_of(methods) as named:
         if workers > 1 and any(label.startswith("stepper:") for label in named):
@@ -77,11 +76,6 @@ def taken(methods: Any, force: bool, workers: int, path: Any = None) -> Iterator
 def scene_of(scene: Scene | str | Path) -> Scene:
     """The scene itself, or the one of this name or path.  SpringcheckError for anything else."""
     return scene if isinstance(scene, Scene) else scenefile.load_scene(scene)
-
-
-def trajectory_of(found: Any) -> Trajectory:
-    """The argument, if it is a trajectory.  SpringcheckError for anything else."""
-    return needed(found, Trajectory, "a Trajectory")  # type: ignore[no-any-return]
 
 
 def path_of(given: Any) -> Path:

@@ -121,15 +121,14 @@ def _ends_beyond(case: Case) -> bool:
             return True
         ends = exact.true_motion(case.scene, case.steps[-1:] + run.every, run.step)
         return not max(float(np.max(np.abs(x))) for x in (*ends, q, p)) <= limit
-    sizes = scene.system.magnitude(None if case.system.is_linear else q)
     kept = bool(np.max(np.abs(run.p / scene.m)) <= run.outcome.fastest)
     for step in range(min(run.every, REPEATED) + 1):
+        sizes = scene.system.magnitude(None if case.system.is_linear else q)
         largest = max(float(np.max(np.abs(x))) for x in (q, p, p / scene.m, sizes(np.abs(q), np.abs(p))))
         slow = np.max(np.abs(p / scene.m)) < OF_FASTEST * run.outcome.fastest
         if not largest <= limit or (kept and step and not slow):
             return True
         q, p = case.step(q, p)
-        sizes = scene.system.magnitude(None if case.system.is_linear else q)
     return False
 
 

@@ -6,7 +6,7 @@ order of this table, so each may rely on those before it that a check requires a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -54,7 +54,9 @@ def _too_long(subject: Any) -> str | None:
 
 
 def _no_phase(case: Any) -> str | None:
-    if np.any((case.system.modes.w2 == 0) & (case.system.modes.pull != 0)):
+    modes = case.system.modes
+    lost = case.system.norm.most(modes.blur, 0 * modes.w2) > case.growth[1][-1]
+    if lost or np.any((modes.w2 == 0) & (modes.pull != 0)):
         return "a mode under a constant force has no closed form here"
     determinant = schemes.rotation(case.matrices).determinant
     if not np.all(np.isfinite(determinant)):
@@ -177,8 +179,7 @@ CLOSED = MAP | {"unmixed", "modes", "phase"}
 """Requirements of the closed form of the discrete motion."""
 
 
-def missing(subject: Any, requires: Iterable[str]) -> str | None:
+def missing(subject: Any, requires: Collection[str]) -> str | None:
     """Why a check of these requirements does not apply to a subject, or None."""
-    wanted = frozenset(requires)
-    reasons = (one.lacks(subject) for one in _ALL if one.name in wanted)
+    reasons = (one.lacks(subject) for one in _ALL if one.name in requires)
     return next((reason for reason in reasons if reason), None)

@@ -24,7 +24,7 @@ from typing import Any, Literal, TypeAlias, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from springcheck.errors import SpringcheckError
+from springcheck.errors import SceneError
 
 Floats: TypeAlias = NDArray[np.float64]
 Extended: TypeAlias = NDArray[np.longdouble]
@@ -142,15 +142,13 @@ def in_pieces(law: Callable[..., Reals], rows: int, *more: Reals) -> Callable[[R
 
 
 def reals(where: str, **given: Any) -> list[Floats]:
-    """Copies of the arguments as doubles.  SpringcheckError for anything but real numbers."""
+    """Copies of the arguments as doubles.  SceneError for anything but real numbers."""
     found = []
     for name, x in given.items():
         try:
             found.append(np.array(float("no") if np.iscomplexobj(x) else x, np.float64))
-        except (TypeError, ValueError):
-            raise SpringcheckError(
-                f"{where}: {name}: real numbers, or an array of them, are needed"
-            ) from None
+        except (TypeError, ValueError, OverflowError):
+            raise SceneError(f"{where}: {name}: real numbers, or an array of them, are needed") from None
     return found
 
 

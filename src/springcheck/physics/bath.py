@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 from springcheck.errors import SceneError
+from springcheck.physics.arguments import of_kind
 
 KELVIN = {"md": 0.00831446261815324, "si": 1.380649e-23, "reduced": 1.0}
 """kT of one unit of temperature by the units of a scene: kJ/mol and J a kelvin, exact in the SI of 2019; in
@@ -26,12 +27,9 @@ class Bath:
             ("temperature", "at 0 it is friction without noise: [[damping]], c = friction * mass"),
             ("friction", "without friction there is no bath: leave [bath] out"),
         ):
-            try:
-                value = float(getattr(self, name))
-            except (TypeError, ValueError, OverflowError):
-                value = math.nan
+            value = float(of_kind(f"bath.{name}", getattr(self, name), "float"))
             if not (0 < value < math.inf):
-                raise SceneError(f"bath.{name} = {getattr(self, name)!r}: a number > 0 is needed; {remedy}")
+                raise SceneError(f"bath.{name} = {value!r}: a number > 0 is needed; {remedy}")
             object.__setattr__(self, name, value)
 
     def thermal(self, units: str) -> float:

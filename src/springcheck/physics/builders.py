@@ -11,14 +11,16 @@ from numpy.typing import ArrayLike
 
 from springcheck.errors import SceneError
 from springcheck.physics import graph, memory
+from springcheck.physics.arguments import typed
 from springcheck.physics.arrays import Floats, reals
-from springcheck.physics.scene import Scene
+from springcheck.physics.scene import MOST_STEPS, Scene
 from springcheck.physics.terms import Damping, Spring, Term, WallSpring
 
 SCENE_BYTES = 150
 """Bytes for each mass of a chain, before anything is run; see `need`."""
 
 
+@typed
 def spring(
     m: ArrayLike = 1.0,
     k: ArrayLike = 1.0,
@@ -41,15 +43,16 @@ def spring(
     >>> spring(m=2.0, k=[1.0, 4.0], p=[1.0, 0.5]).n
     2
     """
-    m, k, q, p, at, friction = _together(m=m, k=k, q=q, p=p, at=at, c=0.0 if c is None else c)
+    m, k, q, p, at, friction = _together("spring", m=m, k=k, q=q, p=p, at=at, c=0.0 if c is None else c)
     index = np.arange(len(m))
     terms: list[Term] = [WallSpring(i=index, k=k, at=at, fast=fast)]
     if c is not None:
         terms.append(Damping(i=index, c=friction))
-    words = {"name": "spring", "title": "Mass on a spring", **rest}
-    return Scene(m=m, q=q, p=p, terms=tuple(terms), step=step, steps=steps, **words)
+    words = {"name": "spring", "title": "Mass on a spring"}
+    return Scene(m=m, q=q, p=p, terms=tuple(terms), step=step, steps=steps, **words).replace(**rest)
 
 
+@typed
 def chain(
     masses: int = 10,
     m: ArrayLike = 1.0,
@@ -68,10 +71,10 @@ def chain(
     q [L] and p [M L/T], plus standing waves given as (mode, amplitude), mode 1 the slowest; a chain with
     neither swings in mode 1 with amplitude 1.  The rest are fields of `Scene`.  Raises SceneError.
     """
-    if not isinstance(masses, int) or masses < 1:
+    if not 1 <= masses < MOST_STEPS:
         raise SceneError(f"masses = {masses}: a whole number >= 1 is needed")
     memory.need(masses * SCENE_BYTES, f"{masses} masses", "a shorter chain has the same waves")
-    _, m, q, p = _together(masses=np.zeros(masses), m=m, q=q, p=p)
+    _, m, q, p = _together("chain", masses=np.zeros(masses), m=m, q=q, p=p)
     links, walls = _between(masses, reals("chain", k=k)[0])
     try:
         waves = [(mode, float(amplitude)) for mode, amplitude in waves]
@@ -79,11 +82,12 @@ def chain(
         raise SceneError(f"waves = {waves!r}: pairs of a mode and an amplitude are needed") from None
     if not (waves or np.any(q) or np.any(p)):
         waves = [(1, 1.0)]
-    words = {"name": "chain", "title": f"Chain of {masses:,} masses between two walls", **rest}
-    words |= {"q": q + graph.standing(masses, waves), "p": p, "step": step, "steps": steps}
-    return Scene(m=m, terms=(walls, links), **words)
+    title, q = f"Chain of {masses:,} masses between two walls", q + graph.standing(masses, waves)
+    found = Scene(m=m, q=q, p=p, terms=(walls, links), step=step, steps=steps, name="chain", title=title)
+    return found.replace(**rest)
 
 
+@typed
 def cold(scene: Scene, friction: float) -> Scene:
     """The scene in a bath of temperature 0: friction alone, of one rate for every particle [1/T].
 
@@ -100,22 +104,20 @@ def cold(scene: Scene, friction: float) -> Scene:
 
 def _between(masses: int, k: Floats) -> tuple[Spring, WallSpring]:
     """The springs of a chain: those between neighbours, and those to the two walls."""
-    row = np.arange(masses - 1)
-    ends, none = np.unique([0, masses - 1]), np.zeros(masses - 1)
-    if k.ndim == 0:
-        # the only mass of a chain is joined to both walls
-        walls = WallSpring(i=ends, k=np.full(len(ends), k * (2 if masses == 1 else 1)), at=0.0 * ends)
-        return Spring(a=row, b=row + 1, k=none + k, rest=none), walls
-    if k.shape != (masses + 1,):
+    if k.shape not in ((), (masses + 1,)):
         raise SceneError(f"k has the shape {k.shape}: springs are one more than masses, ({masses + 1},)")
-    walls = WallSpring(i=np.array([0, masses - 1]), k=k[[0, -1]], at=np.zeros(2))
-    return Spring(a=row, b=row + 1, k=k[1:-1], rest=none), walls
+    each, row, none = np.broadcast_to(k, masses + 1), np.arange(masses - 1), np.zeros(masses - 1)
+    walls = WallSpring(i=np.array([0, masses - 1]), k=each[[0, -1]], at=np.zeros(2))
+    if masses == 1 and not k.ndim:
+        # the only mass of a chain is joined to both walls
+        walls = WallSpring(i=np.zeros(1, np.int64), k=2 * each[:1], at=np.zeros(1))
+    return Spring(a=row, b=row + 1, k=each[1:-1], rest=none), walls
 
 
-def _together(**given: ArrayLike) -> list[Floats]:
+def _together(where: str, **given: ArrayLike) -> list[Floats]:
+    rows = reals(where, **given)
     try:
-        rows = [np.atleast_1d(np.asarray(values, np.float64)) for values in given.values()]
-        return [np.array(row) for row in np.broadcast_arrays(*rows)]
-    except (TypeError, ValueError):
-        shapes = ", ".join(f"{name} {np.shape(values)}" for name, values in given.items())
+        return [np.array(row) for row in np.broadcast_arrays(*map(np.atleast_1d, rows))]
+    except ValueError:
+        shapes = ", ".join(f"{name} {row.shape}" for name, row in zip(given, rows, strict=True))
         raise SceneError(f"numbers that do not broadcast together: {shapes}") from None

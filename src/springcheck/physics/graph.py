@@ -71,8 +71,6 @@ def rest_positions(n: int, terms: Sequence[Term]) -> Floats | None:
     springs = [term for term in terms if isinstance(term, Spring)]
     if not any(np.any(term.rest) for term in springs):
         return np.zeros(n)
-    if len(springs) == 1 and np.all(springs[0].b == springs[0].a + 1) and np.all(np.diff(springs[0].a) > 0):
-        return _in_a_row(n, springs[0])
     neighbours: dict[int, list[tuple[int, float]]] = {}
     for term in springs:
         for a, b, rest in zip(term.a.tolist(), term.b.tolist(), term.rest.tolist(), strict=True):
@@ -92,16 +90,6 @@ def rest_positions(n: int, terms: Sequence[Term]) -> Floats | None:
                     return None
     found = np.zeros(n)
     found[list(placed)] = list(placed.values())
-    return found
-
-
-def _in_a_row(n: int, springs: Spring) -> Floats:
-    """Rest positions where springs join neighbours alone: sums of rest lengths from the last gap on."""
-    found = np.zeros(n)
-    # a sum restarts after every gap, so that each group is rounded as if it were alone
-    starts = np.flatnonzero(np.append(True, np.diff(springs.a) > 1))
-    for first, last in zip(starts, [*starts[1:], len(springs.a)], strict=True):
-        found[springs.b[first:last]] = np.cumsum(springs.rest[first:last])
     return found
 
 

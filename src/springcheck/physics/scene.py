@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import math
-import operator
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
@@ -13,6 +12,7 @@ from typing import Any, cast, get_args
 import numpy as np
 
 from springcheck.errors import SceneError, nearest
+from springcheck.physics.arguments import of_kind
 from springcheck.physics.arrays import Integers
 from springcheck.physics.bath import Bath
 from springcheck.physics.exact.solution import SolvedSystem
@@ -79,15 +79,11 @@ class Scene(SceneFields):
                 total.update((getattr(term, column.field) + 0.0).astype("<f8").tobytes())
         return total.hexdigest()
 
-    @cached_property
-    def _toml(self) -> str:
+    def to_toml(self) -> str:
+        """The scene as the text of a scene file, which reads back with exactly the same numbers."""
         from springcheck.physics.scenefile.writing import text
 
         return text(self.system)
-
-    def to_toml(self) -> str:
-        """The scene as the text of a scene file, which reads back with exactly the same numbers."""
-        return self._toml
 
     def replace(self, **changes: Any) -> Scene:
         """A copy with other values of these fields: ``scene.replace(step=0.05, steps=400)``.
@@ -126,13 +122,14 @@ def _checked(scene: Scene) -> Iterator[tuple[str, Any]]:
         )
     yield from (("steps", steps), ("every", every))
     yield "step", _step(scene.step, steps)
-    tolerance = _real(scene.tolerance, "tolerance")
+    tolerance = float(of_kind("tolerance", scene.tolerance, "float"))
     if not 0 < tolerance < 1:
         raise SceneError(f"tolerance = {tolerance}: a number between 0 and 1 is needed")
     yield "tolerance", tolerance
     for field, known in (("units", get_args(Units)), ("kind", get_args(Kind))):
-        if getattr(scene, field) not in known:
-            raise SceneError(f"{field} = {getattr(scene, field)!r}: one of {', '.join(known)} is needed")
+        given = getattr(scene, field)
+        if not isinstance(given, str) or given not in known:
+            raise SceneError(f"{field} = {given!r:.60}: one of {', '.join(known)} is needed")
     if scene.kind == "circuit" and scene.units != "si":
         raise SceneError(
             f"units = {scene.units!r}: a circuit is given in H, F, Ohm, C and Wb; leave units out"
@@ -181,7 +178,7 @@ def _box(scene: Scene, terms: tuple[Term, ...]) -> tuple[float, ...] | None:
         return None
     try:
         lengths = tuple(np.atleast_1d(np.asarray(scene.box, np.float64)).tolist())
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         lengths = ()
     if len(lengths) not in (1, 3) or not all(isinstance(x, float) and 0 < x < math.inf for x in lengths):
         raise SceneError(f"box = {scene.box!r}: a length > 0, or three of them, is needed")
@@ -212,24 +209,13 @@ def _terms(given: Any, n: int, places: Integers | None) -> tuple[Term, ...]:
 
 
 def _whole(value: Any, field: str) -> int:
-    try:
-        found = operator.index(value)
-    except TypeError:
-        found = 0
-    if found < 1 or isinstance(value, bool):
+    if (found := int(of_kind(field, value, "int"))) < 1:
         raise SceneError(f"{field} = {value}: a whole number >= 1 is needed")
     return found
 
 
-def _real(value: Any, field: str) -> float:
-    try:
-        return float(value)
-    except (TypeError, ValueError, OverflowError):
-        raise SceneError(f"{field} = {value!r}: a number is needed") from None
-
-
 def _step(given: Any, steps: int) -> float:
-    step = _real(given, "step")
+    step = float(of_kind("step", given, "float"))
     if step == 0 or not math.isfinite(step):
         raise SceneError(f"step = {step}: a step forwards (> 0) or backwards (< 0) is needed")
     if not math.isfinite(step * steps):
@@ -240,7 +226,7 @@ def _step(given: Any, steps: int) -> float:
 def _quantities(given: Any) -> tuple[str, ...]:
     known = get_args(Quantity)
     found = tuple(given) if isinstance(given, tuple | list) else (given,)
-    unknown = [one for one in found if one not in known]
+    unknown = [one for one in found if not isinstance(one, str) or one not in known]
     if unknown:
         raise SceneError(f"quantities: {unknown[0]!r} is none of {', '.join(known)}")
     if not {"q", "p"} <= set(found):
@@ -250,11 +236,7 @@ def _quantities(given: Any) -> tuple[str, ...]:
 
 
 def _check_text(given: Any, field: str) -> None:
-    for text in (given,) if isinstance(given, str) else given if isinstance(given, tuple) else (None,):
-        try:
-            right = text.isprintable() or field != "name"
-            text.encode()
-        except (AttributeError, UnicodeEncodeError):
-            right = False
-        if not right or (field == "name" and not text):
+    for text in given if isinstance(given, tuple) else (given,):
+        right = isinstance(text, str) and not any("\ud800" <= c <= "\udfff" for c in text)
+        if not right or (field == "name" and not (text and text.isprintable())):
             raise SceneError(f"{field} = {text!r}: a text is needed, without unpaired surrogates")

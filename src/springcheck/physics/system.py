@@ -207,7 +207,8 @@ class System(Generic[Fields]):
         """Friction rates at q (..., n) [1/T], and their derivatives by each particle's position."""
         rates = self.friction_rates.astype(q.dtype) + np.zeros_like(q), np.zeros_like(q)
         for term in (term for term in self.terms if isinstance(term, VanDerPol)):
-            term.add_rates(q, self.m, rates)
+            for values, each in zip(term.resistance(q), rates, strict=True):
+                term.scatter(values / self.m[term.i].astype(q.dtype), each)
         return rates
 
     def elements(self, q: Reals) -> Iterator[tuple[Integers, Integers, Reals]]:

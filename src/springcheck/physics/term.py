@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from springcheck.errors import SceneError
+from springcheck.physics.arguments import of_kind
 from springcheck.physics.arrays import Floats, Integers, Reals
 
 Where: TypeAlias = "slice | Integers"
@@ -73,12 +74,14 @@ class Term:
     def __post_init__(self) -> None:
         rows: int | None = None
         for name in self.ends:
-            given = np.atleast_1d(getattr(self, name))
+            given = getattr(self, name)
+            given = [given] if np.isscalar(given) else given
             object.__setattr__(self, name, frozen(given, np.int64, rows, f"{self.key}: {name}"))
             rows = len(getattr(self, name))
         for column in self.columns:
             values = frozen(getattr(self, column.field), np.float64, rows, f"{self.key}: {column.field}")
             object.__setattr__(self, column.field, values)
+        of_kind(f"{self.key}: fast", self.fast, "bool")
 
     def check(self, n: int) -> None:
         """SceneError unless every parameter is finite and of its sign, and all ends are below n."""
@@ -208,13 +211,9 @@ class Term:
         strength = self.columns[0].field
         return self._changed(**{strength: getattr(self, strength) * factor})
 
-    def shifted(self, length: float) -> Self:
-        """Copy with the origin of every row's elongation moved [L]; friction has none."""
+    def shifted(self, length: float | Floats) -> Self:
+        """Copy with the origin of every row's elongation moved, (s,) or alike [L]; friction has none."""
         return self._changed(**{self.origin: getattr(self, self.origin) + length}) if self.origin else self
-
-    def centred(self) -> Self:
-        """Copy with every row at rest where positions are 0."""
-        return self._changed(**{self.origin: np.zeros(len(self))}) if self.origin else self
 
     def in_single(self) -> Self:
         """A copy with parameters rounded as a single-precision engine keeps them; inf beyond its range."""

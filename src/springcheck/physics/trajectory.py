@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal, Self
 import numpy as np
 
 from springcheck.errors import SpringcheckError
+from springcheck.physics.arguments import typed
 from springcheck.physics.arrays import AS_WRITTEN, Arithmetic, Extended, Floats, reals, roundoff
 
 if TYPE_CHECKING:
@@ -70,6 +71,7 @@ class Trajectory:
     """The scene that was run, if known: `v` and `error` need it."""
 
     @classmethod
+    @typed
     def from_arrays(
         cls,
         t: Any,
@@ -81,7 +83,7 @@ class Trajectory:
         mass: Any = None,
         scheme: str = "",
         label: str = "data",
-        every: int = 1,
+        every: float = 1,
     ) -> Trajectory:
         """A trajectory from arrays: times t (f,) [T], q [L], and p [M L/T] or v [L/T], (f,) or (f, n).
 
@@ -92,8 +94,6 @@ class Trajectory:
         """
         if p is None and v is None:
             raise SpringcheckError(f"{label}: momenta p or velocities v= are needed beside t and q")
-        if scene is not None and not hasattr(scene, "system"):
-            raise SpringcheckError(f"{label}: scene= is a {type(scene).__name__}; a Scene is needed")
         m, every = (mass, every) if scene is None else (scene.m if mass is None else mass, scene.every)
         if p is None and m is None:
             raise SpringcheckError(f"{label}: velocities make momenta with mass= or scene=")
@@ -173,6 +173,7 @@ class Trajectory:
         more = {x: y[rows] for x in ("energy", "last_step") if (y := getattr(self, x)) is not None}
         return replace(self, t=self.t[rows], q=self.q[rows], p=self.p[rows], **more)
 
+    @typed
     def save(self, path: str | Path) -> Path:
         """Write t, q, p (and m, energy) as .csv or .npz, every double so that it reads back exactly.
 
@@ -196,11 +197,14 @@ class Trajectory:
             raise SpringcheckError(f"{place}: cannot be written: {error.strerror}") from error
         return place
 
+    @typed
     def plot(self, ax: Any = None, *, particle: int = 0) -> Any:
         """Phase portrait of one particle, over the exact solution where it is known -> its axes.
 
         `ax`: matplotlib axes of your own.  `springcheck.plot` draws several trajectories, and over time.
         """
+        if particle not in range(-(n := self.q.shape[1]), n):
+            raise SpringcheckError(f"{self.label}: particle = {particle}: 0 to {n - 1} are here")
         axes = library("matplotlib.pyplot").figure(layout="constrained").add_subplot() if ax is None else ax
         if self.scene is not None and self.scene.system.solution is not None:
             q, p = self._exact(self.scene)

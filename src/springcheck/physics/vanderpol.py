@@ -39,11 +39,6 @@ class VanDerPol(WithoutPotential):
         # (x - 1) (x + 1) keeps its digits where the friction changes its sign
         return np.asarray(self.c * ((x - 1) * (x + 1))), np.asarray(2 * self.c * x / self.width)
 
-    def add_rates(self, q: Reals, m: Floats, out: tuple[Reals, Reals]) -> None:
-        """Add the coefficients over the masses m (n,), by particle (..., n): see `System.friction_at`."""
-        for values, each in zip(self.resistance(q), out, strict=True):
-            self.scatter(values / m[self.i].astype(q.dtype), each)
-
     def add_force(self, q: Reals, v: Reals, out: Reals) -> None:
         self.add_pull(self.resistance(q)[0] * np.take(v, self.i, axis=-1), out)
 

@@ -48,12 +48,10 @@ def _requires(scheme: Scheme) -> frozenset[Need]:
 def _terms(scheme: Scheme) -> frozenset[str]:
     if scheme.has("implicit"):
         return SPRINGS | BRAKES | {"damping"}
-    kicked = all(kind.drifts or kind.evaluates == "all" for kind in scheme.kinds)
-    if scheme.has("explicit") and kicked and not scheme.has("mixes"):
-        # a field is a force like any other
-        return EVERY_FORCE | FIELD | BRAKES | (RODS if scheme.has("symplectic", "splitting") else frozenset())
     # rods hold after every stage of a splitting
-    return EVERY_FORCE | RODS if scheme.has("symplectic", "splitting") else EVERY_FORCE
+    rods = RODS if scheme.has("symplectic", "splitting") else frozenset()
+    # to kicks by all forces, and to a tableau, a field is a force like any other
+    return EVERY_FORCE | rods | (FIELD | BRAKES if scheme.has("plain") or scheme.b else frozenset())
 
 
 def _method(scheme: Scheme) -> Method:

@@ -97,14 +97,10 @@ def _jit(kernel: Callable[..., Any], looks: tuple[Any, ...], *, saved: bool) -> 
     types = _TYPES[looks]
     _registered()
     found: Any = numba.njit(cache=saved, **FLAGS)(kernel)
-    if saved:
-        folder = Path(found.stats.cache_path)
-        unbroken = _unbroken(folder, kernel)
-        found.compile(types)
-        if not unbroken:
-            _seal(folder, kernel)
-    else:
-        found.compile(types)
+    written = saved and not _unbroken(Path(found.stats.cache_path), kernel)
+    found.compile(types)
+    if written:
+        _seal(Path(found.stats.cache_path), kernel)
     # other layouts of arrays are converted, never compiled for
     found.disable_compile()
     function: Callable[..., Any] = found

@@ -28,14 +28,24 @@ def sine(x: float) -> float:
     return math.sin(x) if -INFINITE < x < INFINITE else INFINITE - INFINITE
 
 
+def cosine(x: float) -> float:
+    """cos(x) of the C library; not a number where x is infinite."""
+    return math.cos(x) if -INFINITE < x < INFINITE else INFINITE - INFINITE
+
+
 def exponential(x: float) -> float:
     """exp(x) of the C library; infinite where it overflows."""
     return INFINITE if x > LARGEST_EXPONENT else math.exp(x)
 
 
 def indexed(terms: Any, q: Numbers, p: Numbers, f: Numbers) -> None:
-    """Fill f with the force of index lists: summed over the terms in this order, then over each list."""
-    walls, springs, quartics, cosines, morses, dampings = terms
+    """Fill f with the force of index lists: summed over the terms in this order, then over each list.
+
+    What is driven reads the time off the last coordinate, and is summed as NumPy sums: first over all ends a,
+    then over all ends b.
+    """
+    walls, springs, quartics, cosines, morses, dampings, drives, modulated = terms
+    driven = len(drives[0]) + len(modulated[0]) > 0
     for j in range(len(f)):
         f[j] = 0.0
     i, k, at = walls
@@ -45,7 +55,11 @@ def indexed(terms: Any, q: Numbers, p: Numbers, f: Numbers) -> None:
     for s in range(len(a)):
         tension = k[s] * (q[b[s]] - q[a[s]] - rest[s])
         f[a[s]] += tension
-        f[b[s]] -= tension
+        if not driven:
+            f[b[s]] -= tension
+    if driven:
+        for s in range(len(a)):
+            f[b[s]] -= k[s] * (q[b[s]] - q[a[s]] - rest[s])
     i, k, at = quartics
     for s in range(len(i)):
         u = q[i[s]] - at[s]
@@ -62,6 +76,13 @@ def indexed(terms: Any, q: Numbers, p: Numbers, f: Numbers) -> None:
     i, c, m = dampings
     for s in range(len(i)):
         f[i[s]] += -c[s] * (p[i[s]] / m[s])
+    i, amplitude, frequency, phase = drives
+    for s in range(len(i)):
+        f[i[s]] += amplitude[s] * cosine(frequency[s] * q[len(q) - 1] + phase[s])
+    i, k, depth, frequency, phase, at = modulated
+    for s in range(len(i)):
+        stiffness = k[s] * (1.0 + depth[s] * cosine(frequency[s] * q[len(q) - 1] + phase[s]))
+        f[i[s]] -= stiffness * (q[i[s]] - at[s])
 
 
 def held(k: Numbers, at: Numbers, q: Numbers, f: Numbers) -> None:

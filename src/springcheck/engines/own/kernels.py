@@ -17,12 +17,9 @@ from springcheck.engines.own.forces import Numbers, Slot, force_at, held, pulled
 from springcheck.engines.own.updates import (
     Solver,
     add,
-    chain_euler,
     chain_implicit,
     chain_kick_drift,
     drift,
-    euler,
-    held_euler,
     held_implicit,
     held_kick_drift,
     implicit,
@@ -33,13 +30,13 @@ from springcheck.engines.own.updates import (
 Rows: TypeAlias = Any
 """A list of lists, or a two-dimensional array; qs and ps are always arrays (f, n)."""
 
-KICK, DRIFT, KICK_DRIFT, EULER, FRICTION, IMPLICIT, MIDPOINT = range(7)
+KICK, DRIFT, KICK_DRIFT, EULER, FRICTION, IMPLICIT, MIDPOINT, CLOCK = range(8)
 """Operations on (q, p), with coefficients x and y in units of time:
 
 KICK        p += x F            EULER       KICK and DRIFT, both from the old state
 DRIFT       q += y p/m          IMPLICIT    P = p + x F(Q, P), Q = q + x P/m; q = q + y P/m, p = P
 KICK_DRIFT  one after the other MIDPOINT    the same, but p = P + (P - p)
-FRICTION    p *= decay
+FRICTION    p *= decay            CLOCK       the last coordinate is the time: steps done times x
 """
 
 
@@ -96,6 +93,10 @@ def many(
                         p[i] = p[i] * decayed[i]
                 elif what == DRIFT:
                     drift(ys, m, q, p)
+                elif what == CLOCK:
+                    # nothing else of an index list is in t
+                    q[n - 1] = t[0] * xs
+                    t[0] += 1.0
                 elif what in (IMPLICIT, MIDPOINT):
                     if where == 0 and held_alone:
                         held_implicit(xs, ys, what == MIDPOINT, divisors, k_held, at_held, m, q, p)
@@ -109,16 +110,10 @@ def many(
                         force_at(two, q, p, t, f_two)
                         implicit(xs, ys, what == MIDPOINT, solver, f_two, m, q, p)
                 elif where == 0 and held_alone and stale[0] and what != KICK:
-                    if what == EULER:
-                        held_euler(xs, ys, k_held, at_held, m, q, p)
-                    else:
-                        held_kick_drift(xs, ys, k_held, at_held, m, q, p)
+                    held_kick_drift(xs, ys, what == EULER, k_held, at_held, m, q, p)
                 elif where == 0 and chain_alone and stale[0] and what != KICK:
                     tensions(k, rest, ends, q, t)
-                    if what == EULER:
-                        chain_euler(xs, ys, t, m, q, p)
-                    else:
-                        chain_kick_drift(xs, ys, t, m, q, p)
+                    chain_kick_drift(xs, ys, what == EULER, t, m, q, p)
                 else:
                     if where == 0 and stale[0]:
                         if held_alone:
@@ -133,12 +128,10 @@ def many(
                     pull = f_one if where == 0 else f_two
                     if what == KICK:
                         kick(xs, pull, p)
-                    elif what == KICK_DRIFT:
-                        kick_drift(xs, ys, pull, m, q, p)
                     else:
-                        euler(xs, ys, pull, m, q, p)
+                        kick_drift(xs, ys, what == EULER, pull, m, q, p)
                     stale[where] = False
-                moved = what not in (KICK, FRICTION)
+                moved = what not in (KICK, FRICTION, CLOCK)
                 stale[0] = stale[0] or moved or damped[0]
                 stale[1] = stale[1] or moved or damped[1]
             if stages:
@@ -194,14 +187,12 @@ def single(
                     q = q + (p / m) * y[s]
                 elif what == EULER:
                     q, p = q + (p / m) * y[s], p + (-k * q) * x[s]
-                elif what == IMPLICIT:
-                    p = (p + (-k * q) * x[s]) * divisor
-                    q = q + (p / m) * y[s]
-                elif what == MIDPOINT:
+                else:
                     old = p
                     p = (p + (-k * q) * x[s]) * divisor
                     q = q + (p / m) * y[s]
-                    p = p + (p - old)
+                    if what == MIDPOINT:
+                        p = p + (p - old)
             if stages:
                 for s in range(stages):
                     u, w = q, p

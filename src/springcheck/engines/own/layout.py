@@ -12,7 +12,7 @@ from springcheck.engines.own.forces import Slot
 from springcheck.physics.arrays import Floats, Integers
 from springcheck.physics.terms import Damping, Spring, Term, WallSpring, known
 
-KINDS = ("wall-spring", "spring", "quartic", "cosine", "morse", "damping")
+KINDS = ("wall-spring", "spring", "quartic", "cosine", "morse", "damping", "drive", "modulated-spring")
 """The terms that the kernels have, in the order in which `forces.indexed` takes them."""
 
 NO_INDEX: Integers = np.empty(0, np.int64)
@@ -61,7 +61,7 @@ def _row(terms: Sequence[Term], m: Floats) -> Row | None:
     n = len(m)
     if not all(isinstance(term, WallSpring | Spring | Damping) for term in terms):
         return None
-    (i, k, at), (a, b, stiffness, rest), _, _, _, (slow, c, _) = lists(terms, m)
+    (i, k, at), (a, b, stiffness, rest), _, _, _, (slow, c, _), *_ = lists(terms, m)
     if len(np.unique(slow)) < len(slow) or len(np.unique(i)) < len(i):
         return None
     chain = _chain(a, b, stiffness, rest, n)

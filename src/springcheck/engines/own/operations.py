@@ -18,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from springcheck.engines.own.kernels import (
+    CLOCK,
     DRIFT,
     EULER,
     FRICTION,
@@ -98,10 +99,10 @@ class Program:
         stale, counts = [True, True], [0, 0]
         for cycle in range(2):
             for o, slot in zip(self.operations, self.slots, strict=True):
-                if o.code not in (FRICTION, DRIFT):
+                if o.code not in (FRICTION, DRIFT, CLOCK):
                     counts[cycle] += stale[slot]
                     stale[slot] = False
-                moved = o.code not in (FRICTION, KICK)
+                moved = o.code not in (FRICTION, KICK, CLOCK)
                 stale = [old or moved or damped for old, damped in zip(stale, self.damped, strict=True)]
         return counts[0], counts[1]
 
@@ -115,6 +116,7 @@ def program(scheme: Scheme, scene: Scene, h: float) -> Program:
     """
     if scheme.has("random") or not scheme.has("one-step"):
         raise MethodError(f"own: the scheme {scheme.name} has no fixed step that can be repeated")
+    clock = (Operation(code=CLOCK, x=h),) if scene.system.is_driven else ()
     if scheme.stages:
         found = _splitting(scheme, h)
     elif scheme.has("implicit"):
@@ -126,7 +128,7 @@ def program(scheme: Scheme, scene: Scene, h: float) -> Program:
         a = np.zeros((s + 1, s))
         for i, row in enumerate((*scheme.a, scheme.b)):
             a[i, : len(row)] = [float(number(c, np.float64) * h) for c in row]
-        return Program(a=a)
+        return Program(operations=clock, a=a)
     damped = scene.system.is_damped
     if not damped:
         whole = {ALL: POTENTIAL}
@@ -135,7 +137,7 @@ def program(scheme: Scheme, scene: Scene, h: float) -> Program:
     if len(forces) > 2:
         raise NoKernelError(f"{len(forces)} forces apart, where two are served")
     depends = tuple(damped and name in (ALL, SLOW) for name in (*forces, "", "")[:2])
-    return Program(operations=found, forces=forces or (ALL,), damped=depends)
+    return Program(operations=(*clock, *found), forces=forces or (ALL,), damped=depends)
 
 
 def _splitting(scheme: Scheme, h: float) -> tuple[Operation, ...]:
@@ -172,5 +174,5 @@ def _implicit(scheme: Scheme, h: float) -> tuple[Operation, ...]:
 def terms_of(force: str, scene: Scene) -> tuple[Term, ...]:
     """The terms behind the name of a force."""
     if force == POTENTIAL:
-        return tuple(term for term in scene.terms if term.kind == "potential")
+        return tuple(term for term in scene.terms if term.kind in ("potential", "drive"))
     return {ALL: scene.terms, SLOW: scene.system.slow, FAST: scene.system.fast}[force]

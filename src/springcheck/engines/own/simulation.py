@@ -37,20 +37,20 @@ class Own:
     """A started run of an own method; `compiled` says whether by a compiled kernel."""
 
     def __init__(self, how: Carrier, evaluations: tuple[int, int], *, compiled: bool) -> None:
-        self.force_calls = 0
         self.compiled = compiled
         self._first, self._each = evaluations
         self._steps = 0
         self._how = how
 
+    @property
+    def force_calls(self) -> int:
+        """The forces of all steps so far."""
+        return self._steps and self._first + (self._steps - 1) * self._each
+
     def advance(self, every: int, q: Floats, p: Floats) -> None:
         """Fill q and p (f, n); overflow fills in inf and nan, silently."""
         self._how.advance(every, q, p)
-        steps = every * len(q)
-        if steps and not self._steps:
-            self.force_calls += self._first - self._each
-        self._steps += steps
-        self.force_calls += steps * self._each
+        self._steps += every * len(q)
 
 
 def version() -> dict[str, str]:
@@ -92,8 +92,9 @@ def prepare(
         except NoKernelError:
             each = len(found.evaluations)
             return Own(vectors.Vectors(found, scene, step), (each, each), compiled=False)
-        if any(term.key not in layout.KINDS for term in scene.terms):
+        if _lacks(plan, scene):
             return Own(vectors.Vectors(found, scene, step), plan.evaluations, compiled=False)
+        scene = scene.system.clocked
         job = _one(plan, scene) or _many(plan, scene)
     ahead = job.work * scene.steps >= WORTH if compiled is None else compiled
     if ahead:
@@ -106,6 +107,14 @@ def prepare(
     tiled = ahead and job.reach > 0
     how = tiles.Tiled(job, threads or tiles.processors()) if tiled else tiles.Whole(job, compiled=ahead)
     return Own(how, plan.evaluations, compiled=ahead)
+
+
+def _lacks(plan: Program, scene: Scene) -> bool:
+    """Whether the loops lack a term, or beside one that depends on the time would sum forces or compute them
+    in another way than NumPy, or solve for it."""
+    beside = plan.implicit_step or any(term.fast or term.key == "morse" for term in scene.terms)
+    unknown = any(term.key not in layout.KINDS for term in scene.terms)
+    return unknown or bool(scene.system.is_driven and beside)
 
 
 def _one(plan: Program, scene: Scene) -> tiles.Job | None:
@@ -137,10 +146,12 @@ def _many(plan: Program, scene: Scene) -> tiles.Job:
         solved = solver.factors(scene, plan.implicit_step)
         reach = 0 if joined else reach
     rates = scene.system.friction_rates.astype(np.float64)
+    # without friction a force stays as the clock is set, which moves it by a rounding alone
+    damped = np.array(plan.damped) | (scene.system.is_driven and scene.system.is_damped)
     decays = np.array([np.exp(-x * rates) for x in plan.decays] or np.empty((0, n)))
     return tiles.Job(
         kernel=kernels.many,
-        head=(*plan.arrays, np.array(plan.damped), decays, plan.a, *(slots * 2)[:2], solved),
+        head=(*plan.arrays, damped, decays, plan.a, *(slots * 2)[:2], solved),
         m=m,
         state=(q, p),
         stages=plan.a.shape[1],

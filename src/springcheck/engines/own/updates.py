@@ -22,52 +22,33 @@ def drift(y: float, m: Numbers, q: Numbers, p: Numbers) -> None:
         q[i] = q[i] + (p[i] / m[i]) * y
 
 
-def kick_drift(x: float, y: float, f: Numbers, m: Numbers, q: Numbers, p: Numbers) -> None:
-    """Kick, then drift with the new momentum."""
-    for i in range(len(p)):
-        new = p[i] + f[i] * x
-        p[i] = new
-        q[i] = q[i] + (new / m[i]) * y
-
-
-def euler(x: float, y: float, f: Numbers, m: Numbers, q: Numbers, p: Numbers) -> None:
-    """Drift and kick, both from the old state."""
+def kick_drift(x: float, y: float, euler: bool, f: Numbers, m: Numbers, q: Numbers, p: Numbers) -> None:
+    """Kick, then drift with the new momentum, or with the old one for explicit Euler."""
     for i in range(len(p)):
         old = p[i]
-        p[i] = old + f[i] * x
-        q[i] = q[i] + (old / m[i]) * y
+        new = old + f[i] * x
+        p[i] = new
+        q[i] = q[i] + ((old if euler else new) / m[i]) * y
 
 
-def held_kick_drift(x: float, y: float, k: Numbers, at: Numbers, m: Numbers, q: Numbers, p: Numbers) -> None:
+def held_kick_drift(
+    x: float, y: float, euler: bool, k: Numbers, at: Numbers, m: Numbers, q: Numbers, p: Numbers
+) -> None:
     """`kick_drift` by one wall spring on every particle, whose force is not stored."""
     for i in range(len(p)):
-        new = p[i] + (-k[i] * (q[i] - at[i])) * x
-        p[i] = new
-        q[i] = q[i] + (new / m[i]) * y
-
-
-def held_euler(x: float, y: float, k: Numbers, at: Numbers, m: Numbers, q: Numbers, p: Numbers) -> None:
-    """`euler` by one wall spring on every particle, whose force is not stored."""
-    for i in range(len(p)):
         old = p[i]
-        p[i] = old + (-k[i] * (q[i] - at[i])) * x
-        q[i] = q[i] + (old / m[i]) * y
+        new = old + (-k[i] * (q[i] - at[i])) * x
+        p[i] = new
+        q[i] = q[i] + ((old if euler else new) / m[i]) * y
 
 
-def chain_kick_drift(x: float, y: float, t: Numbers, m: Numbers, q: Numbers, p: Numbers) -> None:
+def chain_kick_drift(x: float, y: float, euler: bool, t: Numbers, m: Numbers, q: Numbers, p: Numbers) -> None:
     """`kick_drift` by the tensions of a chain."""
     for i in range(len(p)):
-        new = p[i] + (t[i + 1] - t[i]) * x
-        p[i] = new
-        q[i] = q[i] + (new / m[i]) * y
-
-
-def chain_euler(x: float, y: float, t: Numbers, m: Numbers, q: Numbers, p: Numbers) -> None:
-    """`euler` by the tensions of a chain."""
-    for i in range(len(p)):
         old = p[i]
-        p[i] = old + (t[i + 1] - t[i]) * x
-        q[i] = q[i] + (old / m[i]) * y
+        new = old + (t[i + 1] - t[i]) * x
+        p[i] = new
+        q[i] = q[i] + ((old if euler else new) / m[i]) * y
 
 
 def solve(solver: Solver, f: Numbers) -> None:

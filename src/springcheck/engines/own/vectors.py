@@ -1,7 +1,7 @@
 """Any scheme of fixed step by NumPy, where the compiled loops have not all of its stages or of its terms.
 
-A clock among the particles, which a force that depends on the time needs, is set to i h before step i: the
-stages move it from there, and no rounding of the sum of all steps is in it.
+A clock among the particles, which a force that depends on the time needs, is set to i h before step i, as the
+loops set it: the stages move it from there, and no rounding of the sum of all steps is in it.
 """
 
 from __future__ import annotations

@@ -12,6 +12,7 @@ from springcheck.physics.exact.closedform import (
     FORM_EPS,
     ClosedForm,
     States,
+    by_particle,
     one_each,
     wide,
 )
@@ -81,7 +82,6 @@ class MorseMotion(ClosedForm):
         self.u, self.p, self.energy, self.excess, self.w, self.rate = u, p_, energy, excess, w, rate
 
     def at(self, t: Extended) -> States:
-        q, p = np.empty((2, len(t), self.system.n), dtype=np.longdouble)
         term, share = self.term, self.share
         stretch, speed = self._stretched(wide(term.steepness), t)
         u, pull = stretch / term.steepness, self.mass * speed / term.steepness
@@ -89,9 +89,9 @@ class MorseMotion(ClosedForm):
         qa, qb = wide(self.system.q[term.a]), wide(self.system.q[term.b])
         centre = share * qa + (1 - share) * qb + total / (self.masses[0] + self.masses[1]) * t
         length = term.rest + u
-        q[:, term.a], q[:, term.b] = centre - (1 - share) * length, centre + share * length
-        p[:, term.a], p[:, term.b] = share * total - pull, (1 - share) * total + pull
-        return q, p
+        q = np.concatenate([centre - (1 - share) * length, centre + share * length], axis=-1)
+        p = np.concatenate([share * total - pull, (1 - share) * total + pull], axis=-1)
+        return by_particle(np.append(term.a, term.b), q, p)
 
     def _stretched(self, a: Extended, t: Extended) -> States:
         """log(s) and its time derivative at times t.
@@ -124,7 +124,6 @@ class MorseMotion(ClosedForm):
 
     def doubt(self, t: np.longdouble) -> States:
         system, term = self.system, self.term
-        q, p = np.empty((2, system.n), dtype=np.longdouble)
         a = np.abs(wide(term.steepness))
         root = np.sqrt(self.energy)
         speed = np.sqrt(2 * term.depth * self.energy / self.mass)
@@ -138,10 +137,9 @@ class MorseMotion(ClosedForm):
         pushed = sum(np.abs(wide(system.p[end])) for end in ends)
         far = sum(np.abs(wide(system.q[end])) for end in ends) + np.abs(term.rest)
         far = far + pushed / (system.m[term.a] + system.m[term.b]) * np.abs(t)
-        for end in ends:
-            q[end] = FORM_EPS * (far + np.abs(self.u) + reach + speed * time)
-            p[end] = FORM_EPS * (pushed + self.mass * speed + force * time)
-        return q, p
+        q = FORM_EPS * (far + np.abs(self.u) + reach + speed * time)
+        p = FORM_EPS * (pushed + self.mass * speed + force * time)
+        return by_particle(np.append(*ends), np.tile(q, 2), np.tile(p, 2))
 
 
 def _relative(m: Any, q: Any, p: Any, rest: Any) -> tuple[Any, Any]:

@@ -6,7 +6,7 @@ from typing import Any, ClassVar, Self, TypeAlias
 
 import numpy as np
 
-from springcheck.physics.arrays import EPS, Extended
+from springcheck.physics.arrays import EPS, Extended, Integers
 from springcheck.physics.system import System
 
 States: TypeAlias = tuple[Extended, Extended]
@@ -65,6 +65,12 @@ class ClosedForm:
 def wide(x: Any) -> Extended:
     """Doubles in extended precision."""
     return np.asarray(x, np.longdouble)
+
+
+def by_particle(index: Integers, *rows: Extended) -> States:
+    """Positions and momenta (..., n) of the particles of these numbers (n,), in the order of the scene."""
+    q, p = (np.take(x, np.argsort(index), axis=-1) for x in rows)
+    return q, p
 
 
 def one_each(system: System[Any]) -> bool:

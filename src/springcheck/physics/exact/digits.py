@@ -48,6 +48,13 @@ def exactly(x: Any) -> Wide:
     return out
 
 
+def summed(values: Wide, index: Any, shape: Any) -> Wide:
+    """Sums of the values with each index, of this shape; 0 where there are none."""
+    out = exactly(np.zeros(shape))
+    np.add.at(out, index, values)
+    return out
+
+
 def extended(x: Wide) -> Extended:
     """Rounded to extended precision."""
     return np.array([np.longdouble(f"{value:.30e}") for value in x.flat], np.longdouble).reshape(x.shape)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from springcheck.physics.arrays import Extended
-from springcheck.physics.exact.closedform import CANCELS, FORM_EPS, ClosedForm, States
+from springcheck.physics.exact.closedform import CANCELS, FORM_EPS, ClosedForm, States, by_particle
 from springcheck.physics.exact.digits import digits, exactly, extended
 from springcheck.physics.exact.normal import exact_sums, normal_modes
 from springcheck.physics.exact.response import first_difference
@@ -59,9 +59,8 @@ class Gyration(ClosedForm):
         slope = np.exp(one * t) + other * part
         z = self.z * (np.exp(one * t) - one * part) + self.v * part
         v = -self.z * one * other * part + self.v * slope
-        q, p = np.empty((2, len(t), self.system.n), np.longdouble)
-        q[:, self.a], q[:, self.b] = z.real, z.imag
-        p[:, self.a], p[:, self.b] = v.real, v.imag
+        parts = (np.concatenate([x.real, x.imag], axis=-1) for x in (z, v))
+        q, p = by_particle(np.append(self.a, self.b), *parts)
         return q + self.centre, p * self.system.m
 
     def doubt(self, t: np.longdouble) -> States:
@@ -73,7 +72,6 @@ class Gyration(ClosedForm):
         hold = np.minimum(np.abs(t), 2 / np.where(gap > 0, gap, 1e-300))
         far = z * (1 + np.abs(one) * hold) + v * hold
         fast = np.abs(self.z * one * other) * hold + v * (1 + np.abs(other) * hold)
-        q, p = np.empty((2, self.system.n), np.longdouble)
-        q[self.a] = q[self.b] = FORM_EPS * (1 + rate * np.abs(t)) * grown * far
-        p[self.a] = p[self.b] = FORM_EPS * (1 + rate * np.abs(t)) * grown * fast
+        sizes = (np.tile(FORM_EPS * (1 + rate * np.abs(t)) * grown * x, 2) for x in (far, fast))
+        q, p = by_particle(np.append(self.a, self.b), *sizes)
         return q + FORM_EPS * np.abs(self.centre), p * self.system.m

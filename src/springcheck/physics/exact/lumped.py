@@ -10,7 +10,7 @@ import numpy as np
 from springcheck.physics import graph
 from springcheck.physics.arrays import EPS, Extended, Floats, Integers
 from springcheck.physics.exact.closedform import FORM_EPS, ClosedForm, States, wide
-from springcheck.physics.exact.digits import Wide, digits, exactly, extended
+from springcheck.physics.exact.digits import Wide, digits, exactly, extended, summed
 from springcheck.physics.system import System
 from springcheck.physics.term import Term
 
@@ -39,10 +39,8 @@ class LumpedMotion(ClosedForm):
             terms, shifts = (
                 zip(*(_moved(term, of, off) for term in others), strict=True) if others else ((), ())
             )
-            sums = exactly(np.zeros((2, len(first))))
-            np.add.at(sums[0], of, exactly(system.m))
-            np.add.at(sums[1], of, exactly(held.projected(wide(system.q), wide(system.p))))
-            (m, p), less = _rounded(sums)
+            each = system.m, held.projected(wide(system.q), wide(system.p))
+            (m, p), less = _rounded(np.stack([summed(exactly(x), of, len(first)) for x in each]))
             self.off = extended(off)
         self.one = system.beside(system.scene.derived(m=m, q=system.q[first], p=p, terms=terms))
         self.need(self.one.solution)

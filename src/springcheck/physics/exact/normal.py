@@ -13,11 +13,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from springcheck.physics.arrays import EPS, Extended, Integers, Reals, by_identity
+from springcheck.physics.arrays import EPS, WIDE, Extended, Integers, Reals, by_identity
 from springcheck.physics.exact.closedform import PI
 from springcheck.physics.exact.digits import FEWER_DIGITS, Wide, digits, eigen, exactly, extended
 from springcheck.physics.system import System
 from springcheck.physics.terms import Damping, Spring
+
+CENTRE_ROUNDINGS = 16
+"""Roundings of a centre's distance in the closed form of a motion about it; 6 have been met."""
 
 
 @by_identity
@@ -83,6 +86,13 @@ class Modes:
     def rest(self) -> Extended:
         """Positions (n,) [L] at which every mode is at its centre."""
         return self.out_of(self.centre(), np.zeros_like(self.w2))[0]
+
+    @property
+    def blur(self) -> Extended:
+        """Rounding of positions (n,) [L] in a motion about the centres of the modes, which are far away where
+        hardly any stiffness holds; 0 where engines round as much as references do."""
+        far = self.spread(np.abs(self.centre())) / self.root_m
+        return np.asarray(CENTRE_ROUNDINGS * EPS * far if WIDE else 0 * far)
 
     def spread(self, reach: Extended) -> Extended:
         """|V| reach (n,): bound on the displacement of each particle by modes of these amplitudes."""
@@ -193,14 +203,10 @@ def _start(system: System[Any], modes: Modes) -> Start:
     return Start(u=u, v=v, slow=slow, fast=fast, sizes=(sizes[0], sizes[1], sizes[2], sizes[3]))
 
 
-def _zeros(*shape: int) -> Any:
-    return exactly(np.zeros(shape))
-
-
 def exact_sums(system: System[Any], of: Callable[[Wide], Wide]) -> tuple[Wide, Wide, Wide]:
     """Stiffness, by the part `of` its matrix; force at 0 (n,) and friction rates (n,); without rounding."""
     zero = np.zeros(system.n, dtype=np.longdouble)
-    k, force, friction = (_zeros(*shape) for shape in ((system.n, system.n), (system.n,), (system.n,)))
+    k, force, friction = (exactly(np.zeros(x)) for x in ((system.n, system.n), system.n, system.n))
     for term in system.terms:
         if isinstance(term, Damping):
             np.add.at(friction, term.i, exactly(term.c))

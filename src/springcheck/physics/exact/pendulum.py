@@ -14,6 +14,7 @@ from springcheck.physics.exact.closedform import (
     PI,
     ClosedForm,
     States,
+    by_particle,
     latency,
     one_each,
     wide,
@@ -110,24 +111,20 @@ class PendulumMotion(ClosedForm):
         self.swing = _swing(system, self.term)
 
     def at(self, t: Extended) -> States:
-        q, p = np.empty((2, len(t), self.system.n), dtype=np.longdouble)
         i, swing = self.term.i, self.swing
         a, r = swing.at(t)
-        q[:, i] = self.system.q[i] + swing.length * (2 * (a - swing.half))
-        p[:, i] = swing.mass * swing.length * 2 * swing.w * r
-        return q, p
+        q = self.system.q[i] + swing.length * (2 * (a - swing.half))
+        return by_particle(i, q, swing.mass * swing.length * 2 * swing.w * r)
 
     def doubt(self, t: np.longdouble) -> States:
-        q, p = np.empty((2, self.system.n), dtype=np.longdouble)
         i, swing = self.term.i, self.swing
         root = np.sqrt(swing.m)
         size = 2 * swing.length * np.minimum(root, PI / 2)
         speed = 2 * swing.length * swing.w * root
         time = np.abs(t) + swing.latency
         force = swing.mass * swing.w**2 * np.minimum(size, swing.length)
-        q[i] = FORM_EPS * (np.abs(self.system.q[i]) + size + speed * time)
-        p[i] = FORM_EPS * (swing.mass * speed + force * time)
-        return q, p
+        q = FORM_EPS * (np.abs(self.system.q[i]) + size + speed * time)
+        return by_particle(i, q, FORM_EPS * (swing.mass * speed + force * time))
 
 
 class HangingRods(ClosedForm):

@@ -79,9 +79,7 @@ def propagate(
         # combined with the powers of the root: growth by cosh and decay by friction would be 0 times infinity
         size, up = sign * np.exp(decay), sign * np.exp(decay + j * g)
         even = np.where(
-            turning,
-            size * np.cos(j * x),
-            np.where(growing, up * (1 + np.exp(-2 * j * g)) / 2, size),
+            turning, size * np.cos(j * x), np.where(growing, up * (1 + np.exp(-2 * j * g)) / 2, size)
         )
         odd = np.where(
             turning,
@@ -90,7 +88,4 @@ def propagate(
         )
         a, b = matrices[:, 0, 0] / root - cosine, matrices[:, 0, 1] / root
         c, e = matrices[:, 1, 0] / root, matrices[:, 1, 1] / root - cosine
-        return (
-            np.asarray(even * y + odd * (a * y + b * v)),
-            np.asarray(even * v + odd * (c * y + e * v)),
-        )
+        return (np.asarray(even * y + odd * (a * y + b * v)), np.asarray(even * v + odd * (c * y + e * v)))

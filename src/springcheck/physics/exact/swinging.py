@@ -13,7 +13,7 @@ import numpy as np
 
 from springcheck.physics.arrays import Extended
 from springcheck.physics.exact.closedform import FORM_EPS, ClosedForm, States, one_each, wide
-from springcheck.physics.exact.digits import Wide, digits, exactly, extended
+from springcheck.physics.exact.digits import Wide, digits, exactly, extended, summed
 from springcheck.physics.rods import START_TOLERANCE
 from springcheck.physics.system import System
 
@@ -31,23 +31,21 @@ class SwingingMotion(ClosedForm):
         super().__init__(system)
         term: Any = system.terms[0]
         self.need(one_each(system))
-        a, b, zero = term.a, term.b, np.zeros(system.n)
+        a, b = term.a, term.b
         bond = np.unique(term.number, return_inverse=True)[1]
 
-        def summed(values: Wide) -> Wide:
-            out = exactly(zero)
-            np.add.at(out, bond, values)
-            return out[bond]
+        def over_axes(values: Wide) -> Wide:
+            return summed(values, bond, system.n)[bond]
 
         # separations and velocities are differences, which may be small beside their operands
         with digits():
             m, q, p, k, rest = (exactly(x) for x in (system.m, system.q, system.p, term.k, term.rest))
             whole, d, v = m[a] + m[b], q[b] - q[a], p / m
-            apart, square = v[b] - v[a], summed(d * d)
+            apart, square = v[b] - v[a], over_axes(d * d)
             self.need(np.all(square != 0) and np.all(term.k > 0))
             s = np.sqrt(square)
-            e, rate = d / s, summed(d * apart) / s
-            across, speed = summed((apart - rate * e) ** 2), summed(v[a] ** 2 + v[b] ** 2) / 2
+            e, rate = d / s, over_axes(d * apart) / s
+            across, speed = over_axes((apart - rate * e) ** 2), over_axes(v[a] ** 2 + v[b] ** 2) / 2
             rows = extended(
                 np.stack([
                     e, (m[a] * q[a] + m[b] * q[b]) / whole, (p[a] + p[b]) / whole,

@@ -14,7 +14,7 @@ import numpy as np
 
 from springcheck.physics.arrays import Extended, Integers
 from springcheck.physics.exact.closedform import FORM_EPS, ClosedForm, States, wide
-from springcheck.physics.exact.digits import Wide, digits, exactly, extended
+from springcheck.physics.exact.digits import Wide, digits, exactly, extended, summed
 from springcheck.physics.rods import START_TOLERANCE, Rods
 from springcheck.physics.system import System
 
@@ -44,19 +44,17 @@ class TurningRods(ClosedForm):
             out.reshape(-1)[places] = values
             return out
 
-        def summed(values: Wide) -> Wide:
-            out = exactly(np.zeros_like(values, np.float64))
-            np.add.at(out, of, values)
-            return out[of]
+        def whole(values: Wide) -> Wide:
+            return summed(values, of, values.shape)[of]
 
         # in more digits: a body may be small beside its distance from 0, and rotate slowly beside its drift
         with digits():
             q, p, m = (exactly(by_axes(x)) for x in (system.q, system.p, system.m))
             q, m = q - exactly(by_axes(at)), np.max(m, axis=1, keepdims=True)
-            drift, centre = (np.where(held, 0 * x, summed(x) / summed(m)) for x in (p, m * q))
+            drift, centre = (np.where(held, 0 * x, whole(x) / whole(m)) for x in (p, m * q))
             x = q - centre
             square = np.sum(x * x, axis=1, keepdims=True)
-            turn = summed(np.cross(x, p)) / summed(m * square)
+            turn = whole(np.cross(x, p)) / whole(m * square)
             v, w = np.cross(turn, x), np.sqrt(np.sum(turn * turn, axis=1, keepdims=True)) + 0 * x
             self.x, self.v, self.reach, self.w, self.drift = (
                 extended(y).reshape(-1)[places] for y in (x, v, np.sqrt(square) + 0 * x, w, drift)

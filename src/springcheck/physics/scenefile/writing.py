@@ -27,13 +27,8 @@ def text(system: System[Any]) -> str:
     scene: SceneFields = system.scene
     head = {"title": scene.title, "source": scene.source, "units": scene.units, "kind": scene.kind}
     lines = [_assigned(head)]
-    is_chain = (
-        scene.places is None
-        and scene.kind == "particles"
-        and scene.n > 1
-        and system.is_uniform_chain
-        and _rests_at_0(scene)
-    )
+    plain = scene.places is None and scene.kind == "particles"
+    is_chain = plain and system.is_uniform_chain and _rests_at_0(scene)
     if is_chain:
         lines += _chain(scene)
     else:

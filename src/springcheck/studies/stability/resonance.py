@@ -82,7 +82,7 @@ def radii(scene: Scene, label: Label, turn: Floats, step: Stepper) -> Floats:
     # coordinates in which q and p/(m w) have one scale
     w = fast_frequency(scene) * np.sqrt(scale)
     # displacements from equilibrium move as if every spring's rest point were 0
-    linear = replace(scene, terms=tuple(term.centred() for term in scene.terms))
+    linear = replace(scene, terms=tuple(x.shifted(-getattr(x, x.origin, 0.0)) for x in scene.terms))
     many = linear.system.tiled(copies)
     terms = tuple(term.scaled(np.repeat(scale, len(term) // copies)) for term in many.terms)
     units = np.ones((copies, scene.n)), scene.m * w[:, None]
