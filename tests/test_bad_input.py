@@ -197,17 +197,17 @@ def test_a_trajectory_that_is_not_in_the_store(capsys: pytest.CaptureFixture[str
     refused(capsys, ["inspect", "spring.h5", "--trajectory", "own:euler", "--rows", "0"], "--rows")
 
 
-def test_an_exported_trajectory_is_not_called_damaged(capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_exported_trajectory_is_a_store_to_every_command(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["run", "spring", "--method", "own:euler", "--quiet"]) == 0
     assert main(["export", "spring.h5", "own:euler", "out.h5md"]) == 0
     capsys.readouterr()
-    refused(capsys, ["inspect", "out.h5md"], "exported trajectory, no store", "identify")
-    assert main(["plot", "out.h5md"]) == 0
-    assert Path("figures/out/states.png").is_file()
+    for command in ("inspect", "plot", "report", "check", "identify"):
+        assert main([command, "out.h5md"]) == 0, command
+    assert Path("figures/out/phase-portrait.png").is_file()
+    assert main(["judge", "out.h5md", "--scene", "spring", "--scheme", "explicit-euler"]) == 0
+    assert main(["run", "--from", "out.h5md"]) == 0
     capsys.readouterr()
-    assert main(["check", "out.h5md"]) == 1
-    assert capsys.readouterr().out == "out.h5md: /: is an exported trajectory, no store of springcheck\n"
-    assert main(["identify", "out.h5md"]) == 0
+    refused(capsys, ["export", "out.h5md", "own:euler", "again.h5md"], "exported trajectory already", "copy")
 
 
 def test_a_file_where_the_journal_goes_is_named(capsys: pytest.CaptureFixture[str]) -> None:

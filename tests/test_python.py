@@ -337,13 +337,18 @@ def test_threads_that_capture_what_libraries_print_leave_the_streams_as_they_wer
 
 @pytest.mark.parametrize("name", ["states.csv", "states.npz"])
 def test_what_a_trajectory_saves_reads_back_to_the_last_bit_and_is_identified(name: str) -> None:
-    run = springcheck.simulate("spring-uneven", "own:velocity-verlet")
+    """A table had neither masses nor energies, and coupled masses were identified as no scheme at all."""
+    run = springcheck.simulate("chain", "own:velocity-verlet")
     path = run.save(name)
     if path.suffix == ".csv":
+        head = path.read_text().splitlines()[0]
+        assert head == "t,q0,p0,q1,p1,q2,p2,energy,m0,m1,m2"
         values = np.loadtxt(path, delimiter=",", skiprows=1)
-        assert np.array_equal(values, np.column_stack([run.t, run.q, run.p]))
-    found = springcheck.identify(path, mass=float(run.scene.m[0]))
-    assert next(iter(found.values())).scheme == "velocity-verlet"
+        states = np.stack([run.q, run.p], axis=2).reshape(len(run.t), 6)
+        assert np.array_equal(values[:, :8], np.column_stack([run.t, states, run.energy]))
+        assert np.all(values[:, 8:] == run.scene.m)
+    (found,) = springcheck.identify(path).values()
+    assert (found.scheme, found.fits) == ("velocity-verlet", True)
     with pytest.raises(SpringcheckError, match=r"\.csv or \.npz"):
         run.save("states.txt")
     with pytest.raises(SpringcheckError, match="cannot be written"):

@@ -6,6 +6,7 @@ import os
 import re
 import shutil
 import subprocess
+from collections.abc import Callable
 from pathlib import Path
 
 import h5py
@@ -18,10 +19,11 @@ from silx.io import open as silx_open
 
 import springcheck
 from springcheck import store
+from springcheck.cli.file import judge
 from springcheck.errors import StoreError
 from springcheck.formats import hdf5
 from springcheck.physics.trajectory import Comparison
-from stores import LABELS, scene, trajectory, written
+from stores import LABELS, assert_same, scene, trajectory, written
 
 
 @pytest.mark.parametrize("label", LABELS)
@@ -54,13 +56,24 @@ def test_mdanalysis_has_the_box_of_an_exported_trajectory(tmp_path: Path) -> Non
         assert np.allclose(frame.dimensions, [41, 33, 57, 90, 90, 90], rtol=1e-6)
 
 
-def test_an_exported_file_says_where_it_comes_from_and_is_never_overwritten(tmp_path: Path) -> None:
-    written(tmp_path / "s.h5", scene())
+def test_an_exported_trajectory_is_a_store_of_its_own_and_is_never_overwritten(tmp_path: Path) -> None:
+    """Its energies, its momenta and what its engine declares were left out."""
+    s = scene()
+    made = written(tmp_path / "s.h5", s)
     out = tmp_path / "out.h5md"
-    store.export(tmp_path / "s.h5", LABELS[1], out)
+    assert store.export(tmp_path / "s.h5", LABELS[1], out) == []
     with h5py.File(out) as file:
         assert list(file["particles"]) == ["trajectory"]
-        assert file["parameters/trajectory"].attrs["method"] == LABELS[1]
+        assert not file["particles/trajectory/position/value"].is_virtual
+    assert store.check(out) == []
+    assert_same(store.read(out)[LABELS[1]], made[LABELS[1]])
+    assert store.digest(out, LABELS[1]) == store.digest(tmp_path / "s.h5", LABELS[1])
+    kept, whole = store.summary(out), store.summary(tmp_path / "s.h5")
+    assert kept.complete
+    assert [run.parameters for run in kept.runs] == [whole.runs[1].parameters]
+    assert store.scene_text(out) == s.to_toml()
+    with pytest.raises(StoreError, match="an exported trajectory already"):
+        store.export(out, LABELS[1], tmp_path / "again.h5md")
     for label, target, said in (
         (LABELS[1], out, "exists"),
         ("own:none", tmp_path / "a.h5md", "no trajectory 'own:none'"),
@@ -71,6 +84,30 @@ def test_an_exported_file_says_where_it_comes_from_and_is_never_overwritten(tmp_
     written(tmp_path / "circuit.h5", scene(kind="circuit", units="si"))
     with pytest.raises(StoreError, match="no particles"):
         store.export(tmp_path / "circuit.h5", LABELS[0], tmp_path / "a.h5md")
+
+
+@pytest.mark.parametrize(
+    ("name", "label", "scheme"),
+    [
+        ("chain", "openmm:verlet", "velocity-verlet"),
+        ("spring-uneven", "sundials:adams", "adams"),
+        ("spring-uneven", "own:rk4", "rk4"),
+        ("dumbbell", "openmm:verlet-rods-as-it-is", "velocity-verlet"),
+    ],
+)
+def test_an_exported_trajectory_is_judged_as_in_its_store(
+    tmp_path: Path, name: str, label: str, scheme: str, need: Callable[[str], None]
+) -> None:
+    """A right engine that rebuilds its velocities, has a tolerance, or holds rods to one, failed on it."""
+    need(label)
+    springcheck.run(name, label, path=tmp_path / "s.h5")
+    store.export(tmp_path / "s.h5", label, tmp_path / "out.h5md")
+    there, here = (
+        judge(path, scene=name, scheme=scheme) for path in (tmp_path / "s.h5", tmp_path / "out.h5md")
+    )
+    # NaN, the value of a check that does not apply, is not equal to itself
+    assert str(here.document()["verdicts"]) == str(there.document()["verdicts"])
+    assert here.status == there.status == 0
 
 
 def test_our_own_reader_takes_an_exported_file_as_anyones(tmp_path: Path) -> None:

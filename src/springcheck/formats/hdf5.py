@@ -166,9 +166,7 @@ def _states(path: Path, group: Any, name: str, most: int | None) -> States | Non
         v=flat[1] if len(flat) > 1 else None,
         mass=mass,
         units={key: unit for key, unit in units.items() if unit},
-        roundoff=max(
-            [2.0**-53, *(float(np.finfo(x.dtype).eps) / 2 if x.dtype.kind == "f" else 0.5 for x in data)]
-        ),
+        roundoff=max(map(_roundoff, data)),
     )
 
 

@@ -177,20 +177,19 @@ class Trajectory:
     def save(self, path: str | Path) -> Path:
         """Write t, q, p (and m, energy) as .csv or .npz, every double so that it reads back exactly.
 
-        `springcheck.identify` and the command read both.  SpringcheckError where it cannot be written.
+        A .csv has columns t, q0, p0, q1 ..., energy, m0, m1 ...; `springcheck.identify` and the command read
+        both.  SpringcheckError where it cannot be written.
         """
-        place, n = Path(path), self.q.shape[1]
-        columns = {"t": self.t, "q": self.q, "p": self.p}
-        columns |= {} if self.energy is None else {"energy": self.energy}
+        place, masses = Path(path), {} if self.scene is None else {"m": self.scene.m}
         try:
             if place.suffix == ".npz":
-                columns |= {} if self.scene is None else {"m": self.scene.m}
-                np.savez(place, allow_pickle=False, **columns)
+                more = masses if self.energy is None else {"energy": self.energy, **masses}
+                np.savez(place, allow_pickle=False, t=self.t, q=self.q, p=self.p, **more)
             elif place.suffix == ".csv":
-                each = [f"{name}{i}" for i in range(n) for name in "qp"]
-                values = np.stack([self.q, self.p], axis=-1).reshape(len(self.t), 2 * n)
-                names, table = ["t", *each], np.column_stack([self.t, values])
-                np.savetxt(place, table, "%.17g", ",", header=",".join(names), comments="")
+                alike = {f"m{i}": np.full(len(self.t), m) for i, m in enumerate(masses.get("m", ()))}
+                columns = {"t": self.t, **self._columns, **alike}
+                rows = np.column_stack([*columns.values()])
+                np.savetxt(place, rows, "%.17g", ",", header=",".join(columns), comments="")
             else:
                 raise SpringcheckError(f"{place}: a name that ends in .csv or .npz is needed")
         except OSError as error:
@@ -227,22 +226,23 @@ class Trajectory:
         rows += [(str(i), f"{self.t[i]:g}", _few(self.q[i]), _few(self.p[i])) for i in shown]
         return html_table(repr(self), rows)
 
+    @property
+    def _columns(self) -> dict[str, Floats]:
+        """Columns (f,) q0, p0, q1 ..., and energy where it is recorded."""
+        states = {f"{name}{i}": getattr(self, name)[:, i] for i in range(self.q.shape[1]) for name in "qp"}
+        return states if self.energy is None else {**states, "energy": self.energy}
+
     def to_dataframe(self) -> Any:
         """A pandas DataFrame: a row for each frame, columns q0, p0, q1 ..., energy if recorded; index t."""
-        pandas = library("pandas")
-        n = self.q.shape[1]
-        columns = {f"{name}{i}": getattr(self, name)[:, i] for i in range(n) for name in "qp"}
-        columns |= {} if self.energy is None else {"energy": self.energy}
-        return pandas.DataFrame(columns, index=pandas.Index(self.t, name="t"))
+        return library("pandas").DataFrame({"t": self.t, **self._columns}).set_index("t")
 
     def to_xarray(self) -> Any:
         """An xarray Dataset: q and p over t and particle, energy over t if recorded."""
-        xarray = library("xarray")
-        kept = {name: (("t", "particle"), getattr(self, name)) for name in ("q", "p")}
-        if self.energy is not None:
-            kept["energy"] = (("t",), self.energy)  # type: ignore[assignment]
+        kept: dict[str, Any] = {name: (("t", "particle"), getattr(self, name)) for name in ("q", "p")}
+        kept |= {} if self.energy is None else {"energy": ("t", self.energy)}
         about = {"method": self.label, "scheme": self.scheme, "step": self.step}
-        return xarray.Dataset(kept, coords={"t": self.t, "particle": range(self.q.shape[1])}, attrs=about)
+        coordinates = {"t": self.t, "particle": range(self.q.shape[1])}
+        return library("xarray").Dataset(kept, coords=coordinates, attrs=about)
 
 
 def html_table(title: str, rows: Iterable[Sequence[str]]) -> str:

@@ -119,10 +119,8 @@ def tried(path: Path) -> bytes:
 def _structure(file: Any, *, arrays: bool) -> Iterator[Damage]:
     root = access.attributes(file)
     if root.get("format") != layout.FORMAT:
-        what = {
-            layout.EXPORTED: "is an exported trajectory",
-            layout.OLDER: "was written by an older springcheck",
-        }.get(str(root.get("format")), f"is not marked as {layout.FORMAT!r}")
+        older = root.get("format") == layout.OLDER
+        what = "was written by an older springcheck" if older else f"is not marked as {layout.FORMAT!r}"
         yield Damage("/", f"{what}, {NO_STORE}")
         return
     now, extents = digests.contents(file)

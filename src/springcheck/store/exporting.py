@@ -1,4 +1,4 @@
-"""Export one trajectory of a store to a file of its own, for MDAnalysis and other readers of H5MD."""
+"""Export one trajectory of a store as a store of its own, which MDAnalysis and other readers of H5MD read."""
 
 from __future__ import annotations
 
@@ -6,18 +6,20 @@ import os
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 
 from springcheck.errors import StoreError
-from springcheck.physics.arrays import Floats, Integers
-from springcheck.store import access, checking, files, layout, parts, reading, space
+from springcheck.physics.arrays import Integers
+from springcheck.store import access, checking, files, layout, merge, parts, reading, space
 from springcheck.store.checking import Damage
 
 
 def export(path: str | Path, label: str, out: str | Path) -> list[Damage]:
-    """Write one trajectory as plain H5MD: one group ``/particles/trajectory``, no virtual datasets.
+    """Write one trajectory as a store whose only particle group is ``/particles/trajectory``, without views.
 
-    MDAnalysis expects that name, and the ending .h5md.  Returns the damage found elsewhere in the store.
+    MDAnalysis expects that name, and the ending .h5md.  All that is known of the trajectory is copied, so
+    that it is identified and judged as in its store.  Returns the damage found elsewhere in the store.
     Raises StoreError for an unknown label, a scene without particles, a path that exists, and a trajectory
     that differs from its digest, of which no clean file is made.
     """
@@ -40,69 +42,60 @@ def export(path: str | Path, label: str, out: str | Path) -> list[Damage]:
             raise StoreError(f"{path} is not what was written: {place} {finding.what}; nothing is exported")
     with parts.opened(source) as file:
         known, attributes = reading.known_of(file, label)
-        if known.kind != "particles" or not {"q", "p"} & set(known.kept):
+        if known.kind != "particles":
             raise StoreError(f"{label} of {path} has no positions to export: its scene has no particles")
-        base, wide = f"observables/{label}", (known.frames, known.particles)
+        base, group = f"observables/{label}", f"particles/{label}"
+        if access.group_at(file, group) is None:
+            raise StoreError(f"{path} is an exported trajectory already: copy it")
         places = space.places_of(known.axes, known.particles)
-        velocity = "velocity" if "velocity" in access.children(file, base) else "p"
-        arrays = {
-            element: access.array(file, f"{base}/{name}/value", wide)
-            for element, kept, name in (("position", "q", "q"), ("velocity", "p", velocity))
-            if kept in known.kept
-        }
-        first = f"{base}/{known.kept[0]}"
-        columns = {
-            "time": access.array(file, f"{first}/time", wide[:1]),
-            "step": access.array(file, f"{first}/step", wide[:1], "i"),
-            "mass": access.array(file, f"particles/{label}/mass", (int(np.max(places)) // 3 + 1,)),
-        }
-        place = f"particles/{label}/box"
-        edges = None
-        if "edges" in access.children(file, place):
-            edges = access.array(file, f"{place}/edges", (3,))[()]
+        arrays = reading.arrays_of(file, label, known)
+        if "velocity" in access.children(file, base):
+            arrays["velocity"] = access.array(file, f"{base}/velocity/value", arrays["p"].shape)
+        arrays["step"] = access.array(file, f"{base}/q/step", (known.frames,), "i")
+        mass = access.array(file, f"{group}/mass", (int(np.max(places)) // 3 + 1,))
+        boxed = "edges" in access.children(file, f"{group}/box")
+        edges = access.array(file, f"{group}/box/edges", (3,))[()].tolist() if boxed else None
+        # positions and velocities are written twice, the second time in three dimensions
+        size = 8 * sum(x.size * (1 + (x.ndim == 2)) for x in arrays.values()) + 24 * known.frames
+        text = 16 * sum(len(str(value)) for value in attributes.values())
+        run = os.urandom(16).hex()
+        root = {"run": run, "complete": True, "scene": known.scene, "scene_name": known.scene_name}
         with files.told(out, "write"), files.unfinished(files.temporary(out)) as made:
-            size = sum(2 * values.size * 8 for values in arrays.values())
-            with layout.fresh(made, size + 24 * known.frames) as target:
+            with layout.fresh(made, size + text) as target:
                 layout.begin(target)
-                layout.write_attributes(target, {"format": layout.EXPORTED})
-                group = target.create_group("particles/trajectory")
-                _write(group, arrays, columns, places, layout.UNITS[known.kind, known.units], edges)
-                layout.write_attributes(target.create_group("parameters/trajectory"), attributes)
+                layout.write_attributes(target, {**root, "units": known.units})
+                layout.write_attributes(target.create_group(f"parameters/{label}"), attributes)
+                axis = _observables(file[base], target.create_group(base), arrays)
+                particles = target.create_group("particles/trajectory")
+                layout.write_particles(
+                    particles, layout.UNITS[known.kind, known.units], mass[()], axis, "velocity" in arrays,
+                    lambda element, source: _copy_values(arrays[source], element, places),
+                )  # fmt: skip
+                layout.write_box(particles, edges, axis)
+                extents = merge.list_digests(target)
+            merge.seal_checked(made, extents, run)
             files.put(made, out)
     return found
 
 
-def _write(
-    group: Any,
-    arrays: dict[str, Any],
-    columns: dict[str, Any],
-    places: Integers,
-    unit: layout.UnitsOf,
-    edges: Floats | None,
-) -> None:
-    layout.write_box(group)
-    first = next(iter(arrays))
-    for name, source in arrays.items():
-        element = group.create_group(name)
-        _copy_values(source, element, places)
-        layout.write_unit(element["value"], unit["q" if name == "position" else "velocity"])
+def _observables(source: Any, target: Any, arrays: dict[str, Any]) -> dict[str, Any]:
+    """Copy the recorded arrays with their attributes -> time and step, one array each under many names."""
+    layout.write_attributes(target, access.attributes(source))
+    axis: dict[str, Any] = {}
+    for name in [name for name in arrays if name not in ("time", "step")]:
+        element = target.create_group(name)
+        layout.write_attributes(element, access.attributes(source[name]))
+        h5py.h5o.copy(arrays[name].id, b".", element.id, b"value")
+        if axis:
+            element.update(axis)
+            continue
         for kind in ("time", "step"):
-            # two elements share them
-            element[kind] = group[f"{first}/{kind}"] if name != first else columns[kind][()]
-        layout.write_unit(element["time"], unit["time"])
-    if edges is not None:
-        layout.write_attributes(group["box"], {"boundary": 3 * ["periodic"]})
-        # a value for each frame, as MDAnalysis expects
-        element = group["box"].create_group("edges")
-        element["value"] = np.broadcast_to(edges, (len(columns["time"]), 3))
-        layout.write_unit(element["value"], unit["q"])
-        for kind in ("time", "step"):
-            element[kind] = group[f"{first}/{kind}"]
-    group["mass"] = columns["mass"][()]
-    layout.write_unit(group["mass"], unit["mass"])
+            h5py.h5o.copy(arrays[kind].id, b".", element.id, kind.encode())
+            axis[kind] = element[kind]
+    return axis
 
 
-def _copy_values(source: Any, target: Any, places: Integers) -> None:
+def _copy_values(source: Any, target: Any, places: Integers) -> Any:
     """Copy (frames, n) to its places in (frames, particles, 3), in pieces; the rest keeps the fill value."""
     frames, particles = source.shape[0], int(np.max(places)) // 3 + 1
     rows = max(1, min(frames, layout.CHUNK // (8 * particles)))
@@ -112,3 +105,4 @@ def _copy_values(source: Any, target: Any, places: Integers) -> None:
         part = np.asarray(source[start : start + rows])
         for columns, of, axis in space.lines(places):
             made[start : start + rows, of, axis] = part[:, columns]
+    return made

@@ -21,7 +21,7 @@ from __future__ import annotations
 import contextlib
 import os
 import platform
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
@@ -31,14 +31,14 @@ import numpy as np
 
 import springcheck
 from springcheck.errors import StoreError, plain
+from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.store import access, files, space
 from springcheck.store.access import Scalar
 
 FORMAT = "springcheck store 2"
 OLDER = "springcheck store 1"
-EXPORTED = "springcheck trajectory 1"
-"""Format of a store, of one by an older version, and of a trajectory on its own."""
+"""Format of a store, and of one by an older version."""
 LIBVER = ("v110", "v110")
 """Smaller than the oldest format, with checksums in its structure, and read by h5dump 1.10 and H5Web."""
 
@@ -65,6 +65,8 @@ _SI_ROTOR = {**_SI, "q": "rad", "p": "kg m2 s-1", "velocity": "rad s-1", "mass":
 _SI_CIRCUIT = {**_SI, "q": "C", "p": "Wb", "velocity": "A", "mass": "H"}
 _BARE = dict.fromkeys(_MD, "1")
 UnitsOf: TypeAlias = Mapping[str, str]
+Axis: TypeAlias = Mapping[str, Any]
+"""The datasets `time` and `step`, which all elements of a trajectory share."""
 UNITS: Mapping[tuple[str, str], UnitsOf] = {
     ("particles", "md"): _MD,
     ("particles", "reduced"): _MD,
@@ -121,19 +123,14 @@ def shape(name: str, frames: int, n: int) -> tuple[int, ...]:
 
 def columns(label: str, scene: Scene, frames: int, *, steps: bool = False) -> dict[str, Column]:
     """The arrays that a trajectory of this scene is made of, by short name; `steps` adds the last ones."""
-    kept: list[str] = [name for name in QUANTITIES if name in scene.quantities]
-    if not kept:
-        raise StoreError(f"scene {scene.name!r} records nothing: ask for q, p or energy in [record]")
+    kept = [*scene.quantities, "last_step"] if steps else [*scene.quantities]
     base = f"/observables/{label}"
-    more = ["last_step"] if steps else []
-    found: dict[str, Column] = {
-        name: Column(path=f"{base}/{name}/value", shape=shape(name, frames, scene.n)) for name in kept + more
-    }
-    if scene.kind == "particles" and "p" in kept and np.any(scene.m != 1):
+    found = {x: Column(path=f"{base}/{x}/value", shape=shape(x, frames, scene.n)) for x in kept}
+    if scene.kind == "particles" and np.any(scene.m != 1):
         found["velocity"] = Column(path=f"{base}/velocity/value", shape=found["p"].shape)
-    found["time"] = Column(path=f"{base}/{kept[0]}/time", shape=(frames,))
+    found["time"] = Column(path=f"{base}/q/time", shape=(frames,))
     step = "<i4" if scene.steps < 2**31 else "<i8"
-    found["step"] = Column(path=f"{base}/{kept[0]}/step", shape=(frames,), dtype=step)
+    found["step"] = Column(path=f"{base}/q/step", shape=(frames,), dtype=step)
     return found
 
 
@@ -227,10 +224,10 @@ def skeleton(file: Any, label: str, scene: Scene, found: Mapping[str, Column]) -
     if scene.units == "reduced":
         write_attributes(base, {"units_are": REDUCED})
     arrays = {name: _contiguous(file, column) for name, column in found.items()}
-    time, step = arrays["time"], arrays["step"]
-    write_unit(time, unit["time"], _named("t", unit["time"], scene))
+    axis = {name: arrays[name] for name in ("time", "step")}
+    write_unit(axis["time"], unit["time"], _named("t", unit["time"], scene))
     for name, array in arrays.items():
-        if name in {"time", "step"}:
+        if name in axis:
             continue
         element = base[name]
         two = len(found[name].shape) == 2
@@ -239,9 +236,10 @@ def skeleton(file: Any, label: str, scene: Scene, found: Mapping[str, Column]) -
         if two:
             write_attributes(element, {"default_slice": [".", "0"]})
         write_unit(array, unit[name], _named(f"{name} of {label}", unit[name], scene))
-        _link(element, time, step)
-    if scene.kind == "particles" and ("q" in found or "p" in found):
-        _particles(file, label, scene, found, time, step)
+        if name != "q":
+            element.update(axis)
+    if scene.kind == "particles":
+        _particles(file, label, scene, found, axis)
     return {name: int(array.id.get_offset()) for name, array in arrays.items()}
 
 
@@ -262,30 +260,32 @@ def _contiguous(file: Any, column: Column) -> Any:
     return h5py.Dataset(h5py.h5d.create(file.require_group(group).id, name.encode(), kind, space, how))
 
 
-def _link(element: Any, time: Any, step: Any) -> None:
-    if "time" not in element:
-        element["time"], element["step"] = time, step
+def _particles(file: Any, label: str, scene: Scene, found: Mapping[str, Column], axis: Axis) -> None:
+    """The particle group of a trajectory: views of its observables."""
 
+    def viewed(element: Any, source: str) -> Any:
+        column = found[source]
+        view = h5py.VirtualLayout((column.shape[0], scene.particles, 3), "<f8")
+        numbers = h5py.VirtualSource(".", column.path, column.shape, "<f8")
+        for columns_, particles, direction in space.lines(scene.all_places):
+            view[:, particles, direction] = numbers[:, columns_]
+        return element.create_virtual_dataset("value", view, fillvalue=0.0)
 
-def _particles(
-    file: Any, label: str, scene: Scene, found: Mapping[str, Column], time: Any, step: Any
-) -> None:
-    unit = units(scene)
     group = file.create_group(f"particles/{label}")
+    write_particles(group, units(scene), scene.masses.astype("<f8"), axis, "velocity" in found, viewed)
     write_box(group, scene.box)
-    for name, source in (("position", "q"), ("velocity", "velocity" if "velocity" in found else "p")):
-        if source not in found:
-            continue
+
+
+def write_particles(
+    group: Any, unit: UnitsOf, mass: Floats, axis: Axis, have_velocity: bool, write: Callable[[Any, str], Any]
+) -> None:
+    """A particle group without its box.  `write(element, source)` writes the values (frames, particles, 3) of
+    one of the observables and returns them."""
+    for name, source in (("position", "q"), ("velocity", "velocity" if have_velocity else "p")):
         element = group.create_group(name)
-        shape = found[source].shape
-        view = h5py.VirtualLayout((shape[0], scene.particles, 3), "<f8")
-        numbers = h5py.VirtualSource(".", found[source].path, shape, "<f8")
-        for columns_, particles, axis in space.lines(scene.all_places):
-            view[:, particles, axis] = numbers[:, columns_]
-        made = element.create_virtual_dataset("value", view, fillvalue=0.0)
-        write_unit(made, unit["q"] if name == "position" else unit["velocity"])
-        _link(element, time, step)
-    write_unit(group.create_dataset("mass", data=scene.masses.astype("<f8")), unit["mass"])
+        write_unit(write(element, source), unit["q" if name == "position" else "velocity"])
+        element.update(axis)
+    write_unit(group.create_dataset("mass", data=mass), unit["mass"])
 
 
 def write_unit(dataset: Any, unit: str, name: str = "") -> None:
@@ -293,17 +293,24 @@ def write_unit(dataset: Any, unit: str, name: str = "") -> None:
     write_attributes(dataset, {"unit": unit, "units": unit, **({"long_name": name} if name else {})})
 
 
-def write_box(group: Any, lengths: tuple[float, ...] | None = None) -> None:
+def write_box(group: Any, lengths: Sequence[float] | None, axis: Axis | None = None) -> None:
     """Write the box of a particle group: three dimensions without borders, or periodic ones of these lengths
-    [L].
+    [L], once or with an axis for each frame, as MDAnalysis expects.
 
     Positions are unwrapped, so that H5MD's images are all 0 and left out.
     """
     box = group.create_group("box")
     box.attrs["dimension"] = 3
     write_attributes(box, {"boundary": ["periodic" if lengths else "none"] * 3})
-    if lengths:
+    if not lengths:
+        return
+    if axis is None:
         box["edges"] = np.array(lengths, "<f8")
+        return
+    element = box.create_group("edges")
+    element["value"] = np.broadcast_to(lengths, (len(axis["time"]), 3))
+    write_unit(element["value"], group["position/value"].attrs["unit"])
+    element.update(axis)
 
 
 @cache

@@ -58,16 +58,26 @@ def collection(
                 name, data=document, dtype=h5py.string_dtype("utf-8")
             )
         _plots(file)
-        listed, extents = digests.contents(file)
-        layout.write_attributes(file, {digests.KEY: json.dumps(listed, separators=(",", ":"))})
+        extents = list_digests(file)
+    seal_checked(path, extents, str(root["run"]), kept)
+
+
+def list_digests(file: Any) -> list[seal.Extent]:
+    """Write the list of digests into a complete collection -> its recorded arrays."""
+    listed, extents = digests.contents(file)
+    layout.write_attributes(file, {digests.KEY: json.dumps(listed, separators=(",", ":"))})
+    return extents
+
+
+def seal_checked(
+    path: Path, extents: Iterable[seal.Extent], run: str, kept: Iterable[seal.Extent] = ()
+) -> None:
+    """Seal a collection.  StoreError where an array, those that it `kept` aside, differs from its sha256."""
     there = {(extent.offset, extent.sha256) for extent in kept}
-    with path.open("rb") as raw:
-        for extent in extents:
-            if (extent.offset, extent.sha256) in there:
-                continue
-            if seal.digest(raw, (extent.offset, extent.size)) != extent.sha256:
-                raise StoreError(f"{extent.name} was damaged on its way into {path}: check disk and memory")
-    seal.attach(path, extents, str(root["run"]))
+    copied = [extent for extent in extents if (extent.offset, extent.sha256) not in there]
+    for name in seal.broken(path, copied):
+        raise StoreError(f"{name} was damaged on its way into {path}: check disk and memory")
+    seal.attach(path, extents, run)
 
 
 def image(root: Mapping[str, Scalar], content: Iterable[Table]) -> bytes:

@@ -110,10 +110,6 @@ def opened(path: Path) -> Iterator[Any]:
     trust.trust(path, trust.OURS)
     with access.for_reading(path) as file:
         marked = access.attribute(file, "format")
-        if marked == layout.EXPORTED:
-            raise StoreError(
-                f"{path} is an exported trajectory, no store: identify reads it, and so do readers of H5MD"
-            )
         if marked == layout.OLDER:
             raise StoreError(f"{path} was written by an older springcheck: run its scene again")
         if marked != layout.FORMAT:

@@ -63,7 +63,7 @@ def known_of(file: Any, label: str) -> tuple[RunRecord, dict[str, Any]]:
 def arrays_of(file: Any, label: str, known: RunRecord) -> dict[str, Any]:
     """The arrays of a trajectory, validated: time, and those quantities that are recorded."""
     base = f"observables/{label}"
-    found = {"time": access.array(file, f"{base}/{known.kept[0]}/time", (known.frames,))}
+    found = {"time": access.array(file, f"{base}/q/time", (known.frames,))}
     for name in known.kept:
         shape = layout.shape(name, known.frames, known.particles)
         found[name] = access.array(file, f"{base}/{name}/value", shape)
@@ -93,8 +93,7 @@ def _whole(path: Path, dataset: Any) -> Floats:
 def read(path: str | Path) -> dict[str, Trajectory]:
     """The trajectories of a store by label, checked against their digests.
 
-    Arrays of more than 64 MiB are mapped into memory rather than read, and left to `check`.  Where a
-    scene did not ask for q or p, that array has no rows.
+    Arrays of more than 64 MiB are mapped into memory rather than read, and left to `check`.
     """
     return {label: read_one(source, label) for label, source in sources(Path(path)).items()}
 

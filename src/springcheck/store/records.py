@@ -8,7 +8,6 @@ from operator import attrgetter
 from typing import Annotated, Any, Literal
 
 import msgspec
-import numpy as np
 
 from springcheck.errors import StoreError
 from springcheck.physics.arrays import Arithmetic, Floats
@@ -107,8 +106,8 @@ def record(place: str, known: Mapping[str, Any]) -> RunRecord:
         found = msgspec.convert(known, RunRecord)
     except msgspec.ValidationError as error:
         raise StoreError(f"{place}: {error}") from error
-    if not found.kept:
-        raise StoreError(f"{place}: records no quantity")
+    if not {"q", "p"} <= set(found.kept):
+        raise StoreError(f"{place}: it records {found.quantities or 'nothing'}; q and p are needed")
     return found
 
 

@@ -168,7 +168,7 @@ def gather(path: Path) -> Content:
     text = store.scene_text(path) if "scene" in summary.root else ""
     name = str(summary.root.get("scene_name") or path.stem)
     scene = scenefile.parse(text, name=name, where=str(path)) if text else None
-    labels = [run.label for run in summary.runs if {"q", "p"} <= set(run.quantities)]
+    labels = [run.label for run in summary.runs]
     rows = 2 + 2 * min(MOST_PANELS, scene.n if scene else 1)
     most = max(FEWEST_SHOWN, PAGE_NUMBERS // (rows * max(1, len(labels))))
     pieces = {label: store.strided(path, label, most) for label in labels}
