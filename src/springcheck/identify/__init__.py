@@ -14,7 +14,7 @@ The way of the data, in the order in which to read it; `report` leads through al
 * `fit` (`noise`) measures the map between frames;
 * `families` lists the maps of schemes and mistakes, `maps` evaluates many at once; `search` says which are
   tried in turn; `guesses` and `compare` hold them against the measured map, which leaves a `hypothesis` or
-  excludes it; of what is left `arithmetic` (`coarse`, `quantised`) has to explain every step;
+  excludes it; of what is left `arithmetic` (`coarse`) has to explain every step;
 * `named` (`candidates`, `notes`) says what the hypotheses that are left mean, `result` holds it;
 * where none is left `explain` asks for causes: `driven`, `interrupted`, `misplaced`, `unknown`, `wrong`.
 

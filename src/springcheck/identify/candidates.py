@@ -12,7 +12,7 @@ import numpy as np
 
 from springcheck.identify.coarse import QUANTUM
 from springcheck.identify.evidence import SINGLE_ROOM, Measured
-from springcheck.identify.families import FAMILIES, title
+from springcheck.identify.families import FAMILIES, title, titles
 from springcheck.identify.hypothesis import Joint, aliases, frictionless
 from springcheck.identify.notes import LEAPFROG, hidden_friction, same_maps, untold
 from springcheck.identify.record import Record
@@ -22,7 +22,6 @@ from springcheck.identify.wrong import stiffness_ratio
 from springcheck.physics.arrays import Floats
 from springcheck.schemes import SCHEMES
 from springcheck.schemes.elsewhere import ELSEWHERE
-from springcheck.text.wording import either
 
 T = TypeVar("T")
 
@@ -93,7 +92,7 @@ def stated_stiffness(
     cause = f"{title(plainest.scheme)}, but of a spring {stiff}"
     remedy = "look at the units of the force constant, and at whether V is k/2 q**2"
     cause = f"{cause}: {meaning}" if meaning else cause
-    return [Explanation(cause=cause, remedy=remedy, misfit=abs(ratio - 1))], against
+    return [Explanation(cause, remedy)], against
 
 
 def of_stated_stiffness(seen: Measured, precisions: dict[Joint, str], stated: Floats) -> list[Joint]:
@@ -175,9 +174,7 @@ def either_way(ways: list[Identification]) -> Identification:
     if len(fitting) < 2 or (len(names) == 1 and None not in names):
         # friction that feeds energy in is none
         return fitting[0] if fitting else ways[-1] if ways[0].fits else ways[0]
-    back, turned = (
-        either(list(dict.fromkeys(title(x.scheme) for x in one.candidates))[:4]) for one in fitting
-    )
+    back, turned = (titles(x.scheme for x in one.candidates) for one in fitting)
     candidates = tuple(x for one in fitting for x in one.candidates)
     return replace(
         fitting[0],

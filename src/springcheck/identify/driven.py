@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from springcheck.errors import IdentificationError
 from springcheck.identify.compare import compare
 from springcheck.identify.evidence import AGREES, Evidence
+from springcheck.identify.families import MOST_TITLES
 from springcheck.identify.fit import fit
 from springcheck.identify.hypothesis import FEW, Match, distinct
 from springcheck.physics.arrays import Extended, Floats
@@ -63,9 +64,6 @@ TUNING_STEPS = 12
 
 STARTS_BESIDE, FEW_FRAMES = 6, 2000
 """Starts on either side, a quarter turn over the run apart, and frames up to which they are looked at."""
-
-MOST_SCHEMES = 3
-"""Schemes that a sentence names at most: on a spring of unknown stiffness several have one map."""
 
 
 def _best(z: Floats, carrier: Floats, turn: float) -> tuple[float, Floats]:
@@ -142,7 +140,7 @@ def _forces(e: Evidence, rows: Floats, turn: float, of: str) -> str:
         strength = complex(np.vdot(unit, b) / np.vdot(unit, unit))
         if np.max(np.abs(b - strength * unit)) <= AGREES * np.max(np.abs(b)):
             found.setdefault(match.scheme, _wave(strength, turn / float(e.record.interval), ".9g", ".9g"))
-    ways = [f"{wave}{of} by {title(name)}" for name, wave in list(found.items())[:MOST_SCHEMES]]
+    ways = [f"{wave}{of} by {title(name)}" for name, wave in list(found.items())[:MOST_TITLES]]
     return ", or ".join(ways)
 
 

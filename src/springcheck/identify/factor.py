@@ -71,5 +71,5 @@ def by_a_factor(found: Identification, h: float, q: Floats, v: Floats) -> Identi
     notes = tuple(note for note in found.notes if not kept or note.split(":")[0] in {x.scheme for x in kept})
     return replace(
         found, statement=cause, candidates=kept, notes=notes,
-        explanations=() if kept else (Explanation(cause=cause, remedy=remedy, misfit=misfit),),
+        explanations=() if kept else (Explanation(cause, remedy),),
     )  # fmt: skip

@@ -14,9 +14,10 @@ from springcheck import formats, schemes, store
 from springcheck.errors import IdentificationError, MethodError, SpringcheckError, StoreError
 from springcheck.formats import columns as columns_of
 from springcheck.identify.laws import COUPLED
-from springcheck.identify.record import ROUNDING, of_size
+from springcheck.identify.record import of_size
 from springcheck.identify.report import identify_arrays
 from springcheck.identify.result import Identification
+from springcheck.identify.storage import ROUNDING
 from springcheck.identify.taken import seen_to_take
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.arrays import Floats, Integers

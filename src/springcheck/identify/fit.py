@@ -1,11 +1,10 @@
 """The map between recorded states: generalised least squares under the observation model.
 
-States are z[n+1] = B z[n] + c + p[n], recorded as z + e: e is what the form of the file leaves uncertain,
-p is what the arithmetic rounds in a step.  The residuals of a map, r[n] = z[n+1] - B z[n] - c, then have the
-covariance V = A S A^T + P, a banded matrix, since each recorded error enters two of them.  B and c
-minimise r^T V^-1 r (Gauss-Helmert model: Mikhail, Observations and Least Squares, 1976, chapter 9).  Where
-the file has all digits V is diagonal and neighbours are all that counts; where it has few, V^-1 adds up what
-the whole orbit shows.  One fit serves both, and what lies between.
+States are z[n+1] = B z[n] + c + p[n], recorded as z + e: e is the error of the storage format, p the rounding
+of a step.  The residuals r[n] = z[n+1] - B z[n] - c have the covariance V = A S A^T + P, a banded matrix,
+since each e enters two of them.  B and c minimise r^T V^-1 r (Gauss-Helmert model: Mikhail, Observations and
+Least Squares, 1976, chapter 9).  In double precision e = 0, V is diagonal and each pair of frames counts by
+itself; with few digits V^-1 combines the whole orbit.
 """
 
 from __future__ import annotations
@@ -20,61 +19,65 @@ from numpy.typing import NDArray
 from springcheck.errors import IdentificationError
 from springcheck.identify.hypothesis import ERRORS
 from springcheck.identify.noise import Noise
-from springcheck.identify.record import ROUNDING, Record
+from springcheck.identify.record import Record
+from springcheck.identify.storage import ROUNDING
 from springcheck.physics.arrays import Extended, Floats
 from springcheck.physics.exact.powers import Rotation
 from springcheck.schemes import rotation
 
 CONSTANT_SHOWS = 50.0
-"""Gain of chi-squared that shows a constant part in double precision, whose residuals are no Gaussian noise:
-5 standard errors leave one in 700 files with an equilibrium that is none."""
+"""Gain of chi-squared from which a constant part is fitted in double precision, whose residuals are not
+Gaussian: at 25, five standard errors, one file in 700 has a spurious equilibrium."""
 
 CONSTANT_LIKELY = 10.0
-"""Gain that shows a constant part in a coarse file: one left out is wrong, one too many costs little."""
+"""The same gain for coarse files, where a missing constant is a bias and a superfluous one only widens
+errors."""
 
 FLOOR = 1 / 8
-"""A number near zero is written finer than its neighbours by any power of ten; it counts as no finer than
-this share of the other component's quantum."""
+"""Smallest standard error of one component relative to the other's: text resolves a number near zero
+arbitrarily finely."""
 
 LEAST_LEFT = 1 / 16
-"""Least mean square residual of a step, in squares of a state's rounding: numbers that happen to be exact
-leave less, and prove no more."""
+"""Lower bound on the mean square residual, in squares of a state's unit roundoff: exact numbers leave
+less."""
 
 ENOUGH = 8
-"""Residuals to spare from which what they leave over shows how large it is; fewer may be small by chance, and
-count as no smaller than a rounding by that share."""
+"""Degrees of freedom below which residuals may be small by chance, so that the lower bound on their mean
+square rises to one unit roundoff."""
 
 LEAST_NOISE = 1e-30
-"""Share of the largest noise that a pair counts with at least."""
+"""Smallest standard deviation of a pair, relative to the largest."""
 
 CERTAIN = 14.0
-"""Log of the likelihood ratio from which one of two noise models is called: exp(-14) bounds mistakes."""
+"""Log of the likelihood ratio from which one of two noise models is chosen: wrong with a probability of
+exp(-14)."""
 
 FEWEST_SLIPPING = 20
-"""Numbers up to which what a clock's slips do to each step is not fitted."""
+"""Residuals up to which the effect of an uneven clock is not fitted."""
 
 CLEAN = 100.0
-"""Largest mean square residual, relative to the expected one, that may still be rounding."""
+"""Largest mean square residual, relative to its expectation, that may still be rounding."""
 
 KURTOSIS = 0.8
-"""Variance of the square of an even error in units of its own squared: chi-squared of n has 0.8 n."""
+"""Variance of the square of a uniform error, relative to its mean squared: chi-squared of n has a variance of
+0.8 n."""
 
 CHANCE = 1e-6
-"""Probability of accepting a constant where there is none."""
+"""Probability of fitting a constant part that is not there."""
 
 UNKNOWN = 1e6
-"""Share of a state that may change between two frames of which nothing is known."""
+"""Standard deviation, relative to the state, of a pair of frames that is left out of the fit."""
 
 MOST_ROUNDS = 12
-"""Gauss-Newton's steps at most; three reach rounding in double precision, five in coarse text."""
+"""Most Gauss-Newton steps: three converge to rounding in double precision, five in coarse text."""
 
 SETTLED = 1e-3
-"""Gain of chi-squared that another step must promise, in units of what each number leaves over."""
+"""Predicted gain of chi-squared, relative to its value per residual, below which Gauss-Newton stops."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Map:
-    """The map z -> B z of one oscillator's states z = ((q - centre)/size_q, v T/size_v), of size 1 each.
+    """The map z -> B z between frames of one oscillator, z = (q - centre, v T)/size.
 
     `covariance` (4, 4) belongs to the entries B11, B12, B21, B22.
     """
@@ -85,35 +88,35 @@ class Map:
     centre: Extended
     z: Extended
     weight: Floats
-    """Weight (f - 1,) of each pair of states, by which weighted states have a mean square of 2."""
+    """Weight (f - 1,) of each pair: weighted states have a mean square of 2."""
     residual: Floats
-    """Root mean square (2,) of the weighted residuals of each component."""
+    """Root mean square (2,) of the weighted residuals."""
     noise: Noise
     chi2: float
-    """Chi-squared: residuals in squares of what the observation model expects."""
+    """Chi-squared of the residuals under the observation model."""
     freedom: int
     conditioned: bool
-    """Whether the states span the plane beyond what the map leaves over."""
+    """Whether the states span the phase plane beyond the residuals."""
     spans: bool
-    """Whether they span it beyond the rounding of their numbers."""
+    """Whether they span it beyond the rounding of the recorded numbers."""
     once: bool | None
     """Whether the states were rounded once, as they were written, and never in the motion; None where that
     does not show, or where they have all digits."""
     drifts: bool = False
     """Whether the constant part is no equilibrium but a constant added to the position in every step."""
     slips: Extended | None = None
-    """Relative excess (f - 1,) of each step over the mean, where the steps follow the clock's."""
+    """Relative deviation (f - 1,) of each step from the mean, where the steps follow the recorded times."""
     found: dict[Any, Any] = field(default_factory=dict, init=False)
-    """What was already worked out of this map."""
+    """Cache of what follows from this map."""
 
     @property
     def unscaled(self) -> Extended:
-        """The map on (q, v T), both in units of length."""
+        """The map on (q, v T), both [L]."""
         return np.asarray(self.entries * self.size[:, None] / self.size[None, :])
 
     @property
     def whole(self) -> bool:
-        """Whether the entries come from one orbit of all states, not from pairs."""
+        """Whether the entries are those of one orbit through all states, rather than of pairs."""
         return self.once is True or (self.once is None and not self.noise.diagonal and self.within)
 
     @property
@@ -123,12 +126,12 @@ class Map:
 
     @property
     def clean(self) -> bool:
-        """Whether the residuals may be rounding: at most ten times what is expected."""
+        """Whether the residuals may be rounding: at most ten times their expectation."""
         return self.chi2 <= CLEAN * self.freedom
 
     @property
     def within(self) -> bool:
-        """Whether the residuals are what the observation model expects."""
+        """Whether chi-squared agrees with the observation model."""
         return self.chi2 <= self.freedom + ERRORS * math.sqrt(KURTOSIS * self.freedom + 1)
 
     def misses(self, other: Map | None = None) -> Floats:
@@ -140,7 +143,7 @@ class Map:
 
 
 def _sizes(z: Extended) -> Extended:
-    """Sizes (2,) of the two components over one turn, also of a motion that grows or decays."""
+    """Root mean square (2,) of the two components over a turn; growth and decay are divided out."""
     square = z**2
     size = np.sqrt(square.mean(axis=0))
     size = np.where(size == 0, 1, size)
@@ -153,7 +156,7 @@ def _sizes(z: Extended) -> Extended:
 
 @dataclass(slots=True, eq=False)
 class _Solution:
-    """A minimum: entries and centre, the covariance of all unknowns, what is left over, and its noise."""
+    """A minimum of chi-squared: entries and centre, covariance of all unknowns, chi-squared, noise model."""
 
     entries: Extended
     centre: Extended
@@ -297,12 +300,13 @@ def fit(record: Record, j: int, *, kept: NDArray[np.bool_] | None = None, consta
 
 
 def _least(freedom: int) -> float:
-    """Lower bound on the mean square residual at this freedom, in squares of a rounding."""
+    """Lower bound on the mean square residual of so many degrees of freedom, in squares of the unit
+    roundoff."""
     return max(LEAST_LEFT, min(1.0, ENOUGH / max(freedom, 1)))
 
 
 def _lengths(z: Extended, centre: Extended | Floats) -> Floats:
-    """Sizes (f - 1,) that the rounding of each pair is relative to."""
+    """Sizes (f - 1,) to which the rounding of each pair is relative."""
     away = np.sqrt(np.sum((z - centre).astype(np.float64) ** 2, axis=1))
     if not np.any(away[:-1]):
         raise IdentificationError("a coordinate rests but for the last frame: give the part before")
@@ -314,7 +318,8 @@ def _lengths(z: Extended, centre: Extended | Floats) -> Floats:
 def _constant_part(
     z: Extended, sigma: Floats, process: Floats, start: _Solution | None, record: Record, constant: bool
 ) -> tuple[_Solution, int, Extended | None]:
-    """Solution with the plainest constant part that explains the states (`centred`), and the slips fitted."""
+    """Solution with the smallest constant part that explains the states (`centred`), and the slips if
+    fitted."""
     from scipy.special import fdtri
 
     numbers, slips, centred = 2 * len(process), None, 0

@@ -9,11 +9,12 @@ from numpy.typing import ArrayLike
 
 from springcheck.errors import IdentificationError
 from springcheck.identify import coupled
-from springcheck.identify.evidence import Measured
+from springcheck.identify.evidence import FIXED, Measured
 from springcheck.identify.fit import Map, fit
 from springcheck.identify.hypothesis import SURE
-from springcheck.identify.record import ROUNDING, SIZES, Record, of_size, stated_stride
-from springcheck.identify.search import COARSE, terms_of
+from springcheck.identify.record import SIZES, Record, of_size, stated_stride
+from springcheck.identify.search import terms_of
+from springcheck.identify.storage import ROUNDING
 
 
 def judged(
@@ -132,7 +133,7 @@ def _uncoupled(record: Record, maps: dict[int, Map]) -> tuple[tuple[Record, list
     """Normal modes, where the coordinates are coupled and the modes are not, and a note on them."""
     single = max(float(np.max(found.residual)) for found in maps.values())
     every = list(maps)
-    if single < max(64 * COARSE, 1e-8) or not record.fine:
+    if single < max(64 * FIXED, 1e-8) or not record.fine:
         return None, []
     found = coupled.modes(record, every)
     if found is None or found[1] > 1e-3 * single:

@@ -18,7 +18,7 @@ from springcheck.identify.candidates import (
     steps_between,
 )
 from springcheck.identify.evidence import Measured
-from springcheck.identify.families import FAMILIES, title
+from springcheck.identify.families import FAMILIES, MOST_TITLES, title, titles
 from springcheck.identify.fit import Map
 from springcheck.identify.hypothesis import Joint, Match
 from springcheck.identify.laws import friction_shows
@@ -35,7 +35,7 @@ from springcheck.identify.search import Explained, visible
 from springcheck.identify.together import OF_A_BOND, of_a_bond
 from springcheck.identify.wrong import faults_like, faults_of
 from springcheck.schemes.elsewhere import ELSEWHERE
-from springcheck.text.wording import either
+from springcheck.text.wording import few
 
 VELOCITY_OFFSET = {
     "semi-implicit-euler": -0.5,
@@ -127,15 +127,13 @@ def _known(seen: Measured, explained: Explained, stated_fits: bool) -> Identific
         also = "".join(f" (on a spring also {x.cause})" for x in slips) or also
         statement = f"{title(scheme)}{also}{law}{steps}: {rounded_by(precision)} explains every step"
     else:
-        names = list(dict.fromkeys(x.scheme for x in candidates))
-        more = f" and {len(names) - 4} more" if len(names) > 4 else ""
-        statement = f"Several schemes fit, which the states do not tell apart: {', '.join(names[:4])}{more}"
+        names = few(list(dict.fromkeys(x.scheme for x in candidates)), MOST_TITLES)
+        statement = f"Several schemes fit, which the states do not tell apart: {names}"
     undecided = any(not d.certain for d in explained[plainest]) and stated_fits
     if undecided:
-        whose = either(list(dict.fromkeys(title(x.scheme) for x in candidates))[:4])
         statement = (
-            f"{whose}{law}{steps}, and errors of the force of the size of {precision} arithmetic: noise or a "
-            "systematic error of that size cannot be excluded"
+            f"{titles(x.scheme for x in candidates)}{law}{steps}, and errors of the force of the size of "
+            f"{precision} arithmetic: noise or a systematic error of that size cannot be excluded"
         )
         notes.append("what would show the arithmetic: every step recorded, and the mass")
     undecided = undecided or (scheme is None and len(joints) == 1)

@@ -1,4 +1,5 @@
-"""Covariance of what a map leaves over: errors of recorded numbers, each in two of them, and roundings."""
+"""Covariance of a map's residuals: storage errors, each of which enters two residuals, and roundings of
+steps."""
 
 from __future__ import annotations
 
@@ -9,7 +10,7 @@ from springcheck.physics.arrays import Floats
 
 
 class Noise:
-    """V of the residuals of a map, factored."""
+    """The covariance V of the residuals of a map, as its Cholesky factor."""
 
     def __init__(self, entries: Floats, sigma: Floats, process: Floats) -> None:
         self.sigma, self.entries = sigma, entries

@@ -11,7 +11,7 @@ from springcheck.errors import IdentificationError
 from springcheck.identify.clock import FEWEST_STATES
 from springcheck.identify.compare import Target, compare
 from springcheck.identify.evidence import Measured
-from springcheck.identify.families import FAMILIES, title
+from springcheck.identify.families import FAMILIES, titles
 from springcheck.identify.fit import Map
 from springcheck.identify.guesses import Guesses
 from springcheck.identify.hypothesis import ERRORS, SURE, Joint, Terms
@@ -104,21 +104,21 @@ def beside_unknown(record: Record, found: Identification, *, stated: bool, seen:
     return replace(out, verdict="not told apart", scheme=None, aliases=())
 
 
-def of_either_sign(found: Identification, against: list[Explanation]) -> Identification:
+def of_either_sign(found: Identification, against: Explanation | None) -> Identification:
     """Withhold the name where positions move against the velocities and the numbers are coarse.  A spring
     that nearly completes a turn between two frames looks like a slow one with -v, and some scheme fits its
     map of few digits."""
     if not (found.candidates and against):
         return found
-    cause = f"{against[0].cause}; or the motion nearly comes round between two frames: {found.statement}"
-    remedy = f"{against[0].remedy}; if they are right, state the stiffness, which tells the two apart"
-    return found.doubted(cause, because=(Explanation(cause=cause, remedy=remedy, local=True),))
+    cause = f"{against.cause}; or the motion nearly comes round between two frames: {found.statement}"
+    remedy = f"{against.remedy}; if they are right, state the stiffness, which tells the two apart"
+    return found.doubted(cause, because=(Explanation(cause, remedy, local=True),))
 
 
 def of_stated_friction(found: Identification, stated: float, mass: float) -> Identification:
     """Explain that the stated friction c [M/T] follows no law: the states have another one, or none."""
     rates = sorted(mass * x.friction[0] for x in found.candidates)
-    whose = either(list(dict.fromkeys(title(x.scheme) for x in found.candidates))[:4])
+    whose = titles(x.scheme for x in found.candidates)
     low, high = rates[0], rates[-1]
     if not (low or high):
         cause = f"{whose}, but without friction, where c = {stated:g} is stated"
@@ -131,7 +131,7 @@ def of_stated_friction(found: Identification, stated: float, mass: float) -> Ide
     return replace(
         found.noting("the stated friction does not fit by any of the laws that are known"),
         statement=found.statement if found.explanations else cause,
-        explanations=(*found.explanations, Explanation(cause=cause, remedy=remedy)),
+        explanations=(*found.explanations, Explanation(cause, remedy)),
     )
 
 
@@ -164,7 +164,7 @@ def of_unasked_friction(found: Identification) -> Identification:
                 "the friction if not"
             )
             remedy = "compare the factors 1/2 of the step with the scheme's"
-            return found.refuted(cause, Explanation(cause=cause, remedy=remedy))
+            return found.refuted(cause, Explanation(cause, remedy))
     return found
 
 

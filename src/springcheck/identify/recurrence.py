@@ -21,7 +21,8 @@ from springcheck.identify.families import Family
 from springcheck.identify.guesses import FLOW_TURNS, Guesses, Roots, first
 from springcheck.identify.hypothesis import ERRORS, Match, Terms, distinct
 from springcheck.identify.maps import MapTable, table, unit
-from springcheck.identify.record import ROUNDING, Record
+from springcheck.identify.record import Record
+from springcheck.identify.storage import ROUNDING
 from springcheck.physics.arrays import Extended, Floats, Reals
 
 FEWEST_FRAMES = 9

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import textwrap
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import numpy as np
@@ -41,18 +41,14 @@ class Candidate:
         return self.scheme if self.stride == 1 else f"{self.scheme}, {self.stride} steps a frame"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Explanation:
-    """Possible cause: a sentence, what to do, and how much it leaves unexplained.
-
-    `misfit` is a share of what is missing, or standard errors of a map; the smaller the better.
-    """
+    """A possible cause, as a sentence, and what to do about it."""
 
     cause: str
     remedy: str
-    misfit: float = 0.0
-    local: bool = False
-    """Whether it leaves no noise to explain: numbers in the wrong place, or a motion known to rounding."""
+    local: bool = field(default=False, kw_only=True)
+    """Whether it leaves no noise to explain: misplaced numbers, or residuals that are only rounding."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

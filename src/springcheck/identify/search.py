@@ -13,22 +13,20 @@ import numpy as np
 from springcheck.identify.arithmetic import SINGLE, Defect, defects
 from springcheck.identify.coarse import over_single
 from springcheck.identify.compare import nearest
-from springcheck.identify.evidence import Measured
+from springcheck.identify.evidence import FIXED, Measured
 from springcheck.identify.families import DAMPED_ELSEWHERE, FAMILIES, HELD, KNOWN_ELSEWHERE, Family
 from springcheck.identify.fit import Map, fit
 from springcheck.identify.guesses import roots_of
 from springcheck.identify.hypothesis import EXCLUDED, FEW, MANY, STRIDES, Joint, Terms, distinct, likely
 from springcheck.identify.interrupted import remembered
 from springcheck.identify.maps import unit
-from springcheck.identify.record import ROUNDING, Record
+from springcheck.identify.record import Record
+from springcheck.identify.storage import ROUNDING
 from springcheck.physics.arrays import Floats
 
 BIAS = 3.0
 """Residuals that a coarse arithmetic may bias an entry by.  Cutting off has a mean of half a unit in the
 last place and a deviation of 0.29; the rest of the factor is for roundings that repeat with the motion."""
-
-COARSE = 2.0**-46
-"""Residual above which it is no double-precision rounding: 64 units in the last place."""
 
 POOR = 8.0
 """Chi-squared of three degrees of freedom that chance exceeds once in 20."""
@@ -260,7 +258,7 @@ def _plan(seen: Measured) -> list[list[Room]]:
     """
     record, whole = seen.record, all(found.whole for found in seen.maps)
     residual = max(float(np.max(found.residual)) for found in seen.maps)
-    biased = [BIAS] if residual > COARSE and not whole else []
+    biased = [BIAS] if residual > FIXED and not whole else []
     if record.fine:
         rooms = [[Room(damped=d, bias=bias)] for d in (False, True) for bias in (0.0, *biased)]
         return [*rooms, [Room(strides=(MANY,))]]

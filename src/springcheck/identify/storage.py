@@ -1,4 +1,4 @@
-"""How finely numbers were written down, read from the numbers themselves: the rounding that a file adds."""
+"""The storage format of recorded numbers, inferred from the numbers: double, single, half, decimal text."""
 
 from __future__ import annotations
 
@@ -9,37 +9,41 @@ import numpy as np
 
 from springcheck.physics.arrays import Floats
 
+ROUNDING = 2.0**-53
+"""Unit roundoff of double precision."""
+
 SAMPLE = 500
-"""Values whose decimal form is looked at; fewer than all of a long file, spread evenly over it."""
+"""Most values whose decimal form is examined, spread evenly over a long file."""
 
 FEWEST_VALUES = 4
-"""Different sizes of numbers below which they say nothing of how they were written."""
+"""Fewest distinct magnitudes from which a format is inferred."""
 
 BINARY = {"single": 24, "half": 11, "bfloat16": 8}
-"""Binary formats shorter than double precision, and their significant bits."""
+"""Significant bits of the binary formats shorter than double precision."""
 
 SMALLEST = {"single": -149, "half": -24, "bfloat16": -133}
-"""Exponents of the smallest numbers of these formats."""
+"""Binary exponents of the smallest subnormal numbers of these formats."""
 
 MOST_DIGITS = 16
-"""Significant decimal digits of text that is coarser than double precision."""
+"""Most significant decimal digits of text that is coarser than double precision."""
 
 DIGITS_OF_SINGLE = 7
-"""Digits above which text says nothing of numbers of single precision."""
+"""Significant decimal digits that a number of single precision has: more of them only rewrite it."""
 
 BY_CHANCE = 1e-6
-"""Probability of numbers that lie as near to those of single precision by chance, from which they do not."""
+"""Probability that decimal text lies so near to numbers of single precision by chance, below which it is
+single."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Storage:
-    """Format of recorded numbers: `name` ("double", "single", "text, 6 digits"), and its resolution."""
+    """A storage format by its name, as "double", "single", "text, 6 digits", and its resolution."""
 
     name: str = "double"
     digits: int = 0
-    """Significant decimal digits; 0 where the numbers are not text of a fixed number of digits."""
+    """Significant decimal digits of text; 0 for binary formats and fixed decimals."""
     decimals: int | None = None
-    """Digits after the point, where that is what is constant."""
+    """Digits after the decimal point of text with fixed decimals."""
 
     def quantum(self, x: Floats) -> Floats:
         """Spacing of the representable numbers around x."""

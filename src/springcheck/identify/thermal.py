@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from springcheck.identify.evidence import AGREES
 from springcheck.identify.factor import by_a_factor
 from springcheck.identify.hypothesis import ERRORS, SURE
 from springcheck.identify.result import Candidate, Explanation, Identification
@@ -22,9 +23,6 @@ from springcheck.thermal.states import FEWEST, Thermal, identify_thermal
 
 MOST = 8
 """Oscillators that are looked at, each by itself."""
-
-STATED_AGREES = 1e-6
-"""Relative difference up to which a measured number is the stated one, beside its standard errors."""
 
 OF_UNITS = "look at the units of what is stated, and at what the engine was given"
 
@@ -112,7 +110,7 @@ def _against(one: Any, first: Thermal, h: float, m: float, stated: Mapping[str, 
         f"{name} {x:.6g} where {given:.6g} is stated"
         for name, (x, error) in found.items()
         if (given := stated.get(name)) is not None and (m or name == "step")
-        if abs(x - given) > SURE * error + STATED_AGREES * abs(x)
+        if abs(x - given) > SURE * error + AGREES * abs(x)
     ]
 
 
@@ -219,7 +217,7 @@ def _said(
         determinant=unknown, fits=best is not None and first.known and not against, undecided=not first.known,
         nearest=best if named else None, notes=tuple(notes),
         explanations=() if best and not against else (
-            Explanation(cause=statement, remedy=OF_UNITS if against else REMEDY, misfit=math.nan),
+            Explanation(statement, OF_UNITS if against else REMEDY),
         ),
     )  # fmt: skip
 
