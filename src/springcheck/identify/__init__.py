@@ -19,7 +19,7 @@ The way of the data, in the order in which to read it; `report` leads through al
 * where none is left `explain` asks for causes: `driven`, `interrupted`, `misplaced`, `unknown`, `wrong`.
 
 Beside it stand `positions` (`recurrence`) for files without velocities, `together` and `field` for
-coordinates of one motion, `thermal` and `factor` for baths, `files` and `stepper` for what commands get.
+coordinates of one motion, `thermal` for baths, `files` and `stepper` for what commands get.
 """
 
 from springcheck.identify.report import identify_arrays as identify

@@ -1,4 +1,5 @@
-"""What the schemes that fit would mean: names, friction laws, and what is stated held against them."""
+"""Candidates of the hypotheses that fit: names, friction laws, numbers, and their agreement with what is
+stated."""
 
 from __future__ import annotations
 
@@ -26,12 +27,12 @@ from springcheck.schemes.elsewhere import ELSEWHERE
 T = TypeVar("T")
 
 SINGLE_CONSTANTS = ("fixed-point force", "mixed", "single")
-"""Precisions of GPU-type platforms, which keep force constants in single precision in every mode."""
+"""Precisions of GPU-type platforms, whose force constants are in single precision."""
 
 
 def shared(candidates: tuple[Candidate, ...], n: int, *, named: bool = True) -> dict[str, Any]:
-    """Fields of the `Identification` of n oscillators that follow from its candidates: the scheme, where all
-    have the same and it may be `named`, and the numbers that all share."""
+    """Fields of the `Identification` of n oscillators that follow from its candidates: the scheme if all have
+    the same and it may be `named`, and the numbers that all share."""
     scheme = common([x.scheme for x in candidates]) if named else None
     # without friction a scheme has the names of others that have none then
     law = next((x for x in candidates if x.law), candidates[0])
@@ -67,7 +68,8 @@ def steps_between(stride: int | None) -> str:
 def stated_stiffness(
     seen: Measured, plainest: Joint, precision: str, stated: Floats
 ) -> tuple[list[Explanation], list[str]]:
-    """Explanations of a stated stiffness that differs from the one of the states, and notes on it."""
+    """The cause of a stiffness that differs from the stated one, if significantly, and notes on the
+    difference."""
     quantum = QUANTUM if precision in SINGLE_CONSTANTS else 0.0
     against = seen.disagreements(plainest)
     if not against or (quantum and not seen.disagreements(plainest, quantum=quantum)):
@@ -96,9 +98,9 @@ def stated_stiffness(
 
 
 def of_stated_stiffness(seen: Measured, precisions: dict[Joint, str], stated: Floats) -> list[Joint]:
-    """Select the hypotheses (each with the arithmetic that explains it) that have the stated stiffness:
-    exactly, with a constant in single precision, or else the nearest; and those of the first one's
-    stiffness."""
+    """The hypotheses, of these with the arithmetic that explains each, of the stated stiffness: exactly, or
+    with a constant in single precision, or else the nearest; and others of the same stiffness as the
+    first."""
     joints = list(precisions)
     agreeing = [x for x in joints if not seen.disagreements(x)] or [
         x for x in joints if not stated_stiffness(seen, x, precisions[x], stated)[0]
@@ -114,8 +116,8 @@ def of_stated_stiffness(seen: Measured, precisions: dict[Joint, str], stated: Fl
 
 
 def nearest_stiffness(seen: Measured, joints: list[Joint], stated: Floats) -> list[Joint]:
-    """Select the hypotheses whose stiffness is nearest to the stated one, where none agrees with it.
-    Differences within the rounding of a constant to single precision and their own errors count as ties."""
+    """The hypotheses whose stiffness is nearest to the stated one, to within single precision and their
+    errors."""
     off, room = {}, {}
     for joint in joints:
         _, stiffness, _ = seen.numbers(joint)
@@ -127,8 +129,8 @@ def nearest_stiffness(seen: Measured, joints: list[Joint], stated: Floats) -> li
 
 
 def _single_constants(record: Record, stated: Floats, stride: int) -> list[tuple[str, Floats, bool]]:
-    """Constants that may be in single precision: name, the stiffness that the states then show, and whether
-    the constant belongs to the force."""
+    """Constants that may be in single precision: name, apparent stiffness, and whether the force has the
+    constant."""
     with np.errstate(all="ignore"):
         single = stated.astype(np.float32).astype(np.float64)
         h = float(record.interval) / stride
@@ -145,7 +147,7 @@ def _single_constants(record: Record, stated: Floats, stride: int) -> list[tuple
 
 @cache
 def other_names(scheme: str, *, damped: bool) -> tuple[str, ...]:
-    """Other names of a scheme's map, and the schemes that have it on a spring of another stiffness."""
+    """Other names of a scheme's map, and schemes that have it on a spring of another stiffness."""
     if scheme not in SCHEMES:
         return ELSEWHERE[scheme].also if scheme in ELSEWHERE else ()
     leapfrog = [LEAPFROG[scheme]] if scheme in LEAPFROG else []
@@ -159,7 +161,7 @@ def other_names(scheme: str, *, damped: bool) -> tuple[str, ...]:
 
 
 def held_over(joint: Joint) -> str:
-    """A held force as a phrase, with its possible numbers of substeps."""
+    """Phrase for a held force, with its possible numbers of substeps."""
     numbers_ = list(map(str, joint.substeps[0])) or ["many"]
     how_many = " to ".join(dict.fromkeys([numbers_[0], numbers_[-1]]))
     return f"Semi-implicit Euler whose force is held over {how_many} substeps"

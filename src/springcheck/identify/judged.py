@@ -12,7 +12,7 @@ from springcheck.identify import coupled
 from springcheck.identify.evidence import FIXED, Measured
 from springcheck.identify.fit import Map, fit
 from springcheck.identify.hypothesis import SURE
-from springcheck.identify.record import SIZES, Record, of_size, stated_stride
+from springcheck.identify.record import AT_REST, Record, of_size, stated_stride
 from springcheck.identify.search import terms_of
 from springcheck.identify.storage import ROUNDING
 
@@ -41,12 +41,10 @@ def judged(
 def _oscillators(record: Record) -> tuple[Record, list[int], list[Map], list[str]]:
     """Record of the oscillators that can be judged, of normal modes where these replace coordinates; their
     indices; their maps; and notes on the rest."""
-    spread = np.ptp(record.q, axis=0) + np.ptp(record.v, axis=0) * abs(record.interval)
-    moving = np.flatnonzero(spread > SIZES[0]).tolist()
-    if not moving:
-        raise IdentificationError("nothing moves: at rest all schemes agree; start away from rest")
-    still = len(spread) - len(moving)
-    notes = [f"{still} of {len(spread)} oscillators are at rest and left out"] if still else []
+    if not (moving := record.moving):
+        raise IdentificationError(AT_REST)
+    n = record.q.shape[1]
+    notes = [f"{n - len(moving)} of {n} oscillators are at rest and left out"] if len(moving) < n else []
     free = [j for j in moving if _straight(record, j)]
     maps = {j: fit(record, j) for j in moving if j not in free}
     if len(maps) > 1:

@@ -54,6 +54,8 @@ class Regression:
     law: Cause
     left: float
     """Root mean square per degree of freedom that remains, relative to that of the residuals."""
+    pairs: int
+    """Pairs to which the law applies."""
     rank: int
     """Rank of the columns of map and law."""
     parameters: int
@@ -79,7 +81,7 @@ class Regression:
             # every pair beside those that columns alone explain is one that chance would have missed
             spare = self.above - self.rank
         # as many columns as pairs leave nothing in any case
-        closely = spare > 0 and self.above > self.rank and self.left**spare < CHANCE
+        closely = spare > 0 and self.pairs > self.rank and self.left**spare < CHANCE
         return self.counted > PAIRS_A_NUMBER * self.parameters or (
             closely and (self.law is POWERS or not self.law.flexible)
         )
@@ -112,7 +114,7 @@ def regression(e: Evidence, law: Cause) -> Regression:
     total = float(np.sum(square))
     share = len(missing) / max(len(missing) - int(rank), 1)
     return Regression(
-        law=law, rank=int(rank), x=x / size[:, None], turn=turn,
+        law=law, pairs=len(missing), rank=int(rank), x=x / size[:, None], turn=turn,
         # a frequency that is looked for counts as numbers more, the map's own constant does not
         parameters=int(rank) - (len(e.linear) - 2) + 3 * law.waves,
         counted=total**2 / float(np.sum(square**2)) if total else 0.0,

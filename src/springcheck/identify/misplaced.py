@@ -94,7 +94,7 @@ def _wrapped(record: Record, j: int) -> Iterator[Repair]:
 def unsorted(record: Record) -> Explanation | None:
     """Velocities in the wrong columns of every frame, if one map fits each coordinate once they are
     sorted."""
-    each = np.flatnonzero(np.ptp(record.q, axis=0) + np.ptp(record.v, axis=0) > 0)
+    each = np.array(record.moving)
     if not 1 < len(each) <= MOST_COMPARED:
         return None
     way, mean = _ways(record, each.tolist())

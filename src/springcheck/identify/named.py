@@ -1,4 +1,4 @@
-"""What the hypotheses that are left mean: held against what is stated, in a sentence."""
+"""The identification by the hypotheses that explain every step, compared with what is stated."""
 
 from __future__ import annotations
 
@@ -42,12 +42,12 @@ VELOCITY_OFFSET = {
     "semi-implicit-euler-drift-kick": 0.5,
     "langevin-middle-early": -0.5,
 }
-"""Time of the velocities after that of the positions, in steps: where the map is of second order."""
+"""Time of the velocities minus that of the positions, in steps, at which the map is of second order."""
 
 
 def named(seen: Measured, explained: Explained, step: float | None) -> Identification:
-    """Identification by the hypotheses that explain every step, restricted to those that agree with the
-    stated stiffness, `step` and friction; where none agrees, with the reason."""
+    """Identification by the hypotheses that explain every step and agree with the stated stiffness, `step`
+    and friction; if none agrees, with the reason."""
     joints, friction, stride = list(explained), seen.friction, seen.stride
     if (stated := seen.stiffness) is not None:
         bond = of_a_bond(seen.record, seen.moving, stated) if seen.disagreements(joints[0]) else None
@@ -84,13 +84,13 @@ def named(seen: Measured, explained: Explained, step: float | None) -> Identific
 
 
 def _shows_law(seen: Measured, joint: Joint) -> bool:
-    """Whether a quadratic drag or a nonlinear force is excluded as the cause of its friction, if any."""
+    """Whether quadratic drag and nonlinear forces are excluded as the cause of its friction."""
     each = enumerate(joint.parts)
     return not joint.damped or all(friction_shows(seen.evidence(i), part) for i, part in each)
 
 
 def _known(seen: Measured, explained: Explained, stated_fits: bool) -> Identification:
-    """Identification by hypotheses that explain every step, with the defects of their steps."""
+    """Identification by these hypotheses and the defects of their steps."""
     joints, maps, notes = list(explained), seen.maps, list(seen.notes)
     plainest = joints[0]
     worst = [max(ds, key=lambda d: (d.precision != "double", d.ulp)) for ds in explained.values()]

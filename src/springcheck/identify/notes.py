@@ -1,4 +1,4 @@
-"""What else could have made the states, and what would tell: sentences beside an identification."""
+"""Alternatives to an identification, and which further data would exclude them."""
 
 from __future__ import annotations
 
@@ -22,22 +22,22 @@ from springcheck.identify.search import coincident, identical
 from springcheck.text.wording import count, either
 
 APART = 10.0
-"""Standard errors by which two schemes must differ to be told apart for certain: five exclude, and chance
-may take five away."""
+"""Standard errors between two schemes that are always told apart: five to exclude one, and five for
+chance."""
 
 MOST_DIGITS = 9
-"""More digits than single precision has short of double: what needs more, digits do not tell."""
+"""Most additional digits that are asked for, those of double over single precision."""
 
 FEWEST_OF_TEXT, FEWEST_DIGITS = 12, 40.0
-"""Frames of text that show the motion, and digits of it in all frames, text or single precision, below which
-a scheme is not told from others for certain: some 24 frames of 3 digits, or 6 of 7.  A map, its equilibrium
-and a start have seven unknowns, and roundings of few digits are large beside a short motion."""
+"""Fewest frames of text that show the motion, and fewest digits of it in all frames of text or single
+precision, from which a scheme is named: some 24 frames of 3 digits, or 6 of 7.  A map, its equilibrium and a
+start have seven unknowns."""
 
 CERTAIN_STEPS = 12
-"""Steps to a frame above which coarse numbers name no scheme: their errors are small, and many lie near."""
+"""Most steps to a frame from which coarse numbers name a scheme: truncation errors of more are too alike."""
 
 MOST_PARTS, MARK = 4, 1e-9
-"""Largest n, and the relative distance within which a friction is h k/(n m)."""
+"""Largest n of a friction h k/(n m) that is a fault's, and the relative difference up to which it is that."""
 
 LEAPFROG = {
     "semi-implicit-euler": "leapfrog with velocities half a step early",
@@ -58,8 +58,8 @@ def separation(seen: Measured, one: Joint, other: Joint) -> float:
 
 
 def of_few(record: Record, found: Identification) -> Identification:
-    """Withhold the name where few frames of text or single precision exclude no other scheme.  Raises
-    IdentificationError where no scheme fits so few."""
+    """Withhold the name where the frames of text or single precision are too few to exclude other schemes.
+    Raises IdentificationError where no scheme fits so few."""
     if record.fine:
         return found
     fewest, of_text = (FEWEST_OF_TEXT, " of text") if record.text else (FEWEST_STATES - 1, "")
@@ -105,9 +105,8 @@ def beside_unknown(record: Record, found: Identification, *, stated: bool, seen:
 
 
 def of_either_sign(found: Identification, against: Explanation | None) -> Identification:
-    """Withhold the name where positions move against the velocities and the numbers are coarse.  A spring
-    that nearly completes a turn between two frames looks like a slow one with -v, and some scheme fits its
-    map of few digits."""
+    """Withhold the name where coarse positions move `against` the velocities: a spring that nearly completes
+    a turn between two frames looks like a slow one with -v."""
     if not (found.candidates and against):
         return found
     cause = f"{against.cause}; or the motion nearly comes round between two frames: {found.statement}"
@@ -116,7 +115,7 @@ def of_either_sign(found: Identification, against: Explanation | None) -> Identi
 
 
 def of_stated_friction(found: Identification, stated: float, mass: float) -> Identification:
-    """Explain that the stated friction c [M/T] follows no law: the states have another one, or none."""
+    """The cause where no law gives the stated friction c [M/T]."""
     rates = sorted(mass * x.friction[0] for x in found.candidates)
     whose = titles(x.scheme for x in found.candidates)
     low, high = rates[0], rates[-1]
@@ -143,8 +142,8 @@ def _between(low: float, high: float) -> str:
 
 
 def of_unasked_friction(found: Identification) -> Identification:
-    """Reject friction that indicates a scheme written down wrongly: h k/(n m), n whole.  A scheme without
-    friction that has the stated stiffness is not rejected."""
+    """Reject a friction c/m = h k/(n m), n an integer: the mark of a faulty or implicit scheme.  A scheme
+    without friction of the stated stiffness is not rejected."""
     if not found.fits or not found.friction or not found.step or not all(x.law for x in found.candidates):
         return found
     for one in found.candidates:
@@ -169,7 +168,7 @@ def of_unasked_friction(found: Identification) -> Identification:
 
 
 def hidden_friction(record: Record, found: Map) -> float:
-    """Largest friction rate c/m [1/T] that is compatible with the map's determinant and its error."""
+    """Largest friction rate c/m [1/T] that the determinant and its standard error admit."""
     gradient = np.linalg.inv(found.entries.astype(np.float64)).T.reshape(4)
     error = math.sqrt(float(gradient @ found.covariance @ gradient))
     loss = abs(math.log(abs(float(np.linalg.det(found.entries.astype(np.float64))))))
@@ -177,7 +176,7 @@ def hidden_friction(record: Record, found: Map) -> float:
 
 
 def same_maps(seen: Measured, joint: Joint) -> list[str]:
-    """Note on damped springs that have the same map, and what distinguishes them from the undamped scheme."""
+    """Note on a damped spring of the same map, and what tells it from the undamped scheme."""
     names, record = coincident(joint.scheme), seen.record
     if not names or joint.stride != 1:
         return []
@@ -222,7 +221,7 @@ def untold(seen: Measured, joints: list[Joint]) -> list[str]:
 
 
 def _stiffer(one: Joint, other: Joint) -> bool:
-    """Whether two schemes imply stiffnesses that differ for certain."""
+    """Whether two schemes imply significantly different stiffnesses."""
     return any(
         abs(a.a * one.stride**2 - b.a * other.stride**2)
         > SURE * (a.a_error * one.stride**2 + b.a_error * other.stride**2)

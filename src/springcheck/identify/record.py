@@ -22,6 +22,9 @@ SIZES = 1e-75, 1e75
 """Smallest and largest magnitudes accepted: their fourth powers neither underflow nor overflow."""
 
 
+AT_REST = "nothing moves: at rest all schemes agree; start away from rest"
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Record:
     """Positions q and velocities v (f, n) of n coordinates at f frames, one interval apart.
@@ -52,6 +55,12 @@ class Record:
     def fine(self) -> bool:
         """Whether positions and velocities are stored in double precision."""
         return self.q_storage.name == self.v_storage.name == "double"
+
+    @property
+    def moving(self) -> list[int]:
+        """Indices of the coordinates that are not at rest."""
+        spread = np.ptp(self.q, axis=0) + np.ptp(self.v, axis=0) * abs(self.interval)
+        return list(np.flatnonzero(spread > SIZES[0]).tolist())
 
     def quanta(self, j: int) -> Floats:
         """Spacing of the representable numbers around each state (f, 2) of coordinate j, on (q, v T)."""

@@ -1,9 +1,9 @@
 """Positions alone: the recurrence q[n+1] - T q[n] + D q[n-1] = c of one step's trace and determinant.
 
-On a spring every one-step scheme obeys it, and schemes that share trace and determinant share all positions:
-velocity Verlet, leapfrog, semi-implicit Euler and position Verlet do.  The two numbers tell a frequency and a
-change of areas.  A scheme without friction fixes one by the other; with friction every scheme has a spring
-that fits, and only a stated stiffness tells more.
+On a spring every one-step scheme obeys it, and schemes of equal trace and determinant have equal positions:
+velocity Verlet, leapfrog, semi-implicit Euler and position Verlet.  T and D give a frequency and a change of
+areas.  Without friction a scheme relates the two; with friction every scheme fits on some spring, so that
+only a stated stiffness excludes any.
 """
 
 from __future__ import annotations
@@ -29,22 +29,22 @@ FEWEST_FRAMES = 9
 """Five unknowns of an orbit, and as many frames again that they have to explain."""
 
 UNUSUAL = 2.5
-"""Largest irregular residual of a frame, in units of its usual rounding error, 4 + 2 sqrt(steps)."""
+"""Largest residual that is white noise, in units of the expected rounding, 4 + 2 sqrt(steps)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Recurrence:
-    """alpha = 1 + D - T and beta = 1 - D of one oscillator, so that nothing cancels where steps are small."""
+    """alpha = 1 + D - T and beta = 1 - D of one oscillator, which do not cancel for small steps."""
 
     alpha: np.longdouble
     beta: np.longdouble
     covariance: Floats
     residual: float
-    """Root mean square of what it leaves over, as a share of the positions' size."""
+    """Root mean square residual, relative to the positions."""
     ulp: float
-    """The largest of it in units of 2**-52 of the terms' sizes."""
+    """Largest residual, in units of 2**-52 of the sum of the terms."""
     precision: str
-    """The arithmetic, or the storage, that explains what is left over; "" where none does."""
+    """The arithmetic, or the storage format, that explains the residuals; "" where none does."""
 
     @property
     def phase(self) -> float:
@@ -123,8 +123,8 @@ def _around(x: Floats) -> Floats:
 def _neighbours(
     q: Extended, noise: Floats, slips: Extended | None
 ) -> tuple[np.longdouble, np.longdouble, Floats, Floats]:
-    """alpha, beta, their covariance (2, 2) and the residuals (f - 2,), from neighbouring frames.  Where steps
-    follow the clock's `slips`, these displace frames along the motion."""
+    """alpha, beta, their covariance (2, 2) and the residuals (f - 2,), from neighbouring frames.  Steps that
+    follow the `slips` of the times displace frames along the motion."""
     weight = (1 / noise)[:, None]
     # a motion that grows is not centred by its largest frames
     share = 1 / np.square(noise / np.min(noise))
@@ -154,8 +154,8 @@ def _neighbours(
 def _orbit(
     q: Extended, unit_: Floats, alpha: np.longdouble, beta: np.longdouble
 ) -> tuple[np.longdouble, np.longdouble, Floats] | None:
-    """alpha, beta and their covariance from one orbit c + r**n (A cos + B sin)(n phase) of which all frames
-    were rounded once; None where the residuals exceed that rounding."""
+    """alpha, beta and their covariance from one orbit c + r**n (A cos + B sin)(n phase), if all frames are
+    this orbit to the rounding of their storage; else None."""
     frames = len(q)
     values = (q - q[0]).astype(np.float64)
     n = np.arange(frames, dtype=np.float64)
@@ -243,9 +243,8 @@ class PositionTarget(Target):
 
 
 def matches(found: Recurrence, families: tuple[Family, ...], strides: range) -> list[Match]:
-    """Families (one of each undamped class; any with friction) that may have this recurrence, with each
-    number of steps and of unseen turns, and each spring.  Without velocities both senses of rotation look
-    alike."""
+    """Fits of the families to a recurrence, for each number of steps and of turns and each spring.  Positions
+    do not show the sense of rotation."""
     every = table(families)
     ways = [(s, i) for s in strides for i in range(max(s, FLOW_TURNS if s == 1 else 1) + 1)]
     s, i = np.array(ways, np.float64).T

@@ -1,5 +1,5 @@
-"""The search: which hypotheses are tried in turn, which of them the states do not exclude, and of which a
-known arithmetic explains every step."""
+"""The search: hypotheses in order of simplicity, those that the states do not exclude, and of these those
+whose every step a known arithmetic explains."""
 
 from __future__ import annotations
 
@@ -25,31 +25,32 @@ from springcheck.identify.storage import ROUNDING
 from springcheck.physics.arrays import Floats
 
 BIAS = 3.0
-"""Residuals that a coarse arithmetic may bias an entry by.  Cutting off has a mean of half a unit in the
-last place and a deviation of 0.29; the rest of the factor is for roundings that repeat with the motion."""
+"""Bias of an entry by truncated forces, in units of the residual.  Truncation has a mean of half an ulp and a
+standard deviation of 0.29; the rest is for roundings that recur with the motion."""
 
 POOR = 8.0
-"""Chi-squared of three degrees of freedom that chance exceeds once in 20."""
+"""Chi-squared of three degrees of freedom that is exceeded with a probability of 5 %."""
 
 ONE_MORE = 4.0
-"""Decrease of chi-squared by one more unknown that chance exceeds once in 20."""
+"""Decrease of chi-squared by one more unknown that is exceeded with a probability of 5 %."""
 
 PLAIN = 30.0
-"""Residuals by which the exact flow must miss where a scheme is named in spite of coarse numbers."""
+"""Distance of the exact solution's map, in residuals, from which the truncation error of a scheme is
+visible."""
 
 AS_NEAR = 1.5
-"""Factor by which the residual of one scheme may exceed that of another for which a cause was found."""
+"""Ratio of residuals up to which the arithmetic of one scheme explains those of another."""
 
 SAME_MAP = 1e-12
-"""Distance of the entries of two steps that are the same, in double precision."""
+"""Largest difference of the entries of equal maps in double precision."""
 
 Explained: TypeAlias = dict[Joint, list[Defect]]
-"""Hypotheses, the plainest first, and the defects of their steps, which a known arithmetic explains."""
+"""Hypotheses, the simplest first, with the defect of each oscillator, which a known arithmetic explains."""
 
 
 @cache
 def coincident(name: str) -> tuple[str, ...]:
-    """Damped families that have the map of this scheme without friction, on springs of another stiffness."""
+    """Damped families with the undamped map of this scheme, on springs of another stiffness."""
     wanted = np.asarray(unit(FAMILIES[name], np.array([0.3, 0.7, 1.1]), np.zeros(3)), np.float64)
     if not np.all(np.log(np.abs(np.linalg.det(wanted))) < -1e-9):
         return ()
@@ -60,8 +61,7 @@ def coincident(name: str) -> tuple[str, ...]:
 
 
 def identical(one: Joint, other: Joint, *, free_scale: bool) -> bool:
-    """Whether two families have the same step, each at its own unknowns, so that no digits tell them
-    apart."""
+    """Whether two hypotheses have the same one-step maps, so that no number of digits tells them apart."""
     if one.stride != other.stride:
         return False
     both = FAMILIES[one.family], FAMILIES[other.family]
@@ -74,7 +74,8 @@ def identical(one: Joint, other: Joint, *, free_scale: bool) -> bool:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Room:
-    """Tolerance beside the numbers' own uncertainty, and the strides looked at, in turn."""
+    """One round of the search: families, tolerances beside the standard errors, and ranges of strides in
+    turn."""
 
     damped: bool = False
     rounding: float = ROUNDING
@@ -87,11 +88,11 @@ class Room:
 
 
 def accounted(seen: Measured) -> tuple[Measured, Explained, bool]:
-    """The hypotheses of which a known arithmetic explains every step, with the data that they fit, and
-    whether any hypothesis fits, explained or not.
+    """The data as fitted, the hypotheses whose every step a known arithmetic explains, and whether any
+    hypothesis fits, explained or not.
 
-    Tried in turn: the schemes of the catalogue, in coarse files also about an unseen equilibrium; Verlet with
-    another first step; those that have the stated stiffness; schemes elsewhere; numbers in single precision.
+    In turn: the schemes of the catalogue, in coarse files also with a fitted equilibrium; Verlet with another
+    first step; schemes of the stated stiffness; schemes elsewhere; step or mass in single precision.
     """
     fine = seen.record.fine
     joints, wide = find(seen)
@@ -140,8 +141,7 @@ def _of_few_steps(found: Explained) -> bool:
 
 
 def _or_elsewhere(seen: Measured, found: Explained) -> Explained:
-    """The hypotheses found, beside the schemes that springcheck does not run and the states do not
-    exclude."""
+    """The hypotheses found, and the schemes that springcheck does not run and the states do not exclude."""
 
     def elsewhere(strides: range) -> Explained:
         joints = seen.compare(KNOWN_ELSEWHERE, strides) or seen.compare(DAMPED_ELSEWHERE, strides)
@@ -168,7 +168,7 @@ def _or_elsewhere(seen: Measured, found: Explained) -> Explained:
 
 
 def _single_parameters(seen: Measured) -> tuple[list[Joint], str]:
-    """Schemes that fit if the step or the mass was rounded to single precision, and a note on which."""
+    """Schemes that fit if step, mass or both were rounded to single precision, and a note on which."""
     record, stride = seen.record, seen.stride
     if record.momenta:
         return [], ""
@@ -193,8 +193,8 @@ def _shortened(x: np.longdouble | float) -> float:
 
 
 def find(seen: Measured) -> tuple[list[Joint], Measured]:
-    """All families that the states do not exclude, the plainest first, and the terms on which they fit.
-    Plainer hypotheses are tried first, and end the search where they fit."""
+    """Hypotheses that the states do not exclude, the simplest first, and the data with the terms on which
+    they fit.  The first round of `_plan` with a fit ends the search."""
     fine, stride = seen.record.fine, seen.stride
     first = (range(stride, stride + 1),) if stride is not None and stride > 0 else ()
     for rooms in _plan(seen):
@@ -237,8 +237,7 @@ def explained(seen: Measured, accepted: list[Joint]) -> Explained:
 
 
 def _stands_out(seen: Measured, accepted: list[Joint], found: Map, terms: Terms, *, damped: bool) -> bool:
-    """Whether no other map fits, and the error of this scheme's step is visible.  On springs of two
-    stiffnesses two schemes may have one map."""
+    """Whether all fitting hypotheses have one map, and the truncation error of its scheme is visible."""
     one = accepted[0]
     alone = all(
         (x.scheme, x.stride) == (one.scheme, one.stride) or identical(one, x, free_scale=seen.record.momenta)
@@ -248,13 +247,13 @@ def _stands_out(seen: Measured, accepted: list[Joint], found: Map, terms: Terms,
 
 
 def _plan(seen: Measured) -> list[list[Room]]:
-    """Order of the search: tolerances, the plainest first, those of one list equally plain.
+    """Rounds of the search, the simplest first; those of one list are equally simple.
 
-    Undamped first, then damped where nothing fits.  Coefficients are rounded in double precision, unless the
-    states show a coarser arithmetic or are too few to exclude it; text does not show it, so that single
-    precision is as plain as friction there.  A bias of the size of the residuals comes last: one orbit,
-    rounded once, has none.  Coarse numbers admit few steps of other schemes, so that many steps are tried
-    before a wider tolerance; with a bias so many would fit that none could be named.
+    Undamped before damped.  Coefficients are rounded in double precision, unless the states show a coarser
+    arithmetic or are too few to exclude it; text does not show it, so that single precision is as simple as
+    friction there.  A bias of the size of the residuals comes last: one orbit, rounded once, has none. Coarse
+    numbers admit few steps of other schemes, so that many steps are tried before a wider tolerance; with a
+    bias too many would fit.
     """
     record, whole = seen.record, all(found.whole for found in seen.maps)
     residual = max(float(np.max(found.residual)) for found in seen.maps)
@@ -282,9 +281,9 @@ def _plan(seen: Measured) -> list[list[Room]]:
 def _further(seen: Measured, accepted: list[Joint], room: Room) -> list[Joint]:
     """Further hypotheses that the states do not exclude, beside those accepted of few steps to a frame.
 
-    The error of a step falls with the number of steps, so that larger numbers may fit too; where the exact
-    flow fits, so does any scheme from some number on.  In double precision these are tried only where few
-    steps leave a choice.  Friction that is barely significant may still be there.
+    The truncation error falls with the number of steps, so that larger numbers may fit too; where the exact
+    solution fits, so does any scheme of enough steps.  In double precision many steps are tried only where
+    few leave a choice.  Friction may be there without being significant.
     """
     out: list[Joint] = []
     open_ended = len(accepted) > 1 or any(x.scheme == "exact" or x.stride == STRIDES[0] for x in accepted)
@@ -306,10 +305,10 @@ def _rivals(seen: Measured, fitting: list[Joint], *, many: bool) -> list[Joint]:
 
 
 def visible(found: Map, terms: Terms, *, damped: bool) -> bool:
-    """Whether the error of a scheme's step is far above the residuals.
+    """Whether the truncation error of a step is far above the residuals.
 
-    An adaptive solver departs from the exact flow by the scatter of its steps, within which many schemes of
-    many small steps fit; a coarse arithmetic does not bring a map nearer to the exact flow.
+    The map of an adaptive solver differs from the exact one by the scatter of its steps, within which many
+    schemes of many small steps fit; coarse arithmetic does not bring a map nearer to the exact one.
     """
     asked = "visible", terms, damped
     if asked not in found.found:
@@ -320,7 +319,7 @@ def visible(found: Map, terms: Terms, *, damped: bool) -> bool:
 
 
 def terms_of(record: Record, j: int, stated: Floats | None) -> Terms:
-    """Conditions on which the map of oscillator j of a record is compared."""
+    """The terms on which the map of oscillator j is compared."""
     log_stiffness = None
     if record.momenta and stated is not None and stated[j] > 0:
         log_stiffness = math.log(stated[j] * float(record.interval) ** 2)

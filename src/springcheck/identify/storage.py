@@ -48,7 +48,8 @@ class Storage:
     def quantum(self, x: Floats) -> Floats:
         """Spacing of the representable numbers around x."""
         if self.decimals is not None:
-            return np.full(x.shape, 10.0**-self.decimals)
+            # large numbers have no more digits than double precision
+            return np.maximum(10.0**-self.decimals, np.spacing(np.abs(x)))
         if self.digits:
             size = np.where(x == 0, 1.0, np.abs(x))
             return np.where(x == 0, 0.0, 10.0 ** (np.floor(np.log10(size)) - self.digits + 1))
@@ -114,10 +115,12 @@ def storage(x: Floats) -> Storage:
     binary = Storage(name=short or ("single" if single else "double"))
     with np.errstate(over="ignore"):
         finer = [text.quantum(sample) / (2 * binary.quantum(sample)) for text in found]
-    # whole numbers of few digits are of a short format as well, which is hardly finer
+    # whole numbers of few digits are of a short format as well, which is hardly finer; of numbers that grow
+    # beyond the digits of double precision the smaller ones show fixed decimals
     found = [
         x for x, y in zip(found, finer, strict=True)
         if np.all(y >= 1) or (short and np.all(y > 0) and np.sum(np.log(y)) >= 0)
+        or (x.decimals is not None and np.sum(np.log(np.maximum(y, 1))) > -math.log(BY_CHANCE))
     ]  # fmt: skip
     if found:
         # both can hold the numbers; the coarser of the two leaves less to chance.  A power of ten has its

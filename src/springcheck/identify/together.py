@@ -47,15 +47,14 @@ def of_a_bond(record: Record, moving: list[int], stated: Floats) -> Floats | Non
 def at_rest(record: Record, found: Identification) -> Identification:
     """Note the stiffness of the bond of two particles in space whose centre of mass rests: that of each
     coordinate is k m/mu, mu the reduced mass."""
-    n = record.q.shape[1]
-    moving = np.flatnonzero(np.ptp(record.q, axis=0) + np.ptp(record.v, axis=0) > 0)
+    n, moving = record.q.shape[1], np.array(record.moving)
     one, other = moving[: len(moving) // 2], moving[len(moving) // 2 :]
     # the coordinates of two points, and not two of one
     if n % 3 or found.scheme is None or found.stiffness is None or len(one) != len(other) or not len(one):
         return found
     if np.any(one % 3 != other % 3) or np.any(one // 3 != one[0] // 3) or np.any(other // 3 == one[0] // 3):
         return found
-    each = of_a_bond(record, moving.tolist(), np.ones(n))
+    each = of_a_bond(record, record.moving, np.ones(n))
     if each is None:
         return found
     stiffness = float(np.median(np.array(found.stiffness) / each[moving]))
@@ -75,8 +74,7 @@ def of_a_pair(record: Record, found: Identification) -> Identification:
     """Note that the distance of two particles was judged, and their bond's stiffness if masses are known."""
     note = OF_A_PAIR
     if record.mass is not None and found.scheme and found.omega:
-        moving = np.flatnonzero(np.ptp(record.q, axis=0) > 0)
-        reduced = 1 / (1 / record.mass[moving[0]] + 1 / record.mass[moving[-1]])
+        reduced = 1 / (1 / record.mass[record.moving[0]] + 1 / record.mass[record.moving[-1]])
         note += f"; their bond has the stiffness {reduced * found.omega[0] ** 2:.9g}"
     return found.noting(note)
 
@@ -87,7 +85,7 @@ def distance(record: Record) -> Record | None:
 
     In single precision the centre of mass and the direction walk at random.
     """
-    moving = np.flatnonzero(np.ptp(record.q, axis=0) + np.ptp(record.v, axis=0) > 0)
+    moving = record.moving
     half = len(moving) // 2
     if len(moving) % 2 or not 0 < half <= 3:
         return None
@@ -175,8 +173,7 @@ def of_plane(record: Record) -> Explanation | None:
     With z = x + i y, on isotropic springs, a frame takes (z, z') to A (z, z') with a complex A, which is real
     without a field.  The phase of its determinant is the angle by which it turns a velocity.
     """
-    moving = np.flatnonzero(np.ptp(record.q, axis=0) + np.ptp(record.v, axis=0) > 0)
-    for i, j in combinations(moving[:MOST_COMPARED].tolist(), 2):
+    for i, j in combinations(record.moving[:MOST_COMPARED], 2):
         if found := _of_two(record, i, j):
             return found
     return None
