@@ -1,9 +1,9 @@
 """Which scheme made these states?  Read from the states alone, ours or anyone's.
 
 Pairs of states one interval apart give the map between them by least squares; where a file is coarser than
-the arithmetic, the orbit of all states together does, and knows it far better.  Of its four entries one
+the arithmetic, the orbit of all states together gives it far more precisely.  Of its four entries one
 fixes (h w)**2, and a scheme with a number of steps per frame predicts the others; the covariance of the
-fit is the yardstick.  What single steps leave over names the arithmetic.
+fit is the yardstick.  The residuals of single steps give the arithmetic.
 
 A scheme is named only where the states exclude the others.  Where they do not, all that are left are named,
 with what would tell them apart.
@@ -18,7 +18,7 @@ The way of the data, in the order in which to read it; `report` leads through al
 * `named` (`candidates`, `notes`) says what the hypotheses that are left mean, `result` holds it;
 * where none is left `explain` asks for causes: `driven`, `interrupted`, `misplaced`, `unknown`, `wrong`.
 
-Beside it stand `positions` (`recurrence`) for files without velocities, `together` and `field` for
+Beside it stand `positions` (`recurrence`) for files without velocities, `together` for several
 coordinates of one motion, `thermal` for baths, `files` and `stepper` for what commands get.
 """
 

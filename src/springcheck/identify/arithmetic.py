@@ -85,13 +85,13 @@ def _derivative(matches: list[Match], found: Map, name: str, *, between: bool = 
     return np.asarray((up - down) / (2 * d)[:, None, None])
 
 
-def _misses(matches: list[Match], found: Map, slips: Extended | None) -> Extended:
+def _residuals(matches: list[Match], found: Map, deviations: Extended | None) -> Extended:
     """Residuals (c, f - 1, 2): each frame minus the prediction from the frame before, in the units of
-    `found`. Steps follow the `slips` of the times."""
+    `found`. Steps follow the `deviations` of the times."""
     out = found.z[1:] - found.z[:-1] @ np.swapaxes(_predicted(matches), 1, 2)
-    if slips is not None:
+    if deviations is not None:
         change = _derivative(matches, found, "longer")
-        out = out - slips[:, None] * (found.z[:-1] @ np.swapaxes(change, 1, 2))
+        out = out - deviations[:, None] * (found.z[:-1] @ np.swapaxes(change, 1, 2))
     return np.asarray(out)
 
 
@@ -305,25 +305,27 @@ def _in_double(
     the residuals (c, f - 1, 2)."""
     stride, unit = sizes.stride, EPSILON * sizes.size
 
-    def missed(slips: Extended | None) -> Floats:
-        return _refitted(record, found, matches, _misses(matches, found, slips).astype(np.float64), unit)
+    def missed(deviations: Extended | None) -> Floats:
+        return _refitted(
+            record, found, matches, _residuals(matches, found, deviations).astype(np.float64), unit
+        )
 
     def ulps(x: Floats, slack: Floats | float = 0.0) -> Floats:
         return _largest(np.maximum(np.abs(x) - slack, 0), unit)
 
-    signed = other = missed(found.slips)
+    signed = other = missed(found.deviations)
     ulp = ulps(signed)
-    follows = np.full(len(matches), found.slips is not None)
-    if record.slips is not None and found.slips is None:
+    follows = np.full(len(matches), found.deviations is not None)
+    if record.deviations is not None and found.deviations is None:
         # too small to show by themselves: steps may follow the clock, or its rounding may be all there is
-        other = missed(record.slips)
+        other = missed(record.deviations)
         follows = ulps(other) < 0.7 * ulp
         signed = np.where(follows[:, None, None], other, signed)
         ulp = ulps(signed)
     # roundings of an uneven clock follow its times
     most_ulp = np.where(follows, sizes.path, np.minimum(sizes.path, sizes.usual))
     rounded, slack = ulp, np.zeros_like(signed)
-    if record.slips is not None and np.any((stride == 1) & (ulp > most_ulp)):
+    if record.deviations is not None and np.any((stride == 1) & (ulp > most_ulp)):
         rounded = np.where(stride == 1, ulps(_stepped_to(record, found, matches, signed, sizes.size)), ulp)
     if np.any((stride > 1) & (ulp > sizes.usual)):
         slack = np.where((stride > 1)[:, None, None], _unlike(record, found, matches), 0.0)
@@ -357,7 +359,7 @@ def _in_file(
     # velocities are differences of positions in some schemes alone, and their roundings are irregular
     differs = explained(SINGLE, sizes.size + sizes.difference) & ~single & (not record.deep)
     for i in np.flatnonzero(differs).tolist():
-        single[i] = _differences(matches[i]) and coarse.irregular(signed[i])
+        single[i] = _differences(matches[i]) and coarse.is_white(signed[i])
     return signed, half, explained(EPSILON, sizes.size), single
 
 

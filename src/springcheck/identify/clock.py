@@ -31,7 +31,7 @@ class Clock:
     """Relative uncertainty of the interval."""
     quantum: float
     """Rounding of the times, in intervals."""
-    slips: Extended | None
+    deviations: Extended | None
     """Relative deviation (f - 1,) of each interval from the mean, where double precision shows it."""
 
 
@@ -80,11 +80,11 @@ def clock_of(t: Floats) -> Clock:
         close = (x for x in near if abs(x / float(interval) - 1) <= room)
         interval = np.longdouble(next(close, float(interval)))
         jitter += float(abs(interval / mean - 1))
-    slips = None
+    deviations = None
     if quantum == even and float(off[worst]) > 2 * ROUNDING * abs(float(interval)):
-        slips = np.asarray(np.diff(wide) / interval - 1)
+        deviations = np.asarray(np.diff(wide) / interval - 1)
     return Clock(
-        interval=interval, jitter=jitter, quantum=quantum / abs(float(interval)), slips=slips,
+        interval=interval, jitter=jitter, quantum=quantum / abs(float(interval)), deviations=deviations,
     )  # fmt: skip
 
 

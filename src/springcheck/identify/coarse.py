@@ -163,7 +163,7 @@ LAGS = range(2, 26)
 """Lags of the autocorrelation, up to a quarter of the frames; in some schemes neighbours share a force."""
 
 
-def irregular(missing: Floats, bias: Floats | None = None) -> bool:
+def is_white(missing: Floats, bias: Floats | None = None) -> bool:
     """Whether residuals (f, c), freed of a bias (f, b), are white noise, as rounding is.
 
     What depends on position, velocity, time or parity recurs after some frames; the sum of squared
@@ -193,7 +193,7 @@ def _white(found: Map, match: Match, signed: Floats) -> bool:
     biased = np.concatenate([biased, np.ones((len(biased), 1))], axis=1)
     # where the motion decays or grows, residuals are tested relative to the size of each frame as well
     weight = found.weight[:, None] / np.max(found.weight)
-    return irregular(signed, biased) and irregular(weight * signed, weight * biased)
+    return is_white(signed, biased) and is_white(weight * signed, weight * biased)
 
 
 def _truncated(found: Map, match: Match) -> Floats:

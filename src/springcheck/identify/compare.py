@@ -72,10 +72,7 @@ def matches(
     """Best fit of each family and stride to a map, if chi-squared accepts it; with `far` in any case."""
     every = table(families)
     with np.errstate(all="ignore"):
-        asked = "roots", tuple(strides)
-        if asked not in found.found:
-            found.found[asked] = roots_of_map(found, asked[1])
-        roots = replace(found.found[asked])
+        roots = replace(roots_of_map(found, tuple(strides)))
         if not len(roots.s):
             return []
         # the scale of velocities is as uncertain as the interval, and where it is known, that of a number in
@@ -199,7 +196,7 @@ def compare(
             return []
     shared = (key for key in parts[0] if all(key in x for x in parts))
     joints = [Joint(family=key[0], stride=key[1], parts=tuple(x[key] for x in parts)) for key in shared]
-    return sorted(joints, key=lambda x: x.plainness)
+    return sorted(joints, key=lambda x: x.simplicity)
 
 
 nearest = partial(compare, far=True)

@@ -1,7 +1,7 @@
-"""Coupled oscillators: their normal modes, read from the map of all coordinates together.
+"""Normal modes of coupled oscillators, from the map of all coordinates together.
 
-Every scheme here is a function of the springs' matrix alone, so that the blocks of its one-step matrix share
-their eigenvectors, and along those each mode moves by itself.
+The blocks of every scheme's one-step matrix are functions of the springs' matrix, and share its eigenvectors,
+along which each mode moves by itself.
 """
 
 from __future__ import annotations
@@ -11,13 +11,13 @@ from dataclasses import replace
 import numpy as np
 
 from springcheck.identify.record import Record
-from springcheck.physics.arrays import Extended, Floats
+from springcheck.physics.arrays import Extended
 
 SPARE = 6
-"""Pairs of states beyond the unknowns of a row that a map of all coordinates needs."""
+"""Degrees of freedom of each row that a map of all coordinates has to leave."""
 
 ALIKE = 1e-5
-"""Relative difference of eigenvalues below which two modes may be turned into each other."""
+"""Relative difference of eigenvalues below which any combination of two modes is one."""
 
 
 def least_squares(columns: Extended, right: Extended) -> Extended:
@@ -33,35 +33,25 @@ def least_squares(columns: Extended, right: Extended) -> Extended:
     return np.asarray(x / size[:, None])
 
 
-def map_of_all(record: Record, chosen: list[int]) -> tuple[Extended, Floats, float] | None:
-    """Map (2m, 2m) between frames on (q, v T) of the chosen coordinates about their equilibrium, sizes of the
-    states (2m,), and the root mean square residual; None where frames are too few."""
+def modes(record: Record, chosen: list[int]) -> tuple[Record, float] | None:
+    """Positions and velocities of the normal modes of the chosen coordinates as a record, and the root mean
+    square residual of the map (2m, 2m) of all coordinates together, relative to the states; None where frames
+    are too few, or no modes are found."""
     z = np.concatenate([record.q[:, chosen], record.v[:, chosen] * record.interval], axis=1)
-    frames, n = z.shape
-    if frames - 1 < n + 1 + SPARE:
+    frames, n = len(z), len(chosen)
+    if frames - 1 < 2 * n + 1 + SPARE:
         return None
     size = np.sqrt(np.mean(z**2, axis=0)).astype(np.float64)
     # one size for all positions, one for all velocities: modes mix coordinates
-    size = np.repeat([np.max(size[: n // 2]), np.max(size[n // 2 :])], n // 2)
+    size = np.repeat([np.max(size[:n]), np.max(size[n:])], n)
     if not np.all(size > 0):
         return None
     scaled = z / size
     columns = np.concatenate([scaled[:-1], np.ones((frames - 1, 1), dtype=np.longdouble)], axis=1)
     x = least_squares(columns, scaled[1:])
-    left = (scaled[1:] - columns @ x).astype(np.float64)
-    return x[:-1].T, size, float(np.sqrt(np.mean(left**2)))
-
-
-def modes(record: Record, chosen: list[int]) -> tuple[Record, float] | None:
-    """Positions and velocities of the normal modes of the chosen coordinates as a record, and the residual of
-    the map of all coordinates relative to the states; None where no modes are found."""
-    found = map_of_all(record, chosen)
-    if found is None:
-        return None
-    entries, _, left = found
-    n = len(chosen)
+    left = float(np.sqrt(np.mean((scaled[1:] - columns @ x).astype(np.float64) ** 2)))
     # the force's block: proportional to the springs' matrix for every scheme, to leading order in the step
-    block = entries[n:, :n]
+    block = x[:-1].T[n:, :n]
     values, vectors = np.linalg.eig(block.astype(np.float64))
     if np.max(np.abs(np.imag(vectors))) > 1e-6 or np.linalg.cond(np.real(vectors)) > 1e6:
         return None
@@ -71,13 +61,9 @@ def modes(record: Record, chosen: list[int]) -> tuple[Record, float] | None:
     far = np.abs(gap) > ALIKE * np.max(np.abs(spread))
     for _ in range(3):
         # eigenvectors of double precision, corrected to first order with what they leave off the diagonal
-        inverse = np.linalg.inv(basis.astype(np.float64)).astype(np.longdouble)
-        inverse = inverse @ (2 * np.eye(n) - basis @ inverse)
-        inside = inverse @ block @ basis
+        inside = _inverse(basis) @ block @ basis
         basis = basis @ (np.eye(n) + np.where(far, inside / np.where(far, gap, 1), 0) * (1 - np.eye(n)))
-    inverse = np.linalg.inv(basis.astype(np.float64)).astype(np.longdouble)
-    inverse = inverse @ (2 * np.eye(n) - basis @ inverse)
-    inverse = inverse @ (2 * np.eye(n) - basis @ inverse)
+    inverse = _inverse(basis)
     q = record.q[:, chosen] @ inverse.T
     v = record.v[:, chosen] @ inverse.T
     spreading = np.abs(inverse).astype(np.float64)
@@ -97,3 +83,11 @@ def modes(record: Record, chosen: list[int]) -> tuple[Record, float] | None:
         ),
         left,
     )
+
+
+def _inverse(x: Extended) -> Extended:
+    """Inverse in extended precision: that of double precision, refined by Newton's iteration."""
+    out = np.linalg.inv(x.astype(np.float64)).astype(np.longdouble)
+    for _ in range(2):
+        out = out @ (2 * np.eye(len(x)) - x @ out)
+    return np.asarray(out)

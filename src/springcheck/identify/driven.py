@@ -1,8 +1,8 @@
-"""A force, or a stiffness, that goes up and down in time: its frequency, its amplitude and its phase.
+"""A force, or a stiffness, that oscillates in time: frequency, amplitude and phase.
 
-With a drive a scheme takes z to A z + Re(b exp(i w n)).  The steady state s = (exp(i w) - A)**-1 b taken off,
-the rest is the scheme's own motion without a drive, and is named as such; the scheme says what b a drive of
-amplitude 1 has, and so how large the drive is.
+With a drive a scheme takes z to A z + Re(b exp(i w n)).  Minus the steady state (exp(i w) - A)**-1 b, the
+motion is that of the scheme without a drive, and is identified as such; the scheme's response b to a drive of
+amplitude 1 gives the amplitude.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def frequency(e: Evidence, carrier: Floats) -> float:
     the map's residuals beside the map's own columns."""
     frames, pull = e.pairs, e.weight * carrier
     linear = np.stack(e.linear, axis=1) * e.weight[:, None]
-    across, missing = np.linalg.qr(linear)[0], e.misses * e.weight[:, None]
+    across, missing = np.linalg.qr(linear)[0], e.residuals * e.weight[:, None]
     missing = missing - across @ (across.T @ missing)
     columns = np.concatenate([missing, across], axis=1).T * pull
     size = 1 << (8 * frames - 1).bit_length()
@@ -60,10 +60,11 @@ def waves(carrier: Floats, turn: float) -> list[Floats]:
 
 
 TUNING_STEPS = 12
-"""Gauss-Newton steps of a frequency: three or four reach the last digits."""
+"""Most Gauss-Newton steps for a frequency: three or four converge."""
 
 STARTS_BESIDE, FEW_FRAMES = 6, 2000
-"""Starts on either side, a quarter turn over the run apart, and frames up to which they are looked at."""
+"""Starting values on either side, a quarter turn over the run apart, and most frames for which they are
+tried."""
 
 
 def _best(z: Floats, carrier: Floats, turn: float) -> tuple[float, Floats]:
@@ -176,7 +177,7 @@ def _schemes(
     size = float(np.max(np.abs(found.z)) / np.max(np.abs(left)))
     terms = [replace(e.terms, rounding=e.terms.rounding * (1 + size))]
     several = (compare([alone], terms, distinct(damped=damped), FEW[:4]) for damped in (False, True))
-    for joint in sorted(itertools.chain(*several), key=lambda x: x.plainness):
+    for joint in sorted(itertools.chain(*several), key=lambda x: x.simplicity):
         match = joint.parts[0]
         unit = _response(e, match, turn)
         # other schemes have its map with other springs than the stated one

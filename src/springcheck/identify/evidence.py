@@ -161,9 +161,9 @@ class Evidence:
         return float(np.max(self.found.residual))
 
     @cached_property
-    def misses(self) -> Floats:
+    def residuals(self) -> Floats:
         """Residuals of the map (f - 1, 2), in units of the states' size."""
-        return self.found.misses()
+        return self.found.residuals()
 
     @cached_property
     def weight(self) -> Floats:
@@ -187,7 +187,7 @@ class Evidence:
     @property
     def excess(self) -> Floats:
         """Residual of each pair (f - 1,), in roundings."""
-        return np.asarray(np.max(np.abs(self.misses), axis=1) / self.unit)
+        return np.asarray(np.max(np.abs(self.residuals), axis=1) / self.unit)
 
     @property
     def turns(self) -> float:

@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from springcheck.identify import laws
-from springcheck.identify.coarse import irregular
+from springcheck.identify.coarse import is_white
 from springcheck.identify.compare import nearest
 from springcheck.identify.evidence import (
     FALLS,
@@ -177,10 +177,10 @@ def _unexplained(e: Evidence, counted: float) -> Explanation:
     ratio = float(rows[0] / rows[1]) if rows[1] else math.inf
     where = "the velocity" if ratio < 0.2 else "the position" if ratio > 5 else "position and velocity"
     # what is left of the other number is rounding, which goes with the state
-    left = e.misses[:, rows >= 0.2 * np.max(rows)]
+    left = e.residuals[:, rows >= 0.2 * np.max(rows)]
     # noise of a coarse number is white relative to a motion that grows, and noise of one size beside its map
     linear = np.column_stack([e.states[:-1], np.ones(e.pairs)])
-    if not (irregular(left * e.weight[:, None]) or (left.shape[1] == 1 and irregular(left, linear))):
+    if not (is_white(left * e.weight[:, None]) or (left.shape[1] == 1 and is_white(left, linear))):
         return Explanation(
             "No known cause alone explains what one map leaves over, and it is no white noise: it "
             f"comes back from frame to frame, {e.size:.1e} of the state's size in each, in {where}",

@@ -10,8 +10,7 @@ itself; with few digits V^-1 combines the whole orbit.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,7 +51,7 @@ CERTAIN = 14.0
 """Log of the likelihood ratio from which one of two noise models is chosen: wrong with a probability of
 exp(-14)."""
 
-FEWEST_SLIPPING = 20
+FEWEST_UNEVEN = 20
 """Residuals up to which the effect of an uneven clock is not fitted."""
 
 CLEAN = 100.0
@@ -104,10 +103,8 @@ class Map:
     does not show, or where they have all digits."""
     drifts: bool = False
     """Whether the constant part is no equilibrium but a constant added to the position in every step."""
-    slips: Extended | None = None
+    deviations: Extended | None = None
     """Relative deviation (f - 1,) of each step from the mean, where the steps follow the recorded times."""
-    found: dict[Any, Any] = field(default_factory=dict, init=False)
-    """Cache of what follows from this map."""
 
     @property
     def unscaled(self) -> Extended:
@@ -134,7 +131,7 @@ class Map:
         """Whether chi-squared agrees with the observation model."""
         return self.chi2 <= self.freedom + ERRORS * math.sqrt(KURTOSIS * self.freedom + 1)
 
-    def misses(self, other: Map | None = None) -> Floats:
+    def residuals(self, other: Map | None = None) -> Floats:
         """Residuals (f - 1, 2) of the map on the pairs of its own states, or of another fit's."""
         z = self.z
         if other is not None:
@@ -171,15 +168,20 @@ class _Solution:
 
 
 def _minimum(
-    z: Extended, sigma: Floats, process: Floats, start: _Solution | None, centred: int, slips: Extended | None
+    z: Extended,
+    sigma: Floats,
+    process: Floats,
+    start: _Solution | None,
+    centred: int,
+    deviations: Extended | None,
 ) -> _Solution:
     """Gauss-Newton for the map, its constant part (`centred`: 0 none, 1 an equilibrium at rest, 2 any), and
-    the effect of the clock's slips on a step (4 further entries)."""
+    the effect of the clock's deviations on a step (4 further entries)."""
     n = 4 + centred
-    x = np.zeros(n if slips is None else n + 4, np.longdouble)
+    x = np.zeros(n if deviations is None else n + 4, np.longdouble)
     x[:n] = _first_guess(z, process, start, centred)
     # of size 1, as everything else
-    slipping = None if slips is None else (slips / np.max(np.abs(slips)))[:, None]
+    slipping = None if deviations is None else (deviations / np.max(np.abs(deviations)))[:, None]
     best: _Solution | None = None
     noise = Noise(np.eye(2), 0 * sigma, process) if not np.any(sigma) else None
     for _ in range(MOST_ROUNDS):
@@ -253,20 +255,20 @@ def fit(record: Record, j: int, *, kept: NDArray[np.bool_] | None = None, consta
     # what happens in other pairs than those that are kept is unknown
     unknown = 1.0 if kept is None else np.where(kept, 1.0, UNKNOWN / ROUNDING)
     process = ROUNDING * length * unknown
-    slips = None
+    deviations = None
     # neighbours alone first: a map that is far off makes nothing of the orbit
     pairs = process if record.fine else np.hypot(process, np.max(sigma[1:], axis=1))
-    best, centred, slips = _constant_part(z, 0 * sigma, pairs, None, record, constant)
+    best, centred, deviations = _constant_part(z, 0 * sigma, pairs, None, record, constant)
     if centred:
         # roundings are relative to the distance from the equilibrium, and to that of the equilibrium from 0
         length = _lengths(z, best.centre)
         process = ROUNDING * length * unknown
-        best = _minimum(z, 0 * sigma, process, best, centred, slips) if record.fine else best
+        best = _minimum(z, 0 * sigma, process, best, centred, deviations) if record.fine else best
     if not record.fine:
         best, centred, _ = _constant_part(z, sigma, process, best, record, constant)
     once: bool | None = None
     pairs_kept = len(process) if kept is None else int(np.count_nonzero(kept))
-    freedom = 2 * pairs_kept - 4 - centred - (4 if slips is not None else 0)
+    freedom = 2 * pairs_kept - 4 - centred - (4 if deviations is not None else 0)
     if not record.fine:
         other = _fed_back(z, sigma, process, best, centred, freedom)
         odds = (other.cost - best.cost) / 2
@@ -275,9 +277,9 @@ def fit(record: Record, j: int, *, kept: NDArray[np.bool_] | None = None, consta
         if best.chi2 > expected:
             best = other
     scale = max(best.chi2 / max(freedom, 1), _least(freedom) if record.fine else 1.0)
-    if record.slips is not None and 2 * pairs_kept <= FEWEST_SLIPPING:
+    if record.deviations is not None and 2 * pairs_kept <= FEWEST_UNEVEN:
         # too few to be fitted, they turn each state on by as much of half a turn at most
-        scale = max(scale, (math.pi * float(np.max(np.abs(record.slips))) / ROUNDING) ** 2)
+        scale = max(scale, (math.pi * float(np.max(np.abs(record.deviations))) / ROUNDING) ** 2)
     covariance = best.inverse[:4, :4] * scale * (1.0 if record.fine else repeats(z))
     state = z - best.centre
     share = length.astype(np.longdouble)[:, None] ** -2
@@ -294,7 +296,8 @@ def fit(record: Record, j: int, *, kept: NDArray[np.bool_] | None = None, consta
     return Map(
         weight=weight, residual=residual, spans=spans,
         entries=best.entries, covariance=covariance, size=size, centre=best.centre * size, z=state,
-        noise=best.noise, chi2=best.chi2, freedom=freedom, once=once, drifts=centred == 2, slips=slips,
+        noise=best.noise, chi2=best.chi2, freedom=freedom, once=once, drifts=centred == 2,
+        deviations=deviations,
         conditioned=spans and smallest > 100 * float(np.max(residual)) ** 2,
     )  # fmt: skip
 
@@ -318,11 +321,11 @@ def _lengths(z: Extended, centre: Extended | Floats) -> Floats:
 def _constant_part(
     z: Extended, sigma: Floats, process: Floats, start: _Solution | None, record: Record, constant: bool
 ) -> tuple[_Solution, int, Extended | None]:
-    """Solution with the smallest constant part that explains the states (`centred`), and the slips if
+    """Solution with the smallest constant part that explains the states (`centred`), and the deviations if
     fitted."""
     from scipy.special import fdtri
 
-    numbers, slips, centred = 2 * len(process), None, 0
+    numbers, deviations, centred = 2 * len(process), None, 0
     least = _least(numbers - 6) if record.fine else 1.0
 
     def gains(old: _Solution, new: _Solution, least_gain: float) -> bool:
@@ -335,38 +338,38 @@ def _constant_part(
     best = _minimum(z, sigma, process, start, 0, None)
     unknown, wide = 4, None
     if record.fine and not constant:
-        removed = _removed_at_most(z, process, best, record.slips)
+        removed = _removed_at_most(z, process, best, record.deviations)
         if removed <= CONSTANT_SHOWS * max((best.chi2 - removed) / max(numbers - 6, 1), least):
             return best, 0, None
-    if record.slips is not None and numbers > FEWEST_SLIPPING:
+    if record.deviations is not None and numbers > FEWEST_UNEVEN:
         wide = _minimum(z, sigma, process, best, 1, None)
-        sliding = _minimum(z, sigma, process, wide, 1, record.slips)
+        sliding = _minimum(z, sigma, process, wide, 1, record.deviations)
         if gains(wide, sliding, 2 * CONSTANT_SHOWS):
-            slips, unknown, wide = record.slips, 8, None
-            best = _minimum(z, sigma, process, best, 0, slips)
+            deviations, unknown, wide = record.deviations, 8, None
+            best = _minimum(z, sigma, process, best, 0, deviations)
     plain = best.chi2 <= (numbers - unknown) * least
     if numbers <= unknown + 2 or (plain and not constant):
-        return best, centred, slips
-    wide = wide or _minimum(z, sigma, process, best, 1, slips)
+        return best, centred, deviations
+    wide = wide or _minimum(z, sigma, process, best, 1, deviations)
     if constant or gains(best, wide, CONSTANT_SHOWS if record.fine else CONSTANT_LIKELY):
         best, centred = wide, 1
     if record.fine and numbers > unknown + 3 and best.chi2 > (numbers - unknown) * least:
-        widest = _minimum(z, sigma, process, best, 2, slips)
+        widest = _minimum(z, sigma, process, best, 2, deviations)
         # at rest the roundings are the same in every step, and add up to a constant of their own
         shift = np.max(np.abs((np.eye(2) - widest.entries) @ (widest.centre - best.centre)))
-        # where the clock's slips are too few to be fitted, a constant may stand for them
-        slipping = record.slips is not None and numbers <= FEWEST_SLIPPING
+        # where the clock's deviations are too few to be fitted, a constant may stand for them
+        slipping = record.deviations is not None and numbers <= FEWEST_UNEVEN
         clean = not slipping or widest.chi2 <= CLEAN * (numbers - unknown - 3)
         if clean and gains(best, widest, CONSTANT_SHOWS) and shift > 64 * ROUNDING * np.max(np.abs(z)):
             best, centred = widest, 2
-    return best, centred, slips
+    return best, centred, deviations
 
 
-def _removed_at_most(z: Extended, process: Floats, best: _Solution, slips: Extended | None) -> float:
-    """Chi-squared that a constant part of any kind and a clock's slips together remove from a fit without:
-    all of them lie among maps that are linear in the state, 1, and both times the slips."""
+def _removed_at_most(z: Extended, process: Floats, best: _Solution, deviations: Extended | None) -> float:
+    """Upper bound on the decrease of chi-squared by a constant part and the deviations of the clock: both are
+    linear in the state, 1, and the products of these with the deviations."""
     state, weight = np.column_stack([z[:-1], np.ones(len(process))]), 1 / process[:, None]
-    every = state if slips is None else np.column_stack([state, slips[:, None] * state])
+    every = state if deviations is None else np.column_stack([state, deviations[:, None] * state])
     size = np.max(np.abs(every), axis=0)
     columns = (every / np.where(size > 0, size, 1)).astype(np.float64) * weight
     left = np.asarray(z[1:] - z[:-1] @ best.entries.T, np.float64) * weight

@@ -8,7 +8,6 @@ comes near is refined by Gauss-Newton.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from typing import Any
@@ -138,9 +137,10 @@ class Roots:
     """Cache of comparisons with the curves."""
 
 
-def roots_of_map(found: Map, strides: Iterable[int]) -> Roots:
+@lru_cache(maxsize=64)
+def roots_of_map(found: Map, strides: tuple[int, ...]) -> Roots:
     """Matrix roots of these degrees, for every possible number of turns between two frames."""
-    every = np.array(list(strides), np.float64)
+    every = np.array(strides, np.float64)
     b = found.entries.astype(np.float64)
     ratio = float(found.size[1] / found.size[0])
     turn = found.turn

@@ -116,7 +116,7 @@ class Joint:
         return bool(np.all(np.abs(entries[:, 0] * entries[:, 3] - entries[:, 1] * entries[:, 2] - 1) < 1e-12))
 
     @property
-    def plainness(self) -> tuple[int, int, int]:
+    def simplicity(self) -> tuple[int, int, int]:
         """Sort key, the simplest first: by turns, steps, the exact solution, the order of `FAMILIES`."""
         turns = max(part.turns for part in self.parts)
         return turns, self.stride, -1 if self.scheme == "exact" else list(FAMILIES).index(self.family)
@@ -194,4 +194,4 @@ def likely(joints: list[Joint]) -> list[Joint]:
         return []
     best = min(x.chi2 for x in joints)
     each = {(x.family, x.stride): x for x in sorted(joints, key=lambda x: -x.chi2)}
-    return sorted((x for x in each.values() if x.chi2 <= best + EXCLUDED), key=lambda x: x.plainness)
+    return sorted((x for x in each.values() if x.chi2 <= best + EXCLUDED), key=lambda x: x.simplicity)

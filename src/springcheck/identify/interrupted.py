@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from springcheck.identify.coarse import irregular
+from springcheck.identify.coarse import is_white
 from springcheck.identify.compare import compare
 from springcheck.identify.evidence import FALLS, LEFT_BY_ROUNDING, SINGLE_ROOM, Evidence, Measured, matched
 from springcheck.identify.families import FAMILIES, OF_HALF_A_STEP_AGO, VERLET, titles
@@ -46,9 +46,10 @@ def remembered(seen: Measured) -> tuple[Measured, list[Joint]]:
     if not record.fine or len(record.q) <= FEWEST_PAIRS or any(_first_off(x) < FALLS for x in seen.maps):
         return seen, []
     parts = None if record.parts is None else (record.parts[0][1:], record.parts[1][1:])
+    uneven = None if record.deviations is None else record.deviations[1:]
     later = replace(
         record, q=record.q[1:], v=record.v[1:], q_quantum=record.q_quantum[1:], parts=parts,
-        v_quantum=record.v_quantum[1:], slips=None if record.slips is None else record.slips[1:],
+        v_quantum=record.v_quantum[1:], deviations=uneven,
     )  # fmt: skip
     rest = replace(seen, record=later, maps=[fit(later, j) for j in seen.moving])
     joints = rest.compare((FAMILIES[OF_HALF_A_STEP_AGO],), FEW)
@@ -57,7 +58,7 @@ def remembered(seen: Measured) -> tuple[Measured, list[Joint]]:
 
 def _first_off(found: Map) -> float:
     """Ratio of the first pair's residual to the largest in the second half."""
-    off = np.max(np.abs(found.misses()), axis=1) * found.weight
+    off = np.max(np.abs(found.residuals()), axis=1) * found.weight
     return float(off[0] / max(np.max(off[len(off) // 2 :]), 1e-300))
 
 
@@ -81,7 +82,7 @@ def few_bad_frames(e: Evidence) -> Explanation | None:
     kept = np.ones(e.pairs, dtype=bool)
     found = e.found
     for _ in range(8):
-        off = np.max(np.abs(found.misses(e.found)), axis=1) / e.unit
+        off = np.max(np.abs(found.residuals(e.found)), axis=1) / e.unit
         limit = max(8 * float(np.median(off[kept])), 2.0)
         now = off <= limit
         if np.count_nonzero(~now) > max(3, FEW_BAD * e.pairs) or np.array_equal(now, kept):
@@ -94,8 +95,8 @@ def few_bad_frames(e: Evidence) -> Explanation | None:
     if float(np.min(off[bad])) < APART * float(np.max(off[kept])):
         # what falls off from frame to frame has no few bad ones
         return None
-    before = float(np.max(e.weight[:, None] * np.abs(e.misses)))
-    rest = (e.weight[:, None] * found.misses(e.found))[kept]
+    before = float(np.max(e.weight[:, None] * np.abs(e.residuals)))
+    rest = (e.weight[:, None] * found.residuals(e.found))[kept]
     after = float(np.sqrt(np.mean(rest**2)))
     if before < FALLS * after:
         return None
@@ -113,7 +114,7 @@ def few_bad_frames(e: Evidence) -> Explanation | None:
         # an error of one size shows where a motion that grows or dies is smallest
         return None
     whose = f" of {titles(x.scheme for x in fitting)}" if fitting else _damped(found, e)
-    if rough and not (after < SINGLE_ROOM * float(np.median(e.weight * size)) and irregular(rest)):
+    if rough and not (after < SINGLE_ROOM * float(np.median(e.weight * size)) and is_white(rest)):
         # what is left of the rest is no arithmetic's, and makes its map so uncertain that wrong schemes fit
         whose = ""
     runs = np.split(bad, np.flatnonzero(np.diff(bad) > 1) + 1)

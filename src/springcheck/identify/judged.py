@@ -1,4 +1,4 @@
-"""What of a record can be judged: the oscillators that move by themselves, or normal modes in their place."""
+"""The oscillators of a record that can be judged: coordinates, or normal modes if these are coupled."""
 
 from __future__ import annotations
 
@@ -47,15 +47,14 @@ def _oscillators(record: Record) -> tuple[Record, list[int], list[Map], list[str
     notes = [f"{n - len(moving)} of {n} oscillators are at rest and left out"] if len(moving) < n else []
     free = [j for j in moving if _straight(record, j)]
     maps = {j: fit(record, j) for j in moving if j not in free}
-    if len(maps) > 1:
-        alone, notes_of = _uncoupled(record, maps)
-        if alone is not None:
-            modes, _ = alone
-            kept = {i: fit(modes, i) for i in range(modes.q.shape[1]) if not _straight(modes, i)}
-            good = [i for i, found in kept.items() if found.conditioned and _forced(found)]
-            # what no springs couple, as a field that turns velocities, has modes that are not alone either
-            if good and not any(found.spans and not found.conditioned for found in kept.values()):
-                return modes, good, [kept[i] for i in good], [*notes, *notes_of]
+    if len(maps) > 1 and (modes := _uncoupled(record, maps)) is not None:
+        kept = {i: fit(modes, i) for i in range(modes.q.shape[1]) if not _straight(modes, i)}
+        good = [i for i, found in kept.items() if found.conditioned and _forced(found)]
+        # what no springs couple, as a field that turns velocities, has modes that are not alone either
+        if good and not any(found.spans and not found.conditioned for found in kept.values()):
+            whose = f"{len(maps)} normal modes were judged instead of them"
+            notes.append(f"the coordinates are coupled, and their {whose}")
+            return modes, good, [kept[i] for i in good], notes
     good = [j for j, found in maps.items() if found.conditioned and _forced(found)]
     lost = [j for j in maps if j not in good]
     rough = [j for j in lost if maps[j].spans and not (maps[j].conditioned and maps[j].clean)]
@@ -85,7 +84,7 @@ def _oscillators(record: Record) -> tuple[Record, list[int], list[Map], list[str
 
 
 ALIKE = 1e-9
-"""Share of a motion's size that velocities may differ by from a multiple of the positions."""
+"""Relative difference up to which velocities are a multiple of the positions."""
 
 
 def _proportional(record: Record, j: int) -> str:
@@ -127,14 +126,10 @@ def _forced(found: Map) -> bool:
     return abs(float(found.entries[1, 0])) >= SURE * math.sqrt(found.covariance[2, 2])
 
 
-def _uncoupled(record: Record, maps: dict[int, Map]) -> tuple[tuple[Record, list[int]] | None, list[str]]:
-    """Normal modes, where the coordinates are coupled and the modes are not, and a note on them."""
+def _uncoupled(record: Record, maps: dict[int, Map]) -> Record | None:
+    """The record of the normal modes, if the coordinates are coupled and the modes are not."""
     single = max(float(np.max(found.residual)) for found in maps.values())
-    every = list(maps)
     if single < max(64 * FIXED, 1e-8) or not record.fine:
-        return None, []
-    found = coupled.modes(record, every)
-    if found is None or found[1] > 1e-3 * single:
-        return None, []
-    note = f"the coordinates are coupled, and their {len(every)} normal modes were judged instead of them"
-    return (found[0], every), [note]
+        return None
+    found = coupled.modes(record, list(maps))
+    return found[0] if found is not None and found[1] <= 1e-3 * single else None

@@ -100,7 +100,7 @@ def regression(e: Evidence, law: Cause) -> Regression:
         columns = driven.waves(columns[0], turn)
     every = e.weight[:, None] * np.stack([*e.linear, *columns], axis=1)
     kept = np.all(np.isfinite(every), axis=1)
-    every, missing = every[kept], (e.weight[:, None] * e.misses)[kept]
+    every, missing = every[kept], (e.weight[:, None] * e.residuals)[kept]
     size = np.sqrt(np.mean(every**2, axis=0)) if len(every) else np.ones(every.shape[1])
     size = np.where(size > 0, size, 1.0)
     x, _, rank, _ = np.linalg.lstsq(every / size, missing)
@@ -315,7 +315,7 @@ def friction_shows(e: Evidence, part: Match) -> bool:
         flat = columns.reshape(2 * e.pairs, -1)
         weighted = found.noise.solve(columns).reshape(flat.shape)
         inverse = np.linalg.pinv(flat.T @ weighted, hermitian=True)
-        x = inverse @ (weighted.T @ e.misses.ravel())
+        x = inverse @ (weighted.T @ e.residuals.ravel())
         # columns are of q and v in turn, each for both numbers of the next state
         at = np.array([0, 2, 1, 3])
         scale = max(found.chi2 / max(found.freedom, 1), 1.0)

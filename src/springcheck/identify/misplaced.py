@@ -6,7 +6,7 @@ Each is undone and the map fitted anew: it is the cause where that reduces the r
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from itertools import combinations
 
@@ -38,7 +38,7 @@ def misplaced(e: Evidence) -> Explanation | None:
     before = _left(e.record, e.j)
     if not before:
         return None
-    for look in LOOKS:
+    for look in (_wrapped, _exchanged):
         for record, cause, remedy in look(e.record, e.j):
             after = _left(record, e.j)
             if after * FALLS < before:
@@ -172,6 +172,3 @@ def _where(frames: list[int], of: int) -> str:
     if len(frames) == of - frames[0]:
         return f"from frame {frames[0]} on"
     return f"in {len(frames)} of {of} frames: {', '.join(map(str, frames[:4]))}{', ...' * (len(frames) > 4)}"
-
-
-LOOKS: tuple[Callable[[Record, int], Iterator[Repair]], ...] = (_wrapped, _exchanged)

@@ -117,7 +117,7 @@ def _joined(
                 for own, a in zip(parts[1:], wanted[1:], strict=True)
             )
             out += [Joint(family=key[0], stride=key[1], parts=(m, *rest)) for m in parts[0][key]]
-    return sorted(out, key=lambda x: (x.plainness, abs(x.parts[0].a)))
+    return sorted(out, key=lambda x: (x.simplicity, abs(x.parts[0].a)))
 
 
 def _first(

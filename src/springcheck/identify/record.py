@@ -37,7 +37,7 @@ class Record:
     """Relative uncertainty of the interval, from the rounding of the recorded times."""
     clock: float
     """Rounding of the recorded times, in intervals."""
-    slips: Extended | None
+    deviations: Extended | None
     """Relative deviation (f - 1,) of each interval from the mean; None where times are coarse or even."""
     q: Extended
     v: Extended
@@ -188,7 +188,7 @@ def read(
         interval=interval,
         jitter=clock.jitter,
         clock=clock.quantum,
-        slips=clock.slips if finely else None,
+        deviations=clock.deviations if finely else None,
         q=positions[kept].astype(np.longdouble),
         v=moving[kept].astype(np.longdouble) / unit,
         q_quantum=q_storage.quantum(positions[kept]),

@@ -14,7 +14,7 @@ from functools import cache
 
 import numpy as np
 
-from springcheck.identify.coarse import irregular
+from springcheck.identify.coarse import is_white
 from springcheck.identify.compare import Target, solved
 from springcheck.identify.coupled import least_squares
 from springcheck.identify.families import Family
@@ -72,12 +72,12 @@ def recurrence(record: Record, j: int, steps: int) -> Recurrence:
     noise = np.maximum(noise, 1e-30 * np.max(noise))
     # a frame may lie off by the rounding of its time, on its way of up to a turn more than it shows
     amplitude = _around(np.abs(q - np.mean(q)).astype(np.float64))[1:-1]
-    alpha, beta, covariance, left = _neighbours(q, noise, record.slips)
+    alpha, beta, covariance, left = _neighbours(q, noise, record.deviations)
     scale = float(np.std(q.astype(np.float64)))
     residual = float(np.sqrt(np.mean(left**2))) / scale
     ulp = float(np.max(np.abs(left) / (2.0**-52 * size)))
     usual = 4 + 2 * math.sqrt(steps)
-    clock = record.clock * amplitude if record.slips is not None else 0.0 * amplitude
+    clock = record.clock * amplitude if record.deviations is not None else 0.0 * amplitude
     # each of four frames may lie half a rounding of its time away, on the way that the motion shows
     on_way = 2 * _phase(alpha, beta) * clock
 
@@ -87,7 +87,7 @@ def recurrence(record: Record, j: int, steps: int) -> Recurrence:
 
         if off(on_way) <= usual:
             return True
-        return off(2 * np.pi * clock) <= UNUSUAL * usual and irregular((left / noise)[:, None])
+        return off(2 * np.pi * clock) <= UNUSUAL * usual and is_white((left / noise)[:, None])
 
     precision = ""
     if record.fine:
@@ -121,10 +121,10 @@ def _around(x: Floats) -> Floats:
 
 
 def _neighbours(
-    q: Extended, noise: Floats, slips: Extended | None
+    q: Extended, noise: Floats, deviations: Extended | None
 ) -> tuple[np.longdouble, np.longdouble, Floats, Floats]:
     """alpha, beta, their covariance (2, 2) and the residuals (f - 2,), from neighbouring frames.  Steps that
-    follow the `slips` of the times displace frames along the motion."""
+    follow the `deviations` of the times displace frames along the motion."""
     weight = (1 / noise)[:, None]
     # a motion that grows is not centred by its largest frames
     share = 1 / np.square(noise / np.min(noise))
@@ -134,8 +134,8 @@ def _neighbours(
     right = np.asarray(second[:, None] * weight, np.longdouble)
     x = least_squares(np.asarray(columns * weight, np.longdouble), right)[:, 0]
     left = (second - columns @ x).astype(np.float64)
-    if slips is not None and len(left) > 4 * FEWEST_FRAMES:
-        moved = [1e12 * s[:, None] * columns[:, :2] for s in (slips[1:], slips[:-1])]
+    if deviations is not None and len(left) > 4 * FEWEST_FRAMES:
+        moved = [1e12 * s[:, None] * columns[:, :2] for s in (deviations[1:], deviations[:-1])]
         wide = np.concatenate([columns, *moved], axis=1)
         y = least_squares(np.asarray(wide * weight, np.longdouble), right)[:, 0]
         rest = (second - wide @ y).astype(np.float64)

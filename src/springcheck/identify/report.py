@@ -1,4 +1,4 @@
-"""Which scheme made these states: the way from arrays to what is said of them."""
+"""Identification of arrays: every stage in its order."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ def _of_record(
 def _of_coordinates(
     record: Record, stiffness: ArrayLike | None, friction: float | None, step: float | None
 ) -> Identification:
-    """Measure maps, compare them with the schemes, and interpret the hypotheses that remain."""
+    """Fit maps, compare them with the schemes, and interpret the hypotheses that remain."""
     seen = judged(record, stiffness, friction, step)
     if any(found.drifts for found in seen.maps):
         return _unknown(seen, range(1, 2))
@@ -102,8 +102,8 @@ def _of_coordinates(
 
 
 def _unknown(seen: Measured, strides: range) -> Identification:
-    """Identification without a scheme: possible causes, and the nearest scheme of these strides, unless
-    velocities have the wrong sign."""
+    """Identification without a scheme: causes, and the nearest scheme of these strides unless velocities have
+    the wrong sign."""
     maps = seen.maps
 
     def distance(joint: Joint) -> float:
@@ -114,7 +114,7 @@ def _unknown(seen: Measured, strides: range) -> Identification:
     if tried and not turned(seen.record, seen.moving):
         least = min(map(distance, tried))
         # many schemes and strides come close by chance; the plainest of the close ones is the better guess
-        close = min((x for x in tried if distance(x) <= 10 * least), key=lambda x: x.plainness)
+        close = min((x for x in tried if distance(x) <= 10 * least), key=lambda x: x.simplicity)
         near = {"nearest": str(close), "difference": difference(maps[0], close.parts[0])}
         if not any(part.turns for part in close.parts):
             # what is near by whole turns that nothing asks for has none of the states' numbers

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import cache, partial
+from functools import cache, lru_cache, partial
 from typing import TypeAlias
 
 import numpy as np
@@ -73,7 +73,7 @@ def identical(one: Joint, other: Joint, *, free_scale: bool) -> bool:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Room:
+class Trial:
     """One round of the search: families, tolerances beside the standard errors, and ranges of strides in
     turn."""
 
@@ -197,18 +197,18 @@ def find(seen: Measured) -> tuple[list[Joint], Measured]:
     they fit.  The first round of `_plan` with a fit ends the search."""
     fine, stride = seen.record.fine, seen.stride
     first = (range(stride, stride + 1),) if stride is not None and stride > 0 else ()
-    for rooms in _plan(seen):
+    for trials in _plan(seen):
         accepted: list[Joint] = []
-        for room in rooms:
-            terms = [replace(what, rounding=room.rounding, bias=room.bias) for what in seen.terms]
+        for trial in trials:
+            terms = [replace(what, rounding=trial.rounding, bias=trial.bias) for what in seen.terms]
             wide = replace(seen, terms=terms)
-            for strides in (*first, *room.strides):
-                fitting = wide.compare(room.families, strides)
+            for strides in (*first, *trial.strides):
+                fitting = wide.compare(trial.families, strides)
                 if fitting:
                     accepted += fitting
-                    if strides is FEW and (MANY in room.strides or not room.bias):
-                        accepted += _further(wide, fitting, room)
-                    if not (fine or room.damped):
+                    if strides is FEW and (MANY in trial.strides or not trial.bias):
+                        accepted += _further(wide, fitting, trial)
+                    if not (fine or trial.damped):
                         accepted += _rivals(wide, fitting, many=strides is MANY)
                     break
         if accepted:
@@ -225,7 +225,7 @@ def explained(seen: Measured, accepted: list[Joint]) -> Explained:
             break
         shows = cache(partial(_stands_out, seen, accepted, found, what, damped=left[0].damped))
         new = defects(seen.record, j, found, [x.parts[i] for x in left], shows)
-        # what explains one scheme's misses does not exclude the others, which miss the states by no more
+        # what explains one scheme's residuals does not exclude others of no larger residuals
         good = [x for x in new if x.precision]
         new = [
             next((y for y in good if x.miss <= AS_NEAR * y.miss), x) if not x.precision else x for x in new
@@ -246,7 +246,7 @@ def _stands_out(seen: Measured, accepted: list[Joint], found: Map, terms: Terms,
     return alone and visible(found, terms, damped=damped)
 
 
-def _plan(seen: Measured) -> list[list[Room]]:
+def _plan(seen: Measured) -> list[list[Trial]]:
     """Rounds of the search, the simplest first; those of one list are equally simple.
 
     Undamped before damped.  Coefficients are rounded in double precision, unless the states show a coarser
@@ -259,26 +259,26 @@ def _plan(seen: Measured) -> list[list[Room]]:
     residual = max(float(np.max(found.residual)) for found in seen.maps)
     biased = [BIAS] if residual > FIXED and not whole else []
     if record.fine:
-        rooms = [[Room(damped=d, bias=bias)] for d in (False, True) for bias in (0.0, *biased)]
-        return [*rooms, [Room(strides=(MANY,))]]
+        trials = [[Trial(damped=d, bias=bias)] for d in (False, True) for bias in (0.0, *biased)]
+        return [*trials, [Trial(strides=(MANY,))]]
     near = (FEW, MANY)
     double, double_damped, single, single_damped = (
-        Room(damped=damped, rounding=rounding, strides=near)
+        Trial(damped=damped, rounding=rounding, strides=near)
         for rounding in (ROUNDING, SINGLE)
         for damped in (False, True)
     )
     coarse = residual > 2.0**-40 and not record.deep
-    out: list[list[Room]] = []
+    out: list[list[Trial]] = []
     if whole or not coarse:
         out += [[double], [double_damped, single] if record.text and coarse else [double_damped]]
     if coarse:
         out += [[single], [single_damped]]
     return out + [
-        [Room(damped=damped, bias=bias, strides=near)] for bias in biased for damped in (False, True)
+        [Trial(damped=damped, bias=bias, strides=near)] for bias in biased for damped in (False, True)
     ]
 
 
-def _further(seen: Measured, accepted: list[Joint], room: Room) -> list[Joint]:
+def _further(seen: Measured, accepted: list[Joint], trial: Trial) -> list[Joint]:
     """Further hypotheses that the states do not exclude, beside those accepted of few steps to a frame.
 
     The truncation error falls with the number of steps, so that larger numbers may fit too; where the exact
@@ -287,9 +287,9 @@ def _further(seen: Measured, accepted: list[Joint], room: Room) -> list[Joint]:
     """
     out: list[Joint] = []
     open_ended = len(accepted) > 1 or any(x.scheme == "exact" or x.stride == STRIDES[0] for x in accepted)
-    if open_ended or not (seen.record.fine or room.damped):
-        out += seen.compare(room.families, MANY)
-    if not room.damped and min(x.chi2 for x in accepted) > EXCLUDED:
+    if open_ended or not (seen.record.fine or trial.damped):
+        out += seen.compare(trial.families, MANY)
+    if not trial.damped and min(x.chi2 for x in accepted) > EXCLUDED:
         out += seen.compare(distinct(damped=True), FEW)
     return out
 
@@ -304,18 +304,16 @@ def _rivals(seen: Measured, fitting: list[Joint], *, many: bool) -> list[Joint]:
     return [x for x in found if x.chi2 < same.get(x.family, math.inf) - ONE_MORE]
 
 
+@lru_cache(maxsize=64)
 def visible(found: Map, terms: Terms, *, damped: bool) -> bool:
     """Whether the truncation error of a step is far above the residuals.
 
     The map of an adaptive solver differs from the exact one by the scatter of its steps, within which many
     schemes of many small steps fit; coarse arithmetic does not bring a map nearer to the exact one.
     """
-    asked = "visible", terms, damped
-    if asked not in found.found:
-        flow = FAMILIES["exact, damped" if damped else "exact"]
-        near = nearest([found], [replace(terms, bias=1.0)], (flow,), range(1, 2))
-        found.found[asked] = all(m.chi2 > PLAIN**2 for m in near)
-    return bool(found.found[asked])
+    flow = FAMILIES["exact, damped" if damped else "exact"]
+    near = nearest([found], [replace(terms, bias=1.0)], (flow,), range(1, 2))
+    return all(m.chi2 > PLAIN**2 for m in near)
 
 
 def terms_of(record: Record, j: int, stated: Floats | None) -> Terms:

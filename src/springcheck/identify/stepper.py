@@ -26,24 +26,25 @@ from springcheck.schemes.elsewhere import ELSEWHERE
 Stepper: TypeAlias = Callable[..., Any]
 
 SPRINGS = ((3.7, 2.9, 0.31), (0.6, 1.7, 0.11), (1.9, 0.8, 0.43))
-"""m, k, h: uneven, so that a mass left out or a half step misplaced shows."""
+"""m, k, h: uneven, so that a missing mass or a misplaced half step shows."""
 
 FRAMES = 81
 
 BATH_FRAMES = 4001
-"""Frames of a stepper that draws random numbers, by which its kT is known to a tenth."""
+"""Frames of a stepper that draws random numbers: its kT is then known to 10 %."""
 
 TINY_STEP = 1e-6, 1e-3
-"""A step that shows the terms linear in h, and by how much their sums of weights may be off 1."""
+"""A step so small that only the terms linear in h count, and the tolerance of their sums of weights, which
+are 1."""
 
 RUNAWAY = 1e5
 """Growth of a state at which a run ends."""
 
 ALONG, MANY_PLACES = 4.0, 257
-"""Largest position from which a step is taken, and how many places there are."""
+"""Largest position, and number of positions, at which jumps are sought."""
 
 LONG = 16
-"""Part of the time on the well that one step takes by which schemes of one map on a spring are told apart."""
+"""Steps in the duration on the quartic potential, to tell schemes apart that agree on a spring."""
 
 WELL = (1.3, 2.1, 1.1, 0.4, 2.0)
 """m, b, q0, p0 and duration on V = b/4 q**4, a quarter of whose time scale passes in a unit of time."""

@@ -27,7 +27,7 @@ from springcheck.thermal.modes import FREE_OF_NOISE, modes
 from springcheck.thermal.states import FEWEST, Thermal, identify_thermal
 
 MOST = 8
-"""Oscillators that are looked at, each by itself."""
+"""Most oscillators in a bath that are identified."""
 
 OF_UNITS = "look at the units of what is stated, and at what the engine was given"
 
@@ -36,10 +36,10 @@ REMEDY = "record every step, each oscillator by itself, with the velocities that
 PLACES_OF_FACTOR = ("before velocity Verlet", "after velocity Verlet", "amid the drift of leapfrog")
 
 SHARP_FACTOR = 1e-3
-"""Misfit over the spread of the factor, below which it is one: two particles of unlike factors leave 1."""
+"""Largest residual of one factor for all momenta, relative to the factor's spread; unlike factors leave 1."""
 
 UNLIKE_MOTION = 0.01
-"""Share of the products of two particles' numbers in their difference, below which the two move alike."""
+"""Relative difference of two particles' products, below which their motions are proportional."""
 
 
 def one_factor(h: float, q: Floats, v: Floats) -> tuple[str, float, Floats] | None:

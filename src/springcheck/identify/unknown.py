@@ -178,7 +178,7 @@ def lasting(e: Evidence) -> Explanation | None:
 def memory(e: Evidence) -> Explanation | None:
     """A multistep method: the two-step leapfrog, or a start-up transient, which leaves residuals of one map
     in the first frames, and not in the first pair alone."""
-    size, off = np.max(np.abs(e.states[1:]), axis=1), np.max(np.abs(e.misses), axis=1)
+    size, off = np.max(np.abs(e.states[1:]), axis=1), np.max(np.abs(e.residuals), axis=1)
     if len(e.states) < FEWEST_WITH_MEMORY or np.min(size) < 1e-100 * np.max(size):
         return None
     relative, rounding = off / size, LEFT_BY_ROUNDING * float(np.max(e.unit / size))
@@ -203,7 +203,7 @@ def memory(e: Evidence) -> Explanation | None:
     found = several or found
     # the first frames alone show the other map, but for which all follow one
     later = fit(e.record, e.j, kept=np.arange(e.pairs) >= e.pairs // 2)
-    start = np.max(np.abs(later.misses(e.found)), axis=1)
+    start = np.max(np.abs(later.residuals(e.found)), axis=1)
     before, weighted = (float(np.max(x[1:])) for x in (start / size, e.weight * start))
     if before < rounding or weighted < FALLS * found.worst:
         return None

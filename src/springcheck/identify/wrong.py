@@ -71,7 +71,7 @@ def wrong_map(e: Evidence) -> list[Explanation]:
 
 
 def _departing(e: Evidence, scheme: str) -> Explanation:
-    size = float(np.max(np.abs(e.misses)))
+    size = float(np.max(np.abs(e.residuals)))
     return Explanation(
         f"The map is {scheme}'s, but single steps depart from it by up to {size:.1e} of the state's "
         "size, which no arithmetic that is known explains",
@@ -97,7 +97,7 @@ def _negative_friction(e: Evidence) -> list[Explanation]:
     ]
     if not joints:
         return []
-    best = min(joints, key=lambda x: x.plainness)
+    best = min(joints, key=lambda x: x.simplicity)
     rate = best.parts[0].g * best.stride / float(e.record.interval)
     cause = f"{title(best.scheme)} with a negative friction, c/m = {rate:.4g}, which feeds energy in"
     return [Explanation(cause, "change the sign of the damping force")]
