@@ -7,6 +7,7 @@ particle; it is driven as `springcheck identify --stepper` drives it, or recorde
 from __future__ import annotations
 
 import dataclasses
+import math
 import re
 from collections.abc import Callable
 from functools import partial
@@ -248,6 +249,7 @@ def test_no_explanation_is_without_a_remedy() -> None:
         for one in found:
             assert one.cause
             assert one.remedy
+            assert math.isfinite(one.misfit)
 
 
 def test_a_trajectory_that_failed_says_what_its_states_are() -> None:

@@ -94,7 +94,7 @@ def stated_stiffness(
     cause = f"{title(plainest.scheme)}, but of a spring {stiff}"
     remedy = "look at the units of the force constant, and at whether V is k/2 q**2"
     cause = f"{cause}: {meaning}" if meaning else cause
-    return [Explanation(cause, remedy)], against
+    return [Explanation(cause, remedy, abs(ratio - 1))], against
 
 
 def of_stated_stiffness(seen: Measured, precisions: dict[Joint, str], stated: Floats) -> list[Joint]:

@@ -84,6 +84,7 @@ def _solver(e: Evidence) -> Explanation | None:
         f"The states are the exact solution to within {size:.1e} of their size in each frame: an adaptive "
         "solver or one of high order, which has no fixed scheme to find",
         "compare its error with its tolerance; give a smaller tolerance, or none",
+        size,
     )
 
 
@@ -100,7 +101,7 @@ def _drift(e: Evidence) -> Explanation | None:
     remedy = "look for a drift that is not the velocity's, such as a removed centre-of-mass motion"
     if what == "velocity":
         remedy = "look for a constant force, or a Jacobian by differences, which rounds to one side"
-    return Explanation(cause, remedy)
+    return Explanation(cause, remedy, e.size)
 
 
 def _law(e: Evidence) -> Explanation:
@@ -151,6 +152,7 @@ def _law(e: Evidence) -> Explanation:
         f"The force {' or '.join(kinds)}, and {why} to tell which: it moves a frame by {e.size:.1e} of the "
         "state's size",
         "record more periods, where positions come back at other times and velocities",
+        first.left,
     )
 
 
@@ -166,6 +168,7 @@ def _too_few(e: Evidence, counted: float) -> Explanation:
         f"{count(round(counted), 'frame')}: too few to show its cause",
         "record more of the motion, before it dies down or after it has begun to grow; a solver "
         "that chooses its steps has no fixed scheme to find",
+        e.size,
     )
 
 
@@ -188,11 +191,13 @@ def _unexplained(e: Evidence, counted: float) -> Explanation:
             "steps has no fixed scheme to find"
             + "; a bath of one factor for all momenta, as a Nose-Hoover chain, shows in two particles or more"
             * (e.record.q.shape[1] == 1),
+            e.size,
         )
     return Explanation(
         f"Noise: what one map leaves over is irregular, {e.size:.1e} of the state's size in each "
         f"frame, in {where}, and has no quanta of a known arithmetic",
         "look for a thermostat, an iteration that stops early, or a sum in changing order",
+        e.size,
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cache
 
@@ -104,6 +105,11 @@ class Joint:
     @property
     def chi2(self) -> float:
         return sum(part.chi2 for part in self.parts)
+
+    @property
+    def misfit(self) -> float:
+        """Distance from the measured maps, in standard errors."""
+        return math.sqrt(self.chi2)
 
     @property
     def damped(self) -> bool:

@@ -136,7 +136,7 @@ def few_bad_frames(e: Evidence) -> Explanation | None:
             f"The motion is one{whose}, but not in frames {bad[0]} to {bad[-1] + 1}, where it is largest: "
             "too few to tell whether the force is anharmonic, or the step or a force changes in time"
         )
-    return Explanation(cause, remedy, local=True)
+    return Explanation(cause, remedy, after / before, local=True)
 
 
 def _damped(found: Map, e: Evidence) -> str:

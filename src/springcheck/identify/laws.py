@@ -333,7 +333,7 @@ def explained_by(e: Evidence, found: Regression) -> Explanation:
     cause = law.cause.format(moved=moved, j=e.j) if isinstance(law.cause, str) else law.cause(e, found)
     if law.waves:
         cause += driven.said(e, law.kind == IS_DRIVEN, found.turn)
-    return Explanation(cause, law.remedy, local=found.exact)
+    return Explanation(cause, law.remedy, found.left, local=found.exact)
 
 
 def alone(law: Cause, e: Evidence) -> Explanation | None:

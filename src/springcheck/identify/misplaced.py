@@ -42,7 +42,7 @@ def misplaced(e: Evidence) -> Explanation | None:
         for record, cause, remedy in look(e.record, e.j):
             after = _left(record, e.j)
             if after * FALLS < before:
-                return Explanation(cause, remedy, local=True)
+                return Explanation(cause, remedy, after / before, local=True)
     return None
 
 

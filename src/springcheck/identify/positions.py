@@ -223,7 +223,7 @@ def _none(seen: Measured, found: list[Recurrence], joints: list[Joint]) -> Ident
             f"{math.exp(found[0].log_det) - 1:+.2e} in each frame"
         )
     return nothing(
-        (Explanation(cause, remedy),),
+        (Explanation(cause, remedy, worst.residual),),
         determinant=tuple(math.exp(x.log_det) for x in found),
         symplectic_defect=max(abs(float(x.beta)) for x in found),
         defect_ulp=max(x.ulp for x in found),

@@ -47,6 +47,9 @@ class Explanation:
 
     cause: str
     remedy: str
+    misfit: float = 0.0
+    """Residual that the cause leaves: of a map in standard errors, else relative to the residuals that it
+    explains, or to the state if it explains none."""
     local: bool = field(default=False, kw_only=True)
     """Whether it leaves no noise to explain: misplaced numbers, or residuals that are only rounding."""
 

@@ -311,7 +311,7 @@ def _short(step: Stepper) -> list[Explanation]:
         "where a scheme of any order has 1 and 1"
     )
     remedy = "add up the lengths of its kicks and of its drifts, or the weights of its stages: each sum is 1"
-    return [Explanation(cause, remedy)]
+    return [Explanation(cause, remedy, off)]
 
 
 def _calls(step: Stepper) -> int:

@@ -98,7 +98,7 @@ def _of_a_factor(
     )
     remedy = "judge it by its scheme, which the factor alone does not tell; its bath is in no frame"
     notes = tuple(note for note in found.notes if not kept or note.split(":")[0] in {x.scheme for x in kept})
-    because = () if kept else (Explanation(cause, remedy),)
+    because = () if kept else (Explanation(cause, remedy, misfit),)
     return replace(found, statement=cause, candidates=kept, notes=notes, explanations=because)
 
 
@@ -238,7 +238,7 @@ def _said(
         determinant=unknown, fits=best is not None and first.known and not against, undecided=not first.known,
         nearest=best if named else None, notes=tuple(notes),
         explanations=() if best and not against else (
-            Explanation(statement, OF_UNITS if against else REMEDY),
+            Explanation(statement, OF_UNITS if against else REMEDY, math.nan),
         ),
     )  # fmt: skip
 

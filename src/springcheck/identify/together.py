@@ -214,7 +214,7 @@ def _of_two(record: Record, i: int, j: int) -> Explanation | None:
             f". By Boris, if every step was recorded: strength over mass {2 * half / interval:.9g}, "
             f"stiffness over mass {stiff / interval**2:.9g}"
         )
-    return Explanation(cause, "judge it against a scene with [[magnetic]]", local=True)
+    return Explanation(cause, "judge it against a scene with [[magnetic]]", float(off), local=True)
 
 
 def _boris(stiff: float, turn: complex) -> NDArray[np.complex128]:

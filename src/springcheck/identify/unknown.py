@@ -53,6 +53,7 @@ def misfit(e: Evidence) -> Explanation:
             f"The velocity follows the position: from frame 1 on it is {times:.6g} times its distance "
             "from rest",
             "look for a buffer that both share, or a velocity that is made from the position",
+            float(np.max(np.abs(v - slope * q))),
         )
     entries = e.found.entries.astype(np.float64)
     det = float(np.linalg.det(entries))
@@ -61,7 +62,7 @@ def misfit(e: Evidence) -> Explanation:
     growth = (
         f"amplitudes change by {math.sqrt(abs(det)) - 1:+.2e} in each frame" if det > 0 else "areas turn over"
     )
-    near = ""
+    near, off = "", math.nan
     if closest is not None:
         off = distance(e.found, closest.parts[0])
         near = f"; the nearest, {title(closest.scheme)}, misses a frame by {off:.1e} of its size"
@@ -72,6 +73,7 @@ def misfit(e: Evidence) -> Explanation:
         f"{ONE_MAP}{'' if kind.startswith(MAP_OF) else none}: {kind}{near}",
         "compare the order of its stages and their coefficients with the scheme's; state the step "
         "where more of them lie between frames",
+        off,
     )
 
 
@@ -172,6 +174,7 @@ def lasting(e: Evidence) -> Explanation | None:
         f"{found.law.cause}, and what is remembered does not fade: a scheme of several steps (as Milne's), "
         "or a coupled oscillator not recorded",
         "give all coordinates; a scheme of several steps whose memory lasts is not stable",
+        found.left,
     )
 
 
@@ -192,6 +195,7 @@ def memory(e: Evidence) -> Explanation | None:
             "Each state is the last but one and a linear map of the last: the leapfrog of two steps, "
             "z[n+1] = z[n-1] + 2 h f(z[n]), whose even and odd frames part",
             "judge it as a scheme of two steps; a first step of second order parts them less",
+            found.left,
             local=True,
         )
     # where the motion grows, a lasting disturbance falls relative to it too: its own size has to fall
@@ -213,6 +217,7 @@ def memory(e: Evidence) -> Explanation | None:
         f"{follows}: a scheme with memory, of {whose or kind}, whose start differs from one map by "
         f"{before:.1e} of the state's size",
         "leave the first frames out, and judge it as a scheme of as many steps",
+        found.worst / weighted,
         local=found.exact,
     )
 

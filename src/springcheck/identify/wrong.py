@@ -49,7 +49,7 @@ def wrong_map(e: Evidence) -> list[Explanation]:
     for joint in compare([e.found], [e.terms], _faults(), range(1, 5)):
         family = FAMILIES[joint.family]
         steps = "" if joint.stride == 1 else f", {joint.stride} steps to a frame"
-        ranked.append((_rank(e, joint), Explanation(f"{family.cause}{steps}", family.remedy)))
+        ranked.append((_rank(e, joint), Explanation(f"{family.cause}{steps}", family.remedy, joint.misfit)))
     if fitting:
         own = [x for rank, x in ranked if rank == 0 and e.stiffness is not None]
         return own or [_departing(e, title(fitting[0].scheme))]
@@ -76,6 +76,7 @@ def _departing(e: Evidence, scheme: str) -> Explanation:
         f"The map is {scheme}'s, but single steps depart from it by up to {size:.1e} of the state's "
         "size, which no arithmetic that is known explains",
         "look at what is rounded in a step beside positions, velocities and forces",
+        size,
     )
 
 
@@ -100,7 +101,7 @@ def _negative_friction(e: Evidence) -> list[Explanation]:
     best = min(joints, key=lambda x: x.simplicity)
     rate = best.parts[0].g * best.stride / float(e.record.interval)
     cause = f"{title(best.scheme)} with a negative friction, c/m = {rate:.4g}, which feeds energy in"
-    return [Explanation(cause, "change the sign of the damping force")]
+    return [Explanation(cause, "change the sign of the damping force", best.misfit)]
 
 
 def _either_way(factor: float, meaning: str) -> tuple[tuple[float, str], tuple[float, str]]:
@@ -146,7 +147,7 @@ def _scales(e: Evidence) -> tuple[list[Explanation], bool]:
             names.setdefault(said, []).append(x.scheme)
         x, _, _, remedy = meant[0]
         cause = "; or ".join(f"{titles(schemes)}{said}" for said, schemes in names.items())
-        return [Explanation(cause, remedy)], True
+        return [Explanation(cause, remedy, x.misfit)], True
     if not fitting:
         return [], False
     x = fitting[0]
@@ -165,7 +166,7 @@ def _scales(e: Evidence) -> tuple[list[Explanation], bool]:
         cause = f"Several schemes would fit at a scale of velocities, each at a factor of its own: {each}"
     advice = "look at the mass, at the units of velocities and times, and at whether dq/dt = p/m"
     alone = of_stated if e.stated is not None else fitting if e.record.fine else []
-    return [Explanation(cause, advice)], len(alone) == 1 and abs(one - 1) > AGREES
+    return [Explanation(cause, advice, x.misfit)], len(alone) == 1 and abs(one - 1) > AGREES
 
 
 def _meaning(e: Evidence, x: Joint) -> tuple[bool, str, str] | None:
@@ -226,7 +227,9 @@ def faults_of(seen: Measured, friction: float | None) -> list[Explanation]:
         if is_ > SURE * error and (rate is None or abs(is_ - rate) <= SURE * error + 1e-9 * rate):
             joints.append(x)
     return [
-        Explanation(FAMILIES[x.family].cause, FAMILIES[x.family].remedy) for x in joints if _rank(e, x) == 0
+        Explanation(FAMILIES[x.family].cause, FAMILIES[x.family].remedy, x.misfit)
+        for x in joints
+        if _rank(e, x) == 0
     ]
 
 
