@@ -18,7 +18,7 @@ BUDGETS = {
     ("engines",): 2826,
     ("driver", "conformance", "doors"): 1263,
     ("checks",): 5071,
-    ("identify",): 8674,
+    ("identify",): 8629,
     ("formats", "store"): 5262,
     ("studies",): 1477,
     ("studies/*",): 9800,

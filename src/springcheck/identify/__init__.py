@@ -10,7 +10,7 @@ with what would tell them apart.
 
 The way of the data, in the order in which to read it; `report` leads through all of it:
 
-* `record` (with `clock`, `storage`) checks what was written; `judged` (`coupled`) picks what can be judged;
+* `record` (with `clock`, `storage`) checks what was written; `judged` picks what can be judged;
 * `fit` (`noise`) measures the map between frames;
 * `families` lists the maps of schemes and mistakes, `maps` evaluates many at once; `search` says which are
   tried in turn; `guesses` and `compare` hold them against the measured map, which leaves a `hypothesis` or

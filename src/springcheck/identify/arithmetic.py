@@ -52,8 +52,7 @@ def _predicted(matches: list[Match]) -> Extended:
 
 
 def _numbers(matches: list[Match], kind: type[Any]) -> tuple[MapTable, Integers, Any]:
-    """Table of the matches' families, the index of each family, and a, g, log of the mass, and stride (4,
-    c)."""
+    """Table of the matches' families, the index of each, and rows of a, g, log of the mass, stride (4, c)."""
     families = tuple(FAMILIES[x] for x in dict.fromkeys(match.family for match in matches))
     which = np.array([families.index(FAMILIES[match.family]) for match in matches])
     rows = [(match.a, match.g, match.log_mass, match.stride) for match in matches]

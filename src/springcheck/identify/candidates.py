@@ -1,5 +1,4 @@
-"""Candidates of the hypotheses that fit: names, friction laws, numbers, and their agreement with what is
-stated."""
+"""Candidates of the hypotheses that fit: names, friction laws, numbers, agreement with what is stated."""
 
 from __future__ import annotations
 
@@ -66,23 +65,23 @@ def steps_between(stride: int | None) -> str:
 
 
 def stated_stiffness(
-    seen: Measured, plainest: Joint, precision: str, stated: Floats
+    seen: Measured, simplest: Joint, precision: str, stated: Floats
 ) -> tuple[list[Explanation], list[str]]:
-    """The cause of a stiffness that differs from the stated one, if significantly, and notes on the
+    """The cause of a stiffness that differs significantly from the stated one, and notes on the
     difference."""
     quantum = QUANTUM if precision in SINGLE_CONSTANTS else 0.0
-    against = seen.disagreements(plainest)
-    if not against or (quantum and not seen.disagreements(plainest, quantum=quantum)):
+    against = seen.disagreements(simplest)
+    if not against or (quantum and not seen.disagreements(simplest, quantum=quantum)):
         return [], []
-    room = max(part.a_room for part in plainest.parts)
-    for what, other, of_force in _single_constants(seen.record, stated, plainest.stride):
-        if seen.disagreements(plainest, other, quantum if of_force else 0.0):
+    room = max(part.a_room for part in simplest.parts)
+    for what, other, of_force in _single_constants(seen.record, stated, simplest.stride):
+        if seen.disagreements(simplest, other, quantum if of_force else 0.0):
             continue
         # a difference barely above its own error may have any cause of that size
         if (quantum and of_force) or room < 0.1 * float(np.max(np.abs(other / stated - 1))):
             why = ", as GPU-type platforms keep it" if quantum else ""
             return [], [f"the {what} is the stated one in single precision{why}"]
-    _, stiffness, _ = seen.numbers(plainest)
+    _, stiffness, _ = seen.numbers(simplest)
     j, masses = seen.moving[0], seen.record.mass
     found = (stiffness or (math.nan,))[0]
     ratio = found / float(stated[j]) if stated[j] else math.inf
@@ -91,7 +90,7 @@ def stated_stiffness(
         f"{ratio:.9g} times as stiff as stated" if abs(ratio - 1) > 1e-6 else f"stiffer by {ratio - 1:+.1e}"
     )
     stiff = stiff if stated[j] else f"of stiffness {found:.9g} where 0 is stated"
-    cause = f"{title(plainest.scheme)}, but of a spring {stiff}"
+    cause = f"{title(simplest.scheme)}, but of a spring {stiff}"
     remedy = "look at the units of the force constant, and at whether V is k/2 q**2"
     cause = f"{cause}: {meaning}" if meaning else cause
     return [Explanation(cause, remedy, abs(ratio - 1))], against
@@ -116,8 +115,7 @@ def of_stated_stiffness(seen: Measured, precisions: dict[Joint, str], stated: Fl
 
 
 def nearest_stiffness(seen: Measured, joints: list[Joint], stated: Floats) -> list[Joint]:
-    """The hypotheses whose stiffness is nearest to the stated one, to within single precision and their
-    errors."""
+    """The hypotheses of the stiffness nearest to the stated one, to within single precision and errors."""
     off, room = {}, {}
     for joint in joints:
         _, stiffness, _ = seen.numbers(joint)
@@ -129,8 +127,7 @@ def nearest_stiffness(seen: Measured, joints: list[Joint], stated: Floats) -> li
 
 
 def _single_constants(record: Record, stated: Floats, stride: int) -> list[tuple[str, Floats, bool]]:
-    """Constants that may be in single precision: name, apparent stiffness, and whether the force has the
-    constant."""
+    """Constants that may be in single precision: name, apparent stiffness, whether the force has it."""
     with np.errstate(all="ignore"):
         single = stated.astype(np.float32).astype(np.float64)
         h = float(record.interval) / stride

@@ -102,8 +102,7 @@ def _even(t: Floats, interval: np.longdouble, quantum: float) -> bool:
 
 
 def _added(t: Floats, interval: np.longdouble, quantum: float) -> np.longdouble | None:
-    """Interval of a clock t += h that gives t to the last bit; None where no step h does.  `quantum` is the
-    rounding of t [T]."""
+    """Interval of a clock t += h that gives t, rounded to `quantum` [T], to the last bit; or None."""
     width = _width(t, quantum)
     times = t.astype(width)
     for steps, h in _steps(t, float(interval), quantum):

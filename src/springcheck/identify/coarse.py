@@ -156,8 +156,7 @@ def _kinematic(record: Record, j: int, found: Map, match: Match) -> tuple[str, s
 
 
 OUTLIER = 6.0
-"""Largest rounding error relative to the root mean square of its neighbours: 1.7 of uniform errors, 4 of
-normal ones."""
+"""Largest rounding error relative to the root mean square of its neighbours: 1.7 if uniform, 4 if normal."""
 
 LAGS = range(2, 26)
 """Lags of the autocorrelation, up to a quarter of the frames; in some schemes neighbours share a force."""
@@ -314,7 +313,7 @@ def _reproduced(record: Record, j: int, found: Map, match: Match, precision: str
     size = np.sqrt(np.mean(rows**2, axis=1, keepdims=True)) + 2.0**-52 * np.max(np.abs(q))
     scale = np.broadcast_to(1 / size, rows.shape).ravel()
     slope = (missed(start + shift, exact) - missed(start - shift, exact))[0] / (2 * shift) * scale
-    # what another stiffness takes away is explained without any quantum
+    # residuals of another stiffness need no quantum
     inverse = (slope / (slope @ slope))[:, None]
     plain = start - missed(start, exact) * scale @ inverse
     without = missed(plain, exact) * scale
@@ -336,7 +335,7 @@ def _reproduced(record: Record, j: int, found: Map, match: Match, precision: str
         for _ in range(REFINED):
             left = missed(values, cut, leaps=leaps) * scale
             share = np.sqrt(np.mean(left**2, axis=1)) / before
-            # of one miss alone any stiffness leaves nothing
+            # a single residual vanishes at some stiffness
             if np.any((share <= EXPLAINED) & (share**counted <= CHANCE)):
                 return True
             values = values - left @ inverse

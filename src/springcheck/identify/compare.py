@@ -31,7 +31,7 @@ COARSE_ERROR = 1e-9
 
 
 class Target:
-    """A measured map with the covariance of its entries: of the fit, the scale of the velocities, and biased
+    """A measured map with the covariance of its entries: of the fit, the scale of velocities, biased
     forces."""
 
     def __init__(self, found: Map, terms: Terms) -> None:
@@ -151,7 +151,7 @@ def solved(
         if every_turn:
             # one number of turns, to the left or right and on each branch of a scheme, is several springs
             key += tuple(f"{float(y):.6g}" for y in values[:2, i])
-        # a free scale of velocities lets steps of several lengths fit: the shortest is the plainest
+        # a free scale of velocities lets steps of several lengths fit: the shortest is the simplest
         close = abs(float(values[0, i])) if free[-1] == 2 and freedom <= 2 else float(chi2[i])
         turns = float(roots.turns[x.root[i]])
         rank = (0.0 if far else turns), close, i

@@ -63,8 +63,7 @@ TUNING_STEPS = 12
 """Most Gauss-Newton steps for a frequency: three or four converge."""
 
 STARTS_BESIDE, FEW_FRAMES = 6, 2000
-"""Starting values on either side, a quarter turn over the run apart, and most frames for which they are
-tried."""
+"""Starting values on either side, a quarter turn over the run apart, and most frames that have them."""
 
 
 def _best(z: Floats, carrier: Floats, turn: float) -> tuple[float, Floats]:

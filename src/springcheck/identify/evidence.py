@@ -35,8 +35,7 @@ SINGLE_ROOM = 8 * 2.0**-24
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Measured:
-    """The oscillators of a record that can be judged: their maps, the terms of comparison, and what is
-    stated."""
+    """The oscillators of a record that can be judged: their maps, terms of comparison, and what is stated."""
 
     record: Record
     moving: list[int]

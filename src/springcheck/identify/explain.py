@@ -105,14 +105,13 @@ def _drift(e: Evidence) -> Explanation | None:
 
 
 def _law(e: Evidence) -> Explanation:
-    """The force law that explains the residuals with the fewest parameters, or the laws that are not told
-    apart."""
+    """The force law that explains the residuals with the fewest parameters, or those not told apart."""
     tried = [regression(e, law) for law in laws.LAWS]
     of = {x.law: x for x in tried}
     constant, powers, counted = of[laws.CONSTANT], of[laws.POWERS], of[laws.CONSTANT].counted
     shown = [x for x in tried if x.shows]
     if constant in shown and constant.left < laws.EXPLAINS:
-        # what a constant explains shows nothing of what has one beside it
+        # where a constant explains the residuals, a law has to explain more than it
         shown = [x for x in shown if x is constant or 2 * x.left < constant.left]
     fitting = [x for x in shown if x.left < laws.EXPLAINS]
     if not fitting:
@@ -126,8 +125,7 @@ def _law(e: Evidence) -> Explanation:
     first = good[0]
     untried = counted < FEWEST_MISSES or (first.law.waves and powers not in shown)
     if untried and FALLS * first.left > 1 and first is not constant:
-        # what explains a part, a frequency that was looked for above all, may stand for what so few pairs
-        # cannot show
+        # a law that explains a part, above all at a fitted frequency, may stand for one of more parameters
         return _too_few(e, counted)
     if any(x.law.kind == laws.ANHARMONIC for x in good):
         # a wave that is in step with the motion to a share of a turn over the run is its own power

@@ -29,16 +29,13 @@ CONSTANT_SHOWS = 50.0
 Gaussian: at 25, five standard errors, one file in 700 has a spurious equilibrium."""
 
 CONSTANT_LIKELY = 10.0
-"""The same gain for coarse files, where a missing constant is a bias and a superfluous one only widens
-errors."""
+"""The same gain for coarse files, where a missing constant is a bias, a superfluous one widens errors."""
 
 FLOOR = 1 / 8
-"""Smallest standard error of one component relative to the other's: text resolves a number near zero
-arbitrarily finely."""
+"""Smallest standard error of one component relative to the other's: text has a fine zero."""
 
 LEAST_LEFT = 1 / 16
-"""Lower bound on the mean square residual, in squares of a state's unit roundoff: exact numbers leave
-less."""
+"""Lower bound on the mean square residual, in squares of the unit roundoff: exact numbers leave less."""
 
 ENOUGH = 8
 """Degrees of freedom below which residuals may be small by chance, so that the lower bound on their mean
@@ -48,8 +45,7 @@ LEAST_NOISE = 1e-30
 """Smallest standard deviation of a pair, relative to the largest."""
 
 CERTAIN = 14.0
-"""Log of the likelihood ratio from which one of two noise models is chosen: wrong with a probability of
-exp(-14)."""
+"""Log of the likelihood ratio from which one of two noise models is chosen."""
 
 FEWEST_UNEVEN = 20
 """Residuals up to which the effect of an uneven clock is not fitted."""
@@ -58,8 +54,7 @@ CLEAN = 100.0
 """Largest mean square residual, relative to its expectation, that may still be rounding."""
 
 KURTOSIS = 0.8
-"""Variance of the square of a uniform error, relative to its mean squared: chi-squared of n has a variance of
-0.8 n."""
+"""Variance of the square of a uniform error over its mean squared: chi-squared of n varies by 0.8 n."""
 
 CHANCE = 1e-6
 """Probability of fitting a constant part that is not there."""
@@ -303,8 +298,7 @@ def fit(record: Record, j: int, *, kept: NDArray[np.bool_] | None = None, consta
 
 
 def _least(freedom: int) -> float:
-    """Lower bound on the mean square residual of so many degrees of freedom, in squares of the unit
-    roundoff."""
+    """Lower bound on the mean square residual by the degrees of freedom, in squares of the unit roundoff."""
     return max(LEAST_LEFT, min(1.0, ENOUGH / max(freedom, 1)))
 
 
@@ -321,8 +315,7 @@ def _lengths(z: Extended, centre: Extended | Floats) -> Floats:
 def _constant_part(
     z: Extended, sigma: Floats, process: Floats, start: _Solution | None, record: Record, constant: bool
 ) -> tuple[_Solution, int, Extended | None]:
-    """Solution with the smallest constant part that explains the states (`centred`), and the deviations if
-    fitted."""
+    """Solution with the smallest sufficient constant part (`centred`), and the deviations if fitted."""
     from scipy.special import fdtri
 
     numbers, deviations, centred = 2 * len(process), None, 0

@@ -27,8 +27,7 @@ NEAR = 1e-11, 30.0
 errors: what Gauss-Newton in double precision leaves of the right family."""
 
 FAR = 3.0
-"""Distance of the entries beyond which a guess is dropped, before Gauss-Newton converges or where the nearest
-family is wanted."""
+"""Distance of the entries beyond which a guess is dropped before Gauss-Newton converges."""
 
 CURVED, QUOTIENT, FARTHEST = 30.0, 1e-5, 0.3
 """Residual after a Gauss-Newton step of length d of a family that converges: at most `CURVED` d**2 (8.4 was
@@ -319,7 +318,7 @@ def polished(every: MapTable, roots: Roots, x: Guesses, *, free_scale: bool, far
         size = _entry_sizes(wanted, roots, x)
         r = left(x.a, x.g, wanted, size)
         off = np.max(np.abs(r), axis=0)
-        # what is left over after a short step is its square and no more, or does not go away
+        # after a short step the residual is of the order of its square, or Gauss-Newton does not converge
         short = np.where(length < FARTHEST, CURVED * length**2 + QUOTIENT * length, FAR)
         keep = np.flatnonzero(off <= (FAR if far else bound + (short if turn < rounds else 0.0)))
         x, length = x[keep], length[keep]
@@ -352,16 +351,14 @@ def _entry_sizes(wanted: Floats, roots: Roots, x: Guesses) -> Floats:
 
 
 def _compared(m: Floats, *, free_scale: bool) -> Floats:
-    """Entries (4, c) of matrices (c, 2, 2), or with `free_scale` the invariants (3, c) under a scaling of
-    velocities."""
+    """Entries (4, c) of matrices (c, 2, 2); with `free_scale` invariants (3, c) under scaled velocities."""
     if free_scale:
         return np.stack([m[:, 0, 0], m[:, 0, 1] * m[:, 1, 0], m[:, 1, 1]])
     return np.stack([m[:, 0, 0], m[:, 0, 1], m[:, 1, 0], m[:, 1, 1]])
 
 
 def least_squares(slopes: Floats, right: Floats) -> tuple[Floats, Floats]:
-    """Solutions (k, c) of c least-squares problems with derivatives (k, m, c) and right sides (m, c), and
-    variances."""
+    """Solutions (k, c) of c least-squares problems with derivatives (k, m, c), values (m, c); variances."""
     square = np.einsum("imc,jmc->cij", slopes, slopes)
     size = np.sqrt(np.einsum("cii->ci", square)) + 1e-300
     even = square / size[:, :, None] / size[:, None, :] + 1e-13 * np.eye(len(slopes))

@@ -48,8 +48,7 @@ class Terms:
     rounding: float = ROUNDING
     """Unit roundoff of the coefficients."""
     bias: float = 0.0
-    """Bias of the entries, in units of the residual, that no number of pairs averages away, as of forces that
-    are truncated."""
+    """Bias of the entries by truncated forces, in units of the residual, which pairs do not average away."""
     scales: tuple[float, ...] = ()
     """Log of the scale of the velocities at each stride from 0 on, where step or mass are rounded."""
     growing: bool = False
@@ -195,7 +194,7 @@ def frictionless(name: str) -> tuple[str, ...]:
 
 
 def likely(joints: list[Joint]) -> list[Joint]:
-    """Hypotheses within five standard errors of the best, each once, the plainest first."""
+    """Hypotheses within five standard errors of the best, each once, the simplest first."""
     if not joints:
         return []
     best = min(x.chi2 for x in joints)

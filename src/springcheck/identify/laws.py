@@ -34,8 +34,7 @@ class Cause:
     """A force beside the linear spring's, as columns (f - 1,) of the state and of time."""
 
     kind: str
-    """What the force does, as a phrase; laws of one kind are one cause where the states do not distinguish
-    them."""
+    """What the force does, as a phrase; laws of one kind that are not told apart are one cause."""
     columns: Callable[[Evidence], list[Floats]]
     """The columns; NaN for pairs to which the law does not apply."""
     waves: bool = False
@@ -78,7 +77,7 @@ class Regression:
         """Whether enough pairs follow the law, or follow it closely enough, to exclude chance."""
         spare = self.counted - self.parameters
         if self.exact and not self.law.flexible:
-            # every pair beside those that columns alone explain is one that chance would have missed
+            # each pair beyond the number of columns would have a residual if the law were wrong
             spare = self.above - self.rank
         # as many columns as pairs leave nothing in any case
         closely = spare > 0 and self.pairs > self.rank and self.left**spare < CHANCE
@@ -107,7 +106,7 @@ def regression(e: Evidence, law: Cause) -> Regression:
     left = missing - every / size @ x
     rounding = (LEFT_BY_ROUNDING * e.weight * e.unit)[kept, None]
     if not np.all(kept):
-        # a pair of which a law says nothing is not explained by it: the map is that of the others
+        # residuals are those of a map of the pairs to which the law applies
         own = every[:, : len(e.linear)]
         missing = missing - own @ np.linalg.lstsq(own, missing)[0]
     square, above = np.sum(missing**2, axis=1), np.any(np.abs(missing) > FALLS * rounding, axis=1)

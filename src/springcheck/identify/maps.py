@@ -131,8 +131,7 @@ class MapTable:
         return _rational(over, under, a, g * inside)
 
     def sums(self, which: Integers, a: Reals, g: Reals) -> Reals:
-        """Sums (c, 2, 2) of the absolute values of all terms of a step, to which its roundings are
-        relative."""
+        """Sums (c, 2, 2) of the absolute values of all terms of a step, which bound its roundings."""
         out = np.zeros((2, 2, len(a)))
         out[0, 0] = out[1, 1] = 1
         for kind, members in self.kinds:

@@ -92,8 +92,7 @@ def _wrapped(record: Record, j: int) -> Iterator[Repair]:
 
 
 def unsorted(record: Record) -> Explanation | None:
-    """Velocities in the wrong columns of every frame, if one map fits each coordinate once they are
-    sorted."""
+    """Velocities in the wrong columns of every frame, if one map fits each once they are sorted."""
     each = np.array(record.moving)
     if not 1 < len(each) <= MOST_COMPARED:
         return None

@@ -78,7 +78,7 @@ def named(seen: Measured, explained: Explained, step: float | None) -> Identific
     faults = faults_of(seen, friction) if found.explanations and found.candidates else []
     if not faults:
         return found
-    # a scheme on another spring, or a wrong one on the stated spring: the latter is the plainer
+    # a scheme on another spring, or a wrong one on the stated spring: the latter is the simpler
     other = [x.cause for x in found.explanations if ": " in x.cause]
     return found.refuted("; or ".join([faults[0].cause, *other]), *faults, *found.explanations)
 
@@ -92,12 +92,12 @@ def _shows_law(seen: Measured, joint: Joint) -> bool:
 def _known(seen: Measured, explained: Explained, stated_fits: bool) -> Identification:
     """Identification by these hypotheses and the defects of their steps."""
     joints, maps, notes = list(explained), seen.maps, list(seen.notes)
-    plainest = joints[0]
+    simplest = joints[0]
     worst = [max(ds, key=lambda d: (d.precision != "double", d.ulp)) for ds in explained.values()]
-    notes += dict.fromkeys(d.note for d in explained[plainest] if d.note)
+    notes += dict.fromkeys(d.note for d in explained[simplest] if d.note)
     explanations: list[Explanation] = []
     if seen.stiffness is not None:
-        explanations, remarks = stated_stiffness(seen, plainest, worst[0].precision, seen.stiffness)
+        explanations, remarks = stated_stiffness(seen, simplest, worst[0].precision, seen.stiffness)
         notes += remarks
         stated_fits = stated_fits and not explanations
     candidates = tuple(x for joint in joints for x in candidates_of(seen, joint))
@@ -115,11 +115,11 @@ def _known(seen: Measured, explained: Explained, stated_fits: bool) -> Identific
     law = f" with{doubt} friction" if damped else ""
     law = f" with {first.law}" if first.law and len(candidates) == 1 else law
     if scheme == "held-force":
-        kicks = plainest.substeps[1]
+        kicks = simplest.substeps[1]
         order = "kick, then drift" if kicks else "drift, then kick"
-        statement = f"{held_over(plainest)} ({order}){steps}"
-        if plainest.endless:
-            # coarse numbers do not tell many substeps from no end of them, which is a fault
+        statement = f"{held_over(simplest)} ({order}){steps}"
+        if simplest.endless:
+            # coarse numbers do not tell many substeps from infinitely many, which is a fault
             statement, scheme = f"{statement}, or {FAMILIES['fault: old force'].cause}", None
     elif scheme:
         also = f" (or {LEAPFROG[scheme]})" if scheme in LEAPFROG else ""
@@ -129,7 +129,7 @@ def _known(seen: Measured, explained: Explained, stated_fits: bool) -> Identific
     else:
         names = few(list(dict.fromkeys(x.scheme for x in candidates)), MOST_TITLES)
         statement = f"Several schemes fit, which the states do not tell apart: {names}"
-    undecided = any(not d.certain for d in explained[plainest]) and stated_fits
+    undecided = any(not d.certain for d in explained[simplest]) and stated_fits
     if undecided:
         statement = (
             f"{titles(x.scheme for x in candidates)}{law}{steps}, and errors of the force of the size of "
@@ -148,7 +148,7 @@ def _known(seen: Measured, explained: Explained, stated_fits: bool) -> Identific
         precision=precision,
         fits=stated_fits and not undecided,
         undecided=undecided,
-        difference=difference(maps[0], plainest.parts[0]) if len(joints) == 1 else (math.nan,) * 4,
+        difference=difference(maps[0], simplest.parts[0]) if len(joints) == 1 else (math.nan,) * 4,
         notes=tuple(dict.fromkeys(notes)),
         explanations=tuple(explanations),
     )

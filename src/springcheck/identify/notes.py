@@ -22,8 +22,7 @@ from springcheck.identify.search import coincident, identical
 from springcheck.text.wording import count, either
 
 APART = 10.0
-"""Standard errors between two schemes that are always told apart: five to exclude one, and five for
-chance."""
+"""Standard errors between schemes that are always told apart: five to exclude one, five for chance."""
 
 MOST_DIGITS = 9
 """Most additional digits that are asked for, those of double over single precision."""
@@ -90,7 +89,7 @@ def beside_unknown(record: Record, found: Identification, *, stated: bool, seen:
     """
     few = found.scheme or any(x.stride <= CERTAIN_STEPS for x in found.candidates)
     clear = record.jitter < DEEP
-    # what lies between two schemes that the numbers do not tell apart they do not exclude either
+    # numbers that do not separate two schemes do not exclude an unknown one between them
     one = found.scheme and len({x.stride for x in found.candidates}) == 1
     near = not (one and seen) or any(x.scheme == "exact" for x in found.candidates)
     certain = stated or found.stride == 1 or (record.deep and clear and few) or found.scheme == "exact"
@@ -195,19 +194,19 @@ def same_maps(seen: Measured, joint: Joint) -> list[str]:
 
 def untold(seen: Measured, joints: list[Joint]) -> list[str]:
     """Why several schemes or numbers of steps remain, and what further data would distinguish them."""
-    plainest, record = joints[0], seen.record
-    if plainest.scheme == "exact":
+    simplest, record = joints[0], seen.record
+    if simplest.scheme == "exact":
         why = "no error of a step is visible: fine steps of many schemes come as near to the exact flow"
         told = ["more digits", "a larger step"]
     else:
-        others = [x for x in joints[1:] if (x.scheme, x.stride) != (plainest.scheme, plainest.stride)]
-        apart = ((separation(seen, plainest, x), x) for x in others)
+        others = [x for x in joints[1:] if (x.scheme, x.stride) != (simplest.scheme, simplest.stride)]
+        apart = ((separation(seen, simplest, x), x) for x in others)
         least, nearest = min(apart, key=lambda pair: pair[0])
         digits = math.ceil(math.log10(APART / least)) if least > 0 else MOST_DIGITS + 1
-        pair = f"the data cannot tell these apart: the maps of {plainest} and {nearest}"
-        if digits > MOST_DIGITS or identical(plainest, nearest, free_scale=record.momenta):
+        pair = f"the data cannot tell these apart: the maps of {simplest} and {nearest}"
+        if digits > MOST_DIGITS or identical(simplest, nearest, free_scale=record.momenta):
             other = "mass" if record.momenta else "stiffness"
-            friction = " and friction" if plainest.damped or nearest.damped else ""
+            friction = " and friction" if simplest.damped or nearest.damped else ""
             why, told = f"{pair} are the same, on springs of different {other}{friction}", []
         else:
             why = f"{pair} are {least:.1g} standard errors of the numbers' rounding from each other"
@@ -215,7 +214,7 @@ def untold(seen: Measured, joints: list[Joint]) -> list[str]:
             told += ["more frames"] if digits <= 2 else []
     if record.momenta:
         told.append("the mass")
-    elif seen.stiffness is None and any(_stiffer(x, plainest) for x in joints):
+    elif seen.stiffness is None and any(_stiffer(x, simplest) for x in joints):
         told.append(f"the {'mass and the ' * (record.mass is None)}stiffness, where known: they differ in it")
     return [why, *([f"what would tell them apart: {either(told)}"] if told else [])]
 

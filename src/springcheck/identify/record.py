@@ -74,8 +74,7 @@ class Record:
 
     @property
     def deep(self) -> bool:
-        """Whether the states resolve roundings of single precision: double precision, or text of as many
-        digits."""
+        """Whether the states resolve single precision's roundings: `fine`, or text of enough digits."""
         pairs = ((self.q, self.q_quantum), (self.v, self.v_quantum))
         return self.fine or all(
             bool(np.max(quantum) <= DEEP * np.max(np.abs(x))) and x_storage.name not in BINARY
@@ -130,8 +129,7 @@ def of_size(name: str, x: ArrayLike | None, n: int = 1, *, zero: bool = False) -
 def read(
     t: ArrayLike, q: ArrayLike, p: ArrayLike | None, v: ArrayLike | None, mass: ArrayLike | None
 ) -> Record:
-    """Record of times (f,), positions, and momenta or velocities or both (f, n).  Raises
-    IdentificationError."""
+    """Record of times (f,), positions, and momenta or velocities (f, n).  Raises IdentificationError."""
     times = np.asarray(t, dtype=np.float64)
     if times.ndim != 1 or not np.all(np.isfinite(times)):
         raise IdentificationError(f"times must be one row of finite numbers; found shape {np.shape(t)}")

@@ -16,11 +16,11 @@ import numpy as np
 
 from springcheck.identify.coarse import is_white
 from springcheck.identify.compare import Target, solved
-from springcheck.identify.coupled import least_squares
 from springcheck.identify.families import Family
 from springcheck.identify.guesses import FLOW_TURNS, Guesses, Roots, first
 from springcheck.identify.hypothesis import ERRORS, Match, Terms, distinct
 from springcheck.identify.maps import MapTable, table, unit
+from springcheck.identify.noise import least_squares
 from springcheck.identify.record import Record
 from springcheck.identify.storage import ROUNDING
 from springcheck.physics.arrays import Extended, Floats, Reals

@@ -68,7 +68,7 @@ def _of_states(t: Any, q: Any, p: Any, v: Any, *, mass: ArrayLike | None, **stat
         if in_a_bath := of_bath(t, q, p, v, mass, **stated):
             return in_a_bath
         raise
-    # noise is not looked for where a scheme, or a mistake in the record, explains the states
+    # noise is sought only where neither a scheme nor a mistake in the record explains the states
     local = any(x.local for x in found.explanations)
     return found if found.candidates or local else explained(found, t, q, p, v, mass, **stated)
 
@@ -113,7 +113,7 @@ def _unknown(seen: Measured, strides: range) -> Identification:
     tried = nearest(maps, seen.terms, distinct(damped=False), strides)
     if tried and not turned(seen.record, seen.moving):
         least = min(map(distance, tried))
-        # many schemes and strides come close by chance; the plainest of the close ones is the better guess
+        # many schemes and strides come close by chance; the simplest of the close ones is the better guess
         close = min((x for x in tried if distance(x) <= 10 * least), key=lambda x: x.simplicity)
         near = {"nearest": str(close), "difference": difference(maps[0], close.parts[0])}
         if not any(part.turns for part in close.parts):

@@ -93,16 +93,14 @@ class Identification:
     several schemes, the smallest."""
     precision: str = "unknown"
     fits: bool = False
-    """Whether a known scheme and arithmetic explain every step, and what is stated (mass, stiffness, step)
-    agrees."""
+    """Whether a known scheme and arithmetic explain every step, and all that is stated agrees."""
     undecided: bool = False
     """Whether the scheme is known, but errors of its force may be those of an arithmetic, noise, or
     systematic. `fits` is False then."""
     nearest: str | None = None
     """The scheme, or if none fits that of the closest map; None if several fit."""
     difference: tuple[float, ...] = (math.nan,) * 4
-    """Measured minus predicted entries M11, M12, M21, M22 on (q, v T) between frames, of the first
-    oscillator."""
+    """Measured minus predicted M11, M12, M21, M22 on (q, v T) between frames, of the first oscillator."""
     notes: tuple[str, ...]
     explanations: tuple[Explanation, ...] = ()
     """Causes if no scheme fits, or what is stated does not, the likeliest first."""

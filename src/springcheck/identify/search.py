@@ -35,8 +35,7 @@ ONE_MORE = 4.0
 """Decrease of chi-squared by one more unknown that is exceeded with a probability of 5 %."""
 
 PLAIN = 30.0
-"""Distance of the exact solution's map, in residuals, from which the truncation error of a scheme is
-visible."""
+"""Distance of the exact solution's map, in residuals, from which a scheme's truncation error is visible."""
 
 AS_NEAR = 1.5
 """Ratio of residuals up to which the arithmetic of one scheme explains those of another."""
@@ -74,8 +73,7 @@ def identical(one: Joint, other: Joint, *, free_scale: bool) -> bool:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trial:
-    """One round of the search: families, tolerances beside the standard errors, and ranges of strides in
-    turn."""
+    """One round of the search: families, tolerances beside standard errors, and ranges of strides."""
 
     damped: bool = False
     rounding: float = ROUNDING
@@ -115,7 +113,7 @@ def accounted(seen: Measured) -> tuple[Measured, Explained, bool]:
                 "the first step has the friction of the first velocity: none is half a step old"
             )
     if found and seen.stiffness is not None and not (fine or any(_agrees(way, x) for x in found)):
-        # friction, or an equilibrium beside 0, is as plain as another spring than the stated one
+        # friction, or an equilibrium beside 0, is as simple as another spring than the stated one
         ways = ((x, damped) for x in (way, apart) for damped in (False, True))
         for other, damped in ways:
             of_stated = (x for x in other.compare(distinct(damped=damped), FEW) if _agrees(other, x))
@@ -124,7 +122,7 @@ def accounted(seen: Measured) -> tuple[Measured, Explained, bool]:
                 break
     found = _or_elsewhere(way, found)
     if not _of_few_steps(found):
-        # few steps, one of them rounded, are plainer than many
+        # few steps, one of them rounded, are simpler than many
         joints, remark = _single_parameters(way)
         if rounded := explained(way, joints):
             way, found = way.noting(remark), rounded
@@ -148,19 +146,19 @@ def _or_elsewhere(seen: Measured, found: Explained) -> Explained:
         return explained(seen, likely(joints))
 
     if not _of_few_steps(found):
-        # of many steps, which a numerous family has, nothing is plainer than few of a scheme elsewhere
+        # few steps of a scheme elsewhere are simpler than many of one in the catalogue
         return {**elsewhere(FEW), **found}
     if seen.stride is not None or seen.stiffness is not None:
         right = {x.scheme for x in found if _agrees(seen, x)}
         if right and (seen.record.fine or (seen.stride is None and len(right - {"exact"}) == 1)):
             return found
-        # what is stated tells more than that the step is a simple one
+        # agreement with what is stated counts more than a simple scheme
         others = elsewhere(FEW if seen.stride is None else range(seen.stride, seen.stride + 1))
         others = {x: ds for x, ds in others.items() if _agrees(seen, x)}
         return {**(found if right or not others else {}), **others}
     if seen.record.fine:
         return found
-    # what coarse numbers do not tell apart they do not tell from a scheme elsewhere either
+    # coarse numbers that leave several schemes leave schemes elsewhere too
     alone = len({(x.scheme, x.stride) for x in found}) == 1
     strides = range(1, min(x.stride for x in found)) if alone else FEW
     others = {**found, **(elsewhere(strides) if strides else {})}

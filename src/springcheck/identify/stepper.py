@@ -34,8 +34,7 @@ BATH_FRAMES = 4001
 """Frames of a stepper that draws random numbers: its kT is then known to 10 %."""
 
 TINY_STEP = 1e-6, 1e-3
-"""A step so small that only the terms linear in h count, and the tolerance of their sums of weights, which
-are 1."""
+"""A step whose higher powers vanish, and the tolerance of the weights' sums, which are 1."""
 
 RUNAWAY = 1e5
 """Growth of a state at which a run ends."""
@@ -339,8 +338,7 @@ def _backwards(step: Stepper, found: Identification) -> list[Explanation]:
 
 
 def _order(step: Stepper) -> tuple[float, float]:
-    """Slope of log error against log step on a quartic potential, with its standard error; NaN where none
-    shows."""
+    """Slope of log error over log step on a quartic potential, with its standard error; or NaN."""
     m, _, q0, p0, duration = WELL
     true_q, true_p = (float(x[0, 0]) for x in true_motion(_well(duration), np.array([1]), duration))
     steps, errors = [], []

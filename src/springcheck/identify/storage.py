@@ -31,8 +31,7 @@ DIGITS_OF_SINGLE = 7
 """Significant decimal digits that a number of single precision has: more of them only rewrite it."""
 
 BY_CHANCE = 1e-6
-"""Probability that decimal text lies so near to numbers of single precision by chance, below which it is
-single."""
+"""Probability of a coincidence of numbers below which their format is certain."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -26,8 +26,7 @@ ORDERS = range(1, 9)
 """Powers of h L among which the first wrong coefficient is sought."""
 
 FORGOTTEN = 0.1
-"""Largest residual in the last three quarters of the frames, relative to the largest of all, of a start-up
-transient."""
+"""Largest residual in the last three quarters of the frames over the largest, of a start-up transient."""
 
 CHOSEN = 1200
 """Common denominator of the parameters that people choose."""
@@ -233,8 +232,7 @@ def _many_steps(*rows: Floats) -> Floats:
 
 
 def _adams(*sigma: int, corrector: tuple[int, ...] = ()) -> Callable[[Floats], Floats]:
-    """Adams' method of these weights over their sum, the newest first; alone, or as a corrector's predictor
-    (PECE)."""
+    """Adams' method of these weights over their sum, the newest first; or a corrector's predictor (PECE)."""
     weights, last = np.array(sigma) / sum(sigma), np.eye(len(sigma))[1]
     rho = np.eye(len(sigma))[0] - last
     if not corrector:

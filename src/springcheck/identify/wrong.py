@@ -170,8 +170,7 @@ def _scales(e: Evidence) -> tuple[list[Explanation], bool]:
 
 
 def _meaning(e: Evidence, x: Joint) -> tuple[bool, str, str] | None:
-    """Whether a scale of the velocities agrees with the stated stiffness, its meaning, and what to do; None
-    without a meaning."""
+    """Agreement of a velocity scale with the stated stiffness, its meaning, what to do; None without one."""
     part = x.parts[0]
     scale = math.exp(-part.log_mass)
     known = 6 * (part.mass_error + part.a_error / abs(part.a)) + e.record.jitter + 32 * ROUNDING
