@@ -21,7 +21,7 @@ from springcheck.identify.compare import compare
 from springcheck.identify.evidence import AGREES, Evidence
 from springcheck.identify.families import MOST_TITLES
 from springcheck.identify.fit import fit
-from springcheck.identify.hypothesis import FEW, Match, distinct
+from springcheck.identify.hypothesis import FEW, SURE, Match, distinct
 from springcheck.physics.arrays import Extended, Floats
 from springcheck.physics.driven import CLOCK
 from springcheck.physics.scene import Scene
@@ -189,7 +189,7 @@ def _response(e: Evidence, match: Match, turn: float) -> NDArray[np.complex128] 
     """Response b to a force cos(w t), in the units of the map: a frame from rest, by the scheme with a clock.
     None for a scheme that is not one-step, or that has a friction stage without friction."""
     law = scheme(match.scheme)
-    if not law.has("one-step") or (law.has("friction") and match.friction <= 6 * match.g_error):
+    if not law.has("one-step") or (law.has("friction") and match.friction <= SURE * match.g_error):
         # without friction such a scheme is one without a stage for it
         return None
     h = float(e.record.interval) / match.stride

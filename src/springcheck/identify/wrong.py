@@ -86,7 +86,7 @@ def _rank(e: Evidence, joint: Joint) -> int:
     if (stated := e.stated) is None:
         return 0 if joint.stride == 1 else 2
     part = joint.parts[0]
-    room = 1e-7 + 6 * part.a_error / abs(part.a)
+    room = 1e-7 + part.a_room
     return 0 if abs(part.a * joint.stride**2 - stated) <= room * abs(stated) else 3
 
 
@@ -134,7 +134,7 @@ def _scales(e: Evidence) -> tuple[list[Explanation], bool]:
     if e.terms.mass_unknown:
         return [], False
     fitting = compare([e.found], [replace(e.terms, mass_unknown=True)], distinct(damped=False), range(1, 4))
-    fitting = [x for x in fitting if abs(x.parts[0].log_mass) > 6 * x.parts[0].mass_error + 4 * ROUNDING]
+    fitting = [x for x in fitting if abs(x.parts[0].log_mass) > SURE * x.parts[0].mass_error + 4 * ROUNDING]
     of_stated = [x for x in fitting if e.stated is not None and _rank(e, x) == 0]
     fitting = of_stated or fitting
     meant = [(x, *meaning) for x in fitting if (meaning := _meaning(e, x))]
@@ -173,7 +173,7 @@ def _meaning(e: Evidence, x: Joint) -> tuple[bool, str, str] | None:
     """Agreement of a velocity scale with the stated stiffness, its meaning, what to do; None without one."""
     part = x.parts[0]
     scale = math.exp(-part.log_mass)
-    known = 6 * (part.mass_error + part.a_error / abs(part.a)) + e.record.jitter + 32 * ROUNDING
+    known = SURE * part.mass_error + part.a_room + e.record.jitter + 32 * ROUNDING
     h = float(e.record.interval) / x.stride
     mass = math.nan if e.record.mass is None else float(e.record.mass[e.j])
     stiffer = part.a * x.stride**2 / e.stated if e.stated else math.nan
