@@ -18,7 +18,7 @@ BUDGETS = {
     ("engines",): 2825,
     ("driver", "conformance", "doors"): 1257,
     ("checks",): 5071,
-    ("identify",): 8693,
+    ("identify",): 8629,
     ("formats", "store"): 5261,
     ("studies",): 1477,
     ("studies/*",): 9800,

@@ -127,3 +127,35 @@ def test_few_frames_of_text_exclude_no_scheme() -> None:
     assert case.v is not None
     with pytest.raises(IdentificationError, match=r"give [0-9]+ frames or more that show it"):
         identify(case.t, case.q, v=1.5 * case.v, mass=case.stated["mass"])
+
+
+def test_a_kick_in_six_frames_leaves_its_cause_open() -> None:
+    """Powers of the state with as many coefficients as there are pairs of frames explain anything."""
+    q, v, h, frames = 14.2, 3.1, 0.242, []
+    for i in range(46):
+        if i % 9 == 0:
+            frames.append((q, v))
+        if i == 22:
+            v *= 1 + 2.2e-9
+        v -= h / 2 * (q - 15.5)
+        q += h * v
+        v -= h / 2 * (q - 15.5)
+    q_, v_ = np.array(frames).T
+    found = identify(9 * h * np.arange(6), q_, v=v_, mass=1.0)
+    assert found.statement.startswith("What one map leaves over")
+    assert found.statement.endswith("too few to show its cause")
+
+
+def test_a_motion_that_dies_in_a_few_frames_of_many_is_not_interrupted_by_these() -> None:
+    """The frames at rest make no motion from which the others could depart."""
+    q, v, h, k, frames = 0.9, 0.4, 1.36, 1.0, []
+    for i in range(153):
+        if i % 8 == 0:
+            frames.append((q, v))
+        pull = k * (1 + 8.4e-7 * ((q + 0.156) / 1.2) ** 2)
+        v = (v - h * pull * (q + 0.156)) / (1 + h * h * pull)
+        q += h * v + 1.5e-11
+    q_, v_ = np.array(frames).T
+    found = identify(8 * h * np.arange(20), q_, v=v_, mass=1.0, stiffness=k)
+    assert not found.fits
+    assert "The motion is one" not in found.statement

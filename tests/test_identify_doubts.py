@@ -682,3 +682,21 @@ def test_what_a_sum_of_slopes_rounds_is_no_room_for_other_schemes(share: float, 
     q, v = frames(rows, h, count=count)
     found = identify(h * np.arange(count + 1), q, v=v, mass=M)
     assert found.scheme == "rk4"
+
+
+@pytest.mark.parametrize(("every", "decimals"), [(1, 3), (4, 6)])
+def test_fixed_decimals_of_a_motion_that_grows_beyond_the_digits_of_double_precision(
+    every: int, decimals: int
+) -> None:
+    """Numbers from 1 to 1e13: the small ones are rounded to their decimals, the large ones to 53 bits."""
+    q, v, rows = 1.0, 0.5, []
+    for _ in range(700):
+        rows.append((q, v))
+        q, v = q + 0.3 * v, v - 0.3 * q
+    written = np.array([[float(f"{x:.{decimals}f}") for x in row] for row in rows[::every]])
+    assert np.max(np.abs(written)) * 2.0**-52 > 10.0**-decimals
+    found = identify(0.3 * every * np.arange(len(written)), written[:, 0], v=written[:, 1], mass=1.0)
+    assert (found.scheme, found.stride, found.fits) == ("explicit-euler", every, True)
+    assert found.precision == f"text, {decimals} decimals"
+    exact = np.array(rows[::every])
+    assert storage(exact[:, 0]).name == "double"

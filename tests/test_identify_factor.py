@@ -9,7 +9,7 @@ import pytest
 
 import springcheck
 from springcheck import driver
-from springcheck.identify.factor import one_factor
+from springcheck.identify.thermal import one_factor
 from springcheck.physics.bath import Bath
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Quartic, Spring, WallSpring

@@ -1,4 +1,4 @@
-"""What the defect of single steps says of the arithmetic, once the scheme is known."""
+"""The arithmetic of a known scheme, from the defects of its single steps."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from springcheck.identify import coarse, quantised
+from springcheck.identify import coarse
 from springcheck.identify.families import FAMILIES, G_ROUNDING, substeps
 from springcheck.identify.fit import Map
 from springcheck.identify.hypothesis import SURE, Match
@@ -17,7 +17,7 @@ from springcheck.identify.record import Record
 from springcheck.physics.arrays import Extended, Floats, Integers
 
 REBUILT = 1 / 32, 1.0
-"""Range of the root mean square of a rebuilt velocity's error in units of what a step adds to it."""
+"""Range of the root mean square error of a rebuilt velocity, relative to the expected rounding."""
 
 REBUILT_NOTE = (
     "velocities carry the rounding of positions over the step: rebuilt as a difference of them, or of a "
@@ -27,23 +27,23 @@ REBUILT_NOTE = (
 STORED_IN_SINGLE = {
     True: "double, stored in single", False: "single", None: "single, or double stored in single",
 }  # fmt: skip
-"""The arithmetic of single-precision states, by whether they were rounded once; None: too few show it."""
+"""The arithmetic of states in single precision, by whether they were rounded once only; None if unknown."""
 
 EPSILON, SINGLE = 2.0**-52, 2.0**-24
-"""Unit in the last place of double precision, and unit roundoff of single."""
+"""Machine epsilon of double precision, and unit roundoff of single precision."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Defect:
-    """Largest residual of a step and the arithmetic that explains it.  `precision` is "" where none does."""
+    """Largest residual of a step, and the arithmetic that explains it; `precision` is "" where none does."""
 
     ulp: float
     precision: str
     note: str = ""
     miss: float = 0.0
-    """Largest residual, as a share of the state."""
+    """Largest residual relative to the state."""
     certain: bool = True
-    """Whether the arithmetic itself shows, and not only an error of its size."""
+    """Whether the arithmetic is identified, rather than an error of its size."""
 
 
 def _predicted(matches: list[Match]) -> Extended:
@@ -52,7 +52,7 @@ def _predicted(matches: list[Match]) -> Extended:
 
 
 def _numbers(matches: list[Match], kind: type[Any]) -> tuple[MapTable, Integers, Any]:
-    """The table of the matches' families, the number of each one's, and a, g, log of the mass and strides."""
+    """Table of the matches' families, the index of each, and rows of a, g, log of the mass, stride (4, c)."""
     families = tuple(FAMILIES[x] for x in dict.fromkeys(match.family for match in matches))
     which = np.array([families.index(FAMILIES[match.family]) for match in matches])
     rows = [(match.a, match.g, match.log_mass, match.stride) for match in matches]
@@ -62,7 +62,7 @@ def _numbers(matches: list[Match], kind: type[Any]) -> tuple[MapTable, Integers,
 def _maps(
     matches: list[Match], found: Map, *, between: bool, longer: Any = 0.0, a: Any = 0.0, g: Any = 0.0
 ) -> Extended:
-    """Maps (c, 2, 2) that matches predict `between` frames, or for one step, with the step lengthened by a
+    """Predicted maps (c, 2, 2) between frames, or of one step if not `between`, with a step longer by the
     share `longer`, and a and g increased."""
     every, which, (own_a, own_g, log_mass, stride) = _numbers(matches, np.longdouble)
     own_g = own_g + g
@@ -84,18 +84,18 @@ def _derivative(matches: list[Match], found: Map, name: str, *, between: bool = 
     return np.asarray((up - down) / (2 * d)[:, None, None])
 
 
-def _misses(matches: list[Match], found: Map, slips: Extended | None) -> Extended:
-    """Residuals (c, f - 1, 2): each frame minus the predicted step from the frame before, in the units of
-    `found`.  Steps follow the clock's `slips`."""
+def _residuals(matches: list[Match], found: Map, deviations: Extended | None) -> Extended:
+    """Residuals (c, f - 1, 2): each frame minus the prediction from the frame before, in the units of
+    `found`. Steps follow the `deviations` of the times."""
     out = found.z[1:] - found.z[:-1] @ np.swapaxes(_predicted(matches), 1, 2)
-    if slips is not None:
+    if deviations is not None:
         change = _derivative(matches, found, "longer")
-        out = out - slips[:, None] * (found.z[:-1] @ np.swapaxes(change, 1, 2))
+        out = out - deviations[:, None] * (found.z[:-1] @ np.swapaxes(change, 1, 2))
     return np.asarray(out)
 
 
 FREE = 1e6
-"""Multiple of the residuals by which the equilibrium may be elsewhere: the prior that leaves it free."""
+"""Prior standard deviation of the equilibrium, in units of the residuals: it is free."""
 
 
 def _refitted(
@@ -105,8 +105,8 @@ def _refitted(
     interval, by the rounding of the times; the equilibrium, of which each scheme has its own; and with
     `numbers` h w and the friction of each match.
 
-    A map is fitted with the rounding of whole states, so that its error in a small component may exceed that
-    component's own rounding.
+    The fit weights a pair by the size of the state, so that its error in a small component may exceed that
+    component's rounding.
     """
     b = _predicted(matches).astype(np.float64)
     z = found.z[:-1].astype(np.float64)
@@ -136,8 +136,8 @@ def _refitted(
 
 
 def _sums(matches: list[Match], found: Map) -> tuple[Floats, Floats]:
-    """Sums (c, 2, 2) of the absolute values of all terms that a step adds up, and those of a frame's first
-    step propagated to its end, in the units of `found`."""
+    """Sums (c, 2, 2) of the absolute values of all terms of a step, and those of a frame's first step
+    propagated to the frame's end, in the units of `found`."""
     every, which, (a, g, log_mass, stride) = _numbers(matches, np.float64)
     step = every.sums(which, a, g)
     first = step
@@ -150,18 +150,18 @@ def _sums(matches: list[Match], found: Map) -> tuple[Floats, Floats]:
 
 
 def _substeps(match: Match) -> int:
-    """Substeps of a step whose force is held, 1 of any other."""
+    """Number of substeps over which the force is held, else 1."""
     if not FAMILIES[match.family].held:
         return 1
-    return max(substeps(match.g, match.g_error + G_ROUNDING)[0], default=1)
+    return max(substeps(match.g, match.g_error)[0], default=1)
 
 
 def _unlike(record: Record, found: Map, matches: list[Match]) -> Floats:
-    """Bound (c, f - 1, 2) on the effect of unequal steps on a frame, of which the clock shows only the sum.
+    """Bound (c, f - 1, 2) on the effect of unequal steps within a frame, of which the times show only the
+    sum.
 
-    A step longer by a share d changes the map of s steps by d M**(s - 1 - i) M' M**i.  The effect of the sum
-    of all d is known; what remains is the deviation of these terms from their mean, times the rounding of a
-    step.
+    Step i, longer by a share d, changes the map of s steps by d M**(s - 1 - i) M' M**i.  The sum of all d is
+    known; what remains is the deviation of these terms from their mean, times the rounding of a step.
     """
     one = _maps(matches, found, between=False).astype(np.float64)
     change = _derivative(matches, found, "longer", between=False).astype(np.float64)
@@ -182,12 +182,12 @@ def _unlike(record: Record, found: Map, matches: list[Match]) -> Floats:
 
 
 CLOCK_ROUNDINGS = 4.0
-"""Roundings of a time by which each step may be longer or shorter than the times show: a program that steps
-to i h halves the last step, or adds one of a rounding, and its clock rounds each of them."""
+"""Roundings of a time by which a step may differ from the difference of the times: a program that steps to i
+h splits the last step, or adds a tiny one, and rounds each."""
 
 
 def _stepped_to(record: Record, found: Map, matches: list[Match], signed: Floats, unit: Floats) -> Floats:
-    """Residuals (c, f - 1, 2), of errors `unit`, less the part that rounding of the clock explains."""
+    """Residuals (c, f - 1, 2), with errors `unit`, minus what `CLOCK_ROUNDINGS` of the times explain."""
     change = _derivative(matches, found, "longer").astype(np.float64)
     way = found.z[:-1].astype(np.float64) @ np.swapaxes(change, 1, 2)
     weight = way / np.maximum(unit, 1e-30 * np.max(unit)) ** 2
@@ -197,7 +197,7 @@ def _stepped_to(record: Record, found: Map, matches: list[Match], signed: Floats
 
 
 TOGETHER = 128
-"""Matches whose defects are worked out at once, so that their arrays stay small."""
+"""Matches that are evaluated at once, to limit the size of arrays."""
 
 
 def defects(
@@ -205,8 +205,8 @@ def defects(
 ) -> list[Defect]:
     """Defect of every step of oscillator j under each scheme, in units of double precision (2**-52).
 
-    `visible` returns whether the scheme's own error is far above the defect and no other scheme shares it.
-    Only then are defects beyond plain rounding explained, and never for an exact flow.
+    `visible` tells whether the scheme's truncation error is far above the defect and no other scheme has the
+    same map.  Only then is a defect attributed to coarse forces, and never for the exact solution.
     """
     chunks = (matches[i : i + TOGETHER] for i in range(0, len(matches), TOGETHER))
     # numbers of a match that hardly any state shows may be none
@@ -216,16 +216,16 @@ def defects(
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Roundings:
-    """Sizes that the roundings of each match (c,) are relative to, and how many there are in a frame."""
+    """Sizes to which the roundings of a frame are relative, and how many there are, for each match (c,)."""
 
     size: Floats
-    """Sums (c, f - 1, 2) of the absolute values of all that is added up on the way to a frame."""
+    """Sums (c, f - 1, 2) of the absolute values of all terms between two frames."""
     difference: Floats
-    """What is added to that of a velocity that is a difference of positions over the step."""
+    """Further terms of a velocity that is a difference of positions over the step."""
     stride: Floats
     path: Floats
     usual: Floats
-    """Roundings that add up at random stay far below the sum of all; what comes near it stands out."""
+    """Expected roundings if they add up at random; `path` is their largest possible sum."""
 
 
 def _roundings(record: Record, j: int, found: Map, matches: list[Match]) -> Roundings:
@@ -286,7 +286,7 @@ def _defects(
             if visible() and not FAMILIES[match.family].flow:
                 # forces may lie beyond the range of single precision
                 with np.errstate(over="ignore", invalid="ignore"):
-                    precision, note, certain = quantised.coarse_forces(record, j, found, match, signed[i])
+                    precision, note, certain = coarse.coarse_forces(record, j, found, match, signed[i])
         elif stored[i]:
             precision = " and ".join(dict.fromkeys(texts)) or STORED_IN_SINGLE[found.once]
         elif single[i]:
@@ -300,29 +300,31 @@ def _defects(
 def _in_double(
     record: Record, found: Map, matches: list[Match], sizes: Roundings
 ) -> tuple[Floats, Any, Floats]:
-    """Largest residuals (c,) in units in the last place, whether roundings of double precision, those of the
-    clock included, explain all of them, and the residuals (c, f - 1, 2)."""
+    """Largest residuals (c,) in ulps, whether double precision and the rounding of times explain them, and
+    the residuals (c, f - 1, 2)."""
     stride, unit = sizes.stride, EPSILON * sizes.size
 
-    def missed(slips: Extended | None) -> Floats:
-        return _refitted(record, found, matches, _misses(matches, found, slips).astype(np.float64), unit)
+    def missed(deviations: Extended | None) -> Floats:
+        return _refitted(
+            record, found, matches, _residuals(matches, found, deviations).astype(np.float64), unit
+        )
 
     def ulps(x: Floats, slack: Floats | float = 0.0) -> Floats:
         return _largest(np.maximum(np.abs(x) - slack, 0), unit)
 
-    signed = other = missed(found.slips)
+    signed = other = missed(found.deviations)
     ulp = ulps(signed)
-    follows = np.full(len(matches), found.slips is not None)
-    if record.slips is not None and found.slips is None:
+    follows = np.full(len(matches), found.deviations is not None)
+    if record.deviations is not None and found.deviations is None:
         # too small to show by themselves: steps may follow the clock, or its rounding may be all there is
-        other = missed(record.slips)
+        other = missed(record.deviations)
         follows = ulps(other) < 0.7 * ulp
         signed = np.where(follows[:, None, None], other, signed)
         ulp = ulps(signed)
     # roundings of an uneven clock follow its times
     most_ulp = np.where(follows, sizes.path, np.minimum(sizes.path, sizes.usual))
     rounded, slack = ulp, np.zeros_like(signed)
-    if record.slips is not None and np.any((stride == 1) & (ulp > most_ulp)):
+    if record.deviations is not None and np.any((stride == 1) & (ulp > most_ulp)):
         rounded = np.where(stride == 1, ulps(_stepped_to(record, found, matches, signed, sizes.size)), ulp)
     if np.any((stride > 1) & (ulp > sizes.usual)):
         slack = np.where((stride > 1)[:, None, None], _unlike(record, found, matches), 0.0)
@@ -337,8 +339,8 @@ def _in_double(
 def _in_file(
     record: Record, j: int, found: Map, matches: list[Match], sizes: Roundings, signed: Floats
 ) -> tuple[Floats, Floats, Any, Any]:
-    """Residuals (c, f - 1, 2), refitted with the file's quanta as errors; what these may do; and whether it
-    explains them (c,) together with roundings of double precision, or of single."""
+    """Residuals (c, f - 1, 2), refitted under the errors of the storage format; the bound of these errors;
+    and whether they explain the residuals (c,) in double, or in single precision arithmetic."""
     b = np.abs(_predicted(matches)).astype(np.float64)
     quanta = record.quanta(j) / found.size.astype(np.float64)
     half = (quanta[1:] + quanta[:-1] @ np.swapaxes(b, 1, 2)) / 2
@@ -356,13 +358,13 @@ def _in_file(
     # velocities are differences of positions in some schemes alone, and their roundings are irregular
     differs = explained(SINGLE, sizes.size + sizes.difference) & ~single & (not record.deep)
     for i in np.flatnonzero(differs).tolist():
-        single[i] = _differences(matches[i]) and coarse.irregular(signed[i])
+        single[i] = _differences(matches[i]) and coarse.is_white(signed[i])
     return signed, half, explained(EPSILON, sizes.size), single
 
 
 def _is_rebuilt(match: Match, missing: Floats, half: Floats, size: Floats, difference: Floats) -> bool:
-    """Whether the velocities alone are off, by eps q / h, as differences of positions over the step are, and
-    by the rounding of a file's digits, `half`.
+    """Whether only the velocities are inaccurate, by eps q / h as differences of positions over the step are,
+    beside the rounding `half` of the storage format.
 
     The rounding of a position enters the leapfrog's velocity in every step, and through it the position: a
     random walk that grows as s**(1/2) in the velocity and as s**(3/2) in the position over s steps.
@@ -378,7 +380,7 @@ def _is_rebuilt(match: Match, missing: Floats, half: Floats, size: Floats, diffe
 
 def _differences(match: Match) -> bool:
     """Whether the velocity may be a difference of positions: the mean of two, as in Stoermer's schemes, or
-    that of the step, where the new velocity moves the position."""
+    that of the step, as where the new velocity moves the position."""
     if match.scheme in coarse.STOERMER:
         return True
     (q, v), (x, u) = unit(FAMILIES[match.family], np.array([match.a]), np.array([match.g]))[0]

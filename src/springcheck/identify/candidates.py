@@ -1,4 +1,4 @@
-"""What the schemes that fit would mean: names, friction laws, and what is stated held against them."""
+"""Candidates of the hypotheses that fit: names, friction laws, numbers, agreement with what is stated."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 
 from springcheck.identify.coarse import QUANTUM
 from springcheck.identify.evidence import SINGLE_ROOM, Measured
-from springcheck.identify.families import FAMILIES, title
+from springcheck.identify.families import FAMILIES, title, titles
 from springcheck.identify.hypothesis import Joint, aliases, frictionless
 from springcheck.identify.notes import LEAPFROG, hidden_friction, same_maps, untold
 from springcheck.identify.record import Record
@@ -22,17 +22,16 @@ from springcheck.identify.wrong import stiffness_ratio
 from springcheck.physics.arrays import Floats
 from springcheck.schemes import SCHEMES
 from springcheck.schemes.elsewhere import ELSEWHERE
-from springcheck.text.wording import either
 
 T = TypeVar("T")
 
 SINGLE_CONSTANTS = ("fixed-point force", "mixed", "single")
-"""Precisions of GPU-type platforms, which keep force constants in single precision in every mode."""
+"""Precisions of GPU-type platforms, whose force constants are in single precision."""
 
 
 def shared(candidates: tuple[Candidate, ...], n: int, *, named: bool = True) -> dict[str, Any]:
-    """Fields of the `Identification` of n oscillators that follow from its candidates: the scheme, where all
-    have the same and it may be `named`, and the numbers that all share."""
+    """Fields of the `Identification` of n oscillators that follow from its candidates: the scheme if all have
+    the same and it may be `named`, and the numbers that all share."""
     scheme = common([x.scheme for x in candidates]) if named else None
     # without friction a scheme has the names of others that have none then
     law = next((x for x in candidates if x.law), candidates[0])
@@ -66,22 +65,23 @@ def steps_between(stride: int | None) -> str:
 
 
 def stated_stiffness(
-    seen: Measured, plainest: Joint, precision: str, stated: Floats
+    seen: Measured, simplest: Joint, precision: str, stated: Floats
 ) -> tuple[list[Explanation], list[str]]:
-    """Explanations of a stated stiffness that differs from the one of the states, and notes on it."""
+    """The cause of a stiffness that differs significantly from the stated one, and notes on the
+    difference."""
     quantum = QUANTUM if precision in SINGLE_CONSTANTS else 0.0
-    against = seen.disagreements(plainest)
-    if not against or (quantum and not seen.disagreements(plainest, quantum=quantum)):
+    against = seen.disagreements(simplest)
+    if not against or (quantum and not seen.disagreements(simplest, quantum=quantum)):
         return [], []
-    room = max(part.a_room for part in plainest.parts)
-    for what, other, of_force in _single_constants(seen.record, stated, plainest.stride):
-        if seen.disagreements(plainest, other, quantum if of_force else 0.0):
+    room = max(part.a_room for part in simplest.parts)
+    for what, other, of_force in _single_constants(seen.record, stated, simplest.stride):
+        if seen.disagreements(simplest, other, quantum if of_force else 0.0):
             continue
         # a difference barely above its own error may have any cause of that size
         if (quantum and of_force) or room < 0.1 * float(np.max(np.abs(other / stated - 1))):
             why = ", as GPU-type platforms keep it" if quantum else ""
             return [], [f"the {what} is the stated one in single precision{why}"]
-    _, stiffness, _ = seen.numbers(plainest)
+    _, stiffness, _ = seen.numbers(simplest)
     j, masses = seen.moving[0], seen.record.mass
     found = (stiffness or (math.nan,))[0]
     ratio = found / float(stated[j]) if stated[j] else math.inf
@@ -90,16 +90,16 @@ def stated_stiffness(
         f"{ratio:.9g} times as stiff as stated" if abs(ratio - 1) > 1e-6 else f"stiffer by {ratio - 1:+.1e}"
     )
     stiff = stiff if stated[j] else f"of stiffness {found:.9g} where 0 is stated"
-    cause = f"{title(plainest.scheme)}, but of a spring {stiff}"
+    cause = f"{title(simplest.scheme)}, but of a spring {stiff}"
     remedy = "look at the units of the force constant, and at whether V is k/2 q**2"
     cause = f"{cause}: {meaning}" if meaning else cause
-    return [Explanation(cause=cause, remedy=remedy, misfit=abs(ratio - 1))], against
+    return [Explanation(cause, remedy, abs(ratio - 1))], against
 
 
 def of_stated_stiffness(seen: Measured, precisions: dict[Joint, str], stated: Floats) -> list[Joint]:
-    """Select the hypotheses (each with the arithmetic that explains it) that have the stated stiffness:
-    exactly, with a constant in single precision, or else the nearest; and those of the first one's
-    stiffness."""
+    """The hypotheses, of these with the arithmetic that explains each, of the stated stiffness: exactly, or
+    with a constant in single precision, or else the nearest; and others of the same stiffness as the
+    first."""
     joints = list(precisions)
     agreeing = [x for x in joints if not seen.disagreements(x)] or [
         x for x in joints if not stated_stiffness(seen, x, precisions[x], stated)[0]
@@ -115,8 +115,7 @@ def of_stated_stiffness(seen: Measured, precisions: dict[Joint, str], stated: Fl
 
 
 def nearest_stiffness(seen: Measured, joints: list[Joint], stated: Floats) -> list[Joint]:
-    """Select the hypotheses whose stiffness is nearest to the stated one, where none agrees with it.
-    Differences within the rounding of a constant to single precision and their own errors count as ties."""
+    """The hypotheses of the stiffness nearest to the stated one, to within single precision and errors."""
     off, room = {}, {}
     for joint in joints:
         _, stiffness, _ = seen.numbers(joint)
@@ -128,8 +127,7 @@ def nearest_stiffness(seen: Measured, joints: list[Joint], stated: Floats) -> li
 
 
 def _single_constants(record: Record, stated: Floats, stride: int) -> list[tuple[str, Floats, bool]]:
-    """Constants that may be in single precision: name, the stiffness that the states then show, and whether
-    the constant belongs to the force."""
+    """Constants that may be in single precision: name, apparent stiffness, whether the force has it."""
     with np.errstate(all="ignore"):
         single = stated.astype(np.float32).astype(np.float64)
         h = float(record.interval) / stride
@@ -146,7 +144,7 @@ def _single_constants(record: Record, stated: Floats, stride: int) -> list[tuple
 
 @cache
 def other_names(scheme: str, *, damped: bool) -> tuple[str, ...]:
-    """Other names of a scheme's map, and the schemes that have it on a spring of another stiffness."""
+    """Other names of a scheme's map, and schemes that have it on a spring of another stiffness."""
     if scheme not in SCHEMES:
         return ELSEWHERE[scheme].also if scheme in ELSEWHERE else ()
     leapfrog = [LEAPFROG[scheme]] if scheme in LEAPFROG else []
@@ -160,7 +158,7 @@ def other_names(scheme: str, *, damped: bool) -> tuple[str, ...]:
 
 
 def held_over(joint: Joint) -> str:
-    """A held force as a phrase, with its possible numbers of substeps."""
+    """Phrase for a held force, with its possible numbers of substeps."""
     numbers_ = list(map(str, joint.substeps[0])) or ["many"]
     how_many = " to ".join(dict.fromkeys([numbers_[0], numbers_[-1]]))
     return f"Semi-implicit Euler whose force is held over {how_many} substeps"
@@ -175,9 +173,7 @@ def either_way(ways: list[Identification]) -> Identification:
     if len(fitting) < 2 or (len(names) == 1 and None not in names):
         # friction that feeds energy in is none
         return fitting[0] if fitting else ways[-1] if ways[0].fits else ways[0]
-    back, turned = (
-        either(list(dict.fromkeys(title(x.scheme) for x in one.candidates))[:4]) for one in fitting
-    )
+    back, turned = (titles(x.scheme for x in one.candidates) for one in fitting)
     candidates = tuple(x for one in fitting for x in one.candidates)
     return replace(
         fitting[0],

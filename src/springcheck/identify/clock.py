@@ -1,4 +1,4 @@
-"""The interval between recorded states, from times that are rounded, added up, or written with few digits."""
+"""The interval between frames, from times that are rounded, accumulated, or written with few digits."""
 
 from __future__ import annotations
 
@@ -9,32 +9,30 @@ from typing import Any
 import numpy as np
 
 from springcheck.errors import IdentificationError
-from springcheck.identify.storage import Storage, single_of, storage
+from springcheck.identify.storage import ROUNDING, Storage, single_of, storage
 from springcheck.physics.arrays import Extended, Floats
 
-ROUNDING = 2.0**-53
-
 FEWEST_STATES = 5
-"""Frames: four pairs leave one number to spare above the three unknowns of each row of the map."""
+"""Four pairs of frames leave one degree of freedom for each row of the map, which has three unknowns."""
 
 MOST_ADDED = 100
-"""Steps to a frame at which a clock that adds up is looked for; each of them rounds by half a quantum."""
+"""Most steps to a frame for which an accumulated clock, t += h, is tried."""
 
 SHORT_STEP = 9
-"""Digits of a step that a program was given."""
+"""Most significant decimal digits of a step that somebody typed."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Clock:
-    """The interval [T] of recorded times, and how well they show it."""
+    """The interval between frames [T] and its uncertainty."""
 
     interval: np.longdouble
     jitter: float
     """Relative uncertainty of the interval."""
     quantum: float
     """Rounding of the times, in intervals."""
-    slips: Extended | None
-    """Relative excess (f - 1,) of each recorded interval, where double precision shows it."""
+    deviations: Extended | None
+    """Relative deviation (f - 1,) of each interval from the mean, where double precision shows it."""
 
 
 def clock_of(t: Floats) -> Clock:
@@ -54,7 +52,7 @@ def clock_of(t: Floats) -> Clock:
     grids = [even]
     grids += [float(np.max(Storage(name="single").quantum(t)))] if single else []
     grids.append(float(np.max(written.quantum(t))))
-    # two rounded times make a difference, and a clock that adds its step up rounds once more each time
+    # an interval is the difference of two rounded times; an accumulated clock rounds once more in every step
     quantum = next((x for x in grids if off[worst] <= 4 * x), None)
     if quantum is None:
         quantum = next((x for x in grids[: 1 + single] if off[worst] <= (4 + MOST_ADDED / 2) * x), None)
@@ -82,11 +80,11 @@ def clock_of(t: Floats) -> Clock:
         close = (x for x in near if abs(x / float(interval) - 1) <= room)
         interval = np.longdouble(next(close, float(interval)))
         jitter += float(abs(interval / mean - 1))
-    slips = None
+    deviations = None
     if quantum == even and float(off[worst]) > 2 * ROUNDING * abs(float(interval)):
-        slips = np.asarray(np.diff(wide) / interval - 1)
+        deviations = np.asarray(np.diff(wide) / interval - 1)
     return Clock(
-        interval=interval, jitter=jitter, quantum=quantum / abs(float(interval)), slips=slips,
+        interval=interval, jitter=jitter, quantum=quantum / abs(float(interval)), deviations=deviations,
     )  # fmt: skip
 
 
@@ -104,8 +102,7 @@ def _even(t: Floats, interval: np.longdouble, quantum: float) -> bool:
 
 
 def _added(t: Floats, interval: np.longdouble, quantum: float) -> np.longdouble | None:
-    """Interval of a clock t += h that gives t to the last bit; None where no step h does.  `quantum` is the
-    rounding of t [T]."""
+    """Interval of a clock t += h that gives t, rounded to `quantum` [T], to the last bit; or None."""
     width = _width(t, quantum)
     times = t.astype(width)
     for steps, h in _steps(t, float(interval), quantum):

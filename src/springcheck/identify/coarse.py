@@ -1,14 +1,17 @@
-"""Arithmetic coarser than double precision in states that are not: what its forces leave behind.
+"""Forces of less than double precision in states of double precision, from the residuals of single steps.
 
 GPU-type platforms compute forces in single precision and sum them in 64-bit fixed point, whatever the
-states are kept in.  The error is cut off rather than rounded, so it is a bias as much as a noise; what
-tells it from anything else is where it enters (in kicks, never in drifts) and its size.
+precision of the states.  Truncation makes a bias as well as noise.  Such errors are recognised by their size
+and by where they enter: in kicks, never in drifts.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from functools import partial
 from itertools import repeat
+from typing import TypeAlias
 
 import numpy as np
 
@@ -18,7 +21,7 @@ from springcheck.identify.hypothesis import CHANCE, Match, most
 from springcheck.identify.maps import power, unit
 from springcheck.identify.record import Record
 from springcheck.physics.arrays import Extended, Floats, Reals
-from springcheck.schemes import SCHEMES, magnitude_step
+from springcheck.schemes import SCHEMES, Scheme, magnitude_step, number
 from springcheck.schemes.rounding import Met
 
 QUANTUM = 2.0**-32
@@ -28,18 +31,18 @@ EXCESS = 2.0**-32
 """Relative excess of the fixed-point forces of OpenMM's CustomIntegrator, which divides by 2**32 - 1."""
 
 LEAST = 1 / 100
-"""Share of its bound that an error must reach in the mean square for the bound to be what explains it."""
+"""Smallest root mean square of residuals, relative to its bound, that the bound explains."""
 
 STOERMER = {
     "semi-implicit-euler": (1, 0),
     "semi-implicit-euler-drift-kick": (0, 1),
     "velocity-verlet": (1, 1),
 }
-"""Schemes whose positions obey q'' - 2 q' + q = h**2 F/m, and whether v is the mean of the difference
-before, after, or both: identities without a force, which hold to rounding however coarse the force is."""
+"""Schemes with q[n+1] - 2 q[n] + q[n-1] = h**2 F/m, and the weights of the differences before and after in
+their velocity: identities that hold to rounding however coarse the force is."""
 
 KICKED = ("explicit-euler", "position-verlet")
-"""Schemes of one kick a step that positions do not see at once."""
+"""Schemes of one kick a step, which shows in the velocity."""
 
 
 def over_single(x: float | np.longdouble) -> np.longdouble:
@@ -49,17 +52,17 @@ def over_single(x: float | np.longdouble) -> np.longdouble:
     return np.longdouble(x) / short if short and np.isfinite(short) else np.longdouble(1)
 
 
-def sized(record: Record, j: int, found: Map, match: Match, signed: Floats) -> tuple[str, str]:
+def _sized(record: Record, j: int, found: Map, match: Match, signed: Floats) -> tuple[str, str]:
     """Precision and note where the residuals (f - 1, 2) of single frames have the size and place of a force
     error.
 
-    An error e of the force in every kick displaces a frame by at most the sum of the kicks' displacements,
-    propagated by the steps that follow; drifts add only the rounding of the state.
+    An error of the force in every kick displaces a frame by at most the sum of the kicks' displacements,
+    propagated by the steps that follow; drifts add the rounding of the state.
     """
     if match.scheme not in SCHEMES:
         return "", ""
     missing = np.abs(signed)
-    kicks, steps = reach(found, match)
+    kicks, steps = _reach(found, match)
     z = found.z.astype(np.float64)
     position = found.size[0].astype(np.float64) + abs(float(found.centre[0]))
     orbit = np.sqrt(np.sum(z[1:] ** 2, axis=1) + np.sum(z[:-1] ** 2, axis=1)) + abs(
@@ -87,7 +90,7 @@ def sized(record: Record, j: int, found: Map, match: Match, signed: Floats) -> t
     return "", ""
 
 
-def reach(found: Map, match: Match) -> tuple[Floats, Floats]:
+def _reach(found: Map, match: Match) -> tuple[Floats, Floats]:
     """Bounds (2,), in the units of `found`, on the effect on a frame of an error of 1: of h**2 F/(m q) in
     every kick, and of both components of the state in every step."""
     one = np.ones(1, dtype=np.longdouble)
@@ -111,12 +114,12 @@ def reach(found: Map, match: Match) -> tuple[Floats, Floats]:
     return kicks, steps
 
 
-def kinematic(record: Record, j: int, found: Map, match: Match) -> tuple[str, str] | None:
-    """Precision and note where positions and velocities of every step are consistent to rounding, so that
-    only the force can be coarse; both are "" where the forces have no quanta.
+def _kinematic(record: Record, j: int, found: Map, match: Match) -> tuple[str, str] | None:
+    """Precision and note by the forces of single steps, where positions and velocities are consistent to
+    rounding; both are "" where the forces have no quanta.
 
-    None where forces cannot be read finely enough for their quanta to show, or too few of them lie near
-    multiples to exclude chance.
+    None where the forces are not resolved finely enough for quanta to show, or too few are near multiples to
+    exclude chance.
     """
     forces = _forces(record, j, found, match)
     if forces is None:
@@ -153,19 +156,17 @@ def kinematic(record: Record, j: int, found: Map, match: Match) -> tuple[str, st
 
 
 OUTLIER = 6.0
-"""Largest error of bounded rounding over the root mean square of its neighbours': 1.7 where uniform, 4 where
-normal."""
+"""Largest rounding error relative to the root mean square of its neighbours: 1.7 if uniform, 4 if normal."""
 
 LAGS = range(2, 26)
-"""Frames at whose distance errors are correlated, a quarter of all at most; neighbours share a force in some
-schemes."""
+"""Lags of the autocorrelation, up to a quarter of the frames; in some schemes neighbours share a force."""
 
 
-def irregular(missing: Floats, bias: Floats | None = None) -> bool:
+def is_white(missing: Floats, bias: Floats | None = None) -> bool:
     """Whether residuals (f, c), freed of a bias (f, b), are white noise, as rounding is.
 
-    A dependence on position, velocity, their powers, time, parity or a neighbour recurs after some frames;
-    the sum of squared autocorrelations of a white series is chi-squared (Box & Pierce 1970).
+    What depends on position, velocity, time or parity recurs after some frames; the sum of squared
+    autocorrelations of a white series is chi-squared (Box & Pierce 1970).
     """
     lags = range(LAGS.start, min(LAGS.stop, len(missing) // 4))
     if not lags:
@@ -185,16 +186,16 @@ def irregular(missing: Floats, bias: Floats | None = None) -> bool:
     return True
 
 
-def white(found: Map, match: Match, signed: Floats) -> bool:
+def _white(found: Map, match: Match, signed: Floats) -> bool:
     """Whether the residuals (f - 1, 2) of frames are irregular, apart from the bias of truncated forces."""
-    biased = cut_off(found, match)
+    biased = _truncated(found, match)
     biased = np.concatenate([biased, np.ones((len(biased), 1))], axis=1)
     # where the motion decays or grows, residuals are tested relative to the size of each frame as well
     weight = found.weight[:, None] / np.max(found.weight)
-    return irregular(signed, biased) and irregular(weight * signed, weight * biased)
+    return is_white(signed, biased) and is_white(weight * signed, weight * biased)
 
 
-def cut_off(found: Map, match: Match) -> Floats:
+def _truncated(found: Map, match: Match) -> Floats:
     """Displacement (f - 1, 2) of each frame by forces truncated towards zero in each of its steps."""
     one = np.ones(1)
     step = unit(FAMILIES[match.family], match.a * one, match.g * one)[0]
@@ -210,8 +211,8 @@ def cut_off(found: Map, match: Match) -> Floats:
 
 
 def _forces(record: Record, j: int, found: Map, match: Match) -> tuple[Floats, float] | None:
-    """Forces read from the states alone, one for each step, and their noise; None where the scheme has no
-    single force a step, or v is inconsistent with q."""
+    """The force of each step, from the states, and its noise; None where the scheme has more than one force a
+    step, or v is inconsistent with q."""
     if match.stride != 1 or match.friction != 0 or match.scheme not in (*STOERMER, *KICKED):
         return None
     h = record.interval
@@ -234,3 +235,122 @@ def _forces(record: Record, j: int, found: Map, match: Match) -> tuple[Floats, f
             return None
         noise = 16 * 2.0**-52 * mass * float(np.max(position)) / float(h) ** 2
     return force.astype(np.float64), noise
+
+
+EXPLAINED = 0.3
+"""Largest ratio of the root mean square residuals with truncated forces to that without, for these to be the
+cause; other noise of that size adds up to a ratio of 1.4."""
+
+REFINED = 16
+"""Newton steps for the stiffness, which the residuals bias."""
+
+Force: TypeAlias = Callable[[Floats, Floats], Floats]
+"""k (c, 1) and q (c, f) -> -k q in an arithmetic; k and the result are in quanta."""
+
+Pull: TypeAlias = Callable[[Floats, Floats], Floats]
+"""a (c, 1) and q (c, f) or (f,) -> h**2 F/m."""
+
+
+def _single(k: Floats, q: Floats) -> Floats:
+    return (-k * q).astype(np.float32).astype(np.float64)
+
+
+def _all_single(k: Floats, q: Floats) -> Floats:
+    return ((-k).astype(np.float32) * q.astype(np.float32)).astype(np.float64)
+
+
+FORCES: dict[str, tuple[Force, ...]] = {
+    "fixed-point force": (lambda k, q: np.trunc(-k * q), lambda k, q: np.rint(-k * q)),
+    "mixed": (
+        _single, _all_single,
+        lambda k, q: np.trunc(_single(k, q)), lambda k, q: np.trunc(_all_single(k, q)),
+    ),
+}  # fmt: skip
+
+
+def coarse_forces(record: Record, j: int, found: Map, match: Match, signed: Floats) -> tuple[str, str, bool]:
+    """Precision of forces that explain these residuals (f - 1, 2), a note, and whether it is certain; ""
+    where none explains them."""
+    name, note = _sized(record, j, found, match, signed)
+    for each in FORCES if name else ():
+        if _reproduced(record, j, found, match, each):
+            return each, "states are double, and the steps redone with such forces are those recorded", True
+    seen = _kinematic(record, j, found, match)
+    if seen is not None:
+        return *seen, record.mass is not None
+    return (name, note, False) if name and _white(found, match, signed) else ("", "", True)
+
+
+def _reproduced(record: Record, j: int, found: Map, match: Match, precision: str) -> bool:
+    """Whether forces of a precision, in an explicit scheme without friction, explain the residuals."""
+    family = FAMILIES[match.family]
+    if record.mass is None:
+        return False
+    mass, h = float(record.mass[j]), float(record.interval) / match.stride
+    # about the equilibrium; velocities as lengths
+    q = (found.z[:, 0] * found.size[0]).astype(np.float64)
+    v = (found.z[:, 1] * found.size[1] / record.interval).astype(np.float64) * h
+    kick = h * h / mass * QUANTUM
+
+    def missed(a: Floats, pull: Pull, *, leaps: bool = False) -> Floats:
+        """Residuals (c, 2 f - 2) of steps with these (h w)**2 (c, 1)."""
+        x, y = (np.broadcast_to(z[:-1], (len(a), len(z) - 1)) for z in (q, v))
+        if leaps:
+            # stored half a step early, and half a kick of the exact force added where it was read
+            y = y + a * x / 2
+        scheme = SCHEMES["semi-implicit-euler" if leaps else family.scheme]
+        for _ in range(match.stride):
+            x, y = _stepped(scheme, x, y, partial(pull, a))
+        if leaps:
+            y = y - a * x / 2
+        return np.concatenate([q[1:] - x, v[1:] - y], axis=1)
+
+    def exact(a: Floats, x: Floats) -> Floats:
+        return -a * x
+
+    start, shift = np.array([[match.a]]), 1e-6 * match.a
+    rows = missed(start, exact).reshape(2, -1)
+    size = np.sqrt(np.mean(rows**2, axis=1, keepdims=True)) + 2.0**-52 * np.max(np.abs(q))
+    scale = np.broadcast_to(1 / size, rows.shape).ravel()
+    slope = (missed(start + shift, exact) - missed(start - shift, exact))[0] / (2 * shift) * scale
+    # residuals of another stiffness need no quantum
+    inverse = (slope / (slope @ slope))[:, None]
+    plain = start - missed(start, exact) * scale @ inverse
+    without = missed(plain, exact) * scale
+    before = float(np.sqrt(np.mean(without**2)))
+    counted = float(np.sum(without**2) ** 2 / np.sum(without**4)) - 1
+    single = float(over_single(mass))
+    factors = [x * y for x in (1.0, 1.0 + EXCESS) for y in dict.fromkeys((1.0, single))]
+    quanta = kick * np.array(factors)[:, None]
+    forces, n = FORCES[precision], len(factors)
+
+    def cut(a: Floats, x: Floats) -> Floats:
+        # every force with all factors, one below the other
+        x = np.broadcast_to(x, (len(a), x.shape[-1]))
+        parts = ((f, a[i : i + n], x[i : i + n]) for f, i in zip(forces, range(0, len(a), n), strict=True))
+        return np.concatenate([quanta * f(b / kick, y) for f, b, y in parts])
+
+    for leaps in (False, True) if family.name == "velocity-verlet" else (False,):
+        values = np.repeat(start, len(forces) * n, axis=0)
+        for _ in range(REFINED):
+            left = missed(values, cut, leaps=leaps) * scale
+            share = np.sqrt(np.mean(left**2, axis=1)) / before
+            # a single residual vanishes at some stiffness
+            if np.any((share <= EXPLAINED) & (share**counted <= CHANCE)):
+                return True
+            values = values - left @ inverse
+    return False
+
+
+def _stepped(scheme: Scheme, q: Floats, v: Floats, pull: Callable[[Floats], Floats]) -> tuple[Floats, Floats]:
+    """One step on (q, v h), with h**2 F/m from `pull`."""
+    slopes: list[tuple[Floats, Floats]] = []
+    for row in (*scheme.a, scheme.b):
+        x, y = q, v
+        for share, (dx, dy) in zip(row, slopes, strict=False):
+            x, y = x + float(share) * dx, y + float(share) * dy
+        slopes.append((y, pull(x)))
+    for kind, part in scheme.stages:
+        c = float(number(part, np.longdouble))
+        x, y = (x + c * y, y) if kind == "drift" else (x, y + c * pull(x) * (kind != "friction"))
+    return x, y

@@ -1,8 +1,8 @@
-"""Hypotheses held against measured maps: one Gauss-Newton for all of them, chi-squared, number of unknowns.
+"""Fit of all hypotheses to measured maps at once, by Gauss-Newton and chi-squared.
 
-A hypothesis is a family of one-step maps, a number of steps to a frame and of whole turns that frames do not
-show.  The roots of a measured map are the steps that it may be the power of; the phase of each gives a first
-guess of (h w)**2 for every family, its determinant one of friction, and the four entries decide.
+A hypothesis is a family of one-step maps, a number of steps to a frame, and a number of whole turns between
+two frames.  Each matrix root of the measured map is a possible step: its phase gives a first guess of
+(h w)**2 for every family, its determinant one of the friction, and the four entries decide.
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ from springcheck.identify.fit import Map
 from springcheck.identify.guesses import Guesses, Roots, first, least_squares, polished, roots_of_map
 from springcheck.identify.hypothesis import Joint, Match, Terms, most
 from springcheck.identify.maps import MapTable, table
-from springcheck.identify.record import ROUNDING
+from springcheck.identify.storage import ROUNDING
 from springcheck.physics.arrays import Floats, Reals
 
 WHOLE = 2
-"""Roundings of a step that act on a whole state and not on what a step adds to it."""
+"""Roundings of a step relative to the whole state, beside those relative to its increment."""
 
 COARSE_ERROR = 1e-9
-"""Error of a map's entries from which their prediction needs no more than double precision."""
+"""Error of the entries above which double precision suffices for their prediction."""
 
 
 class Target:
-    """A measured map, and the errors of its entries: those of the fit, of the scale of velocities, of coarse
-    forces, and of coefficients that are rounded once, a multiple of 1."""
+    """A measured map with the covariance of its entries: of the fit, the scale of velocities, biased
+    forces."""
 
     def __init__(self, found: Map, terms: Terms) -> None:
         self.found, self.terms = found, terms
@@ -47,12 +47,11 @@ class Target:
     def weight(self, every: MapTable, x: Guesses, s: Floats) -> Floats:
         """Reciprocal errors (4, c) along the axes of the covariance.
 
-        The rounding of h k or h/m does not average out over pairs: an entry of the map of s steps is
-        uncertain by the roundings of its path times the increment of s steps, whatever the covariance of the
-        fit.
+        A coefficient, as h k or h/m, is rounded once, which no number of pairs averages out: an entry of the
+        map of s steps is uncertain by the roundings of the family's path times the increment of s steps.
         """
         added = np.minimum(np.sqrt(np.abs(x.a)) + np.abs(x.g), 1)
-        # nor that of a whole state, but for sums in double precision
+        # neither are roundings of the whole state averaged out, but for sums in double precision
         scaled = every.scaled[x.which] | (self.terms.rounding > ROUNDING)
         whole = np.where(scaled, WHOLE, WHOLE / math.sqrt(len(self.found.z)))
         whole = (every.path[x.which] * added + whole) * s * self.largest * self.terms.rounding
@@ -70,13 +69,10 @@ class Target:
 def matches(
     found: Map, terms: Terms, families: tuple[Family, ...], strides: Iterable[int], *, far: bool = False
 ) -> list[Match]:
-    """Best match of each family and stride with a map, if chi-squared accepts it; with `far` in any case."""
+    """Best fit of each family and stride to a map, if chi-squared accepts it; with `far` in any case."""
     every = table(families)
     with np.errstate(all="ignore"):
-        asked = "roots", tuple(strides)
-        if asked not in found.found:
-            found.found[asked] = roots_of_map(found, asked[1])
-        roots = replace(found.found[asked])
+        roots = replace(roots_of_map(found, tuple(strides)))
         if not len(roots.s):
             return []
         # the scale of velocities is as uncertain as the interval, and where it is known, that of a number in
@@ -97,8 +93,8 @@ def matches(
 def solved(
     every: MapTable, target: Target, roots: Roots, x: Guesses, *, far: bool = False, every_turn: bool = False
 ) -> list[Match]:
-    """Best of these guesses for each family and stride, of those that chi-squared accepts (`far`: of all).
-    With `every_turn`, the best for each number of turns, and for each spring that has it."""
+    """Best fit from these guesses for each family and stride, of those that chi-squared accepts (`far`: of
+    all); with `every_turn` for each number of turns and each spring."""
     terms = target.terms
     free = [0, 1] if every.damped else [0]
     if terms.mass_unknown and terms.log_stiffness is None:
@@ -155,7 +151,7 @@ def solved(
         if every_turn:
             # one number of turns, to the left or right and on each branch of a scheme, is several springs
             key += tuple(f"{float(y):.6g}" for y in values[:2, i])
-        # a free scale of velocities lets steps of several lengths fit: the shortest is the plainest
+        # a free scale of velocities lets steps of several lengths fit: the shortest is the simplest
         close = abs(float(values[0, i])) if free[-1] == 2 and freedom <= 2 else float(chi2[i])
         turns = float(roots.turns[x.root[i]])
         rank = (0.0 if far else turns), close, i
@@ -187,8 +183,8 @@ def compare(
     *,
     far: bool = False,
 ) -> list[Joint]:
-    """Families and strides that agree with every oscillator, the plainest first, or with `far` all at their
-    best. A combination that one oscillator excludes is not tried on the others."""
+    """Families and strides that fit every oscillator, the simplest first; with `far` all, at their best.
+    What one oscillator excludes is not tried on the others."""
     steps = list(strides)
     parts: list[dict[tuple[str, int], Match]] = []
     for found, what in zip(maps, terms, strict=True):
@@ -200,8 +196,8 @@ def compare(
             return []
     shared = (key for key in parts[0] if all(key in x for x in parts))
     joints = [Joint(family=key[0], stride=key[1], parts=tuple(x[key] for x in parts)) for key in shared]
-    return sorted(joints, key=lambda x: x.plainness)
+    return sorted(joints, key=lambda x: x.simplicity)
 
 
 nearest = partial(compare, far=True)
-"""Families and strides at their best, whether or not they may be accepted."""
+"""Best fit of every family and stride, accepted or not."""

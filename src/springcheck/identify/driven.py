@@ -1,8 +1,8 @@
-"""A force, or a stiffness, that goes up and down in time: its frequency, its amplitude and its phase.
+"""A force, or a stiffness, that oscillates in time: frequency, amplitude and phase.
 
-With a drive a scheme takes z to A z + Re(b exp(i w n)).  The steady state s = (exp(i w) - A)**-1 b taken off,
-the rest is the scheme's own motion without a drive, and is named as such; the scheme says what b a drive of
-amplitude 1 has, and so how large the drive is.
+With a drive a scheme takes z to A z + Re(b exp(i w n)).  Minus the steady state (exp(i w) - A)**-1 b, the
+motion is that of the scheme without a drive, and is identified as such; the scheme's response b to a drive of
+amplitude 1 gives the amplitude.
 """
 
 from __future__ import annotations
@@ -19,8 +19,9 @@ from numpy.typing import NDArray
 from springcheck.errors import IdentificationError
 from springcheck.identify.compare import compare
 from springcheck.identify.evidence import AGREES, Evidence
+from springcheck.identify.families import MOST_TITLES
 from springcheck.identify.fit import fit
-from springcheck.identify.hypothesis import FEW, Match, distinct
+from springcheck.identify.hypothesis import FEW, SURE, Match, distinct
 from springcheck.physics.arrays import Extended, Floats
 from springcheck.physics.driven import CLOCK
 from springcheck.physics.scene import Scene
@@ -33,7 +34,7 @@ def frequency(e: Evidence, carrier: Floats) -> float:
     the map's residuals beside the map's own columns."""
     frames, pull = e.pairs, e.weight * carrier
     linear = np.stack(e.linear, axis=1) * e.weight[:, None]
-    across, missing = np.linalg.qr(linear)[0], e.misses * e.weight[:, None]
+    across, missing = np.linalg.qr(linear)[0], e.residuals * e.weight[:, None]
     missing = missing - across @ (across.T @ missing)
     columns = np.concatenate([missing, across], axis=1).T * pull
     size = 1 << (8 * frames - 1).bit_length()
@@ -59,13 +60,10 @@ def waves(carrier: Floats, turn: float) -> list[Floats]:
 
 
 TUNING_STEPS = 12
-"""Gauss-Newton steps of a frequency: three or four reach the last digits."""
+"""Most Gauss-Newton steps for a frequency: three or four converge."""
 
 STARTS_BESIDE, FEW_FRAMES = 6, 2000
-"""Starts on either side, a quarter turn over the run apart, and frames up to which they are looked at."""
-
-MOST_SCHEMES = 3
-"""Schemes that a sentence names at most: on a spring of unknown stiffness several have one map."""
+"""Starting values on either side, a quarter turn over the run apart, and most frames that have them."""
 
 
 def _best(z: Floats, carrier: Floats, turn: float) -> tuple[float, Floats]:
@@ -142,7 +140,7 @@ def _forces(e: Evidence, rows: Floats, turn: float, of: str) -> str:
         strength = complex(np.vdot(unit, b) / np.vdot(unit, unit))
         if np.max(np.abs(b - strength * unit)) <= AGREES * np.max(np.abs(b)):
             found.setdefault(match.scheme, _wave(strength, turn / float(e.record.interval), ".9g", ".9g"))
-    ways = [f"{wave}{of} by {title(name)}" for name, wave in list(found.items())[:MOST_SCHEMES]]
+    ways = [f"{wave}{of} by {title(name)}" for name, wave in list(found.items())[:MOST_TITLES]]
     return ", or ".join(ways)
 
 
@@ -178,7 +176,7 @@ def _schemes(
     size = float(np.max(np.abs(found.z)) / np.max(np.abs(left)))
     terms = [replace(e.terms, rounding=e.terms.rounding * (1 + size))]
     several = (compare([alone], terms, distinct(damped=damped), FEW[:4]) for damped in (False, True))
-    for joint in sorted(itertools.chain(*several), key=lambda x: x.plainness):
+    for joint in sorted(itertools.chain(*several), key=lambda x: x.simplicity):
         match = joint.parts[0]
         unit = _response(e, match, turn)
         # other schemes have its map with other springs than the stated one
@@ -191,7 +189,7 @@ def _response(e: Evidence, match: Match, turn: float) -> NDArray[np.complex128] 
     """Response b to a force cos(w t), in the units of the map: a frame from rest, by the scheme with a clock.
     None for a scheme that is not one-step, or that has a friction stage without friction."""
     law = scheme(match.scheme)
-    if not law.has("one-step") or (law.has("friction") and match.friction <= 6 * match.g_error):
+    if not law.has("one-step") or (law.has("friction") and match.friction <= SURE * match.g_error):
         # without friction such a scheme is one without a stage for it
         return None
     h = float(e.record.interval) / match.stride

@@ -1,4 +1,4 @@
-"""Evidence for hypotheses, and for explanations of what none explains."""
+"""The data that hypotheses and causes are tested on: maps of the oscillators, residuals of one map."""
 
 from __future__ import annotations
 
@@ -13,29 +13,29 @@ from springcheck.identify.compare import compare
 from springcheck.identify.families import FAMILIES, Family
 from springcheck.identify.fit import Map
 from springcheck.identify.hypothesis import FEW, Joint, Match, Terms, distinct
-from springcheck.identify.record import ROUNDING, Record
+from springcheck.identify.record import Record
+from springcheck.identify.storage import ROUNDING
 from springcheck.physics.arrays import Floats
 
 FALLS = 12.0
-"""Factor by which an explanation must bring the misfit down."""
+"""Factor by which a cause has to reduce the residuals."""
 
 LEFT_BY_ROUNDING = 64
-"""Roundings of a state that arithmetic may leave over of a step; more have another cause."""
+"""Largest residual of a step, in roundings of the state, that is arithmetic's."""
 
 FIXED = LEFT_BY_ROUNDING * 2.0**-52
-"""Residual of a map, relative to the states, that is still rounding."""
+"""The same residual in double precision, relative to the state."""
 
 AGREES = 1e-6
-"""Relative difference up to which a number that is read from a map is one that is known or stated."""
+"""Relative difference up to which a number from a map agrees with a known or stated one."""
 
 SINGLE_ROOM = 8 * 2.0**-24
-"""Relative difference of stiffnesses that a step, a mass and a stiffness in single precision may make."""
+"""Relative difference of stiffnesses if step, mass and stiffness are rounded to single precision."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Measured:
-    """The data that hypotheses are tested on: the oscillators of a record that can be judged, their maps,
-    on what terms these are compared, and what is stated of them."""
+    """The oscillators of a record that can be judged: their maps, terms of comparison, and what is stated."""
 
     record: Record
     moving: list[int]
@@ -101,7 +101,7 @@ class Measured:
         path = FAMILIES[joint.family].path
         out = []
         for j, part, k in zip(self.moving, joint.parts, stiffness or (), strict=False):
-            error = 6 * part.a_error / abs(part.a) + 2 * record.jitter + 4 * path * ROUNDING + room
+            error = part.a_room + 2 * record.jitter + 4 * path * ROUNDING + room
             error += 0.0 if record.fine else SINGLE_ROOM
             # a step or a mass in single precision moves the stiffness that is worked out with the stated one
             error += 0.0 if record.momenta else 3 * abs(part.log_mass)
@@ -118,7 +118,7 @@ class Measured:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Evidence:
-    """What one map of the worst oscillator leaves over, and what was stated of that oscillator."""
+    """The residuals of one oscillator's map, and what is stated of that oscillator."""
 
     record: Record
     j: int
@@ -141,7 +141,7 @@ class Evidence:
 
     @cached_property
     def states(self) -> Floats:
-        """States (f, 2) in units of their size, about the equilibrium."""
+        """States (f, 2) about the equilibrium, in units of their size."""
         return self.found.z.astype(np.float64)
 
     @property
@@ -156,18 +156,17 @@ class Evidence:
 
     @property
     def size(self) -> float:
-        """Largest root mean square residual of a frame, relative to the state."""
+        """Root mean square residual of a frame, relative to the state."""
         return float(np.max(self.found.residual))
 
     @cached_property
-    def misses(self) -> Floats:
-        """Residuals of the map in each pair (f - 1, 2), in units of the states' size."""
-        return self.found.misses()
+    def residuals(self) -> Floats:
+        """Residuals of the map (f - 1, 2), in units of the states' size."""
+        return self.found.residuals()
 
     @cached_property
     def weight(self) -> Floats:
-        """Weight (f - 1,) of each pair, inverse to its size: the largest states do not dominate a motion that
-        grows or decays."""
+        """Weight (f - 1,) of each pair, inverse to its size, 1 at most."""
         return np.asarray(self.found.weight / np.max(self.found.weight))
 
     @cached_property
@@ -187,21 +186,21 @@ class Evidence:
     @property
     def excess(self) -> Floats:
         """Residual of each pair (f - 1,), in roundings."""
-        return np.asarray(np.max(np.abs(self.misses), axis=1) / self.unit)
+        return np.asarray(np.max(np.abs(self.residuals), axis=1) / self.unit)
 
     @property
     def turns(self) -> float:
-        """Number of turns of the motion over all frames."""
+        """Turns of the motion over all frames."""
         return self.pairs * float(self.found.turn.angle[0]) / (2 * math.pi)
 
     @cached_property
     def linear(self) -> list[Floats]:
-        """Columns of the map's own regression: position, velocity, and the constant where one was fitted."""
+        """Columns of the map's regression: position, velocity, and the constant if one was fitted."""
         return [*self.states[:-1].T, *([np.ones(self.pairs)] if np.any(self.found.centre) else [])]
 
 
 def matched(found: Map, terms: Terms) -> list[Match]:
-    """Undamped schemes of few steps that fit a map, the plainest first."""
+    """Undamped schemes of up to four steps to a frame that fit a map, the simplest first."""
     joints = compare([found], [terms], distinct(damped=False), FEW[:4])
     return [x.parts[0] for x in joints]
 

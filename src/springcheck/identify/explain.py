@@ -1,4 +1,4 @@
-"""What is wrong, where no known scheme explains the states: faults as explanations, the best first."""
+"""Causes of states that no known scheme explains, the likeliest first."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 
 from springcheck.identify import laws
-from springcheck.identify.coarse import irregular
+from springcheck.identify.coarse import is_white
 from springcheck.identify.compare import nearest
 from springcheck.identify.evidence import (
     FALLS,
@@ -30,37 +30,37 @@ from springcheck.identify.wrong import wrong_map
 from springcheck.text.wording import count
 
 FEWEST_MISSES = 24.0
-"""Fewest pairs that count among the residuals for their pattern to show."""
+"""Fewest effective pairs from which the residuals show their cause."""
 
 FEW_TURNS = 2.0
-"""Turns of the motion from which states come back often enough to tell what goes with them from time."""
+"""Fewest periods that separate functions of the state from functions of time."""
 
 IN_STEP = 0.1
-"""Angle over the run by which a wave may be off the motion's harmonics where it is their own."""
+"""Phase over the run [rad] within which a fitted frequency is a harmonic of the motion."""
 
 HARMONICS = range(-3, 4)
-"""Multiples of the motion's frequency at which a force that is not linear acts, or changes a stiffness."""
+"""Harmonics at which an anharmonic force acts."""
 
 LINEAR_LEAVES = 4
-"""Roundings of a state, each of several units, that a linear map leaves over at most."""
+"""Largest residual of a linear map, in units of `Evidence.unit`."""
 
 
 def explain(seen: Measured) -> tuple[Explanation, ...]:
-    """Explanations of states that no scheme fits, the best first."""
+    """Causes of states that no scheme fits, the likeliest first."""
     evidence = seen.evidence(max(range(len(seen.maps)), key=lambda i: float(np.max(seen.maps[i].residual))))
-    if out := turned(seen.record, seen.moving):
-        return tuple(out)
-    linear = np.max(evidence.excess) <= LINEAR_LEAVES
-    drifts = [_drift] if evidence.found.drifts else []
-    found = (out for look in (*drifts, *([wrong_map] if linear else SEARCHED)) if (out := look(evidence)))
-    return tuple(next(found, []) or [misfit(evidence)])
+    if out := turned(seen.record, seen.moving) or _drift(evidence):
+        return (out,)
+    if np.max(evidence.excess) <= LINEAR_LEAVES:
+        return tuple(wrong_map(evidence)) or (misfit(evidence),)
+    found = (look(evidence) for look in SEARCHED)
+    return (next(filter(None, found), None) or _law(evidence),)
 
 
-def _solver(e: Evidence) -> list[Explanation]:
-    """The exact solution, to within the error of an adaptive or high-order solver."""
+def _solver(e: Evidence) -> Explanation | None:
+    """The exact solution to within a tolerance: an adaptive or high-order solver."""
     if min(regression(e, law).left for law in (laws.PARITY, laws.POWERS)) < 1 / FALLS:
         # steps that alternate are no solver's, and its errors are no powers of the state
-        return []
+        return None
     residual = e.size
     # one step to a frame refutes most, and is found soon
     for strides in (range(1, 2), FEW):
@@ -69,32 +69,30 @@ def _solver(e: Evidence) -> list[Explanation]:
         distances = {x: distance(e.found, x.parts[0]) for x in joints}
         near = min((x for x in joints if x.scheme == "exact"), key=lambda x: distances[x], default=None)
         if near is None or max(distances[near], residual) > 0.05:
-            return []
+            return None
         # without friction every scheme is far from a damped motion, and says nothing of its steps
         alike = [(x, d) for x, d in distances.items() if x.scheme != "exact" and x.damped <= near.damped]
         others = min((d for x, d in alike if x.stride == 1), default=math.inf)
         if distances[near] > max(0.3 * others, 4 * residual) or others < 4 * distances[near]:
-            return []
+            return None
         # the error of a solver scatters: one that is the same in every frame may be that of fixed steps
         least = min((d for _, d in alike), default=math.inf)
         if distances[near] > 30 * residual and (least < 0.1 * distances[near] or residual < FIXED):
-            return []
+            return None
         size = max(residual, distances[near])
-    return [
-        Explanation(
-            cause=f"The states are the exact solution to within {size:.1e} of their size in each frame: "
-            "an adaptive solver or one of high order, which has no fixed scheme to find",
-            remedy="compare its error with its tolerance; give a smaller tolerance, or none",
-            misfit=size,
-        )
-    ]
+    return Explanation(
+        f"The states are the exact solution to within {size:.1e} of their size in each frame: an adaptive "
+        "solver or one of high order, which has no fixed scheme to find",
+        "compare its error with its tolerance; give a smaller tolerance, or none",
+        size,
+    )
 
 
-def _drift(e: Evidence) -> list[Explanation]:
+def _drift(e: Evidence) -> Explanation | None:
+    if not e.found.drifts or np.max(e.excess) > LEFT_BY_ROUNDING:
+        # where one map and a constant leave more than rounding, the constant may belong to something else
+        return None
     back = (np.eye(2) - e.found.unscaled.astype(np.float64)) @ e.found.centre.astype(np.float64)
-    if np.max(e.excess) > LEFT_BY_ROUNDING:
-        # what one map and a constant leave over is more than rounding: the constant may be of something else
-        return []
     fitting = matched(e.found, e.terms)
     whose = title(fitting[0].scheme) if fitting else "The scheme"
     size = np.abs(back) / e.found.size.astype(np.float64)
@@ -103,21 +101,21 @@ def _drift(e: Evidence) -> list[Explanation]:
     remedy = "look for a drift that is not the velocity's, such as a removed centre-of-mass motion"
     if what == "velocity":
         remedy = "look for a constant force, or a Jacobian by differences, which rounds to one side"
-    return [Explanation(cause=cause, remedy=remedy, misfit=e.size)]
+    return Explanation(cause, remedy, e.size)
 
 
-def _law(e: Evidence) -> list[Explanation]:
-    """The force law that explains most of the map's residuals with the fewest parameters."""
+def _law(e: Evidence) -> Explanation:
+    """The force law that explains the residuals with the fewest parameters, or those not told apart."""
     tried = [regression(e, law) for law in laws.LAWS]
     of = {x.law: x for x in tried}
     constant, powers, counted = of[laws.CONSTANT], of[laws.POWERS], of[laws.CONSTANT].counted
     shown = [x for x in tried if x.shows]
     if constant in shown and constant.left < laws.EXPLAINS:
-        # what a constant explains shows nothing of what has one beside it
+        # where a constant explains the residuals, a law has to explain more than it
         shown = [x for x in shown if x is constant or 2 * x.left < constant.left]
     fitting = [x for x in shown if x.left < laws.EXPLAINS]
     if not fitting:
-        return [_unexplained(e, counted)]
+        return _unexplained(e, counted)
     # of the laws that explain nearly as much per parameter, take the one of the fewest parameters
     best = min(x.cost for x in fitting)
     good = [x for x in fitting if x.left <= max(3 * best / math.sqrt(x.rank), 0.02)]
@@ -127,9 +125,8 @@ def _law(e: Evidence) -> list[Explanation]:
     first = good[0]
     untried = counted < FEWEST_MISSES or (first.law.waves and powers not in shown)
     if untried and FALLS * first.left > 1 and first is not constant:
-        # what explains a part, a frequency that was looked for above all, may stand for what so few pairs
-        # cannot show
-        return [_too_few(e, counted)]
+        # a law that explains a part, above all at a fitted frequency, may stand for one of more parameters
+        return _too_few(e, counted)
     if any(x.law.kind == laws.ANHARMONIC for x in good):
         # a wave that is in step with the motion to a share of a turn over the run is its own power
         good = [x for x in good if not _out_of_step(e, x) <= IN_STEP]
@@ -145,65 +142,65 @@ def _law(e: Evidence) -> list[Explanation]:
         # several times, and are as likely as a law of time where they leave as little
         kinds[laws.ANHARMONIC] = None
     if len(kinds) == 1:
-        return [explained_by(e, first)]
+        return explained_by(e, first)
     # over few periods position and velocity are functions of time, and of each other; states that
     # come back after a few frames show little else
     why = "the arc is too short" if few else "the states come back too much alike"
-    cause = (
+    return Explanation(
         f"The force {' or '.join(kinds)}, and {why} to tell which: it moves a frame by {e.size:.1e} of the "
-        "state's size"
+        "state's size",
+        "record more periods, where positions come back at other times and velocities",
+        first.left,
     )
-    remedy = "record more periods, where positions come back at other times and velocities"
-    return [Explanation(cause=cause, remedy=remedy, misfit=first.left)]
 
 
 def _out_of_step(e: Evidence, x: Regression) -> float:
-    """Angle over the run [rad] from a law's wave to the nearest harmonic of the motion; NaN without one."""
+    """Phase over the run [rad] between a law's frequency and the nearest harmonic; NaN of a law without."""
     angle = float(e.found.turn.angle[0])
     return e.pairs * min(abs(math.remainder(x.turn - n * angle, 2 * math.pi)) for n in HARMONICS)
 
 
 def _too_few(e: Evidence, counted: float) -> Explanation:
     return Explanation(
-        cause=f"What one map leaves over, {e.size:.1e} of the state's size, stands in about "
+        f"What one map leaves over, {e.size:.1e} of the state's size, stands in about "
         f"{count(round(counted), 'frame')}: too few to show its cause",
-        remedy="record more of the motion, before it dies down or after it has begun to grow; a solver "
+        "record more of the motion, before it dies down or after it has begun to grow; a solver "
         "that chooses its steps has no fixed scheme to find",
-        misfit=e.size,
+        e.size,
     )
 
 
 def _unexplained(e: Evidence, counted: float) -> Explanation:
-    """Explanation of residuals that are irregular, follow no known law, or occur in too few frames."""
+    """Residuals that are noise, follow no known law, or occur in too few frames."""
     if counted < FEWEST_MISSES:
         return _too_few(e, counted)
     rows = e.found.residual
     ratio = float(rows[0] / rows[1]) if rows[1] else math.inf
     where = "the velocity" if ratio < 0.2 else "the position" if ratio > 5 else "position and velocity"
     # what is left of the other number is rounding, which goes with the state
-    left = e.misses[:, rows >= 0.2 * np.max(rows)]
+    left = e.residuals[:, rows >= 0.2 * np.max(rows)]
     # noise of a coarse number is white relative to a motion that grows, and noise of one size beside its map
     linear = np.column_stack([e.states[:-1], np.ones(e.pairs)])
-    if not (irregular(left * e.weight[:, None]) or (left.shape[1] == 1 and irregular(left, linear))):
+    if not (is_white(left * e.weight[:, None]) or (left.shape[1] == 1 and is_white(left, linear))):
         return Explanation(
-            cause="No known cause alone explains what one map leaves over, and it is no white noise: it "
+            "No known cause alone explains what one map leaves over, and it is no white noise: it "
             f"comes back from frame to frame, {e.size:.1e} of the state's size in each, in {where}",
-            remedy="look for several errors at once, and take them out one by one; a solver that chooses its "
+            "look for several errors at once, and take them out one by one; a solver that chooses its "
             "steps has no fixed scheme to find"
             + "; a bath of one factor for all momenta, as a Nose-Hoover chain, shows in two particles or more"
             * (e.record.q.shape[1] == 1),
-            misfit=e.size,
+            e.size,
         )
     return Explanation(
-        cause=f"Noise: what one map leaves over is irregular, {e.size:.1e} of the state's size in each "
+        f"Noise: what one map leaves over is irregular, {e.size:.1e} of the state's size in each "
         f"frame, in {where}, and has no quanta of a known arithmetic",
-        remedy="look for a thermostat, an iteration that stops early, or a sum in changing order",
-        misfit=e.size,
+        "look for a thermostat, an iteration that stops early, or a sum in changing order",
+        e.size,
     )
 
 
 SEARCHED = (
     misplaced, partial(alone, laws.DRY), memory, few_bad_frames, partial(alone, laws.COUPLED), lasting,
-    _solver, _law,
+    _solver,
 )  # fmt: skip
-"""Causes of what one map leaves over, in the order in which they are looked for; the last is always one."""
+"""Causes of the map's residuals, in the order in which they are looked for; `_law` comes last."""

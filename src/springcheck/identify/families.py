@@ -1,28 +1,30 @@
-"""Families of one-step maps: every scheme of the catalogue, each way to put friction into it, held forces.
+"""Families of one-step maps: the schemes of the catalogue, with friction at each place of the step; faults.
 
-On a spring a scheme is a map of (q, v h) with one unknown, a = (h w)**2, or two where there is friction of
-rate gamma, g = gamma h.  Where friction acts within the step, and by which law, gives different maps, and
-maps of different springs may agree: implicit Euler on k is semi-implicit Euler on a damped spring of
-stiffness k/(1 + a).  `search.coincident` finds such identities by matching families against each other.
+On a spring a scheme is a linear map of (q, v h) with one unknown, a = (h w)**2; friction of rate gamma adds
+another, g = gamma h.  The place of the friction in the step and its discretisation change the map.  Two
+families may have the same map on different springs: implicit Euler on k is semi-implicit Euler on a damped
+spring of stiffness k/(1 + a).  `search.coincident` finds such pairs.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from itertools import zip_longest
+from operator import mul
 from typing import Any, TypeAlias
 
 import numpy as np
 
 from springcheck.schemes import SCHEMES, Scheme, roundings
 from springcheck.schemes.elsewhere import ELSEWHERE
+from springcheck.text.wording import either
 
 Stage: TypeAlias = tuple[str, Fraction | str]
-"""kick, drift, friction (decay of v), and kicks with the friction in them: `explicit`, `implicit`, `centred`
-(half of it by the old v, half by the new), and `remembered` (a force of the last half step's velocity; also
-an implicit one whose derivative has the wrong sign)."""
+"""Kind and share of the step: drift, kick, friction (v decays), and kicks whose force has the friction of the
+old v (`explicit`), of the new v (`implicit`), of their mean (`centred`), or of the v half a step ago
+(`remembered`, which is also an implicit kick whose derivative has the wrong sign)."""
 
 ONE, HALF = Fraction(1), Fraction(1, 2)
 
@@ -32,40 +34,42 @@ EXPONENTIAL = "exponential friction"
 CENTRED = "friction by the mean of old and new v"
 
 HELD_SHARES = 64
-"""Largest number of substeps that a held force is looked for at; a force held over more is a held force."""
+"""Largest number of substeps that is told from infinitely many."""
 
 G_ROUNDING = 1e-13
-"""Error of the share of a held force that its own roundings may make, beside that of the fit."""
+"""Error of g by rounding, beside its standard error from the fit."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Family:
-    """A one-step map with unknowns a and, where `damped`, g; `place` says where the friction acts.
-
-    `maps` evaluates it."""
+    """A one-step map with unknowns a and, where `damped`, g, which `maps` evaluates."""
 
     name: str
     scheme: str
     stages: tuple[Stage, ...] = ()
     stability: tuple[tuple[Fraction | str, ...], tuple[Fraction | str, ...]] = ((), ())
-    """Numerator and denominator, from the constant up, of the stability function R(h L)."""
+    """Coefficients of numerator and denominator, in rising powers, of the stability function R(h L)."""
     damped: bool = False
     laws: tuple[str, ...] = ()
-    """Friction laws that have this map, each with a rate of its own (`rates`)."""
+    """Discretisations of the friction that give this map, each at a rate of its own (`rate`)."""
     place: str = ""
+    """Where in the step the friction acts."""
     flow: bool = False
+    """Whether it is the exact solution."""
     path: int = 0
+    """Roundings in a step."""
     limit: float = np.inf
+    """Stability limit of h w."""
     formula: str = ""
-    """A map that stages do not give: of a fault by its name in `maps.FORMULAS`, or of a scheme."""
+    """Key of a map that stages do not give: a fault in `maps.FORMULAS`, or a scheme."""
     cause: str = ""
     remedy: str = ""
-    """What is wrong, and what to do, where the family is a fault."""
+    """Of a fault: what is wrong, and what to do."""
     held: bool = False
-    """Whether g is the share of h F/m that enters the position: a force held over substeps."""
+    """Whether the force is held over substeps; g is then the share of h**2 F/m that enters the position."""
 
     def rate(self, law: str, g: float) -> float:
-        """gamma h under a law whose decay within a step is exp(-g)."""
+        """gamma h of a discretisation by which v decays by exp(-g) in a step."""
         if law.startswith(IMPLICIT):
             return float(np.expm1(g))
         return float(-np.expm1(-g)) if law.startswith("a factor") else g
@@ -79,25 +83,13 @@ def stability_function(
     Hairer & Wanner, Solving Ordinary Differential Equations II, IV.3.
     """
     own = a[-1][len(b) - 1] if len(a[-1]) == len(b) else Fraction(0)
-    denominator = (ONE, -own)
-    # the stages' derivatives are polynomials of z over that denominator: y_i = 1 + z sum a_ij y_j
-    stages: list[list[Fraction]] = []
-    for i, row in enumerate(a):
-        y = [ONE]
-        for c, past in zip(row[:i], stages, strict=False):
-            y = _plus(y, [Fraction(0), *(c * x for x in past)])
-        stages.append(y)
-    out = [ONE]
-    for i, (c, y) in enumerate(zip(b, stages, strict=True)):
-        last = _plus(y, [Fraction(0), *(-own * x for x in y)]) if own and i < len(b) - 1 else y
-        out = _plus(
-            out if not own or i else _plus(out, [Fraction(0), -own]), [Fraction(0), *(c * x for x in last)]
-        )
-    return tuple(out), denominator if own else (ONE,)
-
-
-def _plus(x: list[Fraction], y: list[Fraction]) -> list[Fraction]:
-    return [p + q for p, q in zip_longest(x, y, fillvalue=Fraction(0))]
+    # R = 1 + z (b 1) + z**2 (b A 1) + ..., which ends by itself once it is multiplied by 1 - own z
+    series, powers = [ONE], [ONE for _ in b]
+    for _ in b:
+        series.append(sum(map(mul, b, powers), Fraction(0)))
+        powers = [sum(map(mul, row, powers), Fraction(0)) for row in a]
+    over = tuple(x - own * before for x, before in zip(series, [Fraction(0), *series], strict=False))
+    return over, (ONE, -own) if own else (ONE,)
 
 
 def _of(scheme: Scheme, *, damped: bool) -> Family:
@@ -166,8 +158,8 @@ PREDICTED = {
     "of v + 0.65 h a in the second half kick": Fraction(13, 20),
     "of v + h a in the second half kick": ONE,
 }
-"""Places of friction by lambda of Groot & Warren, J. Chem. Phys. 107 (1997) 4423: the force at the step's end
-has the friction of v + lambda h a.  At 1/2 the map is that of explicit friction in both half kicks."""
+"""lambda of Groot & Warren, J. Chem. Phys. 107 (1997) 4423, by the place of the friction: that of the second
+force is of v + lambda h a.  At 1/2 the map is that of explicit friction in both half kicks."""
 
 OF_HALF_A_STEP_AGO = f"{VERLET}, friction of the velocity half a step ago"
 
@@ -223,7 +215,7 @@ WRONG_RK4: tuple[tuple[str, tuple[Any, ...], tuple[Any, ...]], ...] = (
     ("Heun's method whose weights add up to 2", ((0,), (1,)), (1, 1)),
     ("the midpoint method whose first stage takes a full step", ((0,), (1,)), (0, 1)),
 )  # fmt: skip
-"""What is written down wrongly in Runge-Kutta methods, as tableaux."""
+"""Mistakes in Runge-Kutta methods: what is wrong, stages and weights."""
 
 _FAULTS: tuple[tuple[Any, ...], ...] = (
     ("old force", "Velocity Verlet whose second half kick uses the old force, "
@@ -247,11 +239,22 @@ _FAULTS: tuple[tuple[Any, ...], ...] = (
 )  # fmt: skip
 
 
+MOST_TITLES = 4
+"""Schemes that a sentence names; of more it gives the number."""
+
+
 def title(scheme: str) -> str:
     """Title of a scheme, with a capital letter."""
     known = SCHEMES.get(scheme) or ELSEWHERE.get(scheme)
     name = known.title if known else scheme
     return name[0].upper() + name[1:]
+
+
+def titles(schemes: Iterable[str]) -> str:
+    """Titles of alternative schemes, each once: A, B, C, D or 3 more."""
+    names = list(dict.fromkeys(map(title, schemes)))
+    more = len(names) - MOST_TITLES
+    return either([*names[:MOST_TITLES], *([f"{more} more"] if more > 0 else [])])
 
 
 def _fault(name: str, cause: str, remedy: str, *stages: Stage) -> Family:
@@ -294,7 +297,8 @@ SUBTRACTED = tuple(
     )
     for name, stages in ((EULER, (WRONG, DRIFT)), (EULER_LATE, (DRIFT, WRONG)))
 )  # fmt: skip
-"""Faults of two unknowns: each is a scheme with friction on another spring, told by the stated one."""
+"""Faults with friction: each has the map of a damped scheme on another spring, so that only a stated
+stiffness tells it."""
 
 HELD = Family(name="held-force", scheme="held-force", damped=True, held=True, path=16, limit=0.0)
 
@@ -321,7 +325,7 @@ FAMILIES = {
 
 def substeps(share: float, error: float) -> tuple[range, bool]:
     """Numbers of substeps over which a force may be held, empty where no integer fits, and whether each
-    substep kicks before it drifts.  `error` is the standard error of the share.
+    substep kicks before it drifts.  `error` is the standard error of the share from the fit.
 
     The position advances by (n + 1)/2n of h**2 F/m where substeps kick first, by (n - 1)/2n where they drift
     first.
@@ -329,7 +333,7 @@ def substeps(share: float, error: float) -> tuple[range, bool]:
     if math.isnan(share + error):
         # noise left the fit without a share
         return range(0), False
-    off, room = abs(2 * share - 1), 12 * error
+    off, room = abs(2 * share - 1), 12 * (error + G_ROUNDING)
     least = math.ceil(1 / (off + room))
     most = min(1 / (off - room), HELD_SHARES) if off > room else HELD_SHARES
     return range(max(least, 2), math.floor(most) + 1), share > 0.5
@@ -337,4 +341,4 @@ def substeps(share: float, error: float) -> tuple[range, bool]:
 
 def endless(share: float, error: float) -> bool:
     """Whether the share is that of infinitely many substeps, as of a force held over the whole step."""
-    return abs(2 * share - 1) <= 12 * error
+    return abs(2 * share - 1) <= 12 * (error + G_ROUNDING)

@@ -14,9 +14,10 @@ from springcheck import formats, schemes, store
 from springcheck.errors import IdentificationError, MethodError, SpringcheckError, StoreError
 from springcheck.formats import columns as columns_of
 from springcheck.identify.laws import COUPLED
-from springcheck.identify.record import ROUNDING, of_size
+from springcheck.identify.record import of_size
 from springcheck.identify.report import identify_arrays
 from springcheck.identify.result import Identification
+from springcheck.identify.storage import ROUNDING
 from springcheck.identify.taken import seen_to_take
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.arrays import Floats, Integers
@@ -24,23 +25,24 @@ from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory
 
 MOST_FRAMES = 20_000
-"""Frames that are looked at, from the start on: a scheme shows in every step, so more would say no more."""
+"""Most frames that are identified, from the first on: every step shows the scheme."""
 
 MOST_FAILED = 1000
-"""Frames that are looked at to say what a trajectory is that has failed."""
+"""Most frames that are identified of a trajectory that has failed."""
 
 MOST_OSCILLATORS = 16
-"""Moving coordinates that are looked at in a file of many particles."""
+"""Most moving coordinates that are identified."""
 
 RIGID, TURNED = 1e-3, 0.05
-"""Part by which a distance may change that is a rod's, programs' own tolerances being 1e-4, and by which the
-way has to turn for it to show."""
+"""Largest relative change of a rod's length (programs have tolerances of 1e-4), and smallest rotation by
+which it shows [rad]."""
 
 SEVERAL = 8
-"""Digits of their distance to which two particles that go round each by itself keep to their circles."""
+"""Ratio of the deviation of two particles from circles to that of their distance, up to which each is on an
+orbit of its own."""
 
 FEWEST_ON_ARC = 8
-"""Frames, of which a circle in space takes up to four numbers."""
+"""Most frames that a circle in space, of four parameters, fits without significance."""
 
 LENGTHS = {"nm": 1.0, "Angstrom": 0.1, "angstrom": 0.1, "A": 0.1, "Å": 0.1, "pm": 1e-3, "m": 1e9, "um": 1e3}
 TIMES = {"ps": 1.0, "fs": 1e-3, "ns": 1e3, "s": 1e12, "us": 1e6}

@@ -1,18 +1,16 @@
 """The map between recorded states: generalised least squares under the observation model.
 
-States are z[n+1] = B z[n] + c + p[n], recorded as z + e: e is what the form of the file leaves uncertain,
-p is what the arithmetic rounds in a step.  The residuals of a map, r[n] = z[n+1] - B z[n] - c, then have the
-covariance V = A S A^T + P, a banded matrix, since each recorded error enters two of them.  B and c
-minimise r^T V^-1 r (Gauss-Helmert model: Mikhail, Observations and Least Squares, 1976, chapter 9).  Where
-the file has all digits V is diagonal and neighbours are all that counts; where it has few, V^-1 adds up what
-the whole orbit shows.  One fit serves both, and what lies between.
+States are z[n+1] = B z[n] + c + p[n], recorded as z + e: e is the error of the storage format, p the rounding
+of a step.  The residuals r[n] = z[n+1] - B z[n] - c have the covariance V = A S A^T + P, a banded matrix,
+since each e enters two of them.  B and c minimise r^T V^-1 r (Gauss-Helmert model: Mikhail, Observations and
+Least Squares, 1976, chapter 9).  In double precision e = 0, V is diagonal and each pair of frames counts by
+itself; with few digits V^-1 combines the whole orbit.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,61 +18,60 @@ from numpy.typing import NDArray
 from springcheck.errors import IdentificationError
 from springcheck.identify.hypothesis import ERRORS
 from springcheck.identify.noise import Noise
-from springcheck.identify.record import ROUNDING, Record
+from springcheck.identify.record import Record
+from springcheck.identify.storage import ROUNDING
 from springcheck.physics.arrays import Extended, Floats
 from springcheck.physics.exact.powers import Rotation
 from springcheck.schemes import rotation
 
 CONSTANT_SHOWS = 50.0
-"""Gain of chi-squared that shows a constant part in double precision, whose residuals are no Gaussian noise:
-5 standard errors leave one in 700 files with an equilibrium that is none."""
+"""Gain of chi-squared from which a constant part is fitted in double precision, whose residuals are not
+Gaussian: at 25, five standard errors, one file in 700 has a spurious equilibrium."""
 
 CONSTANT_LIKELY = 10.0
-"""Gain that shows a constant part in a coarse file: one left out is wrong, one too many costs little."""
+"""The same gain for coarse files, where a missing constant is a bias, a superfluous one widens errors."""
 
 FLOOR = 1 / 8
-"""A number near zero is written finer than its neighbours by any power of ten; it counts as no finer than
-this share of the other component's quantum."""
+"""Smallest standard error of one component relative to the other's: text has a fine zero."""
 
 LEAST_LEFT = 1 / 16
-"""Least mean square residual of a step, in squares of a state's rounding: numbers that happen to be exact
-leave less, and prove no more."""
+"""Lower bound on the mean square residual, in squares of the unit roundoff: exact numbers leave less."""
 
 ENOUGH = 8
-"""Residuals to spare from which what they leave over shows how large it is; fewer may be small by chance, and
-count as no smaller than a rounding by that share."""
+"""Degrees of freedom below which residuals may be small by chance, so that the lower bound on their mean
+square rises to one unit roundoff."""
 
 LEAST_NOISE = 1e-30
-"""Share of the largest noise that a pair counts with at least."""
+"""Smallest standard deviation of a pair, relative to the largest."""
 
 CERTAIN = 14.0
-"""Log of the likelihood ratio from which one of two noise models is called: exp(-14) bounds mistakes."""
+"""Log of the likelihood ratio from which one of two noise models is chosen."""
 
-FEWEST_SLIPPING = 20
-"""Numbers up to which what a clock's slips do to each step is not fitted."""
+FEWEST_UNEVEN = 20
+"""Residuals up to which the effect of an uneven clock is not fitted."""
 
 CLEAN = 100.0
-"""Largest mean square residual, relative to the expected one, that may still be rounding."""
+"""Largest mean square residual, relative to its expectation, that may still be rounding."""
 
 KURTOSIS = 0.8
-"""Variance of the square of an even error in units of its own squared: chi-squared of n has 0.8 n."""
+"""Variance of the square of a uniform error over its mean squared: chi-squared of n varies by 0.8 n."""
 
 CHANCE = 1e-6
-"""Probability of accepting a constant where there is none."""
+"""Probability of fitting a constant part that is not there."""
 
 UNKNOWN = 1e6
-"""Share of a state that may change between two frames of which nothing is known."""
+"""Standard deviation, relative to the state, of a pair of frames that is left out of the fit."""
 
 MOST_ROUNDS = 12
-"""Gauss-Newton's steps at most; three reach rounding in double precision, five in coarse text."""
+"""Most Gauss-Newton steps: three converge to rounding in double precision, five in coarse text."""
 
 SETTLED = 1e-3
-"""Gain of chi-squared that another step must promise, in units of what each number leaves over."""
+"""Predicted gain of chi-squared, relative to its value per residual, below which Gauss-Newton stops."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Map:
-    """The map z -> B z of one oscillator's states z = ((q - centre)/size_q, v T/size_v), of size 1 each.
+    """The map z -> B z between frames of one oscillator, z = (q - centre, v T)/size.
 
     `covariance` (4, 4) belongs to the entries B11, B12, B21, B22.
     """
@@ -85,35 +82,33 @@ class Map:
     centre: Extended
     z: Extended
     weight: Floats
-    """Weight (f - 1,) of each pair of states, by which weighted states have a mean square of 2."""
+    """Weight (f - 1,) of each pair: weighted states have a mean square of 2."""
     residual: Floats
-    """Root mean square (2,) of the weighted residuals of each component."""
+    """Root mean square (2,) of the weighted residuals."""
     noise: Noise
     chi2: float
-    """Chi-squared: residuals in squares of what the observation model expects."""
+    """Chi-squared of the residuals under the observation model."""
     freedom: int
     conditioned: bool
-    """Whether the states span the plane beyond what the map leaves over."""
+    """Whether the states span the phase plane beyond the residuals."""
     spans: bool
-    """Whether they span it beyond the rounding of their numbers."""
+    """Whether they span it beyond the rounding of the recorded numbers."""
     once: bool | None
     """Whether the states were rounded once, as they were written, and never in the motion; None where that
     does not show, or where they have all digits."""
     drifts: bool = False
     """Whether the constant part is no equilibrium but a constant added to the position in every step."""
-    slips: Extended | None = None
-    """Relative excess (f - 1,) of each step over the mean, where the steps follow the clock's."""
-    found: dict[Any, Any] = field(default_factory=dict, init=False)
-    """What was already worked out of this map."""
+    deviations: Extended | None = None
+    """Relative deviation (f - 1,) of each step from the mean, where the steps follow the recorded times."""
 
     @property
     def unscaled(self) -> Extended:
-        """The map on (q, v T), both in units of length."""
+        """The map on (q, v T), both [L]."""
         return np.asarray(self.entries * self.size[:, None] / self.size[None, :])
 
     @property
     def whole(self) -> bool:
-        """Whether the entries come from one orbit of all states, not from pairs."""
+        """Whether the entries are those of one orbit through all states, rather than of pairs."""
         return self.once is True or (self.once is None and not self.noise.diagonal and self.within)
 
     @property
@@ -123,15 +118,15 @@ class Map:
 
     @property
     def clean(self) -> bool:
-        """Whether the residuals may be rounding: at most ten times what is expected."""
+        """Whether the residuals may be rounding: at most ten times their expectation."""
         return self.chi2 <= CLEAN * self.freedom
 
     @property
     def within(self) -> bool:
-        """Whether the residuals are what the observation model expects."""
+        """Whether chi-squared agrees with the observation model."""
         return self.chi2 <= self.freedom + ERRORS * math.sqrt(KURTOSIS * self.freedom + 1)
 
-    def misses(self, other: Map | None = None) -> Floats:
+    def residuals(self, other: Map | None = None) -> Floats:
         """Residuals (f - 1, 2) of the map on the pairs of its own states, or of another fit's."""
         z = self.z
         if other is not None:
@@ -140,7 +135,7 @@ class Map:
 
 
 def _sizes(z: Extended) -> Extended:
-    """Sizes (2,) of the two components over one turn, also of a motion that grows or decays."""
+    """Root mean square (2,) of the two components over a turn; growth and decay are divided out."""
     square = z**2
     size = np.sqrt(square.mean(axis=0))
     size = np.where(size == 0, 1, size)
@@ -153,7 +148,7 @@ def _sizes(z: Extended) -> Extended:
 
 @dataclass(slots=True, eq=False)
 class _Solution:
-    """A minimum: entries and centre, the covariance of all unknowns, what is left over, and its noise."""
+    """A minimum of chi-squared: entries and centre, covariance of all unknowns, chi-squared, noise model."""
 
     entries: Extended
     centre: Extended
@@ -168,15 +163,20 @@ class _Solution:
 
 
 def _minimum(
-    z: Extended, sigma: Floats, process: Floats, start: _Solution | None, centred: int, slips: Extended | None
+    z: Extended,
+    sigma: Floats,
+    process: Floats,
+    start: _Solution | None,
+    centred: int,
+    deviations: Extended | None,
 ) -> _Solution:
     """Gauss-Newton for the map, its constant part (`centred`: 0 none, 1 an equilibrium at rest, 2 any), and
-    the effect of the clock's slips on a step (4 further entries)."""
+    the effect of the clock's deviations on a step (4 further entries)."""
     n = 4 + centred
-    x = np.zeros(n if slips is None else n + 4, np.longdouble)
+    x = np.zeros(n if deviations is None else n + 4, np.longdouble)
     x[:n] = _first_guess(z, process, start, centred)
     # of size 1, as everything else
-    slipping = None if slips is None else (slips / np.max(np.abs(slips)))[:, None]
+    slipping = None if deviations is None else (deviations / np.max(np.abs(deviations)))[:, None]
     best: _Solution | None = None
     noise = Noise(np.eye(2), 0 * sigma, process) if not np.any(sigma) else None
     for _ in range(MOST_ROUNDS):
@@ -250,20 +250,20 @@ def fit(record: Record, j: int, *, kept: NDArray[np.bool_] | None = None, consta
     # what happens in other pairs than those that are kept is unknown
     unknown = 1.0 if kept is None else np.where(kept, 1.0, UNKNOWN / ROUNDING)
     process = ROUNDING * length * unknown
-    slips = None
+    deviations = None
     # neighbours alone first: a map that is far off makes nothing of the orbit
     pairs = process if record.fine else np.hypot(process, np.max(sigma[1:], axis=1))
-    best, centred, slips = _constant_part(z, 0 * sigma, pairs, None, record, constant)
+    best, centred, deviations = _constant_part(z, 0 * sigma, pairs, None, record, constant)
     if centred:
         # roundings are relative to the distance from the equilibrium, and to that of the equilibrium from 0
         length = _lengths(z, best.centre)
         process = ROUNDING * length * unknown
-        best = _minimum(z, 0 * sigma, process, best, centred, slips) if record.fine else best
+        best = _minimum(z, 0 * sigma, process, best, centred, deviations) if record.fine else best
     if not record.fine:
         best, centred, _ = _constant_part(z, sigma, process, best, record, constant)
     once: bool | None = None
     pairs_kept = len(process) if kept is None else int(np.count_nonzero(kept))
-    freedom = 2 * pairs_kept - 4 - centred - (4 if slips is not None else 0)
+    freedom = 2 * pairs_kept - 4 - centred - (4 if deviations is not None else 0)
     if not record.fine:
         other = _fed_back(z, sigma, process, best, centred, freedom)
         odds = (other.cost - best.cost) / 2
@@ -272,9 +272,9 @@ def fit(record: Record, j: int, *, kept: NDArray[np.bool_] | None = None, consta
         if best.chi2 > expected:
             best = other
     scale = max(best.chi2 / max(freedom, 1), _least(freedom) if record.fine else 1.0)
-    if record.slips is not None and 2 * pairs_kept <= FEWEST_SLIPPING:
+    if record.deviations is not None and 2 * pairs_kept <= FEWEST_UNEVEN:
         # too few to be fitted, they turn each state on by as much of half a turn at most
-        scale = max(scale, (math.pi * float(np.max(np.abs(record.slips))) / ROUNDING) ** 2)
+        scale = max(scale, (math.pi * float(np.max(np.abs(record.deviations))) / ROUNDING) ** 2)
     covariance = best.inverse[:4, :4] * scale * (1.0 if record.fine else repeats(z))
     state = z - best.centre
     share = length.astype(np.longdouble)[:, None] ** -2
@@ -291,18 +291,19 @@ def fit(record: Record, j: int, *, kept: NDArray[np.bool_] | None = None, consta
     return Map(
         weight=weight, residual=residual, spans=spans,
         entries=best.entries, covariance=covariance, size=size, centre=best.centre * size, z=state,
-        noise=best.noise, chi2=best.chi2, freedom=freedom, once=once, drifts=centred == 2, slips=slips,
+        noise=best.noise, chi2=best.chi2, freedom=freedom, once=once, drifts=centred == 2,
+        deviations=deviations,
         conditioned=spans and smallest > 100 * float(np.max(residual)) ** 2,
     )  # fmt: skip
 
 
 def _least(freedom: int) -> float:
-    """Lower bound on the mean square residual at this freedom, in squares of a rounding."""
+    """Lower bound on the mean square residual by the degrees of freedom, in squares of the unit roundoff."""
     return max(LEAST_LEFT, min(1.0, ENOUGH / max(freedom, 1)))
 
 
 def _lengths(z: Extended, centre: Extended | Floats) -> Floats:
-    """Sizes (f - 1,) that the rounding of each pair is relative to."""
+    """Sizes (f - 1,) to which the rounding of each pair is relative."""
     away = np.sqrt(np.sum((z - centre).astype(np.float64) ** 2, axis=1))
     if not np.any(away[:-1]):
         raise IdentificationError("a coordinate rests but for the last frame: give the part before")
@@ -314,10 +315,10 @@ def _lengths(z: Extended, centre: Extended | Floats) -> Floats:
 def _constant_part(
     z: Extended, sigma: Floats, process: Floats, start: _Solution | None, record: Record, constant: bool
 ) -> tuple[_Solution, int, Extended | None]:
-    """Solution with the plainest constant part that explains the states (`centred`), and the slips fitted."""
+    """Solution with the smallest sufficient constant part (`centred`), and the deviations if fitted."""
     from scipy.special import fdtri
 
-    numbers, slips, centred = 2 * len(process), None, 0
+    numbers, deviations, centred = 2 * len(process), None, 0
     least = _least(numbers - 6) if record.fine else 1.0
 
     def gains(old: _Solution, new: _Solution, least_gain: float) -> bool:
@@ -330,38 +331,38 @@ def _constant_part(
     best = _minimum(z, sigma, process, start, 0, None)
     unknown, wide = 4, None
     if record.fine and not constant:
-        removed = _removed_at_most(z, process, best, record.slips)
+        removed = _removed_at_most(z, process, best, record.deviations)
         if removed <= CONSTANT_SHOWS * max((best.chi2 - removed) / max(numbers - 6, 1), least):
             return best, 0, None
-    if record.slips is not None and numbers > FEWEST_SLIPPING:
+    if record.deviations is not None and numbers > FEWEST_UNEVEN:
         wide = _minimum(z, sigma, process, best, 1, None)
-        sliding = _minimum(z, sigma, process, wide, 1, record.slips)
+        sliding = _minimum(z, sigma, process, wide, 1, record.deviations)
         if gains(wide, sliding, 2 * CONSTANT_SHOWS):
-            slips, unknown, wide = record.slips, 8, None
-            best = _minimum(z, sigma, process, best, 0, slips)
+            deviations, unknown, wide = record.deviations, 8, None
+            best = _minimum(z, sigma, process, best, 0, deviations)
     plain = best.chi2 <= (numbers - unknown) * least
     if numbers <= unknown + 2 or (plain and not constant):
-        return best, centred, slips
-    wide = wide or _minimum(z, sigma, process, best, 1, slips)
+        return best, centred, deviations
+    wide = wide or _minimum(z, sigma, process, best, 1, deviations)
     if constant or gains(best, wide, CONSTANT_SHOWS if record.fine else CONSTANT_LIKELY):
         best, centred = wide, 1
     if record.fine and numbers > unknown + 3 and best.chi2 > (numbers - unknown) * least:
-        widest = _minimum(z, sigma, process, best, 2, slips)
+        widest = _minimum(z, sigma, process, best, 2, deviations)
         # at rest the roundings are the same in every step, and add up to a constant of their own
         shift = np.max(np.abs((np.eye(2) - widest.entries) @ (widest.centre - best.centre)))
-        # where the clock's slips are too few to be fitted, a constant may stand for them
-        slipping = record.slips is not None and numbers <= FEWEST_SLIPPING
+        # where the clock's deviations are too few to be fitted, a constant may stand for them
+        slipping = record.deviations is not None and numbers <= FEWEST_UNEVEN
         clean = not slipping or widest.chi2 <= CLEAN * (numbers - unknown - 3)
         if clean and gains(best, widest, CONSTANT_SHOWS) and shift > 64 * ROUNDING * np.max(np.abs(z)):
             best, centred = widest, 2
-    return best, centred, slips
+    return best, centred, deviations
 
 
-def _removed_at_most(z: Extended, process: Floats, best: _Solution, slips: Extended | None) -> float:
-    """Chi-squared that a constant part of any kind and a clock's slips together remove from a fit without:
-    all of them lie among maps that are linear in the state, 1, and both times the slips."""
+def _removed_at_most(z: Extended, process: Floats, best: _Solution, deviations: Extended | None) -> float:
+    """Upper bound on the decrease of chi-squared by a constant part and the deviations of the clock: both are
+    linear in the state, 1, and the products of these with the deviations."""
     state, weight = np.column_stack([z[:-1], np.ones(len(process))]), 1 / process[:, None]
-    every = state if slips is None else np.column_stack([state, slips[:, None] * state])
+    every = state if deviations is None else np.column_stack([state, deviations[:, None] * state])
     size = np.max(np.abs(every), axis=0)
     columns = (every / np.where(size > 0, size, 1)).astype(np.float64) * weight
     left = np.asarray(z[1:] - z[:-1] @ best.entries.T, np.float64) * weight

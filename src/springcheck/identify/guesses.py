@@ -1,14 +1,13 @@
-"""First guesses of the families' unknowns: steps that a map may be the power of, and what has them.
+"""First guesses of the families' unknowns, from the roots of a measured map.
 
-Without friction a family is a curve over the phase of its step.  Each root of a measured map has a phase, so
-that its entries and those of every curve there are compared at once; what comes near is followed by
-Gauss-Newton.
+Without friction the map of a family is a curve over the phase of its step, which is tabulated.  Each matrix
+root of the measured map has a phase, so that its entries are compared with those of all curves at once; what
+comes near is refined by Gauss-Newton.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from typing import Any
@@ -19,61 +18,61 @@ from springcheck.identify.families import FAMILIES, Family
 from springcheck.identify.fit import Map
 from springcheck.identify.hypothesis import STRIDES
 from springcheck.identify.maps import MapTable, table, unit
-from springcheck.identify.record import ROUNDING
+from springcheck.identify.storage import ROUNDING
 from springcheck.physics.arrays import Floats, Integers
 from springcheck.schemes import rotation
 
 NEAR = 1e-11, 30.0
-"""Distance of the entries of one step, and how many of its errors, within which a family is worth an exact
-comparison: what Gauss-Newton in double precision leaves of the right one."""
+"""Distance of the entries of one step within which a family is compared exactly, absolute and in standard
+errors: what Gauss-Newton in double precision leaves of the right family."""
 
 FAR = 3.0
-"""Bound on the entries' distance where the nearest is wanted, whether or not it may be accepted."""
-
-LOST = 3.0
-"""Bound on the entries' distance of a first guess, and as long as Newton steps are long."""
+"""Distance of the entries beyond which a guess is dropped before Gauss-Newton converges."""
 
 CURVED, QUOTIENT, FARTHEST = 30.0, 1e-5, 0.3
-"""Residual that a Gauss-Newton step may leave beside what further steps remove: in units of its square (8.4
-at most was seen in the right families of 11,600 maps, damped up to 0.9 of the critical) and of its length
-(slopes are difference quotients); and the length of a step from which this says nothing."""
+"""Residual after a Gauss-Newton step of length d of a family that converges: at most `CURVED` d**2 (8.4 was
+the largest in 11,600 maps, damped up to 0.9 of the critical) plus `QUOTIENT` d (slopes are difference
+quotients), for d below `FARTHEST`."""
 
 FLOW_TURNS = 8
-"""Turns between two frames that the exact flow, which has no step, is looked for at."""
+"""Largest number of turns between two frames for the exact solution, which has no step that limits them."""
 
 CELLS, LARGEST_PHASE = 2048, 1.15 * math.pi
-"""Cells of the phase of a step in which it is tabulated, and the largest: RK4 turns by more than a half."""
+"""Cells of the table, and its largest phase of a step: RK4 turns by more than half a turn."""
 
 GLANCE = 3e-6
-"""Distance of the entries of one step from a tabulated one, over the root of the determinant and beside what
-the table bends, within which a guess is followed."""
+"""Distance of the entries of one step from the table, relative to the root of the determinant and beside the
+error of linear interpolation, within which a guess is refined."""
 
 DAMPING = 2.0
-"""Distance in units of g, where there is friction.  Measured on 2,900 maps of up to 0.9 of the critical
-damping: 1.7."""
+"""Distance from the table that friction may add, in units of g: 1.7 at most in 2,900 maps of up to 0.9 of the
+critical damping."""
 
 SWAY = 8.0
-"""Phase beyond the largest one, in units of g: friction acts in substeps forward and back, of 4.4 steps in
-all in Forest & Ruth's scheme, and twice as much in the phase where that is far from a half turn."""
+"""Phase by which friction exceeds the largest one, in units of g: substeps forward and back add up to 4.4
+steps in Forest & Ruth's scheme, and count twice in a phase that is far from half a turn."""
 
 END = 0.02
-"""Phase beside the largest one in which a table says little."""
+"""Phase beside the largest one within which the table is not relied upon."""
 
 FOLDED = 0.7
-"""Share of the largest phase of a step from which friction may take it beyond that."""
+"""Share of the largest phase from which friction may raise a phase above it."""
 
 FOLDS = 0.6, 0.75, 0.9, 1.05, 1.2
-"""Shares of the h w of the largest phase that are tried there."""
+"""First guesses of h w in that case, in units of the h w of the largest phase."""
 
 LARGEST = 30.0
-"""h w that implicit schemes, which have no limit, are looked for at."""
+"""Largest h w of schemes that are stable at any."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Curves:
-    """One-step maps of the frictionless families as functions of their phase, on each interval where it is
-    monotonic.  Each curve has its family, first and last phase; at `CELLS` + 1 phases h w the log of the
-    determinant, and M11 and M12 over its root; and their curvature within a cell."""
+    """One-step maps of frictionless families over the phase: a curve for each interval of h w on which the
+    phase is monotonic.
+
+    Each curve has its family, first and last phase; `rows` (curves, 5, `CELLS` + 1) holds h w, the log of the
+    determinant, M11 and M12 over the root of the determinant, and the curvature within a cell.
+    """
 
     family: Integers
     low: Floats
@@ -125,7 +124,7 @@ def _curve(name: str) -> _Curves:
 
 @dataclass(slots=True, eq=False)
 class Roots:
-    """Steps (r,) that a map may be the power of: the matrix on (q, v h), its phase and log of determinant."""
+    """Matrix roots (r,) of a map, as possible steps on (q, v h), with phase and log of the determinant."""
 
     s: Floats
     turns: Floats
@@ -134,12 +133,13 @@ class Roots:
     step: Floats
     error: float
     kept: dict[Any, Any]
-    """What was already worked out of them."""
+    """Cache of comparisons with the curves."""
 
 
-def roots_of_map(found: Map, strides: Iterable[int]) -> Roots:
-    """Steps of which a map may be one of these powers, for every number of turns that frames do not show."""
-    every = np.array(list(strides), np.float64)
+@lru_cache(maxsize=64)
+def roots_of_map(found: Map, strides: tuple[int, ...]) -> Roots:
+    """Matrix roots of these degrees, for every possible number of turns between two frames."""
+    every = np.array(strides, np.float64)
     b = found.entries.astype(np.float64)
     ratio = float(found.size[1] / found.size[0])
     turn = found.turn
@@ -183,7 +183,7 @@ def roots_of_map(found: Map, strides: Iterable[int]) -> Roots:
 
 @dataclass(slots=True, eq=False)
 class Guesses:
-    """Candidates (c,): family, root, and the unknowns a and g."""
+    """First guesses (c,): the indices of family and root, and the unknowns a and g."""
 
     which: Integers
     root: Integers
@@ -195,8 +195,8 @@ class Guesses:
 
 
 def first(every: MapTable, roots: Roots, *, growing: bool, free_scale: bool, far: bool) -> Guesses:
-    """First guesses: a from the phase of the family's own step, g from the remaining determinant.  Without
-    `far`, only those whose entries may agree."""
+    """First guesses: a from the phase by the family's curve, g from the determinant.  Without `far`, only
+    those whose entries may agree."""
     turning = np.flatnonzero(np.isfinite(roots.phase))
     standing = np.flatnonzero(~np.isfinite(roots.phase))
     curved = [i for i, f in enumerate(every.families) if not (f.held or f.flow)]
@@ -250,7 +250,7 @@ def _base(family: Family) -> str:
 def _on_curves(
     every: MapTable, roots: Roots, curved: Integers, turning: Integers, *, free_scale: bool, far: bool
 ) -> tuple[Integers, Integers, Floats, Floats]:
-    """Families and roots that share a phase, without friction, and whose entries may agree, with a and g."""
+    """Families and roots of the same phase without friction, whose entries may agree, with a and g."""
     # friction moves a step away from that without it, which many families share
     bases = np.array([_base(every.families[i]) for i in curved.tolist()])
     names, base = np.unique(bases, return_inverse=True)
@@ -318,8 +318,8 @@ def polished(every: MapTable, roots: Roots, x: Guesses, *, free_scale: bool, far
         size = _entry_sizes(wanted, roots, x)
         r = left(x.a, x.g, wanted, size)
         off = np.max(np.abs(r), axis=0)
-        # what is left over after a short step is its square and no more, or does not go away
-        short = np.where(length < FARTHEST, CURVED * length**2 + QUOTIENT * length, LOST)
+        # after a short step the residual is of the order of its square, or Gauss-Newton does not converge
+        short = np.where(length < FARTHEST, CURVED * length**2 + QUOTIENT * length, FAR)
         keep = np.flatnonzero(off <= (FAR if far else bound + (short if turn < rounds else 0.0)))
         x, length = x[keep], length[keep]
         if turn == rounds or not len(keep) or float(np.max(off[keep])) < NEAR[0]:
@@ -337,8 +337,8 @@ def polished(every: MapTable, roots: Roots, x: Guesses, *, free_scale: bool, far
 
 
 def _entry_sizes(wanted: Floats, roots: Roots, x: Guesses) -> Floats:
-    """Scales of the entries: the root of the determinant for diagonal ones; for the others their own size,
-    not reduced near half a turn."""
+    """Scales of the entries: for the diagonal the root of the determinant, for the others their own size
+    without its zero at half a turn."""
     whole = np.exp(np.maximum(roots.log_det[x.root] / 2, -600))
     bend = np.nan_to_num(np.abs(np.sinc(roots.phase[x.root] / np.pi)), nan=1.0)
     out = np.abs(wanted)
@@ -351,16 +351,14 @@ def _entry_sizes(wanted: Floats, roots: Roots, x: Guesses) -> Floats:
 
 
 def _compared(m: Floats, *, free_scale: bool) -> Floats:
-    """Numbers compared of matrices (c, 2, 2): the entries, or with `free_scale` the three invariants under a
-    scaling of velocities."""
+    """Entries (4, c) of matrices (c, 2, 2); with `free_scale` invariants (3, c) under scaled velocities."""
     if free_scale:
         return np.stack([m[:, 0, 0], m[:, 0, 1] * m[:, 1, 0], m[:, 1, 1]])
     return np.stack([m[:, 0, 0], m[:, 0, 1], m[:, 1, 0], m[:, 1, 1]])
 
 
 def least_squares(slopes: Floats, right: Floats) -> tuple[Floats, Floats]:
-    """Steps (k, c) of k unknowns by least squares, from slopes (k, m, c) and right sides (m, c);
-    variances."""
+    """Solutions (k, c) of c least-squares problems with derivatives (k, m, c), values (m, c); variances."""
     square = np.einsum("imc,jmc->cij", slopes, slopes)
     size = np.sqrt(np.einsum("cii->ci", square)) + 1e-300
     even = square / size[:, :, None] / size[:, None, :] + 1e-13 * np.eye(len(slopes))
@@ -372,8 +370,8 @@ def least_squares(slopes: Floats, right: Floats) -> tuple[Floats, Floats]:
 def roots_of(
     families: tuple[Family, ...], steps: Floats, room: float, *, free_scale: bool = False
 ) -> tuple[Integers, Integers, Floats, Floats]:
-    """Families whose one-step matrix is one of these (r, 2, 2) on (q, v h) to within `room`: family,
-    matrix, a and g of each."""
+    """Families that have one of these one-step matrices (r, 2, 2) on (q, v h) to within `room`: indices of
+    family and matrix, a and g."""
     every = table(families)
     with np.errstate(all="ignore"):
         found = rotation(steps.astype(np.longdouble))

@@ -1,67 +1,68 @@
-"""Hypotheses of what made states, as data: a family of maps, its steps to a frame, and how far it misses."""
+"""Hypotheses as data: a family of one-step maps, steps to a frame, the fitted unknowns, chi-squared."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
 
-from springcheck.identify.families import DAMPED, FAMILIES, G_ROUNDING, UNDAMPED, Family, endless, substeps
+from springcheck.identify.families import DAMPED, FAMILIES, UNDAMPED, Family, endless, substeps
 from springcheck.identify.maps import unit
-from springcheck.identify.record import ROUNDING
+from springcheck.identify.storage import ROUNDING
 from springcheck.physics.arrays import Reals
 from springcheck.schemes import SCHEMES
 
 ERRORS = 5.0
-"""Standard errors that chance does not exceed: 6e-7."""
+"""Standard errors that chance exceeds with a probability of 6e-7."""
 
 CHANCE = 1e-7
-"""Probability with which a right hypothesis may be refused, or a wrong one pass: five standard errors."""
+"""Probability of rejecting a right hypothesis, and of accepting a wrong one: five standard errors."""
 
 SOLVED = 1e-4
-"""Chi-squared of unknowns that solve as many equations: Gauss-Newton's rest."""
+"""Chi-squared that Gauss-Newton leaves where there are as many unknowns as equations."""
 
 EXCLUDED = ERRORS**2
-"""Excess of chi-squared over the best hypothesis' that excludes another."""
+"""Excess of chi-squared over the best hypothesis from which another is excluded."""
 
 SURE = 6.0
-"""Standard errors by which a number differs from another for certain, and within which it may be off."""
+"""Standard errors from which two numbers differ significantly."""
 
 STRIDES = 12, 100
-"""Steps to a frame looked at: up to so many, and where nothing fits, or a choice is left, up to those."""
+"""Largest numbers of steps to a frame: at first, and where nothing or more than one scheme fits."""
 
 FEW, MANY = range(1, STRIDES[0] + 1), range(STRIDES[0] + 1, STRIDES[1] + 1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Terms:
-    """Conditions of a comparison: what is known of a map beside its entries, and how finely the arithmetic
-    resolves coefficients."""
+    """What a comparison takes as known beside the map: scale of the velocities, rounding of coefficients."""
 
     mass_unknown: bool = False
+    """Whether the scale of the velocities is one more unknown, the log of the mass."""
     jitter: float = 0.0
-    """Relative uncertainty of the interval, and of a step or a mass in single precision."""
+    """Relative uncertainty of the interval, and of a step or a mass that may be in single precision."""
     log_stiffness: float | None = None
-    """log(k T**2) where the stiffness is known and the mass is not: the mass follows from a then."""
+    """log(k T**2) where the stiffness is known and the mass is not, which then follows from a."""
     rounding: float = ROUNDING
+    """Unit roundoff of the coefficients."""
     bias: float = 0.0
-    """Bias allowed of the entries, in units of the residual and whatever the number of pairs: coarse
-    forces that cut off are biased, and repeat from turn to turn."""
+    """Bias of the entries by truncated forces, in units of the residual, which pairs do not average away."""
     scales: tuple[float, ...] = ()
-    """Log of the scale of velocities at each stride from 0 on, where it is known beforehand."""
+    """Log of the scale of the velocities at each stride from 0 on, where step or mass are rounded."""
     growing: bool = False
-    """Whether friction of the wrong sign is looked for."""
+    """Whether negative friction is admitted."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Match:
-    """A family with `stride` steps to a frame against one map; a = (h w)**2, g its second unknown."""
+    """The fit of a family with `stride` steps to a frame to the map of one oscillator; a = (h w)**2."""
 
     family: str
     stride: int
     turns: int
-    """Whole turns of the phase between two frames, which the frames do not show."""
+    """Whole turns of the phase between two frames."""
     a: float
     a_error: float
     g: float
@@ -71,7 +72,7 @@ class Match:
     chi2: float
     freedom: int
     predicted: tuple[np.longdouble, ...]
-    """The four entries, in the frame of the map."""
+    """The four entries of the map between frames, in the units of the measured one."""
 
     @property
     def scheme(self) -> str:
@@ -79,18 +80,18 @@ class Match:
 
     @property
     def a_room(self) -> float:
-        """Largest relative difference from another a that is compatible with it."""
+        """Relative error of a, at `SURE` standard errors."""
         return SURE * self.a_error / abs(self.a)
 
     @property
     def friction(self) -> float:
-        """g of a friction; 0 of a held force."""
+        """gamma h, and 0 of a held force, whose g is a share."""
         return 0.0 if FAMILIES[self.family].held else self.g
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Joint:
-    """One family and stride for all oscillators together."""
+    """A hypothesis: one family and stride, fitted to every oscillator."""
 
     family: str
     stride: int
@@ -105,6 +106,11 @@ class Joint:
         return sum(part.chi2 for part in self.parts)
 
     @property
+    def misfit(self) -> float:
+        """Distance from the measured maps, in standard errors."""
+        return math.sqrt(self.chi2)
+
+    @property
     def damped(self) -> bool:
         return FAMILIES[self.family].damped and not FAMILIES[self.family].held
 
@@ -115,15 +121,15 @@ class Joint:
         return bool(np.all(np.abs(entries[:, 0] * entries[:, 3] - entries[:, 1] * entries[:, 2] - 1) < 1e-12))
 
     @property
-    def plainness(self) -> tuple[int, int, int]:
-        """Sort key of parsimony: no unseen turns, the exact flow or the smallest stride, then the list."""
+    def simplicity(self) -> tuple[int, int, int]:
+        """Sort key, the simplest first: by turns, steps, the exact solution, the order of `FAMILIES`."""
         turns = max(part.turns for part in self.parts)
         return turns, self.stride, -1 if self.scheme == "exact" else list(FAMILIES).index(self.family)
 
     @property
     def substeps(self) -> tuple[range, bool]:
         """Numbers of substeps over which a force may be held, and whether they kick first."""
-        found = [substeps(part.g, part.g_error + G_ROUNDING) for part in self.parts]
+        found = [substeps(part.g, part.g_error) for part in self.parts]
         if len({first for _, first in found}) > 1:
             return range(0), True
         return range(max(n.start for n, _ in found), min(n.stop for n, _ in found)), found[0][1]
@@ -131,7 +137,7 @@ class Joint:
     @property
     def endless(self) -> bool:
         """Whether the force may be held over infinitely many substeps."""
-        return all(endless(part.g, part.g_error + G_ROUNDING) for part in self.parts)
+        return all(endless(part.g, part.g_error) for part in self.parts)
 
     def __str__(self) -> str:
         return self.scheme + ("" if self.stride == 1 else f", {self.stride} steps a frame")
@@ -139,7 +145,7 @@ class Joint:
 
 @cache
 def most(freedom: int) -> float:
-    """Largest chi-squared that is accepted; without degrees of freedom, that of an exact solution."""
+    """Largest accepted chi-squared of so many degrees of freedom."""
     # SciPy is imported where it is asked: half of what importing this package takes
     from scipy.special import chdtri
 
@@ -152,13 +158,13 @@ def _samples(family: Family, g: tuple[float, ...]) -> Reals:
 
 
 def same_map(one: Family, other: Family, g: tuple[float, ...] = (0, 0, 0)) -> bool:
-    """Whether two families have the same map at three steps, with these frictions g."""
+    """Whether two families have the same map at three values of a, with these g."""
     return bool(np.max(np.abs(_samples(one, g) - _samples(other, g))) < 1e-15)
 
 
 @cache
 def distinct(*, damped: bool) -> tuple[Family, ...]:
-    """One family for each map.  The implicit midpoint rule represents the trapezoidal rule, and so on."""
+    """One family for each map: the implicit midpoint rule represents the trapezoidal rule, and so on."""
     out: list[Family] = []
     for family in DAMPED if damped else UNDAMPED:
         if not damped and SCHEMES[family.scheme].has("friction"):
@@ -170,7 +176,7 @@ def distinct(*, damped: bool) -> tuple[Family, ...]:
 
 @cache
 def aliases(name: str) -> tuple[str, ...]:
-    """Schemes whose map on a spring is the same, entry for entry, without friction and with it."""
+    """Schemes with the same map on a spring, without friction and with it."""
     # the scheme itself where only its steps are known
     damped = {x: FAMILIES.get(f"{x}, damped", FAMILIES[x]) for x in (name, *_still(name))}
     return tuple(x for x in _still(name) if same_map(damped[x], damped[name], (0, 0.2, 0.5)))
@@ -188,9 +194,9 @@ def frictionless(name: str) -> tuple[str, ...]:
 
 
 def likely(joints: list[Joint]) -> list[Joint]:
-    """Hypotheses within five standard errors of the best, each once, the plainest first."""
+    """Hypotheses within five standard errors of the best, each once, the simplest first."""
     if not joints:
         return []
     best = min(x.chi2 for x in joints)
     each = {(x.family, x.stride): x for x in sorted(joints, key=lambda x: -x.chi2)}
-    return sorted((x for x in each.values() if x.chi2 <= best + EXCLUDED), key=lambda x: x.plainness)
+    return sorted((x for x in each.values() if x.chi2 <= best + EXCLUDED), key=lambda x: x.simplicity)

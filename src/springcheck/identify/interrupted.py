@@ -1,4 +1,4 @@
-"""A motion that a few bad frames interrupt: which they are, and what happened at them."""
+"""A motion with a few bad frames: which they are, and what happened at them."""
 
 from __future__ import annotations
 
@@ -8,50 +8,48 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from springcheck.identify.coarse import irregular
+from springcheck.identify.coarse import is_white
 from springcheck.identify.compare import compare
 from springcheck.identify.evidence import FALLS, LEFT_BY_ROUNDING, SINGLE_ROOM, Evidence, Measured, matched
-from springcheck.identify.families import FAMILIES, OF_HALF_A_STEP_AGO, VERLET, title
+from springcheck.identify.families import FAMILIES, OF_HALF_A_STEP_AGO, VERLET, titles
 from springcheck.identify.fit import Map, fit
 from springcheck.identify.hypothesis import FEW, Joint, distinct
 from springcheck.identify.maps import powers, unit
-from springcheck.identify.record import ROUNDING
 from springcheck.identify.result import Explanation
+from springcheck.identify.storage import ROUNDING
 from springcheck.physics.arrays import Extended, Floats
-from springcheck.text.wording import count, either
+from springcheck.text.wording import count
 
 FEW_BAD = 0.06
-"""Largest share of pairs that may be bad where the others make one motion."""
+"""Largest share of bad pairs."""
 
 APART = 2.0
-"""Factor by which every bad pair must miss more than all others, in units of rounding."""
+"""Smallest ratio of the least residual of a bad pair to the largest of the others, in units of rounding."""
 
 LARGER = 10.0
-"""Size of some frames, of the median, from which a force that is not linear shows in them alone."""
+"""Ratio of sizes of frames from which an anharmonic force, or noise of one size, shows in some alone."""
 
 HALF_STEP = 1e-3
-"""Relative difference between a residual and half a step's kick up to which it is one."""
+"""Relative difference up to which a residual is half a step's kick."""
 
 AT_AN_END = 3
-"""Pairs at an end of their order by size, for each bad one, within which these do not lie by chance."""
+"""Bad pairs among the smallest, or largest, `AT_AN_END` times as many pairs are there by no chance."""
 
 FEWEST_PAIRS = 8
-"""Pairs beside the bad ones from which they make one motion."""
-
-SCHEMES_SAID = 2
-"""How many of the schemes that fit the rest of the motion a sentence names."""
+"""Fewest pairs beside the bad ones, and of those that move."""
 
 
 def remembered(seen: Measured) -> tuple[Measured, list[Joint]]:
-    """The frames but the first, and the matches of Verlet with the friction of the velocity half a step ago.
-    Its first step has no such velocity, and takes the friction of the first frame's."""
+    """The data without frame 0, and the fits of Verlet with the friction of the velocity half a step ago,
+    whose first step has that of the first velocity."""
     record = seen.record
     if not record.fine or len(record.q) <= FEWEST_PAIRS or any(_first_off(x) < FALLS for x in seen.maps):
         return seen, []
     parts = None if record.parts is None else (record.parts[0][1:], record.parts[1][1:])
+    uneven = None if record.deviations is None else record.deviations[1:]
     later = replace(
         record, q=record.q[1:], v=record.v[1:], q_quantum=record.q_quantum[1:], parts=parts,
-        v_quantum=record.v_quantum[1:], slips=None if record.slips is None else record.slips[1:],
+        v_quantum=record.v_quantum[1:], deviations=uneven,
     )  # fmt: skip
     rest = replace(seen, record=later, maps=[fit(later, j) for j in seen.moving])
     joints = rest.compare((FAMILIES[OF_HALF_A_STEP_AGO],), FEW)
@@ -59,8 +57,8 @@ def remembered(seen: Measured) -> tuple[Measured, list[Joint]]:
 
 
 def _first_off(found: Map) -> float:
-    """Ratio of the first pair's residual to the largest in the later half."""
-    off = np.max(np.abs(found.misses()), axis=1) * found.weight
+    """Ratio of the first pair's residual to the largest in the second half."""
+    off = np.max(np.abs(found.residuals()), axis=1) * found.weight
     return float(off[0] / max(np.max(off[len(off) // 2 :]), 1e-300))
 
 
@@ -79,12 +77,12 @@ def _begins(seen: Measured, maps: list[Map], joint: Joint) -> bool:
     return True
 
 
-def few_bad_frames(e: Evidence) -> list[Explanation]:
-    """Explain a motion that a few bad pairs of frames interrupt."""
+def few_bad_frames(e: Evidence) -> Explanation | None:
+    """The cause of a few bad pairs in a motion of one map."""
     kept = np.ones(e.pairs, dtype=bool)
     found = e.found
     for _ in range(8):
-        off = np.max(np.abs(found.misses(e.found)), axis=1) / e.unit
+        off = np.max(np.abs(found.residuals(e.found)), axis=1) / e.unit
         limit = max(8 * float(np.median(off[kept])), 2.0)
         now = off <= limit
         if np.count_nonzero(~now) > max(3, FEW_BAD * e.pairs) or np.array_equal(now, kept):
@@ -93,37 +91,39 @@ def few_bad_frames(e: Evidence) -> list[Explanation]:
         found = fit(e.record, e.j, kept=kept)
     bad = np.flatnonzero(~kept)
     if not len(bad) or np.count_nonzero(kept) < FEWEST_PAIRS:
-        return []
+        return None
     if float(np.min(off[bad])) < APART * float(np.max(off[kept])):
         # what falls off from frame to frame has no few bad ones
-        return []
-    before = float(np.max(e.weight[:, None] * np.abs(e.misses)))
-    rest = (e.weight[:, None] * found.misses(e.found))[kept]
+        return None
+    before = float(np.max(e.weight[:, None] * np.abs(e.residuals)))
+    rest = (e.weight[:, None] * found.residuals(e.found))[kept]
     after = float(np.sqrt(np.mean(rest**2)))
     if before < FALLS * after:
-        return []
+        return None
     fitting = matched(found, e.terms)
     size = np.sqrt(np.sum(np.square(found.z[:-1].astype(np.float64)), axis=1))
     rough = after > 8 * float(np.median(e.weight * e.unit))
     if rough and not fitting:
         # the rest is no single motion either, as a solver's that begins with small steps
-        return []
+        return None
+    if np.count_nonzero(kept & (size > FALLS * e.unit)) < FEWEST_PAIRS:
+        # too few of the rest are not at rest
+        return None
     middle = float(np.median(size))
     if float(np.max(size[bad])) < min(2 * float(np.min(size[kept])), middle / LARGER):
         # an error of one size shows where a motion that grows or dies is smallest
-        return []
-    names = list(dict.fromkeys(title(x.scheme) for x in fitting))
-    if rough and not (after < SINGLE_ROOM * float(np.median(e.weight * size)) and irregular(rest)):
+        return None
+    whose = f" of {titles(x.scheme for x in fitting)}" if fitting else _damped(found, e)
+    if rough and not (after < SINGLE_ROOM * float(np.median(e.weight * size)) and is_white(rest)):
         # what is left of the rest is no arithmetic's, and makes its map so uncertain that wrong schemes fit
-        names = []
-    whose = f" of {either(names)}" if 0 < len(names) <= SCHEMES_SAID else "" if fitting else _damped(found, e)
+        whose = ""
     runs = np.split(bad, np.flatnonzero(np.diff(bad) > 1) + 1)
     spacing = set(np.diff([run[0] for run in runs]).tolist())
     ranks = np.argsort(np.argsort(size))[bad]
     several = len(runs) > 1 and float(np.max(size)) > LARGER * float(np.min(size))
     if several and float(np.max(ranks)) < AT_AN_END * len(bad):
         # several interruptions, all where the motion is smallest: an error of one size, which shows there
-        return []
+        return None
     cause, remedy = _interruption(e, found, runs[0], whose)
     if len(runs) > 2 and len(spacing) == 1:
         cause = f"{cause}, and so every {spacing.pop()} steps"
@@ -136,7 +136,7 @@ def few_bad_frames(e: Evidence) -> list[Explanation]:
             f"The motion is one{whose}, but not in frames {bad[0]} to {bad[-1] + 1}, where it is largest: "
             "too few to tell whether the force is anharmonic, or the step or a force changes in time"
         )
-    return [Explanation(cause=cause, remedy=remedy, misfit=after / before, local=True)]
+    return Explanation(cause, remedy, after / before, local=True)
 
 
 def _damped(found: Map, e: Evidence) -> str:
@@ -145,13 +145,12 @@ def _damped(found: Map, e: Evidence) -> str:
     if not joints:
         return ""
     every = [FAMILIES[x.family] for x in joints]
-    names = list(dict.fromkeys(title(x.scheme) for x in every))
     law = f"{every[0].laws[0]} {every[0].place}".strip() if len(every) == 1 else "friction"
-    return f" of {either(names)} with {law}" if len(names) <= SCHEMES_SAID else " with friction"
+    return f" of {titles(x.scheme for x in every)} with {law}"
 
 
 def _interruption(e: Evidence, found: Map, run: NDArray[np.intp], whose: str) -> tuple[str, str]:
-    """Cause and remedy of a run of bad pairs, by the map of the other frames."""
+    """Cause and remedy of consecutive bad pairs, by the map of the other frames."""
     z, b = found.z, found.entries
     first, last = int(run[0]), int(run[-1])
 

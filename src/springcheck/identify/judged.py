@@ -1,19 +1,26 @@
-"""What of a record can be judged: the oscillators that move by themselves, or normal modes in their place."""
+"""The oscillators of a record that can be judged: coordinates, or normal modes if these are coupled.
+
+The blocks of every scheme's one-step matrix are functions of the springs' matrix, and share its eigenvectors,
+along which each mode moves by itself.
+"""
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from springcheck.errors import IdentificationError
-from springcheck.identify import coupled
-from springcheck.identify.evidence import Measured
+from springcheck.identify.evidence import FIXED, Measured
 from springcheck.identify.fit import Map, fit
 from springcheck.identify.hypothesis import SURE
-from springcheck.identify.record import ROUNDING, SIZES, Record, of_size, stated_stride
-from springcheck.identify.search import COARSE, terms_of
+from springcheck.identify.noise import least_squares
+from springcheck.identify.record import AT_REST, Record, of_size, stated_stride
+from springcheck.identify.search import terms_of
+from springcheck.identify.storage import ROUNDING
+from springcheck.physics.arrays import Extended
 
 
 def judged(
@@ -40,23 +47,20 @@ def judged(
 def _oscillators(record: Record) -> tuple[Record, list[int], list[Map], list[str]]:
     """Record of the oscillators that can be judged, of normal modes where these replace coordinates; their
     indices; their maps; and notes on the rest."""
-    spread = np.ptp(record.q, axis=0) + np.ptp(record.v, axis=0) * abs(record.interval)
-    moving = np.flatnonzero(spread > SIZES[0]).tolist()
-    if not moving:
-        raise IdentificationError("nothing moves: at rest all schemes agree; start away from rest")
-    still = len(spread) - len(moving)
-    notes = [f"{still} of {len(spread)} oscillators are at rest and left out"] if still else []
+    if not (moving := record.moving):
+        raise IdentificationError(AT_REST)
+    n = record.q.shape[1]
+    notes = [f"{n - len(moving)} of {n} oscillators are at rest and left out"] if len(moving) < n else []
     free = [j for j in moving if _straight(record, j)]
     maps = {j: fit(record, j) for j in moving if j not in free}
-    if len(maps) > 1:
-        alone, notes_of = _uncoupled(record, maps)
-        if alone is not None:
-            modes, _ = alone
-            kept = {i: fit(modes, i) for i in range(modes.q.shape[1]) if not _straight(modes, i)}
-            good = [i for i, found in kept.items() if found.conditioned and _forced(found)]
-            # what no springs couple, as a field that turns velocities, has modes that are not alone either
-            if good and not any(found.spans and not found.conditioned for found in kept.values()):
-                return modes, good, [kept[i] for i in good], [*notes, *notes_of]
+    if len(maps) > 1 and (modes := _uncoupled(record, maps)) is not None:
+        kept = {i: fit(modes, i) for i in range(modes.q.shape[1]) if not _straight(modes, i)}
+        good = [i for i, found in kept.items() if found.conditioned and _forced(found)]
+        # what no springs couple, as a field that turns velocities, has modes that are not alone either
+        if good and not any(found.spans and not found.conditioned for found in kept.values()):
+            whose = f"{len(maps)} normal modes were judged instead of them"
+            notes.append(f"the coordinates are coupled, and their {whose}")
+            return modes, good, [kept[i] for i in good], notes
     good = [j for j, found in maps.items() if found.conditioned and _forced(found)]
     lost = [j for j in maps if j not in good]
     rough = [j for j in lost if maps[j].spans and not (maps[j].conditioned and maps[j].clean)]
@@ -86,7 +90,7 @@ def _oscillators(record: Record) -> tuple[Record, list[int], list[Map], list[str
 
 
 ALIKE = 1e-9
-"""Share of a motion's size that velocities may differ by from a multiple of the positions."""
+"""Relative difference up to which velocities are a multiple of the positions."""
 
 
 def _proportional(record: Record, j: int) -> str:
@@ -128,14 +132,77 @@ def _forced(found: Map) -> bool:
     return abs(float(found.entries[1, 0])) >= SURE * math.sqrt(found.covariance[2, 2])
 
 
-def _uncoupled(record: Record, maps: dict[int, Map]) -> tuple[tuple[Record, list[int]] | None, list[str]]:
-    """Normal modes, where the coordinates are coupled and the modes are not, and a note on them."""
+def _uncoupled(record: Record, maps: dict[int, Map]) -> Record | None:
+    """The record of the normal modes, if the coordinates are coupled and the modes are not."""
     single = max(float(np.max(found.residual)) for found in maps.values())
-    every = list(maps)
-    if single < max(64 * COARSE, 1e-8) or not record.fine:
-        return None, []
-    found = coupled.modes(record, every)
-    if found is None or found[1] > 1e-3 * single:
-        return None, []
-    note = f"the coordinates are coupled, and their {len(every)} normal modes were judged instead of them"
-    return (found[0], every), [note]
+    if single < max(64 * FIXED, 1e-8) or not record.fine:
+        return None
+    found = _modes(record, list(maps))
+    return found[0] if found is not None and found[1] <= 1e-3 * single else None
+
+
+SPARE = 6
+"""Degrees of freedom of each row that a map of all coordinates has to leave."""
+
+SAME_MODE = 1e-5
+"""Relative difference of eigenvalues below which any combination of two modes is one."""
+
+
+def _modes(record: Record, chosen: list[int]) -> tuple[Record, float] | None:
+    """Positions and velocities of the normal modes of the chosen coordinates as a record, and the root mean
+    square residual of the map (2m, 2m) of all coordinates together, relative to the states; None where frames
+    are too few, or no modes are found."""
+    z = np.concatenate([record.q[:, chosen], record.v[:, chosen] * record.interval], axis=1)
+    frames, n = len(z), len(chosen)
+    if frames - 1 < 2 * n + 1 + SPARE:
+        return None
+    size = np.sqrt(np.mean(z**2, axis=0)).astype(np.float64)
+    # one size for all positions, one for all velocities: modes mix coordinates
+    size = np.repeat([np.max(size[:n]), np.max(size[n:])], n)
+    if not np.all(size > 0):
+        return None
+    scaled = z / size
+    columns = np.concatenate([scaled[:-1], np.ones((frames - 1, 1), dtype=np.longdouble)], axis=1)
+    x = least_squares(columns, scaled[1:])
+    left = float(np.sqrt(np.mean((scaled[1:] - columns @ x).astype(np.float64) ** 2)))
+    # the force's block: proportional to the springs' matrix for every scheme, to leading order in the step
+    block = x[:-1].T[n:, :n]
+    values, vectors = np.linalg.eig(block.astype(np.float64))
+    if np.max(np.abs(np.imag(vectors))) > 1e-6 or np.linalg.cond(np.real(vectors)) > 1e6:
+        return None
+    basis = np.real(vectors).astype(np.longdouble)
+    spread = np.real(values)
+    gap = spread[None, :] - spread[:, None]
+    far = np.abs(gap) > SAME_MODE * np.max(np.abs(spread))
+    for _ in range(3):
+        # eigenvectors of double precision, corrected to first order with what they leave off the diagonal
+        inside = _inverse(basis) @ block @ basis
+        basis = basis @ (np.eye(n) + np.where(far, inside / np.where(far, gap, 1), 0) * (1 - np.eye(n)))
+    inverse = _inverse(basis)
+    q = record.q[:, chosen] @ inverse.T
+    v = record.v[:, chosen] @ inverse.T
+    spreading = np.abs(inverse).astype(np.float64)
+    return (
+        replace(
+            record,
+            q=q,
+            v=v,
+            q_quantum=record.q_quantum[:, chosen] @ spreading.T,
+            v_quantum=record.v_quantum[:, chosen] @ spreading.T,
+            parts=(
+                np.abs(record.q[:, chosen]).astype(np.float64) @ spreading.T,
+                np.abs(record.v[:, chosen]).astype(np.float64) @ spreading.T,
+            ),
+            mass=None,
+            momenta=False,
+        ),
+        left,
+    )
+
+
+def _inverse(x: Extended) -> Extended:
+    """Inverse in extended precision: that of double precision, refined by Newton's iteration."""
+    out = np.linalg.inv(x.astype(np.float64)).astype(np.longdouble)
+    for _ in range(2):
+        out = out @ (2 * np.eye(len(x)) - x @ out)
+    return np.asarray(out)

@@ -1,7 +1,6 @@
-"""Causes as data: what one map leaves over, regressed on functions of the state and of time.
+"""Causes as data: regression of a map's residuals on functions of the state and of time.
 
-Each law is linear in columns of its own beside those of the map.  All go through one regression, which tells
-what share is left, and by how many numbers.
+Each law is linear in its own columns, beside those of the map.  One regression serves all of them.
 """
 
 from __future__ import annotations
@@ -21,10 +20,10 @@ from springcheck.identify.result import Explanation
 from springcheck.physics.arrays import Floats
 
 EXPLAINS = 0.35
-"""Largest share of what a map misses that a law which explains it leaves."""
+"""Largest remaining share of the residuals of a law that explains them."""
 
 PAIRS_A_NUMBER = 3
-"""Pairs for each number of a law from which a share that it leaves is none of chance."""
+"""Pairs for each parameter of a law from which it fits by no chance."""
 
 ANHARMONIC, IN_TIME, IS_DRIVEN = "is anharmonic", "changes in time", "is driven"
 OF_VELOCITY = "depends on the velocity"
@@ -32,60 +31,63 @@ OF_VELOCITY = "depends on the velocity"
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Cause:
-    """A law of the force beside a linear spring's, as columns (f - 1,) of the state and of time."""
+    """A force beside the linear spring's, as columns (f - 1,) of the state and of time."""
 
     kind: str
-    """What the force does: laws of one kind are one cause where the states do not tell them apart."""
+    """What the force does, as a phrase; laws of one kind that are not told apart are one cause."""
     columns: Callable[[Evidence], list[Floats]]
-    """Functions that the law is linear in; NaN where it says nothing of a pair."""
+    """The columns; NaN for pairs to which the law does not apply."""
     waves: bool = False
-    """Whether the columns are carriers of a wave, whose frequency is looked for."""
+    """Whether the columns are multiplied by a cosine and a sine, whose frequency is fitted."""
     flexible: bool = False
-    """Whether it follows so much that a motion of few turns shows it no better than another."""
+    """Whether it is flexible enough to fit any force over a few periods."""
     cause: str | Callable[[Evidence, Regression], str]
-    """Sentence; `{moved}` in it stands for how far it moves a frame, `{j}` for the coordinate."""
+    """Sentence, with `{moved}` for the displacement of a frame, and `{j}` for the coordinate."""
     remedy: str = "look for a force that is not that of a linear spring"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Regression:
-    """What a law leaves over of what a map misses."""
+    """Regression of a map's residuals on a law."""
 
     law: Cause
     left: float
-    """Root mean square, per number to spare, as a share of the total."""
+    """Root mean square per degree of freedom that remains, relative to that of the residuals."""
+    pairs: int
+    """Pairs to which the law applies."""
     rank: int
-    """Columns of the law and of the map that are independent."""
+    """Rank of the columns of map and law."""
     parameters: int
-    """Numbers that the law has for each of position and velocity, those of the map among them."""
+    """Parameters for each of position and velocity, those of the map included."""
     counted: float
-    """Pairs that count: those that are large beside the others."""
+    """Effective number of pairs: (sum r**2)**2 / sum r**4 of the residuals r."""
     above: int
-    """Pairs that one map misses by more than rounding."""
+    """Pairs with residuals above rounding."""
     x: Floats
     """Coefficients (columns, 2) of the map's columns, then of the law's."""
     turn: float
-    """Angle [rad] by which its wave turns in a frame; NaN where it has none."""
+    """Fitted frequency [rad/frame]; NaN of a law without."""
     worst: float
-    """Largest that is left, each pair by its weight."""
+    """Largest remaining residual, weighted."""
     exact: bool
-    """Whether what is left is rounding."""
+    """Whether the remaining residuals are rounding."""
 
     @property
     def shows(self) -> bool:
         """Whether enough pairs follow the law, or follow it closely enough, to exclude chance."""
         spare = self.counted - self.parameters
         if self.exact and not self.law.flexible:
-            # every pair beside those that columns alone explain is one that chance would have missed
+            # each pair beyond the number of columns would have a residual if the law were wrong
             spare = self.above - self.rank
-        closely = spare > 0 and self.left**spare < CHANCE
+        # as many columns as pairs leave nothing in any case
+        closely = spare > 0 and self.pairs > self.rank and self.left**spare < CHANCE
         return self.counted > PAIRS_A_NUMBER * self.parameters or (
             closely and (self.law is POWERS or not self.law.flexible)
         )
 
     @property
     def cost(self) -> float:
-        """Residual times the root of the number of independent columns, in favour of few parameters."""
+        """Remaining residual times the root of the rank, which favours few parameters."""
         return self.left * math.sqrt(self.rank)
 
 
@@ -97,21 +99,21 @@ def regression(e: Evidence, law: Cause) -> Regression:
         columns = driven.waves(columns[0], turn)
     every = e.weight[:, None] * np.stack([*e.linear, *columns], axis=1)
     kept = np.all(np.isfinite(every), axis=1)
-    every, missing = every[kept], (e.weight[:, None] * e.misses)[kept]
+    every, missing = every[kept], (e.weight[:, None] * e.residuals)[kept]
     size = np.sqrt(np.mean(every**2, axis=0)) if len(every) else np.ones(every.shape[1])
     size = np.where(size > 0, size, 1.0)
     x, _, rank, _ = np.linalg.lstsq(every / size, missing)
     left = missing - every / size @ x
     rounding = (LEFT_BY_ROUNDING * e.weight * e.unit)[kept, None]
     if not np.all(kept):
-        # a pair of which a law says nothing is not explained by it: the map is that of the others
+        # residuals are those of a map of the pairs to which the law applies
         own = every[:, : len(e.linear)]
         missing = missing - own @ np.linalg.lstsq(own, missing)[0]
     square, above = np.sum(missing**2, axis=1), np.any(np.abs(missing) > FALLS * rounding, axis=1)
     total = float(np.sum(square))
     share = len(missing) / max(len(missing) - int(rank), 1)
     return Regression(
-        law=law, rank=int(rank), x=x / size[:, None], turn=turn,
+        law=law, pairs=len(missing), rank=int(rank), x=x / size[:, None], turn=turn,
         # a frequency that is looked for counts as numbers more, the map's own constant does not
         parameters=int(rank) - (len(e.linear) - 2) + 3 * law.waves,
         counted=total**2 / float(np.sum(square**2)) if total else 0.0,
@@ -138,8 +140,8 @@ def _alternating(e: Evidence) -> list[Floats]:
 
 
 def _directions(e: Evidence) -> list[Floats]:
-    """Sign of the velocity (f - 1,).  NaN where it reverses in a step or in a stage of one, and from where
-    friction holds it: it reverses in every frame, or stays below its largest change in a frame."""
+    """Sign of the velocity (f - 1,).  NaN where it reverses within a step, and once friction holds the
+    motion: where the velocity reverses in every frame, or stays below its largest change in a frame."""
     old, new = e.states[:-1, 1], e.states[1:, 1]
     clear = (old * new > 0) & (2 * np.minimum(np.abs(old), np.abs(new)) > np.abs(new - old))
     held = np.flatnonzero((old[:-1] * new[:-1] <= 0) & (old[1:] * new[1:] <= 0))
@@ -294,15 +296,15 @@ LAWS = (
     ),
     OUTER_DRIVE,
 )  # fmt: skip
-"""Laws of the force at each step, in the order in which those that explain as much are named."""
+"""Laws of the force, in the order in which those that explain as much are named."""
 
 
 LIKE_FRICTION = [x for x in LAWS if x.kind in (OF_VELOCITY, ANHARMONIC) and not x.flexible]
-"""Laws of a force that a linear friction stands for where numbers are few."""
+"""Laws that a few digits do not tell from linear friction."""
 
 
 def friction_shows(e: Evidence, part: Match) -> bool:
-    """Whether friction stays significant with the columns of each nonlinear law beside the map's."""
+    """Whether the friction stays significant when any of `LIKE_FRICTION` is fitted beside the map."""
     found, slope = e.found, np.linalg.inv(e.found.entries.astype(np.float64)).T.reshape(4)
     known = math.sqrt(float(slope @ found.covariance @ slope))
     for law in LIKE_FRICTION:
@@ -312,7 +314,7 @@ def friction_shows(e: Evidence, part: Match) -> bool:
         flat = columns.reshape(2 * e.pairs, -1)
         weighted = found.noise.solve(columns).reshape(flat.shape)
         inverse = np.linalg.pinv(flat.T @ weighted, hermitian=True)
-        x = inverse @ (weighted.T @ e.misses.ravel())
+        x = inverse @ (weighted.T @ e.residuals.ravel())
         # columns are of q and v in turn, each for both numbers of the next state
         at = np.array([0, 2, 1, 3])
         scale = max(found.chi2 / max(found.freedom, 1), 1.0)
@@ -330,10 +332,10 @@ def explained_by(e: Evidence, found: Regression) -> Explanation:
     cause = law.cause.format(moved=moved, j=e.j) if isinstance(law.cause, str) else law.cause(e, found)
     if law.waves:
         cause += driven.said(e, law.kind == IS_DRIVEN, found.turn)
-    return Explanation(cause=cause, remedy=law.remedy, misfit=found.left, local=found.exact)
+    return Explanation(cause, law.remedy, found.left, local=found.exact)
 
 
-def alone(law: Cause, e: Evidence) -> list[Explanation]:
-    """Explanation by a law that leaves almost no residual; empty otherwise."""
+def alone(law: Cause, e: Evidence) -> Explanation | None:
+    """Explanation by a law that leaves almost no residual."""
     found = regression(e, law)
-    return [explained_by(e, found)] if found.shows and found.left < 1 / FALLS else []
+    return explained_by(e, found) if found.shows and found.left < 1 / FALLS else None

@@ -1,4 +1,4 @@
-"""One-step maps of many families at once on (q, v h), and what they are between frames."""
+"""One-step maps of many families at once, on (q, v h), and their powers."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ KINDS: dict[str, tuple[float, float, float]] = {
     "centred": (0.5, 0.5, 0),
     "remembered": (2, -1, 0),
 }
-"""(e, i, x) of a kick over the share c: v' = ((1 - e c g) v - c a q)/(1 + i c g), then times exp(-x c g)."""
+"""Coefficients (e, i, x) of a kick over the share c: v' = exp(-x c g) ((1 - e c g) v - c a q)/(1 + i c g)."""
 
 Selected: TypeAlias = Integers | int
 
 WIDTHS = np.dtype(np.float64), np.dtype(np.longdouble)
 
 Columns: TypeAlias = dict[np.dtype[Any], Reals]
-"""Numbers of every family in the last axis, in double and in extended precision."""
+"""Coefficients with the families along the last axis, in double and in extended precision."""
 
 
 def _in_both_widths(x: Extended) -> Columns:
@@ -38,7 +38,8 @@ def _in_both_widths(x: Extended) -> Columns:
 
 
 def _slots(families: tuple[Family, ...]) -> Extended:
-    """Kicks, each with the drift after it, (slots, 5, F): e, i, x, b, d, the shares included."""
+    """Coefficients (slots, 5, F) of kicks, each with the drift after it: e, i, x of `KINDS` times the share,
+    and the shares b of the force and d of the drift."""
     rows = [_pairs(family.stages) for family in families]
     most = max((len(row) for row in rows), default=0)
     out = np.zeros((most, 5, len(families)), np.longdouble)
@@ -67,7 +68,7 @@ def _pairs(stages: tuple[Stage, ...]) -> list[Extended]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MapTable:
-    """Families whose maps are evaluated together; `which` is the index of each candidate's family."""
+    """Coefficients of F families, so that maps of many are evaluated together; `which` (c,) are indices."""
 
     families: tuple[Family, ...]
     slots: Columns
@@ -76,12 +77,12 @@ class MapTable:
     under: Columns
     """Numerator and denominator (degree, F) of stability functions."""
     inside: Columns
-    """1 (F,) where friction is inside the stability function, 0 where stages have it."""
+    """1 (F,) where the stability function includes the friction, 0 where stages have it."""
     kinds: tuple[tuple[str, NDArray[np.bool_]], ...]
-    """Kinds of map other than stages, and which families are of it (F,)."""
+    """Kinds of map other than stages, and which families (F,) are of each."""
     path: Floats
     scaled: NDArray[np.bool_]
-    """Whether a whole state is multiplied by coefficients, and not only what is added to it (F,)."""
+    """Whether coefficients multiply the whole state, and not only its increment (F,)."""
     held: NDArray[np.bool_]
     damped: bool
 
@@ -130,8 +131,7 @@ class MapTable:
         return _rational(over, under, a, g * inside)
 
     def sums(self, which: Integers, a: Reals, g: Reals) -> Reals:
-        """Sums (c, 2, 2) of the absolute values of all terms of a step, which its roundings are relative
-        to."""
+        """Sums (c, 2, 2) of the absolute values of all terms of a step, which bound its roundings."""
         out = np.zeros((2, 2, len(a)))
         out[0, 0] = out[1, 1] = 1
         for kind, members in self.kinds:
@@ -168,8 +168,8 @@ class MapTable:
 def _used(
     every: MapTable, present: bytes
 ) -> tuple[int | None, list[tuple[str, NDArray[np.bool_] | None]], list[tuple[int, list[bool]]]]:
-    """What the families of this mask use: the family's number, where it is the only one; kinds of map other
-    than stages with their members, None where all are of it; slots, and which of their numbers are not 0."""
+    """What the families of this mask need: the index of the family if it is alone; kinds of map other than
+    stages with their members, None for all; slots, and which of their coefficients are not 0."""
     those = np.frombuffer(present, dtype=bool)
     at = np.flatnonzero(those)
     kinds = [(kind, None if np.all(of[at]) else of) for kind, of in every.kinds if np.any(of[at])]
@@ -180,7 +180,7 @@ def _used(
 
 @cache
 def table(families: tuple[Family, ...]) -> MapTable:
-    """Coefficients of the families, for evaluation together."""
+    """The coefficients of these families."""
     degree = max(len(part) for family in families for part in (*family.stability, (1,)))
 
     def coefficients(row: tuple[Fraction | str, ...]) -> list[np.longdouble]:
@@ -302,7 +302,7 @@ def powers(entries: Reals, frames: int) -> Reals:
 
 
 def _lagging(a: Reals, g: Reals, base: str, steps: int) -> Reals:
-    """Map of (q_n, v_(n + steps)): the same motion, with velocities of another frame."""
+    """Map of (q_n, v_(n + steps)): velocities that are recorded `steps` frames late."""
     m = unit(FAMILIES[base], a, g)
     det = (m[:, 0, 0] * m[:, 1, 1] - m[:, 0, 1] * m[:, 1, 0])[:, None]
     row = m[:, 1, :] if steps > 0 else np.stack([-m[:, 1, 0], m[:, 0, 0]], axis=1) / det
@@ -333,7 +333,7 @@ FORMULAS: dict[str, Callable[[Reals, Reals], Reals]] = {
         for n in (-1, 1)
     },
 }
-"""Maps of faults, (2, 2, c), that stages do not give."""
+"""Maps (2, 2, c) of faults that are no sequence of stages."""
 
 
 def _formula(name: str) -> Callable[[Reals, Reals], Reals]:

@@ -1,12 +1,12 @@
-"""Numbers that stand in the wrong place: positions wrapped into a box, particles or velocities in another
-order, velocities of the other sign.
+"""Misplaced numbers: positions wrapped into a box, particles or velocities in another order, velocities of
+the wrong sign.
 
-Each is undone and the map read anew: it is the cause where that brings down what the map leaves over.
+Each is undone and the map fitted anew: it is the cause where that reduces the residuals.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from itertools import combinations
 
@@ -19,33 +19,35 @@ from springcheck.identify.result import Explanation
 from springcheck.physics.arrays import Extended, Floats
 
 LEAPS = 4.0
-"""Times the usual way between two frames from which a position leaps."""
+"""Ratio of a displacement to the median one from which a position jumps."""
 
 AGAINST = 0.3
-"""Share of the way between frames by which it may differ from that of the velocities, turned over."""
+"""Relative difference up to which displacements are opposite to the velocities."""
 
 MOST_COMPARED = 12
-"""Coordinates of which every two are compared."""
+"""Most coordinates that are compared in pairs."""
+
+SORT = "sort the particles by their number before they are written, positions and velocities alike"
 
 Repair = tuple[Record, str, str]
-"""A record with the numbers in their place, what was wrong, and what to do."""
+"""A repaired record, what was wrong, and what to do."""
 
 
-def misplaced(e: Evidence) -> list[Explanation]:
-    """The cause, where one map fits once numbers are moved to another column, row or sign; otherwise none."""
+def misplaced(e: Evidence) -> Explanation | None:
+    """The cause, if one map fits once numbers are moved to another column or row."""
     before = _left(e.record, e.j)
     if not before:
-        return []
-    for look in LOOKS:
+        return None
+    for look in (_wrapped, _exchanged):
         for record, cause, remedy in look(e.record, e.j):
             after = _left(record, e.j)
             if after * FALLS < before:
-                return [Explanation(cause=cause, remedy=remedy, misfit=after / before, local=True)]
-    return []
+                return Explanation(cause, remedy, after / before, local=True)
+    return None
 
 
 def _left(record: Record, j: int) -> float:
-    """Root mean square residual of one map of a coordinate's frames, relative to its size."""
+    """Root mean square residual of a coordinate's map, relative to the states."""
     z = np.stack([record.q[:, j], record.v[:, j] * record.interval], axis=1).astype(np.float64)
     z = z - np.mean(z, axis=0)
     if not np.all(np.std(z, axis=0) > 0):
@@ -58,7 +60,7 @@ def _left(record: Record, j: int) -> float:
 
 
 def _ways(record: Record, columns: list[int]) -> tuple[Floats, Floats]:
-    """Displacements between frames (f - 1, n), and those that the mean of their velocities gives."""
+    """Displacements between frames (f - 1, n), and those by the mean of their velocities."""
     mean = (record.v[1:, columns] + record.v[:-1, columns]) / 2 * record.interval
     return np.diff(record.q[:, columns], axis=0).astype(np.float64), mean.astype(np.float64)
 
@@ -89,11 +91,11 @@ def _wrapped(record: Record, j: int) -> Iterator[Repair]:
     )
 
 
-def unsorted(record: Record) -> list[Explanation]:
-    """Velocities that stand in other columns in every frame, where one map fits each once they are sorted."""
-    each = np.flatnonzero(np.ptp(record.q, axis=0) + np.ptp(record.v, axis=0) > 0)
+def unsorted(record: Record) -> Explanation | None:
+    """Velocities in the wrong columns of every frame, if one map fits each once they are sorted."""
+    each = np.array(record.moving)
     if not 1 < len(each) <= MOST_COMPARED:
-        return []
+        return None
     way, mean = _ways(record, each.tolist())
     off = np.sum(way**2, axis=0)[:, None] + np.sum(mean**2, axis=0) - 2 * way.T @ mean
     of = each[np.argmin(off, axis=1)]
@@ -102,27 +104,26 @@ def unsorted(record: Record) -> list[Explanation]:
     put.v[:, each] = record.v[:, of]
     sure = others.size and len(set(of)) == len(of) and others.size == np.count_nonzero(of != each)
     if not sure or any(_left(put, j) > max(_left(record, j) / FALLS, FIXED) for j in each[others].tolist()):
-        return []
+        return None
     where = ", ".join(f"of coordinate {each[i]} in column {of[i]}" for i in others)
     cause = f"The velocities stand in other columns than the positions, in every frame: those {where}"
-    remedy = "sort the particles by their number before they are written, positions and velocities alike"
-    return [Explanation(cause=cause, remedy=remedy, local=True)]
+    return Explanation(cause, SORT, local=True)
 
 
-def turned(record: Record, moving: list[int]) -> list[Explanation]:
+def turned(record: Record, moving: list[int]) -> Explanation | None:
     """Velocities of the wrong sign: displacements are opposite to them, in frames close enough to show it."""
     way, mean = _ways(record, moving)
     turn = np.sum((way + mean) ** 2, axis=0) < AGAINST**2 * np.sum(way**2, axis=0)
     against = [j for j, turns in zip(moving, turn, strict=True) if turns]
     if not against:
-        return []
+        return None
     whose = "all coordinates" if against == moving else f"coordinate {', '.join(map(str, against))}"
     cause = f"The velocities of {whose} have the wrong sign: positions move against them"
     remedy = "change the sign of the velocities, or write the frames in the order of time"
     if against == moving and record.interval < 0:
         cause = "The motion runs forwards while its times fall: each step is |h|, not h"
         remedy = "look for abs(dt); if the step is right, all velocities have the wrong sign"
-    return [Explanation(cause=cause, remedy=remedy, local=True)]
+    return Explanation(cause, remedy, local=True)
 
 
 def _exchanged(record: Record, j: int) -> Iterator[Repair]:
@@ -151,7 +152,7 @@ def _exchanged(record: Record, j: int) -> Iterator[Repair]:
             yield (
                 right,
                 f"The {what} of coordinates {pair[0]} and {pair[1]} have changed places {_where(at, len(q))}",
-                "sort the particles by their number before they are written, positions and velocities alike",
+                SORT,
             )
 
 
@@ -170,6 +171,3 @@ def _where(frames: list[int], of: int) -> str:
     if len(frames) == of - frames[0]:
         return f"from frame {frames[0]} on"
     return f"in {len(frames)} of {of} frames: {', '.join(map(str, frames[:4]))}{', ...' * (len(frames) > 4)}"
-
-
-LOOKS: tuple[Callable[[Record, int], Iterator[Repair]], ...] = (_wrapped, _exchanged)

@@ -1,4 +1,4 @@
-"""What the hypotheses that are left mean: held against what is stated, in a sentence."""
+"""The identification by the hypotheses that explain every step, compared with what is stated."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from springcheck.identify.candidates import (
     steps_between,
 )
 from springcheck.identify.evidence import Measured
-from springcheck.identify.families import FAMILIES, title
+from springcheck.identify.families import FAMILIES, MOST_TITLES, title, titles
 from springcheck.identify.fit import Map
 from springcheck.identify.hypothesis import Joint, Match
 from springcheck.identify.laws import friction_shows
@@ -35,19 +35,19 @@ from springcheck.identify.search import Explained, visible
 from springcheck.identify.together import OF_A_BOND, of_a_bond
 from springcheck.identify.wrong import faults_like, faults_of
 from springcheck.schemes.elsewhere import ELSEWHERE
-from springcheck.text.wording import either
+from springcheck.text.wording import few
 
 VELOCITY_OFFSET = {
     "semi-implicit-euler": -0.5,
     "semi-implicit-euler-drift-kick": 0.5,
     "langevin-middle-early": -0.5,
 }
-"""Time of the velocities after that of the positions, in steps: where the map is of second order."""
+"""Time of the velocities minus that of the positions, in steps, at which the map is of second order."""
 
 
 def named(seen: Measured, explained: Explained, step: float | None) -> Identification:
-    """Identification by the hypotheses that explain every step, restricted to those that agree with the
-    stated stiffness, `step` and friction; where none agrees, with the reason."""
+    """Identification by the hypotheses that explain every step and agree with the stated stiffness, `step`
+    and friction; if none agrees, with the reason."""
     joints, friction, stride = list(explained), seen.friction, seen.stride
     if (stated := seen.stiffness) is not None:
         bond = of_a_bond(seen.record, seen.moving, stated) if seen.disagreements(joints[0]) else None
@@ -78,26 +78,26 @@ def named(seen: Measured, explained: Explained, step: float | None) -> Identific
     faults = faults_of(seen, friction) if found.explanations and found.candidates else []
     if not faults:
         return found
-    # a scheme on another spring, or a wrong one on the stated spring: the latter is the plainer
+    # a scheme on another spring, or a wrong one on the stated spring: the latter is the simpler
     other = [x.cause for x in found.explanations if ": " in x.cause]
     return found.refuted("; or ".join([faults[0].cause, *other]), *faults, *found.explanations)
 
 
 def _shows_law(seen: Measured, joint: Joint) -> bool:
-    """Whether a quadratic drag or a nonlinear force is excluded as the cause of its friction, if any."""
+    """Whether quadratic drag and nonlinear forces are excluded as the cause of its friction."""
     each = enumerate(joint.parts)
     return not joint.damped or all(friction_shows(seen.evidence(i), part) for i, part in each)
 
 
 def _known(seen: Measured, explained: Explained, stated_fits: bool) -> Identification:
-    """Identification by hypotheses that explain every step, with the defects of their steps."""
+    """Identification by these hypotheses and the defects of their steps."""
     joints, maps, notes = list(explained), seen.maps, list(seen.notes)
-    plainest = joints[0]
+    simplest = joints[0]
     worst = [max(ds, key=lambda d: (d.precision != "double", d.ulp)) for ds in explained.values()]
-    notes += dict.fromkeys(d.note for d in explained[plainest] if d.note)
+    notes += dict.fromkeys(d.note for d in explained[simplest] if d.note)
     explanations: list[Explanation] = []
     if seen.stiffness is not None:
-        explanations, remarks = stated_stiffness(seen, plainest, worst[0].precision, seen.stiffness)
+        explanations, remarks = stated_stiffness(seen, simplest, worst[0].precision, seen.stiffness)
         notes += remarks
         stated_fits = stated_fits and not explanations
     candidates = tuple(x for joint in joints for x in candidates_of(seen, joint))
@@ -115,11 +115,11 @@ def _known(seen: Measured, explained: Explained, stated_fits: bool) -> Identific
     law = f" with{doubt} friction" if damped else ""
     law = f" with {first.law}" if first.law and len(candidates) == 1 else law
     if scheme == "held-force":
-        kicks = plainest.substeps[1]
+        kicks = simplest.substeps[1]
         order = "kick, then drift" if kicks else "drift, then kick"
-        statement = f"{held_over(plainest)} ({order}){steps}"
-        if plainest.endless:
-            # coarse numbers do not tell many substeps from no end of them, which is a fault
+        statement = f"{held_over(simplest)} ({order}){steps}"
+        if simplest.endless:
+            # coarse numbers do not tell many substeps from infinitely many, which is a fault
             statement, scheme = f"{statement}, or {FAMILIES['fault: old force'].cause}", None
     elif scheme:
         also = f" (or {LEAPFROG[scheme]})" if scheme in LEAPFROG else ""
@@ -127,15 +127,13 @@ def _known(seen: Measured, explained: Explained, stated_fits: bool) -> Identific
         also = "".join(f" (on a spring also {x.cause})" for x in slips) or also
         statement = f"{title(scheme)}{also}{law}{steps}: {rounded_by(precision)} explains every step"
     else:
-        names = list(dict.fromkeys(x.scheme for x in candidates))
-        more = f" and {len(names) - 4} more" if len(names) > 4 else ""
-        statement = f"Several schemes fit, which the states do not tell apart: {', '.join(names[:4])}{more}"
-    undecided = any(not d.certain for d in explained[plainest]) and stated_fits
+        names = few(list(dict.fromkeys(x.scheme for x in candidates)), MOST_TITLES)
+        statement = f"Several schemes fit, which the states do not tell apart: {names}"
+    undecided = any(not d.certain for d in explained[simplest]) and stated_fits
     if undecided:
-        whose = either(list(dict.fromkeys(title(x.scheme) for x in candidates))[:4])
         statement = (
-            f"{whose}{law}{steps}, and errors of the force of the size of {precision} arithmetic: noise or a "
-            "systematic error of that size cannot be excluded"
+            f"{titles(x.scheme for x in candidates)}{law}{steps}, and errors of the force of the size of "
+            f"{precision} arithmetic: noise or a systematic error of that size cannot be excluded"
         )
         notes.append("what would show the arithmetic: every step recorded, and the mass")
     undecided = undecided or (scheme is None and len(joints) == 1)
@@ -150,7 +148,7 @@ def _known(seen: Measured, explained: Explained, stated_fits: bool) -> Identific
         precision=precision,
         fits=stated_fits and not undecided,
         undecided=undecided,
-        difference=difference(maps[0], plainest.parts[0]) if len(joints) == 1 else (math.nan,) * 4,
+        difference=difference(maps[0], simplest.parts[0]) if len(joints) == 1 else (math.nan,) * 4,
         notes=tuple(dict.fromkeys(notes)),
         explanations=tuple(explanations),
     )

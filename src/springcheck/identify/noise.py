@@ -1,15 +1,15 @@
-"""Covariance of what a map leaves over: errors of recorded numbers, each in two of them, and roundings."""
+"""Covariance of a map's residuals, by storage and rounding errors; least squares in extended precision."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from springcheck.errors import IdentificationError
-from springcheck.physics.arrays import Floats
+from springcheck.physics.arrays import Extended, Floats
 
 
 class Noise:
-    """V of the residuals of a map, factored."""
+    """The covariance V of the residuals of a map, as its Cholesky factor."""
 
     def __init__(self, entries: Floats, sigma: Floats, process: Floats) -> None:
         self.sigma, self.entries = sigma, entries
@@ -53,3 +53,16 @@ class Noise:
         out[1:] += weighted
         out[:-1] -= weighted @ self.entries
         return np.asarray(self.sigma**2 * out)
+
+
+def least_squares(columns: Extended, right: Extended) -> Extended:
+    """Solution x of columns x = right by normal equations in extended precision."""
+    size = np.sqrt(np.sum(columns**2, axis=0))
+    size = np.where(size > 0, size, 1)
+    columns = columns / size
+    gram = columns.T @ columns
+    inverse = np.linalg.pinv(gram.astype(np.float64), rcond=1e-15, hermitian=True).astype(np.longdouble)
+    x = inverse @ (columns.T @ right)
+    for _ in range(4):
+        x = x + inverse @ (columns.T @ (right - columns @ x))
+    return np.asarray(x / size[:, None])

@@ -1,4 +1,4 @@
-"""What else could have made the states, and what would tell: sentences beside an identification."""
+"""Alternatives to an identification, and which further data would exclude them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from springcheck.errors import IdentificationError
 from springcheck.identify.clock import FEWEST_STATES
 from springcheck.identify.compare import Target, compare
 from springcheck.identify.evidence import Measured
-from springcheck.identify.families import FAMILIES, title
+from springcheck.identify.families import FAMILIES, titles
 from springcheck.identify.fit import Map
 from springcheck.identify.guesses import Guesses
 from springcheck.identify.hypothesis import ERRORS, SURE, Joint, Terms
@@ -22,22 +22,21 @@ from springcheck.identify.search import coincident, identical
 from springcheck.text.wording import count, either
 
 APART = 10.0
-"""Standard errors by which two schemes must differ to be told apart for certain: five exclude, and chance
-may take five away."""
+"""Standard errors between schemes that are always told apart: five to exclude one, five for chance."""
 
 MOST_DIGITS = 9
-"""More digits than single precision has short of double: what needs more, digits do not tell."""
+"""Most additional digits that are asked for, those of double over single precision."""
 
 FEWEST_OF_TEXT, FEWEST_DIGITS = 12, 40.0
-"""Frames of text that show the motion, and digits of it in all frames, text or single precision, below which
-a scheme is not told from others for certain: some 24 frames of 3 digits, or 6 of 7.  A map, its equilibrium
-and a start have seven unknowns, and roundings of few digits are large beside a short motion."""
+"""Fewest frames of text that show the motion, and fewest digits of it in all frames of text or single
+precision, from which a scheme is named: some 24 frames of 3 digits, or 6 of 7.  A map, its equilibrium and a
+start have seven unknowns."""
 
 CERTAIN_STEPS = 12
-"""Steps to a frame above which coarse numbers name no scheme: their errors are small, and many lie near."""
+"""Most steps to a frame from which coarse numbers name a scheme: truncation errors of more are too alike."""
 
 MOST_PARTS, MARK = 4, 1e-9
-"""Largest n, and the relative distance within which a friction is h k/(n m)."""
+"""Largest n of a friction h k/(n m) that is a fault's, and the relative difference up to which it is that."""
 
 LEAPFROG = {
     "semi-implicit-euler": "leapfrog with velocities half a step early",
@@ -58,8 +57,8 @@ def separation(seen: Measured, one: Joint, other: Joint) -> float:
 
 
 def of_few(record: Record, found: Identification) -> Identification:
-    """Withhold the name where few frames of text or single precision exclude no other scheme.  Raises
-    IdentificationError where no scheme fits so few."""
+    """Withhold the name where the frames of text or single precision are too few to exclude other schemes.
+    Raises IdentificationError where no scheme fits so few."""
     if record.fine:
         return found
     fewest, of_text = (FEWEST_OF_TEXT, " of text") if record.text else (FEWEST_STATES - 1, "")
@@ -90,7 +89,7 @@ def beside_unknown(record: Record, found: Identification, *, stated: bool, seen:
     """
     few = found.scheme or any(x.stride <= CERTAIN_STEPS for x in found.candidates)
     clear = record.jitter < DEEP
-    # what lies between two schemes that the numbers do not tell apart they do not exclude either
+    # numbers that do not separate two schemes do not exclude an unknown one between them
     one = found.scheme and len({x.stride for x in found.candidates}) == 1
     near = not (one and seen) or any(x.scheme == "exact" for x in found.candidates)
     certain = stated or found.stride == 1 or (record.deep and clear and few) or found.scheme == "exact"
@@ -104,21 +103,20 @@ def beside_unknown(record: Record, found: Identification, *, stated: bool, seen:
     return replace(out, verdict="not told apart", scheme=None, aliases=())
 
 
-def of_either_sign(found: Identification, against: list[Explanation]) -> Identification:
-    """Withhold the name where positions move against the velocities and the numbers are coarse.  A spring
-    that nearly completes a turn between two frames looks like a slow one with -v, and some scheme fits its
-    map of few digits."""
+def of_either_sign(found: Identification, against: Explanation | None) -> Identification:
+    """Withhold the name where coarse positions move `against` the velocities: a spring that nearly completes
+    a turn between two frames looks like a slow one with -v."""
     if not (found.candidates and against):
         return found
-    cause = f"{against[0].cause}; or the motion nearly comes round between two frames: {found.statement}"
-    remedy = f"{against[0].remedy}; if they are right, state the stiffness, which tells the two apart"
-    return found.doubted(cause, because=(Explanation(cause=cause, remedy=remedy, local=True),))
+    cause = f"{against.cause}; or the motion nearly comes round between two frames: {found.statement}"
+    remedy = f"{against.remedy}; if they are right, state the stiffness, which tells the two apart"
+    return found.doubted(cause, because=(Explanation(cause, remedy, local=True),))
 
 
 def of_stated_friction(found: Identification, stated: float, mass: float) -> Identification:
-    """Explain that the stated friction c [M/T] follows no law: the states have another one, or none."""
+    """The cause where no law gives the stated friction c [M/T]."""
     rates = sorted(mass * x.friction[0] for x in found.candidates)
-    whose = either(list(dict.fromkeys(title(x.scheme) for x in found.candidates))[:4])
+    whose = titles(x.scheme for x in found.candidates)
     low, high = rates[0], rates[-1]
     if not (low or high):
         cause = f"{whose}, but without friction, where c = {stated:g} is stated"
@@ -131,7 +129,7 @@ def of_stated_friction(found: Identification, stated: float, mass: float) -> Ide
     return replace(
         found.noting("the stated friction does not fit by any of the laws that are known"),
         statement=found.statement if found.explanations else cause,
-        explanations=(*found.explanations, Explanation(cause=cause, remedy=remedy)),
+        explanations=(*found.explanations, Explanation(cause, remedy)),
     )
 
 
@@ -143,8 +141,8 @@ def _between(low: float, high: float) -> str:
 
 
 def of_unasked_friction(found: Identification) -> Identification:
-    """Reject friction that indicates a scheme written down wrongly: h k/(n m), n whole.  A scheme without
-    friction that has the stated stiffness is not rejected."""
+    """Reject a friction c/m = h k/(n m), n an integer: the mark of a faulty or implicit scheme.  A scheme
+    without friction of the stated stiffness is not rejected."""
     if not found.fits or not found.friction or not found.step or not all(x.law for x in found.candidates):
         return found
     for one in found.candidates:
@@ -164,12 +162,12 @@ def of_unasked_friction(found: Identification) -> Identification:
                 "the friction if not"
             )
             remedy = "compare the factors 1/2 of the step with the scheme's"
-            return found.refuted(cause, Explanation(cause=cause, remedy=remedy))
+            return found.refuted(cause, Explanation(cause, remedy))
     return found
 
 
 def hidden_friction(record: Record, found: Map) -> float:
-    """Largest friction rate c/m [1/T] that is compatible with the map's determinant and its error."""
+    """Largest friction rate c/m [1/T] that the determinant and its standard error admit."""
     gradient = np.linalg.inv(found.entries.astype(np.float64)).T.reshape(4)
     error = math.sqrt(float(gradient @ found.covariance @ gradient))
     loss = abs(math.log(abs(float(np.linalg.det(found.entries.astype(np.float64))))))
@@ -177,7 +175,7 @@ def hidden_friction(record: Record, found: Map) -> float:
 
 
 def same_maps(seen: Measured, joint: Joint) -> list[str]:
-    """Note on damped springs that have the same map, and what distinguishes them from the undamped scheme."""
+    """Note on a damped spring of the same map, and what tells it from the undamped scheme."""
     names, record = coincident(joint.scheme), seen.record
     if not names or joint.stride != 1:
         return []
@@ -196,19 +194,19 @@ def same_maps(seen: Measured, joint: Joint) -> list[str]:
 
 def untold(seen: Measured, joints: list[Joint]) -> list[str]:
     """Why several schemes or numbers of steps remain, and what further data would distinguish them."""
-    plainest, record = joints[0], seen.record
-    if plainest.scheme == "exact":
+    simplest, record = joints[0], seen.record
+    if simplest.scheme == "exact":
         why = "no error of a step is visible: fine steps of many schemes come as near to the exact flow"
         told = ["more digits", "a larger step"]
     else:
-        others = [x for x in joints[1:] if (x.scheme, x.stride) != (plainest.scheme, plainest.stride)]
-        apart = ((separation(seen, plainest, x), x) for x in others)
+        others = [x for x in joints[1:] if (x.scheme, x.stride) != (simplest.scheme, simplest.stride)]
+        apart = ((separation(seen, simplest, x), x) for x in others)
         least, nearest = min(apart, key=lambda pair: pair[0])
         digits = math.ceil(math.log10(APART / least)) if least > 0 else MOST_DIGITS + 1
-        pair = f"the data cannot tell these apart: the maps of {plainest} and {nearest}"
-        if digits > MOST_DIGITS or identical(plainest, nearest, free_scale=record.momenta):
+        pair = f"the data cannot tell these apart: the maps of {simplest} and {nearest}"
+        if digits > MOST_DIGITS or identical(simplest, nearest, free_scale=record.momenta):
             other = "mass" if record.momenta else "stiffness"
-            friction = " and friction" if plainest.damped or nearest.damped else ""
+            friction = " and friction" if simplest.damped or nearest.damped else ""
             why, told = f"{pair} are the same, on springs of different {other}{friction}", []
         else:
             why = f"{pair} are {least:.1g} standard errors of the numbers' rounding from each other"
@@ -216,13 +214,13 @@ def untold(seen: Measured, joints: list[Joint]) -> list[str]:
             told += ["more frames"] if digits <= 2 else []
     if record.momenta:
         told.append("the mass")
-    elif seen.stiffness is None and any(_stiffer(x, plainest) for x in joints):
+    elif seen.stiffness is None and any(_stiffer(x, simplest) for x in joints):
         told.append(f"the {'mass and the ' * (record.mass is None)}stiffness, where known: they differ in it")
     return [why, *([f"what would tell them apart: {either(told)}"] if told else [])]
 
 
 def _stiffer(one: Joint, other: Joint) -> bool:
-    """Whether two schemes imply stiffnesses that differ for certain."""
+    """Whether two schemes imply significantly different stiffnesses."""
     return any(
         abs(a.a * one.stride**2 - b.a * other.stride**2)
         > SURE * (a.a_error * one.stride**2 + b.a_error * other.stride**2)

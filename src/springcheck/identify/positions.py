@@ -1,10 +1,9 @@
-"""What positions alone say of the scheme: `recurrence` reads them, and this says what they leave open."""
+"""Identification from positions alone, by their `recurrence`, and what they leave open."""
 
 from __future__ import annotations
 
 import math
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from springcheck.errors import IdentificationError
@@ -19,13 +18,13 @@ from springcheck.identify.candidates import (
 from springcheck.identify.evidence import SINGLE_ROOM, Measured
 from springcheck.identify.families import FAMILIES, HELD, Family, title
 from springcheck.identify.hypothesis import FEW, SURE, Joint, Match, distinct
-from springcheck.identify.record import SIZES, Record, of_size, stated_stride
+from springcheck.identify.record import AT_REST, Record, of_size, stated_stride
 from springcheck.identify.recurrence import FEWEST_FRAMES, Recurrence, classes, matches, recurrence
 from springcheck.identify.result import UNTOLD, Explanation, Identification, nothing, rounded_by
 from springcheck.text.wording import either
 
 CERTAIN_CHANGE = 1e8
-"""Standard errors of a change of areas from which no friction meets that of a scheme by chance."""
+"""Significance of 1 - det, in standard errors, from which no friction agrees with a scheme by chance."""
 
 ALONE = (
     "positions alone show a frequency and how areas change, and no velocities: velocity Verlet, leapfrog, "
@@ -44,9 +43,8 @@ def identify_positions(
         notes.append("the stiffness says nothing of positions without the mass; give the mass as well")
     stride = stated_stride(record, step, notes)
     notes.append(ALONE)
-    moving = np.flatnonzero(np.ptp(record.q, axis=0) > SIZES[0]).tolist()
-    if not moving:
-        raise IdentificationError("nothing moves: at rest all schemes agree; start away from rest")
+    if not (moving := record.moving):
+        raise IdentificationError(AT_REST)
     if len(record.q) < FEWEST_FRAMES:
         raise IdentificationError(
             f"too few frames of positions alone: {len(record.q)}; give {FEWEST_FRAMES}, or velocities"
@@ -103,8 +101,8 @@ def _all_preserve(found: list[Recurrence]) -> bool:
 def _joined(
     found: list[Recurrence], families: tuple[Family, ...], strides: range, wanted: list[float]
 ) -> list[Joint]:
-    """Families and strides that agree with every oscillator, for each spring of the first.  Springs of the
-    others are those nearest to the `wanted` (w T)**2, or where that is 0 of the fewest unseen turns."""
+    """Families and strides that fit every oscillator, for each spring of the first.  Of the others the spring
+    nearest to the `wanted` (w T)**2 is taken, or where that is 0 that of the fewest turns."""
     parts: list[dict[tuple[str, int], list[Match]]] = []
     for x in found:
         own: dict[tuple[str, int], list[Match]] = {}
@@ -119,13 +117,13 @@ def _joined(
                 for own, a in zip(parts[1:], wanted[1:], strict=True)
             )
             out += [Joint(family=key[0], stride=key[1], parts=(m, *rest)) for m in parts[0][key]]
-    return sorted(out, key=lambda x: (x.plainness, abs(x.parts[0].a)))
+    return sorted(out, key=lambda x: (x.simplicity, abs(x.parts[0].a)))
 
 
 def _first(
     found: list[Recurrence], families: tuple[Family, ...], strides: range, wanted: list[float]
 ) -> list[Joint]:
-    """Hypotheses of the fewest steps for each family: more steps that fit as well prove nothing."""
+    """The hypothesis of the fewest steps of each family."""
     out = _joined(found, families, strides[:1], wanted)
     left = tuple(f for f in families if f.name not in {x.family for x in out})
     if left and len(strides) > 1:
@@ -137,8 +135,7 @@ def _first(
 
 
 def _stated(seen: Measured, joints: list[Joint]) -> tuple[Measured, list[Joint]]:
-    """Hypotheses of the stated stiffness, or where there are none, of it with a number in single precision,
-    and a note on that."""
+    """Hypotheses of the stated stiffness, exactly or to single precision, with a note on that."""
     for room in (0.0, SINGLE_ROOM):
         fitting = [x for x in joints if not seen.disagreements(x, room=room)]
         if fitting:
@@ -148,7 +145,7 @@ def _stated(seen: Measured, joints: list[Joint]) -> tuple[Measured, list[Joint]]
 
 
 def _members(joints: list[Joint]) -> list[Joint]:
-    """Every scheme with the same positions, once for each number of steps, with the fewest unseen turns."""
+    """Every scheme with the same positions, once for each number of steps, with the fewest turns."""
     shared = {x[0].name: x for x in classes()}
     out: dict[tuple[str, int], Joint] = {}
     for joint in joints:
@@ -160,7 +157,7 @@ def _members(joints: list[Joint]) -> list[Joint]:
 
 
 def _known(seen: Measured, found: list[Recurrence], kept: list[Joint], known: bool) -> Identification:
-    """Identification of positions that one or several schemes explain."""
+    """Identification by the hypotheses that fit."""
     record, notes, joints = seen.record, list(seen.notes), _members(kept)
     candidates = tuple(x for joint in joints for x in candidates_of(seen, joint))
     names = list(dict.fromkeys(x.scheme for x in candidates))
@@ -206,7 +203,7 @@ def _known(seen: Measured, found: list[Recurrence], kept: list[Joint], known: bo
 
 
 def _none(seen: Measured, found: list[Recurrence], joints: list[Joint]) -> Identification:
-    """Identification without a scheme, and why; `joints` fit but contradict what is stated."""
+    """Identification without a scheme, and its cause; `joints` fit but contradict what is stated."""
     worst = max(found, key=lambda x: x.residual)
     remedy = "compare the order of its stages and their coefficients with the scheme's; velocities show more"
     if any(not x.precision for x in found):
@@ -226,7 +223,7 @@ def _none(seen: Measured, found: list[Recurrence], joints: list[Joint]) -> Ident
             f"{math.exp(found[0].log_det) - 1:+.2e} in each frame"
         )
     return nothing(
-        (Explanation(cause=cause, remedy=remedy, misfit=worst.residual),),
+        (Explanation(cause, remedy, worst.residual),),
         determinant=tuple(math.exp(x.log_det) for x in found),
         symplectic_defect=max(abs(float(x.beta)) for x in found),
         defect_ulp=max(x.ulp for x in found),

@@ -1,4 +1,4 @@
-"""What was recorded: states at a constant interval, and how finely their numbers were written down."""
+"""Recorded states at a constant interval, checked, with the resolution of their numbers."""
 
 from __future__ import annotations
 
@@ -9,26 +9,27 @@ from numpy.typing import ArrayLike
 
 from springcheck.errors import IdentificationError
 from springcheck.identify.clock import FEWEST_STATES, clock_of
-from springcheck.identify.storage import BINARY, Storage, storage
+from springcheck.identify.storage import BINARY, ROUNDING, Storage, storage
 from springcheck.physics.arrays import Extended, Floats
 
-ROUNDING = 2.0**-53
-
 LEAST = 2.0**-102
-"""Smallest number of which single precision keeps all 24 digits in products with others of up to 2**24."""
+"""Smallest factor whose product with another of 2**-24 or more is a normal number of single precision."""
 
 DEEP = 2.0**-30
-"""Rounding of a file, as a share of the largest number, below which it shows that of single precision."""
+"""Resolution of a file, relative to its largest number, that resolves the roundings of single precision."""
 
 SIZES = 1e-75, 1e75
-"""Sizes of numbers whose fourth powers are numbers of double precision still."""
+"""Smallest and largest magnitudes accepted: their fourth powers neither underflow nor overflow."""
+
+
+AT_REST = "nothing moves: at rest all schemes agree; start away from rest"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Record:
-    """Positions q and velocities v (f, n) of n oscillators, one interval apart.
+    """Positions q and velocities v (f, n) of n coordinates at f frames, one interval apart.
 
-    Where only momenta are known and no mass is, v holds the momenta and `mass` is None with `momenta` set.
+    v holds momenta, and `momenta` is set, where neither velocities nor masses are known.
     """
 
     interval: np.longdouble
@@ -36,8 +37,8 @@ class Record:
     """Relative uncertainty of the interval, from the rounding of the recorded times."""
     clock: float
     """Rounding of the recorded times, in intervals."""
-    slips: Extended | None
-    """Relative excess (f - 1,) of each interval over the mean, None where times are coarse or even."""
+    deviations: Extended | None
+    """Relative deviation (f - 1,) of each interval from the mean; None where times are coarse or even."""
     q: Extended
     v: Extended
     q_quantum: Floats
@@ -47,28 +48,33 @@ class Record:
     mass: Floats | None
     momenta: bool
     parts: tuple[Floats, Floats] | None = None
-    """Sizes (f, n) of what positions and velocities are sums of, where they are normal modes: their
-    rounding is relative to these."""
+    """Sums (f, n) of the absolute values of the terms of positions and velocities, where these are normal
+    modes: their rounding is relative to these sums."""
 
     @property
     def fine(self) -> bool:
-        """Whether all numbers have the digits of double precision."""
+        """Whether positions and velocities are stored in double precision."""
         return self.q_storage.name == self.v_storage.name == "double"
 
+    @property
+    def moving(self) -> list[int]:
+        """Indices of the coordinates that are not at rest."""
+        spread = np.ptp(self.q, axis=0) + np.ptp(self.v, axis=0) * abs(self.interval)
+        return list(np.flatnonzero(spread > SIZES[0]).tolist())
+
     def quanta(self, j: int) -> Floats:
-        """Spacing of representable numbers at each state (f, 2) of an oscillator, on (q, v interval)."""
+        """Spacing of the representable numbers around each state (f, 2) of coordinate j, on (q, v T)."""
         return np.stack([self.q_quantum[:, j], self.v_quantum[:, j] * abs(float(self.interval))], axis=1)
 
     def sigma(self, j: int) -> Floats:
-        """Standard uncertainty (f, 2) of an oscillator's recorded states (q, v interval); 0 in double
-        precision, whose rounding is that of the arithmetic."""
+        """Standard error (f, 2) of the recorded states (q, v T) of coordinate j from their storage; 0 in
+        double precision, whose rounding is part of the arithmetic."""
         coarse = [self.q_storage.name != "double", self.v_storage.name != "double"]
         return np.asarray(self.quanta(j) * coarse / np.sqrt(12.0))
 
     @property
     def deep(self) -> bool:
-        """Whether the states resolve single precision's roundings: `fine`, or decimal text of as many
-        digits."""
+        """Whether the states resolve single precision's roundings: `fine`, or text of enough digits."""
         pairs = ((self.q, self.q_quantum), (self.v, self.v_quantum))
         return self.fine or all(
             bool(np.max(quantum) <= DEEP * np.max(np.abs(x))) and x_storage.name not in BINARY
@@ -77,7 +83,7 @@ class Record:
 
     @property
     def text(self) -> bool:
-        """Whether some numbers were written as decimal text of few digits."""
+        """Whether positions or velocities are decimal text."""
         return any(x.name.startswith("text") for x in (self.q_storage, self.v_storage))
 
 
@@ -94,16 +100,16 @@ def _states(x: ArrayLike, name: str, frames: int) -> Floats:
 
 
 def _alive(positions: Floats, moving: Floats) -> int:
-    """Number of frames until a motion has decayed so far that products underflow in single precision; from
-    there on the states follow no scheme's step."""
+    """Number of frames before a decaying motion underflows in products of single precision; later states
+    follow no scheme's step."""
     alive = np.any((np.abs(positions) >= LEAST) & (np.abs(moving) >= LEAST), axis=1)
     last = int(np.flatnonzero(alive)[-1]) if np.any(alive) else 0
     return last + 1 if last + 1 >= FEWEST_STATES else len(positions)
 
 
 def of_size(name: str, x: ArrayLike | None, n: int = 1, *, zero: bool = False) -> Floats | None:
-    """Check a stated number of n oscillators, or of each (n,): a mass within `SIZES`, or a product of two
-    such sizes, and 0 only where `zero`.  Raises IdentificationError."""
+    """Check a stated number for n coordinates, or one for each (n,).  A mass lies within `SIZES`, any other
+    number within their squares, or is 0 where `zero`.  Raises IdentificationError."""
     if x is None:
         return None
     out = np.ravel(np.asarray(x, dtype=np.float64))
@@ -123,8 +129,7 @@ def of_size(name: str, x: ArrayLike | None, n: int = 1, *, zero: bool = False) -
 def read(
     t: ArrayLike, q: ArrayLike, p: ArrayLike | None, v: ArrayLike | None, mass: ArrayLike | None
 ) -> Record:
-    """Record of times (f,), positions, and momenta or velocities or both (f, n).  Raises
-    IdentificationError."""
+    """Record of times (f,), positions, and momenta or velocities (f, n).  Raises IdentificationError."""
     times = np.asarray(t, dtype=np.float64)
     if times.ndim != 1 or not np.all(np.isfinite(times)):
         raise IdentificationError(f"times must be one row of finite numbers; found shape {np.shape(t)}")
@@ -181,7 +186,7 @@ def read(
         interval=interval,
         jitter=clock.jitter,
         clock=clock.quantum,
-        slips=clock.slips if finely else None,
+        deviations=clock.deviations if finely else None,
         q=positions[kept].astype(np.longdouble),
         v=moving[kept].astype(np.longdouble) / unit,
         q_quantum=q_storage.quantum(positions[kept]),

@@ -1,9 +1,9 @@
 """Positions alone: the recurrence q[n+1] - T q[n] + D q[n-1] = c of one step's trace and determinant.
 
-On a spring every one-step scheme obeys it, and schemes that share trace and determinant share all positions:
-velocity Verlet, leapfrog, semi-implicit Euler and position Verlet do.  The two numbers tell a frequency and a
-change of areas.  A scheme without friction fixes one by the other; with friction every scheme has a spring
-that fits, and only a stated stiffness tells more.
+On a spring every one-step scheme obeys it, and schemes of equal trace and determinant have equal positions:
+velocity Verlet, leapfrog, semi-implicit Euler and position Verlet.  T and D give a frequency and a change of
+areas.  Without friction a scheme relates the two; with friction every scheme fits on some spring, so that
+only a stated stiffness excludes any.
 """
 
 from __future__ import annotations
@@ -14,36 +14,37 @@ from functools import cache
 
 import numpy as np
 
-from springcheck.identify.coarse import irregular
+from springcheck.identify.coarse import is_white
 from springcheck.identify.compare import Target, solved
-from springcheck.identify.coupled import least_squares
 from springcheck.identify.families import Family
 from springcheck.identify.guesses import FLOW_TURNS, Guesses, Roots, first
 from springcheck.identify.hypothesis import ERRORS, Match, Terms, distinct
 from springcheck.identify.maps import MapTable, table, unit
-from springcheck.identify.record import ROUNDING, Record
+from springcheck.identify.noise import least_squares
+from springcheck.identify.record import Record
+from springcheck.identify.storage import ROUNDING
 from springcheck.physics.arrays import Extended, Floats, Reals
 
 FEWEST_FRAMES = 9
 """Five unknowns of an orbit, and as many frames again that they have to explain."""
 
 UNUSUAL = 2.5
-"""Largest irregular residual of a frame, in units of its usual rounding error, 4 + 2 sqrt(steps)."""
+"""Largest residual that is white noise, in units of the expected rounding, 4 + 2 sqrt(steps)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Recurrence:
-    """alpha = 1 + D - T and beta = 1 - D of one oscillator, so that nothing cancels where steps are small."""
+    """alpha = 1 + D - T and beta = 1 - D of one oscillator, which do not cancel for small steps."""
 
     alpha: np.longdouble
     beta: np.longdouble
     covariance: Floats
     residual: float
-    """Root mean square of what it leaves over, as a share of the positions' size."""
+    """Root mean square residual, relative to the positions."""
     ulp: float
-    """The largest of it in units of 2**-52 of the terms' sizes."""
+    """Largest residual, in units of 2**-52 of the sum of the terms."""
     precision: str
-    """The arithmetic, or the storage, that explains what is left over; "" where none does."""
+    """The arithmetic, or the storage format, that explains the residuals; "" where none does."""
 
     @property
     def phase(self) -> float:
@@ -71,12 +72,12 @@ def recurrence(record: Record, j: int, steps: int) -> Recurrence:
     noise = np.maximum(noise, 1e-30 * np.max(noise))
     # a frame may lie off by the rounding of its time, on its way of up to a turn more than it shows
     amplitude = _around(np.abs(q - np.mean(q)).astype(np.float64))[1:-1]
-    alpha, beta, covariance, left = _neighbours(q, noise, record.slips)
+    alpha, beta, covariance, left = _neighbours(q, noise, record.deviations)
     scale = float(np.std(q.astype(np.float64)))
     residual = float(np.sqrt(np.mean(left**2))) / scale
     ulp = float(np.max(np.abs(left) / (2.0**-52 * size)))
     usual = 4 + 2 * math.sqrt(steps)
-    clock = record.clock * amplitude if record.slips is not None else 0.0 * amplitude
+    clock = record.clock * amplitude if record.deviations is not None else 0.0 * amplitude
     # each of four frames may lie half a rounding of its time away, on the way that the motion shows
     on_way = 2 * _phase(alpha, beta) * clock
 
@@ -86,7 +87,7 @@ def recurrence(record: Record, j: int, steps: int) -> Recurrence:
 
         if off(on_way) <= usual:
             return True
-        return off(2 * np.pi * clock) <= UNUSUAL * usual and irregular((left / noise)[:, None])
+        return off(2 * np.pi * clock) <= UNUSUAL * usual and is_white((left / noise)[:, None])
 
     precision = ""
     if record.fine:
@@ -120,10 +121,10 @@ def _around(x: Floats) -> Floats:
 
 
 def _neighbours(
-    q: Extended, noise: Floats, slips: Extended | None
+    q: Extended, noise: Floats, deviations: Extended | None
 ) -> tuple[np.longdouble, np.longdouble, Floats, Floats]:
-    """alpha, beta, their covariance (2, 2) and the residuals (f - 2,), from neighbouring frames.  Where steps
-    follow the clock's `slips`, these displace frames along the motion."""
+    """alpha, beta, their covariance (2, 2) and the residuals (f - 2,), from neighbouring frames.  Steps that
+    follow the `deviations` of the times displace frames along the motion."""
     weight = (1 / noise)[:, None]
     # a motion that grows is not centred by its largest frames
     share = 1 / np.square(noise / np.min(noise))
@@ -133,8 +134,8 @@ def _neighbours(
     right = np.asarray(second[:, None] * weight, np.longdouble)
     x = least_squares(np.asarray(columns * weight, np.longdouble), right)[:, 0]
     left = (second - columns @ x).astype(np.float64)
-    if slips is not None and len(left) > 4 * FEWEST_FRAMES:
-        moved = [1e12 * s[:, None] * columns[:, :2] for s in (slips[1:], slips[:-1])]
+    if deviations is not None and len(left) > 4 * FEWEST_FRAMES:
+        moved = [1e12 * s[:, None] * columns[:, :2] for s in (deviations[1:], deviations[:-1])]
         wide = np.concatenate([columns, *moved], axis=1)
         y = least_squares(np.asarray(wide * weight, np.longdouble), right)[:, 0]
         rest = (second - wide @ y).astype(np.float64)
@@ -153,8 +154,8 @@ def _neighbours(
 def _orbit(
     q: Extended, unit_: Floats, alpha: np.longdouble, beta: np.longdouble
 ) -> tuple[np.longdouble, np.longdouble, Floats] | None:
-    """alpha, beta and their covariance from one orbit c + r**n (A cos + B sin)(n phase) of which all frames
-    were rounded once; None where the residuals exceed that rounding."""
+    """alpha, beta and their covariance from one orbit c + r**n (A cos + B sin)(n phase), if all frames are
+    this orbit to the rounding of their storage; else None."""
     frames = len(q)
     values = (q - q[0]).astype(np.float64)
     n = np.arange(frames, dtype=np.float64)
@@ -242,9 +243,8 @@ class PositionTarget(Target):
 
 
 def matches(found: Recurrence, families: tuple[Family, ...], strides: range) -> list[Match]:
-    """Families (one of each undamped class; any with friction) that may have this recurrence, with each
-    number of steps and of unseen turns, and each spring.  Without velocities both senses of rotation look
-    alike."""
+    """Fits of the families to a recurrence, for each number of steps and of turns and each spring.  Positions
+    do not show the sense of rotation."""
     every = table(families)
     ways = [(s, i) for s in strides for i in range(max(s, FLOW_TURNS if s == 1 else 1) + 1)]
     s, i = np.array(ways, np.float64).T

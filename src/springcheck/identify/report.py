@@ -1,4 +1,4 @@
-"""Which scheme made these states: the way from arrays to what is said of them."""
+"""Identification of arrays: every stage in its order."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def _of_states(t: Any, q: Any, p: Any, v: Any, *, mass: ArrayLike | None, **stat
         if in_a_bath := of_bath(t, q, p, v, mass, **stated):
             return in_a_bath
         raise
-    # noise is not looked for where a scheme, or a mistake in the record, explains the states
+    # noise is sought only where neither a scheme nor a mistake in the record explains the states
     local = any(x.local for x in found.explanations)
     return found if found.candidates or local else explained(found, t, q, p, v, mass, **stated)
 
@@ -90,7 +90,7 @@ def _of_record(
 def _of_coordinates(
     record: Record, stiffness: ArrayLike | None, friction: float | None, step: float | None
 ) -> Identification:
-    """Measure maps, compare them with the schemes, and interpret the hypotheses that remain."""
+    """Fit maps, compare them with the schemes, and interpret the hypotheses that remain."""
     seen = judged(record, stiffness, friction, step)
     if any(found.drifts for found in seen.maps):
         return _unknown(seen, range(1, 2))
@@ -102,8 +102,8 @@ def _of_coordinates(
 
 
 def _unknown(seen: Measured, strides: range) -> Identification:
-    """Identification without a scheme: possible causes, and the nearest scheme of these strides, unless
-    velocities have the wrong sign."""
+    """Identification without a scheme: causes, and the nearest scheme of these strides unless velocities have
+    the wrong sign."""
     maps = seen.maps
 
     def distance(joint: Joint) -> float:
@@ -113,8 +113,8 @@ def _unknown(seen: Measured, strides: range) -> Identification:
     tried = nearest(maps, seen.terms, distinct(damped=False), strides)
     if tried and not turned(seen.record, seen.moving):
         least = min(map(distance, tried))
-        # many schemes and strides come close by chance; the plainest of the close ones is the better guess
-        close = min((x for x in tried if distance(x) <= 10 * least), key=lambda x: x.plainness)
+        # many schemes and strides come close by chance; the simplest of the close ones is the better guess
+        close = min((x for x in tried if distance(x) <= 10 * least), key=lambda x: x.simplicity)
         near = {"nearest": str(close), "difference": difference(maps[0], close.parts[0])}
         if not any(part.turns for part in close.parts):
             # what is near by whole turns that nothing asks for has none of the states' numbers

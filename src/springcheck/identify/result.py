@@ -1,11 +1,11 @@
-"""What an identification says, as frozen data, as a JSON document and as text."""
+"""The result of an identification: frozen data, a JSON document, text."""
 
 from __future__ import annotations
 
 import math
 import textwrap
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import numpy as np
@@ -20,7 +20,7 @@ Verdict: TypeAlias = Literal["named", "not told apart", "none", "adaptive"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Candidate:
-    """A scheme that the states do not exclude, and what they would mean if it made them.
+    """A scheme that the states do not exclude, and the numbers that they would then have.
 
     Rows of numbers hold one for each oscillator that moves, as in `Identification`.
     """
@@ -30,29 +30,28 @@ class Candidate:
     stride: int
     step: float
     turns: int
-    """Whole turns between two frames, which the frames do not show."""
+    """Whole turns between two frames."""
     omega: tuple[float, ...]
     stiffness: tuple[float, ...] | None
     friction: tuple[float, ...]
     law: str = ""
-    """Where friction acts and by which law, which the numbers assume; "" where there is none."""
+    """Discretisation and place of the friction that the numbers assume; "" without friction."""
 
     def __str__(self) -> str:
         return self.scheme if self.stride == 1 else f"{self.scheme}, {self.stride} steps a frame"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Explanation:
-    """Possible cause: a sentence, what to do, and how much it leaves unexplained.
-
-    `misfit` is a share of what is missing, or standard errors of a map; the smaller the better.
-    """
+    """A possible cause, as a sentence, and what to do about it."""
 
     cause: str
     remedy: str
     misfit: float = 0.0
-    local: bool = False
-    """Whether it leaves no noise to explain: numbers in the wrong place, or a motion known to rounding."""
+    """Residual that the cause leaves: of a map in standard errors, else relative to the residuals that it
+    explains, or to the state if it explains none."""
+    local: bool = field(default=False, kw_only=True)
+    """Whether it leaves no noise to explain: misplaced numbers, or residuals that are only rounding."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,45 +66,44 @@ class Identification:
 
     verdict: Verdict
     statement: str
-    """One sentence: the scheme and the arithmetic, or what is wrong."""
+    """One sentence: scheme and arithmetic, or the cause."""
     scheme: str | None = None
     aliases: tuple[str, ...] = ()
-    """Other names of the same map: on a spring nothing can tell them apart."""
+    """Other schemes of the same map, which no states on a spring tell apart."""
     candidates: tuple[Candidate, ...] = ()
-    """Schemes that the states do not exclude, the plainest first; one where stride and scheme are certain."""
+    """Schemes that the states do not exclude, the simplest first; one if scheme and stride are certain."""
     step: float = math.nan
     """[T]; negative where time runs backwards, NaN where candidates differ."""
     stride: int | None = None
     """Steps from frame to frame; None where candidates differ."""
     omega: tuple[float, ...]
-    """True angular frequency sqrt(k/m), not that of the discrete motion; NaN for an inverted spring [1/T]."""
+    """sqrt(k/m) [1/T], not the frequency of the discrete motion; NaN for an inverted spring."""
     stiffness: tuple[float, ...] | None = None
     """[M/T2]; None where no mass is known."""
     friction: tuple[float, ...]
     """Rate c/m [1/T]."""
     velocity_offset: float = math.nan
-    """Time of the velocities after that of the positions, in steps."""
+    """Time of the velocities minus that of the positions, in steps."""
     determinant: tuple[float, ...]
     """Determinant of the measured map, for one step."""
     symplectic_defect: float = math.nan
     """Largest |M^T J M - J| of the measured map between frames."""
     defect_ulp: float = math.nan
-    """Largest departure of one recorded step from the scheme's, in units of 2**-52 of the terms' sizes; of
-    several schemes, the closest's."""
+    """Largest difference of a recorded step from the scheme's, in units of 2**-52 of the sum of its terms; of
+    several schemes, the smallest."""
     precision: str = "unknown"
     fits: bool = False
-    """Whether a known scheme explains every step to the rounding of a known arithmetic, and what was stated
-    (mass, stiffness, step) agrees with it."""
+    """Whether a known scheme and arithmetic explain every step, and all that is stated agrees."""
     undecided: bool = False
-    """Whether the scheme is known, but errors of its force have the size of a known arithmetic and nothing
-    shows that they are not noise or a systematic error.  `fits` is False then."""
+    """Whether the scheme is known, but errors of its force may be those of an arithmetic, noise, or
+    systematic. `fits` is False then."""
     nearest: str | None = None
-    """The scheme itself, or where none fits the one whose entries are closest; None where several fit."""
+    """The scheme, or if none fits that of the closest map; None if several fit."""
     difference: tuple[float, ...] = (math.nan,) * 4
-    """Measured less predicted entries M11, M12, M21, M22 on (q, v T) between frames; first oscillator."""
+    """Measured minus predicted M11, M12, M21, M22 on (q, v T) between frames, of the first oscillator."""
     notes: tuple[str, ...]
     explanations: tuple[Explanation, ...] = ()
-    """Where no scheme fits, or not what was stated: what may be wrong, the best first."""
+    """Causes if no scheme fits, or what is stated does not, the likeliest first."""
 
     def __repr__(self) -> str:
         return f"Identification({self.verdict}: {self.statement})"
@@ -133,14 +131,14 @@ class Identification:
         return replace(self, notes=(*self.notes, *more))
 
     def doubted(self, statement: str, *more: str, because: tuple[Explanation, ...] = ()) -> Identification:
-        """Copy that names none of its candidates, because something else may have made the states."""
+        """Copy that names none of its candidates, since something else may have made the states."""
         return replace(
             self.noting(*more), verdict="not told apart", scheme=None, aliases=(), fits=False, undecided=True,
             statement=statement, explanations=because,
         )  # fmt: skip
 
     def refuted(self, statement: str, *because: Explanation) -> Identification:
-        """Copy without candidates, because something else made the states."""
+        """Copy without candidates, since something else made the states."""
         return replace(
             self, verdict="none", scheme=None, aliases=(), candidates=(), fits=False, statement=statement,
             explanations=because,
@@ -191,7 +189,7 @@ def _plain(x: Any, name: str = "") -> Any:
 
 
 UNTOLD = "cannot tell"
-"""Precision of states that show none."""
+"""Precision if none is identified."""
 
 
 def rounded_by(precision: str) -> str:
@@ -204,7 +202,7 @@ def rounded_by(precision: str) -> str:
 
 OR_UNKNOWN = "; or a scheme that is not known here"
 ONLY_TURNS = "The velocity of coordinates "
-"""How a statement begins of what may be no scheme on springs, but a rotation."""
+"""Beginning of a statement on a rotation of the velocity."""
 
 IDENTIFIED = {
     "not told apart": "several schemes, which the data cannot tell apart",
@@ -272,7 +270,7 @@ def _numbers(values: tuple[float, ...] | None) -> str:
 
 
 def _range(rows: Sequence[tuple[float, ...]]) -> str:
-    """Range of the values (s, n) that several schemes imply for a single oscillator, as text."""
+    """Range of the values (s, n) of several schemes for one oscillator, as text."""
     values = [f"{x:.9g}" for x in sorted(row[0] for row in rows if len(row) == 1)]
     ends = list(dict.fromkeys([values[0], values[-1]] if values else []))
     return " to ".join(ends)

@@ -1,11 +1,11 @@
-"""The search: which hypotheses are tried in turn, which of them the states do not exclude, and of which a
-known arithmetic explains every step."""
+"""The search: hypotheses in order of simplicity, those that the states do not exclude, and of these those
+whose every step a known arithmetic explains."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import cache, partial
+from functools import cache, lru_cache, partial
 from typing import TypeAlias
 
 import numpy as np
@@ -13,45 +13,43 @@ import numpy as np
 from springcheck.identify.arithmetic import SINGLE, Defect, defects
 from springcheck.identify.coarse import over_single
 from springcheck.identify.compare import nearest
-from springcheck.identify.evidence import Measured
+from springcheck.identify.evidence import FIXED, Measured
 from springcheck.identify.families import DAMPED_ELSEWHERE, FAMILIES, HELD, KNOWN_ELSEWHERE, Family
 from springcheck.identify.fit import Map, fit
 from springcheck.identify.guesses import roots_of
 from springcheck.identify.hypothesis import EXCLUDED, FEW, MANY, STRIDES, Joint, Terms, distinct, likely
 from springcheck.identify.interrupted import remembered
 from springcheck.identify.maps import unit
-from springcheck.identify.record import ROUNDING, Record
+from springcheck.identify.record import Record
+from springcheck.identify.storage import ROUNDING
 from springcheck.physics.arrays import Floats
 
 BIAS = 3.0
-"""Residuals that a coarse arithmetic may bias an entry by.  Cutting off has a mean of half a unit in the
-last place and a deviation of 0.29; the rest of the factor is for roundings that repeat with the motion."""
-
-COARSE = 2.0**-46
-"""Residual above which it is no double-precision rounding: 64 units in the last place."""
+"""Bias of an entry by truncated forces, in units of the residual.  Truncation has a mean of half an ulp and a
+standard deviation of 0.29; the rest is for roundings that recur with the motion."""
 
 POOR = 8.0
-"""Chi-squared of three degrees of freedom that chance exceeds once in 20."""
+"""Chi-squared of three degrees of freedom that is exceeded with a probability of 5 %."""
 
 ONE_MORE = 4.0
-"""Decrease of chi-squared by one more unknown that chance exceeds once in 20."""
+"""Decrease of chi-squared by one more unknown that is exceeded with a probability of 5 %."""
 
 PLAIN = 30.0
-"""Residuals by which the exact flow must miss where a scheme is named in spite of coarse numbers."""
+"""Distance of the exact solution's map, in residuals, from which a scheme's truncation error is visible."""
 
 AS_NEAR = 1.5
-"""Factor by which the residual of one scheme may exceed that of another for which a cause was found."""
+"""Ratio of residuals up to which the arithmetic of one scheme explains those of another."""
 
 SAME_MAP = 1e-12
-"""Distance of the entries of two steps that are the same, in double precision."""
+"""Largest difference of the entries of equal maps in double precision."""
 
 Explained: TypeAlias = dict[Joint, list[Defect]]
-"""Hypotheses, the plainest first, and the defects of their steps, which a known arithmetic explains."""
+"""Hypotheses, the simplest first, with the defect of each oscillator, which a known arithmetic explains."""
 
 
 @cache
 def coincident(name: str) -> tuple[str, ...]:
-    """Damped families that have the map of this scheme without friction, on springs of another stiffness."""
+    """Damped families with the undamped map of this scheme, on springs of another stiffness."""
     wanted = np.asarray(unit(FAMILIES[name], np.array([0.3, 0.7, 1.1]), np.zeros(3)), np.float64)
     if not np.all(np.log(np.abs(np.linalg.det(wanted))) < -1e-9):
         return ()
@@ -62,8 +60,7 @@ def coincident(name: str) -> tuple[str, ...]:
 
 
 def identical(one: Joint, other: Joint, *, free_scale: bool) -> bool:
-    """Whether two families have the same step, each at its own unknowns, so that no digits tell them
-    apart."""
+    """Whether two hypotheses have the same one-step maps, so that no number of digits tells them apart."""
     if one.stride != other.stride:
         return False
     both = FAMILIES[one.family], FAMILIES[other.family]
@@ -75,8 +72,8 @@ def identical(one: Joint, other: Joint, *, free_scale: bool) -> bool:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Room:
-    """Tolerance beside the numbers' own uncertainty, and the strides looked at, in turn."""
+class Trial:
+    """One round of the search: families, tolerances beside standard errors, and ranges of strides."""
 
     damped: bool = False
     rounding: float = ROUNDING
@@ -89,11 +86,11 @@ class Room:
 
 
 def accounted(seen: Measured) -> tuple[Measured, Explained, bool]:
-    """The hypotheses of which a known arithmetic explains every step, with the data that they fit, and
-    whether any hypothesis fits, explained or not.
+    """The data as fitted, the hypotheses whose every step a known arithmetic explains, and whether any
+    hypothesis fits, explained or not.
 
-    Tried in turn: the schemes of the catalogue, in coarse files also about an unseen equilibrium; Verlet with
-    another first step; those that have the stated stiffness; schemes elsewhere; numbers in single precision.
+    In turn: the schemes of the catalogue, in coarse files also with a fitted equilibrium; Verlet with another
+    first step; schemes of the stated stiffness; schemes elsewhere; step or mass in single precision.
     """
     fine = seen.record.fine
     joints, wide = find(seen)
@@ -116,7 +113,7 @@ def accounted(seen: Measured) -> tuple[Measured, Explained, bool]:
                 "the first step has the friction of the first velocity: none is half a step old"
             )
     if found and seen.stiffness is not None and not (fine or any(_agrees(way, x) for x in found)):
-        # friction, or an equilibrium beside 0, is as plain as another spring than the stated one
+        # friction, or an equilibrium beside 0, is as simple as another spring than the stated one
         ways = ((x, damped) for x in (way, apart) for damped in (False, True))
         for other, damped in ways:
             of_stated = (x for x in other.compare(distinct(damped=damped), FEW) if _agrees(other, x))
@@ -125,7 +122,7 @@ def accounted(seen: Measured) -> tuple[Measured, Explained, bool]:
                 break
     found = _or_elsewhere(way, found)
     if not _of_few_steps(found):
-        # few steps, one of them rounded, are plainer than many
+        # few steps, one of them rounded, are simpler than many
         joints, remark = _single_parameters(way)
         if rounded := explained(way, joints):
             way, found = way.noting(remark), rounded
@@ -142,27 +139,26 @@ def _of_few_steps(found: Explained) -> bool:
 
 
 def _or_elsewhere(seen: Measured, found: Explained) -> Explained:
-    """The hypotheses found, beside the schemes that springcheck does not run and the states do not
-    exclude."""
+    """The hypotheses found, and the schemes that springcheck does not run and the states do not exclude."""
 
     def elsewhere(strides: range) -> Explained:
         joints = seen.compare(KNOWN_ELSEWHERE, strides) or seen.compare(DAMPED_ELSEWHERE, strides)
         return explained(seen, likely(joints))
 
     if not _of_few_steps(found):
-        # of many steps, which a numerous family has, nothing is plainer than few of a scheme elsewhere
+        # few steps of a scheme elsewhere are simpler than many of one in the catalogue
         return {**elsewhere(FEW), **found}
     if seen.stride is not None or seen.stiffness is not None:
         right = {x.scheme for x in found if _agrees(seen, x)}
         if right and (seen.record.fine or (seen.stride is None and len(right - {"exact"}) == 1)):
             return found
-        # what is stated tells more than that the step is a simple one
+        # agreement with what is stated counts more than a simple scheme
         others = elsewhere(FEW if seen.stride is None else range(seen.stride, seen.stride + 1))
         others = {x: ds for x, ds in others.items() if _agrees(seen, x)}
         return {**(found if right or not others else {}), **others}
     if seen.record.fine:
         return found
-    # what coarse numbers do not tell apart they do not tell from a scheme elsewhere either
+    # coarse numbers that leave several schemes leave schemes elsewhere too
     alone = len({(x.scheme, x.stride) for x in found}) == 1
     strides = range(1, min(x.stride for x in found)) if alone else FEW
     others = {**found, **(elsewhere(strides) if strides else {})}
@@ -170,7 +166,7 @@ def _or_elsewhere(seen: Measured, found: Explained) -> Explained:
 
 
 def _single_parameters(seen: Measured) -> tuple[list[Joint], str]:
-    """Schemes that fit if the step or the mass was rounded to single precision, and a note on which."""
+    """Schemes that fit if step, mass or both were rounded to single precision, and a note on which."""
     record, stride = seen.record, seen.stride
     if record.momenta:
         return [], ""
@@ -195,22 +191,22 @@ def _shortened(x: np.longdouble | float) -> float:
 
 
 def find(seen: Measured) -> tuple[list[Joint], Measured]:
-    """All families that the states do not exclude, the plainest first, and the terms on which they fit.
-    Plainer hypotheses are tried first, and end the search where they fit."""
+    """Hypotheses that the states do not exclude, the simplest first, and the data with the terms on which
+    they fit.  The first round of `_plan` with a fit ends the search."""
     fine, stride = seen.record.fine, seen.stride
     first = (range(stride, stride + 1),) if stride is not None and stride > 0 else ()
-    for rooms in _plan(seen):
+    for trials in _plan(seen):
         accepted: list[Joint] = []
-        for room in rooms:
-            terms = [replace(what, rounding=room.rounding, bias=room.bias) for what in seen.terms]
+        for trial in trials:
+            terms = [replace(what, rounding=trial.rounding, bias=trial.bias) for what in seen.terms]
             wide = replace(seen, terms=terms)
-            for strides in (*first, *room.strides):
-                fitting = wide.compare(room.families, strides)
+            for strides in (*first, *trial.strides):
+                fitting = wide.compare(trial.families, strides)
                 if fitting:
                     accepted += fitting
-                    if strides is FEW and (MANY in room.strides or not room.bias):
-                        accepted += _further(wide, fitting, room)
-                    if not (fine or room.damped):
+                    if strides is FEW and (MANY in trial.strides or not trial.bias):
+                        accepted += _further(wide, fitting, trial)
+                    if not (fine or trial.damped):
                         accepted += _rivals(wide, fitting, many=strides is MANY)
                     break
         if accepted:
@@ -227,7 +223,7 @@ def explained(seen: Measured, accepted: list[Joint]) -> Explained:
             break
         shows = cache(partial(_stands_out, seen, accepted, found, what, damped=left[0].damped))
         new = defects(seen.record, j, found, [x.parts[i] for x in left], shows)
-        # what explains one scheme's misses does not exclude the others, which miss the states by no more
+        # what explains one scheme's residuals does not exclude others of no larger residuals
         good = [x for x in new if x.precision]
         new = [
             next((y for y in good if x.miss <= AS_NEAR * y.miss), x) if not x.precision else x for x in new
@@ -239,8 +235,7 @@ def explained(seen: Measured, accepted: list[Joint]) -> Explained:
 
 
 def _stands_out(seen: Measured, accepted: list[Joint], found: Map, terms: Terms, *, damped: bool) -> bool:
-    """Whether no other map fits, and the error of this scheme's step is visible.  On springs of two
-    stiffnesses two schemes may have one map."""
+    """Whether all fitting hypotheses have one map, and the truncation error of its scheme is visible."""
     one = accepted[0]
     alone = all(
         (x.scheme, x.stride) == (one.scheme, one.stride) or identical(one, x, free_scale=seen.record.momenta)
@@ -249,50 +244,50 @@ def _stands_out(seen: Measured, accepted: list[Joint], found: Map, terms: Terms,
     return alone and visible(found, terms, damped=damped)
 
 
-def _plan(seen: Measured) -> list[list[Room]]:
-    """Order of the search: tolerances, the plainest first, those of one list equally plain.
+def _plan(seen: Measured) -> list[list[Trial]]:
+    """Rounds of the search, the simplest first; those of one list are equally simple.
 
-    Undamped first, then damped where nothing fits.  Coefficients are rounded in double precision, unless the
-    states show a coarser arithmetic or are too few to exclude it; text does not show it, so that single
-    precision is as plain as friction there.  A bias of the size of the residuals comes last: one orbit,
-    rounded once, has none.  Coarse numbers admit few steps of other schemes, so that many steps are tried
-    before a wider tolerance; with a bias so many would fit that none could be named.
+    Undamped before damped.  Coefficients are rounded in double precision, unless the states show a coarser
+    arithmetic or are too few to exclude it; text does not show it, so that single precision is as simple as
+    friction there.  A bias of the size of the residuals comes last: one orbit, rounded once, has none. Coarse
+    numbers admit few steps of other schemes, so that many steps are tried before a wider tolerance; with a
+    bias too many would fit.
     """
     record, whole = seen.record, all(found.whole for found in seen.maps)
     residual = max(float(np.max(found.residual)) for found in seen.maps)
-    biased = [BIAS] if residual > COARSE and not whole else []
+    biased = [BIAS] if residual > FIXED and not whole else []
     if record.fine:
-        rooms = [[Room(damped=d, bias=bias)] for d in (False, True) for bias in (0.0, *biased)]
-        return [*rooms, [Room(strides=(MANY,))]]
+        trials = [[Trial(damped=d, bias=bias)] for d in (False, True) for bias in (0.0, *biased)]
+        return [*trials, [Trial(strides=(MANY,))]]
     near = (FEW, MANY)
     double, double_damped, single, single_damped = (
-        Room(damped=damped, rounding=rounding, strides=near)
+        Trial(damped=damped, rounding=rounding, strides=near)
         for rounding in (ROUNDING, SINGLE)
         for damped in (False, True)
     )
     coarse = residual > 2.0**-40 and not record.deep
-    out: list[list[Room]] = []
+    out: list[list[Trial]] = []
     if whole or not coarse:
         out += [[double], [double_damped, single] if record.text and coarse else [double_damped]]
     if coarse:
         out += [[single], [single_damped]]
     return out + [
-        [Room(damped=damped, bias=bias, strides=near)] for bias in biased for damped in (False, True)
+        [Trial(damped=damped, bias=bias, strides=near)] for bias in biased for damped in (False, True)
     ]
 
 
-def _further(seen: Measured, accepted: list[Joint], room: Room) -> list[Joint]:
+def _further(seen: Measured, accepted: list[Joint], trial: Trial) -> list[Joint]:
     """Further hypotheses that the states do not exclude, beside those accepted of few steps to a frame.
 
-    The error of a step falls with the number of steps, so that larger numbers may fit too; where the exact
-    flow fits, so does any scheme from some number on.  In double precision these are tried only where few
-    steps leave a choice.  Friction that is barely significant may still be there.
+    The truncation error falls with the number of steps, so that larger numbers may fit too; where the exact
+    solution fits, so does any scheme of enough steps.  In double precision many steps are tried only where
+    few leave a choice.  Friction may be there without being significant.
     """
     out: list[Joint] = []
     open_ended = len(accepted) > 1 or any(x.scheme == "exact" or x.stride == STRIDES[0] for x in accepted)
-    if open_ended or not (seen.record.fine or room.damped):
-        out += seen.compare(room.families, MANY)
-    if not room.damped and min(x.chi2 for x in accepted) > EXCLUDED:
+    if open_ended or not (seen.record.fine or trial.damped):
+        out += seen.compare(trial.families, MANY)
+    if not trial.damped and min(x.chi2 for x in accepted) > EXCLUDED:
         out += seen.compare(distinct(damped=True), FEW)
     return out
 
@@ -307,22 +302,20 @@ def _rivals(seen: Measured, fitting: list[Joint], *, many: bool) -> list[Joint]:
     return [x for x in found if x.chi2 < same.get(x.family, math.inf) - ONE_MORE]
 
 
+@lru_cache(maxsize=64)
 def visible(found: Map, terms: Terms, *, damped: bool) -> bool:
-    """Whether the error of a scheme's step is far above the residuals.
+    """Whether the truncation error of a step is far above the residuals.
 
-    An adaptive solver departs from the exact flow by the scatter of its steps, within which many schemes of
-    many small steps fit; a coarse arithmetic does not bring a map nearer to the exact flow.
+    The map of an adaptive solver differs from the exact one by the scatter of its steps, within which many
+    schemes of many small steps fit; coarse arithmetic does not bring a map nearer to the exact one.
     """
-    asked = "visible", terms, damped
-    if asked not in found.found:
-        flow = FAMILIES["exact, damped" if damped else "exact"]
-        near = nearest([found], [replace(terms, bias=1.0)], (flow,), range(1, 2))
-        found.found[asked] = all(m.chi2 > PLAIN**2 for m in near)
-    return bool(found.found[asked])
+    flow = FAMILIES["exact, damped" if damped else "exact"]
+    near = nearest([found], [replace(terms, bias=1.0)], (flow,), range(1, 2))
+    return all(m.chi2 > PLAIN**2 for m in near)
 
 
 def terms_of(record: Record, j: int, stated: Floats | None) -> Terms:
-    """Conditions on which the map of oscillator j of a record is compared."""
+    """The terms on which the map of oscillator j is compared."""
     log_stiffness = None
     if record.momenta and stated is not None and stated[j] > 0:
         log_stiffness = math.log(stated[j] * float(record.interval) ** 2)

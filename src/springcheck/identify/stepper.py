@@ -17,6 +17,7 @@ from springcheck.identify.taken import takers
 from springcheck.identify.unknown import MAP_OF, ONE_MAP
 from springcheck.identify.wrong import faults_like
 from springcheck.physics.arrays import Floats
+from springcheck.physics.exact import true_motion
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Quartic
 from springcheck.schemes import SCHEMES
@@ -25,24 +26,24 @@ from springcheck.schemes.elsewhere import ELSEWHERE
 Stepper: TypeAlias = Callable[..., Any]
 
 SPRINGS = ((3.7, 2.9, 0.31), (0.6, 1.7, 0.11), (1.9, 0.8, 0.43))
-"""m, k, h: uneven, so that a mass left out or a half step misplaced shows."""
+"""m, k, h: uneven, so that a missing mass or a misplaced half step shows."""
 
 FRAMES = 81
 
 BATH_FRAMES = 4001
-"""Frames of a stepper that draws random numbers, by which its kT is known to a tenth."""
+"""Frames of a stepper that draws random numbers: its kT is then known to 10 %."""
 
 TINY_STEP = 1e-6, 1e-3
-"""A step that shows the terms linear in h, and by how much their sums of weights may be off 1."""
+"""A step whose higher powers vanish, and the tolerance of the weights' sums, which are 1."""
 
 RUNAWAY = 1e5
 """Growth of a state at which a run ends."""
 
 ALONG, MANY_PLACES = 4.0, 257
-"""Largest position from which a step is taken, and how many places there are."""
+"""Largest position, and number of positions, at which jumps are sought."""
 
 LONG = 16
-"""Part of the time on the well that one step takes by which schemes of one map on a spring are told apart."""
+"""Steps in the duration on the quartic potential, to tell schemes apart that agree on a spring."""
 
 WELL = (1.3, 2.1, 1.1, 0.4, 2.0)
 """m, b, q0, p0 and duration on V = b/4 q**4, a quarter of whose time scale passes in a unit of time."""
@@ -158,7 +159,7 @@ def identify_stepper(step: Stepper) -> Identification:
         wrong += _backwards(step, found)
     if found.scheme in ELSEWHERE and _calls(step) > len(ELSEWHERE[found.scheme].over) - 1 > 0:
         # more stages than the scheme needs: a fault of the same map has them
-        wrong += [Explanation(cause=one.cause, remedy=one.remedy) for one in faults_like(found.scheme)]
+        wrong += [Explanation(one.cause, one.remedy) for one in faults_like(found.scheme)]
     slope, deviation = _order(step)
     order = f"order {slope:.2f} +- {deviation:.2f} on a quartic well"
     if math.isnan(slope):
@@ -168,7 +169,7 @@ def identify_stepper(step: Stepper) -> Identification:
         cause = (
             f"On a spring it is {found.scheme}, of order {known.order}, but not on forces that are not linear"
         )
-        wrong.append(Explanation(cause=cause, remedy="look for a force that is evaluated at the wrong place"))
+        wrong.append(Explanation(cause, "look for a force that is evaluated at the wrong place"))
     if found.scheme and found.fits and not wrong:
         found = _on_a_well(step, found)
     return replace(
@@ -182,15 +183,23 @@ def identify_stepper(step: Stepper) -> Identification:
     )
 
 
+def _steep(q: float, p: float = 0.0) -> float:
+    """Force of the quartic potential."""
+    return -WELL[1] * q**3
+
+
+def _well(h: float) -> Scene:
+    """The quartic potential, with steps of h [T]."""
+    m, b, q, p = (np.array([x]) for x in WELL[:4])
+    return Scene(m=m, q=q, p=p, terms=(Quartic(i=np.array([0]), b=b, at=np.zeros(1)),), step=h, steps=1)
+
+
 def _on_a_well(step: Stepper, found: Identification) -> Identification:
     """Name the scheme, of those with one map on a spring, whose step the stepper takes in a quartic
     potential, or withhold the name where none does."""
-    m, b, q, p, duration = WELL
-    scene = Scene(
-        m=np.array([m]), q=np.array([q]), p=np.array([p]),
-        terms=(Quartic(i=np.array([0]), b=np.array([b]), at=np.zeros(1)),), step=duration / LONG, steps=1,
-    )  # fmt: skip
-    made = _one(step, q, p, scene.step, lambda x, y=0.0: -b * x**3, m)
+    m, _, q, p, duration = WELL
+    scene = _well(duration / LONG)
+    made = _one(step, q, p, scene.step, _steep, m)
     names = [str(found.scheme), *found.aliases]
     known = [name for name in names if name in SCHEMES and SCHEMES[name].has("one-step")]
     least = 2.0 ** (-49 if found.precision == "double" else -20)
@@ -228,13 +237,13 @@ def _on_springs(step: Stepper, results: list[Identification]) -> list[Explanatio
             "the stepper keeps a force or a state of the run before"
         )
         remedy = "make each step follow from its arguments, or begin each run with a stepper of its own"
-        return [Explanation(cause=cause, remedy=remedy)]
+        return [Explanation(cause, remedy)]
     named = "; ".join(
         f"{x.scheme or 'none that is known'} at m={m}, k={k}, h={h}"
         for x, (m, k, h) in zip(results, SPRINGS, strict=False)
     )
     cause = f"The stepper looks like different schemes on different springs: {named}"
-    return [Explanation(cause=cause, remedy="look for numbers that are written into it")]
+    return [Explanation(cause, "look for numbers that are written into it")]
 
 
 def _parameters(step: Stepper, found: Identification) -> list[Explanation]:
@@ -249,7 +258,7 @@ def _parameters(step: Stepper, found: Identification) -> list[Explanation]:
         return []
     each = "; ".join(x or "another" for x in read)
     cause = f"A one-step method that is not known here: on three springs it would be {each}"
-    return [Explanation(cause=cause, remedy=found.explanations[0].remedy)]
+    return [Explanation(cause, found.explanations[0].remedy)]
 
 
 def _parametric(found: Identification) -> str:
@@ -264,7 +273,7 @@ def _unasked_friction(found: Identification) -> list[Explanation]:
         return []
     whose = title(found.candidates[0].scheme)
     cause = f"{whose} with a friction that the force has not: c/m is {rates}"
-    return [Explanation(cause=cause, remedy="set the damping to 0, which many engines do not by default")]
+    return [Explanation(cause, "set the damping to 0, which many engines do not by default")]
 
 
 def _leaps(step: Stepper) -> Explanation | None:
@@ -279,7 +288,7 @@ def _leaps(step: Stepper) -> Explanation | None:
         return None
     cause = f"The positions are wrapped into a box of {leaps[0]:.6g}, and forces are those of wrapped ones"
     remedy = "do not wrap positions between steps, or take the nearest image where forces are worked out"
-    return Explanation(cause=cause, remedy=remedy)
+    return Explanation(cause, remedy)
 
 
 def _draws(step: Stepper) -> bool:
@@ -301,7 +310,7 @@ def _short(step: Stepper) -> list[Explanation]:
         "where a scheme of any order has 1 and 1"
     )
     remedy = "add up the lengths of its kicks and of its drifts, or the weights of its stages: each sum is 1"
-    return [Explanation(cause=cause, remedy=remedy, misfit=off)]
+    return [Explanation(cause, remedy, off)]
 
 
 def _calls(step: Stepper) -> int:
@@ -323,25 +332,15 @@ def _backwards(step: Stepper, found: Identification) -> list[Explanation]:
         return []
     if _identified(step, way=-1).scheme == found.scheme:
         cause = f"{title(str(found.scheme))}, but a negative step goes forwards: the sign of the step is lost"
-        return [Explanation(cause=cause, remedy="take the step with its sign")]
+        return [Explanation(cause, "take the step with its sign")]
     cause = f"A negative step is not {found.scheme} backwards but {back.scheme}"
-    return [Explanation(cause=cause, remedy="look for what depends on the direction of time")]
+    return [Explanation(cause, "look for what depends on the direction of time")]
 
 
 def _order(step: Stepper) -> tuple[float, float]:
-    """Slope of log error against log step on a quartic potential, with its standard error; NaN where none
-    shows."""
-    from scipy.integrate import solve_ivp
-
-    m, b, q0, p0, duration = WELL
-    true = solve_ivp(
-        lambda t, z: [z[1] / m, -b * z[0] ** 3],
-        (0, duration),
-        [q0, p0],
-        method="DOP853",
-        rtol=1e-13,
-        atol=1e-14,
-    ).y[:, -1]
+    """Slope of log error over log step on a quartic potential, with its standard error; or NaN."""
+    m, _, q0, p0, duration = WELL
+    true_q, true_p = (float(x[0, 0]) for x in true_motion(_well(duration), np.array([1]), duration))
     steps, errors = [], []
     for count in (16, 24, 36, 54, 80, 120, 180, 270, 400, 600):
         h = duration / count
@@ -349,9 +348,9 @@ def _order(step: Stepper) -> tuple[float, float]:
         for _ in range(count):
             if not abs(q) + abs(p) < RUNAWAY:
                 break
-            q, p = _one(step, q, p, h, lambda x, y=0.0: -b * x**3, m)
-        size = math.hypot(q - true[0], (p - true[1]) / m)
-        # below, rounding and the reference take over; above, the leading term does not lead yet
+            q, p = _one(step, q, p, h, _steep, m)
+        size = math.hypot(q - true_q, (p - true_p) / m)
+        # below, rounding dominates; above, higher orders do
         if 1e-10 < size < 0.03:
             steps.append(math.log(h))
             errors.append(math.log(size))

@@ -1,4 +1,4 @@
-"""How finely numbers were written down, read from the numbers themselves: the rounding that a file adds."""
+"""The storage format of recorded numbers, inferred from the numbers: double, single, half, decimal text."""
 
 from __future__ import annotations
 
@@ -9,42 +9,46 @@ import numpy as np
 
 from springcheck.physics.arrays import Floats
 
+ROUNDING = 2.0**-53
+"""Unit roundoff of double precision."""
+
 SAMPLE = 500
-"""Values whose decimal form is looked at; fewer than all of a long file, spread evenly over it."""
+"""Most values whose decimal form is examined, spread evenly over a long file."""
 
 FEWEST_VALUES = 4
-"""Different sizes of numbers below which they say nothing of how they were written."""
+"""Fewest distinct magnitudes from which a format is inferred."""
 
 BINARY = {"single": 24, "half": 11, "bfloat16": 8}
-"""Binary formats shorter than double precision, and their significant bits."""
+"""Significant bits of the binary formats shorter than double precision."""
 
 SMALLEST = {"single": -149, "half": -24, "bfloat16": -133}
-"""Exponents of the smallest numbers of these formats."""
+"""Binary exponents of the smallest subnormal numbers of these formats."""
 
 MOST_DIGITS = 16
-"""Significant decimal digits of text that is coarser than double precision."""
+"""Most significant decimal digits of text that is coarser than double precision."""
 
 DIGITS_OF_SINGLE = 7
-"""Digits above which text says nothing of numbers of single precision."""
+"""Significant decimal digits that a number of single precision has: more of them only rewrite it."""
 
 BY_CHANCE = 1e-6
-"""Probability of numbers that lie as near to those of single precision by chance, from which they do not."""
+"""Probability of a coincidence of numbers below which their format is certain."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Storage:
-    """Format of recorded numbers: `name` ("double", "single", "text, 6 digits"), and its resolution."""
+    """A storage format by its name, as "double", "single", "text, 6 digits", and its resolution."""
 
     name: str = "double"
     digits: int = 0
-    """Significant decimal digits; 0 where the numbers are not text of a fixed number of digits."""
+    """Significant decimal digits of text; 0 for binary formats and fixed decimals."""
     decimals: int | None = None
-    """Digits after the point, where that is what is constant."""
+    """Digits after the decimal point of text with fixed decimals."""
 
     def quantum(self, x: Floats) -> Floats:
         """Spacing of the representable numbers around x."""
         if self.decimals is not None:
-            return np.full(x.shape, 10.0**-self.decimals)
+            # large numbers have no more digits than double precision
+            return np.maximum(10.0**-self.decimals, np.spacing(np.abs(x)))
         if self.digits:
             size = np.where(x == 0, 1.0, np.abs(x))
             return np.where(x == 0, 0.0, 10.0 ** (np.floor(np.log10(size)) - self.digits + 1))
@@ -110,10 +114,12 @@ def storage(x: Floats) -> Storage:
     binary = Storage(name=short or ("single" if single else "double"))
     with np.errstate(over="ignore"):
         finer = [text.quantum(sample) / (2 * binary.quantum(sample)) for text in found]
-    # whole numbers of few digits are of a short format as well, which is hardly finer
+    # whole numbers of few digits are of a short format as well, which is hardly finer; of numbers that grow
+    # beyond the digits of double precision the smaller ones show fixed decimals
     found = [
         x for x, y in zip(found, finer, strict=True)
         if np.all(y >= 1) or (short and np.all(y > 0) and np.sum(np.log(y)) >= 0)
+        or (x.decimals is not None and np.sum(np.log(np.maximum(y, 1))) > -math.log(BY_CHANCE))
     ]  # fmt: skip
     if found:
         # both can hold the numbers; the coarser of the two leaves less to chance.  A power of ten has its

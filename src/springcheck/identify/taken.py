@@ -13,11 +13,11 @@ from springcheck.schemes import SCHEMES, Law, title
 from springcheck.text.wording import either
 
 OF_ERROR = 1e-3
-"""Distance from a scheme's step, over the error of that step, up to which the same step is taken: what an
-engine's own solver of implicit steps leaves.  Other schemes are off by about as much as the error."""
+"""Largest difference from a scheme's step, relative to its truncation error: that of an engine's solver of
+implicit steps.  Other schemes differ by about 1."""
 
 STEPS = 24
-"""Recorded steps that a scheme has to take."""
+"""Recorded steps that are compared."""
 
 
 def takers(

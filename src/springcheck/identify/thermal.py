@@ -1,4 +1,10 @@
-"""Identification of thermostats: what `springcheck.thermal` finds, in the words of an identification."""
+"""Identification of thermostats: `springcheck.thermal` finds random ones, a factor of all momenta the others.
+
+A Nose-Hoover chain, or a thermostat that rescales, multiplies all momenta by one factor in each step.  Of one
+particle any factor may be.  Of several, b + F c is what the factor acts on, or has made, of each, with
+unknown constants c of linear forces; the factor cancels in the ratio of two particles, which is linear in c
+once it is multiplied out.
+"""
 
 from __future__ import annotations
 
@@ -9,26 +15,58 @@ from typing import Any
 
 import numpy as np
 
-from springcheck.identify.factor import by_a_factor
+from springcheck.identify.evidence import AGREES
 from springcheck.identify.hypothesis import ERRORS, SURE
 from springcheck.identify.result import Candidate, Explanation, Identification
 from springcheck.physics.arrays import Floats
 from springcheck.text.wording import either
 from springcheck.thermal import THERMOSTATS
-from springcheck.thermal.catalogue import family_of
+from springcheck.thermal.catalogue import family_of, random_scheme
 from springcheck.thermal.likelihood import SUBSTEPS_TRIED
 from springcheck.thermal.modes import FREE_OF_NOISE, modes
 from springcheck.thermal.states import FEWEST, Thermal, identify_thermal
 
 MOST = 8
-"""Oscillators that are looked at, each by itself."""
-
-STATED_AGREES = 1e-6
-"""Relative difference up to which a measured number is the stated one, beside its standard errors."""
+"""Most oscillators in a bath that are identified."""
 
 OF_UNITS = "look at the units of what is stated, and at what the engine was given"
 
 REMEDY = "record every step, each oscillator by itself, with the velocities that the engine stores"
+
+PLACES_OF_FACTOR = ("before velocity Verlet", "after velocity Verlet", "amid the drift of leapfrog")
+
+SHARP_FACTOR = 1e-3
+"""Largest residual of one factor for all momenta, relative to the factor's spread; unlike factors leave 1."""
+
+UNLIKE_MOTION = 0.01
+"""Relative difference of two particles' products, below which their motions are proportional."""
+
+
+def one_factor(h: float, q: Floats, v: Floats) -> tuple[str, float, Floats] | None:
+    """Place in a step of h at which one factor multiplies the velocities v (f, n) of q (f, n), the relative
+    residual, and the factors (f - 1,); None where no factor that varies from step to step explains them."""
+    x, n = q - np.mean(q, axis=0), q.shape[1]
+    here, both = (np.column_stack([y, np.ones(len(y))]) for y in (x[:-1], x[:-1] + x[1:]))
+    ways = ((v[:-1], np.diff(x, axis=0) / h, here), (v[1:], v[:-1], both), (v[1:], v[:-1], here))
+    for i, (a, b, F) in enumerate(ways):
+        misfit, pulled = 0.0, b.copy()
+        for j in range(1, n):
+            one, other = a[:, j] * b[:, 0], a[:, 0] * b[:, j]
+            size = float(np.linalg.norm(np.abs(one) + np.abs(other)))
+            if not np.linalg.norm(one - other) > UNLIKE_MOTION * size:
+                return None
+            columns = np.concatenate([-a[:, [j]] * F, a[:, [0]] * F], axis=1)
+            c = np.linalg.lstsq(columns, one - other, rcond=None)[0]
+            misfit = max(misfit, float(np.linalg.norm(one - other - columns @ c)) / size)
+            pulled[:, 0], pulled[:, j] = b[:, 0] + F @ c[: n + 1], b[:, j] + F @ c[n + 1 :]
+        of, made = (pulled, a) if i else (a, pulled)
+        factor = np.sum(of * made, axis=1) / np.sum(of**2, axis=1)
+        # of velocities that are linear in the positions any c would do: there the factor makes none of them
+        off = np.linalg.norm(made - factor[:, None] * of, axis=0) / np.linalg.norm(made, axis=0)
+        high, low = np.quantile(factor, [0.9, 0.1])
+        if max(misfit, *off) < SHARP_FACTOR * (high - low) / max(abs(high), abs(low)):
+            return PLACES_OF_FACTOR[i], misfit, np.asarray(factor)
+    return None
 
 
 def explained(
@@ -39,8 +77,29 @@ def explained(
     if given is None:
         return found
     times, positions, u, _ = given
-    h = float(np.mean(np.diff(times)))
-    return by_a_factor(of_bath(t, q, p, v, mass, **stated) or found, h, positions, u)
+    found = of_bath(t, q, p, v, mass, **stated) or found
+    if positions.shape[1] < 2 or found.verdict == "named":
+        return found
+    with np.errstate(all="ignore"):
+        seen = one_factor(float(np.mean(np.diff(times))), positions, u)
+    return _of_a_factor(found, u, *seen) if seen else found
+
+
+def _of_a_factor(
+    found: Identification, v: Floats, place: str, misfit: float, factor: Floats
+) -> Identification:
+    """Identification by one factor a step for all momenta."""
+    low, high = np.quantile(factor, [0.1, 0.9])
+    kept = tuple(x for x in found.candidates if random_scheme(x.scheme).rescales)
+    which = " or ".join(x.scheme for x in kept) or "a Nose-Hoover chain, or a thermostat that rescales"
+    cause = (
+        f"One factor a step multiplies the momenta of all {v.shape[1]} coordinates, {place}: {low:.3g} to "
+        f"{high:.3g} in most steps, all else to {misfit:.0e} of their size: {which}"
+    )
+    remedy = "judge it by its scheme, which the factor alone does not tell; its bath is in no frame"
+    notes = tuple(note for note in found.notes if not kept or note.split(":")[0] in {x.scheme for x in kept})
+    because = () if kept else (Explanation(cause, remedy, misfit),)
+    return replace(found, statement=cause, candidates=kept, notes=notes, explanations=because)
 
 
 def of_bath(
@@ -112,7 +171,7 @@ def _against(one: Any, first: Thermal, h: float, m: float, stated: Mapping[str, 
         f"{name} {x:.6g} where {given:.6g} is stated"
         for name, (x, error) in found.items()
         if (given := stated.get(name)) is not None and (m or name == "step")
-        if abs(x - given) > SURE * error + STATED_AGREES * abs(x)
+        if abs(x - given) > SURE * error + AGREES * abs(x)
     ]
 
 
@@ -125,14 +184,13 @@ def _said(
     with_mass: bool,
     joined: bool = False,
 ) -> Identification:
+    """Identification by what each oscillator shows, of masses m (n,), in frames h [T] apart."""
     first = found[0]
-    names = [y.scheme for y in first.candidates]
-    schemes = [name for name in names if all(name in [y.scheme for y in one.candidates] for one in found)]
-    best = schemes[0] if schemes else None
+    each = [{y.scheme: y for y in one.candidates} for one in found]
+    rows = {name: [x[name] for x in each] for name in each[0] if all(name in x for x in each)}
+    best = next(iter(rows), None)
     named = best is not None and all(one.named and one.candidates[0].scheme == best for one in found)
-    rows = {name: [next(y for y in one.candidates if y.scheme == name) for one in found] for name in schemes}
-    kept = [name for name in schemes if all(y.nats < math.inf for y in rows[name])]
-    every = {name: rows[name][0].strides[0] for name in kept}
+    kept = [name for name in rows if all(y.nats < math.inf for y in rows[name])]
     scales = m if with_mass and not joined else np.zeros(len(found))
     stiff = np.broadcast_to(np.asarray(stated.get("stiffness"), dtype=object), len(found))
     differ = {
@@ -148,20 +206,48 @@ def _said(
     if agreeing and agreeing != kept:
         kept, best = agreeing, agreeing[0]
         named = len(kept) == 1 and all(one.known and rows[best][0].strides == (1,) for one in found)
-    several = len(kept) > 1
+    first_stride = {name: rows[name][0].strides[0] for name in kept}
     candidates = tuple(
         Candidate(
             scheme=name, aliases=(), stride=stride, step=h / stride, turns=0,
-            omega=tuple(y.omega if stride == every[name] else math.nan for y in rows[name]),
+            omega=tuple(y.omega if stride == first_stride[name] else math.nan for y in rows[name]),
             stiffness=tuple(float(k * y.omega**2) for k, y in zip(m, rows[name], strict=True))
-            if with_mass and not joined and stride == every[name] else None,
-            friction=tuple(y.friction if stride == every[name] else math.nan for y in rows[name]),
+            if with_mass and not joined and stride == first_stride[name] else None,
+            friction=tuple(y.friction if stride == first_stride[name] else math.nan for y in rows[name]),
             law="of the bath",
         )
         for name in kept
-        for stride in rows[name][0].strides[: None if several else 1]
+        for stride in rows[name][0].strides[: None if len(kept) > 1 else 1]
     )  # fmt: skip
+    statement = _statement(found, {name: rows[name][0].strides for name in kept}, best, named=named)
     numbers = [_numbers(name, rows[name][0], m[0] if with_mass else None) for name in kept[:3]]
+    notes = _remarks(found, numbers, stated, named=named, joined=joined)
+    unknown = (math.nan,) * len(found)
+    rates = [one.candidates[0] for one in found if best and one.candidates]
+    if rates and all(y.friction <= ERRORS * y.friction_error for y in rates):
+        statement += "; no friction shows: random kicks without one would do as well in so few frames"
+    if against:
+        statement = f"{statement}, but of {', '.join(against)}"
+    only = candidates[0] if named else None
+    return Identification(
+        verdict="named" if named else "not told apart" if best else "none", statement=statement,
+        scheme=best if named else None, candidates=candidates,
+        step=h, stride=1 if named else None, omega=only.omega if only else unknown,
+        stiffness=only.stiffness if only else None, friction=only.friction if only else unknown,
+        velocity_offset=math.nan if not only else 0.0 if THERMOSTATS[only.scheme].synchronised else -0.5,
+        determinant=unknown, fits=best is not None and first.known and not against, undecided=not first.known,
+        nearest=best if named else None, notes=tuple(notes),
+        explanations=() if best and not against else (
+            Explanation(statement, OF_UNITS if against else REMEDY, math.nan),
+        ),
+    )  # fmt: skip
+
+
+def _remarks(
+    found: list[Thermal], numbers: list[str], stated: Mapping[str, Any], *, named: bool, joined: bool
+) -> list[str]:
+    """Notes: the numbers of the likeliest schemes, and what would tell these apart."""
+    first = found[0]
     notes = [x for x in numbers if not x.endswith(": ")]
     if joined:
         notes.append("joined particles: omega is that of each mode, and the numbers are those of the first")
@@ -179,53 +265,38 @@ def _said(
     if first.free:
         combination = ", ".join(f"{x:.9g}" for x in first.free)
         notes.append(f"free of noise at every step: ({combination}) on (x', v', x, v), to {first.misfit:.0e}")
-    unknown = (math.nan,) * len(found)
+    return notes
+
+
+def _statement(
+    found: list[Thermal], strides: Mapping[str, tuple[int, ...]], best: str | None, *, named: bool
+) -> str:
+    """The thermostat, or those that are left with their steps to a frame, in a sentence."""
     head = "each step takes noise: a thermostat"
     if named and best:
         late = "" if THERMOSTATS[best].synchronised else "; its velocities are of another time"
-        statement = f"{head}, {THERMOSTATS[best].title}{late}"
-    elif best:
-        every_count = [name for name in kept if family_of(name)[1]]
-        of_counts = tuple({s for name in every_count for s in rows[name][0].strides})
+        return f"{head}, {THERMOSTATS[best].title}{late}"
+    if best:
+        alike: dict[str, list[str]] = {}
+        for name in strides:
+            alike.setdefault(family_of(name)[0], []).append(name)
         which = [
-            _with_strides(name, rows[name][0].strides)
-            if name not in every_count or len(every_count) == 1
-            else _with_strides(_counts(every_count), of_counts)
-            for name in kept
-            if name not in every_count[1:]
+            _with_strides(_counts(names), tuple({s for name in names for s in strides[name]}))
+            for names in alike.values()
         ]
-        statement = f"{head}, {' or '.join(which)}{'' if first.known else ' or one that is not known here'}"
-    elif all(one.added for one in found):
-        statement = (
+        return f"{head}, {' or '.join(which)}{'' if found[0].known else ' or one that is not known here'}"
+    if all(one.added for one in found):
+        return (
             "each step takes noise, added to the momenta after velocity Verlet, and no friction shows: "
             "random kicks without one, or a bath that hardly acts in so few frames"
         )
-    else:
-        statement = (
-            f"{head}, by no scheme known here, or of joined particles, or frames lie several steps apart"
-        )
-    rates = [one.candidates[0] for one in found if best and one.candidates]
-    if rates and all(y.friction <= ERRORS * y.friction_error for y in rates):
-        statement += "; no friction shows: random kicks without one would do as well in so few frames"
-    if against:
-        statement = f"{statement}, but of {', '.join(against)}"
-    only = candidates[0] if named else None
-    return Identification(
-        verdict="named" if named else "not told apart" if best else "none", statement=statement,
-        scheme=best if named else None, candidates=candidates,
-        step=h, stride=1 if named else None, omega=only.omega if only else unknown,
-        stiffness=only.stiffness if only else None, friction=only.friction if only else unknown,
-        velocity_offset=math.nan if not only else 0.0 if THERMOSTATS[only.scheme].synchronised else -0.5,
-        determinant=unknown, fits=best is not None and first.known and not against, undecided=not first.known,
-        nearest=best if named else None, notes=tuple(notes),
-        explanations=() if best and not against else (
-            Explanation(cause=statement, remedy=OF_UNITS if against else REMEDY, misfit=math.nan),
-        ),
-    )  # fmt: skip
+    return f"{head}, by no scheme known here, or of joined particles, or frames lie several steps apart"
 
 
 def _counts(names: list[str]) -> str:
-    """Name of a family of schemes that differ in their number of substeps, with the range."""
+    """Name of schemes that differ in their number of substeps alone, with the range of that."""
+    if len(names) == 1:
+        return names[0]
     (stem, _), counts = family_of(names[0]), sorted(family_of(x)[1] for x in names)
     return f"{stem}{counts[0]} to {counts[-1]}{' or more' if counts[-1] == SUBSTEPS_TRIED[-1] else ''}"
 

@@ -1,4 +1,4 @@
-"""What coordinates show together: two particles bound to each other, a velocity that only turns."""
+"""Several coordinates of one motion: two particles bound to each other, velocities turned by a field."""
 
 from __future__ import annotations
 
@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from springcheck.identify.evidence import LEFT_BY_ROUNDING
 from springcheck.identify.misplaced import MOST_COMPARED, unsorted
-from springcheck.identify.record import ROUNDING, Record
+from springcheck.identify.record import Record
 from springcheck.identify.result import ONLY_TURNS, Explanation, Identification
+from springcheck.identify.storage import ROUNDING
 from springcheck.physics.arrays import Floats, Reals
 
 OF_A_BOND = (
@@ -46,15 +47,14 @@ def of_a_bond(record: Record, moving: list[int], stated: Floats) -> Floats | Non
 def at_rest(record: Record, found: Identification) -> Identification:
     """Note the stiffness of the bond of two particles in space whose centre of mass rests: that of each
     coordinate is k m/mu, mu the reduced mass."""
-    n = record.q.shape[1]
-    moving = np.flatnonzero(np.ptp(record.q, axis=0) + np.ptp(record.v, axis=0) > 0)
+    n, moving = record.q.shape[1], np.array(record.moving)
     one, other = moving[: len(moving) // 2], moving[len(moving) // 2 :]
     # the coordinates of two points, and not two of one
     if n % 3 or found.scheme is None or found.stiffness is None or len(one) != len(other) or not len(one):
         return found
     if np.any(one % 3 != other % 3) or np.any(one // 3 != one[0] // 3) or np.any(other // 3 == one[0] // 3):
         return found
-    each = of_a_bond(record, moving.tolist(), np.ones(n))
+    each = of_a_bond(record, record.moving, np.ones(n))
     if each is None:
         return found
     stiffness = float(np.median(np.array(found.stiffness) / each[moving]))
@@ -63,8 +63,8 @@ def at_rest(record: Record, found: Identification) -> Identification:
 
 
 WANDERS = 1e-3
-"""Part of its size by which the motion of two particles in single precision may leave their line, or their
-middle its place: roundings of 1e-7 that walk for 1e8 steps."""
+"""Relative drift of the direction and of the centre of mass of two particles in single precision: a random
+walk of roundings of 1e-7 over 1e8 steps."""
 
 BOUND = "two particles bound to each other"
 OF_A_PAIR = f"{BOUND}, which swing along their line: their distance is judged"
@@ -74,8 +74,7 @@ def of_a_pair(record: Record, found: Identification) -> Identification:
     """Note that the distance of two particles was judged, and their bond's stiffness if masses are known."""
     note = OF_A_PAIR
     if record.mass is not None and found.scheme and found.omega:
-        moving = np.flatnonzero(np.ptp(record.q, axis=0) > 0)
-        reduced = 1 / (1 / record.mass[moving[0]] + 1 / record.mass[moving[-1]])
+        reduced = 1 / (1 / record.mass[record.moving[0]] + 1 / record.mass[record.moving[-1]])
         note += f"; their bond has the stiffness {reduced * found.omega[0] ** 2:.9g}"
     return found.noting(note)
 
@@ -86,7 +85,7 @@ def distance(record: Record) -> Record | None:
 
     In single precision the centre of mass and the direction walk at random.
     """
-    moving = np.flatnonzero(np.ptp(record.q, axis=0) + np.ptp(record.v, axis=0) > 0)
+    moving = record.moving
     half = len(moving) // 2
     if len(moving) % 2 or not 0 < half <= 3:
         return None
@@ -122,9 +121,9 @@ def distance(record: Record) -> Record | None:
 
 
 def of_rotation(record: Record, found: Identification) -> Identification:
-    """Look for a rotation, which springs may explain as well, or which is there where no scheme fits."""
+    """Add a rotation of the velocity as a cause, or as an alternative to springs."""
     if found.explanations and (cause := (not found.fits and unsorted(record)) or of_plane(record)):
-        return replace(found, statement=cause[0].cause, explanations=tuple(cause))
+        return replace(found, statement=cause.cause, explanations=(cause,))
     if not found.fits or (pair := _turning(record)) is None:
         return found
     i, j, factor = pair
@@ -139,9 +138,8 @@ def of_rotation(record: Record, found: Identification) -> Identification:
 
 
 def _turning(record: Record) -> tuple[int, int, complex] | None:
-    """Two coordinates whose complex velocity v_i + i v_j is multiplied by one constant factor, not real, in
-    every frame, and that factor; None where there are none.  A charge in a magnetic field moves so, and a
-    circular orbit about an isotropic spring."""
+    """Two coordinates whose complex velocity v_i + i v_j is multiplied by one complex factor in every frame,
+    and that factor: a charge in a magnetic field, or a circular orbit on an isotropic spring."""
     v = record.v.astype(np.float64)
     for i, j in combinations(range(min(v.shape[1], MOST_COMPARED)), 2):
         w = v[:, i] + 1j * v[:, j]
@@ -159,30 +157,29 @@ def _turning(record: Record) -> tuple[int, int, complex] | None:
 
 
 LEFT = 1e-9
-"""Largest residual of a right complex map, relative to the states: the roundings of a long motion."""
+"""Largest residual of a complex map, relative to the states: roundings of a long motion."""
 
 KEPT = 1e-4
-"""Largest distance of the determinant from 1 where its angle is that of the velocity."""
+"""Distance of the determinant from 1 up to which its phase is given in full."""
 
 BORIS_AGREES = 1e-10
-"""Share of the largest entry by which Boris' map may miss the measured one."""
+"""Difference of the entries up to which the map is Boris', relative to the largest."""
 
 
-def of_plane(record: Record) -> list[Explanation]:
-    """Explain the first pair of coordinates that a rotation alone couples: a magnetic field across their
-    plane, or a rotating frame.
+def of_plane(record: Record) -> Explanation | None:
+    """The first pair of coordinates that a rotation couples: a magnetic field across their plane, or a
+    rotating frame.
 
     With z = x + i y, on isotropic springs, a frame takes (z, z') to A (z, z') with a complex A, which is real
     without a field.  The phase of its determinant is the angle by which it turns a velocity.
     """
-    moving = np.flatnonzero(np.ptp(record.q, axis=0) + np.ptp(record.v, axis=0) > 0)
-    for i, j in combinations(moving[:MOST_COMPARED].tolist(), 2):
+    for i, j in combinations(record.moving[:MOST_COMPARED], 2):
         if found := _of_two(record, i, j):
             return found
-    return []
+    return None
 
 
-def _of_two(record: Record, i: int, j: int) -> list[Explanation]:
+def _of_two(record: Record, i: int, j: int) -> Explanation | None:
     (x, y), (u, v) = (a[:, [i, j]].astype(np.float64).T for a in (record.q, record.v * record.interval))
     z = np.stack([x + 1j * y, u + 1j * v, np.ones(len(x))], axis=1)
     size = np.max(np.abs(z), axis=0)
@@ -195,13 +192,13 @@ def _of_two(record: Record, i: int, j: int) -> list[Explanation]:
     entries = np.asarray((rows * size / size[:, None]).T[:2, :2], np.complex128)
     size = size[:2]
     if off > LEFT or np.max(np.abs(entries.imag) * size / size[:, None]) < LEFT:
-        return []
+        return None
     interval = abs(float(record.interval))
     det = complex(np.linalg.det(entries))
     angle = cmath.phase(det)
     if abs(angle) < LEFT:
         # the velocities are other numbers than these positions', and nothing turns them
-        return []
+        return None
     of = f" of coordinates {i} and {j}" if record.q.shape[1] > 2 else ""
     turned = f"{angle:.9g}" if abs(abs(det) - 1) < KEPT else f"about {angle:.2g}"
     cause = (
@@ -217,11 +214,7 @@ def _of_two(record: Record, i: int, j: int) -> list[Explanation]:
             f". By Boris, if every step was recorded: strength over mass {2 * half / interval:.9g}, "
             f"stiffness over mass {stiff / interval**2:.9g}"
         )
-    return [
-        Explanation(
-            cause=cause, remedy="judge it against a scene with [[magnetic]]", misfit=float(off), local=True
-        )
-    ]
+    return Explanation(cause, "judge it against a scene with [[magnetic]]", float(off), local=True)
 
 
 def _boris(stiff: float, turn: complex) -> NDArray[np.complex128]:

@@ -1,4 +1,4 @@
-"""Maps that are no known scheme's: the class of a one-step method, and schemes with memory."""
+"""Maps of no known scheme: the class of a one-step method, and multistep methods."""
 
 from __future__ import annotations
 
@@ -14,46 +14,45 @@ from springcheck.identify.evidence import AGREES, FALLS, LEFT_BY_ROUNDING, Evide
 from springcheck.identify.families import title
 from springcheck.identify.fit import Map, fit
 from springcheck.identify.hypothesis import STRIDES, SURE, distinct
-from springcheck.identify.laws import LAWS, Cause, Regression, explained_by, regression
+from springcheck.identify.laws import LAWS, Cause, Regression, regression
 from springcheck.identify.result import Explanation
 from springcheck.physics.arrays import Floats
 from springcheck.text.wording import either
 
 REAL = 0.3
-"""Largest share of an imaginary part in a coefficient that is real but for the terms of the next order."""
+"""Largest ratio of the imaginary to the real part of a coefficient that is real to leading order."""
 
 ORDERS = range(1, 9)
-"""Powers of h L of which the first wrong coefficient is looked for."""
+"""Powers of h L among which the first wrong coefficient is sought."""
 
 FORGOTTEN = 0.1
-"""Share of the initial residual that is left in the last three quarters of the frames, of a memory that
-dies."""
+"""Largest residual in the last three quarters of the frames over the largest, of a start-up transient."""
 
 CHOSEN = 1200
-"""Denominator of what people choose for a parameter."""
+"""Common denominator of the parameters that people choose."""
 
 ONE_MAP = "One linear map explains the states"
 MAP_OF = "if every step was recorded, it is that of a one-step method, "
 UNKNOWN_METHOD = "a one-step method that is not known here, which"
 
 AS_IT_WAS = 0.1
-"""Share of a frame's turn by which the state of two frames ago may differ from that in the next."""
+"""Relative error of the coefficient of z[n-1], which is 1, in the two-step leapfrog."""
 
 FEWEST_WITH_MEMORY = 12
-"""Frames from which a map of two states is told from chance."""
+"""Fewest frames for a map of two states."""
 
 
 def misfit(e: Evidence) -> Explanation:
-    """Explanation by the class of a map that is no known scheme's, with the size of the misfit."""
+    """The class of a map of no known scheme, and its distance from the nearest."""
     q, v = e.found.z[1:].astype(np.float64).T
     slope = float(q @ v / (q @ q)) if np.any(q) else 0.0
     if slope and np.all(np.abs(v - slope * q) <= 8 * e.unit):
         times = slope * float(e.found.size[1] / e.found.size[0] / e.record.interval)
         return Explanation(
-            cause=f"The velocity follows the position: from frame 1 on it is {times:.6g} times its distance "
+            f"The velocity follows the position: from frame 1 on it is {times:.6g} times its distance "
             "from rest",
-            remedy="look for a buffer that both share, or a velocity that is made from the position",
-            misfit=float(np.max(np.abs(v - slope * q))),
+            "look for a buffer that both share, or a velocity that is made from the position",
+            float(np.max(np.abs(v - slope * q))),
         )
     entries = e.found.entries.astype(np.float64)
     det = float(np.linalg.det(entries))
@@ -62,7 +61,7 @@ def misfit(e: Evidence) -> Explanation:
     growth = (
         f"amplitudes change by {math.sqrt(abs(det)) - 1:+.2e} in each frame" if det > 0 else "areas turn over"
     )
-    near = ""
+    near, off = "", math.nan
     if closest is not None:
         off = distance(e.found, closest.parts[0])
         near = f"; the nearest, {title(closest.scheme)}, misses a frame by {off:.1e} of its size"
@@ -70,10 +69,10 @@ def misfit(e: Evidence) -> Explanation:
     few, many = STRIDES
     none = f", but it is none of the known schemes' in up to {many} steps to a frame, or {few} with friction"
     return Explanation(
-        cause=f"{ONE_MAP}{'' if kind.startswith(MAP_OF) else none}: {kind}{near}",
-        remedy="compare the order of its stages and their coefficients with the scheme's; state the step "
+        f"{ONE_MAP}{'' if kind.startswith(MAP_OF) else none}: {kind}{near}",
+        "compare the order of its stages and their coefficients with the scheme's; state the step "
         "where more of them lie between frames",
-        misfit=math.nan if closest is None else distance(e.found, closest.parts[0]),
+        off,
     )
 
 
@@ -147,77 +146,79 @@ def _before(e: Evidence, steps: int) -> list[Floats]:
 
 REMEMBERED = TWO_STEPS, *_ = tuple(
     Cause(
-        kind="is remembered", columns=partial(_before, steps=steps),
-        cause="Each state is the last but one and a linear map of the last: the leapfrog of two steps, "
-        "z[n+1] = z[n-1] + 2 h f(z[n]), whose even and odd frames part",
-        remedy="judge it as a scheme of two steps; a first step of second order parts them less",
+        kind="is remembered", columns=partial(_before, steps=steps), remedy="",
+        cause=f"Each state follows from the {states} before it, and not from one",
     )
-    for steps in (2, 3, 4)
+    for steps, states in ((2, "two"), (3, "three"), (4, "four"))
 )  # fmt: skip
-"""States before the last."""
+"""Multistep maps: the next state from several."""
 
 
-def _remembering(e: Evidence) -> tuple[str, Regression] | None:
-    """How many states before it each follows from to rounding, where one is too few."""
-    for name, law in zip(("the two", "the three", "the four"), REMEMBERED, strict=True):
-        found = regression(e, law)
-        if found.exact and found.above > found.rank:
-            return name, found
-    return None
+def _remembering(e: Evidence) -> Regression | None:
+    """The multistep map of the fewest states that leaves only rounding."""
+    every = (regression(e, law) for law in REMEMBERED)
+    return next((x for x in every if x.exact and x.above > x.rank), None)
 
 
-def lasting(e: Evidence) -> list[Explanation]:
-    """Several states that together give the next, where what they remember does not fade.
+def lasting(e: Evidence) -> Explanation | None:
+    """A multistep map whose parasitic solution does not decay.
 
-    What disturbs a linear motion by a share d in a few waves follows from few states to d**2, and a drive by
-    one wave does so at any size.
+    A disturbance of relative size d with a few frequencies obeys a multistep map to d**2, and a drive of one
+    frequency obeys it exactly.
     """
     found = None if e.size**2 < LEFT_BY_ROUNDING * np.max(e.unit) else _remembering(e)
     if found is None or any(regression(e, law).exact for law in LAWS):
-        return []
-    return [Explanation(
-        cause=f"Each state follows from {found[0]} before it, and not from one, and what is remembered does "
-        "not fade: a scheme of several steps (as Milne's), or a coupled oscillator not recorded",
-        remedy="give all coordinates; a scheme of several steps whose memory lasts is not stable",
-        misfit=found[1].left,
-    )]  # fmt: skip
+        return None
+    return Explanation(
+        f"{found.law.cause}, and what is remembered does not fade: a scheme of several steps (as Milne's), "
+        "or a coupled oscillator not recorded",
+        "give all coordinates; a scheme of several steps whose memory lasts is not stable",
+        found.left,
+    )
 
 
-def memory(e: Evidence) -> list[Explanation]:
-    """Explain states that follow from the two before: a scheme of two steps, or one whose memory dies.  The
-    residuals of one map are then in the first frames, and not in the first pair alone."""
-    size, off = np.max(np.abs(e.states[1:]), axis=1), np.max(np.abs(e.misses), axis=1)
+def memory(e: Evidence) -> Explanation | None:
+    """A multistep method: the two-step leapfrog, or a start-up transient, which leaves residuals of one map
+    in the first frames, and not in the first pair alone."""
+    size, off = np.max(np.abs(e.states[1:]), axis=1), np.max(np.abs(e.residuals), axis=1)
     if len(e.states) < FEWEST_WITH_MEMORY or np.min(size) < 1e-100 * np.max(size):
-        return []
+        return None
     relative, rounding = off / size, LEFT_BY_ROUNDING * float(np.max(e.unit / size))
     if np.max(relative[1:]) < rounding:
-        return []
+        return None
     found, twice = regression(e, TWO_STEPS), np.linalg.matrix_power(e.found.entries.astype(np.float64), 2)
     # maps that alternate have nearly the state of two steps ago in them as well, turned by two frames
     off_by = AS_IT_WAS * np.max(np.abs(twice - np.eye(2)))
     if found.exact and np.max(np.abs(found.x[-2:] - np.eye(2))) < off_by:
-        return [explained_by(e, found)]
+        return Explanation(
+            "Each state is the last but one and a linear map of the last: the leapfrog of two steps, "
+            "z[n+1] = z[n-1] + 2 h f(z[n]), whose even and odd frames part",
+            "judge it as a scheme of two steps; a first step of second order parts them less",
+            found.left,
+            local=True,
+        )
     # where the motion grows, a lasting disturbance falls relative to it too: its own size has to fall
     fading = relative, np.maximum(off - 8 * e.unit, 0)
     if any(x[e.pairs // 4 :].max() > FORGOTTEN * x.max() for x in fading):
-        return []
-    several, found = _remembering(e) or ("several", found)
+        return None
+    several = _remembering(e)
+    follows = several.law.cause if several else "Each state follows from several before it, and not from one"
+    found = several or found
     # the first frames alone show the other map, but for which all follow one
     later = fit(e.record, e.j, kept=np.arange(e.pairs) >= e.pairs // 2)
-    start = np.max(np.abs(later.misses(e.found)), axis=1)
+    start = np.max(np.abs(later.residuals(e.found)), axis=1)
     before, weighted = (float(np.max(x[1:])) for x in (start / size, e.weight * start))
     if before < rounding or weighted < FALLS * found.worst:
-        return []
+        return None
     whose = either(_remembered(e, later))
     kind = "several steps or with an acceleration of its own (Adams, BDF, generalised alpha, Gear)"
-    return [
-        Explanation(
-            cause=f"Each state follows from {several} before it, and not from one: a scheme with memory, "
-            f"of {whose or kind}, whose start differs from one map by {before:.1e} of the state's size",
-            remedy="leave the first frames out, and judge it as a scheme of as many steps",
-            misfit=found.worst / weighted, local=found.exact,
-        )
-    ]  # fmt: skip
+    return Explanation(
+        f"{follows}: a scheme with memory, of {whose or kind}, whose start differs from one map by "
+        f"{before:.1e} of the state's size",
+        "leave the first frames out, and judge it as a scheme of as many steps",
+        found.worst / weighted,
+        local=found.exact,
+    )
 
 
 def _many_steps(*rows: Floats) -> Floats:
@@ -231,8 +232,7 @@ def _many_steps(*rows: Floats) -> Floats:
 
 
 def _adams(*sigma: int, corrector: tuple[int, ...] = ()) -> Callable[[Floats], Floats]:
-    """Adams' method of these weights over their sum, the newest first; alone, or as a corrector's predictor
-    (PECE)."""
+    """Adams' method of these weights over their sum, the newest first; or a corrector's predictor (PECE)."""
     weights, last = np.array(sigma) / sum(sigma), np.eye(len(sigma))[1]
     rho = np.eye(len(sigma))[0] - last
     if not corrector:
@@ -274,17 +274,17 @@ WITH_MEMORY: dict[str, Callable[[Floats], Floats]] = {
     ),
     "second order, WBZ with alpha_m = -{:.6g}": partial(_generalised, lambda x: (-x, 0.0)),
 }
-"""Schemes that remember more than a state, by what they are once the start is forgotten, and the name."""
+"""Maps of multistep and generalised alpha methods after the start-up transient, by order and name."""
 
 DIGITS = 9
-"""Decimals of a parameter that are looked at."""
+"""Decimals to which a parameter is rounded."""
 
 PARAMETERS = 0.05, 0.3, 0.6, 0.9
-"""Values of a parameter from which it is looked for."""
+"""Starting values of a parameter's fit."""
 
 
 def _remembered(e: Evidence, found: Map) -> list[str]:
-    """Schemes with memory that have the map of frames after the start-up transient."""
+    """Methods of `WITH_MEMORY` that have the map of the frames after the start-up transient."""
     from scipy.optimize import least_squares
 
     entries, error = found.unscaled.astype(np.float64).ravel(), np.sqrt(np.diag(found.covariance))

@@ -1,4 +1,4 @@
-"""Linear maps that are no scheme's: schemes written down wrongly, friction of the wrong sign, wrong units."""
+"""Linear maps of faulty schemes: mistakes in a step, friction of the wrong sign, wrong units."""
 
 from __future__ import annotations
 
@@ -10,17 +10,26 @@ import numpy as np
 
 from springcheck.identify.compare import compare
 from springcheck.identify.evidence import AGREES, Evidence, Measured, matched
-from springcheck.identify.families import FAMILIES, FAULTS, G_ROUNDING, SUBTRACTED, Family, title
+from springcheck.identify.families import (
+    FAMILIES,
+    FAULTS,
+    G_ROUNDING,
+    MOST_TITLES,
+    SUBTRACTED,
+    Family,
+    title,
+    titles,
+)
 from springcheck.identify.hypothesis import SURE, Joint, distinct, same_map
-from springcheck.identify.record import ROUNDING
 from springcheck.identify.result import Explanation
+from springcheck.identify.storage import ROUNDING
 from springcheck.identify.unknown import MAP_OF, ONE_MAP, by_parameter, misfit
-from springcheck.text.wording import either
+from springcheck.text.wording import few
 
 
 @cache
 def _faults() -> tuple[Family, ...]:
-    """Faults with a map of their own, unlike kick-drift with velocities a step ahead, which is drift-kick."""
+    """Faults that have no scheme's map; kick-drift with velocities a step ahead, say, is drift-kick."""
     return tuple(f for f in FAULTS if not any(same_map(f, scheme) for scheme in distinct(damped=False)))
 
 
@@ -31,17 +40,16 @@ def faults_like(scheme: str) -> tuple[Family, ...]:
 
 
 def wrong_map(e: Evidence) -> list[Explanation]:
-    """Schemes written down wrongly, friction of the wrong sign, held forces, wrong scales.
+    """Faulty schemes, negative friction, wrong scales of the velocities; the likeliest first.
 
-    A fault that has a scheme's map is that scheme on another spring, and is no explanation unless the
-    stiffness is stated.
+    A fault that has a scheme's map is that scheme on another spring, unless the stiffness is stated.
     """
     ranked: list[tuple[int, Explanation]] = []
     fitting = matched(e.found, e.terms)
     for joint in compare([e.found], [e.terms], _faults(), range(1, 5)):
         family = FAMILIES[joint.family]
         steps = "" if joint.stride == 1 else f", {joint.stride} steps to a frame"
-        ranked.append((_rank(e, joint), _found(f"{family.cause}{steps}", family.remedy, joint)))
+        ranked.append((_rank(e, joint), Explanation(f"{family.cause}{steps}", family.remedy, joint.misfit)))
     if fitting:
         own = [x for rank, x in ranked if rank == 0 and e.stiffness is not None]
         return own or [_departing(e, title(fitting[0].scheme))]
@@ -63,27 +71,23 @@ def wrong_map(e: Evidence) -> list[Explanation]:
 
 
 def _departing(e: Evidence, scheme: str) -> Explanation:
-    size = float(np.max(np.abs(e.misses)))
+    size = float(np.max(np.abs(e.residuals)))
     return Explanation(
-        cause=f"The map is {scheme}'s, but single steps depart from it by up to {size:.1e} of the state's "
+        f"The map is {scheme}'s, but single steps depart from it by up to {size:.1e} of the state's "
         "size, which no arithmetic that is known explains",
-        remedy="look at what is rounded in a step beside positions, velocities and forces",
-        misfit=size,
+        "look at what is rounded in a step beside positions, velocities and forces",
+        size,
     )
 
 
 def _rank(e: Evidence, joint: Joint) -> int:
-    """0 for a fault of the stated stiffness, or of one step to a frame where none is stated; 3 for another
-    stiffness, 2 for more steps."""
+    """0 for a fault of the stated stiffness, or if none is stated of one step to a frame; 2 of more steps, 3
+    of another stiffness."""
     if (stated := e.stated) is None:
         return 0 if joint.stride == 1 else 2
     part = joint.parts[0]
-    room = 1e-7 + 6 * part.a_error / abs(part.a)
+    room = 1e-7 + part.a_room
     return 0 if abs(part.a * joint.stride**2 - stated) <= room * abs(stated) else 3
-
-
-def _found(cause: str, remedy: str, joint: Joint) -> Explanation:
-    return Explanation(cause=cause, remedy=remedy, misfit=math.sqrt(joint.chi2))
 
 
 def _negative_friction(e: Evidence) -> list[Explanation]:
@@ -94,14 +98,10 @@ def _negative_friction(e: Evidence) -> list[Explanation]:
     ]
     if not joints:
         return []
-    best = min(joints, key=lambda x: x.plainness)
+    best = min(joints, key=lambda x: x.simplicity)
     rate = best.parts[0].g * best.stride / float(e.record.interval)
     cause = f"{title(best.scheme)} with a negative friction, c/m = {rate:.4g}, which feeds energy in"
-    return [_found(cause, "change the sign of the damping force", best)]
-
-
-SHOWN = 4
-"""How many of the schemes that would fit at another scale a sentence names."""
+    return [Explanation(cause, "change the sign of the damping force", best.misfit)]
 
 
 def _either_way(factor: float, meaning: str) -> tuple[tuple[float, str], tuple[float, str]]:
@@ -121,7 +121,7 @@ CONSTANTS = (
     *((10.0**n, f"a factor {10.0**n:g}, as between two units") for n in (-6, -3, -2, -1, 1, 2, 3, 6)),
     (2.0, "a factor 2"), (0.5, "a factor 1/2"),
 )  # fmt: skip
-"""Factors between velocities and positions that mean something."""
+"""Known factors between the units of velocities and positions, and their meaning."""
 
 
 def _times(factor: float) -> str:
@@ -129,12 +129,12 @@ def _times(factor: float) -> str:
 
 
 def _scales(e: Evidence) -> tuple[list[Explanation], bool]:
-    """Schemes that fit once velocities are rescaled, what the scale means, and whether it means something: a
-    known factor, or that of the stated stiffness."""
+    """Schemes that fit at another scale of the velocities, with its meaning, and whether it has one: a known
+    factor, or agreement with the stated stiffness."""
     if e.terms.mass_unknown:
         return [], False
     fitting = compare([e.found], [replace(e.terms, mass_unknown=True)], distinct(damped=False), range(1, 4))
-    fitting = [x for x in fitting if abs(x.parts[0].log_mass) > 6 * x.parts[0].mass_error + 4 * ROUNDING]
+    fitting = [x for x in fitting if abs(x.parts[0].log_mass) > SURE * x.parts[0].mass_error + 4 * ROUNDING]
     of_stated = [x for x in fitting if e.stated is not None and _rank(e, x) == 0]
     fitting = of_stated or fitting
     meant = [(x, *meaning) for x in fitting if (meaning := _meaning(e, x))]
@@ -144,10 +144,10 @@ def _scales(e: Evidence) -> tuple[list[Explanation], bool]:
         # schemes that differ by less than the numbers show would each mean the same
         names: dict[str, list[str]] = {}
         for x, _, said, _ in meant:
-            names.setdefault(said, []).append(title(x.scheme))
+            names.setdefault(said, []).append(x.scheme)
         x, _, _, remedy = meant[0]
-        cause = "; or ".join(f"{either(list(dict.fromkeys(y)))}{said}" for said, y in names.items())
-        return [_found(cause, remedy, x)], True
+        cause = "; or ".join(f"{titles(schemes)}{said}" for said, schemes in names.items())
+        return [Explanation(cause, remedy, x.misfit)], True
     if not fitting:
         return [], False
     x = fitting[0]
@@ -162,22 +162,18 @@ def _scales(e: Evidence) -> tuple[list[Explanation], bool]:
     cause = f"{str(x).replace(x.scheme, title(x.scheme))} would fit if velocities were {larger}{of_mass}"
     if len(fitting) > 1:
         # symmetric schemes have the same map but for the scale, so each has one of its own
-        each = "; ".join(f"{name}: {value:.6g}" for name, value in list(scale.items())[:SHOWN])
-        more = f"; and {len(fitting) - SHOWN} more" if len(fitting) > SHOWN else ""
-        cause = (
-            f"Several schemes would fit at a scale of velocities, each at a factor of its own: {each}{more}"
-        )
+        each = few([f"{name}: {value:.6g}" for name, value in scale.items()], MOST_TITLES, "; ")
+        cause = f"Several schemes would fit at a scale of velocities, each at a factor of its own: {each}"
     advice = "look at the mass, at the units of velocities and times, and at whether dq/dt = p/m"
     alone = of_stated if e.stated is not None else fitting if e.record.fine else []
-    return [_found(cause, advice, x)], len(alone) == 1 and abs(one - 1) > AGREES
+    return [Explanation(cause, advice, x.misfit)], len(alone) == 1 and abs(one - 1) > AGREES
 
 
 def _meaning(e: Evidence, x: Joint) -> tuple[bool, str, str] | None:
-    """Meaning of a scale of the velocities, by the mass, the stated stiffness and well-known factors: whether
-    it agrees with the stated stiffness, the meaning, and what to do."""
+    """Agreement of a velocity scale with the stated stiffness, its meaning, what to do; None without one."""
     part = x.parts[0]
     scale = math.exp(-part.log_mass)
-    known = 6 * (part.mass_error + part.a_error / abs(part.a)) + e.record.jitter + 32 * ROUNDING
+    known = SURE * part.mass_error + part.a_room + e.record.jitter + 32 * ROUNDING
     h = float(e.record.interval) / x.stride
     mass = math.nan if e.record.mass is None else float(e.record.mass[e.j])
     stiffer = part.a * x.stride**2 / e.stated if e.stated else math.nan
@@ -221,7 +217,7 @@ def _meanings(
 
 
 def faults_of(seen: Measured, friction: float | None) -> list[Explanation]:
-    """Wrong schemes that have the stated stiffness and friction, where a right one has others."""
+    """Faulty schemes of the stated stiffness and friction."""
     e = seen.evidence(0)
     rate = None if friction is None or e.record.mass is None else friction / float(e.record.mass[e.j])
     joints = compare([e.found], [e.terms], _faults(), range(1, 3))
@@ -230,7 +226,9 @@ def faults_of(seen: Measured, friction: float | None) -> list[Explanation]:
         if is_ > SURE * error and (rate is None or abs(is_ - rate) <= SURE * error + 1e-9 * rate):
             joints.append(x)
     return [
-        _found(FAMILIES[x.family].cause, FAMILIES[x.family].remedy, x) for x in joints if _rank(e, x) == 0
+        Explanation(FAMILIES[x.family].cause, FAMILIES[x.family].remedy, x.misfit)
+        for x in joints
+        if _rank(e, x) == 0
     ]
 
 
