@@ -12,7 +12,7 @@ import numpy as np
 
 from springcheck import thermal
 from springcheck.checks.case import Case, small_move
-from springcheck.checks.check import Chance, Finding, check, largest
+from springcheck.checks.check import Chance, Finding, check
 from springcheck.checks.steps import STILL
 from springcheck.errors import MethodError
 from springcheck.physics.arrays import Floats
@@ -20,6 +20,7 @@ from springcheck.text.wording import count
 from springcheck.thermal import THERMOSTATS, Thermostat
 
 if TYPE_CHECKING:
+    from springcheck.thermal.chance import Statistic
     from springcheck.thermal.draws import Reading
 
 HIDDEN = "the motion is so much larger than its noise that rounding hides the draws"
@@ -116,26 +117,30 @@ def _draws(case: Case) -> tuple[Floats, Reading] | str:
     return (x, found) if np.count_nonzero(~np.isnan(x)) >= 2 else "there were no draws"
 
 
-def _of(case: Case, probability: Callable[[Floats], float], value: Callable[[Floats], str]) -> Chance | str:
+def _of(case: Case, statistic: Callable[[Floats], Statistic]) -> Chance | str:
+    found = _known(case)
+    return found if isinstance(found, str) else Chance.of(statistic(found))
+
+
+def _known(case: Case) -> Floats | str:
+    """Draws in rows, of collisions in one column; those of an impossible size are infinite."""
     found = _draws(case)
     if isinstance(found, str):
         return found
     x, read = found
-    x = x if read.hits is None else x[read.hits][:, None]
-    # draws of an impossible size are infinite
-    return Chance(probability(x), f"{value(x)}, of {count(x.size, 'draw')}")
+    return x if read.hits is None else x[read.hits][:, None]
 
 
 @check("mean", family="noise", requires={"every-step"})
 def draws_mean(case: Case) -> Chance | str:
     """The draws have mean 0."""
-    return _of(case, thermal.chance.mean, lambda x: f"mean {np.mean(x):+.2e}")
+    return _of(case, thermal.chance.mean)
 
 
 @check("var", family="noise", requires={"every-step"})
 def draws_variance(case: Case) -> Chance | str:
     """The draws have variance 1: the noise is that of the temperature, the masses and the friction."""
-    return _of(case, thermal.chance.variance, lambda x: f"variance {np.mean(x * x):.6f} where 1 is right")
+    return _of(case, thermal.chance.variance)
 
 
 @check("shape", family="noise", requires={"every-step"})
@@ -146,15 +151,28 @@ def draws_shape(case: Case) -> Chance | str:
     """
     if case.scene.system.rods and THERMOSTATS[case.trajectory.scheme].uniform:
         return "a rod mixes uniform draws of its ends, and the tails of such sums are others"
-    likely = lambda x: min(1.0, *(2 * thermal.chance.shape(x, degree) for degree in (3, 4)))  # noqa: E731
-    moments = "third moment {:+.4f}, fourth {:.4f}".format
-    return _of(case, likely, lambda x: moments(*(np.mean(x**i) / np.mean(x * x) ** (i / 2) for i in (3, 4))))
+    return _of(case, thermal.chance.shape)
+
+
+@check("largest", family="noise", requires={"every-step"})
+def draws_largest(case: Case) -> Chance | str:
+    """The largest draw is as large as that of so many is: none is cut off.
+
+    Where draws are cut off the two largest are equal to rounding, or the largest is too small.
+    """
+    if THERMOSTATS[case.trajectory.scheme].uniform:
+        return "uniform draws have a largest size"
+    x, read = _known(case), reading(case)
+    if isinstance(x, str):
+        return x
+    error = read.error if read.hits is None else read.error[read.hits][:, None]
+    return Chance.of(thermal.chance.largest(x, error))
 
 
 @check("lag 1", family="noise", requires={"every-step"})
 def draws_neighbours(case: Case) -> Chance | str:
     """The draws of one step say nothing of those of the next."""
-    return _of(case, thermal.chance.neighbours, lambda x: f"correlation {np.mean(x[1:] * x[:-1]):+.2e}")
+    return _of(case, thermal.chance.neighbours)
 
 
 @check("repeat", family="noise", requires={"every-step"})
@@ -162,7 +180,10 @@ def draws_repeat(case: Case) -> Chance | str:
     """The draws of one step do not come again, nor opposite, any number of steps later."""
     if len(case.trajectory.t) < 1010:
         return "fewer than a thousand steps"
-    return _of(case, thermal.chance.repeats, lambda x: "largest correlation of all lags")
+    x = _known(case)
+    if isinstance(x, str):
+        return x
+    return Chance(thermal.chance.repeats(x), f"largest correlation of all lags, of {count(x.size, 'draw')}")
 
 
 @check("apart", family="noise", requires={"company", "every-step"})
@@ -172,11 +193,11 @@ def draws_particles(case: Case) -> Chance | str:
         return "there are no draws of two particles side by side"
     if THERMOSTATS[case.trajectory.scheme].rescales:
         return "one number acts on all particles"
-    return _of(
-        case,
-        thermal.chance.pairs,
-        lambda x: f"largest correlation {np.max(np.abs(thermal.chance.products(x))) / np.sqrt(len(x)):.2e}",
-    )
+    x = _known(case)
+    if isinstance(x, str):
+        return x
+    largest = np.max(np.abs(thermal.chance.products(x))) / np.sqrt(len(x))
+    return Chance(thermal.chance.pairs(x), f"largest correlation {largest:.2e}, of {count(x.size, 'draw')}")
 
 
 @check("state", family="noise", requires={"every-step"})
@@ -193,23 +214,18 @@ def draws_state(case: Case) -> Chance | str:
     x, read = found
     scene, unread = case.judged, _unread(case)
     q, p = (y[unread:-1] for y in (case.trajectory.q, case.trajectory.p))
-    known = {"the momentum": p / np.sqrt(scene.m * scene.thermal)}
+    known = [p / np.sqrt(scene.m * scene.thermal)]
     if THERMOSTATS[case.trajectory.scheme].rescales:
-        known = {"the size of momenta": np.sqrt(np.mean(known["the momentum"] ** 2, axis=1, keepdims=True))}
+        known = [np.sqrt(np.mean(known[0] ** 2, axis=1, keepdims=True))]
     else:
         k = np.abs(scene.system.hessian_diagonal(scene.q)).astype(np.float64)
         size = np.sqrt(np.where(k > 0, k, np.inf) * scene.thermal)
-        known["the force"] = scene.system.potential_force(q, 0 * p) / size
-    y = np.asarray(list(known.values()), np.float64)
+        known.append(scene.system.potential_force(q, 0 * p) / size)
+    y = np.asarray(known, np.float64)
     x = x.reshape(len(q), -1, x.shape[1]).transpose(1, 0, 2)
     if read.hits is not None:
         x, y = np.where(read.hits, x, 0), np.where(read.hits, y, 0)
-    likely = thermal.chance.foretold(x, y)
-    each = np.einsum("usn,ksn->uk", x, y) / np.sqrt(np.sum(x * x) / len(x) * np.sum(y * y, axis=(1, 2)))
-    u, i = largest(np.abs(each))
-    return Chance(
-        likely, f"correlation {each[u, i]:+.2e} with {list(known)[i]} before, of {count(x.size, 'draw')}"
-    )
+    return Chance.of(thermal.chance.foretold(x, y))
 
 
 @check("hits", family="noise", requires={"every-step"})
@@ -227,10 +243,10 @@ def collisions(case: Case) -> Chance | str:
     # a collision that changes less than a rounding is not seen
     if found.missed is None or not p * np.sum(np.minimum(found.missed, 1)) <= 0.05 * np.sqrt(n * p):
         return HIDDEN
-    return Chance(thermal.chance.count(hits, n, p), f"{hits} of {count(n, 'step')}, expected {n * p:.1f}")
+    return Chance.of(thermal.chance.count(hits, n, p))
 
 
 DRAWN = (
-    noise_direction, draws_mean, draws_variance, draws_shape, draws_neighbours, draws_repeat, draws_particles,
-    draws_state, collisions,
+    noise_direction, draws_mean, draws_variance, draws_shape, draws_largest, draws_neighbours, draws_repeat,
+    draws_particles, draws_state, collisions,
 )  # fmt: skip

@@ -49,7 +49,9 @@ def between_collisions(q: Floats, v: Floats, h: float) -> list[Candidate]:
     if not FEWEST_OF_EACH <= np.sum(still) <= n - FEWEST_OF_EACH:
         return []
     spread = (still - share) / np.sqrt(share * (1 - share))
-    if not (chance.neighbours(spread[:, None]) > LEAST_CHANCE and collide(left[~still], known[~still])):
+    if not (
+        chance.neighbours(spread[:, None]).chance > LEAST_CHANCE and collide(left[~still], known[~still])
+    ):
         return []
     entries = np.linalg.lstsq(known[still], after[still], rcond=None)[0]
     off = max(float(np.sqrt(np.mean((known[still] @ entries - after[still]) ** 2))), 2.0**-52)
@@ -86,7 +88,7 @@ def are_drawn(changes: Floats, known: Floats) -> bool:
     if not np.max(sizes) > NO_COLLISION:
         return False
     for x in (rest / sizes).T[sizes > NO_COLLISION]:
-        one = min(chance.neighbours(x[:, None]), chance.repeats(x[:, None]), chance.together(x))
+        one = min(chance.neighbours(x[:, None]).chance, chance.repeats(x[:, None]), chance.together(x))
         if not one > LEAST_CHANCE:
             return False
     return True

@@ -175,13 +175,13 @@ def _is_added(noisy: Floats, left: Floats, u: Floats, every: int) -> bool:
     made = u - np.mean(u) - left
     large = [np.sign(np.abs(x) - np.median(np.abs(x))) for x in (left, made)]
     after = (np.sign(left * made), left / max(float(np.std(left)), 1e-300))
-    chances = [chance.neighbours(x[j::every, None]) for x in after for j in range(every)]
+    chances = [chance.neighbours(x[j::every, None]).chance for x in after for j in range(every)]
     chances += [chance.together(x[j::every]) for x in noisy for j in range(every)]
-    return min(chance.mean(large[0] * large[1]), *chances) > EVEN
+    return min(chance.mean(large[0] * large[1]).chance, *chances) > EVEN
 
 
 def _is_white(x: Floats) -> bool:
-    return min(chance.neighbours(x[:, None]), chance.repeats(x[:, None])) > WHITE
+    return min(chance.neighbours(x[:, None]).chance, chance.repeats(x[:, None])) > WHITE
 
 
 def _is_of_digits(x: Floats) -> bool:
@@ -190,7 +190,7 @@ def _is_of_digits(x: Floats) -> bool:
 
 
 def _is_uniform(x: Floats) -> bool:
-    return bool(np.max(np.abs(x)) < 1.9 and chance.shape(x) < WHITE)
+    return bool(np.max(np.abs(x)) < 1.9 and chance.tails(x) < WHITE)
 
 
 def _of_one(
