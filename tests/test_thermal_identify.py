@@ -446,15 +446,16 @@ def test_friction_and_noise_before_velocity_verlet_are_no_scheme_that_is_known(f
 
 
 @pytest.mark.parametrize("stride", [1, 2, 3])
+@pytest.mark.parametrize("often", [0.1, 0.3])
 @pytest.mark.parametrize("kind", ["shot", "collision"])
 def test_shots_of_noise_that_add_to_a_momentum_are_no_collisions_that_draw_it_anew(
-    kind: str, stride: int
+    kind: str, often: float, stride: int
 ) -> None:
     """Both act in some steps alone, by what is drawn: shots were said to be Andersen's thermostat."""
     rng, m, k, h, q, v, rows = np.random.default_rng(5), 2.3, 1.7, 0.35, 1.0, 0.3, []
     for _ in range(1000 * stride):
         rows.append((q, v))
-        if rng.random() < 0.1:
+        if rng.random() < often:
             v = 0.3 * rng.normal() + v if kind == "shot" else rng.normal()
         v -= h / 2 * k / m * q
         q += h * v
@@ -462,3 +463,20 @@ def test_shots_of_noise_that_add_to_a_momentum_are_no_collisions_that_draw_it_an
     x, u = np.array(rows[::stride]).T
     found = identify(stride * h * np.arange(1000), x, v=u, mass=m)
     assert ("andersen" in [one.scheme for one in found.candidates]) == (kind == "collision")
+
+
+@pytest.mark.parametrize("off", [0.1, 0.3])
+def test_forces_off_by_a_random_factor_are_no_noise_of_a_scheme(off: float) -> None:
+    """Such a force acts in two half kicks, as BBK's noise does, and was named BBK."""
+    rng, m, k, h, q, v, rows = np.random.default_rng(1), 2.3, 1.7, 0.35, 1.0, 0.3, []
+    force = -k * q
+    for _ in range(1000):
+        rows.append((q, v))
+        v += h / 2 * force / m
+        q += h * v
+        force = -k * q * (1 + off * rng.normal())
+        v += h / 2 * force / m
+    x, u = np.array(rows).T
+    found = identify(h * np.arange(1000), x, v=u, mass=m)
+    assert found.verdict != "named"
+    assert found.candidates == ()

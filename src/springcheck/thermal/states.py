@@ -133,9 +133,9 @@ def identify_thermal(
     # and of what frames two steps apart share none three steps apart do
     if off < 1e-6 or (off < 1e-3 * sizes_left[0] and _is_of_digits(jump[::3])):
         return clear(_of_two_halves(q, h, off, beside, mixed))
-    if collided := tuple(between_collisions(q, v, h)):
-        return Thermal(candidates=collided, free=(), misfit=nan, uniform=False)
-    white = all(map(_is_white, left))
+    collided, white = between_collisions(q, v, h), all(map(_is_white, left))
+    if collided or (white and collided is not None):
+        return Thermal(candidates=tuple(collided), free=(), misfit=nan, uniform=False)
     coloured = not (white and even)
     # draws that are carried on into the next frame are in no other
     if coloured and not (all(_is_white(x[i::2]) for x in left for i in (0, 1)) and added(2)):
@@ -144,8 +144,9 @@ def identify_thermal(
     if white and coloured and not any(random_scheme(one.scheme).carried for one in found):
         return None
     return Thermal(
-        candidates=found, free=(), misfit=nan, uniform=_is_uniform(left[1]), known=not bent and white
-    )
+        candidates=found, free=(), misfit=nan, uniform=_is_uniform(left[1]),
+        known=not bent and white and not _grows(left[1], x[:-1], x[1:]),
+    )  # fmt: skip
 
 
 def _follows(left: Floats, beside: Floats, known: Floats) -> bool:
@@ -178,6 +179,14 @@ def _is_added(noisy: Floats, left: Floats, u: Floats, every: int) -> bool:
     chances = [chance.neighbours(x[j::every, None]).chance for x in after for j in range(every)]
     chances += [chance.together(x[j::every]) for x in noisy for j in range(every)]
     return min(chance.mean(large[0] * large[1]).chance, *chances) > EVEN
+
+
+def _grows(left: Floats, *places: Floats) -> bool:
+    """Whether the size of residuals (f,) goes with that of positions (f,), as where a force is off by a
+    random factor: no scheme's noise does."""
+    sizes = [np.abs(left), *(np.abs(x - np.mean(x)) for x in places)]
+    first, *others = (np.sign(x - np.median(x)) for x in sizes)
+    return min(chance.mean(first * x).chance for x in others) < WHITE
 
 
 def _is_white(x: Floats) -> bool:
@@ -236,7 +245,7 @@ def _of_one(
         often = close > COARSE or float(np.quantile(np.abs(changes), 0.05)) > close
         state = np.stack([(q[:-1] - q[0]) / np.std(q), v[:-1] / np.std(v), np.ones(len(v) - 1)], axis=1)
         struck = np.abs(changes) > close
-        collides = collide(changes[struck, None], state[struck])
+        collides = all(collide(changes[struck, None], state[struck]))
         names: tuple[str, ...] = ("andersen", "andersen-after-kick") if collides else ()
         names += ("bussi", "bussi-unsigned") if often and is_a_factor(v[:-1], drawn) else ()
         if not names:
@@ -396,5 +405,6 @@ def _of_two_halves(q: Floats, h: float, misfit: float, beside: Floats | None, mi
                 nats=inf if (uniform and name == "bbk") or (normal and name != "bbk") else 0.0,
             )
         )  # fmt: skip
-    ordered = tuple(sorted(found, key=lambda y: y.nats))
+    # noise in proportion to the force is none that a scheme adds
+    ordered = () if _grows(draws, q[1:-1]) else tuple(sorted(found, key=lambda y: y.nats))
     return Thermal(candidates=ordered, free=(), misfit=misfit, uniform=uniform, known=not bent)
