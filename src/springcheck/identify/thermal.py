@@ -18,7 +18,8 @@ from springcheck.thermal import THERMOSTATS
 from springcheck.thermal.catalogue import family_of
 from springcheck.thermal.likelihood import SUBSTEPS_TRIED
 from springcheck.thermal.modes import FREE_OF_NOISE, modes
-from springcheck.thermal.states import FEWEST, Thermal, identify_thermal
+from springcheck.thermal.residuals import FEWEST
+from springcheck.thermal.states import Thermal, identify_thermal
 
 MOST = 8
 """Oscillators that are looked at, each by itself."""
