@@ -12,7 +12,6 @@ from springcheck.checks.requires import REQUIREMENTS, missing
 from springcheck.errors import MethodError
 from springcheck.physics.arrays import WIDE, Reals
 from springcheck.physics.trajectory import NOT_KNOWN, Limits, Verdict
-from springcheck.text.wording import count
 
 if TYPE_CHECKING:
     from springcheck.thermal.chance import Statistic
@@ -54,9 +53,7 @@ class Chance(NamedTuple):
     @classmethod
     def of(cls, statistic: Statistic) -> Chance:
         """That of a statistic of draws."""
-        return cls(
-            statistic.chance, f"{statistic.words}, of {count(statistic.draws, statistic.noun)}", statistic
-        )
+        return cls(statistic.chance, statistic.words, statistic)
 
     @property
     def decades(self) -> float:
@@ -84,18 +81,12 @@ def shared(verdicts: Sequence[Verdict], false_alarms: float = FALSE_ALARMS) -> l
     """
     random = [one.passed is not None and one.unit == DECADES for one in verdicts]
     bound = float(np.log10(max(sum(random), 1) / false_alarms))
-    return [
-        replace(one, bound=bound, passed=bool(one.value <= bound), sees=_seen(one, 10.0**-bound))
-        if by_chance
-        else one
-        for one, by_chance in zip(verdicts, random, strict=True)
-    ]
 
+    def by_chance(one: Verdict) -> Verdict:
+        sees = one.statistic.sees(10.0**-bound) if one.statistic else one.sees
+        return replace(one, bound=bound, passed=bool(one.value <= bound), sees=sees)
 
-def _seen(verdict: Verdict, chance: float) -> Limits:
-    """Limits of detection of a random verdict with this share of the probability of a false alarm."""
-    of = verdict.statistic
-    return of.sees(chance) if of else verdict.sees
+    return [by_chance(one) if is_random else one for one, is_random in zip(verdicts, random, strict=True)]
 
 
 def over_pieces(worst: Verdict, judged: Sequence[Verdict]) -> Verdict:

@@ -55,8 +55,6 @@ class Statistic:
     """(draws, probability of a false alarm) -> limits of detection, missed in a share `MISSED` of runs."""
     pieces: int = 1
     """Pieces of a run of which it is the statistic."""
-    noun: str = "draw"
-    """What `draws` counts."""
 
     def __add__(self, other: Statistic) -> Statistic:
         """The statistic of the draws of both."""
@@ -92,7 +90,7 @@ def mean(x: Floats) -> Statistic:
     """The mean of draws x (...)."""
 
     def law(n: int, total: float) -> tuple[float, str]:
-        return of_normal(total / math.sqrt(n)), f"mean {total / n:+.2e}"
+        return of_normal(total / math.sqrt(n)), f"mean {total / n:+.2e}, of {n} draws"
 
     return Statistic(draws=x.size, sums=(float(np.sum(x)),), law=law)
 
@@ -102,7 +100,7 @@ def variance(x: Floats) -> Statistic:
     from scipy.special import gammainc, gammaincc, gammainccinv, gammaincinv
 
     def law(n: int, squares: float) -> tuple[float, str]:
-        half, words = squares / 2, f"variance {squares / n:.6f} where 1 is right"
+        half, words = squares / 2, f"variance {squares / n:.6f} where 1 is right, of {n} draws"
         if not math.isfinite(half):
             return 0.0, words
         return min(1.0, 2 * float(min(gammainc(n / 2, half), gammaincc(n / 2, half)))), words
@@ -125,7 +123,7 @@ def shape(x: Floats) -> Statistic:
         chances = [
             2 * _saddlepoint(total / n, n, degree) for total, degree in zip(sums, (3, 4), strict=False)
         ]
-        return min(1.0, *chances), f"third moment {sums[2] / n:+.4f}, fourth {sums[3] / n:.4f}"
+        return min(1.0, *chances), f"third moment {sums[2] / n:+.4f}, fourth {sums[3] / n:.4f}, of {n} draws"
 
     moments = [float(np.sum((x / size) ** i)) for i in (3, 4)]
     return Statistic(draws=x.size, sums=(*(_of_ranks(x, degree) for degree in (3, 4)), *moments), law=law)
@@ -188,7 +186,7 @@ def largest(x: Floats, error: Floats) -> Statistic:
     def law(n: int, sizes: Floats, errors: Floats) -> tuple[float, str]:
         # edges of the usual range, -inf of none
         low, high = (-float(ndtri(-math.expm1(log / n) / 2)) for log in (math.log(USUAL), -USUAL))
-        words = f"largest {sizes[0]:.4f}, usual are {low:.2f} to {high:.2f}"
+        words = f"largest {sizes[0]:.4f}, usual are {low:.2f} to {high:.2f}, of {n} draws"
         if not math.isfinite(sizes[0]):
             return 0.0, words
         beyond = math.erfc(sizes[0] / math.sqrt(2))
@@ -214,7 +212,7 @@ def neighbours(x: Floats) -> Statistic:
     """
 
     def law(n: int, products: float, squares: float, pairs: int) -> tuple[float, str]:
-        words = f"correlation {products / max(pairs, 1):+.2e}"
+        words = f"correlation {products / max(pairs, 1):+.2e}, of {n} draws"
         if not pairs:
             return 1.0, words
         return of_normal(products / math.sqrt(squares)) if squares > 0 else 0.0, words
@@ -242,7 +240,7 @@ def foretold(x: Floats, y: Floats) -> Statistic:
         size = np.sqrt(squares / len(products) * np.sum(known, axis=1))
         each = np.sum(products, axis=2) / size
         u, i = np.unravel_index(np.argmax(np.where(np.isfinite(each), np.abs(each), np.inf)), each.shape)
-        words = f"correlation {each[u, i]:+.2e} with {names[i]} before"
+        words = f"correlation {each[u, i]:+.2e} with {names[i]} before, of {n} draws"
         if not math.isfinite(squares):
             return 0.0, words
         columns = known.shape[-1]
@@ -262,7 +260,7 @@ def count(hits: int, n: int, p: float) -> Statistic:
 
     def law(n: int, hits: int) -> tuple[float, str]:
         below, above = float(bdtr(hits, n, p)), float(bdtrc(hits - 1, n, p)) if hits else 1.0
-        return min(1.0, 2 * min(below, above)), f"{hits} collisions where {n * p:.1f} are expected"
+        return min(1.0, 2 * min(below, above)), f"{hits} of {n} steps, expected {n * p:.1f}"
 
     def limits(n: int, chance: float) -> Limits:
         several = np.ceil(n * p) + np.arange(50 + 10 * int(np.sqrt(n * p)))
@@ -271,7 +269,7 @@ def count(hits: int, n: int, p: float) -> Statistic:
             return NOT_KNOWN
         return Limits(friction=math.log1p(-float(bdtri(alarms[0] - 1, n, MISSED))) / math.log1p(-p) - 1)
 
-    return Statistic(draws=n, sums=(hits,), law=law, limits=limits, noun="step")
+    return Statistic(draws=n, sums=(hits,), law=law, limits=limits)
 
 
 def repeats(x: Floats) -> float:
