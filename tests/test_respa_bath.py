@@ -17,15 +17,20 @@ from springcheck.physics.bath import Bath
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Quartic, Spring, WallSpring
 from springcheck.physics.trajectory import Trajectory
-from springcheck.thermal import Stepper, Thermostat
+from springcheck.thermal import THERMOSTATS, Stepper, Thermostat
 from springcheck.thermal.catalogue import by_groups
 from springcheck.thermal.heat import heated_of
-from springcheck.thermal.likelihood import FULL_RANK, SUBSTEPS_TRIED, likely
+from springcheck.thermal.likelihood import SUBSTEPS_TRIED, likely
 
 LABELS = (
     "own:baoab-respa2", "openmm:mts-langevin-2", "own:baoab-respa3", "openmm:mts-langevin-3",
     "openmm:mts-langevin-4",
 )  # fmt: skip
+
+FULL_RANK = tuple(
+    name for name, one in THERMOSTATS.items() if one.full_rank and not one.carried and one.substeps <= 2
+)
+"""Schemes whose every step has new noise of rank two, of those that are told by a count the first."""
 
 
 def two_scales(*, joined: bool = False, steps: int = 400) -> Scene:

@@ -24,7 +24,7 @@ import numpy as np
 from springcheck.checks import experiments, laws, thermal
 from springcheck.checks.bench import Bench, Run
 from springcheck.checks.case import Case
-from springcheck.checks.check import DECADES, Check, shared
+from springcheck.checks.check import DECADES, Check, over_pieces, shared
 from springcheck.checks.driven import drive
 from springcheck.checks.motion import (
     angular_momentum,
@@ -222,8 +222,8 @@ def worst(pieces: Sequence[Sequence[Verdict]]) -> list[Verdict]:
             # the first sentence counts the frames of its own piece alone
             why += f"; of {len(judged)} pieces of the run {len(failed)} fail"
         if verdict.unit == DECADES:
-            # the least of several chances is found so many times as often
-            verdict = replace(verdict, value=verdict.value - float(np.log10(len(judged))))
+            verdict = over_pieces(replace(verdict, why=why), judged)
+            why = verdict.why
         out.append(replace(verdict, why=why, sees=sees))
     return out
 

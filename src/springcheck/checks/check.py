@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -12,6 +12,9 @@ from springcheck.checks.requires import REQUIREMENTS, missing
 from springcheck.errors import MethodError
 from springcheck.physics.arrays import WIDE, Reals
 from springcheck.physics.trajectory import NOT_KNOWN, Limits, Verdict
+
+if TYPE_CHECKING:
+    from springcheck.thermal.chance import Statistic
 
 BEYOND = 2.0**511
 """Stands for values that fail and are not finite, or larger, so that a verdict and its ratio are finite."""
@@ -44,14 +47,24 @@ class Chance(NamedTuple):
 
     chance: float
     why: str
-    sees: Limits = NOT_KNOWN
+    statistic: Statistic | None = None
+    """What it is the chance of, where that adds up over the pieces of a run."""
+
+    @classmethod
+    def of(cls, statistic: Statistic) -> Chance:
+        """That of a statistic of draws."""
+        return cls(statistic.chance, statistic.words, statistic)
+
+    @property
+    def decades(self) -> float:
+        """Minus the decimal logarithm of the chance."""
+        with np.errstate(divide="ignore"):
+            return float(-np.log10(np.float64(self.chance)))
 
     @property
     def finding(self) -> Finding:
         """Value and bound in decades of chance, as for the only random verdict of a command."""
-        with np.errstate(divide="ignore"):
-            value = -np.log10(np.float64(self.chance))
-        return Finding(value, -np.log10(FALSE_ALARMS), DECADES, self.why, self.sees)
+        return Finding(self.decades, -np.log10(FALSE_ALARMS), DECADES, self.why)
 
 
 FALSE_ALARMS = 1e-6
@@ -68,10 +81,28 @@ def shared(verdicts: Sequence[Verdict], false_alarms: float = FALSE_ALARMS) -> l
     """
     random = [one.passed is not None and one.unit == DECADES for one in verdicts]
     bound = float(np.log10(max(sum(random), 1) / false_alarms))
-    return [
-        replace(one, bound=bound, passed=bool(one.value <= bound)) if by_chance else one
-        for one, by_chance in zip(verdicts, random, strict=True)
-    ]
+
+    def by_chance(one: Verdict) -> Verdict:
+        sees = one.statistic.sees(10.0**-bound) if one.statistic else one.sees
+        return replace(one, bound=bound, passed=bool(one.value <= bound), sees=sees)
+
+    return [by_chance(one) if is_random else one for one, is_random in zip(verdicts, random, strict=True)]
+
+
+def over_pieces(worst: Verdict, judged: Sequence[Verdict]) -> Verdict:
+    """The random verdict on a run, from the worst of its pieces and all of them.
+
+    The least of several chances is found so many times as often; the sums over all pieces, where the
+    statistic adds up, are one more test.
+    """
+    each = [one.statistic for one in judged]
+    if len(judged) == 1 or None in each:
+        return replace(worst, value=worst.value - float(np.log10(len(judged))))
+    whole = Chance.of(sum(each[1:], each[0]))
+    assert whole.statistic is not None
+    why = whole.why if worst.passed or whole.decades >= worst.value else worst.why
+    value = min(max(whole.decades, worst.value), BEYOND) - float(np.log10(whole.statistic.tests))
+    return replace(worst, value=value, why=why, statistic=whole.statistic)
 
 
 Judge: TypeAlias = Callable[[Any], Finding | Chance | str]
@@ -144,6 +175,7 @@ def verdict(method: str, check: str, found: Finding | Chance | str) -> Verdict:
     An infinite bound is inconclusive, and a reason why the check does not apply is reported as such, never as
     passed.  The verdict's value and bound are finite: `BEYOND` stands for a value that is not, and fails.
     """
+    statistic = found.statistic if isinstance(found, Chance) else None
     if isinstance(found, Chance):
         found = found.finding
     if isinstance(found, Finding) and float(found.bound) == np.inf and not np.isnan(float(found.value)):
@@ -163,5 +195,5 @@ def verdict(method: str, check: str, found: Finding | Chance | str) -> Verdict:
         value, bound = BEYOND, min(bound, BEYOND / 2)
     return Verdict(
         method=method, check=check, value=value, bound=bound, unit=found.unit, passed=passed, why=why,
-        sees=found.sees,
+        sees=found.sees, statistic=statistic,
     )  # fmt: skip

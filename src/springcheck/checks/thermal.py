@@ -5,14 +5,13 @@ A draw is the random number that a state must have taken to follow from the one 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from springcheck import thermal
 from springcheck.checks.case import Case, small_move
-from springcheck.checks.check import Chance, Finding, check, largest
+from springcheck.checks.check import Chance, Finding, check
 from springcheck.checks.steps import STILL
 from springcheck.errors import MethodError
 from springcheck.physics.arrays import Floats
@@ -24,9 +23,7 @@ if TYPE_CHECKING:
 
 HIDDEN = "the motion is so much larger than its noise that rounding hides the draws"
 
-NOT_LINEAR = "two numbers of a state tell three draws or more by linear forces alone"
-
-NOT_SUMMED = "sums of three draws or more are told of 64 coordinates at most"
+NOT_SUMMED = "three draws or more of a step are told by linear forces alone, of 64 coordinates at most"
 
 NO_DRAWS = "it takes no draws: its bath is a chain"
 
@@ -97,45 +94,43 @@ def noise_direction(case: Case) -> Finding | str:
     return Finding(float(np.max(worst)), found.roundings, "roundings", why)
 
 
-def _draws(case: Case) -> tuple[Floats, Reading] | str:
-    """Draws (f, n) as standard normal numbers."""
-    if not THERMOSTATS[case.trajectory.scheme].draws:
-        return NO_DRAWS
+def _draws(case: Case) -> Floats:
+    """Draws as standard normal numbers, NaN where a step had none.  MethodError where they are not known."""
+    scheme = THERMOSTATS[case.trajectory.scheme]
+    if not scheme.draws:
+        raise MethodError(NO_DRAWS)
     if limit := small_move(case.trajectory):
-        return limit
-    scheme, found = THERMOSTATS[case.trajectory.scheme], reading(case)
+        raise MethodError(limit)
+    found = reading(case)
     if not found.known:
-        if scheme.fresh < 3:
-            return HIDDEN
-        if not case.judged.system.is_linear:
-            return NOT_LINEAR
-        return HIDDEN if case.scene.n <= thermal.jointly.MOST_JOINTLY else NOT_SUMMED
+        few = scheme.fresh < 3 or (
+            case.judged.system.is_linear and case.scene.n <= thermal.jointly.MOST_JOINTLY
+        )
+        raise MethodError(HIDDEN if few else NOT_SUMMED)
     x = found.draws
     if scheme.uniform and not case.scene.system.rods:
         x = thermal.chance.normal_scores(x)
-    return (x, found) if np.count_nonzero(~np.isnan(x)) >= 2 else "there were no draws"
+    if np.count_nonzero(~np.isnan(x)) < 2:
+        raise MethodError("there were no draws")
+    return x
 
 
-def _of(case: Case, probability: Callable[[Floats], float], value: Callable[[Floats], str]) -> Chance | str:
-    found = _draws(case)
-    if isinstance(found, str):
-        return found
-    x, read = found
-    x = x if read.hits is None else x[read.hits][:, None]
-    # draws of an impossible size are infinite
-    return Chance(probability(x), f"{value(x)}, of {count(x.size, 'draw')}")
+def _drawn(case: Case) -> Floats:
+    """Draws in rows, of collisions in one column; those of an impossible size are infinite."""
+    x, hits = _draws(case), reading(case).hits
+    return x if hits is None else x[hits][:, None]
 
 
 @check("mean", family="noise", requires={"every-step"})
-def draws_mean(case: Case) -> Chance | str:
+def draws_mean(case: Case) -> Chance:
     """The draws have mean 0."""
-    return _of(case, thermal.chance.mean, lambda x: f"mean {np.mean(x):+.2e}")
+    return Chance.of(thermal.chance.mean(_drawn(case)))
 
 
 @check("var", family="noise", requires={"every-step"})
-def draws_variance(case: Case) -> Chance | str:
+def draws_variance(case: Case) -> Chance:
     """The draws have variance 1: the noise is that of the temperature, the masses and the friction."""
-    return _of(case, thermal.chance.variance, lambda x: f"variance {np.mean(x * x):.6f} where 1 is right")
+    return Chance.of(thermal.chance.variance(_drawn(case)))
 
 
 @check("shape", family="noise", requires={"every-step"})
@@ -146,15 +141,26 @@ def draws_shape(case: Case) -> Chance | str:
     """
     if case.scene.system.rods and THERMOSTATS[case.trajectory.scheme].uniform:
         return "a rod mixes uniform draws of its ends, and the tails of such sums are others"
-    likely = lambda x: min(1.0, *(2 * thermal.chance.shape(x, degree) for degree in (3, 4)))  # noqa: E731
-    moments = "third moment {:+.4f}, fourth {:.4f}".format
-    return _of(case, likely, lambda x: moments(*(np.mean(x**i) / np.mean(x * x) ** (i / 2) for i in (3, 4))))
+    return Chance.of(thermal.chance.shape(_drawn(case)))
+
+
+@check("largest", family="noise", requires={"every-step"})
+def draws_largest(case: Case) -> Chance | str:
+    """The largest draw is as large as that of so many is: none is cut off.
+
+    Where draws are cut off the two largest are equal to rounding, or the largest is too small.
+    """
+    if THERMOSTATS[case.trajectory.scheme].uniform:
+        return "uniform draws have a largest size"
+    x, read = _drawn(case), reading(case)
+    error = read.error if read.hits is None else read.error[read.hits][:, None]
+    return Chance.of(thermal.chance.largest(x, error))
 
 
 @check("lag 1", family="noise", requires={"every-step"})
-def draws_neighbours(case: Case) -> Chance | str:
+def draws_neighbours(case: Case) -> Chance:
     """The draws of one step say nothing of those of the next."""
-    return _of(case, thermal.chance.neighbours, lambda x: f"correlation {np.mean(x[1:] * x[:-1]):+.2e}")
+    return Chance.of(thermal.chance.neighbours(_drawn(case)))
 
 
 @check("repeat", family="noise", requires={"every-step"})
@@ -162,7 +168,8 @@ def draws_repeat(case: Case) -> Chance | str:
     """The draws of one step do not come again, nor opposite, any number of steps later."""
     if len(case.trajectory.t) < 1010:
         return "fewer than a thousand steps"
-    return _of(case, thermal.chance.repeats, lambda x: "largest correlation of all lags")
+    x = _drawn(case)
+    return Chance(thermal.chance.repeats(x), f"largest correlation of all lags, of {count(x.size, 'draw')}")
 
 
 @check("apart", family="noise", requires={"company", "every-step"})
@@ -172,11 +179,9 @@ def draws_particles(case: Case) -> Chance | str:
         return "there are no draws of two particles side by side"
     if THERMOSTATS[case.trajectory.scheme].rescales:
         return "one number acts on all particles"
-    return _of(
-        case,
-        thermal.chance.pairs,
-        lambda x: f"largest correlation {np.max(np.abs(thermal.chance.products(x))) / np.sqrt(len(x)):.2e}",
-    )
+    x = _drawn(case)
+    largest = np.max(np.abs(thermal.chance.products(x))) / np.sqrt(len(x))
+    return Chance(thermal.chance.pairs(x), f"largest correlation {largest:.2e}, of {count(x.size, 'draw')}")
 
 
 @check("state", family="noise", requires={"every-step"})
@@ -185,31 +190,23 @@ def draws_state(case: Case) -> Chance | str:
 
     A drag that is not that of the noise, or a wrong force, leaves a part of the state in each draw.
     """
-    found = _draws(case)
-    if isinstance(found, str):
-        return found
+    x, hits = _draws(case), reading(case).hits
     if case.scene.system.rods:
         return "a rod turns the draws of its ends"
-    x, read = found
     scene, unread = case.judged, _unread(case)
     q, p = (y[unread:-1] for y in (case.trajectory.q, case.trajectory.p))
-    known = {"the momentum": p / np.sqrt(scene.m * scene.thermal)}
+    known = [p / np.sqrt(scene.m * scene.thermal)]
     if THERMOSTATS[case.trajectory.scheme].rescales:
-        known = {"the size of momenta": np.sqrt(np.mean(known["the momentum"] ** 2, axis=1, keepdims=True))}
+        known = [np.sqrt(np.mean(known[0] ** 2, axis=1, keepdims=True))]
     else:
         k = np.abs(scene.system.hessian_diagonal(scene.q)).astype(np.float64)
         size = np.sqrt(np.where(k > 0, k, np.inf) * scene.thermal)
-        known["the force"] = scene.system.potential_force(q, 0 * p) / size
-    y = np.asarray(list(known.values()), np.float64)
+        known.append(scene.system.potential_force(q, 0 * p) / size)
+    y = np.asarray(known, np.float64)
     x = x.reshape(len(q), -1, x.shape[1]).transpose(1, 0, 2)
-    if read.hits is not None:
-        x, y = np.where(read.hits, x, 0), np.where(read.hits, y, 0)
-    likely = thermal.chance.foretold(x, y)
-    each = np.einsum("usn,ksn->uk", x, y) / np.sqrt(np.sum(x * x) / len(x) * np.sum(y * y, axis=(1, 2)))
-    u, i = largest(np.abs(each))
-    return Chance(
-        likely, f"correlation {each[u, i]:+.2e} with {list(known)[i]} before, of {count(x.size, 'draw')}"
-    )
+    if hits is not None:
+        x, y = np.where(hits, x, 0), np.where(hits, y, 0)
+    return Chance.of(thermal.chance.foretold(x, y))
 
 
 @check("hits", family="noise", requires={"every-step"})
@@ -227,10 +224,10 @@ def collisions(case: Case) -> Chance | str:
     # a collision that changes less than a rounding is not seen
     if found.missed is None or not p * np.sum(np.minimum(found.missed, 1)) <= 0.05 * np.sqrt(n * p):
         return HIDDEN
-    return Chance(thermal.chance.count(hits, n, p), f"{hits} of {count(n, 'step')}, expected {n * p:.1f}")
+    return Chance.of(thermal.chance.count(hits, n, p))
 
 
 DRAWN = (
-    noise_direction, draws_mean, draws_variance, draws_shape, draws_neighbours, draws_repeat, draws_particles,
-    draws_state, collisions,
+    noise_direction, draws_mean, draws_variance, draws_shape, draws_largest, draws_neighbours, draws_repeat,
+    draws_particles, draws_state, collisions,
 )  # fmt: skip

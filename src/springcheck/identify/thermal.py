@@ -24,7 +24,8 @@ from springcheck.thermal import THERMOSTATS
 from springcheck.thermal.catalogue import family_of, random_scheme
 from springcheck.thermal.likelihood import SUBSTEPS_TRIED
 from springcheck.thermal.modes import FREE_OF_NOISE, modes
-from springcheck.thermal.states import FEWEST, Thermal, identify_thermal
+from springcheck.thermal.residuals import FEWEST
+from springcheck.thermal.states import Thermal, identify_thermal
 
 MOST = 8
 """Most oscillators in a bath that are identified."""

@@ -320,6 +320,8 @@ class Limits:
     """Change of the phase of a drive, in radians."""
     late: float | None = _told("a drive late by {:.1e} of a step")
     """Delay of a drive, in steps."""
+    temperature: float | None = _told("a temperature off by {:.1e}")
+    """Relative change of the temperature of a bath's noise, seen in 19 runs of 20."""
 
     def __str__(self) -> str:
         """The limits in words; "" where all are None."""
@@ -355,6 +357,8 @@ class Verdict:
     """The bound's reason, or why the check does not apply."""
     sees: Limits = NOT_KNOWN
     """Smallest fault that the check would have detected in this run."""
+    statistic: Any = field(default=None, compare=False, repr=False)
+    """Of a random verdict the statistic, where it adds up over pieces of a run (`thermal.chance`)."""
 
     @property
     def reason(self) -> str:

@@ -1,23 +1,84 @@
 """P-values of draws under the null hypothesis: independent standard normal numbers.
 
-Each function returns the probability, two-sided, of a value as extreme or more.  They are exact but for
-`shape`, whose saddlepoint approximation is off by a few percent of the probability itself, however small that
-is (Lugannani & Rice, Adv.  Appl.  Probab. 12 (1980) 475), and `foretold`, which is a bound.
+Each is the probability, two-sided, of a value as extreme or more.  A `Statistic` is of sums that have an
+exact law for the draws of one piece of a run and, added up, for those of all pieces: an error of the noise
+that is too small to show in any piece shows in all.  They are exact but for the saddlepoint approximation of
+`shape`, which is off by a few percent of the probability itself, however small that is (Lugannani & Rice,
+Adv.  Appl.  Probab. 12 (1980) 475), and for `foretold`, which is a bound.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import cache
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.polynomial.legendre import Legendre, leggauss
 
 from springcheck.physics.arrays import Floats
+from springcheck.physics.trajectory import NOT_KNOWN, Limits
 
 FACTOR_LAGS = 20
 """Lags at which a factor of momenta that persists would show."""
+
+MISSED = 0.05
+"""Share of runs in which an error as large as the limit of detection is not detected."""
+
+USUAL = 1e-8
+"""Chance of a largest draw below, and of one above, the range that the report gives as usual."""
+
+FEW_TIMES = 30.0
+"""How much of its usual sum of squares what foretells may lack before it is seen less well."""
+
+Sums: TypeAlias = tuple[Any, ...]
+"""Numbers and arrays, of which those of two pieces of a run add up."""
+
+
+def _added(one: Sums, other: Sums) -> Sums:
+    return tuple(a + b for a, b in zip(one, other, strict=True))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Statistic:
+    """A test statistic of draws, and its law."""
+
+    draws: int
+    sums: Sums
+    law: Callable[..., tuple[float, str]]
+    """(draws, *sums) -> the chance, and the value in words."""
+    join: Callable[[Sums, Sums], Sums] = _added
+    """What the sums of two pieces are together."""
+    limits: Callable[[int, float], Limits] = lambda draws, chance: NOT_KNOWN
+    """(draws, probability of a false alarm) -> limits of detection, missed in a share `MISSED` of runs."""
+    pieces: int = 1
+    """Pieces of a run of which it is the statistic."""
+
+    def __add__(self, other: Statistic) -> Statistic:
+        """The statistic of the draws of both."""
+        draws, pieces = self.draws + other.draws, self.pieces + other.pieces
+        return replace(self, draws=draws, pieces=pieces, sums=self.join(self.sums, other.sums))
+
+    @property
+    def tests(self) -> int:
+        """Tests of a run that is judged by each of its pieces and by all."""
+        return self.pieces + (self.pieces > 1)
+
+    @property
+    def chance(self) -> float:
+        """Two-sided probability of a value as extreme or more."""
+        return self.law(self.draws, *self.sums)[0]
+
+    @property
+    def words(self) -> str:
+        """The value, for the report."""
+        return self.law(self.draws, *self.sums)[1]
+
+    def sees(self, chance: float) -> Limits:
+        """Limits of detection where all tests of the run have this probability of a false alarm."""
+        return self.limits(self.draws, chance / self.tests)
 
 
 def of_normal(z: float) -> float:
@@ -25,32 +86,60 @@ def of_normal(z: float) -> float:
     return math.erfc(abs(z) / math.sqrt(2)) if math.isfinite(z) else 0.0
 
 
-def mean(x: Floats) -> float:
-    """Chance of the mean of draws x (...)."""
-    return of_normal(float(np.sum(x)) / math.sqrt(x.size))
+def mean(x: Floats) -> Statistic:
+    """The mean of draws x (...)."""
+
+    def law(n: int, total: float) -> tuple[float, str]:
+        return of_normal(total / math.sqrt(n)), f"mean {total / n:+.2e}, of {n} draws"
+
+    return Statistic(draws=x.size, sums=(float(np.sum(x)),), law=law)
 
 
-def variance(x: Floats) -> float:
-    """Chance of the sum of squares of draws x (...), by chi-squared."""
-    from scipy.special import gammainc, gammaincc
+def variance(x: Floats) -> Statistic:
+    """The sum of squares of draws x (...), by chi-squared."""
+    from scipy.special import gammainc, gammaincc, gammainccinv, gammaincinv
 
-    half = float(np.sum(x * x)) / 2
-    if not math.isfinite(half):
-        return 0.0
-    return min(1.0, 2 * float(min(gammainc(x.size / 2, half), gammaincc(x.size / 2, half))))
+    def law(n: int, squares: float) -> tuple[float, str]:
+        half, words = squares / 2, f"variance {squares / n:.6f} where 1 is right, of {n} draws"
+        if not math.isfinite(half):
+            return 0.0, words
+        return min(1.0, 2 * float(min(gammainc(n / 2, half), gammaincc(n / 2, half)))), words
+
+    def limits(n: int, chance: float) -> Limits:
+        return Limits(temperature=float(gammainccinv(n / 2, chance / 2) / gammaincinv(n / 2, MISSED)) - 1)
+
+    return Statistic(draws=x.size, sums=(float(np.sum(x * x)),), law=law, limits=limits)
 
 
-def shape(x: Floats, degree: int = 4) -> float:
-    """Chance of the weight of the tails, or by degree 3 of the skewness, whatever the variance.
+def shape(x: Floats) -> Statistic:
+    """Skewness and weight of the tails of draws x (...), whatever the variance.
 
-    The mean of the Legendre polynomial of the rank 2 Phi(x) - 1 (Neyman's smooth test), of draws normalised
-    to variance 1: bounded, so that no single draw decides.
+    The means of the Legendre polynomials of degrees 3 and 4 of the ranks 2 Phi(x) - 1 (Neyman's smooth test),
+    of draws normalised to variance 1, in each piece by itself: bounded, so that no single draw decides.
     """
+    size = math.sqrt(max(float(np.mean(x * x)), 1e-300))
+
+    def law(n: int, *sums: float) -> tuple[float, str]:
+        chances = [
+            2 * _saddlepoint(total / n, n, degree) for total, degree in zip(sums, (3, 4), strict=False)
+        ]
+        return min(1.0, *chances), f"third moment {sums[2] / n:+.4f}, fourth {sums[3] / n:.4f}, of {n} draws"
+
+    moments = [float(np.sum((x / size) ** i)) for i in (3, 4)]
+    return Statistic(draws=x.size, sums=(*(_of_ranks(x, degree) for degree in (3, 4)), *moments), law=law)
+
+
+def tails(x: Floats) -> float:
+    """Chance of the weight of the tails of draws x (...), as `shape` has it of degree 4."""
+    return _saddlepoint(_of_ranks(x, 4) / x.size, x.size, 4)
+
+
+def _of_ranks(x: Floats, degree: int) -> float:
+    """The sum of a Legendre polynomial of the ranks of draws x (...), normalised to variance 1."""
     from scipy.special import erf
 
     u = erf(x.ravel() / math.sqrt(2 * max(float(np.mean(x * x)), 1e-300)))
-    value = float(np.mean(Legendre.basis(degree)(u)))
-    return _saddlepoint(value, x.size, degree) if math.isfinite(value) else 0.0
+    return float(np.sum(Legendre.basis(degree)(u)))
 
 
 @cache
@@ -64,7 +153,7 @@ def _saddlepoint(value: float, n: int, degree: int) -> float:
     """Two-sided chance of a mean of n values of the Legendre polynomial at uniform numbers."""
     values, parts = _quadrature(degree)
     if not np.min(values) < value < np.max(values) or n < 8:
-        return 1.0 if n < 8 else 0.0
+        return 1.0 if n < 8 and math.isfinite(value) else 0.0
 
     def moments(t: float) -> tuple[float, float, float]:
         weights = parts * np.exp(t * values)
@@ -84,6 +173,103 @@ def _saddlepoint(value: float, n: int, degree: int) -> float:
     tail = math.erfc(abs(w) / math.sqrt(2)) / 2
     tail += math.exp(-w * w / 2) / math.sqrt(2 * math.pi) * (1 / abs(t * math.sqrt(n * second)) - 1 / abs(w))
     return min(1.0, 2 * max(tail, 0.0))
+
+
+def largest(x: Floats, error: Floats) -> Statistic:
+    """The largest |x| of draws x (...) with rounding errors (...), and how far it is from the second largest.
+
+    The largest of n has an exact law, and so has the largest given the second.  Draws that are cut off have
+    too small a largest one, or two that are equal to rounding; one of another distribution is too large.
+    """
+    from scipy.special import log_ndtr, ndtri
+
+    def law(n: int, sizes: Floats, errors: Floats) -> tuple[float, str]:
+        # edges of the usual range, -inf of none
+        low, high = (-float(ndtri(-math.expm1(log / n) / 2)) for log in (math.log(USUAL), -USUAL))
+        words = f"largest {sizes[0]:.4f}, usual are {low:.2f} to {high:.2f}, of {n} draws"
+        if not math.isfinite(sizes[0]):
+            return 0.0, words
+        beyond = math.erfc(sizes[0] / math.sqrt(2))
+        smaller = n * math.log1p(-beyond) if beyond < 1 else -math.inf
+        # rounding may have made two sizes equal that were not
+        apart = log_ndtr(-sizes[0] - errors[0]) - log_ndtr(-sizes[1] + errors[1])
+        tied = -math.expm1(min(float(apart), 0.0))
+        return min(1.0, 3 * min(math.exp(smaller), -math.expm1(smaller), tied)), words
+
+    def join(one: Sums, other: Sums) -> Sums:
+        sizes, errors = (np.concatenate([a, b]) for a, b in zip(one, other, strict=True))
+        two = np.argsort(-sizes, kind="stable")[:2]
+        return sizes[two], errors[two]
+
+    none = np.zeros(2), np.zeros(2)
+    return Statistic(draws=x.size, sums=join(none, (np.abs(x.ravel()), error.ravel())), law=law, join=join)
+
+
+def neighbours(x: Floats) -> Statistic:
+    """The autocorrelation of draws x (f, ...) at a lag of one row.
+
+    Given every second row, the sum over the rows between is normal, with a variance that these have.
+    """
+
+    def law(n: int, products: float, squares: float, pairs: int) -> tuple[float, str]:
+        words = f"correlation {products / max(pairs, 1):+.2e}, of {n} draws"
+        if not pairs:
+            return 1.0, words
+        return of_normal(products / math.sqrt(squares)) if squares > 0 else 0.0, words
+
+    around = np.zeros_like(x[1::2])
+    around += x[0 : 2 * len(around) : 2]
+    after = x[2::2]
+    around[: len(after)] += after[: len(around)]
+    sums = float(np.sum(x[1::2] * around)), float(np.sum(around * around)), x[1:].size
+    return Statistic(draws=x.size, sums=sums, law=law)
+
+
+def foretold(x: Floats, y: Floats) -> Statistic:
+    """How well numbers y (k, s, n) of the usual size 1, each known before its draws x (u, s, n), go with
+    those of one column, or of all n together.
+
+    With S = sum x y and V = sum y**2, exp(l S - l**2 V/2) is 1 in the mean however y comes of draws before;
+    so is its average over normal l of variance 1/t, and the product of several x, which is 1/a or more with
+    a chance of at most a (Robbins, Ann. Math. Stat. 41 (1970) 1397): no less than the chance, for any s.
+    """
+    names = ("the momentum", "the force") if len(y) > 1 else ("the size of momenta",)
+
+    @np.errstate(all="ignore")
+    def law(n: int, s: int, products: Floats, known: Floats, squares: float) -> tuple[float, str]:
+        size = np.sqrt(squares / len(products) * np.sum(known, axis=1))
+        each = np.sum(products, axis=2) / size
+        u, i = np.unravel_index(np.argmax(np.where(np.isfinite(each), np.abs(each), np.inf)), each.shape)
+        words = f"correlation {each[u, i]:+.2e} with {names[i]} before, of {n} draws"
+        if not math.isfinite(squares):
+            return 0.0, words
+        columns = known.shape[-1]
+        S, V = (np.concatenate([z, np.sum(z, axis=-1, keepdims=True)], axis=-1) for z in (products, known))
+        t = s * np.append(np.ones(columns), columns) / FEW_TIMES
+        logs = np.sum(np.log1p(V / t) / 2 - S * S / (2 * (V + t)), axis=0)
+        return min(1.0, float(logs.size) * math.exp(min(float(np.min(logs)), 0.0))), words
+
+    sums = x.shape[1], np.einsum("usn,ksn->ukn", x, y), np.sum(y * y, axis=1), float(np.sum(x * x))
+    return Statistic(draws=x.size, sums=sums, law=law)
+
+
+def count(hits: int, n: int, p: float) -> Statistic:
+    """How many of n steps have a collision, each with probability p = 1 - exp(-x), x the friction rate times
+    the step: binomial."""
+    from scipy.special import bdtr, bdtrc, bdtri
+
+    def law(n: int, hits: int) -> tuple[float, str]:
+        below, above = float(bdtr(hits, n, p)), float(bdtrc(hits - 1, n, p)) if hits else 1.0
+        return min(1.0, 2 * min(below, above)), f"{hits} of {n} steps, expected {n * p:.1f}"
+
+    def limits(n: int, chance: float) -> Limits:
+        several = np.ceil(n * p) + np.arange(50 + 10 * int(np.sqrt(n * p)))
+        alarms = several[(several <= n) & (bdtrc(several - 1, n, p) <= chance / 2)]
+        if not len(alarms):
+            return NOT_KNOWN
+        return Limits(friction=math.log1p(-float(bdtri(alarms[0] - 1, n, MISSED))) / math.log1p(-p) - 1)
+
+    return Statistic(draws=n, sums=(hits,), law=law, limits=limits)
 
 
 def repeats(x: Floats) -> float:
@@ -116,46 +302,9 @@ def products(x: Floats) -> Floats:
 def pairs(x: Floats) -> float:
     """Chance of the largest of the sums of products of two columns of draws x (f, n), and of all neighbours
     together."""
-    one, z = neighbours(x.T), products(x)
+    one, z = neighbours(x.T).chance, products(x)
     n = len(z)
     return one if n < 3 else min(1.0, 2 * one, n * (n - 1) * of_normal(float(np.max(np.abs(z)))))
-
-
-def neighbours(x: Floats) -> float:
-    """Chance of the autocorrelation of draws x (f, ...) at a lag of one row.
-
-    Given every second row, the sum over the rows between is normal, with a variance that these have.
-    """
-    if len(x) < 2:
-        return 1.0
-    around = np.zeros_like(x[1::2])
-    around += x[0 : 2 * len(around) : 2]
-    after = x[2::2]
-    around[: len(after)] += after[: len(around)]
-    size = float(np.sum(around * around))
-    return of_normal(float(np.sum(x[1::2] * around)) / math.sqrt(size)) if size > 0 else 0.0
-
-
-def foretold(x: Floats, y: Floats) -> float:
-    """Chance that numbers y (k, s, n) of the usual size 1, each known before its draws x (u, s, n), go with
-    them so well: with those of one column, or of all n together.
-
-    With S = sum x y and V = sum y**2, exp(l S - l**2 V/2) is 1 in the mean however y comes of draws before;
-    so is its average over normal l of variance 1/t, and the product of several x, which is 1/a or more with
-    a chance of at most a (Robbins, Ann. Math. Stat. 41 (1970) 1397): no less than the chance, for any s.
-    """
-    if not np.all(np.isfinite(x)):
-        return 0.0
-    each, squares = np.einsum("usn,ksn->ukn", x, y), np.sum(y * y, axis=1)
-    n = each.shape[-1]
-    S, V = (np.concatenate([z, np.sum(z, axis=-1, keepdims=True)], axis=-1) for z in (each, squares))
-    t = x.shape[1] * np.append(np.ones(n), n) / FEW_TIMES
-    logs = np.sum(np.log1p(V / t) / 2 - S * S / (2 * (V + t)), axis=0)
-    return min(1.0, float(logs.size) * math.exp(min(float(np.min(logs)), 0.0)))
-
-
-FEW_TIMES = 30.0
-"""How much of its usual sum of squares what foretells may lack before it is seen less well."""
 
 
 def crossed(x: Floats, y: Floats) -> float:
@@ -169,14 +318,6 @@ def crossed(x: Floats, y: Floats) -> float:
     later, earlier = squares[n - far], squares[n] - squares[far]
     z = np.concatenate([sums[far] / np.sqrt(later), sums[-far[1:]] / np.sqrt(earlier[1:])])
     return min(1.0, len(z) * of_normal(float(np.max(np.abs(z))))) if np.all(np.isfinite(z)) else 0.0
-
-
-def count(hits: int, n: int, p: float) -> float:
-    """Chance of so many hits of n, each of probability p, by the binomial distribution."""
-    from scipy.special import bdtr, bdtrc
-
-    below, above = float(bdtr(hits, n, p)), float(bdtrc(hits - 1, n, p)) if hits else 1.0
-    return min(1.0, 2 * min(below, above))
 
 
 def normal_scores(x: Any) -> Floats:

@@ -32,9 +32,10 @@ MOST_A_FRAME = 20
 """Steps from frame to frame at most."""
 
 
-def between_collisions(q: Floats, v: Floats, h: float) -> list[Candidate]:
+def between_collisions(q: Floats, v: Floats, h: float) -> list[Candidate] | None:
     """Schemes with collisions, if between many of the frames h apart of q and v (f,) one map of determinant 1
-    holds to rounding, and between many not."""
+    holds to rounding, and between many not; none where what acts there is drawn and adds to the state, which
+    is no scheme's.  None where there is no such map."""
     sizes, n = np.array([np.std(q), np.std(v)]), len(q) - 1
     z = np.stack([(q - q[0]) / sizes[0], v / sizes[1]], axis=1)
     known, after = np.column_stack([z[:-1], np.ones(n)]), z[1:]
@@ -47,15 +48,18 @@ def between_collisions(q: Floats, v: Floats, h: float) -> list[Candidate]:
     still = np.max(np.abs(left), axis=1) < NO_COLLISION
     share = float(np.mean(still))
     if not FEWEST_OF_EACH <= np.sum(still) <= n - FEWEST_OF_EACH:
-        return []
+        return None
     spread = (still - share) / np.sqrt(share * (1 - share))
-    if not (chance.neighbours(spread[:, None]) > LEAST_CHANCE and collide(left[~still], known[~still])):
+    drawn, replaced = collide(left[~still], known[~still])
+    if not (chance.neighbours(spread[:, None]).chance > LEAST_CHANCE and drawn):
+        return None
+    if not replaced:
         return []
     entries = np.linalg.lstsq(known[still], after[still], rcond=None)[0]
     off = max(float(np.sqrt(np.mean((known[still] @ entries - after[still]) ** 2))), 2.0**-52)
     A = entries[:2].T
     if not (abs(np.linalg.det(A) - 1) < NO_COLLISION and A[0, 1] * A[1, 0] < 0):
-        return []
+        return None
     # both ends of a step of leapfrog are unlike by (h w)**2, which few digits may hide
     apart, least = abs(A[0, 0] - A[1, 1]), -A[0, 1] * A[1, 0] / MOST_A_FRAME
     room = TIMES_LEFT_OVER * off
@@ -66,30 +70,28 @@ def between_collisions(q: Floats, v: Floats, h: float) -> list[Candidate]:
     return [y for name in names for y in _of_scheme(name, A, h, share, n, float(np.var(v)), close)]
 
 
-def collide(changes: Floats, known: Floats) -> bool:
-    """Whether changes (f, k) are draws in place of the state (f, 3) before each, in units of its sizes.
+def collide(changes: Floats, known: Floats) -> tuple[bool, bool]:
+    """Whether changes (f, k) are draws beside what follows from the state (f, 3) before each, in units of its
+    sizes, and whether they take the place of it.
 
     A collision forgets half of a state or more, wherever in a frame it is; a shot of noise adds to it.
     """
-    lost, square = np.linalg.lstsq(known, changes, rcond=None)[:2]
-    error = np.sqrt(np.trace(np.linalg.pinv(known.T @ known)[:2, :2]) * np.sum(square) / len(known))
-    return are_drawn(changes, known) and not np.linalg.norm(lost[:2]) < 5 * error < 0.5
+    drawn, entries, rest = _fitted(changes, known)
+    error = np.sqrt(np.trace(np.linalg.pinv(known.T @ known)[:2, :2]) * np.sum(rest**2) / len(known))
+    return drawn, not np.linalg.norm(entries[:2]) < 5 * error < 0.5
 
 
-def are_drawn(changes: Floats, known: Floats) -> bool:
-    """Whether changes (f, k) are draws, beside what follows from the state (f, 3) before each: no rounding is
-    left of them, and what is left tells nothing of the next."""
-    if len(changes) < FEWEST_OF_EACH:
-        return False
-    rest = changes - known @ np.linalg.lstsq(known, changes, rcond=None)[0]
+def _fitted(changes: Floats, known: Floats) -> tuple[bool, Floats, Floats]:
+    """Whether changes (f, k) are draws beside a linear map of what is known (f, m): no rounding is left of
+    them, and what is left tells nothing of the next; the map (m, k), and what it leaves (f, k)."""
+    entries = np.linalg.lstsq(known, changes, rcond=None)[0]
+    rest = changes - known @ entries
     sizes = np.std(rest, axis=0)
-    if not np.max(sizes) > NO_COLLISION:
-        return False
-    for x in (rest / sizes).T[sizes > NO_COLLISION]:
-        one = min(chance.neighbours(x[:, None]), chance.repeats(x[:, None]), chance.together(x))
-        if not one > LEAST_CHANCE:
-            return False
-    return True
+    drawn = len(changes) >= FEWEST_OF_EACH and bool(np.max(sizes) > NO_COLLISION)
+    for x in (rest / sizes).T[sizes > NO_COLLISION] if drawn else ():
+        one = min(chance.neighbours(x[:, None]).chance, chance.repeats(x[:, None]), chance.together(x))
+        drawn = drawn and one > LEAST_CHANCE
+    return drawn, entries, rest
 
 
 def is_a_factor(before: Floats, after: Floats) -> bool:
@@ -102,7 +104,7 @@ def is_a_factor(before: Floats, after: Floats) -> bool:
     c, square = max(float(coefficients[0]), 0.0), float(np.mean((made - known @ coefficients) ** 2))
     b = square / 2 / (np.hypot(c * np.mean(K), np.sqrt(square / 2)) + c * np.mean(K))
     size = np.sqrt(2 * b * b + 4 * c * b * K)[:, None]
-    return bool(b > 0) and are_drawn(made[:, None] / size, known / size)
+    return bool(b > 0) and _fitted(made[:, None] / size, known / size)[0]
 
 
 def _of_scheme(

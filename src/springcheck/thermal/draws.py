@@ -49,7 +49,7 @@ class Reading:
     roundings: int
     """Largest `across` that rounding explains."""
     error: Floats
-    """Rounding error of each draw, (f-1, n), or of two a step (2, f-1, n)."""
+    """Rounding error of each draw, of the shape of `draws`."""
     hits: NDArray[np.bool_] | None = None
     """Where collisions took place, (f-1, n)."""
     missed: Floats | None = None
@@ -143,14 +143,14 @@ class _Reader:
             return self._collided(start, end)
         if self.scheme.fresh > 2:
             draws, unit = self._summed(start, end)
-            return self._reading(draws.transpose(1, 0, 2).reshape(-1, draws.shape[2]), None, unit)
+            return self._reading(_in_rows(draws), None, _in_rows(unit))
         draws, across, unit, unseen = self._solved(start, end, hit=False)
         c = self.scheme.carried
         if draws.shape[0] == 1:
             one = np.asarray(draws[0], np.float64)
             return self._reading(_whitened(one) if c else one, across, unit[0])
         if not c:
-            return self._reading(draws.transpose(1, 0, 2).reshape(-1, draws.shape[2]), None, unit)
+            return self._reading(_in_rows(draws), None, _in_rows(unit))
         # the last draw of each step is the first of the next; that of the start is not recorded
         off = np.abs(draws[0][1:] - draws[1][:-1]) / (unit[0][1:] + unit[1][:-1])
         off = np.where(unseen[1:] | unseen[:-1], np.maximum(across[1:], across[:-1]), off)
@@ -334,6 +334,11 @@ class _Reader:
             noise = LARGEST_DRAW * np.sum(np.abs(each), axis=0) / self.roundings
             across = np.where(unseen, np.max(np.abs(target - none) / (of + noise), axis=0), across)
         return found, across, unit, unseen
+
+
+def _in_rows(draws: Extended) -> Extended:
+    """Draws (2, f-1, n) of two a step as rows one after the other."""
+    return draws.transpose(1, 0, 2).reshape(-1, draws.shape[2])
 
 
 def _unit(u: int, j: int, like: Extended) -> Extended:

@@ -155,7 +155,8 @@ class Heat:
             # of motion that nothing holds the law has no stationary state
             law, error[1] = (law[0], nan), np.nan
         if self._scene.system.rods:
-            law, error[1] = (nan, np.full(len(nan), self._law_of_rods)), self._error_of_rods()
+            law_of_rods, error[1] = self._of_rods()
+            law = nan, np.full(len(nan), law_of_rods)
         return Heated(
             method=method, scheme=self._scheme, configurational=float(np.sum(q)) / bound if bound else np.nan,
             configurational_error=float(error[0]), configurational_law=float(np.mean(law[0])),
@@ -163,15 +164,14 @@ class Heat:
             kinetic_law=float(np.mean(law[1])),
         )  # fmt: skip
 
-    @property
-    def _law_of_rods(self) -> float:
-        """1 where rods move freely, each by itself, and all that acts on momenta acts across them."""
-        rods = self._scene.system.rods
-        free = rods and not rods.share and all(term.kind == "constraint" for term in self._scene.terms)
-        return 1.0 if free and THERMOSTATS[self._scheme].kinetic_of_rods else np.nan
-
-    def _error_of_rods(self) -> float:
-        """Standard error of squares of momenta that forget by exp(-friction h) a step."""
-        assert self._scene.bath is not None
-        square = np.exp(-2 * self._scene.bath.friction * self._scene.step * self._every)
-        return float(np.sqrt(2 * (1 + square) / ((1 - square) * max(self._frames, 2) * self._freedoms)))
+    def _of_rods(self) -> tuple[float, float]:
+        """The kinetic temperature of rods, 1 where they move freely, each by itself, and all that acts on
+        momenta acts across them; and the standard error of squares of momenta that forget by
+        exp(-friction h) a step."""
+        rods, bath = self._scene.system.rods, self._scene.bath
+        assert rods is not None
+        assert bath is not None
+        free = not rods.share and all(term.kind == "constraint" for term in self._scene.terms)
+        square = np.exp(-2 * bath.friction * self._scene.step * self._every)
+        error = np.sqrt(2 * (1 + square) / ((1 - square) * max(self._frames, 2) * self._freedoms))
+        return 1.0 if free and THERMOSTATS[self._scheme].kinetic_of_rods else np.nan, float(error)

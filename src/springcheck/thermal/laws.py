@@ -59,50 +59,41 @@ class Law:
         return np.reshape(p, (-1, 1, 1)) if np.ndim(p) else float(p)
 
     @cached_property
-    def branches(self) -> tuple[tuple[Any, Extended, Extended], ...]:
-        """The affine maps that a step may take: the chance of each, one or (n, 1, 1), A (n, 2, 2) and
-        G (n, 2, draws)."""
+    def _maps(self) -> tuple[tuple[Any, Extended, Extended], ...]:
+        """The affine maps of (q, p, carried draws) that a step may take: the chance of each, one or
+        (n, 1, 1), A (n, d, d), and G (n, d, fresh draws)."""
         if not self.scheme.collides:
-            return (self._branch(1.0, hit=False),)
+            return ((1.0, *self._map(hit=False)),)
         x = np.asarray(self.rate * self.h, np.longdouble).reshape((-1, 1, 1) if np.ndim(self.rate) else ())
-        return self._branch(np.exp(-x), hit=False), self._branch(-np.expm1(-x), hit=True)
+        return (np.exp(-x), *self._map(hit=False)), (-np.expm1(-x), *self._map(hit=True))
 
-    def _branch(self, chance: Any, *, hit: bool) -> tuple[Any, Extended, Extended]:
+    def _map(self, *, hit: bool) -> tuple[Extended, Extended]:
         m, k = (np.atleast_1d(np.asarray(x, np.longdouble)) for x in (self.m, self.k))
-        r, n = self.scheme.draws, len(m)
+        r, c, n = self.scheme.draws, self.scheme.carried, len(m)
         q, p, *draws = np.eye(2 + r, dtype=np.longdouble)[:, :, None] * np.ones(n)
         stepper = Stepper(
             self.scheme, h=self.h, m=m, rate=self.rate, thermal=self.thermal, width=np.longdouble
         )
         parts = {"slow": lambda q, p: (self.fast - k) * q, "fast": lambda q, p: -self.fast * q}
         whole = parts if self.scheme.splits else lambda q, p: -k * q
-        a, b = stepper(q, p, whole, draws, hit)
-        both = np.stack([a, b], axis=0).transpose(2, 0, 1)
-        return chance, both[:, :, :2], both[:, :, 2:]
+        out = np.zeros((n, 2 + c, 2 + r), np.longdouble)
+        out[:, :2] = np.stack(stepper(q, p, whole, draws, hit), axis=0).transpose(2, 0, 1)
+        # the last draws of this step are the first of the next
+        out[:, 2 + np.arange(c), 2 + r - c + np.arange(c)] = 1
+        return out[:, :, : 2 + c], out[:, :, 2 + c :]
 
     @property
     def A(self) -> Extended:  # noqa: N802 - the letter of the propagator
         """The propagator (n, 2, 2) of the means."""
-        return np.asarray(sum(np.asarray(chance, np.longdouble) * A for chance, A, _ in self.branches))
+        return np.asarray(
+            sum(np.asarray(chance, np.longdouble) * A[:, :2, :2] for chance, A, _ in self._maps)
+        )
 
     @property
     def G(self) -> Extended:  # noqa: N802 - the letter of the noise
         """The noise (n, 2, draws) of the last map: the only one, or that of a collision."""
-        return self.branches[-1][2]
-
-    @cached_property
-    def _maps(self) -> tuple[tuple[Any, Extended, Extended], ...]:
-        """The maps on (q, p, carried draws), with fresh draws alone."""
-        d, r, c = 2, self.scheme.draws, self.scheme.carried
-        out = []
-        for chance, of_state, noise in self.branches:
-            n = len(of_state)
-            A, G = (np.zeros((n, d + c, x), np.longdouble) for x in (d + c, r - c))
-            A[:, :d, :d], A[:, :d, d:], G[:, :d] = of_state, noise[:, :, :c], noise[:, :, c:]
-            # the last draws of this step are the first of the next
-            G[:, d + np.arange(c), r - 2 * c + np.arange(c)] = 1
-            out.append((chance, A, G))
-        return tuple(out)
+        _, A, fresh = self._maps[-1]
+        return np.concatenate([A[:, :2, 2:], fresh[:, :2]], axis=2)
 
     @cached_property
     def _even(self) -> Floats:

@@ -37,11 +37,6 @@ NO_RATE = 1e-300
 UNLIKE_A_FRAME = 0.2
 """Nats a frame by which two substeps may be less likely than the best, for more of them to be tried."""
 
-FULL_RANK = tuple(
-    name for name, one in THERMOSTATS.items() if one.full_rank and not one.carried and one.substeps <= 2
-)
-"""Schemes whose every step has new noise of rank two, of those that are told by a count the first."""
-
 EITHER_WAY = 0.5
 """Sine of the rotation between two frames, below which it is tried in both directions."""
 
@@ -82,10 +77,9 @@ def likely(
 
     None where every one falls short of a free map and a free noise by more than chance allows.
     """
-    q, v, unit = _scaled(q, v, h)
     found = [y for name in names for y in _of_scheme(THERMOSTATS[name], q, v, h, (1,), turn)]
     found += _of_more_substeps(found, q, v, h)
-    return _in_units(_compared(found, q, v, fits=not THERMOSTATS[names[0]].full_rank), unit)
+    return _compared(found, q, v, fits=not THERMOSTATS[names[0]].full_rank)
 
 
 def likely_apart(q: Floats, v: Floats, h: float, *, white: bool = True) -> list[Candidate]:
@@ -96,7 +90,6 @@ def likely_apart(q: Floats, v: Floats, h: float, *, white: bool = True) -> list[
     None as in `likely`.
     """
     found: list[Candidate] = []
-    q, v, unit = _scaled(q, v, h)
     for scheme in THERMOSTATS.values():
         if not scheme.rescales and scheme.substeps <= 2:
             at_once = scheme.full_rank and white != bool(scheme.carried)
@@ -109,21 +102,7 @@ def likely_apart(q: Floats, v: Floats, h: float, *, white: bool = True) -> list[
             kept[one.scheme] = one
         elif one.nats < ODDS:
             kept[one.scheme] = replace(before, strides=(*before.strides, *one.strides))
-    return _in_units([one for one in kept.values() if one.nats < ODDS or one.strides == (1,)], unit)
-
-
-def _scaled(q: Floats, v: Floats, h: float) -> tuple[Floats, Floats, float]:
-    """Positions and velocities in a unit of length near their own, a power of 2: no square underflows."""
-    unit = float(2.0 ** np.round(np.log2(max(np.std(q), h * np.std(v)))))
-    return np.asarray(q / unit), np.asarray(v / unit), unit
-
-
-def _in_units(found: list[Candidate], unit: float) -> list[Candidate]:
-    """Candidates of states in units of a length."""
-    return [
-        replace(y, thermal=y.thermal * unit * unit, thermal_error=y.thermal_error * unit * unit)
-        for y in found
-    ]
+    return [one for one in kept.values() if one.nats < ODDS or one.strides == (1,)]
 
 
 def _compared(found: list[Candidate], q: Floats, v: Floats, *, fits: bool = False) -> list[Candidate]:

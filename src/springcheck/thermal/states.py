@@ -15,28 +15,29 @@ from typing import Any
 import numpy as np
 
 from springcheck.physics.arrays import Floats
-from springcheck.thermal import chance
 from springcheck.thermal.catalogue import random_scheme
 from springcheck.thermal.collisions import between_collisions, collide, is_a_factor
 from springcheck.thermal.decays import GJ
 from springcheck.thermal.likelihood import ODDS, Candidate, likely, likely_apart
-
-FEWEST = 200
-"""Fewest frames from which draws are inferred."""
+from springcheck.thermal.residuals import (
+    FEWEST,
+    follows,
+    grows,
+    is_added,
+    is_correlated,
+    is_of_digits,
+    is_uniform,
+    is_white,
+    left_of,
+    regressed,
+)  # fmt: skip
 
 NOISE = 1e-3
 """Smallest noise of a step, relative to the motion, that is not taken for a file's rounding: that of gamma h
 = 5e-7."""
 
-WHITE = 1e-9
-"""Chance below which residuals are not white, and so no draws: deterministic motion beyond one frame's
-map."""
-
 COARSE = 0.01
 """Ratio of a file's rounding to the noise, from which on it hides whether a step had a collision."""
-
-EVEN = 1e-4
-"""Chance below which noise on momenta may be a factor, and no draw is inferred from it."""
 
 UNIT_ROOT = 20.0
 """Bias and spread of a root that is 1, in units of 1 over the number of frames."""
@@ -70,10 +71,6 @@ class Thermal:
         return best and self.known and self.candidates[0].strides == (1,)
 
 
-JOINED_FROM = 6.0
-"""Standard deviations of a correlation from which on particles are joined: 2e-9 of those that are not."""
-
-
 def identify_thermal(
     t: Floats, q: Floats, v: Floats, beside: Floats | None = None, *, mixed: bool = False
 ) -> Thermal | None:
@@ -91,38 +88,52 @@ def identify_thermal(
         sizes = np.array([np.std(q), np.std(v)])
     if not np.all((sizes > 0) & (sizes < np.inf)) or not h > 0:
         return None
+    # in a unit of length near that of the motion, a power of 2, no square underflows
+    unit = float(2.0 ** np.round(np.log2(max(sizes[0], h * sizes[1]))))
+    found = _identified(q / unit, v / unit, h, None if beside is None else beside / unit, mixed)
+    return found and replace(
+        found,
+        candidates=tuple(
+            replace(y, thermal=y.thermal * unit * unit, thermal_error=y.thermal_error * unit * unit)
+            for y in found.candidates
+        ),
+    )
+
+
+def _identified(q: Floats, v: Floats, h: float, beside: Floats | None, mixed: bool) -> Thermal | None:
+    sizes = np.array([np.std(q), np.std(v)])
     x, u = (q - q[0]) / sizes[0], v / sizes[1]
     # a constant beside the state: the centre is not known
-    frames = np.stack([x[1:], u[1:], x[:-1], u[:-1], np.ones(len(t) - 1)], axis=1)
+    frames = np.stack([x[1:], u[1:], x[:-1], u[:-1], np.ones(len(x) - 1)], axis=1)
     weights, turned = np.linalg.svd(frames, full_matrices=False)[1:]
     if weights[3] < NOISE * weights[0]:
         return None
     z = np.stack([x, u])
-    sizes_left, left = _left_of(z, np.empty((0, z.shape[1] - 1)))
+    sizes_left, left = left_of(z, np.empty((0, z.shape[1] - 1)))
     # a nonlinear force is no scheme's draw
     known = np.stack([x[:-1], u[:-1], np.ones(len(x) - 1)], axis=1)
-    bent = _follows(left[1], np.stack([x**2, x**3], axis=1)[:-1], known)
+    bent = follows(left[1], np.stack([x**2, x**3], axis=1)[:-1], known)
 
     def clear(found: Thermal | None) -> Thermal | None:
         return found and replace(found, known=found.known and not bent)
 
     # the residual of a coordinate without noise is rounding
-    added = partial(_is_added, left[sizes_left > NOISE], sizes_left[1] * left[1], u[1:])
+    added = partial(is_added, left[sizes_left > NOISE], sizes_left[1] * left[1], u[1:])
     even = added(1)
     rest = frames @ turned[4] / max(float(np.std(frames @ turned[4])), 1e-300)
     if beside is not None:
         moved = np.concatenate([beside[:-1], np.diff(beside, axis=0)], axis=1)
-        joined = weights[4] > 1e-9 * weights[3] and _follows(rest, moved, known)
-        if joined or _follows(left[1], moved, known):
-            size, joint = _left_of(z, moved.T)
+        joined = weights[4] > 1e-9 * weights[3] and follows(rest, moved, known)
+        if joined or follows(left[1], moved, known):
+            size, joint = left_of(z, moved.T)
             # of joined particles, as of one, what takes no noise leaves none that is white
-            noisy = np.max(size) > NOISE and all(map(_is_white, joint))
+            noisy = np.max(size) > NOISE and all(map(is_white, joint))
             return Thermal(candidates=(), free=(), misfit=nan, uniform=False) if noisy else None
     if weights[4] < 1e-3 * weights[3]:
         free = turned[4][:4] / np.tile(sizes, 2)
         misfit = weights[4] / weights[3]
         # the residual of digits is white but for neighbours, which share a frame
-        digits = misfit < 1e-9 or _is_of_digits(rest[::2])
+        digits = misfit < 1e-9 or is_of_digits(rest[::2])
         # of one draw the position and the momentum leave the same; a joint to what is beside may not show
         several = mixed or (beside is not None and beside.size > 0)
         if not (free[0] and digits):
@@ -131,66 +142,22 @@ def identify_thermal(
     jump = (x[2:] - x[:-2]) - 2 * h * sizes[1] / sizes[0] * u[1:-1]
     off = float(np.std(jump))
     # and of what frames two steps apart share none three steps apart do
-    if off < 1e-6 or (off < 1e-3 * sizes_left[0] and _is_of_digits(jump[::3])):
+    if off < 1e-6 or (off < 1e-3 * sizes_left[0] and is_of_digits(jump[::3])):
         return clear(_of_two_halves(q, h, off, beside, mixed))
-    if collided := tuple(between_collisions(q, v, h)):
-        return Thermal(candidates=collided, free=(), misfit=nan, uniform=False)
-    white = all(map(_is_white, left))
+    collided, white = between_collisions(q, v, h), all(map(is_white, left))
+    if collided or (white and collided is not None):
+        return Thermal(candidates=tuple(collided), free=(), misfit=nan, uniform=False)
     coloured = not (white and even)
     # draws that are carried on into the next frame are in no other
-    if coloured and not (all(_is_white(x[i::2]) for x in left for i in (0, 1)) and added(2)):
+    if coloured and not (all(is_white(x[i::2]) for x in left for i in (0, 1)) and added(2)):
         return None
     found = tuple(likely_apart(q, v, h, white=white))
     if white and coloured and not any(random_scheme(one.scheme).carried for one in found):
         return None
     return Thermal(
-        candidates=found, free=(), misfit=nan, uniform=_is_uniform(left[1]), known=not bent and white
-    )
-
-
-def _follows(left: Floats, beside: Floats, known: Floats) -> bool:
-    """Whether the residual of a map of what is `known` (f, k) depends on more, as on others (f, others)."""
-    for x in beside.T:
-        rest = x - known @ np.linalg.lstsq(known, x, rcond=None)[0]
-        size = float(np.linalg.norm(rest))
-        if size > 0 and abs(float(rest @ left)) > JOINED_FROM * size:
-            return True
-    return False
-
-
-def _left_of(z: Floats, beside: Floats) -> tuple[Floats, Floats]:
-    """Residuals of the best linear map of states and further regressors (k, f-1): their standard deviations
-    (2,), and over these (2, f-1)."""
-    known = np.concatenate([z[:, :-1], beside, np.ones((1, z.shape[1] - 1))]).T
-    left = (z[:, 1:].T - known @ np.linalg.lstsq(known, z[:, 1:].T, rcond=None)[0]).T
-    size = np.std(left, axis=1)
-    return np.asarray(size), np.asarray(left / np.maximum(size, 1e-300)[:, None])
-
-
-def _is_added(noisy: Floats, left: Floats, u: Floats, every: int) -> bool:
-    """Whether what is left is added to the momenta u - left, and no factor of them: its size says nothing of
-    theirs, its sign over theirs nothing of that so many frames later, nor does what `noisy` numbers leave."""
-    if len(u) < FEWEST * every:
-        return False
-    made = u - np.mean(u) - left
-    large = [np.sign(np.abs(x) - np.median(np.abs(x))) for x in (left, made)]
-    after = (np.sign(left * made), left / max(float(np.std(left)), 1e-300))
-    chances = [chance.neighbours(x[j::every, None]) for x in after for j in range(every)]
-    chances += [chance.together(x[j::every]) for x in noisy for j in range(every)]
-    return min(chance.mean(large[0] * large[1]), *chances) > EVEN
-
-
-def _is_white(x: Floats) -> bool:
-    return min(chance.neighbours(x[:, None]), chance.repeats(x[:, None])) > WHITE
-
-
-def _is_of_digits(x: Floats) -> bool:
-    """Whether residuals are rounding to digits: their size goes with a number's, their sign with nothing."""
-    return _is_white(np.sign(x - np.median(x)))
-
-
-def _is_uniform(x: Floats) -> bool:
-    return bool(np.max(np.abs(x)) < 1.9 and chance.shape(x) < WHITE)
+        candidates=found, free=(), misfit=nan, uniform=is_uniform(left[1]),
+        known=not bent and white and not grows(left[1], x[:-1], x[1:]),
+    )  # fmt: skip
 
 
 def _of_one(
@@ -236,7 +203,7 @@ def _of_one(
         often = close > COARSE or float(np.quantile(np.abs(changes), 0.05)) > close
         state = np.stack([(q[:-1] - q[0]) / np.std(q), v[:-1] / np.std(v), np.ones(len(v) - 1)], axis=1)
         struck = np.abs(changes) > close
-        collides = collide(changes[struck, None], state[struck])
+        collides = all(collide(changes[struck, None], state[struck]))
         names: tuple[str, ...] = ("andersen", "andersen-after-kick") if collides else ()
         names += ("bussi", "bussi-unsigned") if often and is_a_factor(v[:-1], drawn) else ()
         if not names:
@@ -245,7 +212,7 @@ def _of_one(
         left = np.empty(0)
     elif abs(b) <= close * h and near(d, -h) and -1 < c < 1:
         # noise that is no factor of the momenta, and no friction of theirs, is added to them
-        added = even and _decay(q, v)[0] >= 1 - UNIT_ROOT / len(q) and _is_white(left)
+        added = even and _decay(q, v)[0] >= 1 - UNIT_ROOT / len(q) and is_white(left)
         known = {"omega": float(np.sqrt(2 * (1 + c)) / h), "omega_error": 0.0}
         found = [] if added else [Candidate(scheme="bussi-after", **known)]
         if found and not is_a_factor(v[:-1] - known["omega"] ** 2 * kicks, v[1:]):
@@ -254,7 +221,7 @@ def _of_one(
     elif near(c, -1) and abs(d) <= close * h:
         roots = {n: (lambda x, c2=c2: np.sqrt((1 - c2(x)) / x)) for n, c2 in GJ.items()}
         if near(b, -h):
-            if not _is_white(left) and _is_correlated(left):
+            if not is_white(left) and is_correlated(left):
                 found, left = likely(("gj-iii-half",), q, v, h), np.empty(0)
                 if found and close > 1e-6:
                     # of little friction few digits do not show a step that is not stretched
@@ -267,11 +234,11 @@ def _of_one(
                 one = "gj-iii-half"
                 found = likely((one,), q, v, h) if one in names else []
                 found += [Candidate(scheme=name) for name in names if name != one]
-        elif -b < h and _is_correlated(left):
+        elif -b < h and is_correlated(left):
             rates = {f"gj-{n}-half": _rate(root, -b / h) for n, root in roots.items()}
             found = [Candidate(scheme=n, friction=x / h, friction_error=0.0) for n, x in rates.items() if x]
             left = np.empty(0)
-    if len(left) and not _is_white(left):
+    if len(left) and not is_white(left):
         return None
     if len(left) and not even and not any(x.scheme == "andersen-leapfrog" for x in found):
         return None
@@ -282,16 +249,9 @@ def _of_one(
     alike = {x.scheme for x in found} - ({"andersen-leapfrog"} if len(found) > 1 else set())
     return Thermal(
         candidates=tuple(found), free=tuple(map(float, free)), misfit=misfit,
-        uniform=bool(len(left)) and _is_uniform(left), added=added,
+        uniform=bool(len(left)) and is_uniform(left), added=added,
         known=alike not in ({"bussi-after"}, {"gj-iii-half"}) and "bussi" not in alike and close <= COARSE,
     )  # fmt: skip
-
-
-def _is_correlated(x: Floats) -> bool:
-    """Whether neighbours share something, and others nothing, as draws that act in two steps; what these
-    leave of the best map fades in a few."""
-    far = [abs(float(np.mean(x[lag:] * x[:-lag]))) for lag in range(6, 30)]
-    return max(far) < 0.3
 
 
 def _rate(of: Callable[[Floats], Floats], wanted: float) -> float | None:
@@ -337,16 +297,6 @@ def _as_gj(number: str, decay: float, slow: float, error: float, t: float, h: fl
     return Candidate(scheme=f"gj-{number}", omega=omega, omega_error=known, friction=float(x[best] / h))
 
 
-def _regressed(known: Floats, x: Floats) -> tuple[Floats, Floats, Floats]:
-    """Regression of x (f,) on `known` (f, k): coefficients (k,), residuals (f,), standard errors (k,)."""
-    entries = np.linalg.lstsq(known, x, rcond=None)[0]
-    left = x - known @ entries
-    # columns of very different size would cost the inverse its digits
-    size = np.linalg.norm(known, axis=0)
-    of = np.sqrt(np.diag(np.linalg.inv((known / size).T @ (known / size)))) / size
-    return np.asarray(entries), np.asarray(left), np.asarray(np.std(left) * of)
-
-
 def _of_no_memory(q: Floats, v: Floats, close: float) -> tuple[str, ...]:
     """Schemes in which positions follow their velocities, v = (x' - x)/h, and a bath draws these anew at
     every step, or at some: between those leapfrog leaves v'' - 2 v' + v = -h w**2 (x' - x)."""
@@ -355,7 +305,7 @@ def _of_no_memory(q: Floats, v: Floats, close: float) -> tuple[str, ...]:
         together = slopes[4:] - slopes[:-4]
         if np.any(together < 1e-6 * np.abs(slopes[2:-2])):
             return ("andersen-leapfrog",)
-    entries, _, errors = _regressed(np.stack([v[:-1], q[:-1], np.ones(len(v) - 1)], axis=1), v[1:])
+    entries, _, errors = regressed(np.stack([v[:-1], q[:-1], np.ones(len(v) - 1)], axis=1), v[1:])
     if abs(entries[0] / errors[0]) > 5:
         # digits may hide that five steps of leapfrog have one slope, and few frames that a draw is carried on
         return ("gj-iii-half", *(() if close < 1e-6 else ("andersen-leapfrog",)))
@@ -367,18 +317,18 @@ def _of_two_halves(q: Floats, h: float, misfit: float, beside: Floats | None, mi
     """Schemes whose draw acts in two half kicks: each velocity of a half step has a draw of its own."""
     half = np.diff(q) / h
     known = np.stack([half[:-1], q[1:-1], np.ones(len(half) - 1)], axis=1)
-    entries, left, (of_c, of_kick, _) = _regressed(known, half[1:])
+    entries, left, (of_c, of_kick, _) = regressed(known, half[1:])
     c, kick, noise = float(entries[0]), float(entries[1]), float(np.std(left))
-    if noise == 0 or not _is_white(left / noise):
+    if noise == 0 or not is_white(left / noise):
         return None
     # a force that is not linear leaves more than draws
-    bent = _follows(left / noise, np.stack([q**2, q**3], axis=1)[1:-1], known)
+    bent = follows(left / noise, np.stack([q**2, q**3], axis=1)[1:-1], known)
     draws = left / noise
     if beside is not None:
         # a weak joint to what stands beside, which does not show by itself, is no draw
-        draws = _regressed(np.concatenate([known, beside[1:-1]], axis=1), draws)[1]
+        draws = regressed(np.concatenate([known, beside[1:-1]], axis=1), draws)[1]
         draws /= np.std(draws)
-    uniform, normal = _is_uniform(draws), bool(np.max(np.abs(draws)) > 2.2) and not mixed
+    uniform, normal = is_uniform(draws), bool(np.max(np.abs(draws)) > 2.2) and not mixed
     found = []
     for name, x, slope in (("lammps-langevin", 1 - c, 1.0), ("bbk", 2 * (1 - c) / (1 + c), 4 / (1 + c) ** 2)):
         # v' = c v - kick x' + noise, the kick of h w**2 and the noise over 1 + x/2 for BBK
@@ -396,5 +346,6 @@ def _of_two_halves(q: Floats, h: float, misfit: float, beside: Floats | None, mi
                 nats=inf if (uniform and name == "bbk") or (normal and name != "bbk") else 0.0,
             )
         )  # fmt: skip
-    ordered = tuple(sorted(found, key=lambda y: y.nats))
+    # noise in proportion to the force is none that a scheme adds
+    ordered = () if grows(draws, q[1:-1]) else tuple(sorted(found, key=lambda y: y.nats))
     return Thermal(candidates=ordered, free=(), misfit=misfit, uniform=uniform, known=not bent)

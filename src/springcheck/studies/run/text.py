@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from springcheck import checks, schemes
-from springcheck.physics.trajectory import Comparison, Limits, Verdict
+from springcheck.physics.trajectory import Comparison, Verdict
 from springcheck.studies.ensemble import STUDY as ENSEMBLE
 from springcheck.studies.run.result import MethodRun, Repeat, Repeats, Report, Stored
 from springcheck.studies.text import left_out, of_energy
@@ -238,16 +238,17 @@ def _cell(verdict: Verdict | None) -> Text:
 
 
 def sights(verdicts: Sequence[Verdict]) -> Lines:
-    """The smallest detectable error of a stiffness, in the best and the worst method."""
-    methods = dict.fromkeys(v.method for v in verdicts if v.passed)
-    best = {name: Limits.least(v.sees for v in verdicts if v.passed and v.method == name) for name in methods}
-    known = {name: sees.stiffness for name, sees in best.items() if sees.stiffness is not None}
-    if not known:
-        return []
-    keen, dull = (how(known, key=lambda name: known[name]) for how in (min, max))
-    said = [f"A stiffness off by {known[keen]:.1e} would be seen in {keen}"]
-    if dull != keen:
-        said = [f"{said[0]},", f"one off by {known[dull]:.1e} in {dull} and in all between"]
+    """Smallest detectable errors of a stiffness and of a temperature, in the best and the worst method."""
+    said = []
+    for quantity in ("stiffness", "temperature"):
+        seen = [(x, v.method) for v in verdicts if v.passed and (x := getattr(v.sees, quantity)) is not None]
+        known = {method: least for least, method in sorted(seen, reverse=True)}
+        if known:
+            keen, dull = (how(known, key=known.__getitem__) for how in (min, max))
+            said.append(f"A {quantity} off by {known[keen]:.1e} would be seen in {keen}")
+            if dull != keen:
+                said[-1] += ","
+                said.append(f"one off by {known[dull]:.1e} in {dull} and in all between")
     return [plain(line, "dim") for line in said]
 
 
