@@ -129,7 +129,8 @@ def trajectory(
     return Trajectory(
         label=label,
         t=arrays["time"],
-        **{name: arrays.get(name, np.empty((0, x.particles))) for name in "qp"},
+        q=arrays["q"],
+        p=arrays["p"],
         energy=arrays.get("energy"),
         last_step=arrays.get("last_step"),
         outcome=Outcome(**parts["outcome"]),
