@@ -163,3 +163,10 @@ def test_what_no_number_explains_is_not_said_to_be_the_scheme() -> None:
         p = run.p.copy()
         p[77] *= 1 + 1e-13
         assert "every step" not in said(scene, replace(run, p=p)).lower()
+
+
+def test_of_several_springs_the_one_that_is_off_is_said() -> None:
+    """The first of them was: "stiffer by -1.1e-16"."""
+    scene = scenefile.load_scene("orbit")
+    run = driver.run(other(scene, 0, "k", 1, 2.9 * (1 + 1e-8)), "own:velocity-verlet")
+    assert "stiffer by +1.0e-08" in said(scene, run)
