@@ -46,13 +46,6 @@ class Chance(NamedTuple):
     why: str
     sees: Limits = NOT_KNOWN
 
-    @property
-    def finding(self) -> Finding:
-        """Value and bound in decades of chance, as for the only random verdict of a command."""
-        with np.errstate(divide="ignore"):
-            value = -np.log10(np.float64(self.chance))
-        return Finding(value, -np.log10(FALSE_ALARMS), DECADES, self.why, self.sees)
-
 
 FALSE_ALARMS = 1e-6
 """Probability of a false alarm of a whole command in which all is right."""
@@ -145,7 +138,10 @@ def verdict(method: str, check: str, found: Finding | Chance | str) -> Verdict:
     passed.  The verdict's value and bound are finite: `BEYOND` stands for a value that is not, and fails.
     """
     if isinstance(found, Chance):
-        found = found.finding
+        # in decades, the bound that of the only random verdict of a command
+        with np.errstate(divide="ignore"):
+            value = -np.log10(np.float64(found.chance))
+        found = Finding(value, -np.log10(FALSE_ALARMS), DECADES, found.why, found.sees)
     if isinstance(found, Finding) and float(found.bound) == np.inf and not np.isnan(float(found.value)):
         found = "what rounding or the tolerance allows is beyond all numbers"
     if isinstance(found, str):

@@ -127,10 +127,10 @@ def trajectory(
         part, _, own = field.rpartition(".")
         parts[part][own] = getattr(x, name)
     parts[""]["every"] *= stride
+    parts[""] |= {name: arrays.get(name, np.empty((0, x.particles))) for name in "qp"}
     return Trajectory(
         label=label,
         t=arrays["time"],
-        **{name: arrays.get(name, np.empty((0, x.particles))) for name in "qp"},
         energy=arrays.get("energy"),
         last_step=arrays.get("last_step"),
         outcome=Outcome(**parts["outcome"]),
