@@ -170,3 +170,11 @@ def test_of_several_springs_the_one_that_is_off_is_said() -> None:
     scene = scenefile.load_scene("orbit")
     run = driver.run(other(scene, 0, "k", 1, 2.9 * (1 + 1e-8)), "own:velocity-verlet")
     assert "stiffer by +1.0e-08" in said(scene, run)
+
+
+@pytest.mark.parametrize(("name", "factor"), [("chain", -1.0), ("anharmonic", -1.0), ("anharmonic", 1.0001)])
+def test_a_factor_to_the_forces_of_all_terms_is_named(name: str, factor: float) -> None:
+    """A sign that is wrong in every force was no cause: each term by itself explains no step."""
+    scene = scenefile.load_scene(name).derived(steps=100)
+    shown = said(scene, driver.run(scene.system.scaled(factor), VERLET))
+    assert f"a factor to every force: {factor:g}, not 1" in shown
