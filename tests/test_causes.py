@@ -8,6 +8,7 @@ from itertools import product
 import numpy as np
 import pytest
 
+import springcheck
 from springcheck import checks, driver
 from springcheck.checks import Case, causes
 from springcheck.identify import files
@@ -178,3 +179,9 @@ def test_a_factor_to_the_forces_of_all_terms_is_named(name: str, factor: float) 
     scene = scenefile.load_scene(name).derived(steps=100)
     shown = said(scene, driver.run(scene.system.scaled(factor), VERLET))
     assert f"a factor to every force: {factor:g}, not 1" in shown
+
+
+def test_a_run_in_a_bath_says_what_its_draws_show_as_the_judge_of_a_file_does() -> None:
+    scene = scenefile.load_scene("bath-spring").derived(steps=400)
+    report = springcheck.run(scene, "own:baoab", faults=["calories"], seed=3)
+    assert "the noise is 2.0" in checks.cause_of(report.verdicts)
