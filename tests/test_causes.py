@@ -8,6 +8,7 @@ from itertools import product
 import numpy as np
 import pytest
 
+import springcheck
 from springcheck import checks, driver
 from springcheck.checks import Case, causes
 from springcheck.identify import files
@@ -163,3 +164,24 @@ def test_what_no_number_explains_is_not_said_to_be_the_scheme() -> None:
         p = run.p.copy()
         p[77] *= 1 + 1e-13
         assert "every step" not in said(scene, replace(run, p=p)).lower()
+
+
+def test_of_several_springs_the_one_that_is_off_is_said() -> None:
+    """The first of them was: "stiffer by -1.1e-16"."""
+    scene = scenefile.load_scene("orbit")
+    run = driver.run(other(scene, 0, "k", 1, 2.9 * (1 + 1e-8)), "own:velocity-verlet")
+    assert "stiffer by +1.0e-08" in said(scene, run)
+
+
+@pytest.mark.parametrize(("name", "factor"), [("chain", -1.0), ("anharmonic", -1.0), ("anharmonic", 1.0001)])
+def test_a_factor_to_the_forces_of_all_terms_is_named(name: str, factor: float) -> None:
+    """A sign that is wrong in every force was no cause: each term by itself explains no step."""
+    scene = scenefile.load_scene(name).derived(steps=100)
+    shown = said(scene, driver.run(scene.system.scaled(factor), VERLET))
+    assert f"a factor to every force: {factor:g}, not 1" in shown
+
+
+def test_a_run_in_a_bath_says_what_its_draws_show_as_the_judge_of_a_file_does() -> None:
+    scene = scenefile.load_scene("bath-spring").derived(steps=400)
+    report = springcheck.run(scene, "own:baoab", faults=["calories"], seed=3)
+    assert "the noise is 2.0" in checks.cause_of(report.verdicts)

@@ -450,9 +450,8 @@ def test_the_closed_form_of_a_driven_scheme_is_where_its_steps_lead(
     law = schemes.SCHEMES[name]
     scene = driven(3.7, k, c, (0.43, frequency, 0.6), step=step, steps=200)
     if name == "semi-implicit-euler" and frequency == W:
-        turn = float(
-            schemes.rotation(checks.Case(trajectory=rest(scene, law), scene=scene).undriven.matrices).angle[0]
-        )
+        alone = checks.Case(trajectory=rest(scene, law), scene=scene).undriven
+        turn = float(schemes.rotation(alone.law.propagator).angle[0])
         scene = driven(3.7, k, c, (0.43, turn / step, 0.6), step=step, steps=200)
     case = checks.Case(trajectory=rest(scene, law), scene=scene)
     if checks.closed_form(case).passed is None:

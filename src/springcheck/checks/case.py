@@ -82,11 +82,6 @@ class Case(Claim):
         """Whether every step keeps area: a symplectic scheme, and no friction."""
         return self.law.has("symplectic", "undamped")
 
-    @property
-    def matrices(self) -> Extended:
-        """One-step matrices of the modes, on (y, v)."""
-        return self.law.propagator
-
     @cached_property
     def w(self) -> Extended:
         """Frequencies that scale mode positions to velocities; a free mode takes 1/duration."""
@@ -192,16 +187,15 @@ class Case(Claim):
         rest."""
         alone = self.undriven
         u, v = schemes.propagate(
-            alone.matrices, *alone.mode_start, steps, area_preserving=alone.area_preserving
+            alone.law.propagator, *alone.mode_start, steps, area_preserving=alone.area_preserving
         )
         if alone is self:
             return u, v
         # imported here: scenes without a drive do without it
         from springcheck.schemes import forced
 
-        y, w = forced.answer(
-            self.scheme, self.system, alone.system.modes, alone.matrices, h=self.trajectory.step, steps=steps
-        )
+        one_step, h = alone.law.propagator, self.trajectory.step
+        y, w = forced.answer(self.scheme, self.system, alone.system.modes, one_step, h=h, steps=steps)
         return u + y, v + w
 
     @cached_property
@@ -213,7 +207,7 @@ class Case(Claim):
         `Norm.most`.
         """
         alone, n = self.undriven, self.scene.n
-        total, grown = schemes.amplification(alone.matrices, alone.w, self.steps)
+        total, grown = schemes.amplification(alone.law.propagator, alone.w, self.steps)
         # without that of a clock
         size = self.system.norm.most(*(one[:, :n] for one in self.clocked.allowance))
         size = np.maximum.accumulate(np.concatenate([size[:1], size]))
@@ -224,7 +218,7 @@ class Case(Claim):
             before = self.envelope, (self.scene.q, self.scene.p)
             first = np.max([self.system.norm.most(*self.allowance_at(*x)) for x in before])
         bound = np.asarray(self.roundings * total)
-        condition = float(np.max(schemes.condition(alone.matrices, alone.w)))
+        condition = float(np.max(schemes.condition(alone.law.propagator, alone.w)))
         if np.isfinite(condition):
             bound = np.minimum(bound, condition * self.walk(self.steps))
         return bound, np.asarray(np.maximum(size, first * grown))
@@ -276,7 +270,7 @@ class Case(Claim):
         a mode that does not turn is left at its start.
         """
         modes, (u, v) = self.system.modes, self.mode_start
-        axes = schemes.condition(self.matrices, self.w)
+        axes = schemes.condition(self.law.propagator, self.w)
         reach = np.hypot(self.w * u, v) * np.where(np.isfinite(axes), axes, 1)
         q = np.abs(modes.rest) + modes.spread(reach / self.w) / modes.root_m
         return np.asarray(q), np.asarray(modes.spread(reach) * modes.root_m)
@@ -343,7 +337,7 @@ def _leap(case: Case, q: Extended, p: Extended, steps: int) -> tuple[Extended, E
     """Many steps at once: the power of each mode's matrix, in its closed form."""
     one, none = np.ones_like(case.system.modes.w2), np.zeros_like(case.system.modes.w2)
     powers = [
-        schemes.propagate(case.matrices, y, v, np.array([steps]), area_preserving=case.area_preserving)
+        schemes.propagate(case.law.propagator, y, v, np.array([steps]), area_preserving=case.area_preserving)
         for y, v in ((one, none), (none, one))
     ]
     (a, c), (b, d) = powers

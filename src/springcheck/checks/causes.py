@@ -7,12 +7,14 @@ from the positions.  The effect of a bath is in the draws that the states imply,
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
 from springcheck.checks import driven, other
 from springcheck.checks.case import Case
 from springcheck.checks.requires import MAP, missing
+from springcheck.checks.steps import step_defect
 from springcheck.checks.thermal import reading
 from springcheck.physics.arrays import Floats, Reals
 from springcheck.thermal import THERMOSTATS
@@ -30,6 +32,9 @@ FEWEST_DRAWS = 50
 FIT_ROUNDS = 20
 """Iterations of a fit whose weights are its own variances."""
 
+DIFFERENCE_ROUNDINGS = 8
+"""Roundings of a velocity from a difference: of that, of a product and a quotient, and of recording it."""
+
 SAME_DRAWS = 1e-6
 """Relative difference up to which two draws count as one number."""
 
@@ -37,18 +42,38 @@ SAME_DRAWS = 1e-6
 @np.errstate(all="ignore")
 def found(case: Case, shown: Callable[[], str] = str) -> str:
     """The cause in one sentence, or "" where nothing known here, nor what the states show, explains them."""
+    run, system = case.trajectory, case.scene.system
+    ways: list[Callable[[Case], str]] = []
+    if run.every == 1 and run.scheme in THERMOSTATS:
+        ways = [_of_bath]
+    elif run.every == 1 and not missing(case, MAP):
+        ways = [_of_differences, driven.found, _of_rods]
     # of one particle by itself states show more than which number is another
-    looks = [shown, lambda: other.found(case)]
-    if not (case.scene.system.is_linear and case.scene.system.is_separate):
-        looks.reverse()
-    here = _of_bath if case.trajectory.scheme in THERMOSTATS else _of_rods
-    return driven.found(case) or here(case) or looks[0]() or looks[1]()
+    looks: list[Callable[[Case], str]] = [lambda case: shown(), other.found]
+    ways += looks if system.is_linear and system.is_separate else reversed(looks)
+    return next(filter(None, (way(case) for way in ways)), "")
+
+
+def _of_differences(case: Case) -> str:
+    """Velocities that are differences of the positions, where every step is right to what those keep."""
+    run, m = case.trajectory, case.judged.m
+    if run.rebuilds_velocity:
+        return ""
+    for words, n in (("differences", 1), ("central differences", 2)):
+        p, made = run.p[1 : len(run.p) - n + 1], m * (run.q[n:] - run.q[:-n]) / (n * run.step)
+        are = np.all(np.abs(p - made) <= DIFFERENCE_ROUNDINGS * run.arithmetic.state * np.abs(p))
+        if are and step_defect(replace(case, trajectory=replace(run, rebuilds_velocity=True))).passed:
+            return (
+                f"velocities are {words} of the positions, which keep eps q/h of them, and each step is "
+                "right to that: judge it with --differences (in Python rebuilds_velocity=True of the run)"
+            )
+    return ""
 
 
 def _of_rods(case: Case) -> str:
     """The direction of the impulses along rods, where it is not that of the rods before the drift."""
     rods, run = case.system.rods, case.trajectory
-    if rods is None or rods.share or missing(case, MAP) or run.every > 1 or len(run.t) < 3:
+    if rods is None or rods.share or len(run.t) < 3:
         return ""
     drifts = [kind for kind in case.scheme.kinds if kind.drifts]
     if len(drifts) != 1:

@@ -61,11 +61,6 @@ class Chance(NamedTuple):
         with np.errstate(divide="ignore"):
             return float(-np.log10(np.float64(self.chance)))
 
-    @property
-    def finding(self) -> Finding:
-        """Value and bound in decades of chance, as for the only random verdict of a command."""
-        return Finding(self.decades, -np.log10(FALSE_ALARMS), DECADES, self.why)
-
 
 FALSE_ALARMS = 1e-6
 """Probability of a false alarm of a whole command in which all is right."""
@@ -177,7 +172,8 @@ def verdict(method: str, check: str, found: Finding | Chance | str) -> Verdict:
     """
     statistic = found.statistic if isinstance(found, Chance) else None
     if isinstance(found, Chance):
-        found = found.finding
+        # the bound is that of the only random verdict of a command
+        found = Finding(found.decades, -np.log10(FALSE_ALARMS), DECADES, found.why)
     if isinstance(found, Finding) and float(found.bound) == np.inf and not np.isnan(float(found.value)):
         found = "what rounding or the tolerance allows is beyond all numbers"
     if isinstance(found, str):

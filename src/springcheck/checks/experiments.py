@@ -124,35 +124,34 @@ def symplecticity(bench: Bench) -> Finding | str:
     return Finding(off[worst], limit[worst], "of an action", why, sees)
 
 
-def _shifted(
-    scene: Scene, scheme: schemes.Scheme, state: tuple[Reals, Reals], sign: int
-) -> tuple[Floats, Floats]:
-    """The state a first stage of a two-stage scheme on, or back: there its adjoint is synchronised."""
-    q, p = (x.astype(np.longdouble) for x in state)
-    h = np.longdouble(sign * scene.step)
-    if scheme.kinds[0].kicks:
-        p = p + h * scene.system.force(q, p)
+def _shifted(case: Case, q: Reals, p: Reals, sign: int) -> tuple[Reals, Reals]:
+    """The state a first stage of a two-stage scheme on, or back: there its adjoint is synchronised.
+
+    Kick-drift and drift-kick undo each other, but for that stage at start and end; other schemes undo
+    themselves.
+    """
+    if len(case.scheme.stages) != 2:
+        return q, p
+    q, p, h = q.astype(np.longdouble), p.astype(np.longdouble), np.longdouble(sign * case.judged.step)
+    if case.scheme.kinds[0].kicks:
+        p = p + h * case.system.force(q, p)
     else:
-        q = q + h * (p / scene.m)
+        q = q + h * (p / case.judged.m)
     return np.asarray(q, np.float64), np.asarray(p, np.float64)
 
 
 @check("reverse", family="map", requires={"one-step", "undamped", "reversible", "autonomous"})
 def reversibility(bench: Bench) -> Finding | str:
     """Run, momenta flipped, and run again, the scene is back where it started, to rounding."""
-    scheme = bench.scheme
-    two_stage = len(scheme.stages) == 2
     out = bench.trajectory
     steps = len(out.t) - 1
     case = Case(trajectory=out, scene=bench.scene)
     if out.outcome.status != "complete" or not steps:
         return "the run did not come to its end"
-    state = out.q[-1], -out.p[-1]
+    state: tuple[Reals, Reals] = (out.q[-1], -out.p[-1])
     if not np.isfinite(state).all():
         return Finding(np.inf, case.roundings, "roundings", ENDED)
-    # kick-drift and drift-kick undo each other; they differ by the first stage, at start and end
-    if two_stage:
-        state = _shifted(case.judged, scheme, state, -1)
+    state = _shifted(case, *state, -1)
     back = bench.run(bench.scene.derived(q=state[0], p=state[1], steps=steps, every=1), bench.label)
     # size of the forward run alone: a backward run that explodes must not enlarge its own bound
     size = np.max(case.system.norm.most(*case.allowance_at(out.q, out.p)))
@@ -162,9 +161,7 @@ def reversibility(bench: Bench) -> Finding | str:
     bound = case.roundings * enlarged
     if len(back.t) < len(out.t):
         return Finding(np.inf, bound, "roundings", "it ended early on its way back")
-    end = back.q[-1], back.p[-1]
-    if two_stage:
-        end = _shifted(case.judged, scheme, end, 1)
+    end = _shifted(case, back.q[-1], back.p[-1], 1)
     off = case.system.norm.size(end[0] - bench.scene.q, end[1] + bench.scene.p)
     # a motion that stands still after its turning point would end there, with the momenta flipped
     moved = case.system.norm.size(out.q - bench.scene.q, bench.scene.p - out.p)
@@ -182,21 +179,18 @@ def _sees(case: Case, steps: int, allowed: np.floating) -> Limits:
     """Relative error of momenta, made at each step, that brings the run back at the bound."""
     change = np.longdouble(sight.change_of(2 * steps))
     q, p = (x.astype(np.longdouble) for x in (case.scene.q, case.scene.p))
-    two_stage = len(case.scheme.stages) == 2
     for sign in (-1, 1):
         for _ in range(steps):
             q, p = case.step(q, p)
             p = p * (1 + change)
-        p = sign * p
-        if two_stage:
-            q, p = (x.astype(np.longdouble) for x in _shifted(case.judged, case.scheme, (q, p), sign))
+        q, p = (x.astype(np.longdouble) for x in _shifted(case, q, sign * p, sign))
     off = case.system.norm.size(q - case.scene.q, p + case.scene.p)
     # beyond a small part of the motion the effect is no longer as large as the change
     told = allowed * change < off <= case.system.norm.unit * SMALL_PART
     return Limits(area=float(allowed * change / off)) if told else NOT_KNOWN
 
 
-def _enlarged(case: Case, steps: int, turned: tuple[Floats, Floats], size: np.floating) -> float | None:
+def _enlarged(case: Case, steps: int, turned: tuple[Reals, Reals], size: np.floating) -> float | None:
     """Amplification of one rounding in each of so many steps out and back, in roundings of this size, or
     None.
 
@@ -204,7 +198,7 @@ def _enlarged(case: Case, steps: int, turned: tuple[Floats, Floats], size: np.fl
     that is made there on the way back.
     """
     if case.linear:
-        total, grown = schemes.amplification(case.matrices, case.w, np.array([2 * steps + 2]))
+        total, grown = schemes.amplification(case.law.propagator, case.w, np.array([2 * steps + 2]))
         return float(total[0]) if grown[0] < 2 else None
     ways = [
         follow(case, q[None].astype(np.longdouble), p[None].astype(np.longdouble), steps + 1)

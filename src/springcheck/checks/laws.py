@@ -144,7 +144,7 @@ ODD, EVEN = 0.013, 2.0**-7
 def drifts(scene: Scene, run: Trajectory) -> tuple[Floats, Floats]:
     """Steps (f,) and relative change of each member's shadow energy at them (f, n)."""
     case = Case(trajectory=run, scene=scene)
-    form = schemes.invariant(case.matrices, h=run.step)
+    form = schemes.invariant(case.law.propagator, h=run.step)
     y, v = case.system.modes.into(run.q, run.p)
     energy = form[:, 0] * y * y + form[:, 1] * y * v + form[:, 2] * v * v
     return case.steps[1:].astype(np.float64), np.asarray(energy[1:] / energy[0] - 1, np.float64)

@@ -77,8 +77,8 @@ def _untold(case: Case, drowned: NDArray[np.bool_], what: str) -> str:
 def shadow_energy(case: Case) -> Finding | str:
     """The scheme's own energy of each mode is kept, or changes by its exact factor, to rounding."""
     run = case.trajectory
-    form = schemes.invariant(case.matrices, h=run.step)
-    turn = schemes.rotation(case.matrices)
+    form = schemes.invariant(case.law.propagator, h=run.step)
+    turn = schemes.rotation(case.law.propagator)
     factor = np.ones_like(turn.determinant) if case.area_preserving else turn.determinant
     (u0, v0), rest = case.mode_start, np.asarray(case.system.modes.rest, np.float64)
     first = form[:, 0] * u0 * u0 + form[:, 1] * u0 * v0 + form[:, 2] * v0 * v0
@@ -119,13 +119,13 @@ def shadow_energy(case: Case) -> Finding | str:
 @check("freq", family="motion", requires=CLOSED | {"undamped"})
 def frequency(case: Case) -> Finding | str:
     """The phase turns by the scheme's own frequency, to rounding."""
-    turn = schemes.rotation(case.matrices)
+    turn = schemes.rotation(case.law.propagator)
     u0, v0 = case.mode_start
     strength = np.where(turn.angle > 0, np.hypot(case.w * u0, v0), -1)
     j = int(np.argmax(strength))
     if strength[j] <= 0:
         return "no mode oscillates"
-    form = schemes.invariant(case.matrices, h=case.trajectory.step)[j]
+    form = schemes.invariant(case.law.propagator, h=case.trajectory.step)[j]
     u, v = case.system.modes.about_centres(case.trajectory.q[-1], case.trajectory.p[-1])
     steps = int(case.steps[-1])
     if steps == 0:
@@ -133,7 +133,7 @@ def frequency(case: Case) -> Finding | str:
     # in the coordinates of the invariant form a step is a plain rotation by -angle
     phase = _phase(form, u[j], v[j]) - _phase(form, u0[j], v0[j])
     # on an inverted spring a scheme with a backward substep can rotate the other way
-    backwards = np.sign(case.matrices[j, 0, 1])
+    backwards = np.sign(case.law.propagator[j, 0, 1])
     expected = backwards * turn.angle[j] * np.longdouble(steps)
     off = phase - expected
     off -= 2 * np.pi * np.round(off / (2 * np.pi)) if np.isfinite(off) else 0
@@ -147,7 +147,7 @@ def frequency(case: Case) -> Finding | str:
     if not np.isfinite(mode) or not np.isfinite(wide):
         return "what rounding may do is beyond all numbers"
     # an error e of a state of size z turns its phase by e/z, times the ratio of the ellipse's axes
-    shape = schemes.condition(case.matrices, case.w)[j]
+    shape = schemes.condition(case.law.propagator, case.w)[j]
     angle = bound[-1] * (wide / mode) * shape
     if angle >= 1:
         return "rounding may be as large as the mode, which has no phase then"
@@ -259,7 +259,7 @@ def _areas(
     (q, p), (dq, dp) = (tuple(one.astype(np.longdouble) for one in two) for two in (states, noise))
     factor: Extended | int = 1
     if not case.area_preserving:
-        d = schemes.rotation(case.matrices).determinant[x]
+        d = schemes.rotation(case.law.propagator).determinant[x]
         factor = d ** steps[:, None].astype(np.longdouble)
     first = start[0][x] * start[1][y] - start[0][y] * start[1][x]
     expected = np.sum(first * factor * np.ones((len(steps), 1)), axis=1)

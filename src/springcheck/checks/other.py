@@ -104,6 +104,9 @@ def _numbers(case: Case) -> Iterator[Number]:
                 other = partial(_with, case, number, column.field)
                 yield from _each(kind, " of ", numbers, other, where, reach, -1 if column.inverse else 1)
 
+    if sum(term.kind == "potential" for term in scene.terms) > 1:
+        yield "a factor to every force", 1.0, 0.0, lambda x: sight.of_scene(case, scene.system.scaled(x))
+
     def heavier(m: Floats) -> Case:
         # no mass is below 0
         return sight.of_scene(case, scene.derived(m=np.append(np.where(m > 0, m, np.nan), scene.m[n:])))

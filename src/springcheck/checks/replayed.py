@@ -9,6 +9,7 @@ exactly: it keeps the energy less (h**2/8) sum F**2/m, each step with its own h.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 from itertools import islice
 from typing import Any, NamedTuple, TypeAlias
 
@@ -38,14 +39,14 @@ Times: TypeAlias = tuple[float, float]
 
 @by_identity
 class _Replayed(NamedTuple):
-    """The replayed stretches between frames: arrays (f-1, n) and (f-1,)."""
+    """The replayed stretches between frames: of q and p (2, f-1, n), and (f-1,)."""
 
-    ends: tuple[Extended, Extended]
-    """Where the steps of each stretch end (f-1, n)."""
-    bounds: tuple[Extended, Extended]
-    """One rounding of all that these steps add up (f-1, n)."""
-    late: tuple[Extended, Extended]
-    """Effect of the roundings of the time on the end (f-1, n)."""
+    ends: Extended
+    """Where the steps of each stretch end."""
+    bounds: Extended
+    """One rounding of all that these steps add up."""
+    late: Extended
+    """Effect of the roundings of the time on the end."""
     gains: Extended
     """Energy that the steps add by their law (f-1,)."""
     loose: Extended
@@ -68,30 +69,22 @@ def _follow(case: Case) -> _Replayed | str:
         return "the length of the step before its first frame is not recorded"
     state, before, unsure = run.arithmetic.state + ROUNDOFF, 0.0, 0.0
     left, ended = MOST_REPLAYED, ""
-    rows: list[tuple[Any, ...]] = []
+    rows: list[list[Extended]] = []
     for i in range(len(run.t) - 1):
         first = tuple(x[i].astype(np.longdouble) for x in (run.q, run.p))
         times = float(case.steps[i] * run.step), float(case.steps[i + 1] * run.step)
-
-        def stretch(
-            before: float, at: tuple[Extended, Extended] = first, times: Times = times, most: int = left + 1,
-            last: float | None = None if told is None else float(told[i + 1]),
-        ) -> list[Taken]:  # fmt: skip
-            allow = allowed(case.scene)
-            steps = taken(
-                case.scheme, case.judged, at, before=before, times=times, tolerance=allow, last=last
-            )
-            return list(islice(steps, most))
-
+        rule: dict[str, Any] = {"times": times, "tolerance": allowed(case.scene)}
+        rule["last"] = None if told is None else float(told[i + 1])
+        stretch = partial(taken, case.scheme, case.judged, first, **rule)
         if told is not None and case.steps[i]:
             before, unsure = float(told[i]), 0.0
         if unsure > LOST * before:
             ended = "the last step before the next hangs on roundings alone"
             break
-        steps = stretch(before)
+        steps = list(islice(stretch(before=before), left + 1))
         # the rule is discontinuous where it holds a step: take both sides
         sides = (before + unsure, before - unsure) if unsure else ()
-        others = [stretch(side) for side in sides if side > 0]
+        others = [list(islice(stretch(before=side), left + 1)) for side in sides if side > 0]
         if not steps:
             return "two of its frames lie at one time"
         if max(map(len, (steps, *others))) > left:
@@ -99,7 +92,7 @@ def _follow(case: Case) -> _Replayed | str:
             break
         left -= len(steps)
         every = list(_rounded(case, steps, before))
-        end, (of_q, of_p), untrue, amiss = steps[-1].end, every[-1], 0.0, 0.0
+        end, untrue, amiss = steps[-1].end, 0.0, 0.0
         if told is not None:
             untrue, amiss = _untrue(case, steps, every, before, times)
             if not (told[i + 1] > 0 and (case.steps[i] or told[i] == 0)):
@@ -116,13 +109,11 @@ def _follow(case: Case) -> _Replayed | str:
             off += 2 * max(abs(abs(x[-1].h) - last) for x in others)
         before, unsure = last, float(off)
         shortest = min(abs(step.h) for step in steps)
-        known = len(steps), shortest, untrue
-        rows.append((*end, of_q, of_p, *late, gain, loose, *map(np.longdouble, known)))
+        row = end, every[-1], late, gain, loose, len(steps), shortest, untrue
+        rows.append([np.asarray(x, np.longdouble) for x in row])
     if not rows:
         return ended
-    found = [np.stack(column) for column in zip(*rows, strict=True)]
-    ends, bounds, late = ((found[i], found[i + 1]) for i in (0, 2, 4))
-    return _Replayed(ends, bounds, late, found[6], found[7], found[8], found[9], found[10], ended)
+    return _Replayed._make((*(np.stack(x, axis=x[0].ndim // 2) for x in zip(*rows, strict=True)), ended))
 
 
 def _gain(case: Case, steps: list[Taken]) -> Extended:

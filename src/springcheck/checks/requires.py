@@ -58,14 +58,14 @@ def _no_phase(case: Any) -> str | None:
     lost = case.system.norm.most(modes.blur, 0 * modes.w2) > case.growth[1][-1]
     if lost or np.any((modes.w2 == 0) & (modes.pull != 0)):
         return "a mode under a constant force has no closed form here"
-    determinant = schemes.rotation(case.matrices).determinant
+    determinant = schemes.rotation(case.law.propagator).determinant
     if not np.all(np.isfinite(determinant)):
         return "the equation of an implicit step has no solution here"
     if np.any(determinant <= 0):
         return "the step reverses orientation (det <= 0): it has no phase"
     if np.any(determinant < CONTRACTED):
         return "friction contracts area more in one step than the reference has digits for"
-    products = np.abs(case.matrices[:, 0, 0] * case.matrices[:, 1, 1])
+    products = np.abs(case.law.propagator[:, 0, 0] * case.law.propagator[:, 1, 1])
     if not case.area_preserving and np.any(products * CONTRACTED > determinant):
         return "what a step leaves of an area is a difference that the reference has no digits for"
     return None
@@ -78,7 +78,7 @@ def _no_answer(case: Any) -> str | None:
         return None
     if case.scheme.has("flow") or case.steps[0] != 0:
         return "the closed form of what a drive adds is that of steps of forces, from the start of the run on"
-    found = schemes.rotation(alone.matrices)
+    found = schemes.rotation(alone.law.propagator)
     if np.any((found.angle == 0) & (found.growth == 0)):
         return "a driven mode that neither turns nor grows has no closed form here"
     return None

@@ -257,6 +257,6 @@ def _mode_motions(case: Case) -> tuple[Integers, float, States, dict[str, list[S
         motions[name] = [
             one.closed_at(steps)
             for one in others
-            if driven or np.all(schemes.rotation(one.matrices).determinant > 0)
+            if driven or np.all(schemes.rotation(one.law.propagator).determinant > 0)
         ]
     return at, change, case.closed_at(steps), motions

@@ -216,14 +216,10 @@ JOINED = 4
 
 def _units(case: Case) -> tuple[Extended, Extended]:
     """Small changes of positions and momenta (n,), each of the same size in the energy norm."""
-    scene = case.scene
-    stiff = _stiff(case)
-    fallback = scene.m * np.longdouble(fastest(case)) ** 2
-    stiff = np.where(stiff > 0, stiff, fallback)
+    stiff, m = _stiff(case), case.scene.m.astype(np.longdouble)
+    stiff = np.where(stiff > 0, stiff, m * np.longdouble(fastest(case)) ** 2)
     unit = case.system.norm.unit * CHANGE
-    return np.asarray(unit * np.sqrt(2 / stiff)), np.asarray(
-        unit * np.sqrt(2 * scene.m.astype(np.longdouble))
-    )
+    return np.asarray(unit * np.sqrt(2 / stiff)), np.asarray(unit * np.sqrt(2 * m))
 
 
 def _stiff(case: Case) -> Extended:

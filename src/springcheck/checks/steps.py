@@ -25,7 +25,7 @@ def bridges(case: Case) -> bool:
     of the motion decays within the run."""
     if missing(case, CLOSED):
         return False
-    decay = np.log(np.min(schemes.rotation(case.matrices).determinant)) * case.scene.steps / 2
+    decay = np.log(np.min(schemes.rotation(case.law.propagator).determinant)) * case.scene.steps / 2
     return case.area_preserving or bool(decay >= -np.log(2.0))
 
 
@@ -112,7 +112,7 @@ def _allowed(case: Case) -> tuple[Floats, NDArray[np.bool_]]:
         told = known(case, case.ahead, case.trajectory.every)
         return np.full(len(told), float(case.roundings)), told
     # amplification of one rounding a step, over the steps from frame to frame
-    total, grown = schemes.amplification(case.matrices, case.w, np.array([case.trajectory.every]))
+    total, grown = schemes.amplification(case.law.propagator, case.w, np.array([case.trajectory.every]))
     bound = np.full(len(case.steps) - 1, case.roundings * float(total[0] * grown[0]))
     told = bound * case.trajectory.arithmetic.state < 1
     return np.where(told, bound, 1), told

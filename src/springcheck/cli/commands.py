@@ -215,11 +215,8 @@ def _judge(options: Namespace) -> int:
     doubts = output.doubts(options.file) if formats.is_hdf5(Path(options.file)) else []
     found = file.judge(
         Path(options.file),
-        scene=options.scene,
-        scheme=options.scheme,
         columns=_columns(options),
-        step=options.step,
-        trajectory=options.trajectory,
+        **{x: getattr(options, x) for x in ("scene", "scheme", "step", "trajectory", "differences")},
     )
     output.warn(options.file, doubts)
     status = found.status or int(bool(doubts))
@@ -345,6 +342,8 @@ COMMANDS = (
         _NAMES,
         _GROUP,
         _STEPS,
+        argument("--differences", action="store_true",
+                 help="its velocities are differences of positions, which keep eps q/h of them"),
         JSON,
     )),
     Command("check", "is a store whole: digests, completeness, structure", _check, (_FILE,)),

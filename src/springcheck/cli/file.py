@@ -54,13 +54,10 @@ class Judgement:
     def document(self) -> dict[str, Any]:
         """Plain data for JSON."""
         names = ("check", "value", "bound", "unit", "passed", "why", "sees")
+        own = {x: getattr(self, x) for x in ("scene", "scheme", "frames", "notes", "not_judged")}
         return keeper.document(
             file=self.path,
-            scene=self.scene,
-            scheme=self.scheme,
-            frames=self.frames,
-            notes=self.notes,
-            not_judged=self.not_judged,
+            **own,
             verdicts=[{name: getattr(v, name) for name in names} for v in self.verdicts],
         )
 
@@ -96,13 +93,17 @@ def judge(
     columns: Sequence[str] = (),
     step: float | None = None,
     trajectory: str | None = None,
+    differences: bool = False,
 ) -> Judgement:
-    """Verdicts on the trajectory of a file.  Raises SpringcheckError where it is unreadable or not of the
-    scene."""
+    """Verdicts on the trajectory of a file; `differences` says that its velocities are those of positions,
+    which keep eps q/h of them.  Raises SpringcheckError where it is unreadable or not of the scene."""
     found = load_scene(scene) if isinstance(scene, str) else scene
     known = schemes.scheme(scheme)
     states = states_in(path, columns, step, trajectory)
     judged, run, notes, taken = as_trajectory(path, states, found, known.name)
+    if differences:
+        run = replace(run, rebuilds_velocity=True)
+        notes += ("velocities are differences of positions, as was said, and judged so",)
     verdicts = [
         replace(v, passed=None, value=np.nan, bound=np.nan, why=taken[v.check]) if v.check in taken else v
         for v in checks.explained(judged, run, checks.judge(judged, run), files.shown)
@@ -272,19 +273,18 @@ def as_trajectory(
         judged = replace(scene, **grid).derived(**begun)
     else:
         judged = replace(scene, **begun, **grid)
-    run = Trajectory(
-        label=path.name, scheme=scheme, t=t, q=np.ascontiguousarray(q), p=np.ascontiguousarray(p),
-        step=scene.step, every=every, outcome=Outcome(status="complete", step=steps),
-        arithmetic=ours.arithmetic if ours else Arithmetic(name=AS_WRITTEN, state=states.roundoff),
-        # a line that is no axis is rounded in each of its coordinates
-        off_axis=beside if beside > 8 * states.roundoff else None,
-    )  # fmt: skip
+    known: dict[str, Any] = {
+        "label": path.name, "scheme": scheme, "t": t, "q": np.ascontiguousarray(q), "step": scene.step,
+        "p": np.ascontiguousarray(p), "every": every, "outcome": Outcome(status="complete", step=steps),
+    }  # fmt: skip
     if ours is not None:
-        run = replace(
-            run, energy=energy, rebuilds_velocity=ours.rebuilds_velocity, off_axis=ours.off_axis,
-            tolerance=ours.tolerance if ours.scheme == scheme else None, force_calls=ours.force_calls,
-            last_step=ours.last_step,
-        )  # fmt: skip
+        run = replace(ours, **known, tolerance=ours.tolerance if ours.scheme == scheme else None)
+    else:
+        # a line that is no axis is rounded in each of its coordinates
+        off_axis = beside if beside > 8 * states.roundoff else None
+        run = Trajectory(
+            **known, arithmetic=Arithmetic(name=AS_WRITTEN, state=states.roundoff), off_axis=off_axis
+        )
     return judged, run, tuple(notes), taken
 
 

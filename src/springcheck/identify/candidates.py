@@ -82,8 +82,8 @@ def stated_stiffness(
             why = ", as GPU-type platforms keep it" if quantum else ""
             return [], [f"the {what} is the stated one in single precision{why}"]
     _, stiffness, _ = seen.numbers(simplest)
-    j, masses = seen.moving[0], seen.record.mass
-    found = (stiffness or (math.nan,))[0]
+    each, masses = zip(seen.moving, stiffness or (math.nan,), strict=False), seen.record.mass
+    j, found = max(each, key=lambda one: abs(one[1] - stated[one[0]]) / (stated[one[0]] or 1.0))
     ratio = found / float(stated[j]) if stated[j] else math.inf
     meaning = stiffness_ratio(ratio, None if masses is None else float(masses[j]))
     stiff = (

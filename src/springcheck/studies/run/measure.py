@@ -237,8 +237,7 @@ def judge(
     worst = {name: checks.worst(verdicts[name]) for name in sources}
     if stride > 1:
         worst = {name: _bridged(mine, verdicts[name], judged_frames) for name, mine in worst.items()}
-    # causes are derived from states for deterministic motion only
-    if failed and not scene.bath:
+    if failed:
         from springcheck.identify import files
 
         for name, piece in failed.items():
