@@ -24,7 +24,7 @@ def _is_number(x: Any) -> bool:
     return False
 
 
-PLAIN: dict[str, tuple[str, Callable[[Any], bool]]] = {
+ANNOTATED: dict[str, tuple[str, Callable[[Any], bool]]] = {
     "bool": ("True or False", lambda x: isinstance(x, bool | np.bool_)),
     "int": ("a whole number", lambda x: isinstance(x, Integral) and not isinstance(x, bool)),
     "float": ("a number", _is_number),
@@ -40,22 +40,22 @@ PLAIN: dict[str, tuple[str, Callable[[Any], bool]]] = {
 
 def of_kind(what: str, value: Any, *kinds: str) -> Any:
     """The value, if it is of one of these kinds.  SceneError, in one line, if it is not."""
-    if any(PLAIN[kind][1](value) for kind in kinds):
+    if any(ANNOTATED[kind][1](value) for kind in kinds):
         return value
-    words = " or ".join(PLAIN[kind][0] for kind in kinds if kind != "None")
+    words = " or ".join(ANNOTATED[kind][0] for kind in kinds if kind != "None")
     raise SceneError(f"{what} = {' '.join(repr(value).split()):.60}: {words} is needed")
 
 
 def typed(function: Callable[P, R]) -> Callable[P, R]:
     """Function decorator: SceneError for an argument that is not what its annotation says, if that is made of
-    `PLAIN`."""
+    `ANNOTATED`."""
     signature = inspect.signature(function)
     wanted = {name: str(one.annotation).split(" | ") for name, one in signature.parameters.items()}
 
     @wraps(function)
     def call(*given: P.args, **named: P.kwargs) -> R:
         for name, value in signature.bind(*given, **named).arguments.items():
-            if PLAIN.keys() >= set(wanted[name]):
+            if ANNOTATED.keys() >= set(wanted[name]):
                 of_kind(f"{function.__name__}: {name}", value, *wanted[name])
         return function(*given, **named)
 
