@@ -41,8 +41,7 @@ class Bodies(ABC):
 
     def __init__(self, scene: Scene, method: Method, label: Label, step: float) -> None:
         ours = method.name == "force"
-        self.force_calls = 0
-        self.off_axis = 0.0
+        self.force_calls, self.off_axis = 0, 0.0
         self.m = scene.m
         self._force = scene.system.force if ours else None
         self._step, self._length = step, scene.system.far

@@ -36,7 +36,7 @@ KICK, DRIFT, KICK_DRIFT, EULER, FRICTION, IMPLICIT, MIDPOINT, SET_CLOCK = range(
 KICK        p += x F            EULER       KICK and DRIFT, both from the old state
 DRIFT       q += y p/m          IMPLICIT    P = p + x F(Q, P), Q = q + x P/m; q = q + y P/m, p = P
 KICK_DRIFT  one after the other MIDPOINT    the same, but p = P + (P - p)
-FRICTION    p *= decay            SET_CLOCK       the last coordinate is the time: steps done times x
+FRICTION    p *= decay            SET_CLOCK   the last coordinate is the time: steps done times x
 """
 
 
