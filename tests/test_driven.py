@@ -524,6 +524,18 @@ def by(check: str, scene: Scene, other: Scene, scheme: schemes.Scheme) -> bool |
     return checks.judge(replace(scene, quantities=("q", "p")), run, [one])[0].passed
 
 
+@pytest.mark.parametrize(("k", "c"), [(4.0, 4.0), (4.0, 4.0 * (1 + 1e-13)), (0.0, 1e-8)])
+@pytest.mark.parametrize("label", ["own:euler", "own:implicit-midpoint", "own:rk4"])
+def test_eigenvalues_that_nearly_meet_have_no_closed_form_here_and_blame_nobody(
+    label: str, k: float, c: float
+) -> None:
+    scene = driven(1.0, k, c, (1.0, 2.0 if k else 1e-9, 0.0), q=[1.0], p=[0.0], steps=100)
+    found = {v.check: v for v in checks.judge(scene, springcheck.simulate(scene, label))}
+    assert [v for v in found.values() if v.passed is False] == []
+    assert found["step-defect"].passed is True
+    assert "neither turns nor grows" in found["closed-form"].why
+
+
 def test_a_driven_mode_that_neither_turns_nor_grows_has_no_closed_form_here() -> None:
     scene = driven(3.7, 0.0, 0.0, (0.43, 0.87, 0.6))
     found = checks.closed_form(

@@ -349,6 +349,40 @@ def test_lammps_that_loses_atoms_in_a_box_ends_the_run_in_a_line(
     assert "Traceback" not in capfd.readouterr().err
 
 
+@pytest.mark.parametrize("rest", [-1.0, -0.5])
+def test_mujoco_takes_a_rest_length_below_0_for_what_it_is(rest: float, need: Need) -> None:
+    """A length of -1 would stand for that of the start."""
+    need("mujoco:joint-spring")
+    scene = one_spring(m=[1.0, 1.3], k=1.0, q=[1.0, 0.3], p=0.0, step=0.1, steps=60)
+    scene = replace(scene, terms=(*scene.terms, Spring(a=[0], b=[1], k=[0.7], rest=[rest])))
+    made = run(scene, "mujoco:joint-spring")
+    assert [v for v in checks.judge(scene, made) if v.passed is False] == []
+
+
+def test_dart_that_leaves_out_an_infinite_force_is_not_blamed_for_it(need: Need) -> None:
+    """A spring of h w = 1e12 takes the force out of range while positions are still numbers."""
+    need("dart:force")
+    scene = one_spring(m=1e-30, k=1e20, q=1.0, p=0.0, step=1e-13, steps=40)
+    made = run(scene, "dart:force")
+    assert made.outcome.status == "diverged"
+    assert np.max(np.abs(made.q)) > 1e250
+    assert [v for v in checks.judge(scene, made) if v.passed is False] == []
+
+
+@pytest.mark.parametrize("pair", [False, True])
+def test_a_joint_that_would_turn_over_ends_the_run_with_its_reason(pair: bool, need: Need) -> None:
+    need("pymunk:damped-spring")
+    scene = one_spring(m=[1.0, 1.3], k=1.0, q=[1.0, 0.3], p=0.0, step=2.5, steps=60)
+    if pair:
+        scene = replace(scene, terms=(Spring(a=[0], b=[1], k=[1.0], rest=[0.4]),))
+    made = run(scene, "pymunk:damped-spring")
+    assert made.outcome.status == "stopped"
+    assert made.outcome.message == f"a joint of length {scene.system.far:g} turns over"
+    wrong = [v for v in checks.judge(scene, made) if v.passed is False]
+    assert [v.check for v in wrong] == ["grid"]
+    assert made.outcome.message in wrong[0].why
+
+
 def test_dart_prints_nothing_of_numbers_that_are_not_finite(
     need: Need, capfd: pytest.CaptureFixture[str]
 ) -> None:

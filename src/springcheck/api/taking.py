@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
@@ -22,7 +22,7 @@ gives the force at q."""
 
 
 @contextmanager
-def labels_of(methods: str | Step | Sequence[str | Step], scheme: str = "") -> Iterator[list[str]]:
+def labels_of(methods: Any, scheme: str = "") -> Iterator[list[str]]:
     """Labels of these methods; functions among them form an engine that exists within this context only."""
     is_one = isinstance(methods, str) or not isinstance(methods, Iterable) or not getattr(methods, "ndim", 1)
     several = [methods] if is_one else list(methods)

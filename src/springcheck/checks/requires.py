@@ -17,8 +17,8 @@ from springcheck.physics import exact
 from springcheck.physics.system import MOST_JOINED
 
 CONTRACTED = 1e-3
-"""Determinant of a step below which its powers are not formed: as the difference of two products it has
-lost 3 of the 19 digits of the reference there."""
+"""Determinant of a step below which its powers are not formed, as differences of products, and the angle of a
+run below which two eigenvalues are not told apart: 3 of the 19 digits of the reference are lost there."""
 
 Lacks: TypeAlias = Callable[[Any], str | None]
 """A subject -> why the requirement is not met, or None."""
@@ -79,7 +79,7 @@ def _no_answer(case: Any) -> str | None:
     if case.scheme.has("flow") or case.steps[0] != 0:
         return "the closed form of what a drive adds is that of steps of forces, from the start of the run on"
     found = schemes.rotation(alone.law.propagator)
-    if np.any((found.angle == 0) & (found.growth == 0)):
+    if np.any(np.maximum(found.near, found.growth) * case.steps[-1] < CONTRACTED):
         return "a driven mode that neither turns nor grows has no closed form here"
     return None
 

@@ -12,6 +12,7 @@ from springcheck.engines.bonds import walls, within
 from springcheck.engines.contract import Label, Method, Stopped
 from springcheck.physics.arrays import Arithmetic, Floats
 from springcheck.physics.scene import Scene
+from springcheck.physics.terms import Spring, WallSpring
 
 
 def single(label: Label) -> Arithmetic:
@@ -38,11 +39,11 @@ class Bodies(ABC):
 
     def __init__(self, scene: Scene, method: Method, label: Label, step: float) -> None:
         ours = method.name == "force"
-        self.force_calls = 0
-        self.off_axis = 0.0
+        self.force_calls, self.off_axis = 0, 0.0
         self.m = scene.m
         self._force = scene.system.force if ours else None
-        self._step = step
+        self._step, self._length = step, scene.system.far
+        self._ties: list[Any] = [] if ours else [x for x in scene.terms if isinstance(x, WallSpring | Spring)]
         self.begin(label, step)
         self._fit(scene, label, ours)
         rows = zip(scene.m.tolist(), scene.q.tolist(), scene.p.tolist(), strict=True)
@@ -104,9 +105,16 @@ class Bodies(ABC):
                     self._within(row, there, 1.0)
                     self.step()
                     self._within(row, np.array([v(body) for body in bodies]), 0.999)
+                    if self._turned_over():
+                        raise Stopped(row, f"a joint of length {self._length:g} turns over", is_limit=True)
                 q[row] = [x(body) for body in bodies]
                 p[row] = [v(body) for body in bodies] * self.m
             self.off_axis = max(self.off_axis, *(abs(y(body)) for body in bodies))
+
+    def _turned_over(self) -> bool:
+        """Whether some joint, whose length has no sign, would have a negative one."""
+        q = np.array([attrgetter(self.x)(body) for body in self.bodies]) if self._ties else np.zeros(0)
+        return any(np.any(term.elongation(q) <= -self._length) for term in self._ties)
 
     def _within(self, row: int, speeds: Floats, part: float) -> None:
         """Stopped(row, ...) where the world does not move as it was told, at this part of its limit."""

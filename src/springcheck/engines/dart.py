@@ -10,7 +10,15 @@ import numpy as np
 
 from springcheck.engines import quiet
 from springcheck.engines.bonds import hinges, walls
-from springcheck.engines.contract import EVERY_FORCE, Engine, Label, Method, by_name, named, version_of
+from springcheck.engines.contract import (
+    EVERY_FORCE,
+    Engine,
+    Label,
+    Method,
+    by_name,
+    named,
+    version_of,
+)
 from springcheck.errors import MethodError
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
@@ -60,17 +68,23 @@ class _World:
 
     def advance(self, every: int, q: Floats, p: Floats) -> None:
         world, skeleton, force = self._world, self._skeleton, self._force
+        self.force_calls += every * len(q)
         # DART warns on standard error at every step of numbers that are not finite: the states show them
         with np.errstate(over="ignore", invalid="ignore"), quiet.caught(2):
             for row in range(len(q)):
                 for _ in range(every):
                     if force is not None:
-                        skeleton.setForces(force(skeleton.getPositions(), skeleton.getVelocities() * self._m))
+                        pull = force(skeleton.getPositions(), skeleton.getVelocities() * self._m)
+                        if not np.all(np.isfinite(pull / self._m)):
+                            # DART leaves such an acceleration out, and goes on
+                            p[:row] *= self._m
+                            q[row:] = p[row:] = np.nan
+                            return
+                        skeleton.setForces(pull)
                     world.step()
                 q[row] = skeleton.getPositions()
                 p[row] = skeleton.getVelocities()
             p *= self._m
-        self.force_calls += every * len(q)
 
 
 ENGINE = Engine(

@@ -29,8 +29,6 @@ class _Plant:
         damping = np.zeros(scene.n)
         for term in scene.terms:
             if isinstance(term, Damping):
-                if np.any(term.c < 0):
-                    raise MethodError(f"{label}: a joint of Drake has a damping of 0 or more")
                 np.add.at(damping, term.i, term.c)
         self._plant = plant = plants.MultibodyPlant(time_step=step)
         plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, 0.0])

@@ -120,9 +120,10 @@ def _first(field: Any, value: float) -> Any:
 def _tendon(spec: Any, joints: Mapping[int, float], k: float, rest: float) -> None:
     tendon = spec.add_tendon()
     tendon.stiffness = _first(tendon.stiffness, k)
-    tendon.springlength = [rest, rest]
+    # MuJoCo takes -1 for the length at the start
+    tendon.springlength = [abs(rest), abs(rest)]
     for i, coefficient in joints.items():
-        tendon.wrap_joint(f"j{i}", coefficient)
+        tendon.wrap_joint(f"j{i}", -coefficient if rest < 0 else coefficient)
 
 
 class _Steps:

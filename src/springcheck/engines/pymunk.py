@@ -9,14 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 from springcheck.engines.bodies import Bodies
-from springcheck.engines.contract import (
-    EVERY_FORCE,
-    SPRINGS,
-    Engine,
-    Label,
-    by_name,
-    named,
-)
+from springcheck.engines.contract import EVERY_FORCE, SPRINGS, Engine, Label, by_name, named
 from springcheck.errors import MethodError
 from springcheck.physics.arrays import Arithmetic
 from springcheck.physics.scene import Scene

@@ -11,14 +11,7 @@ from typing import Any
 
 from springcheck.engines.bodies import Bodies, single
 from springcheck.engines.bonds import walls
-from springcheck.engines.contract import (
-    EVERY_FORCE,
-    Engine,
-    Label,
-    by_name,
-    named,
-    version_of,
-)
+from springcheck.engines.contract import EVERY_FORCE, Engine, Label, by_name, named, version_of
 from springcheck.errors import MethodError
 from springcheck.physics.scene import Scene
 

@@ -14,7 +14,8 @@ import numpy as np
 
 from springcheck.errors import SceneError
 
-P, R = ParamSpec("P"), TypeVar("R")
+P = ParamSpec("P")
+R = TypeVar("R")
 
 
 def _is_number(x: Any) -> bool:
@@ -23,7 +24,7 @@ def _is_number(x: Any) -> bool:
     return False
 
 
-KINDS: dict[str, tuple[str, Callable[[Any], bool]]] = {
+ANNOTATED: dict[str, tuple[str, Callable[[Any], bool]]] = {
     "bool": ("True or False", lambda x: isinstance(x, bool | np.bool_)),
     "int": ("a whole number", lambda x: isinstance(x, Integral) and not isinstance(x, bool)),
     "float": ("a number", _is_number),
@@ -39,23 +40,22 @@ KINDS: dict[str, tuple[str, Callable[[Any], bool]]] = {
 
 def of_kind(what: str, value: Any, *kinds: str) -> Any:
     """The value, if it is of one of these kinds.  SceneError, in one line, if it is not."""
-    if any(KINDS[kind][1](value) for kind in kinds):
+    if any(ANNOTATED[kind][1](value) for kind in kinds):
         return value
-    words = " or ".join(KINDS[kind][0] for kind in kinds if kind != "None")
-    shown = " ".join(repr(value).split())
-    raise SceneError(f"{what} = {shown:.60}: {words} is needed")
+    words = " or ".join(ANNOTATED[kind][0] for kind in kinds if kind != "None")
+    raise SceneError(f"{what} = {' '.join(repr(value).split()):.60}: {words} is needed")
 
 
 def typed(function: Callable[P, R]) -> Callable[P, R]:
     """Function decorator: SceneError for an argument that is not what its annotation says, if that is made of
-    `KINDS`."""
+    `ANNOTATED`."""
     signature = inspect.signature(function)
     wanted = {name: str(one.annotation).split(" | ") for name, one in signature.parameters.items()}
 
     @wraps(function)
     def call(*given: P.args, **named: P.kwargs) -> R:
         for name, value in signature.bind(*given, **named).arguments.items():
-            if KINDS.keys() >= set(wanted[name]):
+            if ANNOTATED.keys() >= set(wanted[name]):
                 of_kind(f"{function.__name__}: {name}", value, *wanted[name])
         return function(*given, **named)
 

@@ -48,8 +48,8 @@ def spring(
     terms: list[Term] = [WallSpring(i=index, k=k, at=at, fast=fast)]
     if c is not None:
         terms.append(Damping(i=index, c=friction))
-    words = {"name": "spring", "title": "Mass on a spring"}
-    return Scene(m=m, q=q, p=p, terms=tuple(terms), step=step, steps=steps, **words).replace(**rest)
+    found = Scene(m=m, q=q, p=p, terms=tuple(terms), step=step, steps=steps, name="spring")
+    return found.replace(**({"title": "Mass on a spring"} | rest))
 
 
 @typed

@@ -30,13 +30,13 @@ from springcheck.engines.own.updates import (
 Rows: TypeAlias = Any
 """A list of lists, or a two-dimensional array; qs and ps are always arrays (f, n)."""
 
-KICK, DRIFT, KICK_DRIFT, EULER, FRICTION, IMPLICIT, MIDPOINT, CLOCK = range(8)
+KICK, DRIFT, KICK_DRIFT, EULER, FRICTION, IMPLICIT, MIDPOINT, SET_CLOCK = range(8)
 """Operations on (q, p), with coefficients x and y in units of time:
 
 KICK        p += x F            EULER       KICK and DRIFT, both from the old state
 DRIFT       q += y p/m          IMPLICIT    P = p + x F(Q, P), Q = q + x P/m; q = q + y P/m, p = P
 KICK_DRIFT  one after the other MIDPOINT    the same, but p = P + (P - p)
-FRICTION    p *= decay            CLOCK       the last coordinate is the time: steps done times x
+FRICTION    p *= decay            SET_CLOCK   the last coordinate is the time: steps done times x
 """
 
 
@@ -93,7 +93,7 @@ def many(
                         p[i] = p[i] * decayed[i]
                 elif what == DRIFT:
                     drift(ys, m, q, p)
-                elif what == CLOCK:
+                elif what == SET_CLOCK:
                     # nothing else of an index list is in t
                     q[n - 1] = t[0] * xs
                     t[0] += 1.0
@@ -131,7 +131,7 @@ def many(
                     else:
                         kick_drift(xs, ys, what == EULER, pull, m, q, p)
                     stale[where] = False
-                moved = what not in (KICK, FRICTION, CLOCK)
+                moved = what not in (KICK, FRICTION, SET_CLOCK)
                 stale[0] = stale[0] or moved or damped[0]
                 stale[1] = stale[1] or moved or damped[1]
             if stages:

@@ -18,7 +18,6 @@ from typing import NamedTuple
 import numpy as np
 
 from springcheck.engines.own.kernels import (
-    CLOCK,
     DRIFT,
     EULER,
     FRICTION,
@@ -26,6 +25,7 @@ from springcheck.engines.own.kernels import (
     KICK,
     KICK_DRIFT,
     MIDPOINT,
+    SET_CLOCK,
 )
 from springcheck.errors import MethodError
 from springcheck.physics.arrays import Floats, Integers
@@ -99,10 +99,10 @@ class Program:
         stale, counts = [True, True], [0, 0]
         for cycle in range(2):
             for o, slot in zip(self.operations, self.slots, strict=True):
-                if o.code not in (FRICTION, DRIFT, CLOCK):
+                if o.code not in (FRICTION, DRIFT, SET_CLOCK):
                     counts[cycle] += stale[slot]
                     stale[slot] = False
-                moved = o.code not in (FRICTION, KICK, CLOCK)
+                moved = o.code not in (FRICTION, KICK, SET_CLOCK)
                 stale = [old or moved or damped for old, damped in zip(stale, self.damped, strict=True)]
         return counts[0], counts[1]
 
@@ -116,7 +116,7 @@ def program(scheme: Scheme, scene: Scene, h: float) -> Program:
     """
     if scheme.has("random") or not scheme.has("one-step"):
         raise MethodError(f"own: the scheme {scheme.name} has no fixed step that can be repeated")
-    clock = (Operation(code=CLOCK, x=h),) if scene.system.is_driven else ()
+    clock = (Operation(code=SET_CLOCK, x=h),) if scene.system.is_driven else ()
     if scheme.stages:
         found = _splitting(scheme, h)
     elif scheme.has("implicit"):

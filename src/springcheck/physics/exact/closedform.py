@@ -67,7 +67,7 @@ def wide(x: Any) -> Extended:
     return np.asarray(x, np.longdouble)
 
 
-def by_particle(index: Integers, *rows: Extended) -> States:
+def by_particle(index: Integers, *rows: Any) -> States:
     """Positions and momenta (..., n) of the particles of these numbers (n,), in the order of the scene."""
     q, p = (np.take(x, np.argsort(index), axis=-1) for x in rows)
     return q, p

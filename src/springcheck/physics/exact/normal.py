@@ -206,6 +206,7 @@ def _start(system: System[Any], modes: Modes) -> Start:
 def exact_sums(system: System[Any], of: Callable[[Wide], Wide]) -> tuple[Wide, Wide, Wide]:
     """Stiffness, by the part `of` its matrix; force at 0 (n,) and friction rates (n,); without rounding."""
     zero = np.zeros(system.n, dtype=np.longdouble)
+    force: Any
     k, force, friction = (exactly(np.zeros(x)) for x in ((system.n, system.n), system.n, system.n))
     for term in system.terms:
         if isinstance(term, Damping):

@@ -32,12 +32,12 @@ from springcheck.physics.exact.swinging import SwingingMotion
 from springcheck.physics.exact.turning import TurningRods, TurningWallRods
 from springcheck.physics.system import Fields, System
 
-WHOLE_SCENES: tuple[type[ClosedForm], ...] = (
+WHOLE_FORMS: tuple[type[ClosedForm], ...] = (
     LinearMotion, Gyration, Response, ModulatedMotion, UnlikeFriction, LumpedMotion,
 )  # fmt: skip
 """Closed forms of all particles together; the first that holds is taken."""
 
-GROUPS: tuple[type[ClosedForm], ...] = (
+GROUP_FORMS: tuple[type[ClosedForm], ...] = (
     VanDerPolMotion, SwingingMotion, QuarticMotion, PendulumMotion, MorseMotion, TurningRods,
     TurningWallRods, HangingRods, LinearMotion,
 )  # fmt: skip
@@ -96,7 +96,7 @@ class SolvedSystem(System[Fields]):
 
 def _solution(system: SolvedSystem[Any]) -> Solution | None:
     """Solution of a system, None where some particles have no closed form here."""
-    for law in WHOLE_SCENES:
+    for law in WHOLE_FORMS:
         if motion := law.of(system):
             return Solution(n=system.n, groups=((np.arange(system.n), motion),))
     groups: list[tuple[Integers, ClosedForm]] = []
@@ -107,7 +107,7 @@ def _solution(system: SolvedSystem[Any]) -> Solution | None:
         acting = {key: system.rods.reach(here) for key, here in acting.items()}
     left = ~nothing
     with np.errstate(all="ignore"):
-        for law in GROUPS:
+        for law in GROUP_FORMS:
             others = (here for key, here in acting.items() if key not in law.terms)
             other = np.any([nothing, *others], axis=0)
             mine = left if law is LinearMotion else acting.get(law.key, nothing) & ~other
