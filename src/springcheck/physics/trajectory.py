@@ -357,8 +357,7 @@ class Verdict:
 
     @property
     def statistic(self) -> Any:
-        """Of a random verdict the statistic (`thermal.chance`), where it adds up over the pieces of a run; in
-        no document."""
+        """Of a random verdict the statistic (`thermal.chance`), where it adds up over pieces of a run."""
         return self._statistic
 
     @property
