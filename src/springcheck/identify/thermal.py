@@ -20,8 +20,7 @@ from springcheck.identify.hypothesis import ERRORS, SURE
 from springcheck.identify.result import Candidate, Explanation, Identification
 from springcheck.physics.arrays import Floats
 from springcheck.text.wording import either
-from springcheck.thermal import THERMOSTATS
-from springcheck.thermal.catalogue import family_of, random_scheme
+from springcheck.thermal.catalogue import THERMOSTATS, family_of, random_scheme
 from springcheck.thermal.likelihood import SUBSTEPS_TRIED
 from springcheck.thermal.modes import FREE_OF_NOISE, modes
 from springcheck.thermal.residuals import FEWEST

@@ -357,8 +357,12 @@ class Verdict:
     """The bound's reason, or why the check does not apply."""
     sees: Limits = NOT_KNOWN
     """Smallest fault that the check would have detected in this run."""
-    statistic: Any = field(default=None, compare=False, repr=False)
-    """Of a random verdict the statistic, where it adds up over pieces of a run (`thermal.chance`)."""
+    _statistic: Any = field(default=None, compare=False, repr=False)
+
+    @property
+    def statistic(self) -> Any:
+        """Of a random verdict the statistic (`thermal.chance`), where it adds up over pieces of a run."""
+        return self._statistic
 
     @property
     def reason(self) -> str:

@@ -91,7 +91,7 @@ def _fitted(changes: Floats, known: Floats) -> tuple[bool, Floats, Floats]:
     for x in (rest / sizes).T[sizes > NO_COLLISION] if drawn else ():
         one = min(chance.neighbours(x[:, None]).chance, chance.repeats(x[:, None]), chance.together(x))
         drawn = drawn and one > LEAST_CHANCE
-    return drawn, entries, rest
+    return drawn, np.asarray(entries), rest
 
 
 def is_a_factor(before: Floats, after: Floats) -> bool:

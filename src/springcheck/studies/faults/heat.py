@@ -12,7 +12,7 @@ from springcheck.thermal.catalogue import HALF, ONE, PROJECT, Act
 
 _DIRECTION, _MATRIX, _MAP = ("noise-direction",), ("noise-matrix",), ("noise-map",)
 _VARIANCE, _SHAPE, _SCALE = ("draws-variance",), ("draws-shape",), ("draws-variance", "noise-size")
-_LARGEST = ("draws-largest",)
+_TAILS = (*_SHAPE, "draws-largest")
 _LAG, _REPEAT, _KEPT, _APART = ("draws-neighbours",), ("draws-repeat",), ("seed-kept",), ("seeds-apart",)
 _COMPANY = ("draws-particles",)
 
@@ -41,13 +41,12 @@ OF_NOISE = each(
     Fault("calories", "calories for joules", _VARIANCE, lambda c: played(c, thermal=4.184)),
     Fault("boltzmann", "Boltzmann's constant of five digits", _MATRIX,
           lambda c: played(c, thermal=8.3145 / 8.31446261815324)),
-    Fault("uniform-draws", "uniform draws", (*_SHAPE, *_LARGEST),
+    Fault("uniform-draws", "uniform draws", _TAILS,
           lambda c: played(c, of_rank(lambda u: np.sqrt(12) * (u - 0.5)))),
-    Fault("coins", "draws of 1 or -1", (*_SHAPE, *_LARGEST),
-          lambda c: played(c, of_rank(lambda u: np.sign(u - 0.5)))),
+    Fault("coins", "draws of 1 or -1", _TAILS, lambda c: played(c, of_rank(lambda u: np.sign(u - 0.5)))),
     Fault("heavy-tails", "draws of Student's distribution with five degrees of freedom", _SHAPE,
           lambda c: played(c, of_rank(heavy))),
-    Fault("cut-draws", "draws are cut off at 2", (*_VARIANCE, *_LARGEST),
+    Fault("cut-draws", "draws are cut off at 2", (*_VARIANCE, "draws-largest"),
           lambda c: played(c, lambda right: np.clip(right[-1], -2, 2))),
     Fault("off-centre", "draws are not centred", ("draws-mean",),
           lambda c: played(c, lambda right: right[-1] + c.x), size=0.05),

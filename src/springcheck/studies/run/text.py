@@ -241,8 +241,10 @@ def sights(verdicts: Sequence[Verdict]) -> Lines:
     """Smallest detectable errors of a stiffness and of a temperature, in the best and the worst method."""
     said = []
     for quantity in ("stiffness", "temperature"):
-        seen = [(x, v.method) for v in verdicts if v.passed and (x := getattr(v.sees, quantity)) is not None]
-        known = {method: least for least, method in sorted(seen, reverse=True)}
+        known: dict[str, float] = {}
+        for v in verdicts:
+            if v.passed and (x := getattr(v.sees, quantity)) is not None:
+                known[v.method] = min(x, known.get(v.method, x))
         if known:
             keen, dull = (how(known, key=known.__getitem__) for how in (min, max))
             said.append(f"A {quantity} off by {known[keen]:.1e} would be seen in {keen}")
