@@ -53,12 +53,13 @@ from springcheck.text.lines import table
 def lines(found, options=None):
     return [table(("number", "square"), [(str(x.number), str(x.square)) for x in found.rows])]
 """
-FIGURE = """
-from matplotlib.figure import Figure
-def pictures(found):
-    figure = Figure()
-    figure.add_subplot().plot([x.number for x in found.rows], [x.square for x in found.rows])
-    return {"squares": figure}
+PAGE = """
+from springcheck.figures.charts import Bank, Chart, Curve, Scale
+def banks(found):
+    numbers, squares = ([getattr(x, name) for x in found.rows] for name in ("number", "square"))
+    line = Curve(name="squares", group="squares", x=numbers, y=squares)
+    chart = Chart(title="Squares.", x=Scale(name="number"), y=Scale(name="square"), curves=[line])
+    return [Bank(name="squares", title="Drawn", charts=[chart])]
 """
 STUDY = """
 from springcheck.studies.arguments import store_arguments
@@ -77,7 +78,7 @@ def test_a_folder_and_a_line_make_a_study(
 ) -> None:
     folder = tmp_path / "squares_study"
     folder.mkdir()
-    for name, text in (("__init__", STUDY), ("measure", MEASURE), ("text", TEXT), ("figure", FIGURE)):
+    for name, text in (("__init__", STUDY), ("measure", MEASURE), ("text", TEXT), ("page", PAGE)):
         (folder / f"{name}.py").write_text(text)
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.chdir(tmp_path)
@@ -98,6 +99,7 @@ def test_a_folder_and_a_line_make_a_study(
     assert cli.main(["plot", "squares.h5", "-o", "pictures"]) == 0
     assert (tmp_path / "pictures" / "squares.png").stat().st_size > 1000
     assert cli.main(["report", "squares.h5"]) == 0
-    assert "9.0</td>" in (tmp_path / "squares.html").read_text()
+    assert "9.0</td>" in (report := (tmp_path / "squares.html").read_text())
+    assert "Squares." in report
     for name in [name for name in sys.modules if name.startswith("squares_study")]:
         del sys.modules[name]

@@ -157,6 +157,15 @@ def test_a_legend_has_one_entry_for_each_scheme() -> None:
     assert len(legend.get_texts()) == 2  # the exact solution, and the scheme
 
 
+def test_a_legend_counts_every_method_of_a_curve_that_several_share() -> None:
+    mine = ["own:euler", "openmm:euler", "dart:force"]
+    curve = Curve(name="own:euler and 2 more", group="explicit-euler", x=[0.0], y=[0.0], methods=mine)
+    scale = Scale(name="x")
+    figure = render.picture(Bank(title="", charts=[Chart(title="", x=scale, y=scale, curves=[curve])]))
+    (text,) = figure.legends[0].get_texts()
+    assert text.get_text().endswith(looks.members(mine))
+
+
 def test_the_separatrix_of_a_pendulum_is_the_motion_that_stops_at_its_top() -> None:
     scene = scenefile.load_scene("pendulum")
     shown = views(scene)
@@ -492,6 +501,10 @@ def test_a_fault_is_named_by_the_check_that_sees_it_first() -> None:
     first = chart.curves[0]
     assert dict(zip(first.y, first.notes, strict=True)) == {0.0: "x", 1.0: "y"}
     assert [label.text for label in chart.labels] == ["x", "y"]
+    # beyond the marks, which they would hide
+    assert all(label.x == 0.99 for label in chart.labels)
+    assert chart.x.shown is not None
+    assert chart.x.shown[1] > 1e5 * max(x for curve in chart.curves for x in curve.x)
     assert page.banks(found)[0].heading == "2 engines broken on purpose: each is rejected; 2 checks"
 
 

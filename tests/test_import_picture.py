@@ -26,12 +26,7 @@ STUDIES = sorted(path.parent.name for path in HOME.glob("studies/*/__init__.py")
 
 HOMES = {
     "h5py": ("store",),
-    "matplotlib": (
-        "plot.py",
-        "cli/drawing.py",
-        "figures",
-        *(f"studies/{name}/figure.py" for name in STUDIES),
-    ),
+    "matplotlib": ("plot.py", "cli/drawing.py", "figures"),
     "openmm": tuple(f"engines/openmm/{name}.py" for name in ("simulation", "thermostats", "variable")),
     "ase": ("engines/ase/simulation.py", "formats/libraries.py"),
     "sksundae": ("engines/sundials/simulation.py", "engines/sundials/circuit.py"),

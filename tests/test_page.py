@@ -19,8 +19,8 @@ from springcheck.cli import main, page
 from springcheck.cli.page.content import Section
 from springcheck.cli.page.given import drawn
 from springcheck.errors import StoreError
-from springcheck.figures import charts, looks
-from springcheck.figures.charts import Bank, Chart, Curve, Scale, Tiles
+from springcheck.figures import charts, looks, overlay
+from springcheck.figures.charts import Bank, Chart, Curve, Naming, Rule, Scale, Tiles
 from springcheck.physics import exact
 from springcheck.physics import scenefile as scenes
 from springcheck.studies import STUDIES, keeper
@@ -209,6 +209,27 @@ def _hostile(content: page.Content) -> page.Content:
     )
 
 
+def test_a_heading_in_a_table_stands_over_its_rows(content: page.Content) -> None:
+    rows = [plain("velocity Verlet", "italic"), ("own:velocity-verlet", "2"), plain("about it", "dim")]
+    section = Section(name="a", title="A", banks=(), blocks=[table(("method", "limit"), rows)])
+    text = page.html(replace(content, sections=(section,)))
+    assert '<th scope="rowgroup" colspan="2">velocity Verlet</th>' in text
+    assert '<td class="why small" colspan="2">about it</td>' in text
+
+
+def test_the_headline_of_a_page_of_few_frames_is_of_all(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The largest error, which is early here, is none of the frames that stand in the page."""
+    monkeypatch.setattr("springcheck.cli.page.content.PAGE_NUMBERS", 40)
+    monkeypatch.setattr("springcheck.cli.page.content.FEWEST_SHOWN", 4)
+    scene = scenes.load_scene("overdamped")
+    found = measure.run(scene, tmp_path / "run.h5", methods=["own:implicit-euler"])
+    headline = page.gather(tmp_path / "run.h5").finding
+    assert f"by at most {overlay.share(found.runs[0].max_error)} (" in headline
+    assert "of the frames drawn" not in headline
+
+
 def test_a_hostile_store_adds_no_element(content: page.Content) -> None:
     text = page.html(_hostile(content))
     tags = Tags(text)
@@ -249,7 +270,7 @@ def test_other_scenes_are_reported_too(name: str, tmp_path: Path) -> None:
     measure.run(scene, tmp_path / "a.h5", methods=("own:euler", "own:semi-implicit-euler"))
     content = page.gather(tmp_path / "a.h5")
     text = page.html(content)
-    assert len(text.encode()) < 505_000
+    assert len(text.encode()) < 506_000
     assert (content.data["linear"] is None) == ("does not compute the motion again" in text)
     assert (content.data["spring"] is None) == (name != "lc-circuit")
 
@@ -602,6 +623,27 @@ def stepped(name: str, h: float, c: float) -> np.ndarray:
             q, p = q + h * p, p + h * force(q, p)
         columns.append((q, p))
     return np.array(columns).T
+
+
+def test_names_at_the_edge_of_a_chart_stand_apart(content: page.Content, opened: Any) -> None:
+    names = ["one", "other", "third"]
+    curves = [Curve(name=x, group=x, x=[0.0, 1.0], y=[0.0, 1.0]) for x in names]
+    labels = [Naming(text=x, group=x, x=1.0, y=1 - 0.052 * i) for i, x in enumerate(names)]
+    rules = [Rule(axis="x", at=at, name=f"limit {at}") for at in (0.1, 0.11, 0.12)]
+    scale = Scale(name="x", shown=(0.0, 1.0))
+    chart = Chart(title="Names", x=scale, y=scale, curves=curves, labels=labels, rules=rules)
+    chromium = opened(replace(content, data={**content.data, "banks": {"motion": charts.plain(
+        Bank(title="Names", charts=[chart]))}}))  # fmt: skip
+    boxes = chromium.run(
+        "[...document.querySelectorAll('#motion .plot g text')].filter((x) => x.textContent)"
+        ".map((x) => x.getBoundingClientRect().toJSON())"
+    )
+    assert len(boxes) == 6
+    for i, one in enumerate(boxes):
+        for other in boxes[:i]:
+            apart = one["left"] >= other["right"] or other["left"] >= one["right"]
+            # letters fill the middle of their lines
+            assert apart or abs(one["y"] - other["y"]) >= 11, (one, other)
 
 
 def _middle(chromium: Browser, of: str) -> tuple[float, float, float, float]:

@@ -55,7 +55,7 @@ def test_the_error_of_a_driven_spring_from_rest_is_in_units_of_its_static_deflec
     assert main(["run", "driven.toml", "--method", "own:velocity-verlet"]) == 0
     said = capsys.readouterr().out
     assert "over the root of the possible gain" in said
-    assert "as H0 is 0" in said
+    assert "energy: (H - H exact)/(possible gain) where it is largest" in said
     # a drive moves it: its precision can be studied
     assert springcheck.precision(scene, "own:rk4", budget=1.0)
 
@@ -84,3 +84,39 @@ def test_what_goes_with_files_of_others_is_refused_for_a_store(
     springcheck.run("spring", "own:euler", path=path)
     assert main(["plot", str(path), "-o", str(tmp_path), *option]) == 2
     assert "file of another program" in capsys.readouterr().err
+
+
+CANCELLING = (
+    'title = "Over a barrier"\n[[particle]]\nmass = 1.3\nposition = 0.7\nmomentum = 0.91\n\n'
+    '[[spring]]\nends = ["wall", 0]\nstiffness = -1.3\nrest = 0.0\n\n[time]\nstep = 0.1\nsteps = 30\n'
+)
+"""T + V = 0 but for a rounding of 6e-17; T + |V| = 0.637."""
+
+
+def test_energies_are_relative_to_what_does_not_cancel_at_the_start(
+    tmp_path: Path,
+) -> None:
+    (tmp_path / "barrier.toml").write_text(CANCELLING)
+    methods = ["own:velocity-verlet", "own:semi-implicit-euler"]
+    scene = springcheck.load_scene(tmp_path / "barrier.toml")
+    found = springcheck.run(scene, methods)
+    for run, energies in ((run, found[run.method].energy) for run in found.runs):
+        off = energies - energies[0]
+        assert run.energy_drift == pytest.approx(off[np.argmax(np.abs(off))] / 0.637, rel=1e-9)
+    assert "energy: (H - H0)/(initial T + |V|) where it is largest" in str(found)
+    cells = springcheck.ensemble(scene, {"time.step": [0.1]}, methods)
+    for run in found.runs:
+        assert cells.of(run.method)["energy_drift"] == pytest.approx([run.energy_drift], rel=1e-9)
+    assert "energy: (H - H0)/(initial T + |V|) where it is" in str(cells)
+    axes = springcheck.plot.energy(found[methods[0]])
+    assert np.max(np.abs(axes.lines[0].get_ydata())) == pytest.approx(abs(found.runs[0].energy_drift))
+    assert axes.get_ylabel() == "(H - H0) / (initial T + |V|)"
+
+
+def test_errors_of_an_ensemble_from_rest_are_those_of_the_run(tmp_path: Path) -> None:
+    (tmp_path / "driven.toml").write_text('title = "From rest"\n' + SCENES["driven"] + TIME)
+    scene = springcheck.load_scene(tmp_path / "driven.toml")
+    (run,) = springcheck.run(scene, "own:velocity-verlet").runs
+    cells = springcheck.ensemble(scene, {"time.step": [scene.step]}, "own:velocity-verlet").of(run.method)
+    assert cells["max_error"] == pytest.approx([run.max_error], rel=1e-9)
+    assert cells["energy_drift"] == pytest.approx([run.energy_drift], rel=1e-9)

@@ -84,7 +84,7 @@ def record(path: str | Path | None, methods: Sequence[str], cells: int) -> Atlas
         found = [cell for part in kept.results(pieces(here, cells - len(usual.cells))) for cell in part]
         every = (*usual.cells, *found)
         atlas = replace(usual, cells=every, windows=tuple(measure.windows(every)))
-        kept.commit("extremes", atlas.kept_document(kept.names))
+        kept.commit("extremes", atlas.kept_document())
     return atlas
 
 

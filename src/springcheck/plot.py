@@ -28,7 +28,8 @@ def position(*runs: Trajectory, particle: int = 0, ax: Axes | None = None) -> Ax
 
 
 def energy(*runs: Trajectory, ax: Axes | None = None) -> Axes:
-    """Relative change of the total energy over time, absolute where it starts at 0; returns the axes.
+    """Change of the total energy over time, relative to the kinetic plus the absolute potential energy of
+    the start, or where that is 0 to what the scene may gain; without a scene to |H0|.  Returns the axes.
 
     SpringcheckError where a trajectory was recorded without energies.
     """
@@ -36,8 +37,9 @@ def energy(*runs: Trajectory, ax: Axes | None = None) -> Axes:
     for run in runs:
         if run.energy is None:
             raise SpringcheckError(f"{run.label}: its scene keeps no energies (record.quantities)")
-        axes.plot(run.t, (run.energy - run.energy[0]) / (abs(run.energy[0]) or 1.0), label=run.label)
-    return _finished(axes, "t", "(H - H0) / |H0|")
+        scale = run.scene.system.norm.unit**2 if run.scene else abs(run.energy[0]) or 1.0
+        axes.plot(run.t, (run.energy - run.energy[0]) / float(scale), label=run.label)
+    return _finished(axes, "t", "(H - H0) / (initial T + |V|)")
 
 
 def _axes(ax: Axes | None) -> Axes:

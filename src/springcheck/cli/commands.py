@@ -49,11 +49,10 @@ def _inspect(options: Namespace) -> int:
 def _plot(options: Namespace) -> int:
     from springcheck import formats
     from springcheck.cli import drawing
-    from springcheck.figures import folder
 
     drawing.need_matplotlib()
     path = Path(options.file)
-    into = Path(options.output or folder.folder_of(path))
+    into = Path(options.output or Path("figures", path.stem))
     if into.suffix in (".png", ".svg", ".pdf") and not into.is_dir():
         raise SpringcheckError(f"-o {into}: a folder is needed, figures have names of their own in it")
     doubts: list[dict[str, str]] = []

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import platform
 from collections.abc import Iterator
-from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 import numpy as np
@@ -15,6 +14,7 @@ from springcheck import engines
 from springcheck.errors import MethodError
 from springcheck.physics import scenefile
 from springcheck.physics.arrays import WIDE
+from springcheck.studies import provenance
 from springcheck.text.lines import Lines, plain
 
 LIBRARIES = ("numpy", "scipy", "h5py", "numba", "matplotlib", "jinja2", "rich", "msgspec", "pandas", "xarray")
@@ -35,17 +35,10 @@ def found() -> dict[str, Any]:
             if WIDE
             else "no wider than double here: bounds are wider, and `extremes` does not run",
         },
-        "libraries": {name: _version(name) for name in LIBRARIES},
+        "libraries": dict.fromkeys(LIBRARIES) | provenance.installed(LIBRARIES),
         "engines": [_engine(name) for name in engines.names()],
         "unusable_engines": engines.unusable(),
     }
-
-
-def _version(name: str) -> str | None:
-    try:
-        return version(name)
-    except PackageNotFoundError:
-        return None
 
 
 def _engine(name: str) -> dict[str, Any]:

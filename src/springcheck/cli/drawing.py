@@ -99,17 +99,16 @@ def draw_foreign(
     few = any(len(found.t) < FEWEST_PERIOD_FRAMES * periods(found.q[:, i]) for i in chosen)
 
     def curves(x: Any, y: Any, *, joined: bool) -> list[Curve]:
-        names = [(f"coordinate {i}", i) for i in chosen.tolist()]
         return [
             Curve(
-                name=name,
+                name=f"coordinate {i}",
                 group=solid[i % len(solid)],
                 x=x[:, i % x.shape[1]],
                 y=y[:, i],
                 dots=few,
                 line=joined or not few,
             )
-            for name, i in names
+            for i in chosen.tolist()
         ]
 
     solid = [name for name, look in looks.LOOKS.items() if look.linestyle == looks.SOLID]

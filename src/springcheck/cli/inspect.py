@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 from typing import Any
 
-from springcheck import engines, schemes, store
+from springcheck import engines, store
 from springcheck.errors import SpringcheckError
 from springcheck.physics.trajectory import Trajectory
 from springcheck.studies import STUDIES, keeper
@@ -18,19 +18,13 @@ from springcheck.text.wording import ordinal
 
 def held(summary: store.Summary) -> Iterator[tuple[Study, StudyResult]]:
     """The studies of a store with their results.  StoreError where one of them cannot be read."""
-    learn(summary)
+    # engines register the schemes that they define
+    for name in {run.label.partition(":")[0] for run in summary.runs} & {*engines.names()}:
+        with suppress(SpringcheckError):
+            engines.engine(name)
     for study in STUDIES:
         if study.held(summary):
             yield study, study.stored(summary.path)
-
-
-def learn(summary: store.Summary) -> None:
-    """Register the schemes that engines of these runs define, where the engines are installed."""
-    for run in summary.runs:
-        name = run.label.partition(":")[0]
-        if run.parameters.get("scheme") not in schemes.known() and name in engines.names():
-            with suppress(SpringcheckError):
-                engines.engine(name)
 
 
 def lines(summary: store.Summary, options: Namespace) -> Lines:

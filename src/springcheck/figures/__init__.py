@@ -1,1 +1,1 @@
-"""Helpers that all figures share.  Each study draws its own (`figure.py` beside its measure)."""
+"""Charts as data, and as pictures; each study describes its own (`page.py` beside its measure)."""

@@ -59,6 +59,8 @@ class Curve:
     """Whether it coincides with an earlier curve of its group, on which a figure shows its marks alone."""
     dots: bool = False
     """Whether points are too far apart to be joined: each is a dot, and its line is faint if it has one."""
+    methods: Sequence[str] = ()
+    """Labels of the methods that it stands for, where there are several."""
     band: tuple[Sequence[float] | Floats, Sequence[float] | Floats] | None = None
     """Smallest and largest of the numbers whose median is y."""
 
@@ -146,7 +148,7 @@ def plain(bank: Bank) -> dict[str, Any]:
             axis |= {"named": bool(said), "values": said or numbers(axis["values"]), "powers": _powers(axis)}
         for curve in chart["curves"]:
             curve |= {"x": numbers(curve["x"]), "y": numbers(curve["y"]), "notes": list(curve["notes"])}
-            for name in ("open", "over", "band"):
+            for name in ("open", "over", "methods", "band"):
                 del curve[name]
         if tiles := chart["tiles"]:
             texts = list(dict.fromkeys(note for row in tiles["notes"] for note in row if note))

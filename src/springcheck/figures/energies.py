@@ -14,6 +14,7 @@ from springcheck.figures.motion import Exact, periods, true_motion
 from springcheck.figures.naming import NAME_HIGH
 from springcheck.figures.overlay import Runs, exact_curve
 from springcheck.figures.portraits import extremes
+from springcheck.figures.views import energy_scale
 from springcheck.physics.arrays import Floats, Reals
 from springcheck.physics.trajectory import Trajectory
 
@@ -53,15 +54,12 @@ def energy(runs: Runs, exact: Exact) -> Bank:
     """Energy over time, and below it how far it is from that of the exact motion on a logarithmic scale.
 
     Without friction that is the initial energy; where friction acts and no closed form is known it is the
-    initial one too, and the axis says so.  All in units of the kinetic plus the absolute potential energy of
-    the start, which is the initial energy unless a potential is negative; see `Norm` where that is 0.
+    initial one too, and the axis says so.  All in units of the scene's `energy_scale`.
     """
     scene = runs.scene
     start = float(scene.system.energy(scene.q, scene.p))
-    unit = float(scene.system.norm.unit) ** 2
-    whole = abs(start - unit) <= 1e-12 * unit
-    unit = start if whole else unit
-    of = "initial energy" if whole else scene.system.norm.of or "unit"
+    unit, of = energy_scale(scene)
+    unit, of = float(unit), of or "unit"
     changes = not scene.system.keeps_energy and exact.known
 
     def energies(q: Reals, p: Reals) -> Floats:
@@ -145,7 +143,7 @@ def orbits(runs: Runs, parts: Runs, exact: Exact) -> str:
         if group.failed:
             continue
         if exact.known:
-            off[group.title] = float(np.max(exact.error(run)))
+            off[group.title] = max(float(np.max(exact.error(run))), parts.errors.get(run.label, 0.0))
         if scene.system.keeps_energy:
             with np.errstate(over="ignore", invalid="ignore"):
                 e = np.asarray(scene.system.energy(run.q, run.p), np.float64)

@@ -14,11 +14,6 @@ FIGURES = "springcheck-figures.json"
 """Index of a folder of figures: the store that each file shows, and the file's sha256."""
 
 
-def folder_of(path: Path) -> Path:
-    """Default folder of a store's figures."""
-    return Path("figures", path.stem)
-
-
 def check(names: Iterable[str], folder: Path, path: Path) -> None:
     """StoreError where figures of a store by these names would replace any other file of a folder."""
     if folder.exists() and not folder.is_dir():

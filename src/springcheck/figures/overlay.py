@@ -42,11 +42,15 @@ Pick = Callable[[Trajectory], tuple[Floats, Floats]]
 class Runs:
     """Trajectories of a scene by their motions; those of a single frame are left out.
 
-    `failed`: labels of the trajectories that some verdict rejects.
+    `failed`: labels of the trajectories that some verdict rejects; `errors`: the largest error of each over
+    all its frames, drawn or not, as far as it is known.
     """
 
-    def __init__(self, scene: Scene, runs: Mapping[str, Trajectory], failed: Collection[str] = ()) -> None:
-        self.scene = scene
+    def __init__(
+        self, scene: Scene, runs: Mapping[str, Trajectory], failed: Collection[str] = (),
+        errors: Mapping[str, float] | None = None,
+    ) -> None:  # fmt: skip
+        self.scene, self.errors = scene, errors or {}
         found: dict[str, list[Trajectory]] = {}
         wrong: list[Trajectory] = []
         for label, run in runs.items():
@@ -168,7 +172,8 @@ class Runs:
     ) -> Bank:
         """The charts of a figure, under what is said of them."""
         # of a long run every so many frames, between which it may be further off
-        few = "at most" in said and any(run.every > self.scene.every for run in self.every)
+        thinned = not self.errors and any(run.every > self.scene.every for run in self.every)
+        few = thinned and "at most" in said
         return Bank(
             name=name, title="Methods drawn", charts=charts, size=size, columns=columns,
             heading=f"{self.scene.title}: {self.wrong}{said}{' (of the frames drawn)' * few}",

@@ -130,7 +130,8 @@ def _entries(curves: Sequence[Curve]) -> list[Line2D]:
             mine.append(curve)
     found = []
     for (group, _), mine in groups.items():
-        name, methods = mine[0].name, [one.name for one in mine if ":" in one.name]
+        name = mine[0].name
+        methods = [x for one in mine for x in (one.methods or [one.name]) if ":" in x]
         title = textwrap.fill((mine[0].title or looks.title(group)) if methods else name, WIDEST)
         label = f"{title}\n{looks.members(methods)}" if methods else title
         if group == REJECTED:

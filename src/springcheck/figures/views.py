@@ -25,15 +25,14 @@ class Units:
     q: str = ""
     p: str = ""
     t: str = ""
-    energy: str = ""
 
 
 _UNITS = {
     "reduced": Units(),
-    "md": Units(q="nm", p="u nm/ps", t="ps", energy="kJ/mol"),
-    "si": Units(q="m", p="kg m/s", t="s", energy="J"),
-    "circuit": Units(q="C", p="Wb", t="s", energy="J"),
-    "rotor": Units(q="rad", p="N m s", t="s", energy="J"),
+    "md": Units(q="nm", p="u nm/ps", t="ps"),
+    "si": Units(q="m", p="kg m/s", t="s"),
+    "circuit": Units(q="C", p="Wb", t="s"),
+    "rotor": Units(q="rad", p="N m s", t="s"),
 }
 
 
@@ -47,6 +46,22 @@ def units(scene: Scene) -> Units:
 def with_unit(name: str, unit: str) -> str:
     """The label of an axis."""
     return f"{name} ({unit})" if unit else name
+
+
+WHOLE = 1e-12
+"""Relative difference up to which the initial energy counts as the energy of the norm's unit."""
+
+
+def energy_scale(scene: Scene) -> tuple[np.longdouble, str]:
+    """The energy to which differences of energies are relative, and its name, as `Norm` has it.
+
+    That is the initial energy, unless potentials of both signs, or one and the kinetic energy, cancel in it:
+    then it may be a rounding.
+    """
+    system = scene.system
+    start, unit = system.energy(*(x.astype(np.longdouble) for x in (scene.q, scene.p))), system.norm.unit**2
+    whole = abs(start - unit) <= WHOLE * unit
+    return (np.longdouble(start), "initial energy") if whole else (unit, system.norm.of)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -90,8 +90,6 @@ class Keeper:
         self._finished = journal.tables() if journal else {}
         self.progress = progress
         self._by: dict[str, list[dict[str, str]]] = {}
-        self.names: list[str] = []
-        """Names of the tables of the pieces, in the order in which they were requested."""
         self.resumed = 0
         """Number of pieces that were not measured again."""
 
@@ -137,7 +135,6 @@ class Keeper:
 
     def stream(self, pieces: Sequence[Piece]) -> Iterator[tuple[Piece, Any]]:
         """Pieces with their results as they finish, those of earlier calls first; none is held in memory."""
-        self.names += [piece.name for piece in pieces]
         left = []
         for piece in pieces:
             if piece.name in self._finished:
@@ -215,7 +212,7 @@ def study(
     more = options if scene is None else (scene.digest, *options)
     with kept(path, command(name, labels, *more), **how) as keeper:
         found: Any = replace(measure(keeper), resumed=keeper.resumed, path=keeper.path)  # type: ignore[type-var]
-        keeper.commit(name, found.document(), scene)
+        keeper.commit(name, found.kept_document(), scene)
     return found  # type: ignore[no-any-return]
 
 
@@ -231,10 +228,10 @@ class Kept:
         """The result of this key.  KeyError where it is missing."""
         return form.found(self.tables[form.beginning + key])
 
-    @property
-    def scene(self) -> Scene:
-        """The scene that was studied."""
-        return stored_scene(self.path)
+    def listed(self, form: Form[Any], name: str) -> tuple[Any, ...]:
+        """The results of the methods that the document lists under this name, in its order."""
+        methods = dict.fromkeys(one["method"] for one in self.document.get(name, ()))
+        return tuple(self.found(form, method) for method in methods)
 
     @property
     def left_out(self) -> tuple[LeftOut, ...]:

@@ -9,7 +9,9 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from hashlib import sha256
+from importlib.metadata import PackageNotFoundError, version
 
 import numpy as np
 
@@ -28,18 +30,19 @@ BITS = ("elementary functions", "sums", "linear algebra")
 
 def versions() -> dict[str, str]:
     """Versions of all that numbers depend on, engines and plug-ins included, as far as installed."""
-    from importlib.metadata import PackageNotFoundError, version
-
     # engine files of a call have versions, too; they are part of the command
     known = [name for name in engines.names() if not engines.is_brought(name)]
     engines_ = [engines.engine(name).distribution for name in known]
     plugins = [engines.origin(name).package for name in known]
+    return installed([*PACKAGES, *engines_, *plugins])
+
+
+def installed(names: Iterable[str]) -> dict[str, str]:
+    """Versions of those of these packages that are installed."""
     found = {}
-    for name in dict.fromkeys([*PACKAGES, *engines_, *plugins]):
-        try:
+    for name in names:
+        with suppress(PackageNotFoundError, ValueError):
             found[name] = version(name)
-        except (PackageNotFoundError, ValueError):
-            continue
     return found
 
 

@@ -1,7 +1,7 @@
-"""Definition of a study: a folder with its measure, result, text and figure, and a line in the list.
+"""Definition of a study: a folder with its measure, result, text and charts, and a line in the list.
 
 The folder's `__init__` declares the study and imports nothing heavy; its parts are imported on use:
-`measure.perform` and `measure.stored`, `text.lines`, and `page.banks` or, with matplotlib, `figure.pictures`.
+`measure.perform` and `measure.stored`, `text.lines`, and `page.banks` where it has charts.
 """
 
 from __future__ import annotations
@@ -83,6 +83,10 @@ class Studied(StudyResult):
     path: Path | None = None
     """Path of the store."""
 
+    def kept_document(self) -> dict[str, Any]:
+        """The document as a store holds it, beside the tables."""
+        return self.document()
+
 
 def study_of(found: object) -> Study:
     """The study that this is a result of; for `run --vary` the ensemble."""
@@ -158,9 +162,6 @@ class Study:
 
     def pictures(self, found: StudyResult, **chosen: Any) -> dict[str, Callable[[], Any]]:
         """Functions that draw its figures by matplotlib, by name."""
-        if self._has("figure"):
-            drawn: dict[str, Any] = self._part("figure").pictures(found, **chosen)
-            return {name: partial(drawn.get, name) for name in drawn}
         from springcheck.figures import render
 
         banks = self.banks(found, **chosen)
@@ -168,13 +169,10 @@ class Study:
 
     def banks(self, found: StudyResult, **chosen: Any) -> list[Bank]:
         """Its charts in figures and in the report page; none where it has no such part."""
-        if not self._has("page"):
+        if find_spec(f"{self._package}.page") is None:
             return []
         banks: list[Bank] = self._part("page").banks(found, **chosen)
         return banks
-
-    def _has(self, name: str) -> bool:
-        return find_spec(f"{self._package}.{name}") is not None
 
     def _part(self, name: str) -> Any:
         return import_module(f"{self._package}.{name}")

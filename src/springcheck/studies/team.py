@@ -60,7 +60,6 @@ def _after(brought: Brought, part: Callable[[], T]) -> T:
 
 ALONE = Processes()
 
-
 MOST_PROCESSES = 4096
 
 

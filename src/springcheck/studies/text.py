@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
+from springcheck.figures.views import energy_scale
 from springcheck.physics.exact import has_true_motion
 from springcheck.physics.scene import Scene
 from springcheck.studies.choose import LeftOut
@@ -32,12 +33,14 @@ def resumed(pieces: int, what: str) -> Lines:
     return [plain(f"  {count(pieces, what)} {were} finished by an interrupted call and resumed")]
 
 
-def of_energy(scene: Scene) -> str:
-    """Explanation of the column of energies."""
+def of_energy(scene: Scene, of: str = "") -> str:
+    """Explanation of the column of energies, relative to the scene's `energy_scale` or that of this name."""
     system = scene.system
     changes = ["loss by friction"] * system.is_damped + ["work of the drive"] * system.is_driven
     known = bool(changes) and has_true_motion(scene)
     off = f"H - H{' exact' if known else '0'}"
-    part = f"({off})/|H0|" if system.energy(scene.q, scene.p) else f"{off}, as H0 is 0,"
+    of = of or energy_scale(scene)[1]
+    over = "|H0|" if of == "initial energy" else f"({of})"
+    part = f"({off})/{over}" if of else off
     how = f", the {'exact ' * known}{' and '.join(changes)} {'taken off' if known else 'in it'}"
     return f"{part} where it is largest{how if changes else ''}"

@@ -1,6 +1,7 @@
 // Charts as SVG: curves or tiles in a box, read by pointer or arrow keys, zoomed by dragging or + and -.
 // A bank is charts with one legend.  springcheck/figures/charts.py describes what is drawn.
 
+const LINE = 12; // pixels from one name to the next below it
 const CLOSE = 40; // pixels within which a pointer reads a point
 const FAR = 1e4; // pixels beyond which nothing is drawn
 const MIDDLE = { "text-anchor": "middle" }, END = { "text-anchor": "end" };
@@ -91,16 +92,20 @@ class Chart {
     }
     root.append(element("clipPath", { id: clip }, element("rect", box)));
     if (spec.tiles) this.tiles(inside, x, y);
+    let [beneath, above] = [T + 11, -99];
     for (const { axis, at, name, look } of spec.rules) {
       const v = this.ways["xy".indexOf(axis)](at), [left, more] = look === "one" ? [L + 5] : [W - R - 5, END];
-      const place = axis === "x" ? { x: x(v) + 5, y: T + 11 } : { x: left, y: y(v) - 5, ...more };
+      const place = axis === "x" ? { x: x(v) + 5, y: beneath } : { x: left, y: y(v) - 5, ...more };
+      if (axis === "x") beneath = T + 11 + ((beneath - T - 11 + LINE) % (4 * LINE));
       inside.append(line(axis, v, look || "limit"), element("text", place, name));
     }
     for (const curve of this.seen()) this.curve(inside, curve, x, y);
     const fills = new Map(this.seen().map(({ group, look }) => [group, colourOf(look)])), [a, b, c, d] = all;
-    for (const one of spec.labels.filter(({ group }) => fills.has(group))) {
+    for (const one of spec.labels.filter(({ group }) => fills.has(group)).sort((p, q) => q.y - p.y)) {
       const style = { fill: fills.get(one.group) }, [off, more] = one.x > 0.6 ? [-4, END] : [4, {}];
-      const place = { x: x(a + one.x * (b - a)) + off, y: Math.max(T + 9, y(c + one.y * (d - c)) - 4) };
+      // those beside the axes are pushed down from the edge, each below the one above it
+      above = Math.max(T + 9, y(c + one.y * (d - c)) - 4, one.x === 1 ? above + LINE : 0);
+      const place = { x: x(a + one.x * (b - a)) + off, y: above };
       inside.append(element("text", { class: "name", ...place, ...more, style }, one.text));
     }
     this.ring = element("circle", { class: "ring", r: 6, cx: -99, cy: -99 });
@@ -249,7 +254,9 @@ class Chart {
 // Charts with one legend: a box for each curve, or for each chart of tiles.
 class Bank {
   constructor(place, bank) {
-    const on = new Set(bank.on), grid = html("div", { class: bank.charts.length > 1 ? "pair" : "one" });
+    // columns that are named need the width of the page
+    const wide = bank.charts.length === 1 || bank.charts.some((chart) => chart.x.named);
+    const on = new Set(bank.on), grid = html("div", { class: wide ? "one" : "pair" });
     const legend = html("fieldset", {}, html("legend", {}, bank.title)), boxes = [];
     const add = (name, drawn, title, change) => {
       const box = html("input", { type: "checkbox" });

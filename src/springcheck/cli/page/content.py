@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import shlex
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -27,7 +27,8 @@ from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Comparison, Verdict
 from springcheck.store import Damage, Summary
 from springcheck.studies.run.drawable import drawable
-from springcheck.studies.run.page import of_runs, temperatures
+from springcheck.studies.run.page import of_drawable
+from springcheck.studies.run.result import Stored
 from springcheck.text.lines import Lines, TextTable
 from springcheck.text.wording import STATES_SHOW
 
@@ -44,12 +45,14 @@ class Section:
     """Names of its charts in the data of the page."""
 
 
-def sections(summary: Summary) -> tuple[list[Section], dict[str, Any]]:
-    """The studies of a store other than trajectories, and the data of all their charts by name."""
+def sections(summary: Summary) -> tuple[list[Section], dict[str, Any], Stored | None]:
+    """The studies of a store other than trajectories, the data of all their charts by name, and its run."""
     found: list[Section] = []
     data: dict[str, Any] = {}
+    run = None
     for study, result in inspect.held(summary):
-        if study.trajectories:
+        if isinstance(result, Stored):
+            run = result
             continue
         mine = {f"{study.name}-{i}": charts.plain(bank) for i, bank in enumerate(study.banks(result))}
         data |= mine
@@ -62,7 +65,7 @@ def sections(summary: Summary) -> tuple[list[Section], dict[str, Any]]:
                 banks=tuple(mine),
             )
         )
-    return found, data
+    return found, data, run
 
 
 PAGE_NUMBERS = 12_000
@@ -162,7 +165,7 @@ class Content:
 def gather(path: Path) -> Content:
     """Gather the contents of a report.  SpringcheckError where a store has neither trajectory nor study."""
     summary = store.summary(path)
-    studies, banks = sections(summary)
+    studies, banks, run = sections(summary)
     if not summary.runs and not studies:
         raise SpringcheckError(f"{path}: holds no trajectory and no study to report")
     text = store.scene_text(path) if "scene" in summary.root else ""
@@ -172,12 +175,9 @@ def gather(path: Path) -> Content:
     rows = 2 + 2 * min(MOST_PANELS, scene.n if scene else 1)
     most = max(FEWEST_SHOWN, PAGE_NUMBERS // (rows * max(1, len(labels))))
     pieces = {label: store.strided(path, label, most) for label in labels}
-    kept = bool(summary.runs) and path.is_file()
-    inspect.learn(summary)
-    verdicts = store.verdicts(path) if kept else ()
-    comparison = store.comparison(path) if kept else None
+    verdicts, comparison = (run.verdicts, run.comparison) if run else ((), None)
     wrong = {verdict.method for verdict in verdicts if verdict.passed is False}
-    if labels and (motion := _motion(path, wrong, most)):
+    if run and labels and (motion := _motion(run, most)):
         banks["motion"] = motion
     title = scene.title if scene else path.name
     return Content(
@@ -204,17 +204,10 @@ def gather(path: Path) -> Content:
     )
 
 
-def _motion(path: Path, wrong: Collection[str], most: int) -> dict[str, Any] | None:
+def _motion(run: Stored, most: int) -> dict[str, Any] | None:
     """The charts that `plot` draws of a run, with the first engine of each scheme visible."""
-    shown = drawable(path, most)
-    found = of_runs(
-        shown.scene,
-        shown.runs,
-        shown.followed,
-        failed=wrong,
-        points=most,
-        heated=temperatures(shown.scene, path),
-    )
+    shown = drawable(run.path, most)
+    found = of_drawable(shown, run, points=most)
     if not found:
         return None
     curves = [curve for bank in found for chart in bank.charts for curve in chart.curves]

@@ -105,11 +105,7 @@ def perform(options: Namespace, progress: Progress | None) -> Census:
 @keeper.restoring("census")
 def stored(kept: keeper.Kept) -> Census:
     """The census that `record` has saved.  StoreError where the file holds none."""
-    return Census(
-        entries=tuple(kept.found(ENTRIES, one["method"]) for one in kept.document["entries"]),
-        left_out=kept.left_out,
-        path=kept.path,
-    )
+    return Census(entries=kept.listed(ENTRIES, "entries"), left_out=kept.left_out, path=kept.path)
 
 
 def entry(label: Label) -> Entry:

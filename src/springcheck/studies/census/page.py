@@ -28,8 +28,11 @@ def banks(census: Census) -> list[Bank]:
             x = equal[0]
             notes = [f"step {step}; bit for bit {', '.join(names)}" for step in range(len(x.q))]
             curves.append(
-                Curve(name=name, group=scheme, title=f"{title(scheme)}{of}", x=x.q, y=x.p, notes=notes)
-            )
+                Curve(
+                    name=name, group=scheme, title=f"{title(scheme)}{of}", x=x.q, y=x.p, notes=notes,
+                    methods=names,
+                )
+            )  # fmt: skip
             if i == 0:
                 on.append(name)
     if not curves:

@@ -8,7 +8,7 @@ neither the file nor memory holds trajectories, however many cells there are.
 from __future__ import annotations
 
 from argparse import Namespace
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, Unpack
@@ -108,7 +108,7 @@ def stored(kept: keeper.Kept) -> Ensemble:
     """The ensemble that `record` has saved.  StoreError where the file holds none."""
     known = kept.document
     return Ensemble(
-        scene=kept.scene,
+        scene=keeper.stored_scene(kept.path),
         fields=tuple(known["fields"]),
         grid=known["grid"],
         tallies=tuple(Tally(**one) for one in known["methods"]),
@@ -166,8 +166,9 @@ def _run(scene: Scene, changes: Any, chosen: np.ndarray, label: Label, found: di
     for name, x in zip(("q0", "p0"), states, strict=True):
         found[name][chosen] = x[frames - 1, np.arange(copies), 0]
     with np.errstate(all="ignore"):
-        drift = _drifts(scene, changes, chosen, many, q, p)
-        error = _errors(scene, changes, chosen, many, q, p)
+        scale = _scales(scene, changes, chosen, many)
+        drift = np.asarray(_drifts(scene, changes, chosen, many, q, p) / scale, np.float64)
+        error = _errors(scene, changes, chosen, many, q, p, scale)
     held = np.arange(len(q))[:, None] < frames
     drift = np.take_along_axis(drift, np.argmax(np.where(held, np.abs(drift), -1), axis=0)[None], axis=0)[0]
     # a cell with no frame but the start has neither error nor drift
@@ -181,13 +182,24 @@ def _of_copies(values: Reals, copies: int) -> Reals:
     return np.asarray(np.sum(values.reshape(len(values), copies, -1), axis=2))
 
 
-def _energies(many: Scene, q: Reals, p: Reals, copies: int) -> Reals:
-    """Energy of each copy (f, copies)."""
+def _energies(
+    many: Scene, q: Reals, p: Reals, copies: int, of: Callable[[Reals], Reals] = np.asarray
+) -> Reals:
+    """Energy of each copy (f, copies), or with another function `of` the potential energy of each term."""
     energy = _of_copies(0.5 * (p * p) / many.m, copies)
     for term in many.terms:
         if term.kind == "potential":
-            energy = energy + _of_copies(term.potential(term.elongation(q), *term.parameters), copies)
+            energy = energy + of(_of_copies(term.potential(term.elongation(q), *term.parameters), copies))
     return energy
+
+
+def _scales(scene: Scene, changes: Any, chosen: np.ndarray, many: Scene) -> Extended:
+    """The square of the unit of each copy's `Norm` (copies,): its initial T + |V| unless that is 0."""
+    q, p = (x.astype(np.longdouble)[None] for x in (many.q, many.p))
+    found = _energies(many, q, p, len(chosen), np.abs)[0]
+    for j in np.flatnonzero(found == 0):
+        found[j] = together(scene, changes, chosen[j : j + 1]).system.norm.unit ** 2
+    return np.asarray(found, np.longdouble)
 
 
 def _solved(
@@ -200,9 +212,9 @@ def _solved(
             yield j, one, *exact.true_motion(one, steps, one.step)
 
 
-def _drifts(scene: Scene, changes: Any, chosen: np.ndarray, many: Scene, q: Floats, p: Floats) -> Floats:
-    """(H - H0) / |H0| of each copy, absolute where H0 is 0 (f, copies).  With friction or a drive the energy
-    of the exact solution replaces H0, where it is known."""
+def _drifts(scene: Scene, changes: Any, chosen: np.ndarray, many: Scene, q: Floats, p: Floats) -> Reals:
+    """H - H0 of each copy (f, copies).  With friction or a drive the energy of the exact solution replaces
+    H0, where it is known."""
     copies = len(chosen)
     energy = _energies(many, q, p, copies)
     least, most = np.finfo(np.float64).smallest_normal / np.finfo(np.float64).eps, np.finfo(np.float64).max
@@ -219,13 +231,14 @@ def _drifts(scene: Scene, changes: Any, chosen: np.ndarray, many: Scene, q: Floa
         else:
             for j, one, q_j, p_j in _solved(scene, changes, chosen, steps):
                 right[:, j] = one.system.energy(q_j, p_j)
-    start = np.abs(energy[0])
-    return np.asarray((energy - right) / np.where(start > 0, start, 1.0), np.float64)
+    return energy - right
 
 
-def _errors(scene: Scene, changes: Any, chosen: np.ndarray, many: Scene, q: Floats, p: Floats) -> Floats:
-    """Distance of each copy from its exact solution, relative to the initial energy norm (f, copies); NaN
-    where that is unknown."""
+def _errors(
+    scene: Scene, changes: Any, chosen: np.ndarray, many: Scene, q: Floats, p: Floats, scale: Extended
+) -> Floats:
+    """Distance of each copy from its exact solution, relative to the initial energy norm (f, copies), the
+    root of the `scale`; NaN where that is unknown."""
     copies, frames = len(chosen), len(q)
     steps = np.arange(frames) * many.every
     system = many.system
@@ -245,14 +258,8 @@ def _errors(scene: Scene, changes: Any, chosen: np.ndarray, many: Scene, q: Floa
         np.where(x == 0, 0, np.maximum(np.abs(x), y))
         for x, y in ((q - true_q, known_q), (p - true_p, known_p))
     )
-    size, unit = (
-        _of_copies(0.5 * (dp * dp) / m, copies),
-        _of_copies((0.5 * (many.p * many.p) / m)[None], copies),
-    )
+    size = _of_copies(0.5 * (dp * dp) / m, copies)
     for term in many.terms:
         du = term.stretch(dq)
         size = size + 0.5 * _of_copies(term.rigidity * du * du, copies)
-        if term.kind == "potential":
-            start = term.potential(term.elongation(many.q.astype(np.longdouble)[None]), *term.parameters)
-            unit = unit + np.abs(_of_copies(start, copies))
-    return np.asarray(np.where(size == 0, 0, np.sqrt(size) / np.sqrt(unit)), np.float64)
+    return np.asarray(np.where(size == 0, 0, np.sqrt(size) / np.sqrt(scale)), np.float64)

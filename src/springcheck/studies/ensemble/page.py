@@ -18,11 +18,11 @@ from springcheck.physics.scene import Scene
 from springcheck.physics.terms import WallSpring
 from springcheck.schemes import known
 from springcheck.studies.ensemble.measure import OUTCOMES
-from springcheck.studies.ensemble.result import Columns, Ensemble
+from springcheck.studies.ensemble.result import CELL_SCALE, Columns, Ensemble
 
 TITLES = {
     "max_error": "largest error, relative to the initial energy norm",
-    "energy_drift": "|H - H0| / |H0| where it is largest",
+    "energy_drift": f"|H - H0| / ({CELL_SCALE}) where it is largest",
     "q0": "q of the first particle at the end",
     "p0": "p of the first particle at the end",
     "steps": "steps with finite numbers",
@@ -31,13 +31,10 @@ TITLES = {
 """Quantities that can be drawn, as axes name them."""
 
 SIZES = ("max_error", "energy_drift")
-"""Quantities drawn by their magnitude, over many powers of ten."""
+"""Quantities drawn by their magnitude, over many powers of ten, and by default."""
 
 MOST_SHOWN_SIZE = 1e3
 """Largest relative size that a chart shows: beyond it nothing can be read off."""
-
-DRAWN_QUANTITIES = SIZES
-"""Quantities that are drawn by default."""
 
 MOST_POINTS, MOST_TILES = 400, 64
 FEW_POINTS = 100
@@ -74,7 +71,7 @@ class Map:
 def _title(quantity: str, scene: Scene) -> str:
     """Title of a quantity; with friction or a drive the energy is compared with the exact solution's."""
     if quantity == "energy_drift" and not scene.system.keeps_energy and has_true_motion(scene):
-        return "|H - H exact| / |H0| where it is largest"
+        return TITLES[quantity].replace("H0", "H exact")
     return TITLES[quantity]
 
 
@@ -183,7 +180,7 @@ def banks(found: Ensemble, *, quantity: str | None = None, over: str | None = No
         close = nearest(quantity, TITLES)
         raise SpringcheckError(f"--quantity {quantity}: {', '.join(TITLES)} can be drawn{close}")
     out, fields = [], fields_over(found, over)
-    for name in DRAWN_QUANTITIES if quantity is None else (quantity,):
+    for name in SIZES if quantity is None else (quantity,):
         every = (
             (tally.method, reduced(found.of(tally.method), found, name, fields)) for tally in found.tallies
         )

@@ -16,8 +16,11 @@ from springcheck.text.wording import count
 
 QUANTITIES = ("max_error", "energy_drift", "steps")
 """Numbers of each cell that are summarised and drawn: largest distance from the exact solution relative to
-the initial energy norm (NaN where it is unknown), (H - H0)/|H0| where it is largest (with friction the exact
-solution's H for H0), and steps with finite numbers."""
+the initial energy norm (NaN where it is unknown), H - H0 over the square of its unit where that is largest
+(with friction the exact solution's H for H0), and steps with finite numbers."""
+
+CELL_SCALE = "initial T + |V|"
+"""The energy to which those of a cell are relative: its own, or where that is 0 what it may gain."""
 
 Columns = Mapping[str, np.ndarray]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from argparse import Namespace
 
-from springcheck.studies.ensemble.result import Ensemble, Tally
+from springcheck.studies.ensemble.result import CELL_SCALE, Ensemble, Tally
 from springcheck.studies.text import left_out, of_energy, resumed
 from springcheck.text.lines import Lines, plain, table
 from springcheck.text.wording import count
@@ -25,7 +25,7 @@ def lines(found: Ensemble, options: Namespace | None = None) -> Lines:
         plain(),
         table(titles, rows),
         plain(
-            f"error: largest distance from the exact solution; energy: {of_energy(found.scene)}",
+            f"error: largest distance from the exact solution; energy: {of_energy(found.scene, CELL_SCALE)}",
             "dim",
         ),
         plain("no cell is judged: `springcheck run SCENE --set FIELD=NUMBER` judges one of them", "dim"),

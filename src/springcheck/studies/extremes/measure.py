@@ -28,13 +28,6 @@ from springcheck.studies.extremes.result import CELLS, Atlas, Window
 from springcheck.studies.keeper import How, Keeper, each
 from springcheck.studies.stability import propagators
 
-
-def everything() -> tuple[str, ...]:
-    """Every method on its first platform, and the platforms that engines declare for the atlas."""
-    places = (f"{name}:{place}" for name in engines.names() for place in engines.engine(name).atlas)
-    return ("*", *places)
-
-
 CALM_TURNS = (0.01, 1.9)
 """h w that count for a window: below, hardly any force shows; beyond, stability decides."""
 
@@ -55,26 +48,25 @@ def record(
             "extremes judges numbers from 1e-300 to 1e300 by wider ones, and long double is no wider than "
             "double on this machine: run it on Linux on x86-64"
         )
-    labels = engines.match(tuple(methods) or everything())
-    command = keeper.command("extremes", labels, "quick" if quick else "whole")
-    with keeper.kept(path, command, **how) as kept:
-        atlas = replace(measure(labels, kept, quick=quick), resumed=kept.resumed, path=kept.path)
-        kept.commit("extremes", atlas.kept_document(kept.names))
-    return atlas
+    places = (f"{name}:{place}" for name in engines.names() for place in engines.engine(name).atlas)
+    labels = engines.match(tuple(methods) or ("*", *places))
+    cells = partial(measure, labels, quick=quick)
+    return keeper.study("extremes", path, labels, cells, "quick" if quick else "whole", **how)
 
 
 def measure(labels: Sequence[Label], kept: Keeper, *, quick: bool = False) -> Atlas:
     """The cells of these methods; those that an earlier call has saved are not measured again."""
     usable, left_out = sorted_out(labels, absence, "has extreme cases here")
     pieces = each(usable, "", lambda label: partial(of_method, label, quick=quick), CELLS)
-    work = [replace(piece, cost=_cost(label)) for label, piece in zip(usable, pieces, strict=True)]
+    # contexts of platforms take long
+    work = [replace(x, cost=100.0 * on_platform(y) + 1.0) for x, y in zip(pieces, usable, strict=True)]
     found = [cell for piece in kept.results(work) for cell in piece]
     return Atlas(cells=tuple(found), windows=tuple(windows(found)), left_out=tuple(left_out))
 
 
-def _cost(label: Label) -> float:
-    """Estimated cost of the cells of a method, relative to others: platforms take contexts."""
-    return 100.0 if label.platform not in ("", "Reference") else 1.0
+def on_platform(label: Label) -> bool:
+    """Whether a run of a method takes a context of a platform other than the reference."""
+    return label.platform not in ("", "Reference")
 
 
 def absence(label: Label) -> str | None:
@@ -116,7 +108,7 @@ def groups(label: Label, *, quick: bool = False) -> list[list[grid.Spec]]:
         return spec.block, spec.h
 
     found = [list(group) for _, group in groupby(sorted(grid.specs(quick=quick), key=together), together)]
-    if label.platform not in ("", "Reference"):
+    if on_platform(label):
         # a context of such a platform takes a quarter of a second: only the groups of most cells
         found = sorted(found, key=len)[-3 if quick else -24 :]
     return found

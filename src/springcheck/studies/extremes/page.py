@@ -36,7 +36,8 @@ def banks(atlas: Atlas) -> list[Bank]:
     """A map for each method; solvers, whose cells are of one h w, have none."""
     methods = dict.fromkeys(cell.method for cell in atlas.cells)
     planes = {x: [c for c in atlas.cells if c.method == x and c.block == "force"] for x in methods}
-    charts = [_chart(method, cells) for method, cells in planes.items() if _is_plane(cells)]
+    turns = {method: {cell.parameters["h_w"] for cell in cells} for method, cells in planes.items()}
+    charts = [_chart(method, cells) for method, cells in planes.items() if len(turns[method]) > 1]
     if not charts:
         return []
     wrong = f"{count(len(atlas.wrong), 'case')} silently wrong" if atlas.wrong else "none silently wrong"
@@ -45,10 +46,6 @@ def banks(atlas: Atlas) -> list[Bank]:
     )
     heading = f"Of {len(atlas.cells)} extreme cases {wrong}: {others}"
     return [Bank(name="extremes", heading=heading, title="Methods drawn", charts=charts)]
-
-
-def _is_plane(cells: Sequence[Cell]) -> bool:
-    return len({cell.parameters["h_w"] for cell in cells}) > 1
 
 
 def _chart(method: str, cells: Sequence[Cell]) -> Chart:

@@ -63,9 +63,10 @@ class Atlas(Studied):
             left_out=self.left_out,
         )  # fmt: skip
 
-    def kept_document(self, tables: Sequence[str]) -> dict[str, Any]:
+    def kept_document(self) -> dict[str, Any]:
         """The document with the names of tables in place of the cells, which these hold exactly."""
-        return {"tables": tables, **{key: x for key, x in self.document().items() if key != "cells"}}
+        tables = dict.fromkeys(CELLS.beginning + cell.method for cell in self.cells)
+        return {"tables": [*tables], **{key: x for key, x in self.document().items() if key != "cells"}}
 
 
 def _for_viewers(cells: Sequence[Cell]) -> dict[str, np.ndarray]:

@@ -15,6 +15,9 @@ KINDS = (
 )
 
 
+ROOM_FOR_NAMES = 1e6
+"""Factor on the largest size to which the axis extends: names of checks stand beyond all marks."""
+
 ROWS_OF_A_MAP, MAPS_BESIDE = 60, 3
 """Most faults in one map, and the number of maps, side by side, of more."""
 
@@ -72,14 +75,11 @@ def _heading(found: FaultReport, checks: int) -> str:
 def _limits(results: Sequence[Result]) -> Bank:
     """A row for each fault, a mark at the detection limit of each check; the most sensitive one is named."""
     shown = [one for one in results if one.limits]
-    points = [
-        (size, float(j), name)
+    rows = [
+        [(size, float(j), name) for name, size in sorted(one.limits.items(), key=lambda x: x[1])]
         for j, one in enumerate(shown)
-        for name, size in sorted(one.limits.items(), key=lambda x: x[1])
     ]
-    first = [next(x for x in points if x[1] == j) for j in range(len(shown))]
-    others = [x for x in points if x not in first]
-    xs = Frame(min(x for x, *_ in points) / 3, max(x for x, *_ in points) * 300, log=True)
+    first, others = [row[0] for row in rows], [x for row in rows for x in row[1:]]
     ys = Frame(-0.5, len(shown) - 0.5)
     curves = [
         Curve(
@@ -88,22 +88,22 @@ def _limits(results: Sequence[Result]) -> Bank:
         )
         for name, some in (("its sharpest check", first), ("other checks", others)) if some
     ]  # fmt: skip
-    places = xs.parts([x for x, *_ in first]), ys.parts([y for _, y, _ in first])
+    least, most = (f(x for x, *_ in [*first, *others]) for f in (min, max))
     chart = Chart(
-        title="How small a fault is seen: one spring, h \N{GREEK SMALL LETTER OMEGA} = 0.09, 200 steps.",
-        x=Scale(name="smallest relative size that the check rejects", log=True, shown=xs.ends),
+        title="How small a fault is seen, each on its own scene, and by which check first.",
+        x=Scale(
+            name="smallest relative size that the check rejects", log=True,
+            shown=(least / 3, most * ROOM_FOR_NAMES),
+        ),
         y=Scale(name="fault", names=[one.name for one in shown], shown=ys.ends),
         curves=curves,
         labels=[
-            Naming(text=check, group=curves[0].name, x=min(0.6, float(u) + 0.01), y=float(v) - 0.009)
-            for (*_, check), u, v in zip(first, *places, strict=True)
+            Naming(text=check, group=curves[0].name, x=0.99, y=float(v) - 0.009)
+            for (*_, check), v in zip(first, ys.parts([y for _, y, _ in first]), strict=True)
         ],
-    )
+    )  # fmt: skip
     middle = sorted(x for x, *_ in first)[len(first) // 2]
-    heading = (
-        f"Half of {len(shown)} faults are seen from {middle:.0e} on: one spring, "
-        "h \N{GREEK SMALL LETTER OMEGA} = 0.09, 200 steps"
-    )
+    heading = f"Half of {len(shown)} faults are seen from {middle:.0e} on, each on a scene of its own"
     return Bank(name="faults", title="Checks", charts=[chart], heading=heading)
 
 

@@ -244,7 +244,7 @@ def _errors(sweep: Sweep, known: Truth) -> Point:
 @keeper.restoring("precision")
 def stored(kept: keeper.Kept) -> PrecisionStudy:
     """The study that `record` has saved.  StoreError where the file holds none."""
-    scene, known = kept.scene, kept.document
+    scene, known = keeper.stored_scene(kept.path), kept.document
     methods = [
         MethodSummary(
             method=one["method"],

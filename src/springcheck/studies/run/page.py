@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from springcheck.checks.compare import EXACT
 from springcheck.figures import chain, energies, looks, portraits
 from springcheck.figures.charts import Bank, Chart, Curve, Rule, Scale
 from springcheck.figures.motion import SMOOTH, Exact, true_motion
@@ -18,6 +19,7 @@ from springcheck.figures.views import paths, views
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory
 from springcheck.studies import keeper
+from springcheck.studies.run.drawable import Drawable
 from springcheck.studies.run.result import Report, Stored
 from springcheck.thermal.heat import Heated, heated_of
 
@@ -29,10 +31,23 @@ TWO_ERRORS = "two standard errors"
 
 def banks(found: Stored | Report, *, particle: int | None = None) -> list[Bank]:
     """Charts of the trajectories, or of the motion of one particle."""
-    shown = found.drawable
+    return of_drawable(found.drawable, found, particle=particle)
+
+
+def of_drawable(
+    shown: Drawable, found: Stored | Report, *, particle: int | None = None, points: int = SMOOTH
+) -> list[Bank]:
+    """These charts, of the frames of the run that are shown."""
     failed = {verdict.method for verdict in found.verdicts if verdict.passed is False}
     heated = temperatures(shown.scene, found.path) if found.path else ()
-    return of_runs(shown.scene, shown.runs, shown.followed, particle=particle, failed=failed, heated=heated)
+    errors, compared = dict[str, float](), found.comparison
+    if compared is not None and EXACT in compared.labels:
+        row = compared.max_difference[compared.labels.index(EXACT)]
+        errors = dict(zip(compared.labels, row.tolist(), strict=True))
+    return of_runs(
+        shown.scene, shown.runs, shown.followed, particle=particle, failed=failed, points=points,
+        heated=heated, errors=errors,
+    )  # fmt: skip
 
 
 def temperatures(scene: Scene, path: Path) -> tuple[Heated, ...]:
@@ -51,17 +66,18 @@ def of_runs(
     failed: Collection[str] = (),
     points: int = SMOOTH,
     heated: Sequence[Heated] = (),
+    errors: Mapping[str, float] | None = None,
 ) -> list[Bank]:
     """The charts, none where no run has more than its start.
 
     `followed`: the parts of the runs in which the motion itself is shown; `particle`: draw this one's motion
     alone; `failed`: labels of runs with a failed verdict, drawn in red; `points`: number of points of the
-    exact solution's line; `heated`: temperatures by all frames, by default by those of `runs`.
-    SpringcheckError where there is no such particle.
+    exact solution's line; `heated` and `errors`: temperatures and largest errors by all frames, by default
+    by those of `runs`.  SpringcheckError where there is no such particle.
     """
     if not any(len(run.t) > 1 for run in runs.values()):
         return []
-    usable, parts = Runs(scene, runs, failed), Runs(scene, followed, failed)
+    usable, parts = Runs(scene, runs, failed), Runs(scene, followed, failed, errors)
     exact = Exact(scene)
     shown = views(scene, particle)
     if scene.bath is not None:

@@ -40,7 +40,7 @@ class MethodRun:
     error_below: bool
     """Whether `max_error` is only an upper bound: the uncertainty of the exact solution."""
     energy_drift: float
-    """(H - H0) / |H0| where it is largest, > 0 where energy is gained; absolute for H0 = 0.  With friction
+    """H - H0 over the scene's `energy_scale` where it is largest, > 0 where energy is gained.  With friction
     the exact solution's H replaces H0, where it is known."""
     start_seconds: float
     run_seconds: float

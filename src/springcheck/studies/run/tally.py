@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from springcheck import checks
+from springcheck.figures.views import energy_scale
 from springcheck.physics import exact
 from springcheck.physics.arrays import Extended, Reals
 from springcheck.physics.scene import Scene
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from springcheck.thermal.heat import Heat
 
 FAINTEST_ENERGY = np.finfo(np.float64).tiny / np.finfo(np.float64).eps
-"""Initial energy below which energies in double precision are subnormal and lose digits."""
+"""Scale of energies below which they are subnormal in double precision and lose digits."""
 
 
 def solution(scene: Scene, pieces: Collection[Trajectory]) -> tuple[Extended, Extended]:
@@ -39,9 +40,10 @@ class Tally:
 
             self.heat = Heat(scene)
         self._known = exact.has_true_motion(scene)
-        start = scene.system.energy(scene.q.astype(np.longdouble), scene.p.astype(np.longdouble))
-        self._wide = bool(start) and not FAINTEST_ENERGY < abs(start) < np.finfo(np.float64).max
-        self._start = start if self._wide else scene.system.energy(scene.q, scene.p)
+        scale, _ = energy_scale(scene)
+        self._wide = not FAINTEST_ENERGY < scale < np.finfo(np.float64).max
+        self._scale = scale if self._wide else np.float64(scale)
+        self._start = self._energy(scene.q, scene.p)
         self.error = 0.0 if self._known else np.nan
         self.doubt = 0.0
         self.drift: float = 0.0
@@ -62,12 +64,12 @@ class Tally:
             self.doubt = max(self.doubt, exact.uncertainty(scene, float(last) * piece.step))
         with np.errstate(over="ignore", invalid="ignore"):
             off = self._energy(piece.q, piece.p) - right
-            worst = float(off[np.argmax(np.abs(off))] / (abs(self._start) or 1.0))
+            worst = float(off[np.argmax(np.abs(off))] / self._scale)
         if not abs(worst) <= abs(self.drift) and not np.isnan(self.drift):
             self.drift = worst
 
     def _energy(self, q: Reals, p: Reals) -> Reals:
-        """Energies in double precision, or in extended where that of the start leaves the range of double."""
+        """Energies in double precision, or in extended where their scale leaves the range of double."""
         if not self._wide:
             return np.asarray(self._scene.system.energy(q, p), np.float64)
         return self._scene.system.energy(q.astype(np.longdouble), p.astype(np.longdouble))

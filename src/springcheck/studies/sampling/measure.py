@@ -183,10 +183,7 @@ def perform(options: Namespace, progress: Progress | None) -> Sampling:
 @keeper.restoring("sampling")
 def stored(kept: keeper.Kept) -> Sampling:
     """The study that `record` has saved.  StoreError where the file holds none."""
-    return Sampling(
-        methods=tuple(kept.found(SAMPLED, one["method"]) for one in kept.document["methods"]),
-        left_out=kept.left_out, path=kept.path,
-    )  # fmt: skip
+    return Sampling(methods=kept.listed(SAMPLED, "methods"), left_out=kept.left_out, path=kept.path)
 
 
 def curve(scheme: str, turns: Floats, of: str) -> Floats:

@@ -70,8 +70,8 @@ def banks(study: Sampling) -> list[Bank]:
             part
             for x in shown
             for part in (
-                Curve(name=title(x.scheme), group=x.scheme, x=x.friction, y=_finite(x.limit_law)),
-                _marks(x, x.friction, _finite(x.limit), x.limit_law),
+                Curve(name=title(x.scheme), group=x.scheme, x=x.friction, y=x.limit_law),
+                _marks(x, x.friction, x.limit, x.limit_law),
             )
         ],
     )
@@ -125,7 +125,3 @@ def _laws(methods: Sequence[Sampled], of: str) -> list[Curve]:
 def _marks(one: Sampled, x: np.ndarray, y: np.ndarray, law: np.ndarray) -> Curve:
     notes = [f"law {value!r}" for value in np.asarray(law).tolist()]
     return Curve(name=one.method, group=one.scheme, x=x, y=y, line=False, marks=True, notes=notes)
-
-
-def _finite(x: np.ndarray) -> np.ndarray:
-    return np.where(np.isfinite(x), x, np.nan)

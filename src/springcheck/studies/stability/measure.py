@@ -11,7 +11,7 @@ from argparse import Namespace
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any, Unpack
+from typing import Unpack
 
 import numpy as np
 
@@ -28,7 +28,6 @@ from springcheck.studies.keeper import How, Keeper, each
 from springcheck.studies.stability import limits, multipliers, propagators, regions, resonance
 from springcheck.studies.stability.longest import fastest
 from springcheck.studies.stability.result import LIMITS, MULTIPLIERS, REGIONS, RESONANCES, Stability
-from springcheck.studies.tables import Form
 
 
 def record(
@@ -96,17 +95,11 @@ def perform(options: Namespace, progress: Progress | None) -> Stability:
 @keeper.restoring("stability")
 def stored(kept: keeper.Kept) -> Stability:
     """The study that `record` has saved.  StoreError where the file holds none."""
-
-    def under(form: Form[Any], name: str) -> tuple[Any, ...]:
-        # the document has the order in which they were measured
-        methods = dict.fromkeys(one["method"] for one in kept.document.get(name, ()))
-        return tuple(kept.found(form, method) for method in methods)
-
     return Stability(
-        scene=kept.scene,
-        limits=under(LIMITS, "methods"),
-        regions=under(REGIONS, "regions"),
-        resonances=under(RESONANCES, "resonances"),
-        multipliers=under(MULTIPLIERS, "multipliers"),
+        scene=keeper.stored_scene(kept.path),
+        limits=kept.listed(LIMITS, "methods"),
+        regions=kept.listed(REGIONS, "regions"),
+        resonances=kept.listed(RESONANCES, "resonances"),
+        multipliers=kept.listed(MULTIPLIERS, "multipliers"),
         left_out=kept.left_out,
     )
