@@ -231,7 +231,7 @@ def _drifts(scene: Scene, changes: Any, chosen: np.ndarray, many: Scene, q: Floa
         else:
             for j, one, q_j, p_j in _solved(scene, changes, chosen, steps):
                 right[:, j] = one.system.energy(q_j, p_j)
-    return energy - right
+    return np.asarray(energy - right)
 
 
 def _errors(
