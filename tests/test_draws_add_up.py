@@ -6,13 +6,17 @@ repetitions under the null hypothesis.
 
 from __future__ import annotations
 
+import json
+import pickle
 from dataclasses import replace
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from springcheck import checks
+from springcheck.cli import main
 from springcheck.physics.trajectory import Trajectory, Verdict
 from springcheck.studies.faults import baths
 from springcheck.studies.faults.seeded import Fault
@@ -154,3 +158,19 @@ def test_a_report_says_the_least_temperature_that_its_draws_would_have_shown() -
         one, four = (getattr(found[check].sees, name) for found in (whole, apart))
         assert 1 < four / one < 1.1
     assert "a temperature off by" in whole["draws-variance"].reason
+
+
+def test_a_statistic_is_in_no_document_and_no_pickle(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Its law is a function: documents of runs in a bath were refused."""
+    monkeypatch.chdir(tmp_path)
+    assert main(["run", "spring", "--method", "own:baoab", "--temperature", "1", "--json"]) == 0
+    (mean,) = (one for one in json.loads(capsys.readouterr().out)["verdicts"] if one["check"] == "draws-mean")
+    assert "statistic" not in mean
+    fault = Fault("", "", (), lambda c: baths.played(c, baths.by(1 + c.x)), scheme="baoab", size=0.0)
+    verdict = judged(fault, 0.0, 200, 1)["draws-mean"]
+    assert verdict.statistic is not None
+    again = pickle.loads(pickle.dumps(verdict))
+    assert again == verdict
+    assert again.statistic is None

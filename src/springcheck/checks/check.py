@@ -97,7 +97,7 @@ def over_pieces(worst: Verdict, judged: Sequence[Verdict]) -> Verdict:
     assert whole.statistic is not None
     why = whole.why if worst.passed or whole.decades >= worst.value else worst.why
     value = min(max(whole.decades, worst.value), BEYOND) - float(np.log10(whole.statistic.tests))
-    return replace(worst, value=value, why=why, _statistic=whole.statistic)
+    return replace(worst, value=value, why=why, statistic=whole.statistic)
 
 
 Judge: TypeAlias = Callable[[Any], Finding | Chance | str]
@@ -191,5 +191,5 @@ def verdict(method: str, check: str, found: Finding | Chance | str) -> Verdict:
         value, bound = BEYOND, min(bound, BEYOND / 2)
     return Verdict(
         method=method, check=check, value=value, bound=bound, unit=found.unit, passed=passed, why=why,
-        sees=found.sees, _statistic=statistic,
+        sees=found.sees, statistic=statistic,
     )  # fmt: skip

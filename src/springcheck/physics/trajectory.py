@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
+from functools import partial
 from html import escape
 from importlib import import_module
 from pathlib import Path
@@ -357,12 +358,17 @@ class Verdict:
     """The bound's reason, or why the check does not apply."""
     sees: Limits = NOT_KNOWN
     """Smallest fault that the check would have detected in this run."""
-    _statistic: Any = field(default=None, compare=False, repr=False)
+    statistic: Any = field(default=None, compare=False, repr=False)
+    """Of a random verdict the statistic (`thermal.chance`) where it adds up over pieces of a run; it is in no
+    document and no pickle."""
 
     @property
-    def statistic(self) -> Any:
-        """Of a random verdict the statistic (`thermal.chance`), where it adds up over pieces of a run."""
-        return self._statistic
+    def stated(self) -> dict[str, Any]:
+        """What documents state of it, by name."""
+        return {one.name: getattr(self, one.name) for one in fields(self) if one.name != "statistic"}
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return partial(Verdict, **self.stated), ()
 
     @property
     def reason(self) -> str:

@@ -116,7 +116,7 @@ class Report(StudyResult):
             runs=self.runs,
             judged_frames=self.judged_frames,
             left_out=self.left_out,
-            verdicts=self.verdicts,
+            verdicts=[one.stated for one in self.verdicts],
             not_judged=self.not_judged,
             comparison=self.comparison,
             same_motion=self.same,
@@ -181,4 +181,4 @@ class Stored(StudyResult):
 
     def document(self) -> dict[str, Any]:
         """Plain data for JSON."""
-        return document(verdicts=self.verdicts)
+        return document(verdicts=[one.stated for one in self.verdicts])
