@@ -19,7 +19,7 @@ BUDGETS = {
     ("driver", "conformance", "doors"): 1263,
     ("checks",): 5071,
     ("identify",): 8693,
-    ("formats", "store"): 5262,
+    ("formats", "store"): 5259,
     ("studies",): 1477,
     ("studies/*",): 9800,
     ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 7088,

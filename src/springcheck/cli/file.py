@@ -134,6 +134,8 @@ def _taken(states: States, judged: Scene, run: Trajectory, asked: Scene) -> dict
             f"the file has {count(len(run.t), 'frame')}, {count(run.every, 'step')} apart, and the scene "
             f"asks for {asked.frames}, {asked.every} apart: what is there was judged"
         )
+    if run.tolerance is not None and not isinstance(states, Recorded):
+        out["tolerance"] = "the file does not say what tolerance its solver has, nor how many steps it took"
     return out
 
 
@@ -278,8 +280,7 @@ def as_trajectory(
     ours = states.run if isinstance(states, Recorded) else None
     if ours is not None and ours.rebuilds_velocity:
         notes.append("velocities are rebuilt from positions, as its run declared, and judged so")
-    energy = None if ours is None else ours.energy
-    kept = ("q", "p") if energy is None else ("q", "p", "energy")
+    kept = ("q", "p") if ours is None or ours.energy is None else ("q", "p", "energy")
     begun: dict[str, Any] = {"q": q[0].copy(), "p": p[0].copy()}
     grid: dict[str, Any] = {"steps": steps, "every": every, "quantities": kept}
     if scene.system.rods and states.roundoff > 2.0**-53:
@@ -294,13 +295,12 @@ def as_trajectory(
         arithmetic=ours.arithmetic if ours else Arithmetic(name=AS_WRITTEN, state=states.roundoff),
         # a line that is no axis is rounded in each of its coordinates
         off_axis=beside if beside > 8 * states.roundoff else None,
+        tolerance=scene.tolerance if schemes.scheme(scheme).has("adaptive") else None,
     )  # fmt: skip
     if ours is not None:
-        run = replace(
-            run, energy=energy, rebuilds_velocity=ours.rebuilds_velocity, off_axis=ours.off_axis,
-            tolerance=ours.tolerance if ours.scheme == scheme else None, force_calls=ours.force_calls,
-            last_step=ours.last_step,
-        )  # fmt: skip
+        declared = ("energy", "rebuilds_velocity", "off_axis", "force_calls", "last_step")
+        known: dict[str, Any] = {name: getattr(ours, name) for name in declared}
+        run = replace(run, tolerance=ours.tolerance if ours.scheme == scheme else None, **known)
     return judged, run, tuple(notes)
 
 
