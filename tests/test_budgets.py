@@ -19,7 +19,7 @@ BUDGETS = {
     ("driver", "conformance", "doors"): 1257,
     ("checks",): 5070,
     ("identify",): 8629,
-    ("formats", "store"): 5261,
+    ("formats", "store"): 5259,
     ("studies",): 1477,
     ("studies/*",): 9799,
     ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 7084,

@@ -170,7 +170,7 @@ def test_the_action_judges_an_engine_of_the_contract(tmp_path: Path) -> None:
     [
         ({}, "give one of trajectory, program and engine"),
         ({"trajectory": "a", "engine": "b"}, "give one of"),
-        ({"trajectory": "nosuch.csv"}, "No such file"),
+        ({"trajectory": "nosuch.csv"}, "there is no such file"),
         ({"trajectory": "a.csv", "command": "exit 3"}, "the command that makes the trajectory failed"),
         ({"trajectory": "a.csv", "scheme": "nosuch"}, "neither in the catalogue"),
     ],
@@ -232,7 +232,7 @@ def test_a_mistake_is_an_error_in_the_report(tmp_path: Path) -> None:
     )
     suite = ElementTree.parse(tmp_path / "j.xml").getroot()[0]
     assert suite.get("errors") == "1"
-    assert "No such file" in str(suite.find("testcase/error").get("message"))  # type: ignore[union-attr]
+    assert "there is no such file" in str(suite.find("testcase/error").get("message"))  # type: ignore[union-attr]
     assert json.loads((tmp_path / "b.json").read_text())["message"] == "nothing judged"
 
 

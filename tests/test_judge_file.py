@@ -219,3 +219,15 @@ def test_identify_says_which_mass_it_took(tmp_path: Path, capsys: pytest.Capture
     main(["identify", str(path), "--mass", "3.7"])
     said = " ".join(capsys.readouterr().out.split())
     assert "momenta over velocities are 1, and the mass is stated as 3.7" in said
+
+
+def test_a_table_of_an_adaptive_solver_is_no_failure_and_cannot_be_judged(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], need: Callable[[str], None]
+) -> None:
+    """CVODE failed `grid`, since its tolerance "is None": a table has no place for it."""
+    need("sundials:adams")
+    table = driver.run(scenefile.load_scene("spring-uneven"), "sundials:adams").save(tmp_path / "a.csv")
+    assert main(["judge", str(table), "--scene", "spring-uneven", "--scheme", "adams"]) == 2
+    text = " ".join(capsys.readouterr().out.split())
+    assert "tolerance: the file does not say what tolerance its solver has" in text
+    assert "0 failed" in text

@@ -263,8 +263,7 @@ def as_trajectory(
     ours = states.run if isinstance(states, Recorded) else None
     if ours is not None and ours.rebuilds_velocity:
         notes.append("velocities are rebuilt from positions, as its run declared, and judged so")
-    energy = None if ours is None else ours.energy
-    kept = ("q", "p") if energy is None else ("q", "p", "energy")
+    kept = ("q", "p") if ours is None or ours.energy is None else ("q", "p", "energy")
     begun: dict[str, Any] = {"q": q[0].copy(), "p": p[0].copy()}
     grid: dict[str, Any] = {"steps": steps, "every": every, "quantities": kept}
     if scene.system.rods and states.roundoff > 2.0**-53:
@@ -282,9 +281,13 @@ def as_trajectory(
     else:
         # a line that is no axis is rounded in each of its coordinates
         off_axis = beside if beside > 8 * states.roundoff else None
-        run = Trajectory(
-            **known, arithmetic=Arithmetic(name=AS_WRITTEN, state=states.roundoff), off_axis=off_axis
-        )
+        arithmetic = Arithmetic(name=AS_WRITTEN, state=states.roundoff)
+        tolerance = scene.tolerance if schemes.scheme(scheme).has("adaptive") else None
+        run = Trajectory(**known, arithmetic=arithmetic, off_axis=off_axis, tolerance=tolerance)
+        if tolerance is not None:
+            taken["tolerance"] = (
+                "the file does not say what tolerance its solver has, nor how many steps it took"
+            )
     return judged, run, tuple(notes), taken
 
 

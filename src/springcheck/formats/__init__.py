@@ -24,7 +24,7 @@ from springcheck.errors import StoreError
 from springcheck.formats import libraries, molecular, numbers, octave, tables, trr
 from springcheck.formats.columns import Reader, States, fitting, moving
 from springcheck.formats.hdf5 import is_foreign, read_hdf5
-from springcheck.store import apart
+from springcheck.store import apart, files
 
 __all__ = ["BY_NAME", "FORMATS", "States", "is_hdf5", "is_store", "moving", "read"]
 
@@ -87,11 +87,8 @@ KNOWN = f"read are HDF5, {', '.join(BY_NAME)}, texts gzipped too"
 
 
 def _beginning(path: Path) -> bytes:
-    try:
-        with path.open("rb") as file:
-            return file.read(BEGINNING)
-    except OSError as error:
-        raise StoreError(f"{path}: {error.strerror or error}") from error
+    with files.told(path, "read"), path.open("rb") as file:
+        return file.read(BEGINNING)
 
 
 def is_hdf5(path: Path) -> bool:

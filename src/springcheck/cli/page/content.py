@@ -171,13 +171,12 @@ def gather(path: Path) -> Content:
     text = store.scene_text(path) if "scene" in summary.root else ""
     name = str(summary.root.get("scene_name") or path.stem)
     scene = scenefile.parse(text, name=name, where=str(path)) if text else None
-    labels = [run.label for run in summary.runs]
     rows = 2 + 2 * min(MOST_PANELS, scene.n if scene else 1)
-    most = max(FEWEST_SHOWN, PAGE_NUMBERS // (rows * max(1, len(labels))))
-    pieces = {label: store.strided(path, label, most) for label in labels}
+    most = max(FEWEST_SHOWN, PAGE_NUMBERS // (rows * max(1, len(summary.runs))))
+    pieces = {one.label: store.strided(path, one.label, most) for one in summary.runs}
     verdicts, comparison = (run.verdicts, run.comparison) if run else ((), None)
     wrong = {verdict.method for verdict in verdicts if verdict.passed is False}
-    if run and labels and (motion := _motion(run, most)):
+    if run and summary.runs and (motion := _motion(run, most)):
         banks["motion"] = motion
     title = scene.title if scene else path.name
     return Content(
@@ -199,7 +198,7 @@ def gather(path: Path) -> Content:
         comparison=comparison,
         sha256=_digest(path) if path.is_file() else "",
         stride=max((stride for _, stride in pieces.values()), default=1),
-        data=given.to_scripts(scene if labels else None, [piece for piece, _ in pieces.values()], wrong)
+        data=given.to_scripts(scene if summary.runs else None, [piece for piece, _ in pieces.values()], wrong)
         | {"banks": banks},
     )
 
