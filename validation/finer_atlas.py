@@ -81,10 +81,13 @@ def record(path: str | Path | None, methods: Sequence[str], cells: int) -> Atlas
     with keeper.kept(path, keeper.command("extremes", labels, f"{cells} cells")) as kept:
         usual = measure.measure(labels, kept)
         here = [engines.parse(name) for name in dict.fromkeys(cell.method for cell in usual.cells)]
-        found = [cell for part in kept.results(pieces(here, cells - len(usual.cells))) for cell in part]
+        more = pieces(here, cells - len(usual.cells))
+        found = [cell for part in kept.results(more) for cell in part]
         every = (*usual.cells, *found)
         atlas = replace(usual, cells=every, windows=tuple(measure.windows(every)))
-        kept.commit("extremes", atlas.kept_document())
+        # a piece's table is named by its cells, too, and not by its method alone
+        tables = [*usual.kept_document()["tables"], *(piece.name for piece in more)]
+        kept.commit("extremes", {**atlas.kept_document(), "tables": tables})
     return atlas
 
 

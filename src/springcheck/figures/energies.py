@@ -58,8 +58,8 @@ def energy(runs: Runs, exact: Exact) -> Bank:
     """
     scene = runs.scene
     start = float(scene.system.energy(scene.q, scene.p))
-    unit, of = energy_scale(scene)
-    unit, of = float(unit), of or "unit"
+    scale, of = energy_scale(scene)
+    unit, of = start if of == "initial energy" else float(scale), of or "unit"
     changes = not scene.system.keeps_energy and exact.known
 
     def energies(q: Reals, p: Reals) -> Floats:

@@ -28,6 +28,13 @@ from springcheck.studies.extremes.result import CELLS, Atlas, Window
 from springcheck.studies.keeper import How, Keeper, each
 from springcheck.studies.stability import propagators
 
+
+def everything() -> tuple[str, ...]:
+    """Every method on its first platform, and the platforms that engines declare for the atlas."""
+    places = (f"{name}:{place}" for name in engines.names() for place in engines.engine(name).atlas)
+    return ("*", *places)
+
+
 CALM_TURNS = (0.01, 1.9)
 """h w that count for a window: below, hardly any force shows; beyond, stability decides."""
 
@@ -48,8 +55,7 @@ def record(
             "extremes judges numbers from 1e-300 to 1e300 by wider ones, and long double is no wider than "
             "double on this machine: run it on Linux on x86-64"
         )
-    places = (f"{name}:{place}" for name in engines.names() for place in engines.engine(name).atlas)
-    labels = engines.match(tuple(methods) or ("*", *places))
+    labels = engines.match(tuple(methods) or everything())
     cells = partial(measure, labels, quick=quick)
     return keeper.study("extremes", path, labels, cells, "quick" if quick else "whole", **how)
 
@@ -58,7 +64,6 @@ def measure(labels: Sequence[Label], kept: Keeper, *, quick: bool = False) -> At
     """The cells of these methods; those that an earlier call has saved are not measured again."""
     usable, left_out = sorted_out(labels, absence, "has extreme cases here")
     pieces = each(usable, "", lambda label: partial(of_method, label, quick=quick), CELLS)
-    # contexts of platforms take long
     work = [replace(x, cost=100.0 * on_platform(y) + 1.0) for x, y in zip(pieces, usable, strict=True)]
     found = [cell for piece in kept.results(work) for cell in piece]
     return Atlas(cells=tuple(found), windows=tuple(windows(found)), left_out=tuple(left_out))
