@@ -58,8 +58,8 @@ def energy(runs: Runs, exact: Exact) -> Bank:
     """
     scene = runs.scene
     start = float(scene.system.energy(scene.q, scene.p))
-    scale, name = energy_scale(scene)
-    unit, of = float(scale), name or "unit"
+    scale, of = energy_scale(scene)
+    unit, of = start if of == "initial energy" else float(scale), of or "unit"
     changes = not scene.system.keeps_energy and exact.known
 
     def energies(q: Reals, p: Reals) -> Floats:

@@ -225,9 +225,8 @@ def _drifts(scene: Scene, changes: Any, chosen: np.ndarray, many: Scene, q: Floa
     if not many.system.keeps_energy:
         steps = np.arange(len(q)) * many.every
         if many.system.is_separate and many.system.is_linear:
-            right = np.asarray(
-                _energies(many, *exact.true_motion(many, steps, many.step), copies), np.float64
-            )
+            true = exact.true_motion(many, steps, many.step)
+            right = np.asarray(_energies(many, *true, copies), np.float64)
         else:
             for j, one, q_j, p_j in _solved(scene, changes, chosen, steps):
                 right[:, j] = one.system.energy(q_j, p_j)

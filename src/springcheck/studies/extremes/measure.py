@@ -64,7 +64,6 @@ def measure(labels: Sequence[Label], kept: Keeper, *, quick: bool = False) -> At
     """The cells of these methods; those that an earlier call has saved are not measured again."""
     usable, left_out = sorted_out(labels, absence, "has extreme cases here")
     pieces = each(usable, "", lambda label: partial(of_method, label, quick=quick), CELLS)
-    # contexts of platforms take long
     work = [replace(x, cost=100.0 * on_platform(y) + 1.0) for x, y in zip(pieces, usable, strict=True)]
     found = [cell for piece in kept.results(work) for cell in piece]
     return Atlas(cells=tuple(found), windows=tuple(windows(found)), left_out=tuple(left_out))

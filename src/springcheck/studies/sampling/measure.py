@@ -77,7 +77,8 @@ def measured(label: Label) -> Sampled:
         if linear and not max(exact) < HOTTEST_LAW:
             rows.append((nan,) * 6)
             continue
-        wait = round(WAIT / _slowest_decay(law)) if law else 100
+        slowest_decay = max(-np.log(law.slowest), 0.02) if law and law.slowest > 0 else 1.0
+        wait = round(WAIT / slowest_decay) if law else 100
         made = driver.run(bathed(springs(WIDE, wait + 500), turn, RATE), label, seed=SEED_OF_ALL)
         found = temperatures(made.q[wait:], made.p[wait:])
         rows.append((*found[0], exact[0], *found[1], exact[1]))
@@ -100,11 +101,6 @@ def measured(label: Label) -> Sampled:
         if linear else np.full(len(FRICTIONS), nan),
         force_calls=run.force_calls / steps, seconds=run.timing.run / steps / WIDE,
     )  # fmt: skip
-
-
-def _slowest_decay(law: Law) -> float:
-    """Decay rate per step of the slowest part of the motion."""
-    return max(-np.log(law.slowest), 0.02) if law.slowest > 0 else 1.0
 
 
 def _error_of_average(law: Law | None, frames: int) -> float:
