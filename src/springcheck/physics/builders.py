@@ -13,7 +13,7 @@ from springcheck.errors import SceneError
 from springcheck.physics import graph, memory
 from springcheck.physics.arguments import typed
 from springcheck.physics.arrays import Floats, reals
-from springcheck.physics.scene import MOST_STEPS, Scene
+from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Damping, Spring, Term, WallSpring
 
 SCENE_BYTES = 150
@@ -71,7 +71,7 @@ def chain(
     q [L] and p [M L/T], plus standing waves given as (mode, amplitude), mode 1 the slowest; a chain with
     neither swings in mode 1 with amplitude 1.  The rest are fields of `Scene`.  Raises SceneError.
     """
-    if not 1 <= masses < MOST_STEPS:
+    if masses < 1:
         raise SceneError(f"masses = {masses}: a whole number >= 1 is needed")
     memory.need(masses * SCENE_BYTES, f"{masses} masses", "a shorter chain has the same waves")
     _, m, q, p = _together("chain", masses=np.zeros(masses), m=m, q=q, p=p)

@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from hashlib import sha256
-from importlib.metadata import PackageNotFoundError, version
+from importlib import metadata
 
 import numpy as np
 
@@ -41,8 +41,8 @@ def installed(names: Iterable[str]) -> dict[str, str]:
     """Versions of those of these packages that are installed."""
     found = {}
     for name in names:
-        with suppress(PackageNotFoundError, ValueError):
-            found[name] = version(name)
+        with suppress(metadata.PackageNotFoundError, ValueError):
+            found[name] = metadata.version(name)
     return found
 
 
