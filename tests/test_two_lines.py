@@ -69,7 +69,7 @@ def printed(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, str]]:
             ["identify", f"{name}-run.h5"],
             ["report", f"{name}-run.h5", "-o", f"{name}-page.html"],
             ["stability", scene, *method, "-o", f"{name}-stability.h5"],
-            ["precision", scene, *method, "--budget", "0.1", "-o", f"{name}-precision.h5"],
+            ["precision", scene, *method, "--budget", "0.5", "-o", f"{name}-precision.h5"],
         ]
     program = PROGRAM.format(lines="\n".join(lines), commands=commands)
     done = subprocess.run(
