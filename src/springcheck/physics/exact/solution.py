@@ -9,6 +9,7 @@ time, near a barrier as elsewhere.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -16,32 +17,10 @@ from typing import Any
 import numpy as np
 
 from springcheck.physics.arrays import Extended, Integers
-from springcheck.physics.exact.bond import MorseMotion
 from springcheck.physics.exact.closedform import ClosedForm
-from springcheck.physics.exact.damped import UnlikeFriction
-from springcheck.physics.exact.gyration import Gyration
 from springcheck.physics.exact.linear import LinearMotion
-from springcheck.physics.exact.lumped import LumpedMotion
-from springcheck.physics.exact.mathieu import ModulatedMotion
 from springcheck.physics.exact.normal import Modes, normal_modes
-from springcheck.physics.exact.pendulum import HangingRods, PendulumMotion
-from springcheck.physics.exact.quartic import QuarticMotion
-from springcheck.physics.exact.relaxation import VanDerPolMotion
-from springcheck.physics.exact.response import Response
-from springcheck.physics.exact.swinging import SwingingMotion
-from springcheck.physics.exact.turning import TurningRods, TurningWallRods
 from springcheck.physics.system import Fields, System
-
-WHOLE_FORMS: tuple[type[ClosedForm], ...] = (
-    LinearMotion, Gyration, Response, ModulatedMotion, UnlikeFriction, LumpedMotion,
-)  # fmt: skip
-"""Closed forms of all particles together; the first that holds is taken."""
-
-GROUP_FORMS: tuple[type[ClosedForm], ...] = (
-    VanDerPolMotion, SwingingMotion, QuarticMotion, PendulumMotion, MorseMotion, TurningRods,
-    TurningWallRods, HangingRods, LinearMotion,
-)  # fmt: skip
-"""Closed forms of independent particles, and last that of normal modes for the rest."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -96,7 +75,7 @@ class SolvedSystem(System[Fields]):
 
 def _solution(system: SolvedSystem[Any]) -> Solution | None:
     """Solution of a system, None where some particles have no closed form here."""
-    for law in WHOLE_FORMS:
+    for law in _of_whole_scenes(system):
         if motion := law.of(system):
             return Solution(n=system.n, groups=((np.arange(system.n), motion),))
     groups: list[tuple[Integers, ClosedForm]] = []
@@ -107,7 +86,7 @@ def _solution(system: SolvedSystem[Any]) -> Solution | None:
         acting = {key: system.rods.reach(here) for key, here in acting.items()}
     left = ~nothing
     with np.errstate(all="ignore"):
-        for law in GROUP_FORMS:
+        for law in _of_groups(system):
             others = (here for key, here in acting.items() if key not in law.terms)
             other = np.any([nothing, *others], axis=0)
             mine = left if law is LinearMotion else acting.get(law.key, nothing) & ~other
@@ -122,3 +101,45 @@ def _solution(system: SolvedSystem[Any]) -> Solution | None:
                 groups.append((chosen, motion))
                 left[chosen] = False
     return Solution(n=system.n, groups=tuple(groups))
+
+
+def _of_whole_scenes(system: SolvedSystem[Any]) -> Iterator[type[ClosedForm]]:
+    """Closed forms of all particles together; those that the scene's terms exclude are not imported."""
+    yield LinearMotion
+    if "magnetic" in system.acting:
+        from springcheck.physics.exact.gyration import Gyration
+
+        yield Gyration
+    elif system.is_driven:
+        from springcheck.physics.exact.mathieu import ModulatedMotion
+        from springcheck.physics.exact.response import Response
+
+        yield from (Response, ModulatedMotion)
+    elif system.is_damped and system.is_linear:
+        from springcheck.physics.exact.damped import UnlikeFriction
+
+        yield UnlikeFriction
+    if system.rods:
+        from springcheck.physics.exact.lumped import LumpedMotion
+
+        yield LumpedMotion
+
+
+def _of_groups(system: SolvedSystem[Any]) -> Iterator[type[ClosedForm]]:
+    """Closed forms of independent particles, and last that of normal modes for the rest."""
+    if system.brakes_by_place:
+        from springcheck.physics.exact.relaxation import VanDerPolMotion
+
+        yield VanDerPolMotion
+    if "bond" in system.acting:
+        from springcheck.physics.exact.swinging import SwingingMotion
+
+        yield SwingingMotion
+    from springcheck.physics.exact.bond import MorseMotion
+    from springcheck.physics.exact.pendulum import HangingRods, PendulumMotion
+    from springcheck.physics.exact.quartic import QuarticMotion
+    from springcheck.physics.exact.turning import TurningRods, TurningWallRods
+
+    yield from (
+        QuarticMotion, PendulumMotion, MorseMotion, TurningRods, TurningWallRods, HangingRods, LinearMotion,
+    )  # fmt: skip
