@@ -14,8 +14,8 @@ from springcheck.figures.motion import Exact, periods, true_motion
 from springcheck.figures.naming import NAME_HIGH
 from springcheck.figures.overlay import Runs, exact_curve
 from springcheck.figures.portraits import extremes
-from springcheck.figures.views import energy_scale
 from springcheck.physics.arrays import Floats, Reals
+from springcheck.physics.norm import energy_scale
 from springcheck.physics.trajectory import Trajectory
 
 MOST_DRAWN = 1e3
@@ -58,7 +58,7 @@ def energy(runs: Runs, exact: Exact) -> Bank:
     """
     scene = runs.scene
     start = float(scene.system.energy(scene.q, scene.p))
-    scale, of = energy_scale(scene)
+    scale, of = energy_scale(scene.system)
     unit, of = start if of == "initial energy" else float(scale), of or "unit"
     changes = not scene.system.keeps_energy and exact.known
 

@@ -48,22 +48,6 @@ def with_unit(name: str, unit: str) -> str:
     return f"{name} ({unit})" if unit else name
 
 
-WHOLE = 1e-12
-"""Relative difference up to which the initial energy counts as the energy of the norm's unit."""
-
-
-def energy_scale(scene: Scene) -> tuple[np.longdouble, str]:
-    """The energy to which differences of energies are relative, and its name, as `Norm` has it.
-
-    That is the initial energy, unless potentials of both signs, or one and the kinetic energy, cancel in it:
-    then it may be a rounding.
-    """
-    system = scene.system
-    start, unit = system.energy(*(x.astype(np.longdouble) for x in (scene.q, scene.p))), system.norm.unit**2
-    whole = abs(start - unit) <= WHOLE * unit
-    return (np.longdouble(start), "initial energy") if whole else (unit, system.norm.of)
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class View:
     """One coordinate x of a scene and its momentum y."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +13,9 @@ from springcheck.physics.term import Term
 
 SMALLEST_ENERGY = np.finfo(np.longdouble).tiny / np.finfo(np.longdouble).eps
 """Least energy whose terms, squares, lose no digits to underflow."""
+
+WHOLE = 1e-12
+"""Relative difference up to which the initial energy counts as the energy of the norm's unit."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -82,3 +86,14 @@ def kinetic_energy(m: Floats, p: Reals) -> Reals:
     """Sum of p**2 / 2m of momenta p (..., n) -> (...) [M L2/T2]."""
     # 2 m would overflow from half the largest number on
     return np.asarray(np.sum(0.5 * (p * p) / m, axis=-1))
+
+
+def energy_scale(system: Any) -> tuple[np.longdouble, str]:
+    """The energy to which differences of energies are relative, and its name, as `Norm` has it.
+
+    That is the initial energy, unless potentials of both signs, or one and the kinetic energy, cancel in it:
+    then it may be a rounding.
+    """
+    start, unit = system.energy(*(x.astype(np.longdouble) for x in (system.q, system.p))), system.norm.unit**2
+    whole = abs(start - unit) <= WHOLE * unit
+    return (np.longdouble(start), "initial energy") if whole else (unit, system.norm.of)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from springcheck.figures.views import energy_scale
 from springcheck.physics.exact import has_true_motion
+from springcheck.physics.norm import energy_scale
 from springcheck.physics.scene import Scene
 from springcheck.studies.choose import LeftOut
 from springcheck.text.lines import Lines, plain
@@ -39,7 +39,7 @@ def of_energy(scene: Scene, of: str = "") -> str:
     changes = ["loss by friction"] * system.is_damped + ["work of the drive"] * system.is_driven
     known = bool(changes) and has_true_motion(scene)
     off = f"H - H{' exact' if known else '0'}"
-    of = of or energy_scale(scene)[1]
+    of = of or energy_scale(scene.system)[1]
     over = "|H0|" if of == "initial energy" else f"({of})"
     part = f"({off})/{over}" if of else off
     how = f", the {'exact ' * known}{' and '.join(changes)} {'taken off' if known else 'in it'}"

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from springcheck import checks
-from springcheck.figures.views import energy_scale
 from springcheck.physics import exact
 from springcheck.physics.arrays import Extended, Reals
+from springcheck.physics.norm import energy_scale
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory
 from springcheck.studies.run.result import MethodRun
@@ -40,7 +40,7 @@ class Tally:
 
             self.heat = Heat(scene)
         self._known = exact.has_true_motion(scene)
-        scale, _ = energy_scale(scene)
+        scale, _ = energy_scale(scene.system)
         self._wide = not FAINTEST_ENERGY < scale < np.finfo(np.float64).max
         self._scale = scale if self._wide else np.float64(scale)
         self._start = self._energy(scene.q, scene.p)
