@@ -53,7 +53,7 @@ class Chance(NamedTuple):
     @classmethod
     def of(cls, statistic: Statistic) -> Chance:
         """That of a statistic of draws."""
-        return cls(statistic.chance, statistic.words, statistic)
+        return cls(*statistic.found, statistic)
 
     @property
     def decades(self) -> float:

@@ -67,14 +67,14 @@ class Statistic:
         return self.pieces + (self.pieces > 1)
 
     @property
-    def chance(self) -> float:
-        """Two-sided probability of a value as extreme or more."""
-        return self.law(self.draws, *self.sums)[0]
+    def found(self) -> tuple[float, str]:
+        """Two-sided probability of a value as extreme or more, and the value in words, for the report."""
+        return self.law(self.draws, *self.sums)
 
     @property
-    def words(self) -> str:
-        """The value, for the report."""
-        return self.law(self.draws, *self.sums)[1]
+    def chance(self) -> float:
+        """The probability alone."""
+        return self.found[0]
 
     def sees(self, chance: float) -> Limits:
         """Limits of detection where all tests of the run have this probability of a false alarm."""
