@@ -10,19 +10,19 @@ import springcheck
 HOME = Path(springcheck.__file__).parent
 
 BUDGETS = {
-    ("physics",): 6991,
+    ("physics",): 7027,
     ("schemes",): 1620,
     ("thermal",): 3055,
     ("engines/own",): 1648,
     ("engines/openmm", "engines/ase", "engines/sundials"): 1326,
-    ("engines",): 2825,
+    ("engines",): 2817,
     ("driver", "conformance", "doors"): 1257,
     ("checks",): 5099,
     ("identify",): 8629,
     ("formats", "store"): 5260,
     ("studies",): 1477,
     ("studies/*",): 9803,
-    ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 7084,
+    ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 7082,
 }
 """Lines of each room, or of several: of an engine in one file, and of what all studies share, in the first
 folder."""

@@ -15,14 +15,9 @@ from springcheck.api.studies import (
     sampling,
     stability,
 )
-from springcheck.physics.arguments import typed
 
 __all__ = [
     "Said", "Shelf", "Verdicts", "census", "compare", "ensemble", "exact", "explain", "extremes", "faults",
     "identify", "judge", "methods", "precision", "read", "report", "run", "sampling", "simulate",
     "stability",
 ]  # fmt: skip
-
-globals().update(
-    {name: typed(x) for name, x in list(globals().items()) if name in __all__ and not isinstance(x, type)}
-)

@@ -16,6 +16,7 @@ from springcheck.api.taking import Step, labels_of, needed, path_of, scene_of, s
 from springcheck.checks import compare as comparing
 from springcheck.errors import MethodError, SpringcheckError
 from springcheck.physics import exact as solutions
+from springcheck.physics.arguments import typed
 from springcheck.physics.arrays import reals
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Comparison, Trajectory, of_scene
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from springcheck.studies.run.result import Report
 
 
+@typed
 def run(
     scene: Scene | str | Path,
     methods: str | Step | Sequence[str | Step] = (),
@@ -57,6 +59,7 @@ def run(
         return report if path is not None else replace(report, path=None, trajectories=read(place))
 
 
+@typed
 def simulate(
     scene: Scene | str | Path,
     method: str | Step,
@@ -82,6 +85,7 @@ def simulate(
         return replace(driver.run(found, label, progress=progress, seed=seed), scene=found)
 
 
+@typed
 def judge(scene: Scene | str | Path, trajectory: Trajectory) -> Verdicts:
     """Verdicts of all checks on a trajectory of this scene; `passed` is None for those that do not apply, and
     the first failed one says what the states show.
@@ -121,6 +125,7 @@ def judge(scene: Scene | str | Path, trajectory: Trajectory) -> Verdicts:
     return Verdicts(verdicts)
 
 
+@typed
 def compare(
     scene: Scene | str | Path, trajectories: Mapping[str, Trajectory] | Sequence[Trajectory]
 ) -> Comparison:
@@ -135,6 +140,7 @@ def compare(
     return comparing.compare(scene_of(scene), named)
 
 
+@typed
 def identify(
     found: Trajectory | str | Path | Any,
     q: Any = None,
@@ -182,6 +188,7 @@ def identify(
     return of_states(**numbers)
 
 
+@typed
 def exact(scene: Scene | str | Path) -> Trajectory:
     """The exact solution at the frames of a scene, rounded to double precision.
 
@@ -195,6 +202,7 @@ def exact(scene: Scene | str | Path) -> Trajectory:
     return of_scene(found, q, p, label="exact", scheme="exact")
 
 
+@typed
 def read(path: str | Path) -> dict[str, Trajectory]:
     """The trajectories of a store by label.  StoreError where it cannot be read."""
     from springcheck.studies import keeper

@@ -11,6 +11,7 @@ from springcheck.api.showing import Said, Shelf
 from springcheck.api.taking import Step, needed, path_of, scene_of, spoken, taken
 from springcheck.errors import SpringcheckError
 from springcheck.physics import scenefile
+from springcheck.physics.arguments import typed
 from springcheck.physics.arrays import reals
 from springcheck.physics.scene import Scene
 
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from springcheck.studies.stability.result import Stability
 
 
+@typed
 def precision(
     scene: Scene | str | Path, methods: str | Step | Sequence[str | Step] = (), *, budget: float = 75.0,
     path: str | Path | None = None, force: bool = False, workers: int = 1,
@@ -44,6 +46,7 @@ def precision(
         return measure.record(found, labels, path, budget=budget, left=left, **how)
 
 
+@typed
 def stability(
     scene: Scene | str | Path, methods: str | Sequence[str] = (), *, path: str | Path | None = None,
     force: bool = False, workers: int = 1,
@@ -56,6 +59,7 @@ def stability(
         return measure.record(scene_of(scene), path, named, **how)
 
 
+@typed
 def extremes(
     methods: str | Sequence[str] = (), *, quick: bool = False,
     path: str | Path | None = None, force: bool = False, workers: int = 1,
@@ -70,6 +74,7 @@ def extremes(
         return measure.record(path, named, quick=quick, **how)
 
 
+@typed
 def faults(*, path: str | Path | None = None, force: bool = False, workers: int = 1) -> FaultReport:
     """Engines broken on purpose: which checks reject each, and their detection limits.  It takes minutes."""
     from springcheck.studies.faults import measure
@@ -78,6 +83,7 @@ def faults(*, path: str | Path | None = None, force: bool = False, workers: int 
         return measure.record(path, **how)
 
 
+@typed
 def census(
     methods: str | Sequence[str] = (), *, thermostats: bool = False, path: str | Path | None = None,
     force: bool = False, workers: int = 1,
@@ -93,6 +99,7 @@ def census(
         return measure.record(path, named, thermostats=thermostats, **how)
 
 
+@typed
 def sampling(
     methods: str | Sequence[str] = (), *, path: str | Path | None = None, force: bool = False,
     workers: int = 1,
@@ -104,6 +111,7 @@ def sampling(
         return measure.record(path, named, **how)
 
 
+@typed
 def ensemble(
     scene: Scene | str | Path, vary: Mapping[str, str | Sequence[float]],
     methods: str | Step | Sequence[str | Step] = (), *, samples: int | None = None, seed: int = 0,
@@ -131,6 +139,7 @@ def ensemble(
         return measure.record(found, cells, path, named, **how)
 
 
+@typed
 def methods(scene: Scene | str | Path | None = None) -> Shelf:
     """All known methods: label, scheme, whether it runs by default, and why it cannot be used (its engine is
     not installed, or it cannot serve the `scene`); "" where it can."""
@@ -139,6 +148,7 @@ def methods(scene: Scene | str | Path | None = None) -> Shelf:
     return Shelf(listing.methods(None if scene is None else scene_of(scene)))
 
 
+@typed
 def explain(word: str) -> Said:
     """Explain a check, scheme, method, fault, finding or term.  SpringcheckError for an unknown word."""
     from springcheck.cli import explain as explaining
@@ -146,6 +156,7 @@ def explain(word: str) -> Said:
     return Said("\n".join(explaining.lines(needed(word, str, "a word"))))
 
 
+@typed
 def report(path: str | Path, output: str | Path | None = None) -> Path:
     """Write a store as one HTML page that checks itself in a browser; `output` is its name with .html by
     default.

@@ -10,15 +10,7 @@ import numpy as np
 
 from springcheck.engines import quiet
 from springcheck.engines.bonds import hinges, walls
-from springcheck.engines.contract import (
-    EVERY_FORCE,
-    Engine,
-    Label,
-    Method,
-    by_name,
-    named,
-    version_of,
-)
+from springcheck.engines.contract import EVERY_FORCE, Engine, Label, Method, by_name, named, version_of
 from springcheck.errors import MethodError
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
