@@ -442,3 +442,8 @@ def test_judge_without_a_scheme_says_in_a_line_how_to_find_it() -> None:
     assert "forest-ruth" not in str(error.value)
     with pytest.raises(SpringcheckError, match="did you mean velocity-verlet or position-verlet or"):
         springcheck.judge(scene, replace(made, scheme="verlet"))
+
+
+def test_an_argument_that_a_function_has_not_is_answered_with_its_name() -> None:
+    with pytest.raises(TypeError, match=r"^run\(\) got an unexpected keyword argument 'workers'"):
+        springcheck.run("spring", "own:euler", workers=2)  # type: ignore[call-arg]

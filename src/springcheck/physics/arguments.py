@@ -54,7 +54,12 @@ def typed(function: Callable[P, R]) -> Callable[P, R]:
 
     @wraps(function)
     def call(*given: P.args, **named: P.kwargs) -> R:
-        for name, value in signature.bind(*given, **named).arguments.items():
+        try:
+            bound = signature.bind(*given, **named)
+        except TypeError:
+            # Python's own message names the function
+            return function(*given, **named)
+        for name, value in bound.arguments.items():
             if ANNOTATED.keys() >= set(wanted[name]):
                 of_kind(f"{function.__name__}: {name}", value, *wanted[name])
         return function(*given, **named)

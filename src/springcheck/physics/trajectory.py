@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import partial
-from html import escape
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Self
@@ -248,6 +247,8 @@ class Trajectory:
 
 def html_table(title: str, rows: Iterable[Sequence[str]]) -> str:
     """Rows of cells, the first of them the titles, under a line of text."""
+    from html import escape
+
     body = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)
     return f"<p>{escape(title)}</p><table>{body}</table>"
 

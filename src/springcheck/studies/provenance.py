@@ -11,7 +11,6 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from hashlib import sha256
-from importlib import metadata
 
 import numpy as np
 
@@ -39,6 +38,8 @@ def versions() -> dict[str, str]:
 
 def installed(names: Iterable[str]) -> dict[str, str]:
     """Versions of those of these packages that are installed."""
+    from importlib import metadata
+
     found = {}
     for name in names:
         with suppress(metadata.PackageNotFoundError, ValueError):
