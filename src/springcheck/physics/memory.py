@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from contextlib import suppress
 from pathlib import Path
 
@@ -40,6 +41,6 @@ def need(size: float, what: str, then: str) -> None:
     """SceneError where `what` takes more bytes than are available; `then` is the remedy."""
     there = available()
     if there is not None and size > there:
-        raise SceneError(
-            f"{what} take {size / 1e9:.3g} GB of memory and {there / 1e9:.3g} GB are available here; {then}"
-        )
+        # a whole number may be larger than any double
+        wanted, here = (f"{min(x, sys.float_info.max) / 1e9:.3g} GB" for x in (size, there))
+        raise SceneError(f"{what} take {wanted} of memory and {here} are available here; {then}")
