@@ -196,6 +196,11 @@ def test_the_table_of_detection_limits_is_what_is_measured(name: str) -> None:
     assert found.size is not None
     assert float(size) == pytest.approx(found.size, rel=0.02)
     sharpest = min(found.limits, key=lambda check: found.limits[check])
+    if "drawn anew" in by:
+        # of 60 measurements, 50 found repeatability sharper, and all lay from 1.8e-17 to 2.4e-17
+        assert sharpest in by.partition(";")[0].split(", ")
+        assert 0.5 < found.limits[sharpest] / float(least) < 2
+        return
     assert by.startswith(sharpest)
     # limits are found by halving, to a sixteenth of a factor of two, and are printed in two digits
     assert float(least) == pytest.approx(found.limits[sharpest], rel=0.05)
