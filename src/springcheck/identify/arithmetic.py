@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -266,6 +267,8 @@ def _defects(
     record: Record, j: int, found: Map, matches: list[Match], visible: Callable[[], bool]
 ) -> list[Defect]:
     sizes = _roundings(record, j, found, matches)
+    if record.fine and _beyond(record, found, sizes) and not visible():
+        return [Defect(ulp=math.inf, precision="", miss=math.inf)] * len(matches)
     ulp, plain, signed = _in_double(record, found, matches, sizes)
     stored = single = np.zeros(len(matches), dtype=bool)
     half = np.zeros_like(signed)
@@ -295,6 +298,23 @@ def _defects(
         miss = float(share[i])
         out.append(Defect(ulp=float(ulp[i]), precision=precision, note=note, miss=miss, certain=certain))
     return out
+
+
+FAR = 1e3
+"""Bounds on what double precision and the rounding of times explain, from which no refitting is tried."""
+
+
+def _beyond(record: Record, found: Map, sizes: Roundings) -> bool:
+    """Whether the residuals exceed `FAR` bounds of double precision under every match.
+
+    No map leaves a smaller weighted mean square than the fitted one, whatever is refitted of a match.
+    """
+    off = record.clock + (0.0 if record.deviations is None else float(np.max(np.abs(record.deviations))))
+    with np.errstate(over="ignore"):
+        each = FAR * (EPSILON + off * sizes.stride) * (sizes.path + sizes.stride**2)
+        most = each[:, None, None] * (sizes.size + sizes.difference)
+        explained = np.sum((most * found.weight[:, None]) ** 2, axis=(1, 2))
+    return bool(np.all(found.freedom / 2 * np.sum(found.residual**2) > explained))
 
 
 def _in_double(

@@ -6,7 +6,9 @@ Methods for Ordinary Differential Equations (2016), chapter 3; Hairer & Wanner, 
 Equations II (1996), IV.3 and IV.5; Fehlberg, NASA TR R-315 (1969); Dormand and Prince, J. Comput.  Appl.
 Math. 6 (1980) 19; Cash & Karp, ACM TOMS 16 (1990) 201; Bank et al., IEEE Trans.  CAD 4 (1985) 436; Alexander,
 SIAM J. Numer.  Anal. 14 (1977) 1006; Verwer et al., SIAM J. Sci.  Comput. 20 (1999) 1456; Omelyan, Mryglod &
-Folk, Comput.  Phys.  Commun. 146 (2002) 188; McLachlan, SIAM J. Sci.  Comput. 16 (1995) 151.
+Folk, Comput.  Phys.  Commun. 146 (2002) 188; McLachlan, SIAM J. Sci.  Comput. 16 (1995) 151; Suzuki, Phys.
+Lett. A 146 (1990) 319; Yoshida, Phys.  Lett. A 150 (1990) 262, solution A, in the digits that he prints;
+McLachlan & Atela, Nonlinearity 5 (1992) 541; Tsitouras, Comput.  Math.  Appl. 62 (2011) 770.
 """
 
 from __future__ import annotations
@@ -52,6 +54,12 @@ def _alternating(first: str, *half: str, middle: str) -> tuple[tuple[str, Coeffi
     return tuple((kinds[i % 2], c) for i, c in enumerate(every))
 
 
+# 1/(4 - 4**(1/3)), of Suzuki's five steps of Verlet: halves, wholes, and those of the middle one
+_S5 = ("0.2072453858971878685711770314303807478559", *3 * ("0.4144907717943757371423540628607614957118",),
+       "-0.1217361576915636057135310942911422435677")  # fmt: skip
+_Y6 = ("0.39225680523878", "0.78451361047756", "0.5100434119184585", "0.235573213359357",
+       "-0.4710533854097565", "-1.17767998417887", "0.068753168252518")  # fmt: skip
+
 # 1 - 1/sqrt 2 and 1 + 1/sqrt 2, twice and squared
 _SDIRK = _row("1", "-0.58578643762690495119831127579030192143", "0.085786437626904951198311275790301921430")
 _ROS = _row("1", "-3.4142135623730950488016887242096980785697", "2.9142135623730950488016887242096980785697")
@@ -66,6 +74,8 @@ _ALL = (
     Elsewhere(name="dormand-prince5", title="Dormand-Prince, fifth order (RK45, dopri5, ode45)", order=5,
               over=_taylor(5, "1/600")),
     Elsewhere(name="cash-karp5", title="Cash-Karp, fifth order", order=5, over=_taylor(5, "1/800")),
+    Elsewhere(name="tsitouras5", title="Tsitouras, fifth order (Tsit5)", order=5,
+              over=_taylor(5, "0.001432211324807348")),
     Elsewhere(name="rk5-butcher", title="Butcher's fifth order", order=5, over=_taylor(5, "1/640")),
     Elsewhere(name="sdirk2", title="SDIRK of second order in two stages (Alexander)", order=2,
               also=("tr-bdf2",), over=_row("1", "0.41421356237309504880168872420969807857"), under=_SDIRK),
@@ -73,6 +83,8 @@ _ALL = (
               over=_row("1", "-2.4142135623730950488016887242096980785697"), under=_ROS),
     Elsewhere(name="gauss4", title="Gauss collocation, fourth order", order=4, also=("hermite4",),
               over=_row("1", "1/2", "1/12"), under=_row("1", "-1/2", "1/12")),
+    Elsewhere(name="gauss6", title="Gauss collocation, sixth order", order=6,
+              over=_row("1", "1/2", "1/10", "1/120"), under=_row("1", "-1/2", "1/10", "-1/120")),
     Elsewhere(name="radau3", title="Radau IIA, third order", order=3, over=_row("1", "1/3"),
               under=_row("1", "-2/3", "1/6")),
     Elsewhere(name="radau5", title="Radau IIA, fifth order", order=5, over=_row("1", "2/5", "1/20"),
@@ -81,6 +93,22 @@ _ALL = (
               stages=_alternating("drift", "0.1786178958448091", "0.7123418310626054",
                                   "-0.06626458266981849", "-0.2123418310626054",
                                   middle="0.77529337365001878")),
+    *(
+        Elsewhere(name=f"{name}{first}", title=f"{whose}, {kind} first", order=order,
+                  stages=_alternating(kind, *half, middle=middle))
+        for name, whose, order, half, middle in (
+            ("suzuki4", "Suzuki, fourth order", 4, _S5, "-0.6579630871775029485694162514430459828471"),
+            ("yoshida6", "Yoshida, sixth order", 6, _Y6, "1.315186320683906"),
+        )
+        for kind, first in (("kick", ""), ("drift", "-drift-first"))
+    ),
+    Elsewhere(name="mclachlan-atela4", title="McLachlan-Atela, fourth order in four kicks", order=4,
+              stages=tuple((kind, c) for pair in (
+                  ("0.1344961992774310892", "0.5153528374311229364"),
+                  ("-0.2248198030794208058", "-0.085782019412973646"),
+                  ("0.7563200005156682911", "0.4415830236164665242"),
+                  ("0.3340036032863214255", "0.1288461583653841854"),
+              ) for kind, c in zip(("kick", "drift"), pair, strict=True))),
     Elsewhere(name="mclachlan2", title="McLachlan, second order in two kicks", order=2,
               stages=_alternating("drift", "0.1931833275037836", "0.5", middle="0.6136333449924328")),
 )  # fmt: skip
