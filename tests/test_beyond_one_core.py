@@ -22,8 +22,6 @@ from springcheck.studies.team import Processes
 from springcheck.text.wording import count
 from stores import raising
 
-pytestmark = pytest.mark.slow
-
 OWN = ("own:euler", "own:implicit-euler", "own:semi-implicit-euler")
 
 

@@ -13,8 +13,6 @@ import springcheck
 from springcheck.cli import main
 from springcheck.physics import scenefile
 
-pytestmark = pytest.mark.slow
-
 
 @pytest.mark.campaign
 @pytest.mark.parametrize("name", bonds_in_space.CASES)

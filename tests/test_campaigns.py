@@ -11,6 +11,7 @@ from functools import cache
 from pathlib import Path
 
 import campaigns
+import slow
 from springcheck import driver, load_scene
 
 HERE = Path(__file__).parent
@@ -33,6 +34,19 @@ def test_every_case_that_is_left_out_is_of_a_campaign() -> None:
     for name in listed:
         file, test = name.split("[")[0].split("::")
         assert test in marked(file), name
+
+
+def test_what_is_slow_is_a_test_and_in_the_list_alone() -> None:
+    rows = [line.split(" ") for line in slow.LIST.read_text(encoding="utf-8").splitlines()]
+    assert len(rows) > 400
+    assert [name for _, name in rows] == sorted({name for _, name in rows})
+    assert all(float(seconds) >= slow.SLOW for seconds, _ in rows)
+    sources = {path.name: path.read_text(encoding="utf-8") for path in HERE.glob("test_*.py")}
+    for _, name in rows:
+        file, test = name.removeprefix("tests/").split("::")
+        assert f"def {test}(" in sources[file], name
+    by_hand = "mark." + "slow"
+    assert [name for name, text in sources.items() if by_hand in text] == []
 
 
 def test_the_dearest_are_left_out_as_long_as_every_jump_is_made() -> None:

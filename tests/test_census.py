@@ -59,7 +59,6 @@ def test_each_method_is_named_by_its_states(capsys: pytest.CaptureFixture[str]) 
     assert np.array_equal(restored.entries[0].q, driver.run(load_scene("spring"), OWN[0]).q[:, 0])
 
 
-@pytest.mark.slow
 def test_a_census_by_workers_is_that_of_one_but_for_the_times_which_they_do_not_measure() -> None:
     assert np.isnan(census.entry(engines.parse(OWN[0])).seconds)
     two, one = (census.record(f"{n}.h5", OWN, team=Processes(n)) for n in (2, 1))
@@ -426,7 +425,6 @@ def test_a_thermostat_is_a_row_whose_temperatures_are_measured(capsys: pytest.Ca
     assert "Temperatures over that of the bath" in capsys.readouterr().out
 
 
-@pytest.mark.slow
 def test_a_thermostat_whose_springs_diverge_says_so_in_place_of_temperatures() -> None:
     # its chain counts three degrees of freedom for each of a thousand springs that have one
     row = baths.entry(engines.parse("ase:nose-hoover"))

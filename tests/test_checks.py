@@ -41,7 +41,6 @@ def alarms(verdicts: list[Verdict]) -> list[str]:
     return [f"{v.check} {v.value:.3g} of {v.bound:.3g}" for v in verdicts if v.passed is False]
 
 
-@pytest.mark.slow
 @pytest.mark.campaign
 @pytest.mark.parametrize("name", PLAIN)
 def test_no_check_rejects_the_textbook_step_on_random_scenes(name: str) -> None:
@@ -67,7 +66,6 @@ def part_of(run: Trajectory, rows: slice) -> Trajectory:
     return replace(run, t=run.t[rows], q=run.q[rows], p=run.p[rows], energy=run.energy[rows], outcome=outcome)
 
 
-@pytest.mark.slow
 @pytest.mark.campaign
 @pytest.mark.parametrize("name", ["explicit-euler", "velocity-verlet", "implicit-euler", "rk4"])
 def test_every_piece_of_a_long_run_is_judged_like_the_whole(name: str) -> None:
@@ -116,7 +114,6 @@ def test_the_step_defect_s_bound_is_within_a_thousand_times_of_what_is_seen() ->
     assert max(ratios) < 1e4
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("precision", "steps"), [("double", 200), ("mixed", 200), ("single", 200)])
 def test_the_arithmetic_of_opencl_is_the_one_it_is_said_to_have(
     precision: str, steps: int, need: Need, whole: bool

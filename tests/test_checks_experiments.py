@@ -32,7 +32,6 @@ ENGINES = [
 ]  # fmt: skip
 
 
-@pytest.mark.slow
 @pytest.mark.campaign
 @pytest.mark.parametrize("label", ENGINES)
 def test_every_engine_passes_every_experiment_that_applies(label: str, need: Need) -> None:
@@ -48,7 +47,6 @@ def plain(name: str) -> checks.Run:
     return lambda scene, label: steppers.record(scene, scheme, steppers.textbook(scene, scheme), label=label)
 
 
-@pytest.mark.slow
 @pytest.mark.campaign
 @pytest.mark.parametrize("name", ["ruth3", "forest-ruth", "yoshida4", "rk2-heun", "rk4", "implicit-midpoint"])
 def test_schemes_of_every_order_pass_every_experiment(name: str) -> None:
@@ -137,7 +135,6 @@ def test_an_anharmonic_scene_has_no_matrix_but_turns_back() -> None:
     assert verdicts["reversibility"].passed is True
 
 
-@pytest.mark.slow
 def test_a_free_chain_and_an_inverted_spring_pass_the_experiments() -> None:
     for seed in range(30):
         scene = clean.random_scene(np.random.default_rng([5, seed]))

@@ -102,7 +102,6 @@ MOVING = {
 }
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("how", [Arithmetic(), SINGLE], ids=["double", "single"])
 @pytest.mark.parametrize("what", WRONG)
 @pytest.mark.parametrize("where", MOVING)

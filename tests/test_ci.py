@@ -17,8 +17,6 @@ import pytest
 from springcheck.cli import ci, main
 from springcheck.studies.arguments import reported
 
-pytestmark = pytest.mark.slow
-
 HERE = Path(__file__).parent
 EXAMPLES = HERE / "ci-examples"
 ACTION = HERE.parents[0] / ".github" / "actions" / "judge"

@@ -127,7 +127,6 @@ def test_inspect_shows_the_store_and_the_numbers_asked_for(capsys: pytest.Captur
 PICTURES = ("phase-portrait", "position", "energy", "error")
 
 
-@pytest.mark.slow
 def test_plot_draws_four_pictures_twice(capsys: pytest.CaptureFixture[str]) -> None:
     main(["run", "spring", *OWN, "--quiet"])
     assert main(["plot", "spring.h5", "-o", "pictures"]) == 0
@@ -288,7 +287,6 @@ def test_output_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:
     assert done.stderr.startswith("springcheck: ")
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("old", "new"),
     [

@@ -29,8 +29,6 @@ from springcheck.studies.cluster import Cluster
 from springcheck.studies.extremes import measure as extremes
 from springcheck.studies.tables import Rows
 
-pytestmark = pytest.mark.slow
-
 if not os.environ.get("SPRINGCHECK_REQUIRE_TOOLS"):
     pytest.importorskip("distributed")
 

@@ -77,7 +77,6 @@ def textbook(scene: Scene, name: str, moved: Scene | None = None) -> Trajectory:
     return steppers.record(scene, scheme, step, label=f"own:{name}{'' if moved is None else '-wrong'}")
 
 
-@pytest.mark.slow
 def test_schemes_of_several_orders_in_a_well_are_several_motions() -> None:
     names = ("rk4", "yoshida4", "forest-ruth", "velocity-verlet")
     runs = {run.label: run for run in (textbook(WELL, name) for name in names)}

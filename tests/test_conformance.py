@@ -146,7 +146,6 @@ FAULTS = [
 ]  # fmt: skip
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("name", "old", "new"), FAULTS)
 def test_each_check_rejects_a_broken_engine(name: str, old: str, new: str) -> None:
     assert old in CODE
@@ -171,7 +170,6 @@ def test_a_wrong_engine_is_told_what_its_states_show() -> None:
     assert "What the states show" not in str(caught.value)
 
 
-@pytest.mark.slow
 def test_pytest_shows_the_sentence_and_no_frames_of_ours(tmp_path: Path) -> None:
     code = CODE.replace("self.h * y / m", "self.h * y", 1)
     (tmp_path / "my_engine.py").write_text(code)
@@ -229,7 +227,6 @@ def test_a_wrong_trajectory_is_told_in_words() -> None:
         conformance.assert_right(scene, replace(run, scheme="rk4"))
 
 
-@pytest.mark.slow
 @pytest.mark.campaign("check.label")
 @conformance.parametrize_with_checks(engines.engine("ase"))
 def test_an_engine_of_ours(check: conformance.Check, need: Any) -> None:

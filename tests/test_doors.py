@@ -147,7 +147,6 @@ def test_names_that_would_be_one_are_refused(tmp_path: Path, capsys: pytest.Capt
     assert "two commands have this name" in refused(capsys, *command, *command)
 
 
-@pytest.mark.slow
 def test_workers_run_what_a_call_brings(tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text(VERLET)
     shutil.copy(Path(__file__).parent / "plugin-example" / "springcheck_pefrl.py", tmp_path / "plug.py")
@@ -223,7 +222,6 @@ def program(tmp_path: Path, body: str) -> str:
 ROWS = "0,0,1"
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("body", "said"),
     [

@@ -22,8 +22,6 @@ from springcheck.studies.faults import baths
 from springcheck.studies.faults.seeded import Fault
 from springcheck.thermal import chance
 
-pytestmark = pytest.mark.slow
-
 BEYOND_ONE = 0.15865525393145707
 """Chance of a normal number above 1."""
 

@@ -200,7 +200,6 @@ def multiplier(scene: Scene, label: str, steps: int) -> complex:
     return complex(max(np.linalg.eigvals(np.array(ends)), key=abs))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", ["mathieu-stable", "mathieu-tongue"])
 def test_the_floquet_multiplier_is_that_of_mathieus_functions(name: str) -> None:
     """By Taylor series in 20 digits, and by the characteristic exponent of Hill's determinant."""
@@ -492,7 +491,6 @@ def off(scene: Scene, name: str, x: float, row: int) -> Scene:
     return replace(scene, terms=tuple(changed if one is term else one for one in scene.terms))
 
 
-@pytest.mark.slow
 @pytest.mark.campaign("which", "law")
 @pytest.mark.parametrize("which", ["driven-spring", "uneven", "mathieu-tongue"])
 @pytest.mark.parametrize("law", ["semi-implicit-euler", "velocity-verlet", "rk4"])

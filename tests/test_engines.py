@@ -224,7 +224,6 @@ def test_a_custom_integrator_on_opencl_takes_two_to_the_32_for_one_less(need: Ne
         assert ("step-defect" in judged(scene, as_documented)) == bool(factor)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("precision", ["single", "mixed", "double"])
 @pytest.mark.parametrize(
     ("method", "size", "step"), [("euler", 1, 289), ("verlet", 1e3, 2), ("leapfrog", 1e3, 2)]
@@ -251,7 +250,6 @@ def test_a_force_beyond_fixed_point_fails_with_its_step_and_its_reason(
     assert judged(replace(scene, steps=step - 1), before) == []
 
 
-@pytest.mark.slow
 def test_pocl_turns_every_force_beyond_fixed_point_into_the_lowest_number_and_sums_modulo_2_to_the_64(
     need: Need,
 ) -> None:

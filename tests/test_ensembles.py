@@ -26,7 +26,6 @@ def text_of(name: str) -> str:
     return (scenefile.folder() / f"{name}.toml").read_text()
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "given", "methods"),
     [
@@ -186,7 +185,6 @@ def test_what_no_cell_has_of_its_own_is_refused(scene: str, field: str, words: s
         measure.record(scenefile.load_scene(scene), vary.plan([field]), None)
 
 
-@pytest.mark.slow
 def test_the_command_line_runs_inspects_and_draws_an_ensemble(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

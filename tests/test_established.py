@@ -22,8 +22,6 @@ from springcheck.physics.terms import Cosine, Damping, Spring, WallSpring
 from springcheck.physics.trajectory import Trajectory
 from springcheck.studies.extremes import grid, running
 
-pytestmark = pytest.mark.slow
-
 Need = Callable[[str], None]
 
 NAMES = ("mujoco", "pymunk", "rebound", "dart", "box2d", "rapier", "drake", "lammps", "heyoka")

@@ -422,7 +422,6 @@ def test_an_error_below_that_of_the_exact_solution_is_marked_so(tmp_path: Path) 
     assert f"<{known:.2e}" in "".join(map(str, text._runs(said.runs).lines(100)))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("n", [40, 60_000])
 def test_the_stated_error_of_a_long_chain_is_some_roundings_of_its_length(n: int) -> None:
     scene = builders.chain(n, 1.3, 2.9, waves=[(1, 1.0), (7, 0.3)], step=0.03, steps=2000)

@@ -51,7 +51,6 @@ def test_every_method_is_explained_whether_its_engine_is_here_or_not() -> None:
             assert next(explain.lines(f"{engine}:{method}")).startswith(f"{engine}:{method}: ")
 
 
-@pytest.mark.slow
 def test_a_check_says_what_it_must_reject_and_what_it_passes() -> None:
     said = " ".join(" ".join(explain.lines("shadow-energy")).split())
     assert "Must reject, and is held to it: start-momentum of 1e-12, friction of 1e-12" in said

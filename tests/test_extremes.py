@@ -37,7 +37,6 @@ GPU = [
 ]
 
 pytestmark = [
-    pytest.mark.slow,
     pytest.mark.skipif(not WIDE, reason="the study needs a wider range than double's"),
 ]
 

@@ -24,8 +24,6 @@ from springcheck.studies.faults.result import FaultReport, Result
 from springcheck.studies.faults.seeded import Fault
 from springcheck.studies.faults.table import FAULTS
 
-pytestmark = pytest.mark.slow
-
 Need = Callable[[str], None]
 
 

@@ -235,7 +235,6 @@ def test_the_energies_of_all_modes_of_a_chain_are_its_energy() -> None:
     np.testing.assert_allclose(np.sum(found, axis=1), scene.system.energy(run.q, run.p) - least, rtol=1e-12)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "also"),
     [("free", set()), ("inverted", set()), ("chain", {"modes"}), ("long-chain", {"modes", "wave"})],

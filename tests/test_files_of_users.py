@@ -18,7 +18,7 @@ from springcheck.physics.scenefile import folder
 from springcheck.store import files, parts
 from stores import LABELS, scene, trajectory, written
 
-pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("own_folder", "tried_here", "sketched")]
+pytestmark = pytest.mark.usefixtures("own_folder", "tried_here", "sketched")
 
 OWN = ["--method", "own:euler", "--quiet"]
 
@@ -109,7 +109,6 @@ def test_force_replaces_a_store_that_is_damaged(tmp_path: Path) -> None:
         assert store.check(name) == []
 
 
-@pytest.mark.slow
 def test_plot_replaces_no_figure_but_its_own(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["run", "spring", *OWN, "-o", "a.h5"]) == 0
     assert main(["run", "spring", "--method", "own:implicit-euler", "--quiet", "-o", "b.h5"]) == 0

@@ -30,7 +30,7 @@ from springcheck.physics.scenefile import load_scene
 from springcheck.physics.trajectory import Trajectory
 from springcheck.store import apart
 
-pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("own_folder", "tried_here")]
+pytestmark = pytest.mark.usefixtures("own_folder", "tried_here")
 
 SCENE = load_scene("spring-uneven")
 READ_APART = apart.read

@@ -33,8 +33,6 @@ from springcheck.thermal.heat import heated_of
 from springcheck.thermal.rigid import read
 from springcheck.thermal.stepper import forces
 
-pytestmark = pytest.mark.slow
-
 LABELS = (
     "own:baoab", "own:baoa", "own:aboba", "own:obabo", "own:oabao", "own:lammps-langevin",
     "openmm:langevin-middle-rods", "ase:langevin-rods", "lammps:rattle-langevin",

@@ -174,7 +174,6 @@ def test_what_rounding_hides_is_said_and_not_guessed() -> None:
     assert any("more digits" in note for note in found.notes)
 
 
-@pytest.mark.slow
 @pytest.mark.campaign
 @pytest.mark.parametrize("form", ["single", "text"])
 @pytest.mark.parametrize("name", ["rk4", "ruth3", "forest-ruth", "yoshida4"])

@@ -15,7 +15,6 @@ from springcheck.identify import Identification, identify
 DRAWN = [case for case in corpus.load() if case.group == "census"]
 
 
-@pytest.mark.slow
 @pytest.mark.campaign
 @pytest.mark.parametrize("case", DRAWN, ids=lambda case: case.name.split(":")[0])
 def test_what_was_wrong_once_is_right(case: corpus.Case) -> None:
@@ -78,7 +77,6 @@ def test_positions_at_rounded_times_are_named(case: corpus.Case) -> None:
     assert (found.verdict, found.fits) == ("named", True)
 
 
-@pytest.mark.slow
 def test_a_missing_frame_of_a_coarse_file_is_no_rounding_of_many_steps() -> None:
     (case,) = drawn("a frame of text is missing")
     found = corpus.said(case)

@@ -15,8 +15,6 @@ import identify_corpus as corpus
 from springcheck.errors import IdentificationError
 from springcheck.identify import Identification
 
-pytestmark = pytest.mark.slow
-
 RANKS = {"WRONG NAME": 0, "FALSE SENTENCE": 1, "LISTED WITHOUT": 1, "refused": 2, "short": 2, "right": 3}
 
 

@@ -14,8 +14,6 @@ from springcheck.physics import scenefile as scenes
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Drive
 
-pytestmark = pytest.mark.slow
-
 ONE = np.array([0])
 
 

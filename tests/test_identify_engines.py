@@ -17,8 +17,6 @@ import springcheck
 from springcheck.identify import Identification, identify
 from springcheck.physics.trajectory import Trajectory
 
-pytestmark = pytest.mark.slow
-
 PRECISIONS = {"double": "fixed-point force", "mixed": "mixed", "single": "single"}
 GRID = (("spring", (1, 5)), ("spring-uneven", (2, 10)))
 """Scenes and steps to a frame."""

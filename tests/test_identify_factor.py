@@ -71,7 +71,6 @@ def test_two_baths_and_a_force_that_is_not_linear_are_none() -> None:
     assert one_factor(other.step, *(np.repeat(x, 2, axis=1) for x in (first.q, first.p / 3.7))) is None
 
 
-@pytest.mark.slow
 def test_identify_says_that_all_momenta_have_one_factor() -> None:
     scene = particles(3, steps=500)
     chain = springcheck.identify(driver.run(scene, "own:nose-hoover", seed=4), mass=scene.m)

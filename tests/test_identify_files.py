@@ -17,7 +17,7 @@ from springcheck.cli import main
 from springcheck.physics.arrays import Floats
 from springcheck.schemes import SCHEMES, step
 
-pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("own_folder", "tried_here")]
+pytestmark = pytest.mark.usefixtures("own_folder", "tried_here")
 
 M, K, H = 3.7, 2.9, 0.31
 FIELDS = {

@@ -512,7 +512,6 @@ def test_a_number_of_substeps_that_digits_do_not_tell_is_a_range(digits: int, wo
     assert_said(found, words)
 
 
-@pytest.mark.slow
 def test_a_stiffness_that_wobbles_is_found_in_a_long_file_in_little_memory() -> None:
     step = verlet(lambda i, q, p: -K * q * (1 + 1e-6 * np.sin(0.037 * i)))
     t, q, p = march(step, 4000)
@@ -528,7 +527,6 @@ def written(x: np.ndarray, digits: int) -> np.ndarray:
     return np.array([float(f"{y:.{digits}g}") for y in x])
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("substeps", "h", "frames", "digits"), [(3, 0.0678, 5, 3), (4, 0.05, 10, 3)])
 def test_few_frames_of_few_digits_do_not_tell_substeps_from_steps(substeps, h, frames, digits) -> None:
     rng, judged = np.random.default_rng(1), 0

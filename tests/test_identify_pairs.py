@@ -5,11 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import pytest
 
 from springcheck.identify import identify
-
-pytestmark = pytest.mark.slow
 
 M, K, REST, H, N = (3.7, 1.9), 2.9, 1.1, 0.1, 300
 WAY = np.array([1.0, 2.0, -2.0]) / 3

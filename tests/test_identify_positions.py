@@ -14,8 +14,6 @@ from springcheck.errors import IdentificationError
 from springcheck.identify import identify
 from springcheck.physics.arrays import Floats
 
-pytestmark = pytest.mark.slow
-
 K, M, H = 2.9, 1.3, 0.31
 STOERMER = {"velocity-verlet", "semi-implicit-euler", "semi-implicit-euler-drift-kick", "position-verlet"}
 

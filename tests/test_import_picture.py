@@ -42,7 +42,6 @@ def test_every_module_has_aroom() -> None:
     assert {room(path) for path in modules()} <= set(ROWS)
 
 
-@pytest.mark.slow
 def test_a_module_imports_only_from_rows_above_it() -> None:
     wrong = []
     for path in modules():
@@ -61,7 +60,6 @@ def test_a_foreign_library_is_imported_only_where_it_belongs() -> None:
     assert [x for x in libraries if x[1] in HOMES and not x[0].startswith(HOMES[x[1]])] == []
 
 
-@pytest.mark.slow
 def test_arrows_between_rooms_are_few() -> None:
     found = house.arrows()
     count, chain = sum(map(len, found.values())), house.longest(found)

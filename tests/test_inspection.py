@@ -39,8 +39,6 @@ from springcheck.studies.run.page import of_runs
 from springcheck.studies.stability import limits
 from springcheck.studies.stability import measure as stability
 
-pytestmark = pytest.mark.slow
-
 Need = Callable[[str], None]
 
 

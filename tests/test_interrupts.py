@@ -34,8 +34,6 @@ from springcheck.physics import scenefile
 from springcheck.studies import workers
 from springcheck.studies.run import measure as session
 
-pytestmark = pytest.mark.slow
-
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "validation"))
 _spec = importlib.util.spec_from_file_location("interrupting", ROOT / "validation" / "interrupts.py")

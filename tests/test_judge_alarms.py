@@ -128,7 +128,6 @@ def test_an_engine_that_counts_displacements_from_the_start_says_so(name: str) -
     assert judged(share=1 + 1e-11) != []
 
 
-@pytest.mark.slow
 @pytest.mark.campaign("well", "name")
 @pytest.mark.parametrize("name", FIXED)
 @pytest.mark.parametrize("well", WELLS)

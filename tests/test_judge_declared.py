@@ -168,7 +168,6 @@ def test_every_fact_of_an_arithmetic_is_stored() -> None:
     assert {one.name for one in fields(Arithmetic)} <= {*DECLARED, "name"}
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("fact", DECLARED)
 def test_a_store_is_judged_as_its_run_was_whatever_it_declares(tmp_path: Path, fact: str) -> None:
     scene = uneven(quantities=("q", "p", "energy"))

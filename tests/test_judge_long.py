@@ -65,7 +65,6 @@ def small(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(measure, "LONG_PIECE", 64 * 4)
 
 
-@pytest.mark.slow
 @pytest.mark.usefixtures("small")
 @pytest.mark.parametrize("fault", FAULTS)
 def test_every_step_of_a_long_anharmonic_run_is_judged(tmp_path: Path, fault: str) -> None:

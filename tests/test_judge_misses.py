@@ -80,7 +80,6 @@ def fast_and_slow(slow: float) -> Scene:
     )
 
 
-@pytest.mark.slow
 @pytest.mark.campaign
 @pytest.mark.parametrize("every", [20, 100, 500])
 def test_a_slow_stiffness_of_multiple_time_steps_is_judged_however_far_apart_frames_are(every: int) -> None:
@@ -268,7 +267,6 @@ def test_more_joined_particles_than_have_tangent_matrices_are_judged_by_tangent_
     assert exact < many < 4 * exact
 
 
-@pytest.mark.slow
 @pytest.mark.campaign("name", "every")
 @EXTENDED
 @pytest.mark.parametrize("name", ["velocity-verlet", "rk4", "implicit-midpoint"])
@@ -284,7 +282,6 @@ def test_a_step_is_judged_as_sharply_between_frames_far_apart_as_by_itself(name:
     assert failed(scene(2.9), plain(scene(2.9), name, scene(2.9 * (1 + 1.2e-14)))) != []
 
 
-@pytest.mark.slow
 @pytest.mark.campaign("name", "wander")
 @pytest.mark.parametrize("name", ["semi-implicit-euler", "rk4", "implicit-euler"])
 @pytest.mark.parametrize("wander", [0.3, 3e-5, 1e-6])

@@ -24,8 +24,6 @@ from springcheck.physics.terms import Quartic, Spring, WallSpring
 from springcheck.physics.trajectory import NOT_KNOWN, Limits, Trajectory, Verdict
 from springcheck.store import tables
 
-pytestmark = pytest.mark.slow
-
 VALIDATION = Path(__file__).parent.parent / "validation"
 sys.path.insert(0, str(VALIDATION))
 _spec = importlib.util.spec_from_file_location("detection", VALIDATION / "detection.py")

@@ -69,7 +69,6 @@ FAULTS: dict[str, Callable[[Floats], list[float] | Floats]] = {
 }
 
 
-@pytest.mark.slow
 @pytest.mark.campaign("name", "ratio")
 @pytest.mark.parametrize("name", forms.THETA)
 @pytest.mark.parametrize("ratio", [1e6, 1e7, 1e8, 1e9, 1e10])
@@ -89,7 +88,6 @@ def test_the_momenta_of_a_stiff_pair_are_judged(name: str, ratio: float) -> None
         assert found.value > 1e3 * found.bound, fault
 
 
-@pytest.mark.slow
 @pytest.mark.campaign("name", "form")
 @pytest.mark.parametrize("name", forms.THETA)
 @pytest.mark.parametrize("form", WRITTEN)
@@ -118,7 +116,6 @@ def soft_body(rng: np.random.Generator, hw: float) -> Scene:
     return replace(made, step=hw / w, quantities=("q", "p"))
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("form", ["change of velocity", "positions first", "change of position"])
 def test_cloth_and_position_based_dynamics_pass_on_soft_bodies(form: str) -> None:
     """From h omega of 20 on the change of velocity adds up what the neighbours' momenta do to the force;

@@ -21,8 +21,6 @@ from springcheck.physics.arrays import Reals
 from springcheck.physics.terms import Damping, Spring
 from springcheck.studies.run import measure as session
 
-pytestmark = pytest.mark.slow
-
 Need = Callable[[str], None]
 
 ENGINES = {"openmm", "ase", "sksundae"}

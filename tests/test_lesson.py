@@ -21,8 +21,6 @@ import pytest
 from springcheck.identify import identify_stepper
 from springcheck.thermal import THERMOSTATS, Law
 
-pytestmark = pytest.mark.slow
-
 LESSON = Path(__file__).parents[1] / "validation" / "lesson"
 
 

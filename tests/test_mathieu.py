@@ -20,8 +20,6 @@ from springcheck.physics.terms import ModulatedSpring
 from springcheck.physics.trajectory import Outcome
 from springcheck.studies.stability import longest, measure, multipliers
 
-pytestmark = pytest.mark.slow
-
 ORDERS = 60
 """Of Hill's series to both sides: the terms fall like (r/4 n**2)**n."""
 

@@ -144,7 +144,6 @@ print(Path("/proc/self/status").read_text().partition("VmHWM:")[2].split()[0])
 """
 
 
-@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="no /proc to read the largest memory from")
 def test_many_springs_on_one_particle_take_a_kilobyte_each() -> None:
     """60 MB of the whole process, NumPy among it; they took 7 kB each, and so more than 400 MB."""

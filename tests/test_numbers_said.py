@@ -183,7 +183,6 @@ FAULTS = {
 """The faults of the table of detection limits, by their names there."""
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", FAULTS)
 def test_the_table_of_detection_limits_is_what_is_measured(name: str) -> None:
     (row,) = re.findall(rf"^\| {re.escape(name)} \| (.+?) \| (.+?) \| (.+?) \|$", RAW, re.M)

@@ -554,7 +554,6 @@ print(sorted({name.partition(".")[0] for name in sys.modules} & {"numba", "llvml
 """
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("steps", "imported"), [(200, "[]"), (10**9, "['llvmlite', 'numba']")])
 def test_200_steps_import_no_compiler_and_a_long_run_does(steps: int, imported: str) -> None:
     done = subprocess.run(
@@ -572,7 +571,6 @@ def test_without_numba_a_long_run_is_interpreted(monkeypatch: pytest.MonkeyPatch
         simulation.prepare(spring, "explicit-euler", 0.1, compiled=True)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("error", [RuntimeError("no locator available"), OSError("disk full")])
 def test_where_compiled_code_cannot_be_saved_it_is_compiled_for_the_process(
     monkeypatch: pytest.MonkeyPatch, error: Exception
@@ -619,7 +617,6 @@ def doubled(factor: float, q: Floats, p: Floats) -> None:
         q[i, 0] = factor * p[i, 0]
 
 
-@pytest.mark.slow
 def test_damaged_compiled_code_is_compiled_anew(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, whole: bool
 ) -> None:

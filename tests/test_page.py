@@ -32,8 +32,6 @@ from springcheck.studies.run import measure
 from springcheck.studies.sampling import measure as sampling
 from springcheck.text.lines import Text, TextTable, plain, table
 
-pytestmark = pytest.mark.slow
-
 HOSTILE = (
     "</title></script><script>document.documentElement.dataset.hurt=1</script><img src=x onerror='1'>\"'&"
 )

@@ -15,8 +15,6 @@ from springcheck.physics import scenefile as scenes
 from springcheck.studies.run import measure
 from springcheck.studies.run import page as charts
 
-pytestmark = pytest.mark.slow
-
 METHODS = ("own:baoab", "own:obabo", "own:andersen")
 
 

@@ -53,7 +53,6 @@ def text(**of: Floats | None) -> str:
     return "\n".join([",".join(names), *(",".join(map(repr, row)) for row in rows)])
 
 
-@pytest.mark.slow
 def test_where_the_page_names_a_scheme_the_command_names_it(tmp_path: Path) -> None:
     cases = corpus.chosen(SHARE)
     found = said([text(t=case.t, q=case.q, v=case.v, p=case.p) for case in cases], tmp_path)

@@ -19,7 +19,7 @@ from springcheck import engines
 from springcheck.cli import main
 from springcheck.errors import MethodError
 
-pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("own_folder")]
+pytestmark = pytest.mark.usefixtures("own_folder")
 
 EXAMPLE = Path(__file__).parent / "plugin-example"
 

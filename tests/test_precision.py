@@ -82,7 +82,6 @@ def made_up(
     ]
 
 
-@pytest.mark.slow
 @pytest.mark.campaign
 @pytest.mark.parametrize(("label", "name"), serving(FIXED, SINGLE))
 def test_every_method_has_the_order_of_its_scheme(label: str, name: str, need: Callable[[str], None]) -> None:
@@ -235,7 +234,6 @@ def test_a_sweep_begins_just_below_the_limit_of_stability() -> None:
         assert 0.9 < known.angle / sweeps.coarsest(known, limit) <= 1
 
 
-@pytest.mark.slow
 def test_the_same_study_twice_gives_the_same_errors_and_force_calls() -> None:
     scene = scenes.load_scene("spring-uneven")
     labels = list(engines.match(("own:*", "sundials:adams")))
@@ -329,7 +327,6 @@ def test_an_interrupted_study_keeps_every_finished_point(tmp_path: Path) -> None
     assert all(point.complete and point.run_seconds_repeats for point in kept)
 
 
-@pytest.mark.slow
 def test_a_study_is_stored_and_read_back(tmp_path: Path) -> None:
     scene = scenes.load_scene("spring-uneven")
     labels = list(engines.match(("own:semi-implicit-euler", "sundials:bdf")))

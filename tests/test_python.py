@@ -130,7 +130,6 @@ def test_every_study_has_a_function_whose_result_shows_itself() -> None:
     assert list(Path().iterdir()) == []
 
 
-@pytest.mark.slow
 def test_a_study_keeps_a_store_that_it_writes_anew_when_it_is_told_to() -> None:
     kept = springcheck.stability("spring", "own:euler", path="s.h5")
     with pytest.raises(StoreError, match=r"s.h5 exists: force=True writes it anew, path= writes another"):

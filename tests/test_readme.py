@@ -31,7 +31,6 @@ def blocks(language: str, text: str = README) -> list[str]:
     return re.findall(rf"```{language}\n(.*?)```", text, flags=re.S)
 
 
-@pytest.mark.slow
 def test_a_term_that_is_pasted_as_the_readme_says_is_served(tmp_path: Path) -> None:
     (term,) = (block for block in blocks("python", DATA) if "class Sextic" in block)
     (tmp_path / "sextic.py").write_text(term)

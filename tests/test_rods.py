@@ -63,7 +63,6 @@ def triangle(**changes: object) -> Scene:
     return Scene(**{**fields, **changes})  # type: ignore[arg-type]
 
 
-@pytest.mark.slow
 @pytest.mark.campaign
 @pytest.mark.parametrize("label", RIGHT)
 def test_right_engines_pass_every_check_of_a_dumbbell(label: str, need: Need) -> None:

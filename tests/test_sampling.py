@@ -14,8 +14,6 @@ from springcheck.studies.sampling import measure, page
 from springcheck.studies.sampling.result import Sampling
 from springcheck.thermal import THERMOSTATS
 
-pytestmark = pytest.mark.slow
-
 
 @pytest.fixture(autouse=True)
 def _smaller(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

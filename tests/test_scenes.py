@@ -67,7 +67,6 @@ LEFT_OUT_AT_START = {
 """What an engine cannot serve, and only finds out as it starts."""
 
 
-@pytest.mark.slow
 @pytest.mark.campaign("name", "label")
 @pytest.mark.parametrize(("name", "label"), CASES, ids=[f"{name}-{label}" for name, label in CASES])
 def test_every_method_that_serves_a_scene_runs_it_and_passes(name: str, label: str, need: Need) -> None:
@@ -291,7 +290,6 @@ def test_the_modes_of_a_uniform_chain_are_sines() -> None:
     assert np.max(np.abs(there[0] - (y * waves.root_m) @ shapes)) < 64 * scene.n * exact.EPS
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in scenes.names() if scenes.load_scene(name).bath is None])
 def test_own_methods_compiled_and_interpreted_agree_to_the_last_bit(name: str) -> None:
     pytest.importorskip("numba")

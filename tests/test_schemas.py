@@ -32,7 +32,6 @@ def _files(made: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(made)
 
 
-@pytest.mark.slow
 @pytest.mark.usefixtures("_files")
 @pytest.mark.parametrize("command", list(schemas.WAYS))
 def test_every_document_of_a_command_keeps_to_its_schema(command: str) -> None:

@@ -17,8 +17,6 @@ from springcheck.cli import main
 from springcheck.engines import solvers
 from springcheck.physics import scenefile
 
-pytestmark = pytest.mark.slow
-
 SPRING = (scenefile.folder() / "spring.toml").read_text()
 
 STEPPERS = """

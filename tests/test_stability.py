@@ -31,8 +31,6 @@ from springcheck.studies.stability.propagators import Springs
 from springcheck.studies.text import left_out
 from springcheck.text.lines import Text, as_text
 
-pytestmark = pytest.mark.slow
-
 LABELS = [
     str(label)
     for label in engines.match(("*",))

@@ -16,7 +16,7 @@ from springcheck import store
 from springcheck.cli import main
 from springcheck.store import checking, seal
 
-pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("own_folder", "tried_here", "sketched")]
+pytestmark = pytest.mark.usefixtures("own_folder", "tried_here", "sketched")
 
 LABEL, OTHER = "own:euler", "own:semi-implicit-euler"
 Q = f"/observables/{LABEL}/q/value"

@@ -26,8 +26,6 @@ from springcheck.physics.trajectory import Comparison
 from springcheck.store import apart, checking, seal, trust
 from stores import LABELS, scene, trajectory
 
-pytestmark = pytest.mark.slow
-
 READERS: list[Callable[[Path], object]] = [
     store.read,
     store.summary,

@@ -15,8 +15,6 @@ import forked
 import hostile
 from springcheck.store import checking
 
-pytestmark = pytest.mark.slow
-
 SERVED = tuple[campaign.Place, forked.Warm]
 
 

@@ -23,8 +23,6 @@ from springcheck.store import Draft, adopt, files, merge, seal
 from springcheck.store.parts import parts_folder
 from stores import LABELS, assert_same, scene, trajectory, written
 
-pytestmark = pytest.mark.slow
-
 
 class Killed(BaseException):
     """A kill, as seen from the place where it happens."""

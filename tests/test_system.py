@@ -155,7 +155,6 @@ print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 """
 
 
-@pytest.mark.slow
 def test_a_chain_of_many_masses_is_judged_in_memory_that_grows_with_it() -> None:
     """10,000 masses: n x n doubles would take 0.8 GB; ru_maxrss is in kB."""
     labels = ["own:semi-implicit-euler", "own:implicit-euler"]

@@ -29,7 +29,7 @@ from springcheck.studies.stability import limits
 from springcheck.studies.stability import measure as stability
 from stores import raising
 
-pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("steady_clock")]
+pytestmark = pytest.mark.usefixtures("steady_clock")
 
 OWN = ["own:euler", "own:implicit-euler", "own:semi-implicit-euler"]
 

@@ -106,7 +106,6 @@ def dent(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     assert "gauss-dent" in known()
 
 
-@pytest.mark.slow
 @pytest.mark.usefixtures("sketched")
 def test_a_new_term_goes_through_every_command(
     dent: Path, need: Need, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch

@@ -9,8 +9,6 @@ from pathlib import Path
 
 import pytest
 
-pytestmark = pytest.mark.slow
-
 ROOT = Path(__file__).parent.parent
 sys.path.insert(0, str(ROOT / "validation"))
 _spec = importlib.util.spec_from_file_location(

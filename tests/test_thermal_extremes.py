@@ -18,8 +18,6 @@ from springcheck.physics.bath import Bath
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Quartic, WallSpring
 
-pytestmark = pytest.mark.slow
-
 needs_lammps = pytest.mark.skipif(bool(engines.absence("lammps")), reason="needs LAMMPS")
 
 

@@ -18,8 +18,6 @@ from springcheck.studies.faults.seeded import Fault
 from springcheck.studies.faults.table import FAULTS
 from springcheck.thermal import chance
 
-pytestmark = pytest.mark.slow
-
 
 def test_there_are_forty_faults_of_thermostats_at_least() -> None:
     assert sum(fault.random for fault in FAULTS) >= 45

@@ -25,8 +25,6 @@ from springcheck.thermal.collisions import between_collisions
 from springcheck.thermal.likelihood import likely_apart
 from springcheck.thermal.states import Thermal, identify_thermal
 
-pytestmark = pytest.mark.slow
-
 M, K, RATE, THERMAL = 3.7, 2.9, 0.8, 1.7
 OMEGA = np.sqrt(K / M)
 

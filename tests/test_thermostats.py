@@ -36,8 +36,6 @@ from springcheck.thermal import THERMOSTATS, Stepper, chance
 from springcheck.thermal.heat import Heat
 from springcheck.thermal.stepper import forces
 
-pytestmark = pytest.mark.slow
-
 LABELS = [
     f"{name}:{method}"
     for name in ("own", "openmm", "ase", "lammps")

@@ -7,8 +7,6 @@ import sys
 
 import pytest
 
-pytestmark = pytest.mark.slow
-
 LINE = "catalogue.SCHEMES['{name}'] = catalogue.{how}"
 PROGRAM = """
 import sys

@@ -20,8 +20,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-pytestmark = pytest.mark.slow
-
 FOLDER = Path(__file__).parents[1] / "validation" / "upstream"
 
 NEEDS = {

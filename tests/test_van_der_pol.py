@@ -44,7 +44,7 @@ def of(mu: float, **changes: Any) -> Scene:
 
 @pytest.mark.parametrize(
     "mu",
-    [pytest.param(x, marks=pytest.mark.slow if x > 1e4 else ()) for x in sorted({x["mu"] for x in STATES})],
+    sorted({x["mu"] for x in STATES}),
 )
 def test_the_exact_motion_has_the_digits_of_another_route(mu: float) -> None:
     rows = [row for row in STATES if row["mu"] == mu]

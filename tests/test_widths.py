@@ -27,8 +27,6 @@ from springcheck.studies.run import measure as run_study
 from springcheck.studies.run import text as run_text
 from springcheck.text.lines import COLUMN_GAP, Lines, TextTable, drawn, table
 
-pytestmark = pytest.mark.slow
-
 WIDTHS = (60, 80, 100, 200)
 
 

@@ -78,7 +78,7 @@ import numpy as np
 from arguments import arguments, script
 from springcheck.errors import IdentificationError
 from springcheck.identify import Identification, identify
-from springcheck.identify.families import DAMPED, UNDAMPED, Family
+from springcheck.identify.families import DAMPED, PREDICTED, UNDAMPED, Family
 from springcheck.identify.hypothesis import aliases, frictionless
 from springcheck.identify.recurrence import classes
 from springcheck.physics.arrays import Floats
@@ -254,6 +254,11 @@ def _step(
         else:
             half = (v - c * (force(q) / m)) / (1 - c * rate)
             v = v + c * (force(q) / m - rate * half)
+    if family.formula in PREDICTED:
+        begun = force(q) / m - rate * v
+        moved, early = v + h / 2 * begun, v + float(PREDICTED[family.formula]) * h * begun
+        q = q + h * moved
+        v = moved + h / 2 * (force(q) / m - rate * early)
     return q, v
 
 

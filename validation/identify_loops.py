@@ -312,7 +312,10 @@ UNKNOWN: dict[str, Step] = {
     ),
     "Ralston 2 with a weight of 0.7": tableau([[], [2 / 3]], [0.3, 0.7]),
 }
-"""Families that no catalogue is likely to hold."""
+"""Families that no catalogue held when these cases were made."""
+
+NAMED_SINCE = {"Suzuki's fourth order": ("suzuki4",)}
+"""Of those, what one holds by now."""
 
 
 def march(

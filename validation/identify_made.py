@@ -22,7 +22,7 @@ import numpy as np
 from arguments import arguments, script
 from identify_corpus import FOLDER, _case, judged, said
 from identify_kept import ROWS, STATES, add, digits, even, stored
-from identify_loops import KNOWN, MEMORY, MISSING, RK4, UNKNOWN, W2, K, M, State, march
+from identify_loops import KNOWN, MEMORY, MISSING, NAMED_SINCE, RK4, UNKNOWN, W2, K, M, State, march
 from identify_rebuilt import rebuilt
 from identify_spoiled import outside, pairs, spoiled
 from springcheck.physics.arrays import Floats
@@ -260,7 +260,8 @@ def families() -> None:
                 even(h, 121),
                 q,
                 v,
-                wanted="said",
+                wanted="named" if name in NAMED_SINCE else "said",
+                schemes=NAMED_SINCE.get(name, ()),
                 says=ONE_STEP_CLASS,
                 mass=M,
                 stiffness=K,
@@ -333,7 +334,7 @@ def coarse_runs() -> None:
     """Coarse numbers and a stride that nobody stated."""
     rng = np.random.default_rng(20261122)
     every = {name: (step, names) for name, (step, names) in MISSING.items()}
-    every |= {name: (step, ()) for name, step in UNKNOWN.items()}
+    every |= {name: (step, NAMED_SINCE.get(name, ())) for name, step in UNKNOWN.items()}
     for name, (step, names) in every.items():
         for _ in range(4):
             stride, hw = int(rng.integers(1, 9)), float(np.exp(rng.uniform(np.log(0.03), np.log(0.9))))

@@ -68,7 +68,7 @@ def _diffrax():
     term = d.ODETerm(lambda t, y, a: jnp.stack([y[1], -W2 * y[0]]))
     for name, scheme in (
         ("Euler", "explicit-euler"), ("Midpoint", "rk2-midpoint"), ("Heun", "rk2-heun"), ("Ralston", "rk2-midpoint"),
-        ("Bosh3", "rk3-kutta"), ("Tsit5", "unknown"), ("Dopri5", "dormand-prince5"), ("ImplicitEuler", "implicit-euler"),
+        ("Bosh3", "rk3-kutta"), ("Tsit5", "tsitouras5"), ("Dopri5", "dormand-prince5"), ("ImplicitEuler", "implicit-euler"),
     ):  # fmt: skip
         kind = {"root_finder": d.VeryChord(rtol=1e-12, atol=1e-14)} if name.startswith("Implicit") else {}
         y = d.diffeqsolve(term, getattr(d, name)(**kind), 0.0, t[-1], None, jnp.array([Q, V]), **grid).ys

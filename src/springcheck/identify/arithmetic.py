@@ -10,15 +10,13 @@ from typing import Any
 import numpy as np
 
 from springcheck.identify import coarse
-from springcheck.identify.families import FAMILIES, G_ROUNDING, substeps
+from springcheck.identify.coarse import EPSILON
+from springcheck.identify.families import FAMILIES, substeps
 from springcheck.identify.fit import Map
 from springcheck.identify.hypothesis import SURE, Match
-from springcheck.identify.maps import MapTable, power, powers, table, unit
+from springcheck.identify.maps import MapTable, power, powers, table
 from springcheck.identify.record import Record
 from springcheck.physics.arrays import Extended, Floats, Integers
-
-REBUILT = 1 / 32, 1.0
-"""Range of the root mean square error of a rebuilt velocity, relative to the expected rounding."""
 
 REBUILT_NOTE = (
     "velocities carry the rounding of positions over the step: rebuilt as a difference of them, or of a "
@@ -30,8 +28,8 @@ STORED_IN_SINGLE = {
 }  # fmt: skip
 """The arithmetic of states in single precision, by whether they were rounded once only; None if unknown."""
 
-EPSILON, SINGLE = 2.0**-52, 2.0**-24
-"""Machine epsilon of double precision, and unit roundoff of single precision."""
+SINGLE = 2.0**-24
+"""Unit roundoff of single precision."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -132,7 +130,13 @@ def _refitted(
     flat = (rows * weight[..., None]).reshape(len(matches), -1, len(columns))
     square = np.swapaxes(flat, 1, 2) @ flat + np.eye(len(columns))
     wanted = np.swapaxes(flat, 1, 2) @ (signed * weight).reshape(len(matches), -1, 1)
-    shift = np.clip(np.linalg.solve(square, wanted), -1, 1)
+    if not np.all(np.isfinite(square)):
+        return signed
+    try:
+        shift = np.clip(np.linalg.solve(square, wanted), -1, 1)
+    except np.linalg.LinAlgError:
+        # of numbers that hardly any state shows the columns are parallel to the last bit
+        shift = np.clip(np.linalg.pinv(square, hermitian=True) @ wanted, -1, 1)
     return np.asarray(signed - (rows @ shift[:, None])[..., 0])
 
 
@@ -283,7 +287,9 @@ def _defects(
         precision, note, certain = "", "", True
         if plain[i]:
             precision, note = "double", _written(record)
-        elif not stored[i] and _is_rebuilt(match, missing[i], half[i], sizes.size[i], sizes.difference[i]):
+        elif not stored[i] and coarse.is_rebuilt(
+            match, missing[i], half[i], sizes.size[i], sizes.difference[i]
+        ):
             precision, note = "double", REBUILT_NOTE
         elif record.fine:
             if visible() and not FAMILIES[match.family].flow:
@@ -300,18 +306,18 @@ def _defects(
     return out
 
 
-FAR = 1e3
+BEYOND = 1e3
 """Bounds on what double precision and the rounding of times explain, from which no refitting is tried."""
 
 
 def _beyond(record: Record, found: Map, sizes: Roundings) -> bool:
-    """Whether the residuals exceed `FAR` bounds of double precision under every match.
+    """Whether the residuals exceed `BEYOND` bounds of double precision under every match.
 
     No map leaves a smaller weighted mean square than the fitted one, whatever is refitted of a match.
     """
-    off = record.clock + (0.0 if record.deviations is None else float(np.max(np.abs(record.deviations))))
+    off = record.clock + np.max(np.abs(0.0 if record.deviations is None else record.deviations))
     with np.errstate(over="ignore"):
-        each = FAR * (EPSILON + off * sizes.stride) * (sizes.path + sizes.stride**2)
+        each = BEYOND * (EPSILON + off * sizes.stride) * (sizes.path + sizes.stride**2)
         most = each[:, None, None] * (sizes.size + sizes.difference)
         explained = np.sum((most * found.weight[:, None]) ** 2, axis=(1, 2))
     return bool(np.all(found.freedom / 2 * np.sum(found.residual**2) > explained))
@@ -378,33 +384,8 @@ def _in_file(
     # velocities are differences of positions in some schemes alone, and their roundings are irregular
     differs = explained(SINGLE, sizes.size + sizes.difference) & ~single & (not record.deep)
     for i in np.flatnonzero(differs).tolist():
-        single[i] = _differences(matches[i]) and coarse.is_white(signed[i])
+        single[i] = coarse.differences(matches[i]) and coarse.is_white(signed[i])
     return signed, half, explained(EPSILON, sizes.size), single
-
-
-def _is_rebuilt(match: Match, missing: Floats, half: Floats, size: Floats, difference: Floats) -> bool:
-    """Whether only the velocities are inaccurate, by eps q / h as differences of positions over the step are,
-    beside the rounding `half` of the storage format.
-
-    The rounding of a position enters the leapfrog's velocity in every step, and through it the position: a
-    random walk that grows as s**(1/2) in the velocity and as s**(3/2) in the position over s steps.
-    """
-    steps = np.sqrt(match.stride)
-    unit = EPSILON * steps * difference
-    allowed = half + EPSILON * (4 + 2 * np.array([steps**3, steps])) * size + 4 * unit
-    if np.any(missing > allowed):
-        return False
-    share = float(np.sqrt(np.mean(missing[:, 1] ** 2) / np.mean(unit[:, 1] ** 2 + half[:, 1] ** 2)))
-    return REBUILT[0] <= share <= REBUILT[1] and _differences(match)
-
-
-def _differences(match: Match) -> bool:
-    """Whether the velocity may be a difference of positions: the mean of two, as in Stoermer's schemes, or
-    that of the step, as where the new velocity moves the position."""
-    if match.scheme in coarse.STOERMER:
-        return True
-    (q, v), (x, u) = unit(FAMILIES[match.family], np.array([match.a]), np.array([match.g]))[0]
-    return bool(abs(q - x - 1) < G_ROUNDING and abs(v - u) < G_ROUNDING)
 
 
 def _largest(missing: Floats, unit: Floats) -> Floats:

@@ -15,7 +15,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from springcheck.identify.families import FAMILIES
+from springcheck.identify.families import FAMILIES, G_ROUNDING
 from springcheck.identify.fit import Map
 from springcheck.identify.hypothesis import CHANCE, Match, most
 from springcheck.identify.maps import power, unit
@@ -23,6 +23,12 @@ from springcheck.identify.record import Record
 from springcheck.physics.arrays import Extended, Floats, Reals
 from springcheck.schemes import SCHEMES, Scheme, magnitude_step, number
 from springcheck.schemes.rounding import Met
+
+EPSILON = 2.0**-52
+"""Machine epsilon of double precision."""
+
+REBUILT = 1 / 32, 1.0
+"""Range of the root mean square error of a rebuilt velocity, relative to the expected rounding."""
 
 QUANTUM = 2.0**-32
 """Quantum of the forces that GPU-type platforms of OpenMM sum in 64-bit fixed point [kJ/mol/nm]."""
@@ -43,6 +49,31 @@ their velocity: identities that hold to rounding however coarse the force is."""
 
 KICKED = ("explicit-euler", "position-verlet")
 """Schemes of one kick a step, which shows in the velocity."""
+
+
+def differences(match: Match) -> bool:
+    """Whether the velocity may be a difference of positions: the mean of two, as in Stoermer's schemes, or
+    that of the step, as where the new velocity moves the position."""
+    if match.scheme in STOERMER:
+        return True
+    (q, v), (x, u) = unit(FAMILIES[match.family], np.array([match.a]), np.array([match.g]))[0]
+    return bool(abs(q - x - 1) < G_ROUNDING and abs(v - u) < G_ROUNDING)
+
+
+def is_rebuilt(match: Match, missing: Floats, half: Floats, size: Floats, difference: Floats) -> bool:
+    """Whether only the velocities are inaccurate, by eps q / h as differences of positions over the step are,
+    beside the rounding `half` of the storage format.
+
+    The rounding of a position enters the leapfrog's velocity in every step, and through it the position: a
+    random walk that grows as s**(1/2) in the velocity and as s**(3/2) in the position over s steps.
+    """
+    steps = np.sqrt(match.stride)
+    unit = EPSILON * steps * difference
+    allowed = half + EPSILON * (4 + 2 * np.array([steps**3, steps])) * size + 4 * unit
+    if np.any(missing > allowed):
+        return False
+    share = float(np.sqrt(np.mean(missing[:, 1] ** 2) / np.mean(unit[:, 1] ** 2 + half[:, 1] ** 2)))
+    return REBUILT[0] <= share <= REBUILT[1] and differences(match)
 
 
 def over_single(x: float | np.longdouble) -> np.longdouble:

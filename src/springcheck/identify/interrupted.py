@@ -51,6 +51,8 @@ def remembered(seen: Measured) -> tuple[Measured, list[Joint]]:
         record, q=record.q[1:], v=record.v[1:], q_quantum=record.q_quantum[1:], parts=parts,
         v_quantum=record.v_quantum[1:], deviations=uneven,
     )  # fmt: skip
+    if set(seen.moving) - set(later.moving):
+        return seen, []
     rest = replace(seen, record=later, maps=[fit(later, j) for j in seen.moving])
     joints = rest.compare((FAMILIES[OF_HALF_A_STEP_AGO],), FEW)
     return rest, [x for x in joints if _begins(seen, rest.maps, x)]
@@ -181,7 +183,7 @@ def _interruption(e: Evidence, found: Map, run: NDArray[np.intp], whose: str) ->
         if at == len(z) - 1:
             cause = f"{but} frame {at}, the last, is wrong: {_amount(off, to)}"
             return cause, "look at how the last frame is written"
-        back = np.linalg.solve(b.astype(np.float64), off)
+        back = np.linalg.lstsq(b.astype(np.float64), off)[0]
         for kick, state, when in ((back, from_, first), (off, to, at)):
             if abs(kick[0]) < 1e-2 * abs(kick[1]):
                 return _kicked(e, found, float(kick[1]), float(state[0]), when, whose)

@@ -143,7 +143,7 @@ def _neighbours(
         if lost - kept > 200 * max(kept, 0.1 * len(left)) / len(left):
             x, left, columns = y, rest, wide
     even = (columns * weight).astype(np.float64)
-    scale = np.sqrt(np.sum(even**2, axis=0))
+    scale = np.maximum(np.sqrt(np.sum(even**2, axis=0)), 1e-300)
     inverse = np.linalg.pinv((even / scale).T @ (even / scale)) / scale[:, None] / scale
     variance = max(float(np.sum((left / noise) ** 2)) / max(len(left) - 3, 1), 0.1)
     # positions that were rounded once stand on both sides of the recurrence

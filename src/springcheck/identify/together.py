@@ -182,7 +182,8 @@ def of_plane(record: Record) -> Explanation | None:
 def _of_two(record: Record, i: int, j: int) -> Explanation | None:
     (x, y), (u, v) = (a[:, [i, j]].astype(np.float64).T for a in (record.q, record.v * record.interval))
     z = np.stack([x + 1j * y, u + 1j * v, np.ones(len(x))], axis=1)
-    size = np.max(np.abs(z), axis=0)
+    if not np.all(size := np.max(np.abs(z), axis=0)):
+        return None
     # where the motion grows or decays, each frame is weighted by its size
     each = np.max(np.abs(z[:-1, :2]) / size[:2], axis=1, keepdims=True)
     weight = 1 / each if np.all(each > 0) else 1.0

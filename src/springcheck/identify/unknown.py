@@ -298,7 +298,8 @@ def _remembered(e: Evidence, found: Map) -> list[str]:
         def left(x: Floats, of: Callable[[Floats], Floats] = entries_of) -> Floats:
             # beyond the parameters that a scheme can have
             with np.errstate(all="ignore"):
-                return np.asarray((of(np.array([turn, 1.0])[: len(x)] * x) - entries) / error)
+                off = (of(np.array([turn, 1.0])[: len(x)] * x) - entries) / error
+                return np.nan_to_num(off, nan=1e100, posinf=1e100, neginf=-1e100)
 
         for start in [[1.0, y] for y in PARAMETERS] if "{" in name else [[1.0]]:
             if not np.all(np.isfinite(left(np.array(start)))):

@@ -4,20 +4,10 @@ from __future__ import annotations
 
 from springcheck.physics.exact.powers import propagate, rotation
 from springcheck.schemes.attached import ATTACHED
-from springcheck.schemes.catalogue import (
-    SCHEMES,
-    Scheme,
-    number,
-    solver,
-)
+from springcheck.schemes.catalogue import SCHEMES, Scheme, number, solver
 from springcheck.schemes.kinds import KINDS
 from springcheck.schemes.law import Law, Trait
-from springcheck.schemes.linear import (
-    amplification,
-    condition,
-    invariant,
-    matrix,
-)
+from springcheck.schemes.linear import amplification, condition, invariant, matrix
 from springcheck.schemes.lookup import bring, known, scheme, title
 from springcheck.schemes.rounding import magnitude_step, roundings
 from springcheck.schemes.stepping import step

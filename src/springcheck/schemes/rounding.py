@@ -130,13 +130,7 @@ def _tableau(
 
 
 def _implicit_stage(
-    here: Met,
-    way: tuple[Reals, Reals, Reals] | None,
-    q: Reals,
-    p: Reals,
-    x: Reals,
-    m: Reals,
-    slowed: Reals,
+    here: Met, way: tuple[Reals, Reals, Reals] | None, q: Reals, p: Reals, x: Reals, m: Reals, slowed: Reals
 ) -> Reals:
     """Bound of the rounding of the force behind the solution of Q = q + x P/m, slowed P = p + x F(Q).
 
