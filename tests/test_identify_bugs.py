@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import identify_strange
 from springcheck.identify import identify, identify_stepper, record
 from springcheck.identify.fit import fit
 from springcheck.identify.judged import judged
@@ -435,3 +436,32 @@ def test_velocities_of_the_wrong_sign_give_no_frequency(k: float) -> None:
     assert np.isnan(found.omega).all()
     assert found.stiffness is None
     assert found.nearest is None
+
+
+# 60 to 3526 ended in an exception of NumPy or SciPy
+STRANGE = (
+    *range(10), 60, 214, 602, 970, 1148, 1216, 1438, 1546, 1679, 1874, 2021, 2026, 2300, 3293, 3413, 3526,
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("number", STRANGE)
+def test_whatever_is_recorded_is_answered_or_refused(number: int) -> None:
+    assert identify_strange.said(number) in ("answered", "refused")
+
+
+def test_a_coordinate_whose_position_stands_still_is_left_out_and_alone_it_is_explained() -> None:
+    t = 0.1 * np.arange(60)
+    q, v = 0.8 * np.cos(1.3 * t), -0.8 * 1.3 * np.sin(1.3 * t)
+    found = identify(t, np.stack([q, np.full(60, 0.3)], axis=1), v=np.stack([v, np.sin(t)], axis=1))
+    assert "exact" in {x.scheme for x in found.candidates}
+    assert any("stands still while its velocity changes" in note for note in found.notes)
+    found = identify_stepper(lambda q, p, h, force, mass: (q, p + h * force(q)))
+    assert "the position by 0 h p/m" in found.statement
+
+
+def test_a_state_that_changes_once_and_stands_still_after_is_told() -> None:
+    """Without its first frame nothing moves, and no map is fitted to that."""
+    q, v = np.full(15, 1.9), np.full(15, -0.5)
+    q[0], v[0] = 2.1, -0.3
+    found = identify(0.3 * np.arange(15), q, v=v, mass=1.3)
+    assert not found.fits

@@ -202,6 +202,8 @@ def _minimum(
             columns[:, 0, -4:-2] = columns[:, 1, -2:] = slipping.astype(np.float64) * seen[:-1]
         flat = columns.reshape(r.size, -1)
         square = flat.T @ now.solve(columns).reshape(flat.shape)
+        if not np.all(np.isfinite(square)):
+            raise IdentificationError("a coordinate rests but for a few frames: give a part that moves")
         size = np.sqrt(np.maximum(np.diag(square), 1e-300))
         inverse = np.linalg.pinv(square / size[:, None] / size, rcond=1e-14, hermitian=True)
         inverse = inverse / size[:, None] / size

@@ -50,11 +50,8 @@ def _oscillators(record: Record) -> tuple[Record, list[int], list[Map], list[str
     if not (moving := record.moving):
         raise IdentificationError(AT_REST)
     stands = [j for j in moving if not np.ptp(record.q[:, j])]
-    if stands == moving:
-        raise IdentificationError(
-            "positions do not change while velocities do: look at what is written as position, or write more "
-            "digits"
-        )
+    # alone it is explained: a position that a program forgets to move
+    stands = stands if stands != moving else []
     n = record.q.shape[1]
     notes = [f"{n - len(moving)} of {n} oscillators are at rest and left out"] if len(moving) < n else []
     free = [j for j in moving if _straight(record, j)]

@@ -161,6 +161,8 @@ def _orbit(
     n = np.arange(frames, dtype=np.float64)
     unit_ = np.maximum(unit_, _around(unit_) / 64)
     phase = _phase(alpha, beta)
+    if not beta < 1:
+        return None
     x = np.array([0.5 * math.log1p(-float(beta)), phase])
     for _ in range(30):
         wave = np.exp(np.clip(x[0] * n, -60, 60))
