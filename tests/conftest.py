@@ -43,7 +43,7 @@ CAMPAIGNS = Path(__file__).parent / "campaigns.txt"
 """Cases of campaigns that reach nothing which no other reaches: `validation/campaigns.py` finds them."""
 SLOW = Path(__file__).parent / "slow.txt"
 """Tests of more than a tenth of a second a case, with its seconds: `validation/slow.py` finds them."""
-LONG = 0.25
+LONG = 0.2
 """Seconds a case from which a test is run by `--whole` alone."""
 
 

@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 
 import identify_strange
+from springcheck.errors import IdentificationError
 from springcheck.identify import identify, identify_stepper, record
 from springcheck.identify.fit import fit
 from springcheck.identify.judged import judged
@@ -449,14 +450,11 @@ def test_whatever_is_recorded_is_answered_or_refused(number: int) -> None:
     assert identify_strange.said(number) in ("answered", "refused")
 
 
-def test_a_coordinate_whose_position_stands_still_is_left_out_and_alone_it_is_explained() -> None:
-    t = 0.1 * np.arange(60)
-    q, v = 0.8 * np.cos(1.3 * t), -0.8 * 1.3 * np.sin(1.3 * t)
-    found = identify(t, np.stack([q, np.full(60, 0.3)], axis=1), v=np.stack([v, np.sin(t)], axis=1))
-    assert "exact" in {x.scheme for x in found.candidates}
-    assert any("stands still while its velocity changes" in note for note in found.notes)
+def test_a_position_that_stands_still_is_told_alone_and_beside_others() -> None:
     found = identify_stepper(lambda q, p, h, force, mass: (q, p + h * force(q)))
     assert "the position by 0 h p/m" in found.statement
+    with pytest.raises(IdentificationError, match="its velocity changes and its position does not"):
+        identify(**identify_strange.drawn(1216))
 
 
 def test_a_state_that_changes_once_and_stands_still_after_is_told() -> None:

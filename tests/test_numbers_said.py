@@ -105,7 +105,7 @@ def test_the_corpus_of_trajectories_is_what_is_said() -> None:
         f"{frozen['LISTED WITHOUT']} lists lacked the scheme and {frozen['WRONG NAME']} names were wrong"
     ) in VALIDATION
     assert f"adds {sum(programs.values())} trajectories of 32 programs" in VALIDATION
-    assert f"{programs['right']} right, {programs['short']} short, all of solvers" in VALIDATION
+    assert f"{programs['right']} right, {programs['short']} short, nearly all of solvers" in VALIDATION
     bugs = sum(case["group"] == "bugs" for case in cases)
     assert f"Of {bugs} rebuilt bugs" in VALIDATION
 

@@ -215,7 +215,7 @@ def defects(
     """
     chunks = (matches[i : i + TOGETHER] for i in range(0, len(matches), TOGETHER))
     # numbers of a match that hardly any state shows may be none
-    with np.errstate(invalid="ignore"):
+    with np.errstate(invalid="ignore", over="ignore"):
         return [x for chunk in chunks for x in _defects(record, j, found, chunk, visible)]
 
 

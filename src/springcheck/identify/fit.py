@@ -203,7 +203,10 @@ def _minimum(
         flat = columns.reshape(r.size, -1)
         square = flat.T @ now.solve(columns).reshape(flat.shape)
         if not np.all(np.isfinite(square)):
-            raise IdentificationError("a coordinate rests but for a few frames: give a part that moves")
+            raise IdentificationError(
+                "a coordinate rests but for a few frames, or its velocity changes and its position does not: "
+                "leave it out"
+            )
         size = np.sqrt(np.maximum(np.diag(square), 1e-300))
         inverse = np.linalg.pinv(square / size[:, None] / size, rcond=1e-14, hermitian=True)
         inverse = inverse / size[:, None] / size
@@ -234,6 +237,7 @@ def _first_guess(z: Extended, process: Floats, of: _Solution | None, centred: in
     return np.concatenate([x[:2].T.ravel(), centre]).astype(np.longdouble)
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def fit(record: Record, j: int, *, kept: NDArray[np.bool_] | None = None, constant: bool = False) -> Map:
     """Map of oscillator j from the pairs that are `kept` (f - 1,), or from all.
 

@@ -49,13 +49,10 @@ def _oscillators(record: Record) -> tuple[Record, list[int], list[Map], list[str
     indices; their maps; and notes on the rest."""
     if not (moving := record.moving):
         raise IdentificationError(AT_REST)
-    stands = [j for j in moving if not np.ptp(record.q[:, j])]
-    # alone it is explained: a position that a program forgets to move
-    stands = stands if stands != moving else []
     n = record.q.shape[1]
     notes = [f"{n - len(moving)} of {n} oscillators are at rest and left out"] if len(moving) < n else []
     free = [j for j in moving if _straight(record, j)]
-    maps = {j: fit(record, j) for j in moving if j not in free + stands}
+    maps = {j: fit(record, j) for j in moving if j not in free}
     if len(maps) > 1 and (modes := _uncoupled(record, maps)) is not None:
         kept = {i: fit(modes, i) for i in range(modes.q.shape[1]) if not _straight(modes, i)}
         good = [i for i, found in kept.items() if found.conditioned and _forced(found)]
@@ -87,8 +84,6 @@ def _oscillators(record: Record) -> tuple[Record, list[int], list[Map], list[str
         )
     if free:
         notes.append(f"{_names(free)} moves freely, in a straight line as by every scheme, and is left out")
-    if stands:
-        notes.append(f"{_names(stands)} stands still while its velocity changes, and is left out")
     if lost:
         notes.append(f"{_names(lost)} shows too little of its motion to be judged, and is left out")
     return record, good, [maps[j] for j in good], notes

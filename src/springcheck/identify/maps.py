@@ -259,9 +259,10 @@ def _exponential(a: Reals, g: Reals) -> Reals:
     )
 
 
+@np.errstate(divide="ignore", invalid="ignore")
 def power(matrices: Reals, strides: Floats) -> Reals:
     """matrices (c, 2, 2) to the powers strides (c,), from phase and determinant.  Two to four times faster
-    than `schemes.propagate`, which keeps the digits of 1e7 steps."""
+    than `schemes.propagate`, which keeps the digits of 1e7 steps; NaN of matrices of determinant 0."""
     found = rotation(matrices)
     s = strides.astype(matrices.dtype)
     root = np.sqrt(np.abs(found.determinant))

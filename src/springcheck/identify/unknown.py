@@ -283,6 +283,7 @@ PARAMETERS = 0.05, 0.3, 0.6, 0.9
 """Starting values of a parameter's fit."""
 
 
+@np.errstate(all="ignore")
 def _remembered(e: Evidence, found: Map) -> list[str]:
     """Methods of `WITH_MEMORY` that have the map of the frames after the start-up transient."""
     from scipy.optimize import least_squares
@@ -296,13 +297,12 @@ def _remembered(e: Evidence, found: Map) -> list[str]:
     for name, entries_of in WITH_MEMORY.items():
 
         def left(x: Floats, of: Callable[[Floats], Floats] = entries_of) -> Floats:
-            # beyond the parameters that a scheme can have
-            with np.errstate(all="ignore"):
-                off = (of(np.array([turn, 1.0])[: len(x)] * x) - entries) / error
-                return np.nan_to_num(off, nan=1e100, posinf=1e100, neginf=-1e100)
+            # not finite beyond the parameters that a scheme can have
+            off = (of(np.array([turn, 1.0])[: len(x)] * x) - entries) / error
+            return np.nan_to_num(off, nan=1e100, posinf=1e100, neginf=-1e100)
 
         for start in [[1.0, y] for y in PARAMETERS] if "{" in name else [[1.0]]:
-            if not np.all(np.isfinite(left(np.array(start)))):
+            if np.max(np.abs(left(np.array(start)))) >= 1e100:
                 continue
             best = least_squares(left, start, x_scale="jac", xtol=1e-15, ftol=1e-15, gtol=1e-15)
             other = stated is not None and abs(best.x[0] * turn - stated) > AGREES * abs(stated)
