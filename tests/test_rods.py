@@ -891,3 +891,28 @@ def test_what_has_grown_beyond_the_squares_that_numbers_hold_is_no_rod(size: flo
     grown[-1, 2:] = size
     with np.errstate(all="ignore"):
         assert rod_of(grown, fits=fits) is None
+
+
+@pytest.mark.parametrize("scheme", ["exact", "adams"])
+def test_rods_are_judged_by_what_has_no_step_without_their_velocities(scheme: str) -> None:
+    """It was a ValueError: the allowance of a step was asked for."""
+    scene = springcheck.load_scene("dumbbell")
+    q, p = (np.tile(x, (5, 1)) for x in (scene.q, scene.p))
+    found = springcheck.judge(
+        scene, springcheck.Trajectory.from_arrays(scene.step * np.arange(5), q, p, scheme=scheme)
+    )
+    (along,) = (verdict for verdict in found if verdict.check == "rod-velocity")
+    assert along.passed is None
+    (length,) = (verdict for verdict in found if verdict.check == "rod-length")
+    assert length.passed
+
+
+def test_states_that_overflow_are_judged_without_a_warning() -> None:
+    scene = springcheck.load_scene("morse-bond")
+    q = np.tile(scene.q, (5, 1))
+    q[2] = -1e150
+    found = springcheck.judge(
+        scene,
+        springcheck.Trajectory.from_arrays(scene.step * np.arange(5), q, 0 * q, scheme="velocity-verlet"),
+    )
+    assert any(verdict.passed is False for verdict in found)

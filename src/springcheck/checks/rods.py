@@ -64,10 +64,10 @@ def rod_velocity(case: Case) -> Finding | str:
     rods, bath, heated = _rods(case), THERMOSTATS.get(case.trajectory.scheme), case.law.has("random")
     if bath and bath.held and bath.held[-1] != PROJECT:
         return "momenta are stored as the drift leaves them, with what is taken off them in the next step"
+    # the sum over a step depends on its draws, which frames further apart do not determine
+    if why := missing(case, {"every-step"} if heated else {"one-step"}):
+        return why
     if heated:
-        # the sum over a step depends on its draws, which frames further apart do not determine
-        if why := missing(case, {"every-step"}):
-            return why
         found = reading(case)
         assert found.allowed is not None
         roundings, of_p = found.roundings, found.allowed[1]

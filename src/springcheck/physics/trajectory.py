@@ -126,10 +126,10 @@ class Trajectory:
         """The same with the energies of its states, where this scene asks for them, and with times in single
         precision as the whole steps of it that they are."""
         more: dict[str, Any] = {}
-        if self.energy is None and "energy" in scene.quantities:
-            more["energy"] = np.asarray(scene.system.energy(self.q, self.p), np.float64)
         t = np.rint(self.t / scene.step) * scene.step
-        with np.errstate(over="ignore"):
+        with np.errstate(all="ignore"):
+            if self.energy is None and "energy" in scene.quantities:
+                more["energy"] = np.asarray(scene.system.energy(self.q, self.p), np.float64)
             single = t.astype(np.float32)
         if np.any(self.t != t) and np.array_equal(self.t, single):
             more |= {"t": t, "step": scene.step}
