@@ -68,24 +68,22 @@ def pytest_cmdline_main(config: pytest.Config) -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Mark what is slow, and without `--whole` leave out long tests and the listed cases of campaigns that
-    nobody has named."""
+    """Mark what is slow.  Without `--whole` long tests are left out unless their file or they are named, and
+    the listed cases of campaigns unless they are."""
     slow = {
         name: float(x) for x, name in (line.split(" ", 1) for line in SLOW.read_text("utf-8").splitlines())
     }
-    listed, named = (
-        set(CAMPAIGNS.read_text(encoding="utf-8").splitlines()),
-        [x for x in config.args if "::" in x],
-    )
+    listed = set(CAMPAIGNS.read_text(encoding="utf-8").splitlines()).difference(config.args)
+    named = tuple(x for x in config.args if ".py" in x)
     out = []
     for item in items:
         seconds = slow.get(item.nodeid.split("[")[0], 0.0)
         if seconds:
             item.add_marker("slow")
-        if seconds > LONG or (item.nodeid in listed and item.get_closest_marker("campaign")):
+        long = seconds > LONG and not item.nodeid.startswith(named)
+        if long or (item.nodeid in listed and item.get_closest_marker("campaign")):
             out.append(item)
-    out = [] if config.getoption("--whole") else [x for x in out if not x.nodeid.startswith(tuple(named))]
-    if out:
+    if out and not config.getoption("--whole"):
         config.hook.pytest_deselected(items=out)
         gone = set(out)
         items[:] = [item for item in items if item not in gone]

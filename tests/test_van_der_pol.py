@@ -42,10 +42,7 @@ def of(mu: float, **changes: Any) -> Scene:
     return replace(scene, terms=(spring, replace(brake, c=c)), **changes)  # type: ignore[type-var]
 
 
-@pytest.mark.parametrize(
-    "mu",
-    sorted({x["mu"] for x in STATES}),
-)
+@pytest.mark.parametrize("mu", sorted({x["mu"] for x in STATES}))
 def test_the_exact_motion_has_the_digits_of_another_route(mu: float) -> None:
     rows = [row for row in STATES if row["mu"] == mu]
     scene = of(mu)

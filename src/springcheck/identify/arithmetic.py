@@ -311,15 +311,12 @@ BEYOND = 1e3
 
 
 def _beyond(record: Record, found: Map, sizes: Roundings) -> bool:
-    """Whether the residuals exceed `BEYOND` bounds of double precision under every match.
-
-    No map leaves a smaller weighted mean square than the fitted one, whatever is refitted of a match.
-    """
+    """Whether the residuals exceed `BEYOND` bounds of double precision under every match: no map leaves a
+    smaller weighted mean square than the fitted one, whatever is refitted of a match."""
     off = record.clock + np.max(np.abs(0.0 if record.deviations is None else record.deviations))
-    with np.errstate(over="ignore"):
-        each = BEYOND * (EPSILON + off * sizes.stride) * (sizes.path + sizes.stride**2)
-        most = each[:, None, None] * (sizes.size + sizes.difference)
-        explained = np.sum((most * found.weight[:, None]) ** 2, axis=(1, 2))
+    each = BEYOND * (EPSILON + off * sizes.stride) * (sizes.path + sizes.stride**2)
+    most = each[:, None, None] * (sizes.size + sizes.difference)
+    explained = np.sum((most * found.weight[:, None]) ** 2, axis=(1, 2))
     return bool(np.all(found.freedom / 2 * np.sum(found.residual**2) > explained))
 
 

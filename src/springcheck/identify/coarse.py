@@ -68,11 +68,11 @@ def is_rebuilt(match: Match, missing: Floats, half: Floats, size: Floats, differ
     random walk that grows as s**(1/2) in the velocity and as s**(3/2) in the position over s steps.
     """
     steps = np.sqrt(match.stride)
-    unit = EPSILON * steps * difference
-    allowed = half + EPSILON * (4 + 2 * np.array([steps**3, steps])) * size + 4 * unit
+    each = EPSILON * steps * difference
+    allowed = half + EPSILON * (4 + 2 * np.array([steps**3, steps])) * size + 4 * each
     if np.any(missing > allowed):
         return False
-    share = float(np.sqrt(np.mean(missing[:, 1] ** 2) / np.mean(unit[:, 1] ** 2 + half[:, 1] ** 2)))
+    share = float(np.sqrt(np.mean(missing[:, 1] ** 2) / np.mean(each[:, 1] ** 2 + half[:, 1] ** 2)))
     return REBUILT[0] <= share <= REBUILT[1] and differences(match)
 
 

@@ -282,6 +282,9 @@ DIGITS = 9
 PARAMETERS = 0.05, 0.3, 0.6, 0.9
 """Starting values of a parameter's fit."""
 
+NO_METHOD = 1e100
+"""Residual of parameters at which a method has no map."""
+
 
 @np.errstate(all="ignore")
 def _remembered(e: Evidence, found: Map) -> list[str]:
@@ -299,10 +302,10 @@ def _remembered(e: Evidence, found: Map) -> list[str]:
         def left(x: Floats, of: Callable[[Floats], Floats] = entries_of) -> Floats:
             # not finite beyond the parameters that a scheme can have
             off = (of(np.array([turn, 1.0])[: len(x)] * x) - entries) / error
-            return np.nan_to_num(off, nan=1e100, posinf=1e100, neginf=-1e100)
+            return np.nan_to_num(off, nan=NO_METHOD, posinf=NO_METHOD, neginf=-NO_METHOD)
 
         for start in [[1.0, y] for y in PARAMETERS] if "{" in name else [[1.0]]:
-            if np.max(np.abs(left(np.array(start)))) >= 1e100:
+            if np.max(np.abs(left(np.array(start)))) >= NO_METHOD:
                 continue
             best = least_squares(left, start, x_scale="jac", xtol=1e-15, ftol=1e-15, gtol=1e-15)
             other = stated is not None and abs(best.x[0] * turn - stated) > AGREES * abs(stated)
