@@ -138,6 +138,84 @@ def test_openmm_counts_from_rest_where_a_bond_could_turn_over(need: Need) -> Non
     assert judged(scene, run) == []
 
 
+def pair(*more: str, bath: str = "") -> Scene:
+    """Two particles on a spring of a rest length, one of them held, beside other terms."""
+    text = """
+[[particle]]
+mass = 3.7
+[[particle]]
+mass = 1.3
+position = 1.0
+[[spring]]
+ends = [0, 1]
+stiffness = 2.9
+rest = 0.9
+[[spring]]
+ends = ["wall", 0]
+stiffness = 5.1
+"""
+    return scenes.parse("\n".join([text, *more, bath, "[time]\nstep = 0.05\nsteps = 400\n"]), name="pair")
+
+
+DRIVE = "[[drive]]\nparticle = 1\namplitude = 7.0\nfrequency = 1.1"
+HILL = "[[cosine]]\nparticle = 1\ndepth = -7.0\nlength = 0.7\nat = 1.05"
+
+
+@pytest.mark.parametrize(
+    ("label", "more"), [("openmm:verlet", DRIVE), ("openmm:leapfrog", HILL), ("lammps:bond", DRIVE)]
+)
+def test_a_bond_that_a_drive_or_a_hill_turns_over_is_counted_from_rest(
+    label: str, more: str, need: Need
+) -> None:
+    need(label)
+    scene = pair(more)
+    run = springcheck.simulate(scene, label)
+    assert np.any(np.diff(run.q, axis=1) < 0)
+    assert judged(scene, run) == []
+
+
+@pytest.mark.parametrize("more", [DRIVE, HILL, "[[weight]]\nparticle = 1\nforce = -7.0\nat = 1.0"])
+def test_a_morse_bond_that_may_gain_energy_is_refused(more: str, need: Need) -> None:
+    need("openmm:verlet")
+    morse = "[[morse]]\nends = [0, 1]\ndepth = 1.0\nsteepness = 1.1\nrest = 0.9"
+    scene = pair(morse)
+    assert judged(scene, springcheck.simulate(scene, "openmm:verlet")) == []
+    alone = [replace(x, terms=[t for t in x.terms if t.key != "spring"]) for x in (scene, pair(morse, more))]
+    assert judged(alone[0], springcheck.simulate(alone[0], "openmm:verlet")) == []
+    with pytest.raises(MethodError, match="a Morse bond may turn over"):
+        springcheck.simulate(alone[1], "openmm:verlet")
+
+
+def test_velocities_rebuilt_from_positions_that_are_counted_from_rest_are_rounded_there(need: Need) -> None:
+    """Where a particle passes 0 its position, counted from rest, is rounded as 0.9 is: 70 of 19 roundings."""
+    need("openmm:verlet")
+    scene = replace(pair(), p=np.array([0.0, 5.0]), step=0.002, steps=4000)
+    assert judged(scene, springcheck.simulate(scene, "openmm:verlet")) == []
+
+
+BOND = "[[bond]]\nends = [0, 1]\nstiffness = 1.7\nrest = 1.1"
+
+
+@pytest.mark.parametrize("label", ["openmm:verlet", "lammps:bond"])
+def test_a_bond_beside_a_spring_that_may_turn_over_is_refused(label: str, need: Need) -> None:
+    need(label)
+    scene = pair(BOND)
+    assert judged(scene, springcheck.simulate(scene, label)) == []
+    wild = replace(scene, p=np.array([0.0, 9.0]))
+    with pytest.raises(MethodError, match="a spring and another bond have no common rest"):
+        springcheck.simulate(wild, label)
+
+
+def test_noise_across_the_line_turns_a_bond(need: Need) -> None:
+    need("openmm:langevin-middle-bath")
+    scene = pair(BOND, bath="[bath]\ntemperature = 0.3\nfriction = 0.7")
+    with pytest.raises(MethodError, match="turns a rod or bond"):
+        springcheck.simulate(scene, "openmm:langevin-middle-bath", seed=3)
+    # ASE's noise is across it too, and its forces are those of the line
+    need("ase:langevin-baoab")
+    assert judged(scene, springcheck.simulate(scene, "ase:langevin-baoab", seed=3)) == []
+
+
 def test_springs_without_a_common_rest_are_refused_by_name(need: Need) -> None:
     need("openmm:verlet")
     scene = replace(

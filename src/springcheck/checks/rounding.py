@@ -45,8 +45,8 @@ def of_step(
     # an engine may count positions from the rest points of springs, and so round those
     of_q, of_p = state * (size_q + case.origins), state * size_p
     if run.rebuilds_velocity and not how.keeps_displacement:
-        # in a box, positions are wrapped into it
-        of_p = of_p + how.state * m * (np.abs(q) + size_q + 2 * scene.periods) / h
+        # as they are counted: from rest, or wrapped into a box
+        of_p = of_p + how.state * m * (np.abs(q) + size_q + 2 * case.origins) / h
     # a force, its product with the step, and a velocity may each underflow; a solver adds up n products
     lost = smallest * (1 + m + h * scene.system.pulls())
     if case.scheme.has("implicit"):

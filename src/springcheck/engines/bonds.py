@@ -15,7 +15,7 @@ from springcheck.physics.arrays import Floats, Integers
 from springcheck.physics.rods import Rods
 from springcheck.physics.scene import Scene
 from springcheck.physics.term import Term
-from springcheck.physics.terms import Cosine, RadialSpring, Spring, WallSpring
+from springcheck.physics.terms import Cosine, Morse, RadialSpring, Spring, WallSpring
 from springcheck.schemes import scheme
 
 ANCHOR_MASS = 2.0**100
@@ -40,40 +40,42 @@ def origins(scene: Scene, scheme_name: str) -> Floats:
     scheme can reach rules that out, real positions are used (origins 0).  Elsewhere each particle is counted
     from its own rest position, so that every bond has rest length 0 and the two laws are one.  Every group of
     joined particles is treated by itself, so that it does not depend on others.  Raises MethodError where
-    springs in a ring have no common rest.
+    springs in a ring have no common rest, or a bond of another law joins their particles.
     """
-    pairs = [term for term in scene.terms if isinstance(term, Spring)]
-    springs = [t for t in scene.terms if isinstance(t, WallSpring | Spring)]
-    of_length = [t for t in scene.terms if isinstance(t, WallSpring | Spring | RadialSpring)]
+    of_length = [t for t in scene.terms if isinstance(t, WallSpring | Spring | RadialSpring | Morse)]
     # Gershgorin's bound of the squared frequencies
     w2 = np.max(scene.derived(terms=tuple(of_length)).system.gershgorin(scene.q) / scene.m)
     hw = abs(scene.step) * float(np.sqrt(w2))
-    bounded = scheme(scheme_name).has("symplectic") and hw < 2 and all(np.all(t.k >= 0) for t in of_length)
+    bounded = scheme(scheme_name).has("symplectic") and hw < 2 and gains_nothing(scene, "morse")
     group = graph.lowest_joined(scene.n, scene.terms)
     # the energy that a symplectic Euler conserves differs from the true one by hw/2 of it at most
     energy = _energies(scene, group) * (2 + hw) / (2 - hw) if bounded else np.full(scene.n, np.inf)
     turning = np.zeros(scene.n, dtype=bool)
-    for term in pairs:
+    for term in (t for t in of_length if isinstance(t, Spring)):
         u = (scene.q[term.b] - scene.q[term.a]) * np.sign(term.rest)
-        own = group[term.a]
-        safe = (term.rest == 0) | ((u > 0) & (0.5 * term.k * term.rest**2 > 1.01 * energy[own]))
-        turning[own[~safe]] = True
+        safe = (term.rest == 0) | ((u > 0) & (0.5 * term.k * term.rest**2 > 1.01 * energy[group[term.a]]))
+        turning[group[term.a[~safe]]] = True
     if scene.box is not None:
-        _within_half(scene, springs, energy[group])
+        _within_half(scene, [t for t in of_length if isinstance(t, WallSpring | Spring)], energy[group])
         reach = float(scene.system.energy(scene.q, scene.p)) * (2 + hw) / (2 - hw) if bounded else np.inf
         # a single bond may have all of the energy
         for one in (x for x in scene.terms if isinstance(x, RadialSpring)):
             longest = one.rest + np.sqrt(2 * reach / np.abs(one.k))
             _shorter(scene, one, longest, np.full(len(one), min(scene.box)))
-    if not np.any(turning):
-        return np.zeros(scene.n)
-    rest = scene.system.rest_positions
-    if rest is None:
+    rest = scene.system.rest_positions if np.any(turning) else np.zeros(scene.n)
+    others = (t for t in scene.terms if t.bodies == 2 and not isinstance(t, Spring))
+    if rest is None or any(np.any(turning[group[t.particles[0]]]) for t in others):
         raise MethodError(
-            f"{scene.name}: springs in a ring have no common rest, and a bond that may turn over is known by "
-            "its length alone"
+            f"{scene.name}: {'springs in a ring' if rest is None else 'a spring and another bond'} have no "
+            "common rest, and a bond that may turn over is known by its length alone"
         )
     return np.where(turning[group], rest, 0.0)
+
+
+def gains_nothing(scene: Scene, *others: str) -> bool:
+    """Whether nothing adds to the energy: all terms are springs, friction or of other keys, none negative."""
+    known = {"wall-spring", "spring", "bond", "damping", *others}
+    return all(t.key in known and np.all(getattr(t, t.columns[0].field) >= 0) for t in scene.terms)
 
 
 def _within_half(scene: Scene, springs: list[WallSpring | Spring], energy: Floats) -> None:
@@ -148,11 +150,10 @@ def rests(scene: Scene, label: Label) -> Floats:
     """Origin of each particle for which every bond has rest length 0, (n,) [L].
 
     Such a bond pulls along each axis by itself, independent of noise across the line.  MethodError where
-    springs have no common rest.
+    springs have no common rest, or that noise turns a rod or bond.
     """
+    in_all_of_space(scene, label, scene.system.rods or any(isinstance(t, RadialSpring) for t in scene.terms))
     pairs = [term for term in scene.terms if isinstance(term, Spring)]
-    if not any(np.any(term.rest) for term in pairs):
-        return np.zeros(scene.n)
     found = scene.system.rest_positions
     if found is None or any(np.any(lengths(term, found)) for term in pairs):
         raise MethodError(f"{label}: springs without a common rest bend under noise across the line")
@@ -211,12 +212,12 @@ def joints(scene: Scene, term: Term, origins: Floats) -> list[Tie]:
     return found
 
 
-def in_all_of_space(scene: Scene, label: Label) -> None:
-    """MethodError where noise along an axis that the scene leaves out would rotate a rod that way."""
-    if scene.system.rods and scene.n < 3 * scene.particles:
+def in_all_of_space(scene: Scene, label: Label, turned: object) -> None:
+    """MethodError where noise along an axis that the scene leaves out would rotate a rod or bond that way."""
+    if turned and scene.n < 3 * scene.particles:
         raise MethodError(
-            f"{label}: its noise acts along x, y and z, and turns a rod; the scene's particles move along "
-            f"{' and '.join(scene.axes)}"
+            f"{label}: its noise acts along x, y and z, and turns a rod or bond; the scene's particles move "
+            f"along {' and '.join(scene.axes)}"
         )
 
 

@@ -112,7 +112,6 @@ class _Run:
             raise MethodError(f"{label}: LAMMPS leaves out the third rod of a triangle beside another rod")
         ours = method.name == "external" or bool(rods)
         if method.generator:
-            bonds.in_all_of_space(scene, label)
             self._origins = bonds.rests(scene, label)
         else:
             self._origins = np.zeros(scene.n) if ours else bonds.origins(scene, method.scheme)

@@ -130,7 +130,7 @@ class _Dynamics:
             self._atoms.set_constraint(FixBondLengths(pairs, bondlengths=[x * length for _, x, _ in rods]))
         self._atoms.calc = Springs(scene.system, length, time)
         if method.generator:
-            in_all_of_space(scene, label)
+            in_all_of_space(scene, label, rods)
             energy = scene.thermal * (length / time) ** 2
             self._dynamics = _thermostat(method.name, self._atoms, scene, step, time, energy, seed)
         else:
