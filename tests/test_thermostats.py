@@ -140,6 +140,21 @@ def test_chances_are_those_of_their_null() -> None:
     assert np.mean([chance.pairs(rng.standard_normal((300, 5))) <= 0.05 for _ in range(1000)]) < 0.085
 
 
+def test_a_mean_and_a_variance_of_one_coordinate_are_not_made_up_for_by_another() -> None:
+    """Two groups in baths of unlike temperatures whose mean is right passed, and opposite constant forces."""
+    x = np.random.default_rng(12).standard_normal((40_000, 6))
+    for of in (chance.mean, chance.variance):
+        assert of(x).chance > 1e-3
+        chances = np.array([of(y).chance for y in x.reshape(1000, 40, 6)])
+        for level in (0.5, 0.1, 0.01):
+            assert np.mean(chances <= level) < level + 5 * np.sqrt(level / len(chances))
+    unlike = x * np.sqrt([1.12, 1.0, 1.0, 1.0, 1.0, 0.88])
+    found = chance.variance(unlike).found
+    assert found[0] < 1e-15
+    assert "of coordinate 5 where 1 is right, of 240000 draws" in found[1]
+    assert chance.mean(x + 0.05 * np.array([1, 0, 0, 0, 0, -1])).chance < 1e-15
+
+
 def test_what_is_known_before_a_draw_foretells_it_as_seldom_as_is_said() -> None:
     """Momenta that forget slowly, of the draws themselves: their correlation is not normal."""
     rng = np.random.default_rng(9)

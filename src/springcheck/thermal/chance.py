@@ -86,29 +86,41 @@ def of_normal(z: float) -> float:
     return math.erfc(abs(z) / math.sqrt(2)) if math.isfinite(z) else 0.0
 
 
+def _any(of: Callable[[float, float], float], words: str, n: int, sums: Any) -> tuple[float, str]:
+    """Chance of the sum over n draws, or over those of one of their columns (c,), by `of` (sum, draws)."""
+    columns, c = np.ravel(sums).tolist(), np.size(sums)
+    each = [(c * of(x, n / c), c * x / n, f" of coordinate {i}") for i, x in enumerate(columns)]
+    found, value, which = min([(of(sum(columns), n), sum(columns) / n, ""), *each])
+    return min(1.0, (1 + (c > 1)) * found), words.format(value, which, n)
+
+
 def mean(x: Floats) -> Statistic:
-    """The mean of draws x (...)."""
+    """The mean of draws x (f, ...), of all and of each column."""
 
-    def law(n: int, total: float) -> tuple[float, str]:
-        return of_normal(total / math.sqrt(n)), f"mean {total / n:+.2e}, of {n} draws"
+    def law(n: int, totals: Floats) -> tuple[float, str]:
+        return _any(
+            lambda total, n: of_normal(total / math.sqrt(n)), "mean {:+.2e}{}, of {} draws", n, totals
+        )
 
-    return Statistic(draws=x.size, sums=(float(np.sum(x)),), law=law)
+    return Statistic(draws=x.size, sums=(np.sum(x, axis=0),), law=law)
 
 
 def variance(x: Floats) -> Statistic:
-    """The sum of squares of draws x (...), by chi-squared."""
+    """The sum of squares of draws x (f, ...), of all and of each column, by chi-squared."""
     from scipy.special import gammainc, gammaincc, gammainccinv, gammaincinv
 
-    def law(n: int, squares: float) -> tuple[float, str]:
-        half, words = squares / 2, f"variance {squares / n:.6f} where 1 is right, of {n} draws"
-        if not math.isfinite(half):
-            return 0.0, words
-        return min(1.0, 2 * float(min(gammainc(n / 2, half), gammaincc(n / 2, half)))), words
+    def of(squares: float, n: float) -> float:
+        sides = gammainc(n / 2, squares / 2), gammaincc(n / 2, squares / 2)
+        return min(1.0, 2 * float(min(sides))) if math.isfinite(squares) else 0.0
+
+    def law(n: int, squares: Floats) -> tuple[float, str]:
+        return _any(of, "variance {:.6f}{} where 1 is right, of {} draws", n, squares)
 
     def limits(n: int, chance: float) -> Limits:
-        return Limits(temperature=float(gammainccinv(n / 2, chance / 2) / gammaincinv(n / 2, MISSED)) - 1)
+        part = chance / (2 + 2 * (x.ndim > 1 and x.shape[1] > 1))
+        return Limits(temperature=float(gammainccinv(n / 2, part) / gammaincinv(n / 2, MISSED)) - 1)
 
-    return Statistic(draws=x.size, sums=(float(np.sum(x * x)),), law=law, limits=limits)
+    return Statistic(draws=x.size, sums=(np.sum(x * x, axis=0),), law=law, limits=limits)
 
 
 def shape(x: Floats) -> Statistic:
@@ -120,18 +132,11 @@ def shape(x: Floats) -> Statistic:
     size = math.sqrt(max(float(np.mean(x * x)), 1e-300))
 
     def law(n: int, *sums: float) -> tuple[float, str]:
-        chances = [
-            2 * _saddlepoint(total / n, n, degree) for total, degree in zip(sums, (3, 4), strict=False)
-        ]
+        chances = [2 * _saddlepoint(x / n, n, degree) for x, degree in zip(sums, (3, 4), strict=False)]
         return min(1.0, *chances), f"third moment {sums[2] / n:+.4f}, fourth {sums[3] / n:.4f}, of {n} draws"
 
     moments = [float(np.sum((x / size) ** i)) for i in (3, 4)]
     return Statistic(draws=x.size, sums=(*(_of_ranks(x, degree) for degree in (3, 4)), *moments), law=law)
-
-
-def tails(x: Floats) -> float:
-    """Chance of the weight of the tails of draws x (...), as `shape` has it of degree 4."""
-    return _saddlepoint(_of_ranks(x, 4) / x.size, x.size, 4)
 
 
 def _of_ranks(x: Floats, degree: int) -> float:
@@ -217,8 +222,7 @@ def neighbours(x: Floats) -> Statistic:
             return 1.0, words
         return of_normal(products / math.sqrt(squares)) if squares > 0 else 0.0, words
 
-    around = np.zeros_like(x[1::2])
-    around += x[0 : 2 * len(around) : 2]
+    around = x[: len(x) // 2 * 2 : 2].copy()
     after = x[2::2]
     around[: len(after)] += after[: len(around)]
     sums = float(np.sum(x[1::2] * around)), float(np.sum(around * around)), x[1:].size
@@ -254,8 +258,7 @@ def foretold(x: Floats, y: Floats) -> Statistic:
 
 
 def count(hits: int, n: int, p: float) -> Statistic:
-    """How many of n steps have a collision, each with probability p = 1 - exp(-x), x the friction rate times
-    the step: binomial."""
+    """How many of n steps have a collision, each of probability p = 1 - exp(-friction rate h): binomial."""
     from scipy.special import bdtr, bdtrc, bdtri
 
     def law(n: int, hits: int) -> tuple[float, str]:

@@ -75,7 +75,7 @@ def likely(
 ) -> list[Candidate]:
     """Schemes by the likelihood of their innovations in frames of every step; `turn` is (h w)**2 if known.
 
-    None where every one falls short of a free map and a free noise by more than chance allows.
+    Empty where every one falls short of a free map and a free noise by more than chance allows.
     """
     found = [y for name in names for y in _of_scheme(THERMOSTATS[name], q, v, h, (1,), turn)]
     found += _of_more_substeps(found, q, v, h)
@@ -85,9 +85,7 @@ def likely(
 def likely_apart(q: Floats, v: Floats, h: float, *, white: bool = True) -> list[Candidate]:
     """Schemes by their likelihood, the steps between two frames h apart unknown; such as fall short of the
     best by more than `ODDS` at every stride are left out, but for those of every step.  What every step
-    leaves is white unless it carries draws on.
-
-    None as in `likely`.
+    leaves is white unless it carries draws on.  Empty as in `likely`.
     """
     found: list[Candidate] = []
     for scheme in THERMOSTATS.values():

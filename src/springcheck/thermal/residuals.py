@@ -11,8 +11,7 @@ FEWEST = 200
 """Fewest frames from which draws are inferred."""
 
 WHITE = 1e-9
-"""Chance below which residuals are not white, and so no draws: deterministic motion beyond one frame's
-map."""
+"""Chance below which residuals are not white, and so no draws but motion beyond one frame's map."""
 
 EVEN = 1e-4
 """Chance below which noise on momenta may be a factor, and no draw is inferred from it."""
@@ -73,7 +72,7 @@ def is_of_digits(x: Floats) -> bool:
 
 def is_uniform(x: Floats) -> bool:
     """Whether draws (f,) of variance 1 are uniform."""
-    return bool(np.max(np.abs(x)) < 1.9 and chance.tails(x) < WHITE)
+    return bool(np.max(np.abs(x)) < 1.9 and chance.shape(x).chance < WHITE)
 
 
 def is_correlated(x: Floats) -> bool:
