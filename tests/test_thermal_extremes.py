@@ -52,6 +52,8 @@ RIGHT: tuple[tuple[str, dict[str, float]], ...] = (
     ("lammps:gjf-4-half", {"x": 0.01}),
     ("lammps:gjf-1", {"x": 700.0}),
     ("lammps:gjf-8-half", {"x": 70.0}),
+    # the second draw is next to nothing beside what the first makes of the momentum
+    *(("own:" + name, {"turn": turn}) for name in ("obabo", "oabao", "bbk") for turn in (4e4, 4e6)),
 )
 
 

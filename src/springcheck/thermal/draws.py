@@ -74,7 +74,6 @@ def law_of(scheme: Thermostat, scene: Scene) -> Law:
     """The law of a scheme on each particle by itself, with its own curvature at the start."""
     assert scene.bath is not None
     q = scene.q.astype(np.longdouble)
-    # of all terms, and of fast ones
     all_k, fast = (
         np.asarray(one.system.hessian_diagonal(q), np.longdouble)
         for one in (scene, scene.derived(terms=scene.system.fast))
@@ -354,13 +353,13 @@ def _directions(scheme: Thermostat, scene: Scene) -> tuple[Extended, bool]:
     # the stiffest particle has all that the others have
     j = int(np.argmax(np.abs(found.k) / found.m))
     m = float(scene.m[j])
-    G = found.G[j].astype(np.float64) / (np.sqrt(scene.thermal / m) * np.array([[scene.step], [m]]))
-    _, weights, turned = np.linalg.svd(G, full_matrices=False)
-    u = int(np.count_nonzero(weights > 1e-9 * weights[0]))
-    if u == scheme.draws:
-        return np.eye(u, dtype=np.longdouble), bool(np.any(np.abs(G[0]) > 1e-9))
-    of_one = turned[:1].T * np.sign(turned[0, 0])
-    return of_one.astype(np.longdouble), bool(np.any(np.abs(G[0]) > 1e-9))
+    G = found.G[j] / (np.sqrt(scene.thermal / m) * np.array([[scene.step], [m]]))
+    # of rank two unless its rows are in proportion, however much the draws differ in what they do
+    x = np.multiply.outer(*G)
+    u = 1 + bool(np.any(np.abs(x - x.T) > 1e-12 * (np.abs(x) + np.abs(x.T))))
+    _, _, turned = np.linalg.svd(G.astype(np.float64), full_matrices=False)
+    made = np.eye(u) if u == scheme.draws else turned[:1].T * np.sign(turned[0, 0])
+    return made.astype(np.longdouble), bool(np.any(np.abs(G[0]) > 1e-9))
 
 
 def _whitened(x: Floats) -> Floats:

@@ -99,7 +99,7 @@ class Heat:
             else:
                 # the virial q dV/dq has the mean kT in every potential
                 of_q, of_p = -q * scene.system.potential_force(q, p), p * p / scene.m
-        self._sums += np.asarray([np.sum(of_q, axis=0), np.sum(of_p, axis=0)], np.float64)
+            self._sums += np.asarray([np.sum(of_q, axis=0), np.sum(of_p, axis=0)], np.float64)
         self._frames += len(some)
 
     def _begin(self, piece: Trajectory) -> None:
