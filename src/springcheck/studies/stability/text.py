@@ -54,12 +54,12 @@ def _of_scene(study: Stability) -> Lines:
         return [plain("  nothing in this scene oscillates: no step is too long for its stability")]
     if not w and not scene.system.is_damped:
         return [plain("  nothing in this scene oscillates at its start, which says nothing of where it goes")]
-    where = "" if scene.system.is_linear else ", where its motion is stiffest"
-    if where and not has_true_motion(scene):
-        where = ", at its start"
-    friction = ", without its friction" if scene.system.is_damped else ""
+    there = ", where its motion is stiffest" if has_true_motion(scene) else ", at its start"
+    where = "" if scene.system.is_linear else there
+    left = {"friction": scene.system.is_damped, "field": any(x.kind == "magnetic" for x in scene.terms)}
+    where += "".join(f", without its {name}" for name, acts in left.items() if acts)
     here = f"its step h = {scene.step:g} makes h w = {abs(scene.step) * w:.4g}"
-    out: Lines = [plain(f"  fastest angular frequency of this scene{where}{friction}: w = {w:.6g}; {here}")]
+    out: Lines = [plain(f"  fastest angular frequency of this scene{where}: w = {w:.6g}; {here}")]
     beyond = [x.method for x in study.limits if study.largest(x) < abs(scene.step)]
     if beyond:
         out.append(plain(f"  beyond the limit there: {', '.join(beyond)}", "bold yellow"))
