@@ -41,6 +41,8 @@ def text_of(name: str) -> str:
         ),
         ("chain", ["particle.0.mass=1:5:3"], ["own:semi-implicit-euler"]),
         ("anharmonic", ["particle.0.position=0.1:0.9:3"], ["own:semi-implicit-euler"]),
+        ("mathieu-tongue", ["modulated-spring.0.depth=0:0.9:3"], ["own:euler"]),
+        ("diatomic", ["time.step=0.01,0.05"], ["own:semi-implicit-euler"]),
         ("rlc-circuit", ["capacitor.0.capacitance=1e-9:1e-8:3:log"], ["own:euler"]),
     ],
     ids=lambda x: str(x) if isinstance(x, str) else "",

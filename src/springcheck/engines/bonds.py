@@ -164,9 +164,7 @@ def _energies(scene: Scene, group: Integers) -> Floats:
     """Energy of every group of joined particles at the start, where its lowest particle stands (n,)."""
     found = np.asarray(np.bincount(group, scene.p**2 / (2 * scene.m), scene.n), np.float64)
     for term in scene.terms:
-        if term.kind == "potential":
-            rows = term.potential(term.elongation(scene.q), *term.parameters)
-            found += np.bincount(group[term.particles[0]], np.broadcast_to(rows, (len(term),)), scene.n)
+        found += np.bincount(group[term.particles[0]], term.energies(scene.q), scene.n)
     return found
 
 

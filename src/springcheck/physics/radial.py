@@ -20,10 +20,8 @@ from springcheck.physics.term import Column, LinearLaw, Term
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RadialSpring(LinearLaw, Term):
-    """Bonds between particles: V = k/2 (|q[b] - q[a]| - rest)**2, a row for each axis.
-
-    k [M/T2], rest [L]; rows of one bond stand together and have one number.
-    """
+    """Bonds between particles, a row for each axis: V = k/2 (|q[b] - q[a]| - rest)**2.  k [M/T2], rest [L].
+    Rows of one bond stand together and have one number."""
 
     key: ClassVar[str] = "bond"
     formula: ClassVar[str] = "k/2 (|q[b] - q[a]| - rest)**2"
@@ -38,8 +36,6 @@ class RadialSpring(LinearLaw, Term):
     k: Floats
     rest: Floats
     number: Floats
-
-    # the row's own law has no rest length: the energy of a bond is no sum over its axes
 
     @cached_property
     def _starts(self) -> Integers:
@@ -62,10 +58,10 @@ class RadialSpring(LinearLaw, Term):
         # a length of 0 has no direction, and d is 0 there
         return d, np.where(s > 0, s, np.finfo(q.dtype).tiny)
 
-    def energy(self, q: Reals) -> Reals:
-        s = np.sqrt(np.add.reduceat(self.stretch(q) ** 2, self._starts, axis=-1))
-        k, rest = self.k[self._starts], self.rest[self._starts]
-        return np.asarray(np.sum(0.5 * (k * (s - rest) * (s - rest)), axis=-1))
+    def energies(self, q: Reals) -> Reals:
+        # the energy of a bond is no sum over its axes: its first row has all of it
+        s, first = np.sqrt(self._sum(self.stretch(q) ** 2)), np.diff(self._bond, prepend=-1) > 0
+        return np.where(first, 0.5 * (self.k * (s - self.rest) * (s - self.rest)), 0.0)
 
     def pull(self, q: Reals) -> Reals:
         d, s = self._vectors(q)

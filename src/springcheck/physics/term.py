@@ -150,9 +150,13 @@ class Term:
         for place in self._places:
             _scatter(np.add, out, place, values)
 
+    def energies(self, q: Reals) -> Reals:
+        """Potential energy of each row at positions q (..., n) -> (..., s) [M L2/T2], 0 at its own rest."""
+        return np.asarray(self.potential(self.elongation(q), *self.parameters))
+
     def energy(self, q: Reals) -> Reals:
         """Potential energy of states q (..., n) -> (...) [M L2/T2], 0 at the term's own rest."""
-        return np.asarray(np.sum(self.potential(self.elongation(q), *self.parameters), axis=-1))
+        return np.asarray(np.sum(self.energies(q), axis=-1))
 
     def pull(self, q: Reals) -> Reals:
         """Restoring force of each row at positions q (..., n) -> (..., s) [M L/T2]."""

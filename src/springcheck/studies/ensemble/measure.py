@@ -188,8 +188,7 @@ def _energies(
     """Energy of each copy (f, copies), or with another function `of` the potential energy of each term."""
     energy = _of_copies(0.5 * (p * p) / many.m, copies)
     for term in many.terms:
-        if term.kind == "potential":
-            energy = energy + of(_of_copies(term.potential(term.elongation(q), *term.parameters), copies))
+        energy = energy + of(_of_copies(term.energies(q), copies))
     return energy
 
 
