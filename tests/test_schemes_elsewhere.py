@@ -102,6 +102,21 @@ def runge_kutta(rows: list[list[float]], weights: list[float], rounds: int = 1) 
     return step
 
 
+def alternating(half: list[float], other: list[float], *, kick_first: bool) -> Step:
+    """Partitioned steps of symmetric coefficients, of which half is given, and the rest adds up to one."""
+    ours = [*half, 1 - 2 * sum(half), *reversed(half)]
+    theirs = [*other, 0.5 - sum(other), 0.5 - sum(other), *reversed(other)]
+    kicks, drifts = (ours, [*theirs, 0.0]) if kick_first else ([0.0, *theirs], ours)
+
+    def step(q: Any, p: Any, h: float, force: Callable[[Any], Any], mass: Any) -> tuple[Any, Any]:
+        for b, a in zip(kicks, drifts, strict=True):
+            p = p + b * h * force(q)
+            q = q + a * h * p / mass
+        return q, p
+
+    return step
+
+
 def mclachlan_atela(q: Any, p: Any, h: float, force: Callable[[Any], Any], mass: Any) -> tuple[Any, Any]:
     drifts = 0.5153528374311229364, -0.085782019412973646, 0.4415830236164665242, 0.1288461583653841854
     kicks = 0.1344961992774310892, -0.2248198030794208058, 0.7563200005156682911, 0.3340036032863214255
@@ -127,11 +142,26 @@ GAUSS6 = [
     [5 / 36, 2 / 9 - R / 15, 5 / 36 - R / 30], [5 / 36 + R / 24, 2 / 9, 5 / 36 - R / 24],
     [5 / 36 + R / 30, 2 / 9 + R / 15, 5 / 36],
 ]  # fmt: skip
+BM4 = [0.0792036964311957, 0.353172906049774, -0.0420650803577195], [0.209515106613362, -0.143851773179818]
+BM6 = (
+    [0.0502627644003922, 0.413514300428344, 0.0450798897943977, -0.188054853819569, 0.541960678450780],
+    [0.148816447901042, -0.132385865767784, 0.067307604692185, 0.432666402578175],
+)
 
 TEXTBOOK = {
     "suzuki4": verlets(FIVE, kick_first=True), "suzuki4-drift-first": verlets(FIVE, kick_first=False),
     "yoshida6": verlets(SEVEN, kick_first=True), "yoshida6-drift-first": verlets(SEVEN, kick_first=False),
     "mclachlan-atela4": mclachlan_atela, "tsitouras5": runge_kutta(TSIT5, TSIT5_WEIGHTS),
+    **{
+        f"{name}{'' if kick else '-drift-first'}": alternating(half, other, kick_first=kick)
+        for name, half, other in (("blanes-moan4", *BM4), ("blanes-moan6", *BM6))
+        for kick in (True, False)
+    },
+    "lobatto-iiic2": runge_kutta([[1 / 2, -1 / 2], [1 / 2, 1 / 2]], [1 / 2, 1 / 2], rounds=60),
+    "lobatto-iiic4": runge_kutta(
+        [[1 / 6, -1 / 3, 1 / 6], [1 / 6, 5 / 12, -1 / 12], [1 / 6, 2 / 3, 1 / 6]], [1 / 6, 2 / 3, 1 / 6],
+        rounds=60,
+    ),
     "gauss6": runge_kutta(GAUSS6, [5 / 18, 4 / 9, 5 / 18], rounds=40),
 }  # fmt: skip
 

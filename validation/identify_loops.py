@@ -314,7 +314,12 @@ UNKNOWN: dict[str, Step] = {
 }
 """Families that no catalogue held when these cases were made."""
 
-NAMED_SINCE = {"Suzuki's fourth order": ("suzuki4",)}
+NAMED_SINCE = {
+    "Suzuki's fourth order": ("suzuki4",),
+    "Blanes-Moan, six stages": ("blanes-moan4-drift-first",),
+    "Lobatto IIIC 2": ("lobatto-iiic2",),
+    "SDIRK3 of Alexander": ("sdirk3",),
+}
 """Of those, what one holds by now."""
 
 
