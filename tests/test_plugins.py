@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import forked
-from springcheck import engines
+from springcheck import engines, schemes
 from springcheck.cli import main
 from springcheck.errors import MethodError
 
@@ -91,6 +91,21 @@ def test_an_installed_package_is_found_run_stored_and_still_readable_when_it_is_
     assert "PEFRL" not in capsys.readouterr().out
     assert main(["run", "spring-uneven", "--method", "pefrl:pefrl"]) == 2
     assert capsys.readouterr().err.startswith("springcheck: unknown engine 'pefrl'")
+
+
+def test_what_is_in_a_store_is_told_without_its_engines_but_for_schemes_of_their_own(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """A plug-in may be slow to import, or run code of a stranger."""
+    plugin = str(EXAMPLE / "springcheck_pefrl.py")
+    assert main(["run", "spring", "--engine", plugin, "--method", "own:*", "--quiet", "-o", "x.h5"]) == 0
+    loaded: list[str] = []
+    find = engines.registry._find
+    monkeypatch.setattr(engines.registry, "_find", lambda name: loaded.append(name) or find(name))
+    monkeypatch.delitem(schemes.lookup._brought, "pefrl")
+    for command in ("inspect", "plot", "report"):
+        assert main([command, "x.h5"]) == 0
+    assert set(loaded) == {"pefrl"}
 
 
 def test_a_scheme_of_its_own_is_carried_out_wrongly_and_the_verdicts_say_so(tmp_path: Path) -> None:

@@ -4,24 +4,23 @@ from __future__ import annotations
 
 from argparse import Namespace
 from collections.abc import Iterator
-from contextlib import suppress
 from typing import Any
 
-from springcheck import engines, store
-from springcheck.errors import SpringcheckError
+from springcheck import engines, schemes, store
 from springcheck.physics.trajectory import Trajectory
 from springcheck.studies import STUDIES, keeper
 from springcheck.studies.study import Study, StudyResult
 from springcheck.text.lines import Lines, TextTable, plain, table
 from springcheck.text.wording import ordinal
+from springcheck.thermal import THERMOSTATS
 
 
 def held(summary: store.Summary) -> Iterator[tuple[Study, StudyResult]]:
     """The studies of a store with their results.  StoreError where one of them cannot be read."""
     # engines register the schemes that they define
-    for name in {run.label.partition(":")[0] for run in summary.runs} & {*engines.names()}:
-        with suppress(SpringcheckError):
-            engines.engine(name)
+    for run in summary.runs:
+        if run.parameters.get("scheme") not in {**schemes.known(), **THERMOSTATS}:
+            engines.names(run.label.partition(":")[0])
     for study in STUDIES:
         if study.held(summary):
             yield study, study.stored(summary.path)
