@@ -257,6 +257,22 @@ def test_a_full_disk_is_told_by_the_name_of_the_store(blocks: int) -> None:
     assert not Path("here.h5").exists()
 
 
+def test_of_a_scene_for_which_there_is_no_room_nothing_is_left() -> None:
+    resource = pytest.importorskip("resource")
+    done = subprocess.run(
+        [sys.executable, "-B", "-m", "springcheck", "show", "spring", "-o", "my.toml"],
+        env=os.environ | {"PYTHONPATH": str(Path(springcheck.__file__).parents[1])},
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100)),
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=60,
+    )
+    assert done.returncode == 2
+    assert "cannot write my.toml: the file would be larger than this system allows" in done.stderr
+    assert not Path("my.toml").exists()
+
+
 @pytest.mark.parametrize("study", ["stability", "precision"])
 def test_forces_beyond_all_numbers_are_refused(study: str, capsys: pytest.CaptureFixture[str]) -> None:
     text = (folder() / "morse-bond.toml").read_text()

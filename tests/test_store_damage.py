@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 
 from springcheck import store
-from springcheck.cli import file
+from springcheck.cli import file, main
 from springcheck.errors import StoreError
 from springcheck.formats import hdf5
 from springcheck.physics.trajectory import Comparison
@@ -124,6 +124,16 @@ def test_a_changed_number_is_named_and_not_read(whole: Path, tmp_path: Path) -> 
         if extent.name.endswith(("q/value", "p/value", "energy/value", "/time")):
             with pytest.raises(StoreError, match="damaged"):
                 store.read(path)
+
+
+def test_a_store_is_named_once_in_a_finding(
+    whole: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = flipped(whole, tmp_path / "s.h5", 100)
+    assert main(["check", str(path)]) == 1
+    lines = capsys.readouterr().out.splitlines()
+    assert any("it is damaged" in line for line in lines)
+    assert all(line.count("s.h5") == 1 for line in lines)
 
 
 def test_of_a_store_too_long_to_check_a_command_is_told_so(

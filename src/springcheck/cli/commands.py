@@ -5,6 +5,7 @@ Heavy modules are imported by the command that needs them.
 
 from __future__ import annotations
 
+import os
 import sys
 from argparse import Namespace
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -13,7 +14,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from springcheck import interrupts
 from springcheck.cli import output
 from springcheck.errors import SpringcheckError, plain
 from springcheck.studies.arguments import ENGINE, JSON, QUIET, Argument, argument
@@ -89,16 +89,16 @@ def _report(options: Namespace) -> int:
 
 def _show(options: Namespace) -> int:
     from springcheck.physics import scenefile
+    from springcheck.store import files
 
     text = scenefile.text_of(options.scene)
     if options.output is None:
         sys.stdout.write(text)
         return 0
-    try:
-        with interrupts.held(), open(options.output, "x", encoding="utf-8") as file:
-            file.write(text)
-    except OSError as error:
-        raise SpringcheckError(f"cannot write {options.output}: {error.strerror}") from error
+    if os.path.lexists(options.output):
+        raise SpringcheckError(f"{options.output} exists: name another file with -o")
+    with files.told(Path(options.output), "write"):
+        files.put_bytes(text.encode(), Path(options.output))
     print(plain(f"{options.output}: run it with springcheck run {options.output}"))
     return 0
 

@@ -84,7 +84,7 @@ def check_file(path: Path, most: int | None = None) -> list[Damage]:
         # where the file is no store, no other finding matters
         found = said if said and NO_STORE in said[0].what else found + said
     except StoreError as error:
-        found.append(Damage("/", str(error)))
+        found.append(Damage("/", str(error).removeprefix(f"cannot read {files.shown(path)}: ")))
     except ValueError:
         found.append(Damage("/", "it is damaged, reading it crashes the HDF5 library"))
     return found
@@ -103,7 +103,7 @@ def structure(path: Path, *, arrays: bool = True) -> list[Damage]:
                 if len(found) == MOST_FINDINGS:
                     break
     except StoreError as error:
-        found.append(Damage("/", str(error)))
+        found.append(Damage("/", str(error).removeprefix(f"cannot read {files.shown(path)}: ")))
     return found
 
 
