@@ -13,6 +13,7 @@ from argparse import Namespace
 from collections.abc import Callable
 from dataclasses import fields, replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -362,6 +363,21 @@ def test_a_figure_that_cannot_be_written_leaves_the_old_one(
         save(figure, tmp_path, "picture")
     assert png.read_bytes() == before
     assert {path.name for path in tmp_path.iterdir()} == {"picture.png", "picture.svg"}
+
+
+def test_a_disk_without_room_for_figures_or_an_export_is_left_as_it_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, into = str(tmp_path / "s.h5"), tmp_path / "full"
+    assert main(["run", "spring", "--method", "own:euler", "--quiet", "-o", path]) == 0
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: SimpleNamespace(free=1000))
+    into.mkdir()
+    for line in (["plot", path, "-o", str(into / "a")], ["export", path, "own:euler", str(into / "a.h5md")]):
+        assert main(line) == 2
+        said = capsys.readouterr().err
+        assert f"are needed, and 1 kB are free in {into}: make room" in said
+        assert ".new" not in said
+        assert [*into.iterdir()] == []
 
 
 @pytest.mark.usefixtures("steady_clock")

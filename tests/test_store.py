@@ -292,7 +292,7 @@ def test_a_store_of_studies_alone_needs_no_trajectory(tmp_path: Path) -> None:
 
 def test_a_recording_that_would_not_fit_is_told_before_it_starts(tmp_path: Path) -> None:
     s = scene(steps=10**13, every=1)
-    with pytest.raises(StoreError, match=r"would take 960 TB; .* are free in"):
+    with pytest.raises(StoreError, match=r"960 TB are needed, and .* are free in"):
         store.need_space(tmp_path / "s.h5", store.size(s))
     free = shutil.disk_usage(tmp_path).free
     with pytest.MonkeyPatch.context() as patch:

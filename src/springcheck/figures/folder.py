@@ -38,6 +38,7 @@ def put(drawn: list[Path], folder: Path, path: Path) -> list[Path]:
         _, *old = known.get(name, [mine])
         # the last one too: whoever is killed in between may find it in its place
         known[name] = [mine, *old[-1:], _sha256(figure)]
+    files.need_space(folder / FIGURES, sum(map(len, content.values())))
     try:
         folder.mkdir(parents=True, exist_ok=True)
         files.put_bytes(json.dumps(known, indent=1).encode(), folder / FIGURES)

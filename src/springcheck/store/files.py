@@ -109,14 +109,14 @@ def told(path: Path, doing: str) -> Iterator[None]:
 
 
 def need_space(path: Path, size: int) -> None:
-    """Raise StoreError when `size` bytes [B] would not fit beside `path`."""
-    folder = path.absolute().parent
-    with told(folder, "look into"):
+    """Raise StoreError when `size` bytes [B] would not fit at `path`, in a folder that may not be there."""
+    with told(path, "write"):
+        folder = next(one for one in path.absolute().parents if one.exists())
         free = shutil.disk_usage(folder).free
     if size > free:
         raise StoreError(
-            f"{shown(path).name} would take {readable(size)}; {readable(free)} are free in {folder}: "
-            "record less (every, quantities) or choose another folder with -o"
+            f"{readable(size)} are needed, and {readable(free)} are free in {folder}: make room, "
+            "record less (every, quantities), or choose another folder"
         )
 
 
