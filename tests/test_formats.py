@@ -490,7 +490,7 @@ def test_each_group_of_an_hdf5_file_is_a_trajectory(capsys: pytest.CaptureFixtur
     ]  # fmt: skip
     for command in (["judge", "x.hdf5", "--scene", "spring", "--scheme", "rk4"], ["plot", "x.hdf5"]):
         assert main(command) == 2
-        assert "holds 2 trajectories; choose by --trajectory: one, other" in capsys.readouterr().err
+        assert "trajectories: 2; choose one by --trajectory: one, other" in capsys.readouterr().err
 
 
 @pytest.mark.filterwarnings("ignore")
@@ -593,6 +593,7 @@ def test_a_file_that_ends_before_its_scene_says_so(capsys: pytest.CaptureFixture
 BAD = [
     ("", "is empty"),
     ("hello\n", "holds no row of numbers"),
+    ("t;q;p\n0;3,000.0;7,000.0\n", "line 2: '3,000.0' is no number"),
     ("1,2,3\n", "have no names"),
     ("t,q,p\n0,1\n", "columns: 2, names: 3"),
     ("t,q\n0,1\n", "no momenta or velocities"),

@@ -196,7 +196,7 @@ def test_a_full_disk_is_one_line(line: str) -> None:
     main(["run", "spring", "--method", "own:euler", "--quiet", "-o", "0.h5"])
     done = program(f"{line} > /dev/full")
     assert done.returncode == 2
-    assert done.stderr == "springcheck: No space left on device\n"
+    assert done.stderr == "springcheck: cannot write the output: No space left on device\n"
 
 
 @pytest.mark.skipif(os.name != "posix", reason="a shell is needed")

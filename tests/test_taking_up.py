@@ -178,6 +178,9 @@ def test_an_interrupted_study_says_that_the_same_command_goes_on(
     assert capsys.readouterr().err == (
         "springcheck: interrupted; what was finished is kept, the same command goes on\n"
     )
+    for command in ("plot", "report"):
+        assert cli.main([command, str(tmp_path / "study.h5")]) == 2
+        assert "yet: give the command that writes it again, it goes on" in capsys.readouterr().err
     again: list[Label] = []
     monkeypatch.setattr(limits, "measure", lambda label: (again.append(label), measure(label))[1])
     assert cli.main(arguments) == 0

@@ -107,8 +107,8 @@ def _mistake(error: SpringcheckError | OSError) -> int:
         # the program ends without a message
         raise error
     # the library names its files; any other OSError is of our own output, on a full disk for example
-    said = error.strerror if isinstance(error, OSError) else None
-    print(f"springcheck: {said or error}", file=sys.stderr)
+    said = f"cannot write the output: {error.strerror}" if isinstance(error, OSError) else error
+    print(f"springcheck: {said}", file=sys.stderr)
     if isinstance(error, OSError):
         # nothing more can be written, not even by the interpreter's shutdown
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

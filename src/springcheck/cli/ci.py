@@ -15,6 +15,7 @@ from typing import Any
 
 from springcheck import interrupts
 from springcheck.errors import SpringcheckError, plain
+from springcheck.store import files
 from springcheck.studies.arguments import REPORT_FORMS
 from springcheck.text.wording import STATES_SHOW, count
 
@@ -223,8 +224,5 @@ def _write(options: Namespace, found: list[Case], status: int) -> None:
 
 
 def _put(path: str, mode: str, data: bytes) -> None:
-    try:
-        with interrupts.held(), open(path, mode) as file:
-            file.write(data)
-    except OSError as error:
-        raise SpringcheckError(f"cannot write {path}: {error.strerror}") from error
+    with files.told(Path(path), "write"), interrupts.held(), open(path, mode) as file:
+        file.write(data)

@@ -89,12 +89,13 @@ def _report(options: Namespace) -> int:
 
 def _show(options: Namespace) -> int:
     from springcheck.physics import scenefile
-    from springcheck.store import files
 
     text = scenefile.text_of(options.scene)
     if options.output is None:
         sys.stdout.write(text)
         return 0
+    from springcheck.store import files
+
     if os.path.lexists(options.output):
         raise SpringcheckError(f"{options.output} exists: name another file with -o")
     with files.told(Path(options.output), "write"):

@@ -125,7 +125,7 @@ def draw_foreign(
 
 
 def _found(q: Any, frames: int) -> str:
-    """Number of periods of a coordinate, and the change of its amplitude, in a sentence."""
+    """How often a coordinate crosses its mean, and the change of its amplitude, in a sentence."""
     from springcheck.figures.motion import periods
 
     rounds = periods(q)
@@ -139,4 +139,4 @@ def _found(q: Any, frames: int) -> str:
         way = "less far" if change < 0 else "farther" if change < 1 else "as far"
         times = f"{100 * abs(change):.0f} %" if change < 1 else f"{last / first:.3g} times"
         reach = f"reaches {times} {way} at the end"
-    return f"goes round {rounds:.3g} times in {count(frames, 'frame')} and {reach}"
+    return f"crosses its mean {2 * rounds:.0f} times in {count(frames, 'frame')} and {reach}"

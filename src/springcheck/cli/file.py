@@ -156,7 +156,7 @@ def states_in(
         return next(iter(found.values()))
     if label not in found:
         raise StoreError(
-            f"{path}: holds {len(found)} trajectories; choose by --trajectory: {', '.join(found)}"
+            f"{path}: trajectories: {len(found)}; choose one by --trajectory: {', '.join(found)}"
         )
     return found[label]
 

@@ -25,8 +25,7 @@ def read_table(path: Path, columns: list[str], step: float | None) -> States:
     """The states of a text table; the last line before the numbers names the columns."""
     header: list[str] = []
     first: list[list[str]] = []
-    numbers = array("d")
-    width = 0
+    numbers, width = array("d"), 0
     unlike: StoreError | None = None
     with Lines(path) as lines:
         for line in lines:
@@ -59,7 +58,8 @@ def read_table(path: Path, columns: list[str], step: float | None) -> States:
             if len(first) < SHOWN:
                 first.append(cells)
     if not width:
-        raise StoreError(f"{path}: holds no row of numbers")
+        # a row with some numbers in it was meant to be one
+        raise wrong if header and len(bad) < len(header) else StoreError(f"{path}: holds no row of numbers")
     return of_rows(path, np.frombuffer(numbers).reshape(-1, width), first, columns, header, step)
 
 
@@ -87,7 +87,7 @@ def _cells(line: str) -> list[str]:
     text = line.strip(" ").lstrip("#%").strip(" ")
     if ";" in text or "\t" in text:
         # there a comma stands for a decimal point
-        parts = [re.sub(r"^([+-]?\d*),(\d+)", r"\1.\2", _bare(x)) for x in re.split(r"[;\t]", text)]
+        parts = [re.sub(r"^([+-]?\d*),(\d+)(?![\d.,])", r"\1.\2", _bare(x)) for x in re.split(r"[;\t]", text)]
     else:
         # a name may contain a blank, as in "t [s]", where columns have another separator
         parts = [*map(_bare, text.split(","))] if "," in text else text.split()

@@ -167,7 +167,8 @@ def gather(path: Path) -> Content:
     summary = store.summary(path)
     studies, banks, run = sections(summary)
     if not summary.runs and not studies:
-        raise SpringcheckError(f"{path}: holds no trajectory and no study to report")
+        rest = "" if summary.complete else " yet: give the command that writes it again, it goes on"
+        raise SpringcheckError(f"{path}: holds no trajectory and no study to report{rest}")
     text = store.scene_text(path) if "scene" in summary.root else ""
     name = str(summary.root.get("scene_name") or path.stem)
     scene = scenefile.parse(text, name=name, where=str(path)) if text else None
