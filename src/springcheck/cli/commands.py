@@ -325,7 +325,7 @@ COMMANDS = (
         argument("--stiffness", type=float, metavar="K", help="is this the stiffness?"),
         argument("--friction", type=float, metavar="C", help="is this the friction c of a force -c v?"),
         argument("--mass", type=float, metavar="M",
-                 help="mass of every particle in the file's unit, where it has none"),
+                 help="mass of every particle in the file's unit (default: the file's)"),
         _NAMES,
         argument("--step", type=float, metavar="H", help="is this the time step?"),
         argument("--scheme", metavar="NAME", help="is this the scheme?"),

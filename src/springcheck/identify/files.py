@@ -297,13 +297,9 @@ def identify_file(
 
 
 def identify_states(
-    states: FileStates,
-    *,
-    mass: float | None = None,
-    stiffness: float | None = None,
-    friction: float | None = None,
-    step: float | None = None,
-) -> Identification:
+    states: FileStates, *, mass: float | None = None, stiffness: float | None = None,
+    friction: float | None = None, step: float | None = None,
+) -> Identification:  # fmt: skip
     """Identify the states of a file; a stated mass overrides the file's.  Raises IdentificationError."""
     m = states.mass if mass is None else np.full(states.q.shape[1], mass)
     found = identify_arrays(
@@ -316,7 +312,10 @@ def identify_states(
 
 
 def _of_the_mass(states: FileStates, m: Floats | None) -> tuple[str, ...]:
-    """Note on the mass that momenta over velocities give, where none (n,) is stated or that differs."""
+    """Note on the file's mass, or that of momenta over velocities, where it is not the stated one (n,)."""
+    if states.mass is not None and m is not None and np.any(states.mass != m):
+        i = int(np.argmax(states.mass != m))
+        return (f"the file has mass {states.mass[i]:.6g}, and the stated one, {m[i]:.6g}, was taken",)
     if states.p is None or states.v is None or not np.any(states.v):
         return ()
     i = int(np.argmax(np.max(np.abs(states.v), axis=0)))
