@@ -26,6 +26,7 @@ from springcheck.physics.trajectory import Trajectory
 from springcheck.studies.census import baths, rigid, table
 from springcheck.studies.census import measure as census
 from springcheck.studies.census.limit import _of_states, first_limit
+from springcheck.studies.census.page import banks
 from springcheck.studies.census.result import ENTRIES, Entry
 from springcheck.studies.team import Processes
 from springcheck.thermal import THERMOSTATS
@@ -55,6 +56,8 @@ def test_each_method_is_named_by_its_states(capsys: pytest.CaptureFixture[str]) 
     assert main(["plot", "c.h5"]) == 0
     assert Path("figures/c/census.png").stat().st_size > 10_000
     restored = census.stored("c.h5")
+    (drawn,) = banks(restored)
+    assert drawn.heading.startswith("The blog's spring by 3 methods of 1 engine: ")
     assert [x.method for x in restored.entries] == list(OWN)
     assert np.array_equal(restored.entries[0].q, driver.run(load_scene("spring"), OWN[0]).q[:, 0])
 

@@ -390,6 +390,8 @@ def test_each_method_in_a_bath_has_a_line_and_states_of_its_own() -> None:
         assert [one.name for one in banks[name].charts[0].curves if not one.over] == list(both), name
     assert [one.text for one in banks["energy"].charts[0].labels] == ["BAOA"]
     assert "(phase portrait of particle 0 of 2, x)" in banks["phase-portrait"].heading
+    # of one seed engines may draw the same noise
+    assert "one random motion of each method" in banks["position"].heading
     assert "a few periods" not in banks["position"].heading
     drawn = render.picture(banks["temperature"])
     assert drawn.axes[0].get_ylim()[1] >= len(both)

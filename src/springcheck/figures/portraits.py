@@ -220,7 +220,7 @@ def positions(runs: Runs, shown: Sequence[View], truth: Motion | None, whole: Ru
     charts = [_position(runs, view, truth, span, alone=len(shown) == 1) for view in shown for span in spans]
     parts = "" if len(spans) == 1 else f"; the first and the last {PERIODS_SHOWN} periods"
     few = "; a few periods" if spans[-1][1] < _last(runs) else ""
-    bath = f"every method draws noise of its own{few}"
+    bath = f"one random motion of each method{few}"
     off = _off(whole, shown[0]) if runs.scene.bath is None else bath
     said = _heading(f"{shown[0].what}{_of(runs, shown)}{runs.part}", off) + parts
     size = (7.6 if len(spans) == 1 else 5.0, 3.8 if len(shown) == 1 else 1.9)

@@ -46,9 +46,9 @@ def banks(census: Census) -> list[Bank]:
         curves=[exact, *curves],
         equal=True,
     )
-    engines = len({engine(x.method) for x in census.entries})
+    engines = count(len({engine(x.method) for x in census.entries}), "engine")
     heading = (
-        f"The blog's spring by {len(census.entries)} methods of {engines} engines: how it is attached "
+        f"The blog's spring by {count(len(census.entries), 'method')} of {engines}: how it is attached "
         "decides the scheme (m = k = 1, h = 0.1, 200 steps)"
     )
     return [
