@@ -11,6 +11,7 @@ import pytest
 import springcheck
 from springcheck import checks, driver
 from springcheck.checks import Case, causes
+from springcheck.engines import Arithmetic
 from springcheck.identify import files
 from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
@@ -30,6 +31,18 @@ def test_the_way_of_a_push_is_read_off_positions(name: str, said: str) -> None:
     assert (said in shown) if said else shown == ""
     right = driver.run(scene, "own:velocity-verlet")
     assert causes.found(Case(trajectory=right, scene=scene)) == ""
+
+
+def test_states_in_single_precision_that_none_declares_are_said_to_be_so() -> None:
+    def step(q, p, h, force, mass):  # type: ignore[no-untyped-def]
+        p = np.float32(p + h * force(q))
+        return np.float32(q + h * p / mass), p
+
+    scene = scenefile.load_scene("spring-uneven")
+    run = springcheck.simulate(scene, step)
+    assert "single arithmetic explains every step" in said(scene, run)
+    declared = replace(run, arithmetic=Arithmetic(name="single", state=2.0**-24, force=2.0**-24))
+    assert said(scene, declared) == ""
 
 
 @pytest.mark.parametrize("name", ["baoab", "lammps-langevin", "bussi"])

@@ -16,7 +16,7 @@ from springcheck.formats import columns as columns_of
 from springcheck.identify.laws import COUPLED
 from springcheck.identify.record import of_size
 from springcheck.identify.report import identify_arrays
-from springcheck.identify.result import Identification
+from springcheck.identify.result import UNTOLD, Identification
 from springcheck.identify.storage import ROUNDING
 from springcheck.identify.taken import seen_to_take
 from springcheck.physics import scenefile as scenes
@@ -243,8 +243,9 @@ def sentence(run: Trajectory, mass: Floats, stiffness: Floats | None = None, *, 
         found = identify_arrays(run.t[frames], q, p, mass=mass[chosen], stiffness=k)
     except IdentificationError:
         return ""
-    # that they are of the scheme which they failed to be is no cause
-    return "" if found.fits and run.scheme in (found.scheme, *found.aliases) else found.statement
+    # that they are of the scheme which they failed to be is no cause, but that they are so in single may be
+    plain = found.precision in ("double", UNTOLD) or run.arithmetic.state > 2.0**-53
+    return "" if plain and found.fits and run.scheme in (found.scheme, *found.aliases) else found.statement
 
 
 def shown(scene: Scene, run: Trajectory, about: int) -> str:
