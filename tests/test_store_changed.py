@@ -14,6 +14,7 @@ import pytest
 
 from springcheck import store
 from springcheck.cli import main
+from springcheck.physics import scenefile
 from springcheck.store import checking, seal
 
 pytestmark = pytest.mark.usefixtures("own_folder", "tried_here", "sketched")
@@ -90,6 +91,18 @@ def test_a_store_that_another_program_wrote_to_is_named(
     edited(whole, lambda file: file.attrs.create("note", "of mine"))
     assert main(command) == 1
     assert "s.h5 is not what was written" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("command", ["plot", "report"])
+def test_a_changed_store_is_named_before_what_becomes_of_it(
+    whole: Path, command: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As one into which the runs of another scene were merged, of which no figure can be drawn."""
+    edited(whole, lambda file: file.attrs.modify("scene", scenefile.text_of("chain")))
+    assert main([command, "s.h5"]) == 2
+    first, second = capsys.readouterr().err.splitlines()
+    assert "s.h5 is not what was written" in first
+    assert "s.h5" in second
 
 
 def test_a_changed_trajectory_is_not_exported(whole: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -65,26 +65,26 @@ def _plot(options: Namespace) -> int:
         if options.trajectory is not None or options.step is not None:
             raise SpringcheckError(f"{path}: --trajectory and --step go with the file of another program")
         doubts = output.doubts(options.file)
+        output.warn(options.file, doubts)
         chosen = {name: getattr(options, name) for name in ("particle", "quantity", "over")}
         written, notes = drawing.draw(path, into, **chosen)
-    output.warn(options.file, doubts)
     if not options.quiet:
-        for line in (*notes, *written):
-            print(plain(line))
+        print(*map(plain, (*notes, *written)), sep="\n")
     return int(bool(doubts))
 
 
 def _report(options: Namespace) -> int:
+    from springcheck import store
     from springcheck.cli import page
 
     path = Path(options.file)
     into = Path(options.output or f"{path.stem}.html")
-    content = page.gather(path)
-    size = page.write(content, into)
-    output.warn(options.file, output.listed(content.not_trusted))
+    doubts = store.doubts(path)
+    output.warn(options.file, output.listed(doubts))
+    size = page.write(page.gather(path, doubts), into)
     if not options.quiet:
         print(plain(f"{into}: {size / 1e3:.0f} kB"))
-    return int(bool(content.not_trusted))
+    return int(bool(doubts))
 
 
 def _show(options: Namespace) -> int:

@@ -162,8 +162,8 @@ class Content:
         return shlex.quote(self.summary.path.name)
 
 
-def gather(path: Path) -> Content:
-    """Gather the contents of a report.  SpringcheckError where a store has neither trajectory nor study."""
+def gather(path: Path, doubts: Sequence[Damage] | None = None) -> Content:
+    """The contents of a report; `doubts` as far as known.  SpringcheckError without trajectory and study."""
     summary = store.summary(path)
     studies, banks, run = sections(summary)
     if not summary.runs and not studies:
@@ -187,7 +187,7 @@ def gather(path: Path) -> Content:
         known=_known(summary),
         sections=tuple(studies),
         summary=summary,
-        not_trusted=tuple(store.doubts(path)),
+        not_trusted=tuple(store.doubts(path) if doubts is None else doubts),
         # failures come first
         methods=tuple(sorted(_methods(summary, verdicts), key=lambda one: not one.count(False))),
         explained={
