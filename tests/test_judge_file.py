@@ -211,6 +211,21 @@ def test_single_precision_in_the_digits_of_double_is_judged_as_single(tmp_path: 
     assert any(v.passed is False for v in verdicts(tmp_path, rows)[0].values())
 
 
+def test_a_scheme_of_a_bath_is_refused_where_there_is_none(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, mine, text = tmp_path / "a.csv", tmp_path / "mine.py", tmp_path / "mine.toml"
+    text.write_text(SCENE.to_toml())
+    np.savetxt(path, np.c_[T, Q, P], fmt="%.17g", delimiter=",", header="t,q,p", comments="")
+    mine.write_text("def step(q, p, h, force, mass):\n    return q, p\n")
+    assert main(["judge", str(path), "--scene", str(text), "--scheme", "baoab"]) == 2
+    assert "baoab needs a bath, which [bath] gives: scene mine has none" in capsys.readouterr().err
+    store = tmp_path / "s.h5"
+    assert main(["run", "spring", "--stepper", f"{mine}:step", "--scheme", "baoab", "-o", str(store)]) == 2
+    assert "for scenes with a bath" in capsys.readouterr().err
+    assert not store.with_suffix(".h5.parts").exists()
+
+
 def test_identify_says_which_mass_it_took(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "a.csv"
     np.savetxt(path, np.c_[T, Q, P, P], fmt="%.17g", delimiter=",", header="t,q,v,p", comments="")

@@ -40,6 +40,7 @@ from springcheck.checks.requires import CONTRACTED, REQUIREMENTS
 from springcheck.checks.rods import rod_length, rod_velocity, turn
 from springcheck.checks.solver import tolerance, tolerance_bound
 from springcheck.checks.steps import BLIND, arithmetic, border, bridges, first_off, step_defect
+from springcheck.errors import MethodError
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Limits, Trajectory, Verdict
 from springcheck.text.wording import STATES_SHOW
@@ -111,8 +112,7 @@ def summary(verdicts: Sequence[Verdict]) -> str:
 def explained(
     scene: Scene, run: Trajectory, verdicts: Sequence[Verdict], shown: Callable[[Scene, Trajectory, int], str]
 ) -> list[Verdict]:
-    """The verdicts, the first failed one with its cause appended, as the states around its first step off
-    show.
+    """The verdicts, the first failed one with its cause appended, by the states around its first step off.
 
     `shown(scene, run, frame)` is that sentence, "" where the states show nothing.
     """
@@ -170,13 +170,14 @@ def judge(
 ) -> list[Verdict]:
     """Verdicts of all checks on a trajectory of this scene, or on a piece that may begin after the start.
 
-    Checks that do not apply are included, `passed` None.  By default the checks follow from the scheme's
-    kind.
+    Checks that do not apply are included, `passed` None.  By default they follow from the scheme's kind.
     """
     case = Case(trajectory=trajectory, scene=scene, piece=piece)
-    if checks is None:
-        checks = RANDOM if case.law.has("random") else CHECKS
-    return shared([one(case) for one in checks])
+    if (random := case.law.has("random")) and scene.bath is None:
+        raise MethodError(
+            f"{trajectory.scheme} needs a bath, which [bath] gives: scene {scene.name} has none"
+        )
+    return shared([one(case) for one in ((RANDOM if random else CHECKS) if checks is None else checks)])
 
 
 def not_exercised(scene: Scene) -> str:

@@ -267,7 +267,7 @@ def refusal(scene: Scene, label: Label) -> str | None:
         if able:
             serve = f"the thermostats of {mine} are {', '.join(able[:3])}{more}"
         return f"{what.scheme} has no noise, and the scene has a bath; {serve}"
-    if what.generator and not scene.bath:
+    if (what.generator or what.scheme in THERMOSTATS) and not scene.bath:
         return "it is a thermostat, for scenes with a bath: --temperature or [bath] gives one"
     of_bath = THERMOSTATS[what.scheme] if what.generator else None
     if of_bath and of_bath.rescales and of_bath.draws and not any(scene.p):
