@@ -377,6 +377,17 @@ def test_an_orbit_of_negative_energy_that_stays_has_not_spiralled_in() -> None:
     assert "in gravity: states off by at most" in of_runs(scene, made, made)[0].heading
 
 
+def test_a_run_that_stays_by_an_exact_motion_that_runs_away_has_not_left_it() -> None:
+    """Off the top of a hill e**20 away RK4 is off by 5e3 of the start, 1e-5 of the motion."""
+    spring = scenefile.load_scene("spring")
+    (term,) = spring.terms
+    scene = replace(spring, terms=(replace(term, k=-term.k),))
+    made = runs(scene, "own:rk4", "own:velocity-verlet")
+    for bank in of_runs(scene, made, made):
+        if bank.name != "energy":
+            assert "leave" not in bank.heading, bank.heading
+
+
 def test_each_method_in_a_bath_has_a_line_and_states_of_its_own() -> None:
     """Of one scheme, with noise of their own; and the name of the bath has a row above those of methods."""
     scene = replace(scenefile.load_scene("bath-dumbbell"), steps=600)

@@ -20,6 +20,7 @@ from springcheck import driver, engines, schemes
 from springcheck.physics import builders
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.arrays import Extended
+from springcheck.physics.driven import ModulatedSpring
 from springcheck.physics.terms import Damping, Quartic
 from springcheck.studies.choose import LeftOut
 from springcheck.studies.run import measure as session
@@ -255,6 +256,19 @@ def test_the_frequency_of_a_scene_in_a_field_is_said_to_be_that_without_it() -> 
     study = stability.record(scenes.load_scene("foucault"), None, ["own:euler"])
     said = next(str(line) for line in STUDY.lines(study) if "fastest angular frequency" in str(line))
     assert "without its field: w = 1.30609" in said
+
+
+def test_the_frequency_of_a_modulated_spring_with_friction_is_said_to_be_its_largest() -> None:
+    """At its start the stiffness is 2.4335 (1 + 0.031 cos 1), by which w would be 1.11222."""
+    term = ModulatedSpring(
+        i=np.array([0]), k=np.array([2.4335]), depth=np.array([0.031]), frequency=np.array([1.1]),
+        phase=np.array([1.0]), at=np.array([0.0]),
+    )  # fmt: skip
+    still = builders.spring(m=2.0, k=2.4335, q=0.3, p=0.7)
+    scene = replace(still, terms=(term, Damping(i=[0], c=[0.2])))
+    study = stability.record(scene, None, ["own:velocity-verlet"])
+    said = next(str(line) for line in STUDY.lines(study) if "fastest angular frequency" in str(line))
+    assert "its modulated springs at their stiffest, without its friction: w = 1.12003" in said
 
 
 def test_a_method_that_cannot_serve_the_scene_has_no_largest_step_there(need: Need) -> None:

@@ -50,9 +50,7 @@ GROUPS: Mapping[str, Sequence[str]] = {
     "known of the motion": ("--mass", "--stiffness", "--differences"),
     "how much is measured": ("--thorough", "--budget", "--quick", "--workers", "--cluster"),
     "figures": ("--particle", "--quantity", "--over"),
-    "output": (
-        "output", "--output", "--force", "--json", "--quiet", "--verdicts", "--rows", "--points",
-    ),
+    "output": ("output", "--output", "--force", "--json", "--quiet", "--verdicts", "--rows", "--points"),
     "continuous integration": tuple(f"--{name}" for name in REPORT_FORMS),
 }  # fmt: skip
 """Headings in the order of the help, with the arguments below each."""

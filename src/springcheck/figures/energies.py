@@ -157,18 +157,16 @@ def orbits(runs: Runs, parts: Runs, exact: Exact) -> str:
             said[way].append(group.title)
     turns = max(periods(x) for x in parts.longest.q.T[:MOST_TURNING])
     if turns >= 1 and (said["spirals out"] or said["spirals in"]):
-        many = {
-            "spirals out": "spiral out",
-            "spirals in": "spiral in",
-            "keeps to its orbit": "keep to their orbits",
-        }
+        many = {"spirals out": "spiral out", "spirals in": "spiral in"}
+        many["keeps to its orbit"] = "keep to their orbits"
         return "; ".join(
             f"{names[0]} {way}" if len(names) == 1 else f"{len(names)} {many[way]}"
             for way, names in said.items()
             if names
         )
     some = {name: x for name, x in off.items() if np.isfinite(x)}
-    return extremes(some, "states off by at most {}", beyond=MOST_DRAWN) if some else ""
+    far = MOST_DRAWN * exact.reach(runs.longest) if some else np.inf
+    return extremes(some, "states off by at most {}", beyond=far) if some else ""
 
 
 def _scale(found: Sequence[Floats], true: Floats | None) -> Frame:
@@ -262,7 +260,8 @@ def error(runs: Runs, exact: Exact) -> Bank:
     charts = decades(runs, found, name, title, known=True)
     largest = _largest(runs, found)
     some = {label: x for label, x in largest.items() if np.isfinite(x)}
-    said = extremes(some, "off the exact solution by at most {}", beyond=MOST_DRAWN) if some else "errors"
+    far = MOST_DRAWN * exact.reach(runs.longest)
+    said = extremes(some, "off the exact solution by at most {}", beyond=far) if some else "errors"
     return runs.bank("error", charts, said, (7.2, 4.2 if len(charts) == 1 else 2.6))
 
 

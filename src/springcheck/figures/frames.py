@@ -130,8 +130,6 @@ def nearer(x: Floats, y: Floats, a: Frame, b: Frame) -> tuple[Floats, Floats]:
         return x, y
     x, y = x[: min(ends) + 1], y[: min(ends) + 1]
     # in extended precision: 1e300 over a half width of 1e-200 overflows
-    u, v = (
-        (np.asarray(one, np.longdouble) - its.centre) / its.half for one, its in ((x, a), (y, b))
-    )  # fmt: skip
+    u, v = ((np.asarray(one, np.longdouble) - its.centre) / its.half for one, its in ((x, a), (y, b)))
     scale = np.maximum(1, np.maximum(np.abs(u), np.abs(v)) / FAR_OFF)
     return tuple(np.asarray(w / scale * its.half + its.centre, np.float64) for w, its in ((u, a), (v, b)))  # type: ignore[return-value]

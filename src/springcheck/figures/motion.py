@@ -70,6 +70,11 @@ class Exact:
         q, p = self.at(run)
         return np.maximum(self.scene.system.norm(run.q - q, run.p - p), self.uncertainty(run.t))
 
+    def reach(self, run: Trajectory) -> float:
+        """How far it goes from its start in the time of a run, or 1, relative to the initial energy norm."""
+        q, p = self.at(run)
+        return max(1.0, float(np.max(self.scene.system.norm(q - q[0], p - p[0]))))
+
     def uncertainty(self, t: Floats) -> Floats:
         """Its uncertainty at these times (f,), relative to the initial energy norm."""
         times = np.linspace(0, float(np.max(np.abs(t))), BOUNDS)

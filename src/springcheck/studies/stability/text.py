@@ -54,7 +54,8 @@ def _of_scene(study: Stability) -> Lines:
         return [plain("  nothing in this scene oscillates: no step is too long for its stability")]
     if not w and not scene.system.is_damped:
         return [plain("  nothing in this scene oscillates at its start, which says nothing of where it goes")]
-    there = ", where its motion is stiffest" if has_true_motion(scene) else ", at its start"
+    most = ", its modulated springs at their stiffest" * any(x.key == "modulated-spring" for x in scene.terms)
+    there = ", where its motion is stiffest" if has_true_motion(scene) else f", at its start{most}"
     where = "" if scene.system.is_linear else there
     left = {"friction": scene.system.is_damped, "field": any(x.kind == "magnetic" for x in scene.terms)}
     where += "".join(f", without its {name}" for name, acts in left.items() if acts)
@@ -71,7 +72,7 @@ def _of_scene(study: Stability) -> Lines:
         said = f"the exact motion {bounded} (Floquet)"
         out.append(plain(f"  in each period of its modulation, {period:.4g}, {said}"))
     elif not scene.system.is_linear:
-        said = "limits of small oscillations there; an anharmonic motion may be lost below them"
+        said = "limits of small oscillations there; an anharmonic or modulated motion may be lost below them"
         out.append(plain(f"  {said}", "dim"))
     return out
 
