@@ -80,3 +80,12 @@ def test_collisions_of_particles_mix_modes_which_then_have_no_law_of_their_own()
     alone = springcheck.load_scene("bath-spring")
     found = heated_of(alone, [driver.run(alone, "own:andersen-leapfrog", seed=4)])
     assert abs(found.kinetic - found.kinetic_law) < 5 * found.kinetic_error < 1
+
+
+def test_what_is_held_is_seen_where_a_run_that_diverges_still_is() -> None:
+    """`run bath-well --all` ended in a LinAlgError: Euler-Maruyama leaves a quartic well."""
+    scene = springcheck.load_scene("bath-well")
+    run = driver.run(scene, "own:euler-maruyama", seed=1)
+    assert run.outcome.status == "diverged"
+    assert bound_freedoms(scene, run.q) == 1
+    assert heated_of(scene, [run]).method == "own:euler-maruyama"

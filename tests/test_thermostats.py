@@ -155,6 +155,19 @@ def test_a_mean_and_a_variance_of_one_coordinate_are_not_made_up_for_by_another(
     assert chance.mean(x + 0.05 * np.array([1, 0, 0, 0, 0, -1])).chance < 1e-15
 
 
+def test_draws_alike_all_along_a_run_are_said_to_be_as_often_as_is_said() -> None:
+    """The chances of periodograms are exact, of one number and of few; none is of a single step."""
+    rng = np.random.default_rng(17)
+    for f, c in ((1, 3), (2, 1), (7, 2), (24, 1), (113, 3)):
+        x = rng.standard_normal((2000, f, c))
+        for one, z in ((chance.mean, x), (chance.variance, chance.normal_sizes(x))):
+            found = np.array([chance.steady(one(y), w).chance for y, w in zip(x, z, strict=True)])
+            for level in (0.1, 0.01):
+                off = np.mean(found <= level) - level
+                assert off < 5 * np.sqrt(level / len(found)), (f, c)
+                assert f == 1 or off > -5 * np.sqrt(level / len(found)), (f, c)
+
+
 def test_what_is_known_before_a_draw_foretells_it_as_seldom_as_is_said() -> None:
     """Momenta that forget slowly, of the draws themselves: their correlation is not normal."""
     rng = np.random.default_rng(9)

@@ -52,8 +52,7 @@ def _read(case: Case, q: Floats, p: Floats) -> Reading:
 
 
 def _unread(case: Case) -> int:
-    """Frames before the first draw that can be read: one that acts in two steps is not recorded at the
-    start."""
+    """Frames before the first draw that can be read: of one that acts in two steps the start has none."""
     return int(thermostat(case).carried > 0 and case.steps[0] == 0)
 
 
@@ -123,14 +122,15 @@ def _drawn(case: Case) -> Floats:
 
 @check("mean", family="noise", requires={"every-step"})
 def draws_mean(case: Case) -> Chance:
-    """The draws have mean 0."""
-    return Chance.of(thermal.chance.mean(_drawn(case)))
+    """The draws have mean 0, all along the run."""
+    return Chance.of(thermal.chance.steady(thermal.chance.mean(x := _drawn(case)), x))
 
 
 @check("var", family="noise", requires={"every-step"})
 def draws_variance(case: Case) -> Chance:
-    """The draws have variance 1: the noise is that of the temperature, the masses and the friction."""
-    return Chance.of(thermal.chance.variance(_drawn(case)))
+    """The draws have variance 1 all along the run: their size is that of temperature, masses and friction."""
+    x = _drawn(case)
+    return Chance.of(thermal.chance.steady(thermal.chance.variance(x), thermal.chance.normal_sizes(x)))
 
 
 @check("shape", family="noise", requires={"every-step"})

@@ -123,6 +123,50 @@ def variance(x: Floats) -> Statistic:
     return Statistic(draws=x.size, sums=(np.sum(x * x, axis=0),), law=law, limits=limits)
 
 
+def steady(one: Statistic, z: Floats) -> Statistic:
+    """A statistic, or whether standard normal numbers z (f, c) of its draws are alike all along a run.
+
+    Their periodogram shows what comes and goes: that of each piece, and that of the sums of pieces.
+    """
+
+    def law(n: int, one: Statistic, inside: tuple[float, str], sums: Floats) -> tuple[float, str]:
+        (found, words), (chance, period) = one.found, min(inside, _periodic(sums, "pieces"))
+        return min(1.0, 2 * min(found, chance)), words + period * (chance < found)
+
+    def join(a: Sums, b: Sums) -> Sums:
+        return a[0] + b[0], (1.0, ""), np.concatenate([a[2], b[2]])
+
+    # no normal number is larger
+    z = np.clip(z, -40, 40)
+    sums = one, _periodic(z, "rows of draws"), np.sum(z, axis=0, keepdims=True) / math.sqrt(len(z))
+    return replace(one, sums=sums, law=law, join=join, limits=lambda n, chance: one.limits(n, chance / 2))
+
+
+def _periodic(z: Floats, rows: str) -> tuple[float, str]:
+    """Chance, and period in words, of the largest ordinate of the periodograms of normal numbers z (f, c), of
+    each column and of all: each has an exponential law, or that of chi-squared where it alternates."""
+    from scipy.special import erfc
+
+    # every second, third, fourth, and sixth row is then a period
+    f, c = len(z) - len(z) % 12 * (len(z) > 100), z.shape[1]
+    z = np.concatenate([z, np.sum(z, axis=1, keepdims=True) / math.sqrt(c)], axis=1)[:f, c == 1 :]
+    powers = np.abs(np.fft.rfft(z, axis=0)[1:]) ** 2 / f
+    chances = np.exp(-powers)
+    chances[(f - 1) // 2 :] = erfc(np.sqrt(powers[(f - 1) // 2 :] / 2))
+    if not chances.size:
+        return 1.0, ""
+    k, j = np.unravel_index(np.argmin(chances), chances.shape)
+    words = f", but not alike all along: with a period of {f / (k + 1):.4g} of {f} {rows}"
+    return min(1.0, chances.size * float(chances[k, j])), words
+
+
+def normal_sizes(x: Floats) -> Floats:
+    """The sizes |x| of normal draws as the normal numbers of the same rank; of 0 that is -inf."""
+    from scipy.special import erfc, ndtri
+
+    return np.asarray(-ndtri(erfc(np.abs(x) / math.sqrt(2))))
+
+
 def shape(x: Floats) -> Statistic:
     """Skewness and weight of the tails of draws x (...), whatever the variance.
 

@@ -60,7 +60,10 @@ def bound_freedoms(scene: Scene, q: Floats) -> int:
         return int(np.count_nonzero(system.modes.w2))
     if scene.n > MOST_DENSE:
         return scene.n - len(system.free_groups)
-    there = system.hessian(q[np.linspace(0, len(q) - 1, PLACES).astype(int)]).astype(np.float64)
+    with np.errstate(all="ignore"):
+        there = system.hessian(q[np.linspace(0, len(q) - 1, PLACES).astype(int)]).astype(np.float64)
+    # of a run that diverges where it still has one, as at its start
+    there = there[np.isfinite(there).all(axis=(1, 2))]
     size = np.sqrt(np.max(np.abs(there), axis=(0, 1)))
     size[size == 0] = 1
     return int(np.linalg.matrix_rank((there / size / size[:, None]).reshape(-1, scene.n), tol=RESISTED))
