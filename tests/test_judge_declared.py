@@ -262,3 +262,27 @@ def test_velocities_that_are_differences_pass_where_that_is_declared(
         found = file.judge(path, differences=declares, **given)
         assert found.status == 1
         assert "differences" not in checks.cause_of(found.verdicts)
+
+
+def test_velocities_of_rattle_that_are_differences_are_said_to_be() -> None:
+    """A mass on a rod in gravity: SHAKE's positions, and (q' - q)/h, half a kick, less its part along the
+    rod."""
+    scene = replace(scenefile.load_scene("rigid-pendulum"), steps=200, step=0.002)
+    run = springcheck.simulate(scene, "own:velocity-verlet")
+    h, m, force = scene.step, scene.m, scene.system.force(scene.q, scene.p)
+    q, p = [scene.q], [scene.p]
+    at = np.array([0.2, 0.1])
+    for _ in range(200):
+        free = q[-1] + h * (p[-1] + h / 2 * force) / m
+        # the k near 0 that restores the length of u - k rod
+        rod, u = q[-1] - at, free - at
+        b, c = u @ rod / (rod @ rod), (u @ u - 0.65**2) / (rod @ rod)
+        q.append(free - c / (b + np.sqrt(b * b - c)) * rod)
+        kicked, rod = m * (q[-1] - q[-2]) / h + h / 2 * force, q[-1] - at
+        p.append(kicked - (kicked @ rod) / (rod @ rod) * rod)
+    q, p = np.array(q), np.array(p)
+    mine = replace(run, q=q, p=p, energy=scene.system.energy(q, p))
+    found = springcheck.judge(scene, mine)
+    assert "step-defect" in {v.check for v in found if v.passed is False}
+    assert "differences of the positions and half a kick" in found.cause
+    assert failed(scene, replace(mine, rebuilds_velocity=True)) == set()

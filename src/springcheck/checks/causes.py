@@ -60,9 +60,11 @@ def _of_differences(case: Case) -> str:
     for more, n, kick in (("", 1, 0.0), (" over two steps", 2, 0.0), (" and half a kick", 1, 0.5)):
         q, p = (x[1 : len(x) - n + 1] for x in (run.q, run.p))
         made = m * (run.q[n:] - run.q[:-n]) / (n * run.step)
-        off = np.abs(p - made - kick * run.step * case.system.force(q, p))
-        allowed = DIFFERENCE_ROUNDINGS * run.arithmetic.state * (np.abs(p) + np.abs(made))
-        are = not run.rebuilds_velocity and np.all(off <= allowed)
+        right, size = made + kick * run.step * case.system.force(q, p), np.abs(p) + np.abs(made)
+        if rods := case.system.rods:
+            right, size = rods.projected(q, right), np.max(size, axis=1, keepdims=True)
+        off = np.abs(p - right) / (DIFFERENCE_ROUNDINGS * run.arithmetic.state)
+        are = not run.rebuilds_velocity and np.all(off <= size)
         if are and step_defect(replace(case, trajectory=replace(run, rebuilds_velocity=True))).passed:
             return (
                 f"velocities are differences of the positions{more}, which keep eps q/h of them, and each "
@@ -74,10 +76,8 @@ def _of_differences(case: Case) -> str:
 def _of_rods(case: Case) -> str:
     """The direction of the impulses along rods, where it is not that of the rods before the drift."""
     rods, run = case.system.rods, case.trajectory
-    if rods is None or rods.share or len(run.t) < 3:
-        return ""
     drifts = [kind for kind in case.scheme.kinds if kind.drifts]
-    if len(drifts) != 1:
+    if rods is None or rods.share or len(run.t) < 3 or len(drifts) != 1:
         return ""
     scene = case.judged
     free = scene.derived(terms=tuple(x for x in scene.terms if x.kind != "constraint"))
