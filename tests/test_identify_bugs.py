@@ -463,3 +463,10 @@ def test_a_state_that_changes_once_and_stands_still_after_is_told() -> None:
     q[0], v[0] = 2.1, -0.3
     found = identify(0.3 * np.arange(15), q, v=v, mass=1.3)
     assert not found.fits
+
+
+def test_two_runs_in_one_file_are_said_to_be_two() -> None:
+    """The second begins at the start again; it was called a restart from numbers of 1 digit."""
+    _, q, p = run(right, 120)
+    found = identify(H * np.arange(240), np.tile(q, 2), np.tile(p, 2), mass=M, stiffness=K)
+    assert "between frames 119 and 120, as where another run begins" in found.statement

@@ -232,7 +232,7 @@ def as_trajectory(
         row = int(np.argmax(off > allowed))
         raise StoreError(
             f"{path}: row {row + 1} is at t = {states.t[row]:.12g}; frames lie whole steps of "
-            f"{scene.step:g} apart in scene {scene.name}"
+            f"{scene.step:g} apart in scene {scene.name}, of all frames as many as of the first two"
         )
     if np.any(states.t != t):
         notes.append(TIMES)

@@ -187,12 +187,12 @@ def _interruption(e: Evidence, found: Map, run: NDArray[np.intp], whose: str) ->
         for kick, state, when in ((back, from_, first), (off, to, at)):
             if abs(kick[0]) < 1e-2 * abs(kick[1]):
                 return _kicked(e, found, float(kick[1]), float(state[0]), when, whose)
-        digits = -math.log10(max(float(np.max(np.abs(back))), 1e-16))
-        return (
-            f"The motion{whose} jumps by {10**-digits:.1e} of its size between frames {first} and {at}, as "
-            f"after a restart from numbers of {count(max(1, round(digits)), 'digit')}",
-            "write restarts in full precision",
-        )
+        size = max(float(np.max(np.abs(back))), 1e-16)
+        jumps = f"The motion{whose} jumps by {size:.1e} of its size between frames {first} and {at}, as"
+        if (digits := round(-math.log10(size))) < 1:
+            return f"{jumps} where another run begins", "give each run a file of its own"
+        restart = f"after a restart from numbers of {count(digits, 'digit')}"
+        return f"{jumps} {restart}", "write restarts in full precision"
     if len(run) == 2 and near(z[last + 1], b @ (b @ z[first])):
         off = (z[last] - b @ z[first]).astype(np.float64)
         return f"{but} frame {last} is wrong: {_amount(off, z[last])}", "look at how that frame is written"
