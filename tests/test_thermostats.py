@@ -183,6 +183,32 @@ def test_what_is_known_before_a_draw_foretells_it_as_seldom_as_is_said() -> None
     assert chance.foretold(x + 0.15 * p, p).chance < 1e-9
     assert chance.foretold(x, p).chance > 0.1
     assert chance.foretold(np.where(p > 3, np.inf, x), p).chance == 0.0
+    found = chance.foretold(x * np.sqrt(1 + 0.3 * np.sign(p)), np.concatenate([p, np.abs(p) - 0.8])).found
+    assert found[0] < 1e-9
+    assert "of the size of draws with the momentum before, of 4000 draws" in found[1]
+
+
+@pytest.mark.parametrize(
+    ("where", "what"),
+    [(lambda q, p: np.sign(p), "the momentum"), (lambda q, p: np.sign(q), "the force"),
+     (lambda q, p: np.sign(np.abs(p) - 0.674), "the size of momenta")],
+)  # fmt: skip
+@pytest.mark.parametrize("name", ["baoab", "obabo", "gj-i"])
+def test_noise_whose_strength_depends_on_the_state_is_seen(name: str, where: Any, what: str) -> None:
+    """Too hot by 15 % in one half of the states and too cold in the other; all else of it is right."""
+    scene = replace(scenefile.load_scene("bath-spring"), steps=20_000)
+    stepper = Stepper.of(THERMOSTATS[name], scene, width=np.float64)
+    rng, size, number = np.random.default_rng(7), np.sqrt(scene.m * scene.thermal), THERMOSTATS[name].draws
+    push, states = forces(THERMOSTATS[name], scene.system), [(scene.q, scene.p)]
+    for _ in range(scene.steps):
+        q, p = states[-1]
+        draws = np.sqrt(1 + 0.15 * where(q, p / size)) * rng.standard_normal((number, 1))
+        states.append(stepper(q, p, push, list(draws), False))
+    q, p = (np.array(x, np.float64) for x in zip(*states, strict=True))
+    run = replace(driver.run(scene, f"own:{name}", seed=1), q=q, p=p, energy=scene.system.energy(q, p))
+    (failed,) = (v for v in springcheck.judge(scene, run) if v.passed is False)
+    assert failed.check == "draws-state"
+    assert f"of the size of draws with {what} before" in failed.why
 
 
 DRAG_ALONE = ("baoab", "baoa", "gj-i", "gj-i-half", "bbk", "obabo", "vanden-eijnden-ciccotti", "bussi")

@@ -102,10 +102,8 @@ def _draws(case: Case) -> Floats:
         raise MethodError(limit)
     found = reading(case)
     if not found.known:
-        few = scheme.fresh < 3 or (
-            case.judged.system.is_linear and case.scene.n <= thermal.jointly.MOST_JOINTLY
-        )
-        raise MethodError(HIDDEN if few else NOT_SUMMED)
+        summed = case.judged.system.is_linear and case.scene.n <= thermal.jointly.MOST_JOINTLY
+        raise MethodError(HIDDEN if scheme.fresh < 3 or summed else NOT_SUMMED)
     x = found.draws
     if scheme.uniform and not case.scene.system.rods:
         x = thermal.chance.normal_scores(x)
@@ -186,9 +184,9 @@ def draws_particles(case: Case) -> Chance | str:
 
 @check("state", family="noise", requires={"every-step"})
 def draws_state(case: Case) -> Chance | str:
-    """The draws of a step say nothing of the state that it starts from: drag and forces are right.
+    """The draws of a step and their sizes say nothing of the state before: drag, forces, noise are right.
 
-    A drag that is not that of the noise, or a wrong force, leaves a part of the state in each draw.
+    A drag that is not that of the noise, a wrong force, or noise by place leaves a part of it in each draw.
     """
     x, hits = _draws(case), reading(case).hits
     if case.scene.system.rods:
@@ -202,6 +200,8 @@ def draws_state(case: Case) -> Chance | str:
         k = np.abs(scene.system.hessian_diagonal(scene.q)).astype(np.float64)
         size = np.sqrt(np.where(k > 0, k, np.inf) * scene.thermal)
         known.append(scene.system.potential_force(q, 0 * p) / size)
+        # less the mean size of normal numbers
+        known += [np.abs(y) - np.sqrt(2 / np.pi) for y in known]
     y = np.asarray(known, np.float64)
     x = x.reshape(len(q), -1, x.shape[1]).transpose(1, 0, 2)
     if hits is not None:

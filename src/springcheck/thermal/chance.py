@@ -275,20 +275,22 @@ def neighbours(x: Floats) -> Statistic:
 
 def foretold(x: Floats, y: Floats) -> Statistic:
     """How well numbers y (k, s, n) of the usual size 1, each known before its draws x (u, s, n), go with
-    those of one column, or of all n together.
+    those of one column, or of all n together, or with the sizes of these; a draw of 0 is none.
 
     With S = sum x y and V = sum y**2, exp(l S - l**2 V/2) is 1 in the mean however y comes of draws before;
     so is its average over normal l of variance 1/t, and the product of several x, which is 1/a or more with
     a chance of at most a (Robbins, Ann. Math. Stat. 41 (1970) 1397): no less than the chance, for any s.
     """
-    names = ("the momentum", "the force") if len(y) > 1 else ("the size of momenta",)
+    names = ("the momentum", "the force", "the size of momenta", "the size of forces")[-2 * (len(y) == 1) :]
+    sized = np.where(x == 0, 0, np.clip(normal_sizes(x), -40, 40))
 
     @np.errstate(all="ignore")
     def law(n: int, s: int, products: Floats, known: Floats, squares: float) -> tuple[float, str]:
         size = np.sqrt(squares / len(products) * np.sum(known, axis=1))
         each = np.sum(products, axis=2) / size
         u, i = np.unravel_index(np.argmax(np.where(np.isfinite(each), np.abs(each), np.inf)), each.shape)
-        words = f"correlation {each[u, i]:+.2e} with {names[i]} before, of {n} draws"
+        what = "of the size of draws with" if u >= len(each) // 2 else "with"
+        words = f"correlation {each[u, i]:+.2e} {what} {names[i]} before, of {n} draws"
         if not math.isfinite(squares):
             return 0.0, words
         columns = known.shape[-1]
@@ -297,8 +299,9 @@ def foretold(x: Floats, y: Floats) -> Statistic:
         logs = np.sum(np.log1p(V / t) / 2 - S * S / (2 * (V + t)), axis=0)
         return min(1.0, float(logs.size) * math.exp(min(float(np.min(logs)), 0.0))), words
 
+    x = np.concatenate([x, sized])
     sums = x.shape[1], np.einsum("usn,ksn->ukn", x, y), np.sum(y * y, axis=1), float(np.sum(x * x))
-    return Statistic(draws=x.size, sums=sums, law=law)
+    return Statistic(draws=x.size // 2, sums=sums, law=law)
 
 
 def count(hits: int, n: int, p: float) -> Statistic:
