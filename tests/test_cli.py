@@ -133,6 +133,15 @@ def test_plot_draws_four_pictures_twice(capsys: pytest.CaptureFixture[str]) -> N
     written = {Path(line).name for line in capsys.readouterr().out.splitlines()}
     assert written == {f"{a}.{b}" for a in PICTURES for b in ("png", "svg")}
     assert all((Path("pictures") / name).stat().st_size > 10_000 for name in written)
+    assert main(["plot", "spring.h5", "--trajectory", "own:euler", "-o", "one"]) == 0
+    assert {path.name for path in Path("one").iterdir()} >= {"states.png", "states.svg"}
+    assert "spring.h5, own:euler: crosses its mean" in Path("one/states.svg").read_text()
+    for more in (
+        ["--step", "0.1"],
+        ["--trajectory", "own:nothing"],
+        ["--trajectory", "own:euler", "--over", "h"],
+    ):
+        assert main(["plot", "spring.h5", *more]) == 2
 
 
 def test_list_names_every_scene_engine_and_check(capsys: pytest.CaptureFixture[str]) -> None:

@@ -166,9 +166,8 @@ def junit(command: str, found: Sequence[Case]) -> bytes:
     suite = ElementTree.Element("testsuite", name=f"springcheck {command}", tests=str(len(found)))
     numbers = {"failures": 0, "errors": 0, "skipped": 0}
     for x in found:
-        case = ElementTree.SubElement(
-            suite, "testcase", classname=_text(x.subject), name=_text(x.name), time="0"
-        )
+        names = {"classname": _text(x.subject), "name": _text(x.name)}
+        case = ElementTree.SubElement(suite, "testcase", names, time="0")
         if x.passed:
             continue
         kind, key = ("failure", "failures") if x.passed is False else ("skipped", "skipped")

@@ -55,19 +55,19 @@ def _plot(options: Namespace) -> int:
     into = Path(options.output or Path("figures", path.stem))
     if into.suffix in (".png", ".svg", ".pdf") and not into.is_dir():
         raise SpringcheckError(f"-o {into}: a folder is needed, figures have names of their own in it")
-    doubts: list[dict[str, str]] = []
-    if path.is_file() and (options.columns or not formats.is_store(path)):
+    ours = not options.columns and (not path.is_file() or formats.is_store(path))
+    if ours and options.step is not None:
+        raise SpringcheckError(f"{path}: --step goes with the file of another program")
+    doubts = output.doubts(options.file) if ours else []
+    output.warn(options.file, doubts)
+    if ours and options.trajectory is None:
+        chosen = {name: getattr(options, name) for name in ("particle", "quantity", "over")}
+        written, notes = drawing.draw(path, into, **chosen)
+    else:
         if options.quantity or options.over:
             raise SpringcheckError(f"{path}: --quantity and --over go with the store of an ensemble")
         which = {"columns": _columns(options), "step": options.step, "trajectory": options.trajectory}
         written, notes = drawing.draw_foreign(path, into, particle=options.particle, **which)
-    else:
-        if options.trajectory is not None or options.step is not None:
-            raise SpringcheckError(f"{path}: --trajectory and --step go with the file of another program")
-        doubts = output.doubts(options.file)
-        output.warn(options.file, doubts)
-        chosen = {name: getattr(options, name) for name in ("particle", "quantity", "over")}
-        written, notes = drawing.draw(path, into, **chosen)
     if not options.quiet:
         print(*map(plain, (*notes, *written)), sep="\n")
     return int(bool(doubts))

@@ -117,7 +117,8 @@ def draw_foreign(
         Chart(title=f"{name} over q.", x=q, y=Scale(name=name), curves=curves(found.q, other, joined=False)),
         Chart(title="q over time.", x=t, y=q, curves=curves(found.t[:, None], found.q, joined=True)),
     ]
-    heading = f"{path.name}: {_found(found.q[:, chosen[0]], len(found.t))}"
+    which = f", {trajectory}" if trajectory else ""
+    heading = f"{path.name}{which}: {_found(found.q[:, chosen[0]], len(found.t))}"
     bank = Bank(name="states", title="Coordinates", charts=charts, heading=heading, size=(4.4, 3.8))
     folder.check(files_of(bank.name), into, path)
     with style(), interrupts.folder() as made:

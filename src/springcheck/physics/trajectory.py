@@ -178,7 +178,7 @@ class Trajectory:
         """Write t, q, p (and m, energy) as .csv or .npz, every double so that it reads back exactly.
 
         A .csv has columns t, q0, p0, q1 ..., energy, m0, m1 ...; `springcheck.identify` and the command read
-        both.  SpringcheckError where it cannot be written.
+        both.  A file of this name is replaced.  SpringcheckError where it cannot be written.
         """
         place, masses = Path(path), {} if self.scene is None else {"m": self.scene.m}
         try:
