@@ -7,8 +7,10 @@ every trajectory of the corpus that went through its body is identified anew, in
 the module without it.  It has a case where something is then said that is worse than with it: a wrong name, a
 false sentence, less than before, or an exception.  PART is a part of the name of the modules (all).
 
-It needs coverage (`pip install coverage`), and takes 40 minutes on two idle cores.  Printed are the rules
-without which nothing in the corpus is worse, with the trajectories that go through each, and their number.
+It needs coverage (`pip install coverage`).  Tracing the corpus takes a minute and a half of the processor, a
+rule a second where a trajectory dies soon, and up to 20 where none does.  Printed are the rules without which
+nothing in the corpus is worse, with the trajectories that go through each, and their number; for `clock` "of
+10 rules 4 have a case; 6, of 22 lines, have none in the corpus".
 Many of these refuse what is no motion, or word a note, which the corpus does not look at.
 """
 
