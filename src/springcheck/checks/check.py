@@ -57,9 +57,8 @@ class Chance(NamedTuple):
 
     @property
     def decades(self) -> float:
-        """Minus the decimal logarithm of the chance."""
-        with np.errstate(divide="ignore"):
-            return float(-np.log10(np.float64(self.chance)))
+        """Minus the decimal logarithm of the chance; 308 of one that is too small for a number."""
+        return float(-np.log10(np.maximum(self.chance, np.finfo(np.float64).tiny)))
 
 
 FALSE_ALARMS = 1e-6
