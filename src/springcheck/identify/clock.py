@@ -54,6 +54,10 @@ def clock_of(t: Floats) -> Clock:
     grids.append(float(np.max(written.quantum(t))))
     # an interval is the difference of two rounded times; an accumulated clock rounds once more in every step
     quantum = next((x for x in grids if off[worst] <= 4 * x), None)
+    cut = written.name.startswith("text") and quantum == grids[-1]
+    if cut and (off[worst] > 1.5 * grids[-1] or abs(interval / grids[-1] - 1) < 0.1):
+        # a cut is by the last digit at most, and times one digit apart are not cut: a frame is there twice
+        quantum = None
     if quantum is None:
         quantum = next((x for x in grids[: 1 + single] if off[worst] <= (4 + MOST_ADDED / 2) * x), None)
     if quantum is None:

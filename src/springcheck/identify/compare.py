@@ -166,8 +166,7 @@ def solved(
         out.append(
             Match(
                 family=every.families[which].name, stride=stride, turns=int(roots.turns[x.root[i]]),
-                a=a,
-                a_error=float(errors[0, i]), g=g, g_error=float(errors[1, i]), log_mass=log_mass,
+                a=a, a_error=float(errors[0, i]), g=g, g_error=float(errors[1, i]), log_mass=log_mass,
                 mass_error=float(errors[2, i]), chi2=float(chi2[i]), freedom=max(freedom, 1),
                 predicted=tuple(entries[:, i].astype(np.longdouble)),
             )
@@ -176,13 +175,9 @@ def solved(
 
 
 def compare(
-    maps: list[Map],
-    terms: list[Terms],
-    families: tuple[Family, ...],
-    strides: Iterable[int],
-    *,
-    far: bool = False,
-) -> list[Joint]:
+    maps: list[Map], terms: list[Terms], families: tuple[Family, ...], strides: Iterable[int], *,
+    far: bool = False
+) -> list[Joint]:  # fmt: skip
     """Families and strides that fit every oscillator, the simplest first; with `far` all, at their best.
     What one oscillator excludes is not tried on the others."""
     steps = list(strides)

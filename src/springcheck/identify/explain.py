@@ -21,11 +21,11 @@ from springcheck.identify.evidence import (
 )
 from springcheck.identify.families import title
 from springcheck.identify.hypothesis import FEW, distinct
-from springcheck.identify.interrupted import few_bad_frames
+from springcheck.identify.interrupted import broken, few_bad_frames, two_parts
 from springcheck.identify.laws import Regression, alone, explained_by, regression
 from springcheck.identify.misplaced import misplaced, turned
 from springcheck.identify.result import Explanation
-from springcheck.identify.unknown import lasting, memory, misfit
+from springcheck.identify.unknown import ONE_MAP, lasting, memory, misfit
 from springcheck.identify.wrong import wrong_map
 from springcheck.text.wording import count
 
@@ -51,9 +51,18 @@ def explain(seen: Measured) -> tuple[Explanation, ...]:
     if out := turned(seen.record, seen.moving) or _drift(evidence):
         return (out,)
     if np.max(evidence.excess) <= LINEAR_LEAVES:
-        return tuple(wrong_map(evidence)) or (misfit(evidence),)
+        vague = [_vague(evidence)] if seen.record.vague else []
+        return tuple(vague or wrong_map(evidence)) or (misfit(evidence),)
     found = (look(evidence) for look in SEARCHED)
     return (next(filter(None, found), None) or _law(evidence),)
+
+
+def _vague(e: Evidence) -> Explanation:
+    return Explanation(
+        f"{ONE_MAP}, but the times are written too coarsely to say whose: they leave the step open by "
+        f"{e.record.jitter:.1e} of it, and the states have all their digits",
+        "write the times with all their digits as well, or state the step with all of its (--step)",
+    )
 
 
 def _solver(e: Evidence) -> Explanation | None:
@@ -191,8 +200,10 @@ def _unexplained(e: Evidence, counted: float) -> Explanation:
             * (e.record.q.shape[1] == 1),
             e.size,
         )
+    # quanta of a force show in steps of a particle of known mass, and not in a normal mode
+    single = " or forces in single precision" * (e.record.mass is None and ratio < 0.2 and e.size < 2.0**-24)
     return Explanation(
-        f"Noise: what one map leaves over is irregular, {e.size:.1e} of the state's size in each "
+        f"Noise{single}: what one map leaves over is irregular, {e.size:.1e} of the state's size in each "
         f"frame, in {where}, and has no quanta of a known arithmetic",
         "look for a thermostat, an iteration that stops early, or a sum in changing order",
         e.size,
@@ -200,7 +211,7 @@ def _unexplained(e: Evidence, counted: float) -> Explanation:
 
 
 SEARCHED = (
-    misplaced, partial(alone, laws.DRY), memory, few_bad_frames, partial(alone, laws.COUPLED), lasting,
-    _solver,
+    misplaced, partial(alone, laws.DRY), memory, few_bad_frames, two_parts, broken,
+    partial(alone, laws.COUPLED), lasting, _solver,
 )  # fmt: skip
 """Causes of the map's residuals, in the order in which they are looked for; `_law` comes last."""

@@ -18,7 +18,7 @@ from springcheck.identify.maps import powers, unit
 from springcheck.identify.result import Explanation
 from springcheck.identify.storage import ROUNDING
 from springcheck.physics.arrays import Extended, Floats
-from springcheck.text.wording import count
+from springcheck.text.wording import count, few
 
 FEW_BAD = 0.06
 """Largest share of bad pairs."""
@@ -34,6 +34,12 @@ HALF_STEP = 1e-3
 
 AT_AN_END = 3
 """Bad pairs among the smallest, or largest, `AT_AN_END` times as many pairs are there by no chance."""
+
+OF_ROUNDING = 8.0
+"""Largest residual of a pair, in units of `Evidence.unit`, of a part that is one map to rounding."""
+
+LEFT_BY_ALL = 1e-10
+"""Largest residual of a map of all coordinates, relative to their sizes, that is rounding."""
 
 FEWEST_PAIRS = 8
 """Fewest pairs beside the bad ones, and of those that move."""
@@ -131,7 +137,7 @@ def few_bad_frames(e: Evidence) -> Explanation | None:
         cause = f"{cause}, and so every {spacing.pop()} steps"
     elif len(runs) > 1:
         at = ", ".join(str(run[0] + 1) for run in runs[1:5])
-        cause = f"{cause}, and {len(runs) - 1} more like it, at frames {at}"
+        cause = f"{cause}, and {len(runs) - 1} more like it, at frame{'s' * (len(runs) > 2)} {at}"
     largest = float(np.min(size[bad])) > max(float(np.max(size[kept])) / 2, LARGER * middle)
     if (len(bad) > 1 and largest) or (several and float(np.min(ranks)) >= e.pairs - AT_AN_END * len(bad)):
         cause = (
@@ -139,6 +145,61 @@ def few_bad_frames(e: Evidence) -> Explanation | None:
             "too few to tell whether the force is anharmonic, or the step or a force changes in time"
         )
     return Explanation(cause, remedy, after / before, local=True)
+
+
+def two_parts(e: Evidence) -> Explanation | None:
+    """One map up to a frame and another from there on, each to rounding."""
+    frames = np.arange(e.pairs if e.pairs >= 2 * FEWEST_PAIRS else 0)
+
+    def off(found: Map) -> Floats:
+        return np.asarray(np.max(np.abs(found.residuals(e.found)), axis=1) / (OF_ROUNDING * e.unit))
+
+    for half in (frames < e.pairs // 2, frames >= e.pairs // 2) if len(frames) else ():
+        parts = [fit(e.record, e.j, kept=half)]
+        bad = np.flatnonzero(off(parts[0]) > 1)
+        if len(bad) < FEWEST_PAIRS or np.any(half[bad]):
+            continue
+        at = int(bad[0] if half[0] else bad[-1] + 1)
+        rest = (frames >= at) == half[0]
+        parts.insert(int(half[0]), fit(e.record, e.j, kept=rest))
+        if all(x.conditioned for x in parts) and np.all(off(parts[int(half[0])])[rest] <= 1):
+            fits = [titles(x.scheme for x in matched(part, e.terms)) for part in parts]
+            before, after = (f" of {x}" if x else "" for x in fits)
+            return Explanation(
+                f"The motion is one{before} up to frame {at}, another{after} from there on: the step, the "
+                "stiffness or the friction changes there",
+                "look for what changes there, as a restart with another step, or give one of the parts",
+                local=True,
+            )
+    return None
+
+
+def broken(e: Evidence) -> Explanation | None:
+    """A few bad pairs of a coupled motion: one map of all coordinates takes every other frame to the next."""
+    moving, record = e.record.moving, e.record
+    z = np.concatenate([record.q[:, moving], record.v[:, moving]], axis=1).astype(np.float64)
+    quanta = np.concatenate([record.q_quantum[:, moving], record.v_quantum[:, moving]], axis=1)
+    size = np.maximum(np.max(np.abs(z), axis=0), np.finfo(np.float64).tiny)
+    columns, ends = np.column_stack([z[:-1] / size, np.ones(e.pairs)]), z[1:] / size
+    part, room = e.pairs // 3, LEFT_BY_ALL + 32 * float(np.max(quanta / size))
+    if len(moving) < 2 or part < 2 * columns.shape[1]:
+        return None
+    for begin in (0, part, 2 * part):
+        kept = np.arange(e.pairs) // part == begin // part
+        for _ in range(2):
+            off = np.max(np.abs(ends - columns @ np.linalg.lstsq(columns[kept], ends[kept])[0]), axis=1)
+            left = float(np.max(off[kept]))
+            kept = off <= LARGER**2 * max(left, ROUNDING)
+        bad = np.flatnonzero(~kept)
+        if left < room and 0 < len(bad) <= max(3, FEW_BAD * e.pairs):
+            runs = np.split(bad, np.flatnonzero(np.diff(bad) > 1) + 1)
+            at = [f"from frame {x[0]} to {x[-1] + 1}" for x in runs]
+            return Explanation(
+                f"The coupled motion is that of one map of all coordinates, but not {few(at, 3)}",
+                "look at how those frames are written, at the start and at restarts, or leave them out",
+                local=True,
+            )
+    return None
 
 
 def _damped(found: Map, e: Evidence) -> str:
@@ -195,7 +256,9 @@ def _interruption(e: Evidence, found: Map, run: NDArray[np.intp], whose: str) ->
         return f"{jumps} {restart}", "write restarts in full precision"
     if len(run) == 2 and near(z[last + 1], b @ (b @ z[first])):
         off = (z[last] - b @ z[first]).astype(np.float64)
-        return f"{but} frame {last} is wrong: {_amount(off, z[last])}", "look at how that frame is written"
+        begins = "; or a scheme of several steps begins so" if first == 0 else ""
+        cause = f"{but} frame {last} is wrong: {_amount(off, z[last])}{begins}"
+        return cause, "look at how that frame is written"
     if len(run) == 3 and near(z[first + 2], b @ z[first]):
         cause = f"{but} frames {first + 1} and {first + 2} have changed places"
         return cause, "sort the frames by time"

@@ -29,10 +29,14 @@ def judged(
     """Select the oscillators that can be judged, and check stated numbers.  Raises IdentificationError."""
     stated = of_size("stiffness", stiffness, record.q.shape[1], zero=True)
     of_size("friction", friction, zero=True)
+    remarks: list[str] = []
+    stride = stated_stride(record, step, remarks)
+    if step is not None and stride is not None and stride > 0 and record.vague:
+        record = replace(record, interval=stride * np.longdouble(step))
     of, moving, maps, notes = _oscillators(record)
     if of is not record:
         stated = None
-    stride = stated_stride(of, step, notes)
+    notes += remarks
     if of.momenta and stated is None:
         notes.append(
             "neither mass nor velocities nor stiffness are known, so only three numbers of each map count: "

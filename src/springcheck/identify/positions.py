@@ -51,7 +51,8 @@ def identify_positions(
         )
     strides = range(stride, stride + 1) if stride is not None and stride > 0 else FEW
     every = {j: recurrence(record, j, strides.stop - 1) for j in moving}
-    free = [j for j in moving if not _forced(every[j])]
+    # of what no single line explains, the size of the force says nothing
+    free = [j for j in moving if every[j].precision and not _forced(every[j])]
     moving = [j for j in moving if j not in free]
     if not moving:
         raise IdentificationError(
@@ -60,7 +61,7 @@ def identify_positions(
     if free:
         notes.append(f"{len(free)} of {len(free) + len(moving)} coordinates show no force, and are left out")
     found = [every[j] for j in moving]
-    if any(x.phase <= 0 for x in found):
+    if any(x.phase <= 0 and (x.precision or not x.beta < 1) for x in found):
         raise IdentificationError(
             "the motion does not turn: without velocities one that dies or grows alone shows no scheme"
         )
@@ -91,7 +92,7 @@ def identify_positions(
 
 
 def _forced(x: Recurrence) -> bool:
-    return float(x.alpha) > SURE * math.sqrt(x.covariance[0, 0])
+    return abs(float(x.alpha)) > SURE * math.sqrt(x.covariance[0, 0])
 
 
 def _all_preserve(found: list[Recurrence]) -> bool:
@@ -175,6 +176,9 @@ def _known(seen: Measured, found: list[Recurrence], kept: list[Joint], known: bo
         law = f" with {said}" if said else " with friction" if all(damped) else ""
         notes += law_assumed(candidates) if all(damped) else []
         whose = held_over(joints[0]) if scheme == HELD.scheme else title(scheme)
+        if scheme == HELD.scheme and joints[0].endless:
+            whose += f", or {FAMILIES['fault: old force'].cause}"
+            fields |= {"verdict": "not told apart", "scheme": None, "aliases": ()}
         statement = f"{whose}{law}{frames}, by positions alone: {rounded_by(precision)} explains them"
     else:
         listed = names[:6] + ([f"{len(names) - 6} more"] if len(names) > 6 else [])
@@ -191,15 +195,10 @@ def _known(seen: Measured, found: list[Recurrence], kept: list[Joint], known: bo
         notes.append("a damped spring of another stiffness may have the same positions")
     share = 1 / stride if stride else math.nan
     return Identification(
-        **fields,
-        statement=statement,
-        determinant=tuple(math.exp(x.log_det * share) for x in found),
-        symplectic_defect=max(abs(float(x.beta)) for x in found),
-        defect_ulp=max(x.ulp for x in found),
-        precision=precision,
-        fits=True,
-        notes=tuple(dict.fromkeys(notes)),
-    )
+        **fields, statement=statement, determinant=tuple(math.exp(x.log_det * share) for x in found),
+        symplectic_defect=max(abs(float(x.beta)) for x in found), defect_ulp=max(x.ulp for x in found),
+        precision=precision, fits=True, notes=tuple(dict.fromkeys(notes)),
+    )  # fmt: skip
 
 
 def _none(seen: Measured, found: list[Recurrence], joints: list[Joint]) -> Identification:
@@ -225,7 +224,6 @@ def _none(seen: Measured, found: list[Recurrence], joints: list[Joint]) -> Ident
     return nothing(
         (Explanation(cause, remedy, worst.residual),),
         determinant=tuple(math.exp(x.log_det) for x in found),
-        symplectic_defect=max(abs(float(x.beta)) for x in found),
-        defect_ulp=max(x.ulp for x in found),
+        symplectic_defect=max(abs(float(x.beta)) for x in found), defect_ulp=max(x.ulp for x in found),
         notes=seen.notes,
-    )
+    )  # fmt: skip

@@ -150,14 +150,9 @@ class Identification:
 
 
 def nothing(
-    explanations: tuple[Explanation, ...],
-    *,
-    determinant: tuple[float, ...],
-    symplectic_defect: float,
-    defect_ulp: float,
-    notes: Sequence[str],
-    **near: Any,
-) -> Identification:
+    explanations: tuple[Explanation, ...], *, determinant: tuple[float, ...], symplectic_defect: float,
+    defect_ulp: float, notes: Sequence[str], **near: Any
+) -> Identification:  # fmt: skip
     """Identification without a scheme, and why.  `determinant` has one value for each moving oscillator;
     `near` holds what is known of the nearest scheme."""
     unknown = (math.nan,) * len(determinant)

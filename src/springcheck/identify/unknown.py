@@ -38,6 +38,9 @@ UNKNOWN_METHOD = "a one-step method that is not known here, which"
 AS_IT_WAS = 0.1
 """Relative error of the coefficient of z[n-1], which is 1, in the two-step leapfrog."""
 
+AS_BEFORE = 1e-3
+"""Share of what the first frames miss up to which the first state leads to those after them by one map."""
+
 FEWEST_WITH_MEMORY = 12
 """Fewest frames for a map of two states."""
 
@@ -99,10 +102,10 @@ def _class(e: Evidence) -> str:
     with np.errstate(divide="ignore", invalid="ignore"):
         a = 2 * (1 - x) / y
         beta, gamma = (1 / y - 1) / a, (1 - u) / (a * y)
-        chosen = 0 <= beta <= 1 and abs(beta - np.rint(CHOSEN * beta) / CHOSEN) * a < room
+        chosen = abs(beta - np.rint(CHOSEN * beta) / CHOSEN) * a < room
     # any map that keeps areas and is symmetric is one of gamma = 1/2 on some spring, or in some mass
     other = stated is None or symmetric
-    own = (chosen or not other) and (stated is None or abs(stated - a) < room)
+    own = 0 <= beta <= 1 and (chosen or not other) and (stated is None or abs(stated - a) < room)
     if own and abs(z + a * (1 - gamma + gamma * x)) < room < AGREES * a and e.record.fine:
         return f"{MAP_OF}Newmark's method with beta = {beta:.6g}, gamma = {gamma:.6g}"
     keeps = abs(det - 1) <= SURE * float(np.max(error) * max(size, 1 / size)) + 1e-13
@@ -209,6 +212,11 @@ def memory(e: Evidence) -> Explanation | None:
     start = np.max(np.abs(later.residuals(e.found)), axis=1)
     before, weighted = (float(np.max(x[1:])) for x in (start / size, e.weight * start))
     if before < rounding or weighted < FALLS * found.worst:
+        return None
+    last = int(np.flatnonzero(start > 8 * e.unit)[-1]) + 1
+    goes_on = later.z[last] - np.linalg.matrix_power(later.entries, last) @ later.z[0]
+    if np.max(np.abs(goes_on)) < AS_BEFORE * np.max(start):
+        # frames between are written wrongly: what is remembered would have moved those that follow
         return None
     whose = either(_remembered(e, later))
     kind = "several steps or with an acceleration of its own (Adams, BDF, generalised alpha, Gear)"

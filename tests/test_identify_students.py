@@ -1,0 +1,167 @@
+"""Loops and files as students write them: what is said of them is true, whatever their clocks and breaks."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from springcheck.errors import IdentificationError
+from springcheck.identify import Identification, identify
+from springcheck.physics.arrays import Floats
+
+M, K, Q, V, H = 3.7, 2.9, 0.3, 0.7 / 3.7, 0.1
+Step = Callable[[float, float, float], tuple[float, float]]
+
+
+def verlet(q: float, v: float, h: float, k: float = K) -> tuple[float, float]:
+    a = -k * q / M
+    q = q + h * v + h * h / 2 * a
+    return q, v + h / 2 * (a - k * q / M)
+
+
+def kick_drift(q: float, v: float, h: float) -> tuple[float, float]:
+    v = v - h * K * q / M
+    return q + h * v, v
+
+
+def states(step: Step, h: float = H, frames: int = 201, early: float = 1.0, until: int = 0) -> Floats:
+    """Rows t, q, v; the step is `early` times as long until a frame."""
+    rows = [(0.0, Q, V)]
+    for i in range(frames - 1):
+        _, q, v = rows[-1]
+        rows.append(((i + 1) * h, *step(q, v, h * early if i < until else h)))
+    return np.array(rows)
+
+
+def rounded(x: Floats, form: str) -> Floats:
+    return np.array([float(format(y, form)) for y in x.tolist()])
+
+
+def seen(rows: Floats, **stated: float) -> Identification:
+    t, q, v = rows.T
+    return identify(t, q, v=v, **stated)
+
+
+@pytest.mark.parametrize("h", [0.1, 0.2, 0.04])
+@pytest.mark.parametrize("kept", [[*range(101), *range(100, 201)], [*range(90), *range(91, 201)]])
+@pytest.mark.parametrize("form", [".17g", ".6g"])
+def test_a_frame_twice_or_missing_is_no_rounding_of_tidy_times(h: float, kept: list[int], form: str) -> None:
+    rows = states(verlet, h)
+    t, q, v = rounded(rows[:, 0], ".2f")[kept], *(rounded(x, form)[kept] for x in rows.T[1:])
+    with pytest.raises(IdentificationError, match=r"constant interval: frames (100|89) and (101|90)"):
+        identify(t, q, v=v)
+
+
+@pytest.mark.parametrize(("h", "form"), [(1 / 30, ".3f"), (1 / 3, ".1f"), (math.pi / 50, ".4f")])
+@pytest.mark.parametrize("step", [verlet, kick_drift])
+def test_times_of_few_digits_beside_states_of_all_name_no_wrong_cause(
+    h: float, form: str, step: Step
+) -> None:
+    rows = states(step, h)
+    rows[:, 0] = rounded(rows[:, 0], form)
+    for stated in ({}, {"mass": M}, {"mass": M, "stiffness": K}):
+        found = seen(rows, **stated)
+        assert "times are written too coarsely" in found.statement
+        assert "--step" in found.explanations[0].remedy
+    name = {verlet: "velocity-verlet", kick_drift: "semi-implicit-euler"}[step]
+    found = seen(rows, mass=M, stiffness=K, step=h)
+    assert found.fits
+    assert found.scheme == name
+
+
+@pytest.mark.parametrize("form", [".17g", ".7g"])
+@pytest.mark.parametrize("until", [21, 100, 150])
+@pytest.mark.parametrize("early", [0.5, 1.01, 2.0])
+def test_a_step_that_changes_once_is_said_to_change_at_its_frame(form: str, until: int, early: float) -> None:
+    rows = states(kick_drift, early=early, until=until)
+    q, v = (rounded(x, form) for x in rows.T[1:])
+    said = identify(rows[:, 0], q, v=v).statement
+    assert f"up to frame {until}, another of Semi-implicit Euler, kick-drift from there on" in said
+
+
+def test_newmark_s_parameters_are_those_that_somebody_may_have_chosen() -> None:
+    def doubled(q: float, v: float, h: float) -> tuple[float, float]:
+        u = v - h * K * q / M
+        return q + h * (v + u), u
+
+    assert "Newmark" not in seen(states(doubled), mass=M, stiffness=K).statement
+
+
+def test_forces_in_single_precision_are_not_called_noise_where_no_mass_shows_them() -> None:
+    def single(q: float, v: float, h: float) -> tuple[float, float]:
+        a = float(np.float32(-K) * np.float32(q)) / M
+        q = q + h * v + h * h / 2 * a
+        return q, v + h / 2 * (a + float(np.float32(-K) * np.float32(q)) / M)
+
+    assert seen(states(single)).statement.startswith("Noise or forces in single precision: ")
+    assert seen(states(single), mass=M).scheme == "velocity-verlet"
+
+
+def test_velocities_in_other_units_are_no_scheme_of_a_hundred_steps() -> None:
+    t, q, v = states(verlet).T
+    found = identify(t, rounded(q, ".6g"), v=rounded(1000 * v, ".6g"), mass=M, stiffness=K)
+    assert found.statement.startswith("Velocity Verlet, but velocities would have to be 0.001 times as large")
+
+
+@pytest.mark.parametrize("frame", [1, 2, 3])
+@pytest.mark.parametrize("of", [1, 2])
+def test_an_early_frame_that_is_written_wrongly_is_no_scheme_with_memory(frame: int, of: int) -> None:
+    rows = states(verlet)
+    rows[frame, of] += 1e-4
+    assert f"The motion is one of Velocity Verlet, but frame {frame} is wrong" in seen(rows).statement
+
+
+@pytest.mark.parametrize(
+    "wrong", ["velocities late", "no velocity", "frame 0 twice", "frame 50 twice", "one number"]
+)
+@pytest.mark.parametrize("form", [".17g", ".8g"])
+def test_a_bad_frame_of_a_chain_is_no_bath_no_drive_and_no_memory(wrong: str, form: str) -> None:
+    m, q, v = np.array([1.3, 0.7, 2.1]), np.array([0.2, 0.0, -0.1]), np.array([0.3, -0.4, 0.2])
+    k = np.array([[3.4, -1.1, 0.0], [-1.1, 4.8, -3.7], [0.0, -3.7, 4.6]])
+    rows = [(q, v)]
+    for _ in range(200):
+        v = v - H / 2 * k @ q / m
+        q = q + H * v
+        v = v - H / 2 * k @ q / m
+        rows.append((q, v))
+    t, (x, u) = np.arange(201) * H, np.array(rows).transpose(1, 0, 2)
+    first = int(wrong.split()[1]) if wrong.startswith("frame") else 0
+    if wrong == "velocities late":
+        u = np.concatenate([u[:1], u[:-1]])
+    elif wrong == "no velocity":
+        u[0] = 0
+    elif wrong == "one number":
+        x[5, 1] += 0.3
+    else:
+        kept = [*range(first + 1), *range(first, 200)]
+        x, u = x[kept], u[kept]
+    x, u = (rounded(a.ravel(), form).reshape(a.shape) for a in (x, u))
+    where = f"{first} to {first + 1}" if wrong != "one number" else "4 to 6"
+    assert identify(t, x, v=u).statement.endswith(f"one map of all coordinates, but not from frame {where}")
+
+
+def test_bad_frames_at_both_ends_are_counted_in_good_grammar() -> None:
+    t, q, _ = states(verlet).T
+    assert identify(t, q, v=np.gradient(q, t)).statement.endswith("1 more like it, at frame 200")
+
+
+def test_positions_alone_do_not_name_a_held_force_where_an_old_force_has_them_too() -> None:
+    def old(q: float, v: float, h: float) -> tuple[float, float]:
+        a = -K * q / M
+        return q + h * v + h * h / 2 * a, v + h * a
+
+    t, q, _ = states(old).T
+    found = identify(t, q, mass=M, stiffness=K)
+    assert found.scheme is None
+    assert "whose second half kick uses the old force" in found.statement
+
+
+def test_a_spring_that_pushes_and_wrapped_positions_show_a_force() -> None:
+    t, q, _ = states(lambda q, v, h: verlet(q, v, h, -K)).T
+    with pytest.raises(IdentificationError, match="the motion does not turn"):
+        identify(t, q)
+    t, q, _ = states(verlet).T
+    assert "not those of one linear scheme" in identify(t, (q + 0.25) % 0.5).statement
