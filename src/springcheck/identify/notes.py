@@ -157,9 +157,9 @@ def of_unasked_friction(found: Identification) -> Identification:
             n = parts[0]
             part = "h k/m" if n == 1 else f"h k/({n} m)"
             cause = (
-                f"{titles([one.scheme])} with a friction c/m = {rate:.6g} that was not stated and loses as much area "
-                f"as {part}: the mark of a scheme that is written down wrongly, or of an implicit one; state "
-                "the friction if not"
+                f"{titles([one.scheme])} with a friction c/m = {rate:.6g} that was not stated and loses as "
+                f"much area as {part}: the mark of a scheme that is written down wrongly, or of an implicit "
+                "one; state the friction if not"
             )
             remedy = "compare the factors 1/2 of the step with the scheme's"
             return found.refuted(cause, Explanation(cause, remedy))
