@@ -231,9 +231,8 @@ def as_trajectory(
     if every < 1 or np.any(off > allowed):
         row = int(np.argmax(off > allowed))
         raise StoreError(
-            f"{path}: row {row + 1} is at t = {states.t[row]:.12g}, and {states.t[0] + t[row]:.12g} is due "
-            f"there: frames lie whole steps of {scene.step:g} apart in scene {scene.name}, all as many as the "
-            "first two"
+            f"{path}: row {row + 1} is at t = {states.t[row]:.12g}, and {states.t[0] + t[row]:.12g} is due: "
+            f"frames lie whole steps of {scene.step:g} apart in scene {scene.name}, as the first two do"
         )
     if np.any(states.t != t):
         notes.append(TIMES)
