@@ -604,10 +604,7 @@ BAD = [
     ("t,q,p\n0,0.3,0.7\n0.1,0.3,0.7\nnan,0.3,0.7\n", "row 3 of t is not finite"),
     ("t,q,p\n0,0.3,0.7\ninf,0.3,0.7\n", "row 2 of t is not finite"),
     ("t,q,p\n0,5,7\n0.1,5,7\n", "frames lie whole steps of|off the start"),
-    (
-        "t,q,p\n0,0,1\n0.1,0.0998,0.995\n0.3,0.2955,0.955\n",
-        "row 3 is at t = 0.3, and 0.2 is due: .* as the first two do",
-    ),
+    ("t,q,p\n0,0.3,0.7\n0.1,0.3,0.7\n0.3,0.3,0.7\n", "row 3 is at t = 0.3, and 0.2 is due: frames lie"),
     ("t,q,p\n0,0.3,0.7\n0.1,0.3,0.7\n0.1,0.3,0.7\n", "row 3 is at t = 0.1, and 0.2 is due"),
     ("ITEM: TIMESTEP\n0\n", "damaged or cut off"),
     ("1\nProperties=species:S:1:pos:R:3\nX 0 0 0\n", "give its time step"),
