@@ -66,11 +66,13 @@ def _maps(
     every, which, (own_a, own_g, log_mass, stride) = _numbers(matches, np.longdouble)
     own_g = own_g + g
     out = every.frame(
-        which, (own_a + a) * (1 + longer) ** 2, np.where(every.held[which], own_g, own_g * (1 + longer)),
+        which,
+        (own_a + a) * (1 + longer) ** 2,
+        np.where(every.held[which], own_g, own_g * (1 + longer)),
         log_mass - np.log1p(longer) + (0 if between else np.log(stride)),
         stride.astype(np.float64) if between else np.ones(len(matches)),
         found.size[1] / found.size[0] * np.ones(len(matches), np.longdouble),
-    )  # fmt: skip
+    )
     return np.asarray(out.T.reshape(-1, 2, 2))
 
 

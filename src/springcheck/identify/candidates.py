@@ -205,10 +205,16 @@ def candidates_of(seen: Measured, joint: Joint) -> list[Candidate]:
             if any(abs(x - y) > z for x, y, z in zip(friction, rates, room, strict=True)):
                 continue
         candidate = Candidate(
-            scheme=joint.scheme, aliases=other_names(joint.scheme, damped=joint.damped), stride=joint.stride,
-            step=float(record.interval) / joint.stride, turns=max(part.turns for part in joint.parts),
-            omega=omega, stiffness=stiffness, friction=friction, law=f"{law} {family.place}".strip(),
-        )  # fmt: skip
+            scheme=joint.scheme,
+            aliases=other_names(joint.scheme, damped=joint.damped),
+            stride=joint.stride,
+            step=float(record.interval) / joint.stride,
+            turns=max(part.turns for part in joint.parts),
+            omega=omega,
+            stiffness=stiffness,
+            friction=friction,
+            law=f"{law} {family.place}".strip(),
+        )
         out.append(candidate)
     return out
 

@@ -175,9 +175,13 @@ def solved(
 
 
 def compare(
-    maps: list[Map], terms: list[Terms], families: tuple[Family, ...], strides: Iterable[int], *,
-    far: bool = False
-) -> list[Joint]:  # fmt: skip
+    maps: list[Map],
+    terms: list[Terms],
+    families: tuple[Family, ...],
+    strides: Iterable[int],
+    *,
+    far: bool = False,
+) -> list[Joint]:
     """Families and strides that fit every oscillator, the simplest first; with `far` all, at their best.
     What one oscillator excludes is not tried on the others."""
     steps = list(strides)

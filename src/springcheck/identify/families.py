@@ -101,11 +101,17 @@ def _of(scheme: Scheme, *, damped: bool) -> Family:
     implicit = damped and scheme.has("implicit")
     law = EXPONENTIAL if own else IMPLICIT if implicit else "" if scheme.has("flow") else EXPLICIT
     return Family(
-        name=scheme.name + (", damped" if damped else ""), scheme=scheme.name, stages=stages,
-        stability=stability_function(scheme.a, scheme.b) if scheme.b else ((), ()), damped=damped,
-        laws=((law,) if law else ("friction",)) if damped else (), place="", flow=scheme.has("flow"),
-        path=1 if scheme.has("flow") else roundings(scheme), limit=scheme.limit,
-    )  # fmt: skip
+        name=scheme.name + (", damped" if damped else ""),
+        scheme=scheme.name,
+        stages=stages,
+        stability=stability_function(scheme.a, scheme.b) if scheme.b else ((), ()),
+        damped=damped,
+        laws=((law,) if law else ("friction",)) if damped else (),
+        place="",
+        flow=scheme.has("flow"),
+        path=1 if scheme.has("flow") else roundings(scheme),
+        limit=scheme.limit,
+    )
 
 
 _ON_A_SPRING = tuple(

@@ -163,9 +163,13 @@ class _Solution:
 
 
 def _minimum(
-    z: Extended, sigma: Floats, process: Floats, start: _Solution | None, centred: int,
-    deviations: Extended | None
-) -> _Solution:  # fmt: skip
+    z: Extended,
+    sigma: Floats,
+    process: Floats,
+    start: _Solution | None,
+    centred: int,
+    deviations: Extended | None,
+) -> _Solution:
     """Gauss-Newton for the map, its constant part (`centred`: 0 none, 1 an equilibrium at rest, 2 any), and
     the effect of the clock's deviations on a step (4 further entries)."""
     n = 4 + centred

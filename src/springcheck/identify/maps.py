@@ -198,14 +198,17 @@ def table(families: tuple[Family, ...]) -> MapTable:
         "rational": [bool(family.stability[0]) for family in families],
     }
     return MapTable(
-        families=families, slots=_in_both_widths(_slots(families)), over=_in_both_widths(over),
+        families=families,
+        slots=_in_both_widths(_slots(families)),
+        over=_in_both_widths(over),
         under=_in_both_widths(under[: max([2, *(len(family.stability[1]) for family in families)])]),
         inside=_in_both_widths(np.array([not family.stages for family in families])),
         kinds=tuple((name, np.array(members)) for name, members in kinds.items() if any(members)),
         path=np.array([family.path for family in families], np.float64),
-        scaled=np.array([not _adds(family) for family in families]), held=np.array(kinds["held"]),
+        scaled=np.array([not _adds(family) for family in families]),
+        held=np.array(kinds["held"]),
         damped=any(family.damped for family in families),
-    )  # fmt: skip
+    )
 
 
 def _adds(family: Family) -> bool:

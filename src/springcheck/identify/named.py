@@ -139,14 +139,19 @@ def _known(seen: Measured, explained: Explained, stated_fits: bool) -> Identific
     undecided = undecided or (scheme is None and len(joints) == 1)
     statement = explanations[0].cause if explanations else statement
     return Identification(
-        **shared(candidates, len(maps), named=scheme is not None), statement=statement,
+        **shared(candidates, len(maps), named=scheme is not None),
+        statement=statement,
         velocity_offset=math.nan if offset is None else offset,
-        determinant=determinant if stride else unknown, symplectic_defect=symplectic,
-        defect_ulp=min(max(d.ulp for d in ds) for ds in explained.values()), precision=precision,
-        fits=stated_fits and not undecided, undecided=undecided,
+        determinant=determinant if stride else unknown,
+        symplectic_defect=symplectic,
+        defect_ulp=min(max(d.ulp for d in ds) for ds in explained.values()),
+        precision=precision,
+        fits=stated_fits and not undecided,
+        undecided=undecided,
         difference=difference(maps[0], simplest.parts[0]) if len(joints) == 1 else (math.nan,) * 4,
-        notes=tuple(dict.fromkeys(notes)), explanations=tuple(explanations),
-    )  # fmt: skip
+        notes=tuple(dict.fromkeys(notes)),
+        explanations=tuple(explanations),
+    )
 
 
 def difference(found: Map, part: Match) -> tuple[float, ...]:

@@ -195,10 +195,15 @@ def _known(seen: Measured, found: list[Recurrence], kept: list[Joint], known: bo
         notes.append("a damped spring of another stiffness may have the same positions")
     share = 1 / stride if stride else math.nan
     return Identification(
-        **fields, statement=statement, determinant=tuple(math.exp(x.log_det * share) for x in found),
-        symplectic_defect=max(abs(float(x.beta)) for x in found), defect_ulp=max(x.ulp for x in found),
-        precision=precision, fits=True, notes=tuple(dict.fromkeys(notes)),
-    )  # fmt: skip
+        **fields,
+        statement=statement,
+        determinant=tuple(math.exp(x.log_det * share) for x in found),
+        symplectic_defect=max(abs(float(x.beta)) for x in found),
+        defect_ulp=max(x.ulp for x in found),
+        precision=precision,
+        fits=True,
+        notes=tuple(dict.fromkeys(notes)),
+    )
 
 
 def _none(seen: Measured, found: list[Recurrence], joints: list[Joint]) -> Identification:
@@ -224,6 +229,7 @@ def _none(seen: Measured, found: list[Recurrence], joints: list[Joint]) -> Ident
     return nothing(
         (Explanation(cause, remedy, worst.residual),),
         determinant=tuple(math.exp(x.log_det) for x in found),
-        symplectic_defect=max(abs(float(x.beta)) for x in found), defect_ulp=max(x.ulp for x in found),
+        symplectic_defect=max(abs(float(x.beta)) for x in found),
+        defect_ulp=max(x.ulp for x in found),
         notes=seen.notes,
-    )  # fmt: skip
+    )

@@ -189,12 +189,19 @@ def read(
     finely = q_storage.name == v_storage.name == "double"
     kept = slice(None if finely else _alive(positions, moving))
     return Record(
-        interval=interval, jitter=clock.jitter, clock=clock.quantum,
-        deviations=clock.deviations if finely else None, q=positions[kept].astype(np.longdouble),
-        v=moving[kept].astype(np.longdouble) / unit, q_quantum=q_storage.quantum(positions[kept]),
-        v_quantum=quantum[kept], q_storage=q_storage, v_storage=v_storage, mass=masses,
+        interval=interval,
+        jitter=clock.jitter,
+        clock=clock.quantum,
+        deviations=clock.deviations if finely else None,
+        q=positions[kept].astype(np.longdouble),
+        v=moving[kept].astype(np.longdouble) / unit,
+        q_quantum=q_storage.quantum(positions[kept]),
+        v_quantum=quantum[kept],
+        q_storage=q_storage,
+        v_storage=v_storage,
+        mass=masses,
         momenta=v is None and masses is None,
-    )  # fmt: skip
+    )
 
 
 def stated_stride(record: Record, step: float | None, notes: list[str]) -> int | None:

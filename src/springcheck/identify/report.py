@@ -26,10 +26,16 @@ from springcheck.identify.together import at_rest, distance, of_a_pair, of_rotat
 
 
 def identify_arrays(
-    t: ArrayLike, q: ArrayLike, p: ArrayLike | None = None, *, v: ArrayLike | None = None,
-    mass: ArrayLike | None = None, stiffness: ArrayLike | None = None, friction: float | None = None,
-    step: float | None = None
-) -> Identification:  # fmt: skip
+    t: ArrayLike,
+    q: ArrayLike,
+    p: ArrayLike | None = None,
+    *,
+    v: ArrayLike | None = None,
+    mass: ArrayLike | None = None,
+    stiffness: ArrayLike | None = None,
+    friction: float | None = None,
+    step: float | None = None,
+) -> Identification:
     """The scheme that made a trajectory of oscillators, from its states alone.
 
     t (f,) [T]; q (f, n) or (f,) [L]; p [M L/T] or v [L/T] or both, like q.  Where both are given the mass
@@ -118,7 +124,10 @@ def _unknown(seen: Measured, strides: range) -> Identification:
             near["omega"], near["stiffness"], _ = seen.numbers(close)
     determinant, symplectic = determinants(maps, 1)
     return nothing(
-        explain(seen), determinant=determinant, symplectic_defect=symplectic,
-        defect_ulp=max(float(np.max(found.residual)) for found in maps) / 2.0**-52, notes=seen.notes,
+        explain(seen),
+        determinant=determinant,
+        symplectic_defect=symplectic,
+        defect_ulp=max(float(np.max(found.residual)) for found in maps) / 2.0**-52,
+        notes=seen.notes,
         **near,
-    )  # fmt: skip
+    )

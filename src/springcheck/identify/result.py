@@ -150,9 +150,14 @@ class Identification:
 
 
 def nothing(
-    explanations: tuple[Explanation, ...], *, determinant: tuple[float, ...], symplectic_defect: float,
-    defect_ulp: float, notes: Sequence[str], **near: Any
-) -> Identification:  # fmt: skip
+    explanations: tuple[Explanation, ...],
+    *,
+    determinant: tuple[float, ...],
+    symplectic_defect: float,
+    defect_ulp: float,
+    notes: Sequence[str],
+    **near: Any,
+) -> Identification:
     """Identification without a scheme, and why.  `determinant` has one value for each moving oscillator;
     `near` holds what is known of the nearest scheme."""
     unknown = (math.nan,) * len(determinant)

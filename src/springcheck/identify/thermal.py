@@ -176,9 +176,14 @@ def _against(one: Any, first: Thermal, h: float, m: float, stated: Mapping[str, 
 
 
 def _said(
-    found: list[Thermal], h: float, m: Any, stated: Mapping[str, Any], *, with_mass: bool,
-    joined: bool = False
-) -> Identification:  # fmt: skip
+    found: list[Thermal],
+    h: float,
+    m: Any,
+    stated: Mapping[str, Any],
+    *,
+    with_mass: bool,
+    joined: bool = False,
+) -> Identification:
     """Identification by what each oscillator shows, of masses m (n,), in frames h [T] apart."""
     first = found[0]
     each = [{y.scheme: y for y in one.candidates} for one in found]
