@@ -18,11 +18,11 @@ BUDGETS = {
     ("engines",): 2817,
     ("driver", "conformance", "doors"): 1257,
     ("checks",): 5099,
-    ("identify",): 8775,
+    ("identify",): 8776,
     ("formats", "store"): 5260,
     ("studies",): 1478,
     ("studies/*",): 9803,
-    ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 7082,
+    ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 7095,
 }
 """Lines of each room, or of several: of an engine in one file, and of what all studies share, in the first
 folder."""

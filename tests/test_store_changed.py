@@ -100,9 +100,10 @@ def test_a_changed_store_is_named_before_what_becomes_of_it(
     """As one into which the runs of another scene were merged, of which no figure can be drawn."""
     edited(whole, lambda file: file.attrs.modify("scene", scenefile.text_of("chain")))
     assert main([command, "s.h5"]) == 2
-    first, second = capsys.readouterr().err.splitlines()
-    assert "s.h5 is not what was written" in first
-    assert "s.h5" in second
+    (line,) = capsys.readouterr().err.splitlines()
+    changed, _, failed = line.partition("is not what was written")
+    assert "s.h5" in changed
+    assert "s.h5" in failed
 
 
 def test_a_changed_trajectory_is_not_exported(whole: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -59,15 +59,15 @@ def _plot(options: Namespace) -> int:
     if ours and options.step is not None:
         raise SpringcheckError(f"{path}: --step goes with the file of another program")
     doubts = output.doubts(options.file) if ours else []
-    output.warn(options.file, doubts)
-    if ours and options.trajectory is None:
-        chosen = {name: getattr(options, name) for name in ("particle", "quantity", "over")}
-        written, notes = drawing.draw(path, into, **chosen)
-    else:
-        if options.quantity or options.over:
-            raise SpringcheckError(f"{path}: --quantity and --over go with the store of an ensemble")
-        which = {"columns": _columns(options), "step": options.step, "trajectory": options.trajectory}
-        written, notes = drawing.draw_foreign(path, into, particle=options.particle, **which)
+    with output.warned(options.file, doubts):
+        if ours and options.trajectory is None:
+            chosen = {name: getattr(options, name) for name in ("particle", "quantity", "over")}
+            written, notes = drawing.draw(path, into, **chosen)
+        else:
+            if options.quantity or options.over:
+                raise SpringcheckError(f"{path}: --quantity and --over go with the store of an ensemble")
+            which = {"columns": _columns(options), "step": options.step, "trajectory": options.trajectory}
+            written, notes = drawing.draw_foreign(path, into, particle=options.particle, **which)
     if not options.quiet:
         print(*map(plain, (*notes, *written)), sep="\n")
     return int(bool(doubts))
@@ -80,8 +80,8 @@ def _report(options: Namespace) -> int:
     path = Path(options.file)
     into = Path(options.output or f"{path.stem}.html")
     doubts = store.doubts(path)
-    output.warn(options.file, output.listed(doubts))
-    size = page.write(page.gather(path, doubts), into)
+    with output.warned(options.file, output.listed(doubts)):
+        size = page.write(page.gather(path, doubts), into)
     if not options.quiet:
         print(plain(f"{into}: {size / 1e3:.0f} kB"))
     return int(bool(doubts))

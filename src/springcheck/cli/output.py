@@ -86,12 +86,25 @@ def listed(found: Sequence[Any]) -> list[dict[str, str]]:
     return [{"place": one.place, "what": one.what} for one in found]
 
 
-def warn(file: str, found: Sequence[dict[str, str]]) -> None:
-    """Print in one line which parts of a store are damaged, before anything of it is shown."""
-    if found:
-        first = "; ".join(f"{one['place']} {one['what']}" for one in found[:3])
-        more = f"; {len(found) - 3} more, which springcheck check names" if len(found) > 3 else ""
-        print(f"springcheck: {plain(f'{file} is not what was written: {first}', 400)}{more}", file=sys.stderr)
+def warn(file: str, found: Sequence[dict[str, str]], beside: str = "") -> str:
+    """Print in one line which parts of a store are damaged; or return it with what failed `beside` it."""
+    first = "; ".join(f"{one['place']} {one['what']}" for one in found[:3])
+    more = f"; {len(found) - 3} more, which springcheck check names" if len(found) > 3 else ""
+    said = f"{plain(f'{file} is not what was written: {first}', 250 if beside else 400)}{more}" * bool(found)
+    if said and not beside:
+        print(f"springcheck: {said}", file=sys.stderr)
+    return ": ".join(filter(None, (said, beside)))
+
+
+@contextmanager
+def warned(file: str, found: Sequence[dict[str, str]]) -> Iterator[None]:
+    """Warn of damage once what is done here has succeeded; what fails here names it in the same line."""
+    try:
+        with readable(file):
+            yield
+    except SpringcheckError as error:
+        raise type(error)(warn(file, found, str(error))) from error
+    warn(file, found)
 
 
 @contextmanager

@@ -157,7 +157,8 @@ def two_parts(e: Evidence) -> Explanation | None:
     for half in (frames < e.pairs // 2, frames >= e.pairs // 2) if len(frames) else ():
         parts = [fit(e.record, e.j, kept=half)]
         bad = np.flatnonzero(off(parts[0]) > 1)
-        if len(bad) < FEWEST_PAIRS or np.any(half[bad]):
+        # of what changes slowly a half that is one map to rounding shows too little in the other
+        if len(bad) < FEWEST_PAIRS or np.any(half[bad]) or np.max(off(parts[0])) < LARGER**2:
             continue
         at = int(bad[0] if half[0] else bad[-1] + 1)
         rest = (frames >= at) == half[0]
