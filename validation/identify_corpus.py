@@ -70,6 +70,10 @@ CLAIMS = {
 """What sentences claim, by the words that do so."""
 
 
+RANKS = {"WRONG NAME": 0, "FALSE SENTENCE": 1, "LISTED WITHOUT": 1, "refused": 2, "short": 2, "right": 3}
+"""How good each judgement is: less is worse."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Case:
     """One trajectory and what is expected of it."""

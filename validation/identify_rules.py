@@ -30,12 +30,11 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import identify_corpus as whole
 import springcheck
 from arguments import arguments, script
 
 ROOM = Path(springcheck.__file__).parent / "identify"
-
-RANKS = {"WRONG NAME": 0, "FALSE SENTENCE": 1, "LISTED WITHOUT": 1, "refused": 2, "short": 2, "right": 3}
 
 LEAST_LINES, MOST_LINES = 2, 8
 """Lines of a rule, and of a loop that is one."""
@@ -119,14 +118,12 @@ def passed() -> tuple[dict[tuple[str, int], set[int]], list[str]]:
     """The trajectories that go through each line (file, line), and what is said of each with all rules."""
     import coverage
 
-    import identify_corpus as corpus
-
     through: dict[tuple[str, int], set[int]] = {}
     said = []
-    for i, case in enumerate(corpus.load()):
+    for i, case in enumerate(whole.load()):
         recorder = coverage.Coverage(data_file=None, include=[str(ROOM / "*.py")])
         with recorder.collect():
-            said.append(corpus.judged(case, corpus.said(case)))
+            said.append(whole.judged(case, whole.said(case)))
         data = recorder.get_data()
         for file in data.measured_files():
             for line in data.lines(file) or ():
@@ -144,7 +141,7 @@ def first_worse(rule: Rule, tried: list[int], said: list[str]) -> str:
     cases = corpus.load()
     for i in tried:
         signal.alarm(PATIENCE)
-        if RANKS[corpus.judged(cases[i], corpus.said(cases[i]))] < RANKS[said[i]]:
+        if whole.RANKS[corpus.judged(cases[i], corpus.said(cases[i]))] < whole.RANKS[said[i]]:
             return cases[i].name
     return ""
 

@@ -86,14 +86,17 @@ def listed(found: Sequence[Any]) -> list[dict[str, str]]:
     return [{"place": one.place, "what": one.what} for one in found]
 
 
-def warn(file: str, found: Sequence[dict[str, str]], beside: str = "") -> str:
-    """Print in one line which parts of a store are damaged; or return it with what failed `beside` it."""
+def _changed(file: str, found: Sequence[dict[str, str]], most: int) -> str:
+    """Which parts of a store are damaged, in a line of about `most` letters; "" where none is."""
     first = "; ".join(f"{one['place']} {one['what']}" for one in found[:3])
     more = f"; {len(found) - 3} more, which springcheck check names" if len(found) > 3 else ""
-    said = f"{plain(f'{file} is not what was written: {first}', 250 if beside else 400)}{more}" * bool(found)
-    if said and not beside:
+    return f"{plain(f'{file} is not what was written: {first}', most)}{more}" if found else ""
+
+
+def warn(file: str, found: Sequence[dict[str, str]]) -> None:
+    """Print in one line which parts of a store are damaged, before anything of it is shown."""
+    if said := _changed(file, found, 400):
         print(f"springcheck: {said}", file=sys.stderr)
-    return ": ".join(filter(None, (said, beside)))
 
 
 @contextmanager
@@ -103,7 +106,9 @@ def warned(file: str, found: Sequence[dict[str, str]]) -> Iterator[None]:
         with readable(file):
             yield
     except SpringcheckError as error:
-        raise type(error)(warn(file, found, str(error))) from error
+        if found:
+            raise type(error)(f"{_changed(file, found, 250)}: {error}") from error
+        raise
     warn(file, found)
 
 

@@ -149,22 +149,26 @@ def few_bad_frames(e: Evidence) -> Explanation | None:
 
 def two_parts(e: Evidence) -> Explanation | None:
     """One map up to a frame and another from there on, each to rounding."""
-    frames = np.arange(e.pairs if e.pairs >= 2 * FEWEST_PAIRS else 0)
+    if e.pairs < 2 * FEWEST_PAIRS:
+        return None
+    frames = np.arange(e.pairs)
 
     def off(found: Map) -> Floats:
         return np.asarray(np.max(np.abs(found.residuals(e.found)), axis=1) / (OF_ROUNDING * e.unit))
 
-    for half in (frames < e.pairs // 2, frames >= e.pairs // 2) if len(frames) else ():
-        parts = [fit(e.record, e.j, kept=half)]
-        bad = np.flatnonzero(off(parts[0]) > 1)
+    for half in (frames < e.pairs // 2, frames >= e.pairs // 2):
+        one = fit(e.record, e.j, kept=half)
+        left = off(one)
+        bad = np.flatnonzero(left > 1)
         # of what changes slowly a half that is one map to rounding shows too little in the other
-        if len(bad) < FEWEST_PAIRS or np.any(half[bad]) or np.max(off(parts[0])) < LARGER**2:
+        if len(bad) < FEWEST_PAIRS or np.any(half[bad]) or np.max(left) < LARGER**2:
             continue
         at = int(bad[0] if half[0] else bad[-1] + 1)
         rest = (frames >= at) == half[0]
-        parts.insert(int(half[0]), fit(e.record, e.j, kept=rest))
-        if all(x.conditioned for x in parts) and np.all(off(parts[int(half[0])])[rest] <= 1):
-            fits = [titles(x.scheme for x in matched(part, e.terms)) for part in parts]
+        other = fit(e.record, e.j, kept=rest)
+        if one.conditioned and other.conditioned and np.all(off(other)[rest] <= 1):
+            parts = (one, other) if half[0] else (other, one)
+            fits = (titles(x.scheme for x in matched(part, e.terms)) for part in parts)
             before, after = (f" of {x}" if x else "" for x in fits)
             return Explanation(
                 f"The motion is one{before} up to frame {at}, another{after} from there on: the step, the "

@@ -123,6 +123,10 @@ def variance(x: Floats) -> Statistic:
     return Statistic(draws=x.size, sums=(np.sum(x * x, axis=0),), law=law, limits=limits)
 
 
+LARGEST = 40.0
+"""No normal number of double precision is larger."""
+
+
 def steady(one: Statistic, z: Floats) -> Statistic:
     """A statistic, or whether standard normal numbers z (f, c) of its draws are alike all along a run.
 
@@ -136,8 +140,7 @@ def steady(one: Statistic, z: Floats) -> Statistic:
     def join(a: Sums, b: Sums) -> Sums:
         return a[0] + b[0], (1.0, ""), np.concatenate([a[2], b[2]])
 
-    # no normal number is larger
-    z = np.clip(z, -40, 40)
+    z = np.clip(z, -LARGEST, LARGEST)
     sums = one, _periodic(z, "rows of draws"), np.sum(z, axis=0, keepdims=True) / math.sqrt(len(z))
     return replace(one, sums=sums, law=law, join=join, limits=lambda n, chance: one.limits(n, chance / 2))
 
@@ -161,10 +164,10 @@ def _periodic(z: Floats, rows: str) -> tuple[float, str]:
 
 
 def normal_sizes(x: Floats) -> Floats:
-    """The sizes |x| of normal draws as the normal numbers of the same rank; of 0 that is -inf."""
+    """The sizes |x| of normal draws as the normal numbers of the same rank, up to `LARGEST`."""
     from scipy.special import erfc, ndtri
 
-    return np.asarray(-ndtri(erfc(np.abs(x) / math.sqrt(2))))
+    return np.clip(-ndtri(erfc(np.abs(x) / math.sqrt(2))), -LARGEST, LARGEST)
 
 
 def shape(x: Floats) -> Statistic:
@@ -282,7 +285,7 @@ def foretold(x: Floats, y: Floats) -> Statistic:
     a chance of at most a (Robbins, Ann. Math. Stat. 41 (1970) 1397): no less than the chance, for any s.
     """
     names = ("the momentum", "the force", "the size of momenta", "the size of forces")[-2 * (len(y) == 1) :]
-    sized = np.where(x == 0, 0, np.clip(normal_sizes(x), -40, 40))
+    sized = np.where(x == 0, 0, normal_sizes(x))
 
     @np.errstate(all="ignore")
     def law(n: int, s: int, products: Floats, known: Floats, squares: float) -> tuple[float, str]:
