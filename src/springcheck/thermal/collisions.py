@@ -57,14 +57,21 @@ def between_collisions(q: Floats, v: Floats, h: float) -> list[Candidate] | None
         return []
     entries = np.linalg.lstsq(known[still], after[still], rcond=None)[0]
     off = max(float(np.sqrt(np.mean((known[still] @ entries - after[still]) ** 2))), 2.0**-52)
-    A = entries[:2].T
-    if not (abs(np.linalg.det(A) - 1) < NO_COLLISION and A[0, 1] * A[1, 0] < 0):
+    A, room = entries[:2].T, TIMES_LEFT_OVER * off
+    if not (abs(np.linalg.det(A) - 1) < NO_COLLISION and A[0, 1] * A[1, 0] < room):
         return None
     # both ends of a step of leapfrog are unlike by (h w)**2, which few digits may hide
     apart, least = abs(A[0, 0] - A[1, 1]), -A[0, 1] * A[1, 0] / MOST_A_FRAME
-    room = TIMES_LEFT_OVER * off
     alike = {apart <= room} if apart > room or room < least else {True, False}
     names = [name for name, one in THERMOSTATS.items() if one.collides and one.synchronised in alike]
+    if -A[0, 1] * A[1, 0] < room < A[0, 1]:
+        # without a spring all are alike, in any number of steps
+        heat, kept = float(np.var(v)), (1 + share) / (1 - share)
+        soft = Candidate(
+            scheme="", omega=0.0, omega_error=float(np.sqrt(room) / h), **_rate(share, n, h), thermal=heat,
+            thermal_error=heat * float(np.sqrt(2 * kept / n)), strides=tuple(range(1, MOST_A_FRAME + 1)),
+        )  # fmt: skip
+        return [replace(soft, scheme=name) for name in names]
     close = room * (1 / abs(A[0, 1]) + 1 / abs(A[1, 0]))
     A = A * sizes[:, None] / sizes
     return [y for name in names for y in _of_scheme(name, A, h, share, n, float(np.var(v)), close)]
@@ -124,17 +131,22 @@ def _of_scheme(
         near = np.abs(of_step - frequency * h / steps) < close * (frequency * h + sine) / steps
         fits = near & (np.sin(steps * angles) * A[0, 1] > 0)
         for angle in angles[fits]:
-            w, rate = 2 * np.sin(angle / 2) * steps / h, -np.log(share) / h
+            w, rate = 2 * np.sin(angle / 2) * steps / h, _rate(share, n, h)
             law = Law(
-                scheme=THERMOSTATS[name], h=h / steps, m=np.ones(1), k=np.array([w * w]), rate=float(rate),
-                thermal=1.0,
+                scheme=THERMOSTATS[name], h=h / steps, m=np.ones(1), k=np.array([w * w]),
+                rate=rate["friction"], thermal=1.0,
             )  # fmt: skip
             heat = size / float(law.covariance[0, 1, 1])
             found.append(
                 Candidate(
-                    scheme=name, omega=float(w), omega_error=0.0, friction=float(rate),
-                    friction_error=float(np.sqrt((1 - share) / (share * n)) / h), thermal=heat,
-                    thermal_error=heat * float(law.error_of_variances(n, steps)[0, 1]), strides=(steps,),
+                    scheme=name, omega=float(w), omega_error=0.0, **rate, thermal=heat, strides=(steps,),
+                    thermal_error=heat * float(law.error_of_variances(n, steps)[0, 1]),
                 )
             )  # fmt: skip
     return [replace(found[0], strides=tuple(sorted({s for y in found for s in y.strides})))] if found else []
+
+
+def _rate(share: float, n: int, h: float) -> dict[str, float]:
+    """The friction of n frames h apart of which a share has no collision, and its standard error."""
+    error = np.sqrt((1 - share) / (share * n)) / h
+    return {"friction": float(-np.log(share) / h), "friction_error": float(error)}

@@ -22,8 +22,8 @@ from springcheck.thermal.laws import Law
 ODDS = float(np.log(1e6))
 """Log-likelihood ratio [nats] by which one scheme must exceed every other to be named."""
 
-GAINED_BY_CHANCE = 25.0
-"""Nats that seven parameters of a map and a noise gain over three or four by chance once in 1e9 times."""
+GAINED_BY_CHANCE = 26.0
+"""Nats that nine parameters of a map, a constant and a noise gain over four or five by chance once in 1e9."""
 
 STEPS_A_FRAME = (2, 3, 4, 5, 6, 8)
 """Steps from frame to frame that are tried where they are not known."""
@@ -108,8 +108,7 @@ def _compared(found: list[Candidate], q: Floats, v: Floats, *, fits: bool = Fals
     best = min((y.nats for y in found), default=inf)
     if not fits:
         moments, n = _moments(q, v)
-        A = _free(moments)
-        free = moments[:2, :2] - A @ moments[2:, :2]
+        free = moments[:2, :2] - _free(moments) @ moments[2:, :2]
         if not best - n / 2 * (float(np.log(np.linalg.det(free))) + 2) < GAINED_BY_CHANCE:
             return []
     return sorted((replace(y, nats=y.nats - best) for y in found), key=lambda y: y.nats)
@@ -144,7 +143,7 @@ def _of_scheme(
 ) -> list[Candidate]:  # fmt: skip
     """Best candidate of a scheme at each stride, or from each start, with its log likelihood in nats."""
     moments, n = _moments(q, v * h)
-    begins, every = _starts(_free(moments), strides, n)
+    begins, every = _starts(_free(moments)[:, :2], strides, n)
     if starts is not None:
         begins, every = starts, np.array(strides)
     elif turn is not None:
@@ -197,16 +196,24 @@ def _profile(
     unit = np.stack([np.ones(len(at)), every], axis=1)
     B = B * unit[:, :, None] / unit[:, None, :]
     Q = Q * unit[:, :, None] * unit[:, None, :]
-    over = np.concatenate([np.broadcast_to(np.eye(2), B.shape), -B], axis=2)
+    full = scheme.full_rank or not np.all(every == 1)
+    # of one draw the position and the momentum carry the same information
+    weight = Q[:, ::-1, ::-1] * np.array([[1, -1], [-1, 1]]) if full else np.diag([0.0, 1.0])
+    apart = np.stack([1 - B[:, 0, 0], -B[:, 1, 0]], axis=1)[:, :, None]
+    over = np.concatenate([np.broadcast_to(np.eye(2), B.shape), -B, 0 * apart], axis=2)
+    # the likeliest centre: where it does not matter, as without a spring, 0
+    weighed = apart.transpose(0, 2, 1) @ weight
+    held, mean = weighed @ apart, weighed @ over @ moments[:, -1:]
+    centre = np.divide(mean, held, where=held > 0, out=np.zeros_like(held))
+    over[:, :, -1:] = -centre * apart
     seen = over @ moments @ over.transpose(0, 2, 1)
-    if scheme.full_rank or not np.all(every == 1):
+    if full:
         det = Q[:, 0, 0] * Q[:, 1, 1] - Q[:, 0, 1] ** 2
         thermal = (
             Q[:, 1, 1] * seen[:, 0, 0] + Q[:, 0, 0] * seen[:, 1, 1] - 2 * Q[:, 0, 1] * seen[:, 0, 1]
         ) / (2 * det)
         value = 2 * np.log(thermal) + np.log(det) + 2
     else:
-        # the position and the momentum carry the same information
         thermal = seen[:, 1, 1] / Q[:, 1, 1]
         value = np.log(seen[:, 1, 1]) + 1
     value = n / 2 * value
@@ -313,12 +320,13 @@ def _errors(
 
 
 def _moments(q: Floats, v: Floats) -> tuple[Floats, int]:
-    """Second moments of (x', v', x, v), (4, 4), and of how many frames."""
-    z = np.stack([q - np.mean(q), v - np.mean(v)])
-    n, both = z.shape[1] - 1, np.concatenate([z[:, 1:], z[:, :-1]])
+    """Second moments of (x', v', x, v, 1), (5, 5), and of how many frames."""
+    # a mean velocity is none of the law: over few frames, of little friction, it is not 0
+    z, n = np.stack([q - np.mean(q), v]), len(q) - 1
+    both = np.concatenate([z[:, 1:], z[:, :-1], np.ones((1, n))])
     return np.asarray(both @ both.T / n), n
 
 
 def _free(moments: Floats) -> Floats:
-    """The best map of a frame, of these moments."""
-    return np.asarray(moments[:2, 2:] @ np.linalg.inv(moments[2:, 2:]))
+    """The best map of a frame and the best constant, (2, 3), of these moments."""
+    return np.asarray(np.linalg.solve(moments[2:, 2:], moments[2:, :2]).T)

@@ -129,7 +129,12 @@ def _identified(q: Floats, v: Floats, h: float, beside: Floats | None, mixed: bo
             # of joined particles, as of one, what takes no noise leaves none that is white
             noisy = np.max(size) > NOISE and all(map(is_white, joint))
             return Thermal(candidates=(), free=(), misfit=nan, uniform=False) if noisy else None
-    if weights[4] < 1e-3 * weights[3]:
+    collided, sharp = between_collisions(q, v, h), weights[4] < 1e-3 * weights[3]
+    if collided:
+        # of several steps a combination is free of noise in none
+        each = tuple(replace(y, strides=(1,)) if sharp else y for y in collided)
+        return Thermal(candidates=each, free=(), misfit=nan, uniform=False)
+    if sharp:
         free = turned[4][:4] / np.tile(sizes, 2)
         misfit = weights[4] / weights[3]
         # the residual of digits is white but for neighbours, which share a frame
@@ -144,9 +149,9 @@ def _identified(q: Floats, v: Floats, h: float, beside: Floats | None, mixed: bo
     # and of what frames two steps apart share none three steps apart do
     if off < 1e-6 or (off < 1e-3 * sizes_left[0] and is_of_digits(jump[::3])):
         return clear(_of_two_halves(q, h, off, beside, mixed))
-    collided, white = between_collisions(q, v, h), all(map(is_white, left))
-    if collided or (white and collided is not None):
-        return Thermal(candidates=tuple(collided), free=(), misfit=nan, uniform=False)
+    white = all(map(is_white, left))
+    if white and collided is not None:
+        return Thermal(candidates=(), free=(), misfit=nan, uniform=False)
     coloured = not (white and even)
     # draws that are carried on into the next frame are in no other
     if coloured and not (all(is_white(x[i::2]) for x in left for i in (0, 1)) and added(2)):
@@ -187,14 +192,14 @@ def _of_one(
             found = likely(("baoab",), q, v, h, turn=turn)
         if not half or close > 1e-6 or slow < error:
             # a GJ scheme kicks and drifts by another step: another spring for the same null vector
-            found += [y for number in GJ if (y := _as_gj(number, decay, slow, error, -b, h))]
+            found += [y for number in GJ if (y := _as_gj(number, decay, slow, error, -b, h, 8 * close))]
     elif near(b, d) and near(b, -h / 2) and -1 < c < 1:
         found = likely(("baoa",), q, v, h, turn=2 * (1 + c))
     elif near(c, -1) and near(d, -h) and abs(b) <= close * h:
         decay, slow, error = _decay(q, v)
         # without a spring Bussi's factor leaves the same
         found = [*likely(("euler-maruyama",), q, v, h), *[Candidate(scheme="bussi-after")] * (slow < error)]
-    elif c < -1 - close and abs(d) <= close * h and near(b, h * c):
+    elif abs(c) > 1 + close and abs(d) <= close * h and near(b, h * c):
         # what a collision has left of the momentum, the rest of the step takes on without noise
         known: dict[str, Any] = {"omega": float(np.sqrt(2 * (1 + 1 / c)) / h), "omega_error": 0.0}
         # some steps have no collision, unless these are many; a factor acts in every step, if little
@@ -221,7 +226,12 @@ def _of_one(
     elif near(c, -1) and abs(d) <= close * h:
         roots = {n: (lambda x, c2=c2: np.sqrt((1 - c2(x)) / x)) for n, c2 in GJ.items()}
         if near(b, -h):
-            if not is_white(left) and is_correlated(left):
+            # of several particles' collisions each mode has a part
+            before = np.stack([v[:-1], q[:-1], np.ones(len(v) - 1)], axis=1)
+            entries, _, errors = regressed(before, v[1:])
+            carried, spring = np.abs(entries[:2] / errors[:2]) > 5
+            names, leapfrog = _of_no_memory(q, v, inf if mixed else close, carried), ("andersen-leapfrog",)
+            if names != leapfrog and not is_white(left) and is_correlated(left):
                 found, left = likely(("gj-iii-half",), q, v, h), np.empty(0)
                 if found and close > 1e-6:
                     # of little friction few digits do not show a step that is not stretched
@@ -229,11 +239,14 @@ def _of_one(
                     near_1 = [n for n in GJ if n != "iii" and roots[n](np.asarray(x)) > 1 - 2 * close]
                     found += [Candidate(scheme=f"gj-{n}-half") for n in near_1]
             else:
-                # of several particles' collisions each mode has a part
-                names = _of_no_memory(q, v, inf if mixed else close)
+                left = np.empty(0) if names == leapfrog else left
+                if not spring:
+                    # without a spring these leave the same
+                    names += ("andersen", "andersen-after-kick") if leapfrog[0] in names else ()
+                    names += ("bussi", "bussi-unsigned") if is_a_factor(v[:-1], v[1:]) else ()
                 one = "gj-iii-half"
-                found = likely((one,), q, v, h) if one in names else []
-                found += [Candidate(scheme=name) for name in names if name != one]
+                found = [Candidate(scheme=name) for name in names if name != one]
+                found += likely((one,), q, v, h) if one in names else []
         elif -b < h and is_correlated(left):
             rates = {f"gj-{n}-half": _rate(root, -b / h) for n, root in roots.items()}
             found = [Candidate(scheme=n, friction=x / h, friction_error=0.0) for n, x in rates.items() if x]
@@ -277,40 +290,43 @@ def _decay(q: Floats, v: Floats) -> tuple[float, float, float]:
     return decay, 2 - 2 * float(np.trace(A)) / (1 + decay), error
 
 
-def _as_gj(number: str, decay: float, slow: float, error: float, t: float, h: float) -> Candidate | None:
+def _as_gj(
+    number: str, decay: float, slow: float, error: float, t: float, h: float, least: float
+) -> Candidate | None:
     """What a GJ scheme would mean by the null vector (1, -t, -1, -t), of a decay and an (h w)**2 of its
-    stretched step that are known to an error, the latter to two such in its trace and its determinant."""
+    stretched step that are known to an error, the latter to two such in its trace and its determinant; t
+    leaves an (h w)**2 of 0 known to `least`."""
     x = np.geomspace(1e-9, 1e4, 4000)
     if near := _rate(GJ[number], decay):
         x = np.append(x, near)
     with np.errstate(all="ignore"):
         stretch = np.sqrt(2 * GJ[number].lost(x) / (GJ[number].both(x) * x))
         a = 4 * (1 - stretch * h / (2 * t)) / stretch**2
-        fits = (a > 0) & (np.abs(a * stretch**2 - slow) <= 4 * error)
+        fits = (a > -least) & (np.abs(a * stretch**2 - slow) <= 4 * error)
         off = np.where(fits, np.abs(GJ[number](x) - decay), np.inf)
     best = int(np.argmin(off))
     if not off[best] <= error:
         return None
     # GJ-I does not stretch, and knows its spring whatever its friction
     known = 0.0 if number == "i" else nan
-    omega = float(np.sqrt(a[best]) / h)
+    omega = float(np.sqrt(max(a[best], 0.0)) / h)
     return Candidate(scheme=f"gj-{number}", omega=omega, omega_error=known, friction=float(x[best] / h))
 
 
-def _of_no_memory(q: Floats, v: Floats, close: float) -> tuple[str, ...]:
-    """Schemes in which positions follow their velocities, v = (x' - x)/h, and a bath draws these anew at
-    every step, or at some: between those leapfrog leaves v'' - 2 v' + v = -h w**2 (x' - x)."""
+def _of_no_memory(q: Floats, v: Floats, close: float, carried: bool) -> tuple[str, ...]:
+    """Schemes in which positions follow their velocities, v = (x' - x)/h, of which a part may be carried on,
+    and a bath draws these anew at every step, or at some: between those leapfrog leaves
+    v'' - 2 v' + v = -h w**2 (x' - x)."""
     with np.errstate(all="ignore"):
         slopes = np.sort((v[2:] - 2 * v[1:-1] + v[:-2]) / (q[1:-1] - q[:-2]))
         together = slopes[4:] - slopes[:-4]
         if np.any(together < 1e-6 * np.abs(slopes[2:-2])):
             return ("andersen-leapfrog",)
-    entries, _, errors = regressed(np.stack([v[:-1], q[:-1], np.ones(len(v) - 1)], axis=1), v[1:])
-    if abs(entries[0] / errors[0]) > 5:
+    if carried:
         # digits may hide that five steps of leapfrog have one slope, and few frames that a draw is carried on
         return ("gj-iii-half", *(() if close < 1e-6 else ("andersen-leapfrog",)))
-    # a collision in every step leaves what Brownian motion does
-    return ("brownian", "andersen-leapfrog")
+    # a collision in every step leaves what Brownian motion does, and so does a small part carried on
+    return ("brownian", "andersen-leapfrog", "gj-iii-half")
 
 
 def _of_two_halves(q: Floats, h: float, misfit: float, beside: Floats | None, mixed: bool) -> Thermal | None:
@@ -333,14 +349,15 @@ def _of_two_halves(q: Floats, h: float, misfit: float, beside: Floats | None, mi
     for name, x, slope in (("lammps-langevin", 1 - c, 1.0), ("bbk", 2 * (1 - c) / (1 + c), 4 / (1 + c) ** 2)):
         # v' = c v - kick x' + noise, the kick of h w**2 and the noise over 1 + x/2 for BBK
         over = 1 + x / 2 if name == "bbk" else 1.0
-        a = -kick * h * over
-        if a <= 0 or x <= 0:
+        a, error = -kick * h * over, of_kick * h * over
+        # a spring may be too soft to show
+        if a <= -5 * error or x <= 0:
             continue
-        w, thermal = float(np.sqrt(a) / h), float((noise * over) ** 2 / (2 * x))
+        w, thermal = float(np.sqrt(max(a, 0.0)) / h), float((noise * over) ** 2 / (2 * x))
         found.append(
             Candidate(
-                scheme=name, omega=w, omega_error=float(of_kick * over / (2 * w * h)), friction=float(x / h),
-                friction_error=float(of_c * slope / h), thermal=thermal,
+                scheme=name, omega=w, omega_error=float(error / (2 * h * max(w * h, np.sqrt(error)))),
+                friction=float(x / h), friction_error=float(of_c * slope / h), thermal=thermal,
                 thermal_error=thermal * float(np.hypot(np.sqrt(2 / len(left)), of_c * slope / x)),
                 # each draws as its library does, where that shows: uniform draws end at 1.73
                 nats=inf if (uniform and name == "bbk") or (normal and name != "bbk") else 0.0,
