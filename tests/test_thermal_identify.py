@@ -349,6 +349,27 @@ def test_draws_that_are_carried_on_are_no_reason_to_be_silent() -> None:
     assert not [x for x in schemes if x in at_once and 1 in schemes[x].strides]
 
 
+@pytest.mark.parametrize("name", ["andersen", "andersen-leapfrog"])
+def test_a_few_collisions_are_no_kicks_without_a_cause(name: str) -> None:
+    scene = Scene(
+        q=[0.3], p=[0.2], m=[M], step=0.006, steps=2789, bath=Bath(temperature=THERMAL, friction=2.0),
+        terms=(WallSpring(i=[0], k=[K], at=[0.0]),),
+    )  # fmt: skip
+    run_of = driver.run(scene, f"own:{name}", seed=306)
+    found = springcheck.identify(run_of.t, run_of.q, p=run_of.p, mass=M)
+    rates = {one.scheme: one.friction for one in found.candidates}
+    assert rates[name] == pytest.approx([2.0], rel=0.5)
+    # kicks of one size are no draws
+    q, v, h = [0.4], [-0.3], 0.1
+    for i in range(2000):
+        half = v[-1] - h / 2 * K / M * q[-1] + 0.2 * (i % 97 == 50)
+        q.append(q[-1] + h * half)
+        v.append(half - h / 2 * K / M * q[-1])
+    found = springcheck.identify(h * np.arange(2001), q, v=v)
+    assert not found.candidates
+    assert "one kick" in found.statement
+
+
 @pytest.mark.parametrize("digits", [17, 8])
 def test_a_loop_of_ones_own_with_explicit_friction_may_be_a_scheme_that_is_not_known(digits: int) -> None:
     # v += h (F/m - friction v) + noise; x += h v

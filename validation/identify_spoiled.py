@@ -82,7 +82,13 @@ def spoiled() -> None:
         if float(rng.random()) < 0.1:
             v = 0.2 * float(rng.normal())
         rows.append((q, v))
-    of("Andersen", *np.array(rows).T, "noise|random|kick", (*noise, "frames"))
+    of(
+        "Andersen",
+        *np.array(rows).T,
+        "noise|random|kick",
+        (*noise, "frames"),
+        schemes=("andersen", "andersen-after-kick"),
+    )
     q, v = 0.3, 0.2
     rows = [(q, v)]
     for _ in range(400):

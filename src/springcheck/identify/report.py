@@ -23,6 +23,7 @@ from springcheck.identify.result import Identification, nothing
 from springcheck.identify.search import accounted
 from springcheck.identify.thermal import explained, of_bath
 from springcheck.identify.together import at_rest, distance, of_a_pair, of_rotation
+from springcheck.thermal.catalogue import random_scheme
 
 
 def identify_arrays(
@@ -68,9 +69,13 @@ def _of_states(t: Any, q: Any, p: Any, v: Any, *, mass: ArrayLike | None, **stat
         if in_a_bath := of_bath(t, q, p, v, mass, **stated):
             return in_a_bath
         raise
-    # noise is sought only where neither a scheme nor a mistake in the record explains the states
+    if found.candidates:
+        return found
+    bath = explained(found, t, q, p, v, mass, **stated)
     local = any(x.local for x in found.explanations)
-    return found if found.candidates or local else explained(found, t, q, p, v, mass, **stated)
+    # of noise, where a mistake in the record explains the states, only counted collisions are as sharp
+    sharp = any(random_scheme(x.scheme).collides and np.all(np.isfinite(x.friction)) for x in bath.candidates)
+    return bath if sharp or not local else found
 
 
 def _of_record(

@@ -239,7 +239,6 @@ def _of_one(
                     near_1 = [n for n in GJ if n != "iii" and roots[n](np.asarray(x)) > 1 - 2 * close]
                     found += [Candidate(scheme=f"gj-{n}-half") for n in near_1]
             else:
-                left = np.empty(0) if names == leapfrog else left
                 if not spring:
                     # without a spring these leave the same
                     names += ("andersen", "andersen-after-kick") if leapfrog[0] in names else ()
