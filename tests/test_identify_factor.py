@@ -35,25 +35,32 @@ def particles(n: int, *, joined: bool = False, steps: int = 500) -> Scene:
 @pytest.mark.parametrize("joined", [False, True], ids=["apart", "joined"])
 @pytest.mark.parametrize("n", [2, 3])
 @pytest.mark.parametrize("name", PLACE)
-def test_the_place_and_the_factors_are_found_to_rounding(name: str, n: int, joined: bool) -> None:
-    scene = particles(n, joined=joined)
+@pytest.mark.parametrize(("step", "bound"), [(0.35, 1e-13), (0.01, 1e-10)])
+def test_the_place_and_the_factors_are_found_to_rounding(
+    name: str, n: int, joined: bool, step: float, bound: float
+) -> None:
+    """Over few turns all particles move nearly alike, and the factor is as sharp."""
+    scene = replace(particles(n, joined=joined), step=step)
     run = driver.run(scene, f"own:{name}", seed=4)
     found = one_factor(scene.step, run.q, run.p / scene.m)
     assert found is not None
     place, misfit, factor = found
     assert place.split()[0] == PLACE[name]
-    assert misfit < 1e-14
+    assert misfit < bound
     # the sign of Bussi's is drawn too
     assert np.all(factor > 0) or name == "bussi"
-    single = one_factor(scene.step, *(x.astype(np.float32).astype(float) for x in (run.q, run.p / scene.m)))
-    assert single is not None
-    assert single[0] == place
+    if step > 0.1:
+        rounded = (x.astype(np.float32).astype(float) for x in (run.q, run.p / scene.m))
+        single = one_factor(scene.step, *rounded)
+        assert single is not None
+        assert single[0] == place
 
 
 @pytest.mark.parametrize("name", ["andersen", "andersen-leapfrog", "baoab", "obabo", "brownian"])
 @pytest.mark.parametrize("n", [2, 3])
-def test_draws_of_each_particle_are_no_factor(name: str, n: int) -> None:
-    scene = particles(n, joined=True)
+@pytest.mark.parametrize("step", [0.35, 0.01])
+def test_draws_of_each_particle_are_no_factor(name: str, n: int, step: float) -> None:
+    scene = replace(particles(n, joined=True), step=step)
     run = driver.run(scene, f"own:{name}", seed=4)
     assert one_factor(scene.step, run.q, run.p / scene.m) is None
 

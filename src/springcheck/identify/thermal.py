@@ -38,7 +38,7 @@ PLACES_OF_FACTOR = ("before velocity Verlet", "after velocity Verlet", "amid the
 SHARP_FACTOR = 1e-3
 """Largest residual of one factor for all momenta, relative to the factor's spread; unlike factors leave 1."""
 
-UNLIKE_MOTION = 0.01
+UNLIKE_MOTION = 1e-5
 """Relative difference of two particles' products, below which their motions are proportional."""
 
 
@@ -52,12 +52,12 @@ def one_factor(h: float, q: Floats, v: Floats) -> tuple[str, float, Floats] | No
         misfit, pulled = 0.0, b.copy()
         for j in range(1, n):
             one, other = a[:, j] * b[:, 0], a[:, 0] * b[:, j]
-            size = float(np.linalg.norm(np.abs(one) + np.abs(other)))
-            if not np.linalg.norm(one - other) > UNLIKE_MOTION * size:
+            unlike = float(np.linalg.norm(one - other))
+            if not unlike > UNLIKE_MOTION * np.linalg.norm(np.abs(one) + np.abs(other)):
                 return None
             columns = np.concatenate([-a[:, [j]] * F, a[:, [0]] * F], axis=1)
             c = np.linalg.lstsq(columns, one - other, rcond=None)[0]
-            misfit = max(misfit, float(np.linalg.norm(one - other - columns @ c)) / size)
+            misfit = max(misfit, float(np.linalg.norm(one - other - columns @ c)) / unlike)
             pulled[:, 0], pulled[:, j] = b[:, 0] + F @ c[: n + 1], b[:, j] + F @ c[n + 1 :]
         of, made = (pulled, a) if i else (a, pulled)
         factor = np.sum(of * made, axis=1) / np.sum(of**2, axis=1)
@@ -94,7 +94,7 @@ def _of_a_factor(
     which = " or ".join(x.scheme for x in kept) or "a Nose-Hoover chain, or a thermostat that rescales"
     cause = (
         f"One factor a step multiplies the momenta of all {v.shape[1]} coordinates, {place}: {low:.3g} to "
-        f"{high:.3g} in most steps, all else to {misfit:.0e} of their size: {which}"
+        f"{high:.3g} in most steps, to {misfit:.0e} of how unlike they move: {which}"
     )
     remedy = "judge it by its scheme, which the factor alone does not tell; its bath is in no frame"
     notes = tuple(note for note in found.notes if not kept or note.split(":")[0] in {x.scheme for x in kept})
