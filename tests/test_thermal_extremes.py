@@ -138,6 +138,20 @@ def test_a_file_is_given_every_scheme_that_may_have_made_it(name: str, given: di
         assert found is None or name in [one.scheme for one in found.candidates], found.statement
 
 
+@pytest.mark.parametrize(
+    ("name", "seed", "steps", "digits"),
+    [("bbk", 1, 260, 17), ("andersen", 1, 1000, 7), ("andersen-leapfrog", 1, 1000, 7)],
+)
+def test_a_bath_that_hardly_acts_is_not_taken_for_another(
+    name: str, seed: int, steps: int, digits: int
+) -> None:
+    """Few collisions that digits hide are no draws carried on, and a friction may be too small to show."""
+    run = driver.run(scene(steps=steps, x=0.01, turn=0.02), f"own:{name}", seed=seed)
+    q, p = (np.array([float(f"{y:.{digits}g}") for y in x[:, 0]])[:, None] for x in (run.q, run.p))
+    found = of_bath(run.t, q, p, None, scene().m[:1])
+    assert found is None or name in [one.scheme for one in found.candidates], found.statement
+
+
 @pytest.mark.campaign
 @pytest.mark.parametrize("name", ["nose-hoover", "nose-hoover-fourth", "nose-hoover-middle"])
 @pytest.mark.parametrize("frames", [220, 400])

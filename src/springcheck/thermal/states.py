@@ -178,7 +178,7 @@ def _of_one(
     def near(value: float, wanted: float) -> bool:
         return bool(abs(value - wanted) <= close * max(abs(wanted), abs(d), h))
 
-    found, added = list[Candidate](), False
+    found, added, sparse = list[Candidate](), False, bool(np.median(np.abs(left)) < SPARSE)
     if near(b, d) and near(c, -1):
         half, (decay, slow, error) = near(b, -h / 2), _decay(q, v)
         turn = 4 * (1 + h / (2 * b))
@@ -231,7 +231,8 @@ def _of_one(
             entries, _, errors = regressed(before, v[1:])
             carried, spring = np.abs(entries[:2] / errors[:2]) > 5
             names, leapfrog = _of_no_memory(q, v, inf if mixed else close, carried), ("andersen-leapfrog",)
-            if names != leapfrog and not is_white(left) and is_correlated(left):
+            of_two = not is_white(left) and is_correlated(left) and not sparse
+            if names != leapfrog and of_two:
                 found, left = likely(("gj-iii-half",), q, v, h), np.empty(0)
                 if found and close > 1e-6:
                     # of little friction few digits do not show a step that is not stretched
@@ -254,7 +255,7 @@ def _of_one(
         return None
     if len(left) and not even and not any(x.scheme == "andersen-leapfrog" for x in found):
         return None
-    if not found and float(np.median(np.abs(left))) < SPARSE:
+    if not found and sparse:
         # few steps are off, and all others are not
         return None
     # explicit friction in a loop of one's own leaves what these two leave where digits hide collisions
@@ -345,19 +346,23 @@ def _of_two_halves(q: Floats, h: float, misfit: float, beside: Floats | None, mi
         draws /= np.std(draws)
     uniform, normal = is_uniform(draws), bool(np.max(np.abs(draws)) > 2.2) and not mixed
     found = []
-    for name, x, slope in (("lammps-langevin", 1 - c, 1.0), ("bbk", 2 * (1 - c) / (1 + c), 4 / (1 + c) ** 2)):
+    for name, share, slope in (
+        ("lammps-langevin", 1 - c, 1.0),
+        ("bbk", 2 * (1 - c) / (1 + c), 4 / (1 + c) ** 2),
+    ):
         # v' = c v - kick x' + noise, the kick of h w**2 and the noise over 1 + x/2 for BBK
-        over = 1 + x / 2 if name == "bbk" else 1.0
+        over = 1 + share / 2 if name == "bbk" else 1.0
         a, error = -kick * h * over, of_kick * h * over
-        # a spring may be too soft to show
-        if a <= -5 * error or x <= 0:
+        # a spring may be too soft to show, and a friction too small
+        if a <= -5 * error or share <= -5 * of_c * slope:
             continue
-        w, thermal = float(np.sqrt(max(a, 0.0)) / h), float((noise * over) ** 2 / (2 * x))
+        w, x = float(np.sqrt(max(a, 0.0)) / h), max(share, 0.0)
+        thermal = float((noise * over) ** 2 / (2 * x)) if x else nan
         found.append(
             Candidate(
                 scheme=name, omega=w, omega_error=float(error / (2 * h * max(w * h, np.sqrt(error)))),
                 friction=float(x / h), friction_error=float(of_c * slope / h), thermal=thermal,
-                thermal_error=thermal * float(np.hypot(np.sqrt(2 / len(left)), of_c * slope / x)),
+                thermal_error=thermal * float(np.hypot(np.sqrt(2 / len(left)), of_c * slope / (x or nan))),
                 # each draws as its library does, where that shows: uniform draws end at 1.73
                 nats=inf if (uniform and name == "bbk") or (normal and name != "bbk") else 0.0,
             )
