@@ -16,6 +16,7 @@ import pytest
 from clean import clean_bath
 from springcheck import checks, driver, engines
 from springcheck.errors import MethodError
+from springcheck.physics.bath import Bath
 from springcheck.physics.scene import Scene
 from springcheck.studies.faults import baths
 from springcheck.studies.faults.table import FAULTS
@@ -142,3 +143,20 @@ def test_a_chain_starts_from_rest_which_a_factor_of_all_momenta_cannot() -> None
 def test_a_chain_that_stops_a_motion_too_hot_for_it_is_no_alarm(case: int) -> None:
     """Random baths of 10,000, whose kinetic energy is 1e17 kT and more."""
     assert clean_bath(case).alarms == ()
+
+
+def test_a_chaotic_chain_is_judged_as_far_as_it_predicts() -> None:
+    """Much friction on free particles: roundings grow to all of the chain, and shrink again without it."""
+    scene = replace(
+        springs(2, 400, step=0.0135), m=np.array([3.7, 0.4]), p=np.array([1.14, 0.24]), terms=(),
+        bath=Bath(temperature=1.0, friction=105.0),
+    )  # fmt: skip
+    run = driver.run(scene, "own:nose-hoover")
+    (found,) = checks.judge(scene, run, [checks.thermal.noise_direction])
+    assert found.passed
+    assert "judged to step" in found.why
+    # a chain of another friction is another one from the first step on
+    other = replace(scene, bath=Bath(temperature=1.0, friction=105.0 * (1 + 1e-9)))
+    (found,) = checks.judge(other, run, [checks.thermal.noise_direction])
+    assert found.passed is False
+    assert "first at step" in found.why

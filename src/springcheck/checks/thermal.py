@@ -89,6 +89,8 @@ def noise_direction(case: Case) -> Finding | str:
     where = f"; first at step {case.steps[0] + int(off[0]) + 1}" if len(off) else ""
     if limit := small_move(case.trajectory) if where else "":
         return limit
+    if (told := int(np.count_nonzero(worst != thermal.draws.UNTOLD))) < len(worst):
+        where = f", judged to step {told}, where these have grown to all of the chain{where}"
     why = f"roundings along one step of {case.scheme.title}; does not grow with the run{where}"
     return Finding(float(np.max(worst)), found.roundings, "roundings", why)
 

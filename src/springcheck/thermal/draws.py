@@ -28,6 +28,10 @@ HOTTEST = 1e4
 
 _NONE: Extended = np.empty((0, 0), np.longdouble)
 
+LOST, UNTOLD = 0.01, -1.0
+"""Error of a chain's state, relative to the usual one, from which on it predicts nothing; and what stands for
+the contradictions of the frames from there on."""
+
 LARGEST_DRAW = 8.0
 """Size that no draw of a run of a few steps exceeds: the chance is 1e-15 for each."""
 
@@ -227,7 +231,8 @@ class _Reader:
 
         Roundings of the chain add up.  J, what a step makes of them, is found by moving the chain by ten
         thousand of them; N errors e_i, each carried on by its own product of J, add up to at most
-        sqrt(N sum (J..J e_i)**2), whose sum of squares goes from step to step.
+        sqrt(N sum (J..J e_i)**2), whose sum of squares goes from step to step.  From where they are no longer
+        small, as of much friction, whose chain is chaotic, the frames after are not told.
         """
         chain, stepper, m, h = self.scheme.chain, self.stepper, self.scene.m, self.scene.step
         assert chain is not None
@@ -237,6 +242,9 @@ class _Reader:
         squares, across = np.zeros((M, M)), np.empty((len(q) - 1, len(m)))
         state, usual = chain.start(), np.sqrt(about["Q"] * about["thermal"])
         for i in range(len(q) - 1):
+            if M * i * np.max(np.diag(squares)) > LOST**2:
+                across[i:] = UNTOLD
+                break
             moved = 1e4 * self.how.unit * (usual + np.abs(state[:M]))
             stepper.chain = np.repeat(state[:, None], M + 1, axis=1)
             stepper.chain[range(M), range(1, M + 1)] += moved
