@@ -49,6 +49,13 @@ def test_files_that_had_a_wrong_name_have_none(case: int) -> None:
         assert scheme in [one.scheme for one in found.candidates]
 
 
+@pytest.mark.campaign
+@pytest.mark.parametrize("case", [71, 293, 294, 515, 10061, 10284, 10394, 10506])
+def test_a_factor_of_several_steps_is_not_taken_for_collisions(case: int) -> None:
+    found = campaign.wide_files(case)
+    assert not [word for word in found if "MISSING" in word or "WRONG" in word]
+
+
 @pytest.mark.parametrize("case", [1000, 1031, 1062, 1093, 1124])
 def test_a_file_of_each_kind_has_no_wrong_name(case: int) -> None:
     scheme, _, (t, q, p, scene) = campaign.file_of(case)
@@ -65,7 +72,7 @@ def test_a_campaign_goes_on_where_it_stopped(tmp_path: Path, monkeypatch: pytest
     assert json.loads((tmp_path / "alarms.json").read_text()) == known
 
 
-@pytest.mark.parametrize("part", ["alarms", "files"])
+@pytest.mark.parametrize("part", ["alarms", "files", "wide"])
 def test_what_is_stored_has_no_alarm_and_no_wrong_name(part: str) -> None:
     known = json.loads((campaign.HERE / f"{part}.json").read_text())
     assert known["cases"] + sum(end - first for first, end in known.get("more", [])) >= 300

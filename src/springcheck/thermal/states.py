@@ -159,9 +159,11 @@ def _identified(q: Floats, v: Floats, h: float, beside: Floats | None, mixed: bo
     found = tuple(likely_apart(q, v, h, white=white))
     if white and coloured and not any(random_scheme(one.scheme).carried for one in found):
         return None
+    # a factor of the momenta, of several steps, leaves what collisions do
+    a_factor = any(random_scheme(y.scheme).collides and y.strides != (1,) for y in found)
     return Thermal(
         candidates=found, free=(), misfit=nan, uniform=is_uniform(left[1]),
-        known=not bent and white and not grows(left[1], x[:-1], x[1:]),
+        known=not (bent or a_factor) and white and not grows(left[1], x[:-1], x[1:]),
     )  # fmt: skip
 
 
@@ -210,7 +212,7 @@ def _of_one(
         struck = np.abs(changes) > close
         collides = all(collide(changes[struck, None], state[struck]))
         names: tuple[str, ...] = ("andersen", "andersen-after-kick") if collides else ()
-        names += ("bussi", "bussi-unsigned") if often and is_a_factor(v[:-1], drawn) else ()
+        names += ("bussi", "bussi-unsigned") if often and (mixed or is_a_factor(v[:-1], drawn)) else ()
         if not names:
             return None
         found = [Candidate(scheme=name, **known) for name in names]
