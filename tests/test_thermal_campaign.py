@@ -52,7 +52,7 @@ def test_files_that_had_a_wrong_name_have_none(case: int) -> None:
 @pytest.mark.campaign
 @pytest.mark.parametrize("case", [71, 293, 294, 515, 10061, 10284, 10394, 10506])
 def test_a_factor_of_several_steps_is_not_taken_for_collisions(case: int) -> None:
-    found = campaign.wide_files(case)
+    found = campaign.files(case, wide=True)
     assert not [word for word in found if "MISSING" in word or "WRONG" in word]
 
 

@@ -25,6 +25,7 @@ import sys
 import warnings
 from collections import Counter
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -136,11 +137,6 @@ def file_of(case: int, name: str = "", kind: str = "", *, wide: bool = False) ->
     return name, kind, (run.t, q, p, scene)
 
 
-def wide_files(case: int) -> dict[str, int]:
-    """What is said of a random file of any friction and step."""
-    return files(case, wide=True)
-
-
 def files(case: int, *, wide: bool = False) -> dict[str, int]:
     """What is said of a random file, nothing stated but the masses: by what looks for noise, and of every
     eighth by the whole of identify."""
@@ -171,7 +167,7 @@ def files(case: int, *, wide: bool = False) -> dict[str, int]:
 
 
 PARTS: dict[str, Callable[[int], dict[str, int]]] = {
-    "alarms": alarms, "engines": by_engine, "files": files, "wide": wide_files
+    "alarms": alarms, "engines": by_engine, "files": files, "wide": partial(files, wide=True)
 }  # fmt: skip
 
 

@@ -66,10 +66,11 @@ def between_collisions(q: Floats, v: Floats, h: float) -> list[Candidate] | None
     names = [name for name, one in THERMOSTATS.items() if one.collides and one.synchronised in alike]
     if -A[0, 1] * A[1, 0] < room < A[0, 1]:
         # without a spring all are alike, in any number of steps
-        heat, kept = float(np.var(v)), (1 + share) / (1 - share)
+        heat, lasting = float(np.var(v)), (1 + share) / (1 - share)
         soft = Candidate(
-            scheme="", omega=0.0, omega_error=float(np.sqrt(room) / h), **_rate(share, n, h), thermal=heat,
-            thermal_error=heat * float(np.sqrt(2 * kept / n)), strides=tuple(range(1, MOST_A_FRAME + 1)),
+            scheme="", omega=0.0, omega_error=float(np.sqrt(room) / h), **_friction(share, n, h),
+            thermal=heat, thermal_error=heat * float(np.sqrt(2 * lasting / n)),
+            strides=tuple(range(1, MOST_A_FRAME + 1)),
         )  # fmt: skip
         return [replace(soft, scheme=name) for name in names]
     close = room * (1 / abs(A[0, 1]) + 1 / abs(A[1, 0]))
@@ -131,7 +132,7 @@ def _of_scheme(
         near = np.abs(of_step - frequency * h / steps) < close * (frequency * h + sine) / steps
         fits = near & (np.sin(steps * angles) * A[0, 1] > 0)
         for angle in angles[fits]:
-            w, rate = 2 * np.sin(angle / 2) * steps / h, _rate(share, n, h)
+            w, rate = 2 * np.sin(angle / 2) * steps / h, _friction(share, n, h)
             law = Law(
                 scheme=THERMOSTATS[name], h=h / steps, m=np.ones(1), k=np.array([w * w]),
                 rate=rate["friction"], thermal=1.0,
@@ -146,7 +147,7 @@ def _of_scheme(
     return [replace(found[0], strides=tuple(sorted({s for y in found for s in y.strides})))] if found else []
 
 
-def _rate(share: float, n: int, h: float) -> dict[str, float]:
+def _friction(share: float, n: int, h: float) -> dict[str, float]:
     """The friction of n frames h apart of which a share has no collision, and its standard error."""
     error = np.sqrt((1 - share) / (share * n)) / h
     return {"friction": float(-np.log(share) / h), "friction_error": float(error)}

@@ -129,12 +129,7 @@ def _identified(q: Floats, v: Floats, h: float, beside: Floats | None, mixed: bo
             # of joined particles, as of one, what takes no noise leaves none that is white
             noisy = np.max(size) > NOISE and all(map(is_white, joint))
             return Thermal(candidates=(), free=(), misfit=nan, uniform=False) if noisy else None
-    collided, sharp = between_collisions(q, v, h), weights[4] < 1e-3 * weights[3]
-    if collided:
-        # of several steps a combination is free of noise in none
-        each = tuple(replace(y, strides=(1,)) if sharp else y for y in collided)
-        return Thermal(candidates=each, free=(), misfit=nan, uniform=False)
-    if sharp:
+    if weights[4] < 1e-3 * weights[3]:
         free = turned[4][:4] / np.tile(sizes, 2)
         misfit = weights[4] / weights[3]
         # the residual of digits is white but for neighbours, which share a frame
@@ -149,9 +144,9 @@ def _identified(q: Floats, v: Floats, h: float, beside: Floats | None, mixed: bo
     # and of what frames two steps apart share none three steps apart do
     if off < 1e-6 or (off < 1e-3 * sizes_left[0] and is_of_digits(jump[::3])):
         return clear(_of_two_halves(q, h, off, beside, mixed))
-    white = all(map(is_white, left))
-    if white and collided is not None:
-        return Thermal(candidates=(), free=(), misfit=nan, uniform=False)
+    collided, white = between_collisions(q, v, h), all(map(is_white, left))
+    if collided or (white and collided is not None):
+        return Thermal(candidates=tuple(collided), free=(), misfit=nan, uniform=False)
     coloured = not (white and even)
     # draws that are carried on into the next frame are in no other
     if coloured and not (all(is_white(x[i::2]) for x in left for i in (0, 1)) and added(2)):
@@ -180,6 +175,10 @@ def _of_one(
     def near(value: float, wanted: float) -> bool:
         return bool(abs(value - wanted) <= close * max(abs(wanted), abs(d), h))
 
+    if abs(d) <= close * h and near(b, h * c) and (counted := between_collisions(q, v, h)):
+        # of several steps no combination is free of noise
+        each = tuple(replace(y, strides=(1,)) for y in counted)
+        return Thermal(candidates=each, free=tuple(map(float, free)), misfit=misfit, uniform=False)
     found, added, sparse = list[Candidate](), False, bool(np.median(np.abs(left)) < SPARSE)
     if near(b, d) and near(c, -1):
         half, (decay, slow, error) = near(b, -h / 2), _decay(q, v)
@@ -228,13 +227,13 @@ def _of_one(
     elif near(c, -1) and abs(d) <= close * h:
         roots = {n: (lambda x, c2=c2: np.sqrt((1 - c2(x)) / x)) for n, c2 in GJ.items()}
         if near(b, -h):
-            # of several particles' collisions each mode has a part
             before = np.stack([v[:-1], q[:-1], np.ones(len(v) - 1)], axis=1)
             entries, _, errors = regressed(before, v[1:])
             carried, spring = np.abs(entries[:2] / errors[:2]) > 5
-            names, leapfrog = _of_no_memory(q, v, inf if mixed else close, carried), ("andersen-leapfrog",)
+            # of several particles' collisions each mode has a part
+            names, leapfrog = _of_no_memory(q, v, inf if mixed else close, carried), "andersen-leapfrog"
             of_two = not is_white(left) and is_correlated(left) and not sparse
-            if names != leapfrog and of_two:
+            if of_two and names != (leapfrog,):
                 found, left = likely(("gj-iii-half",), q, v, h), np.empty(0)
                 if found and close > 1e-6:
                     # of little friction few digits do not show a step that is not stretched
@@ -244,7 +243,7 @@ def _of_one(
             else:
                 if not spring:
                     # without a spring these leave the same
-                    names += ("andersen", "andersen-after-kick") if leapfrog[0] in names else ()
+                    names += ("andersen", "andersen-after-kick") if leapfrog in names else ()
                     names += ("bussi", "bussi-unsigned") if is_a_factor(v[:-1], v[1:]) else ()
                 one = "gj-iii-half"
                 found = [Candidate(scheme=name) for name in names if name != one]
