@@ -15,6 +15,7 @@ from springcheck.checks.claim import Claim
 from springcheck.checks.stretch import DEVIATIONS, Stretch, follow
 from springcheck.physics.arrays import WIDE, Arithmetic, Extended, Floats, Force, Integers, Reals
 from springcheck.physics.driven import CLOCK
+from springcheck.physics.scene import Scene
 from springcheck.physics.term import Term
 from springcheck.physics.trajectory import Trajectory
 
@@ -305,6 +306,13 @@ def least_moved(moved: Reals) -> Reals:
     Twice what an engine overlooks bounds it: a position may have come back past where its force was computed.
     """
     return np.asarray(np.minimum(moved, np.append(moved[:1], moved[:-1])))
+
+
+def too_strong(run: Trajectory, scene: Scene) -> str:
+    """A sentence where a force of some frame overflows the engine's fixed-point sum; "" elsewhere."""
+    how = run.arithmetic
+    peak = np.max(strongest(scene.terms, run.q.astype(np.longdouble))) if np.isfinite(how.overflow) else 0
+    return f"the engine's limit: {overflows(how)}, and a force is {peak:.3g}" if peak >= how.overflow else ""
 
 
 def small_move(run: Trajectory) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from springcheck.checks.case import REPEATED, Case, overflows, strongest
+from springcheck.checks.case import REPEATED, Case, too_strong
 from springcheck.checks.check import Finding, check
 from springcheck.physics import exact
 from springcheck.physics.arrays import AS_WRITTEN
@@ -140,14 +140,11 @@ stop at 0.999 of it, so as not to take a speed that was cut down to the limit fo
 @check("line", family="record", requires={"three-dimensions"})
 def line(case: Case) -> Finding:
     """Along axes that the scene leaves out nothing moves, exactly."""
-    off, how = case.trajectory.off_axis, case.trajectory.arithmetic
+    off = case.trajectory.off_axis
     assert off is not None
-    why = "every force along another axis is a product with 0"
     # of a start whose forces overflow there may be no second frame, whose step would tell it
-    peak = np.max(strongest(case.scene.terms, case.trajectory.q.astype(np.longdouble))) if off else 0.0
-    if how.overflow <= peak:
-        why = f"the engine's limit: {overflows(how)}, along every axis, and a force is {peak:.3g}"
-    return Finding(abs(off), 0.0, "L", why)
+    limit = too_strong(case.trajectory, case.scene) if off else ""
+    return Finding(abs(off), 0.0, "L", limit or "every force along another axis is a product with 0")
 
 
 @check("energy", family="record", requires={"energies"})

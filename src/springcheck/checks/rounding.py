@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
 import numpy as np
 
 from springcheck import schemes
 from springcheck.checks.claim import Claim
-from springcheck.physics.arrays import ROUNDOFF, WIDE, Extended, Force, Reals
+from springcheck.physics.arrays import ROUNDOFF, WIDE, Arithmetic, Extended, Force, Reals
 from springcheck.physics.term import Term
 from springcheck.schemes.rounding import Met
 
@@ -35,11 +39,14 @@ def of_step(
     how = run.arithmetic
     q, p = q.astype(np.longdouble), p.astype(np.longdouble)
     h, m = np.longdouble(abs(run.step)), scene.m.astype(np.longdouble)
-    size_q, size_p = schemes.magnitude_step(
-        case.scheme, q, p, h=run.step, m=m, rate=case.law.rate, turns=case.law.turns,
-        met=_evaluations(case, places, recorded), hold=case.system.rods,
-        loose=0.0 if paired else how.lengths / (how.state * case.roundings),
-    )  # fmt: skip
+    fine: list[Reals] = []
+    # of a force that is coarser than the state, first the sizes that it has without its own error
+    for way in [how] if how.force <= how.state else [replace(how, force=how.state, quantum=0.0), how]:
+        size_q, size_p = schemes.magnitude_step(
+            case.scheme, q, p, h=run.step, m=m, rate=case.law.rate, turns=case.law.turns,
+            met=_evaluations(case, partial(_force, case, way, fine), places, recorded), hold=case.system.rods,
+            loose=0.0 if paired else how.lengths / (how.state * case.roundings),
+        )  # fmt: skip
     # the reference step rounds as well
     state = how.state + ROUNDOFF
     # an engine may count positions from the rest points of springs, and so round those
@@ -54,8 +61,8 @@ def of_step(
     return np.asarray(of_q + h / m * lost + smallest), np.asarray(of_p + lost)
 
 
-def _evaluations(case: Claim, places: list[Reals] | None, recorded: bool) -> list[Met]:
-    """Error bound of each evaluation of the force within a step."""
+def _evaluations(case: Claim, of: Any, places: list[Reals] | None, recorded: bool) -> list[Met]:
+    """Error bound `of` each evaluation of the force within a step."""
     scene, scheme = case.judged, case.scheme
     far, none = np.full(scene.n, scene.system.far, np.longdouble), np.zeros(scene.n, np.longdouble)
     pulls = scene.system.magnitude()(far, none) if case.trajectory.arithmetic.joints else 0.0
@@ -75,7 +82,7 @@ def _evaluations(case: Claim, places: list[Reals] | None, recorded: bool) -> lis
             if scheme.has("implicit"):
                 stiffness = case.law.stiffness if bent is None else scene.system.slope(bent)[0]
             made[known] = Met(
-                magnitude=_force(case, acting.get(terms, scene.terms), bent, whole, recorded and at_end),
+                magnitude=of(acting.get(terms, scene.terms), bent, whole, recorded and at_end),
                 stiffness=stiffness,
                 joined=not scene.system.is_separate,
                 joints=joints,
@@ -87,16 +94,19 @@ def _evaluations(case: Claim, places: list[Reals] | None, recorded: bool) -> lis
     return found
 
 
-def _force(case: Claim, terms: tuple[Term, ...], near: Reals | None, whole: float, exact: bool) -> Force:
-    """Bound on the rounding of a force, in roundings of the state: of its sum, its width and its quantum."""
-    how = case.trajectory.arithmetic
+def _force(
+    case: Claim, how: Arithmetic, fine: list[Reals], terms: tuple[Term, ...], near: Reals | None,
+    whole: float, exact: bool,
+) -> Force:  # fmt: skip
+    """Bound on the rounding of a force, in roundings of the state: of its sum, its width and its quantum.
+
+    The error of a coarse force is no size for that of the next: a fine step leaves its `fine` sizes.
+    """
     plain = case.system.magnitude(near, terms, exact=exact)
     count = case.scene.system.pulls(terms)
     # each term on a particle after the first is added with a rounding of its own
     more = 1 + np.maximum(count - 1, 0) / np.longdouble(case.roundings)
-    if how.force > how.state:
-        more = more + whole * how.force / np.longdouble(how.state)
-
+    width = whole * how.force / np.longdouble(how.state) if how.force > how.state else 0.0
     far = case.scene.periods
     if how.from_start:
         # roundings of the force at the start, and of its change with the displacement from there
@@ -106,6 +116,10 @@ def _force(case: Claim, terms: tuple[Term, ...], near: Reals | None, whole: floa
         # the nearest image is the difference of positions that lie in the box
         sizes = plain(q + far, p)
         bound = sizes * more
+        if width:
+            bound = bound + width * fine.pop(0)
+        elif how is not case.trajectory.arithmetic:
+            fine.append(sizes)
         if how.quantum:
             # each term's force on a particle is truncated once in a kick, not once for every rounding, and a
             # force below the quantum is lost, no more

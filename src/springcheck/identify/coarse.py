@@ -36,6 +36,9 @@ QUANTUM = 2.0**-32
 EXCESS = 2.0**-32
 """Relative excess of the fixed-point forces of OpenMM's CustomIntegrator, which divides by 2**32 - 1."""
 
+LARGEST_SINGLE = 4 * 2.0**-24
+"""Largest relative error of a force in single precision: position, product, a root and a quotient."""
+
 LEAST = 1 / 100
 """Smallest root mean square of residuals, relative to its bound, that the bound explains."""
 
@@ -101,7 +104,7 @@ def _sized(record: Record, j: int, found: Map, match: Match, signed: Floats) -> 
     )
     path = FAMILIES[match.family].path * match.stride
     # a position and a product are rounded; a stiffness too, but that is the same in every kick
-    relative = 2 * 2.0**-24 * abs(match.a) * orbit
+    relative = LARGEST_SINGLE / 2 * abs(match.a) * orbit
     quantum = np.zeros(len(orbit))
     if record.mass is not None:
         h = float(record.interval) / match.stride
@@ -155,7 +158,7 @@ def _kinematic(record: Record, j: int, found: Map, match: Match) -> tuple[str, s
     forces = _forces(record, j, found, match)
     if forces is None:
         return None
-    values, noise = forces
+    values, noise, consistent = forces
     single = np.spacing(np.abs(values).astype(np.float32)).astype(np.float64)
     fixed = np.full(len(values), QUANTUM)
     mass = 1.0 if record.mass is None else float(record.mass[j])
@@ -183,7 +186,7 @@ def _kinematic(record: Record, j: int, found: Map, match: Match) -> tuple[str, s
             if n * math.log(total) - math.lgamma(n + 1) < math.log(CHANCE):
                 return name, f"states are double, and forces are {note}"
             readable = False
-    return ("", "") if readable else None
+    return ("", "") if readable and consistent else None
 
 
 OUTLIER = 6.0
@@ -217,36 +220,19 @@ def is_white(missing: Floats, bias: Floats | None = None) -> bool:
     return True
 
 
-def _white(found: Map, match: Match, signed: Floats) -> bool:
-    """Whether the residuals (f - 1, 2) of frames are irregular, apart from the bias of truncated forces."""
-    biased = _truncated(found, match)
-    biased = np.concatenate([biased, np.ones((len(biased), 1))], axis=1)
+def _white(found: Map, signed: Floats) -> bool:
+    """Whether the residuals (f - 1, 2) of frames are irregular."""
     # where the motion decays or grows, residuals are tested relative to the size of each frame as well
     weight = found.weight[:, None] / np.max(found.weight)
-    return is_white(signed, biased) and is_white(weight * signed, weight * biased)
+    return is_white(signed) and is_white(weight * signed, weight)
 
 
-def _truncated(found: Map, match: Match) -> Floats:
-    """Displacement (f - 1, 2) of each frame by forces truncated towards zero in each of its steps."""
-    one = np.ones(1)
-    step = unit(FAMILIES[match.family], match.a * one, match.g * one)[0]
-    up = np.array([1.0, match.stride * float(found.size[0] / found.size[1])])
-    state = found.z[:-1].astype(np.float64) / up
-    out = np.zeros_like(state)
-    rest = float(found.centre[0] / found.size[0])
-    for _ in range(match.stride):
-        out = out @ step.T
-        out[:, 1] -= np.sign(state[:, 0] + rest)
-        state = state @ step.T
-    return np.asarray(out * up)
-
-
-def _forces(record: Record, j: int, found: Map, match: Match) -> tuple[Floats, float] | None:
-    """The force of each step, from the states, and its noise; None where the scheme has more than one force a
-    step, or v is inconsistent with q."""
+def _forces(record: Record, j: int, found: Map, match: Match) -> tuple[Floats, float, bool] | None:
+    """The force of each step, from the states, its noise, and whether v is consistent with q to rounding;
+    None where the scheme has more than one force a step, or v is off by more than half a kick in single."""
     if match.stride != 1 or match.friction != 0 or match.scheme not in (*STOERMER, *KICKED):
         return None
-    h = record.interval
+    h, consistent = record.interval, True
     mass = 1.0 if record.mass is None else float(record.mass[j])
     q = found.z[:, 0] * found.size[0]
     v = found.z[:, 1] * found.size[1] / h
@@ -262,10 +248,11 @@ def _forces(record: Record, j: int, found: Map, match: Match) -> tuple[Floats, f
         # four roundings each of positions over the step and of the velocity, and the identity's own few
         unit = 8 * 2.0**-52 * (np.abs(v[1:-1]).astype(np.float64) + 2 * position / abs(float(h)))
         off = v[1:-1] - (sides[0] * before + sides[1] * after) / sum(sides)
-        if np.any(np.abs(off) > unit):
+        consistent = not np.any(np.abs(off) > unit)
+        if np.any(np.abs(off) > unit + np.abs(h * force) * (LARGEST_SINGLE / (2 * mass))):
             return None
         noise = 16 * 2.0**-52 * mass * float(np.max(position)) / float(h) ** 2
-    return force.astype(np.float64), noise
+    return force.astype(np.float64), noise, consistent
 
 
 EXPLAINED = 0.3
@@ -309,7 +296,8 @@ def coarse_forces(record: Record, j: int, found: Map, match: Match, signed: Floa
     seen = _kinematic(record, j, found, match)
     if seen is not None:
         return *seen, record.mass is not None
-    return (name, note, False) if name and _white(found, match, signed) else ("", "", True)
+    rough = record.rough and match.friction == 0 and match.scheme in (*STOERMER, *KICKED)
+    return (name, note, False) if name and (rough or _white(found, signed)) else ("", "", True)
 
 
 def _reproduced(record: Record, j: int, found: Map, match: Match, precision: str) -> bool:

@@ -176,6 +176,7 @@ def _too_few(e: Evidence, counted: float) -> Explanation:
         "record more of the motion, before it dies down or after it has begun to grow; a solver "
         "that chooses its steps has no fixed scheme to find",
         e.size,
+        shown=False,
     )
 
 
@@ -199,6 +200,7 @@ def _unexplained(e: Evidence, counted: float) -> Explanation:
             + "; a bath of one factor for all momenta, as a Nose-Hoover chain, shows in two particles or more"
             * (e.record.q.shape[1] == 1),
             e.size,
+            shown=False,
         )
     # quanta of a force show in steps of a particle of known mass, and not in a normal mode
     single = " or forces in single precision" * (e.record.mass is None and ratio < 0.2 and e.size < 2.0**-24)

@@ -50,6 +50,8 @@ class Record:
     parts: tuple[Floats, Floats] | None = None
     """Sums (f, n) of the absolute values of the terms of positions and velocities, where these are normal
     modes: their rounding is relative to these sums."""
+    rough: bool = False
+    """Whether errors of forces that are as small as those of single precision need not be noise."""
 
     @property
     def fine(self) -> bool:

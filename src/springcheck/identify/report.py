@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -105,7 +106,12 @@ def _of_coordinates(
         left = {x: left[x] for x in left if not seen.disagreements(x)}
     if not left:
         # where nothing fits, the nearest scheme may take several steps to a frame
-        return _unknown(seen, range(1, 2) if fitting else FEW)
+        unknown = _unknown(seen, range(1, 2) if fitting else FEW)
+        if not unknown.explanations[0].shown:
+            # approximate roots and quotients err alike where the motion comes back, as on a graphics card
+            way, left, _ = accounted(replace(seen, record=replace(seen.record, rough=True)))
+        if not left:
+            return unknown
     return named(way, left, step)
 
 

@@ -52,6 +52,8 @@ class Explanation:
     explains, or to the state if it explains none."""
     local: bool = field(default=False, kw_only=True)
     """Whether it leaves no noise to explain: misplaced numbers, or residuals that are only rounding."""
+    shown: bool = field(default=True, kw_only=True)
+    """Whether the states show it: else it says why they show none."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

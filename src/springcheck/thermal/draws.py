@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from springcheck.physics.arrays import Arithmetic, Extended, Floats, Reals
+from springcheck.physics.arrays import Arithmetic, Extended, Floats, Force, Reals
 from springcheck.physics.scene import Scene
+from springcheck.physics.term import Term
 from springcheck.thermal.catalogue import ENERGY_LEFT, Thermostat, value_of
 from springcheck.thermal.jointly import MOST_JOINTLY, independent_sums, jointly
 from springcheck.thermal.laws import Law
@@ -115,8 +116,15 @@ def one_rounding(
     """
     assert scene.bath is not None
     size, unit, x = np.abs(start[0]), how.unit, scene.bath.friction * abs(scene.step)
-    sizes = forces(sizer.scheme, scene.system, lambda terms: scene.system.magnitude(terms=terms))
-    loose = how.lengths / (unit * roundings_of(sizer.scheme, scene))
+    once = unit * roundings_of(sizer.scheme, scene)
+
+    def pull(terms: Sequence[Term]) -> Force:
+        plain, lost = scene.system.magnitude(terms=terms), how.quantum * scene.system.pulls(terms)
+        # each term's force on a particle is truncated once in a kick, and lost below the quantum, no more
+        return lambda q, p: (of := plain(q, p)) + np.minimum(lost, of) / once
+
+    sizes = forces(sizer.scheme, scene.system, pull)
+    loose = how.lengths / once
     q, p = sizer(size, np.abs(start[1]), sizes, draws, hit, met=met, loose=loose)
     if how.cancels:
         # coefficients of all that is added to q, and of p
@@ -130,7 +138,8 @@ def one_rounding(
 class _Reader:
     def __init__(self, scheme: Thermostat, scene: Scene, how: Arithmetic, rebuilt: bool) -> None:
         self.scheme, self.scene, self.how, self.rebuilt = scheme, scene, how, rebuilt
-        self.stepper, self.sizer = Stepper.of(scheme, scene), Stepper.of(scheme, scene, absolute=True)
+        self.stepper = Stepper.of(scheme, scene, single=how.parameters == "single")
+        self.sizer = Stepper.of(scheme, scene, absolute=True)
         self._force = forces(scheme, scene.system)
         self.roundings = roundings_of(scheme, scene)
         self.directions, self.of_q = (_NONE, False) if scheme.rescales else _directions(scheme, scene)

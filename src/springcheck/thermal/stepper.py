@@ -34,10 +34,10 @@ def forces(
 class Stepper:
     """Steps of a random scheme: its coefficients are worked out once, in the width of its numbers.
 
-    `rate` is the friction rate gamma [1/T], > 0; `thermal` is kT [M L2/T2].  A chain swings
-    on from step to step, at rest before the first, beside so many `freedoms`, one for each mass by default.
-    Rods `hold` where the scheme says so.  With `absolute` every difference is taken as a sum of sizes: a unit
-    roundoff of these, times the roundings of a step, bounds its rounding.
+    `rate` is the friction rate gamma [1/T], > 0; `thermal` is kT [M L2/T2].  A chain swings on from step to
+    step, at rest before the first, beside so many `freedoms`, one for each mass by default; with `single` it
+    keeps its step and its rate so.  Rods `hold` where the scheme says so.  With `absolute` every difference
+    is taken as a sum of sizes: a unit roundoff of these, times the roundings of a step, bounds its rounding.
     """
 
     @classmethod
@@ -51,12 +51,14 @@ class Stepper:
 
     def __init__(
         self, scheme: Thermostat, *, h: float, m: Reals, rate: Reals | float, thermal: float, width: Any,
-        absolute: bool = False, freedoms: int = 0, hold: Rods | None = None,
+        absolute: bool = False, freedoms: int = 0, hold: Rods | None = None, single: bool = False,
     ) -> None:  # fmt: skip
         self.scheme, self.h, self.m = scheme, width(h), np.asarray(m, width)
         if scheme.chain:
-            freedoms = freedoms or self.m.size
-            Q = scheme.chain.masses(freedoms, width(thermal), width(rate))
+            kept, times = (np.float32, scheme.chain.times) if single else (width, 1)
+            # a part of the step, and the square of the rate, are rounded as those are
+            freedoms, self._clock = freedoms or self.m.size, width(kept(h) / kept(times)) * times
+            Q = scheme.chain.masses(freedoms, width(thermal), kept(rate))
             self.of_chain = {"freedoms": freedoms, "thermal": width(thermal), "Q": Q}
             self.chain, self._swing = scheme.chain.start().astype(width), scheme.chain.swing
         self._hold, acts = hold, scheme.held if hold else scheme.acts
@@ -114,7 +116,7 @@ class Stepper:
                 q = q + c * force(q, np.zeros_like(p)) / m
             elif kind == "chain" and hit is None:
                 twice = np.sum(p * p / m, axis=-1)
-                self.chain, factor = self._swing(self.chain, twice, c * h, **self.of_chain)
+                self.chain, factor = self._swing(self.chain, twice, c * self._clock, **self.of_chain)
                 p = p * np.expand_dims(factor, -1)
             elif kind in ("rescale", "scale", "chain"):
                 p = p * (self._factor(p, c, noise, draws[number], kind == "rescale") if hit is None else hit)

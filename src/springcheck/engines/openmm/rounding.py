@@ -31,7 +31,7 @@ _PRECISIONS = {
 displacement of the step times 1/h, so it does not lose the digits of x' - x as on Reference."""
 
 CUSTOM = ("euler", "semi-implicit-euler", "mts", "boris")
-"""Methods that OpenMM's CustomIntegrator carries out; MTSIntegrator is one."""
+"""Methods that OpenMM's CustomIntegrator carries out; MTSIntegrator and MTSLangevinIntegrator are such."""
 
 CUSTOM_EXCESS = 2.0**-32
 """On GPU-type platforms CustomIntegrator turns fixed-point forces back by 1/0xFFFFFFFF, which is
@@ -80,4 +80,4 @@ def arithmetic(label: Label) -> Arithmetic:
     found = _PRECISIONS[label.precision or "single"]
     if label.method in LENGTHS:
         found = replace(found, lengths=max(LENGTHS[label.method], SHAKE))
-    return replace(found, excess=CUSTOM_EXCESS) if label.method in CUSTOM else found
+    return replace(found, excess=CUSTOM_EXCESS) if label.method.partition("-langevin")[0] in CUSTOM else found

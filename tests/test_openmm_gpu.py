@@ -1,0 +1,121 @@
+"""OpenMM on GPU-type platforms: what CUDA wrote on an H200, and what OpenCL writes here, in a bath too."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import springcheck
+from springcheck import checks, driver, engines
+from springcheck.identify import identify
+from springcheck.physics.bath import Bath
+from springcheck.physics.scene import Scene
+from springcheck.physics.trajectory import Trajectory
+
+STATES = Path(__file__).parents[1] / "data" / "reference" / "openmm-cuda" / "states.npz"
+
+MODES = {"single": "single", "mixed": "mixed", "double": "fixed-point force"}
+
+SCHEMES = {
+    "verlet": "velocity-verlet",
+    "leapfrog": "semi-implicit-euler",
+    "euler": "explicit-euler",
+    "semi-implicit-euler": "semi-implicit-euler",
+}
+
+
+def scene_of(name: str, *, bath: bool = False) -> Scene:
+    scene = replace(springcheck.load_scene(name), every=1)
+    if bath:
+        chosen = scene.bath or Bath(temperature=0.7, friction=0.6 / scene.step)
+        scene = replace(scene, steps=400, bath=chosen)
+    return scene
+
+
+def recorded(mode: str, method: str, scene: Scene) -> Trajectory:
+    """What `openmm:method@CUDA-mode` wrote, as the driver would have it."""
+    label = engines.parse(f"openmm:{method}@CUDA-{mode}")
+    with np.load(STATES) as states:
+        q, p = (states[f"{mode}/{method}/{scene.name}/{x}"] for x in "qp")
+    like = driver.run(scene, engines.parse(f"openmm:{method}"), seed=7 if scene.bath else None)
+    return replace(
+        like, label=label, q=q, p=p, t=like.t[: len(q)], arithmetic=engines.arithmetic(label), off_axis=None,
+        energy=np.asarray(scene.system.energy(q, p)),
+    )  # fmt: skip
+
+
+def failed(scene: Scene, run: Trajectory) -> dict[str, str]:
+    return {v.check: v.why for v in checks.judge(scene, run) if v.passed is False}
+
+
+@pytest.mark.campaign("mode", "method")
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("method", SCHEMES)
+@pytest.mark.parametrize("name", ["spring", "spring-uneven"])
+def test_what_cuda_wrote_passes_and_is_named_with_its_arithmetic(name: str, method: str, mode: str) -> None:
+    scene = scene_of(name)
+    run = recorded(mode, method, scene)
+    assert failed(scene, run) == {}
+    for every in (1, 2, 5, 10):
+        found = identify(run.t[::every], run.q[::every], run.p[::every], mass=scene.m)
+        # its approximate quotients are redone nowhere else, so that single forces have to show
+        certain = every == 1 or mode != "mixed"
+        told = found.scheme, found.stride, found.precision, found.fits
+        assert told == (SCHEMES[method], every, MODES[mode], certain), found.statement
+
+
+@pytest.mark.parametrize("number", ["q", "p"])
+@pytest.mark.parametrize("method", SCHEMES)
+def test_an_error_above_single_precision_is_seen_in_mixed(method: str, number: str) -> None:
+    """A coarse force is no size to which the next one's error is proportional: in velocity Verlet the bound
+    on a momentum was 1e5 times too wide."""
+    scene = scene_of("spring-uneven")
+    run = recorded("mixed", method, scene)
+    moved = np.copy(getattr(run, number))
+    moved[100] *= 1 + 1e-6
+    off = replace(run, **{number: moved})
+    assert "step-defect" in failed(scene, replace(off, energy=np.asarray(scene.system.energy(off.q, off.p))))
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("method", ["langevin-middle-bath", "langevin-middle-synchronised", "andersen"])
+@pytest.mark.parametrize("name", ["spring-uneven", "bath-spring"])
+def test_noise_that_cuda_wrote_passes_but_for_the_collisions(name: str, method: str, mode: str) -> None:
+    scene = scene_of(name, bath=True)
+    run = recorded(mode, method, scene)
+    # of 400 steps at p = 0.04 two thirds of the collisions are no sure sign yet
+    few = method == "andersen" and name == "spring-uneven"
+    assert list(failed(scene, run)) == (["collisions"] if few else [])
+    if mode == "double":
+        finer = replace(run, arithmetic=replace(run.arithmetic, quantum=0.0))
+        assert {"noise-direction", "collisions"} & set(failed(scene, finer))
+
+
+@pytest.mark.parametrize("method", ["mts-langevin", "nose-hoover-bath", "langevin-middle-bath"])
+def test_a_bath_on_opencl_is_judged_to_rounding(method: str, need: Callable[[str], None]) -> None:
+    """MTSLangevinIntegrator is a CustomIntegrator, and a chain's kernel takes step and rate as floats."""
+    label = f"openmm:{method}@OpenCL-double"
+    need(label)
+    scene = scene_of("spring-uneven", bath=True)
+    run = driver.run(scene, engines.parse(label), seed=7)
+    assert failed(scene, run) == {}
+    worse = {"excess": 0.0} if method == "mts-langevin" else {"parameters": "double"}
+    plain = replace(run, arithmetic=replace(run.arithmetic, quantum=0.0, **worse))  # type: ignore[arg-type]
+    assert "noise-direction" in failed(scene, plain)
+
+
+@pytest.mark.parametrize("method", ["andersen", "langevin-middle-bath"])
+def test_a_bath_whose_forces_leave_the_fixed_point_fails_with_that_reason(
+    method: str, need: Callable[[str], None]
+) -> None:
+    label = f"openmm:{method}@OpenCL-double"
+    need(label)
+    scene = springcheck.load_scene("multiple-time-steps")
+    scene = replace(scene, bath=Bath(temperature=0.7, friction=0.6 / scene.step))
+    told = failed(scene, driver.run(scene, engines.parse(label), seed=7))
+    assert list(told) == ["noise-direction"]
+    assert "fixed-point sum of forces overflows beyond 2**31, and a force is" in told["noise-direction"]
