@@ -18,7 +18,7 @@ BUDGETS = {
     ("engines",): 2817,
     ("driver", "conformance", "doors"): 1257,
     ("checks",): 5123,
-    ("identify",): 8785,
+    ("identify",): 8789,
     ("formats", "store"): 5260,
     ("studies",): 1478,
     ("studies/*",): 9803,

@@ -49,6 +49,7 @@ def test_every_method_is_explained_whether_its_engine_is_here_or_not() -> None:
     for engine in engines.names():
         for method in engines.engine(engine).methods:
             assert next(explain.lines(f"{engine}:{method}")).startswith(f"{engine}:{method}: ")
+    assert next(explain.lines("openmm:andersen")).endswith("it collides at most 2/pi as often as asked")
 
 
 def test_a_check_says_what_it_must_reject_and_what_it_passes() -> None:

@@ -155,7 +155,7 @@ def meaning_lines(meaning: Meaning) -> Iterator[str]:
 
 def _method(name: str) -> Iterator[str]:
     method = engines.method(engines.parse(name))
-    yield f"{name}: {method.about}"
+    yield f"{name}: {method.about}" + f"; {method.note}" * bool(method.note)
     yield ""
     yield from scheme_lines(schemes.scheme(method.scheme))
 

@@ -270,14 +270,19 @@ def _roundings(record: Record, j: int, found: Map, matches: list[Match]) -> Roun
 def _defects(
     record: Record, j: int, found: Map, matches: list[Match], visible: Callable[[], bool]
 ) -> list[Defect]:
-    sizes = _roundings(record, j, found, matches)
-    if record.fine and _beyond(record, found, sizes) and not visible():
+    sizes, half = _roundings(record, j, found, matches), np.zeros(1)
+    if not record.fine:
+        b = np.abs(_predicted(matches)).astype(np.float64)
+        quanta = record.quanta(j) / found.size.astype(np.float64)
+        half = (quanta[1:] + quanta[:-1] @ np.swapaxes(b, 1, 2)) / 2
+    if _beyond(record, found, sizes, half) and not (record.fine and visible()):
         return [Defect(ulp=math.inf, precision="", miss=math.inf)] * len(matches)
     ulp, plain, signed = _in_double(record, found, matches, sizes)
     stored = single = np.zeros(len(matches), dtype=bool)
-    half = np.zeros_like(signed)
-    if not record.fine:
-        signed, half, stored, single = _in_file(record, j, found, matches, sizes, signed)
+    if record.fine:
+        half = np.zeros_like(signed)
+    else:
+        signed, half, stored, single = _in_file(record, found, matches, sizes, signed, half)
     missing = np.abs(signed)
     lengths = np.sqrt(np.sum(found.z[:-1].astype(np.float64) ** 2, axis=1))
     share = _largest(missing, np.repeat(lengths[None, :, None], 2, axis=2))
@@ -306,16 +311,18 @@ def _defects(
     return out
 
 
-BEYOND = 1e3
-"""Bounds on what double precision and the rounding of times explain, from which no refitting is tried."""
+BEYOND, BEYOND_FILE = 1e3, 10.0
+"""Bounds on what double precision, and what a coarser file explains, from which no refitting is tried."""
 
 
-def _beyond(record: Record, found: Map, sizes: Roundings) -> bool:
-    """Whether the residuals exceed `BEYOND` bounds of double precision under every match: no map leaves a
-    smaller weighted mean square than the fitted one, whatever is refitted of a match."""
+def _beyond(record: Record, found: Map, sizes: Roundings, half: Floats) -> bool:
+    """Whether the residuals exceed so many bounds, `half` that of a file's numbers, under every match: no map
+    leaves a smaller weighted mean square than the fitted one, whatever is refitted of a match."""
     off = record.clock + np.max(np.abs(0.0 if record.deviations is None else record.deviations))
     each = BEYOND * (EPSILON + off * sizes.stride) * (sizes.path + sizes.stride**2)
-    most = each[:, None, None] * (sizes.size + sizes.difference)
+    if not record.fine:
+        each = BEYOND_FILE * (SINGLE + off * sizes.stride) * np.minimum(sizes.path, sizes.usual)
+    most = BEYOND_FILE * half + each[:, None, None] * (sizes.size + sizes.difference)
     explained = np.sum((most * found.weight[:, None]) ** 2, axis=(1, 2))
     return bool(np.all(found.freedom / 2 * np.sum(found.residual**2) > explained))
 
@@ -360,13 +367,10 @@ def _in_double(
 
 
 def _in_file(
-    record: Record, j: int, found: Map, matches: list[Match], sizes: Roundings, signed: Floats
+    record: Record, found: Map, matches: list[Match], sizes: Roundings, signed: Floats, half: Floats
 ) -> tuple[Floats, Floats, Any, Any]:
-    """Residuals (c, f - 1, 2), refitted under the errors of the storage format; the bound of these errors;
-    and whether they explain the residuals (c,) in double, or in single precision arithmetic."""
-    b = np.abs(_predicted(matches)).astype(np.float64)
-    quanta = record.quanta(j) / found.size.astype(np.float64)
-    half = (quanta[1:] + quanta[:-1] @ np.swapaxes(b, 1, 2)) / 2
+    """Residuals (c, f - 1, 2), refitted under the errors `half` of the storage format; their bound; and
+    whether they explain the residuals (c,) in double, or in single precision arithmetic."""
     signed = _refitted(record, found, matches, signed, half)
     # the map is known from rounded states that move, to a few parts in sqrt(pairs) of their rounding
     moving = np.count_nonzero(np.all(np.diff(found.z.astype(np.float64), axis=0) != 0, axis=1)) + 1

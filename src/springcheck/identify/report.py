@@ -107,7 +107,7 @@ def _of_coordinates(
     if not left:
         # where nothing fits, the nearest scheme may take several steps to a frame
         unknown = _unknown(seen, range(1, 2) if fitting else FEW)
-        if not unknown.explanations[0].shown:
+        if seen.record.fine and not unknown.explanations[0].shown:
             # approximate roots and quotients err alike where the motion comes back, as on a graphics card
             way, left, _ = accounted(replace(seen, record=replace(seen.record, rough=True)))
         if not left:
