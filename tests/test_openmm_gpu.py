@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import springcheck
 from springcheck import checks, driver, engines
+from springcheck.cli import file
 from springcheck.identify import identify
 from springcheck.physics.bath import Bath
 from springcheck.physics.scene import Scene
@@ -66,6 +68,24 @@ def test_what_cuda_wrote_passes_and_is_named_with_its_arithmetic(name: str, meth
         certain = every == 1 or mode != "mixed"
         told = found.scheme, found.stride, found.precision, found.fits
         assert told == (SCHEMES[method], every, MODES[mode], certain), found.statement
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_a_file_from_cuda_is_judged_by_the_arithmetic_that_is_stated(mode: str, tmp_path: Path) -> None:
+    scene = scene_of("spring-uneven")
+    path = recorded(mode, "verlet", scene).save(tmp_path / "run.csv")
+    given: dict[str, Any] = {"scene": scene, "scheme": "velocity-verlet"}
+    plain = file.judge(path, **given)
+    assert plain.status == 1
+    assert any("--arithmetic openmm:verlet@CUDA-mixed" in note for note in plain.notes)
+    stated = file.judge(path, **given, arithmetic=f"openmm:verlet@CUDA-{mode}")
+    assert stated.status == 0
+    assert any(f"judged by the arithmetic of openmm:verlet@CUDA-{mode}" in note for note in stated.notes)
+    # another scheme, and a force that is wrong by more than single precision, fail all the same
+    other = file.judge(path, scene=scene, scheme="semi-implicit-euler", arithmetic="openmm:verlet@CUDA-mixed")
+    assert other.status == 1
+    heavy = replace(scene, m=scene.m * (1 + 1e-4))
+    assert file.judge(path, **given | {"scene": heavy}, arithmetic="openmm:verlet@CUDA-single").status == 1
 
 
 @pytest.mark.parametrize("number", ["q", "p"])

@@ -213,11 +213,9 @@ def _judge(options: Namespace) -> int:
     from springcheck.cli import file
 
     doubts = output.doubts(options.file) if formats.is_hdf5(Path(options.file)) else []
-    found = file.judge(
-        Path(options.file),
-        columns=_columns(options),
-        **{x: getattr(options, x) for x in ("scene", "scheme", "step", "trajectory", "differences")},
-    )
+    names = ("scene", "scheme", "step", "trajectory", "differences", "arithmetic")
+    given = {x: getattr(options, x) for x in names}
+    found = file.judge(Path(options.file), columns=_columns(options), **given)
     output.warn(options.file, doubts)
     status = found.status or int(bool(doubts))
     return output.answer(options, lambda: {**found.document(), "not_trusted": doubts}, found.lines, status)
@@ -344,6 +342,8 @@ COMMANDS = (
         _STEPS,
         argument("--differences", action="store_true",
                  help="its velocities are differences of positions, which keep eps q/h of them"),
+        argument("--arithmetic", metavar="LABEL",
+                 help="it rounds as this method does: openmm:verlet@CUDA-mixed (default: in double)"),
         JSON,
     )),
     Command("check", "is a store whole: digests, completeness, structure", _check, (_FILE,)),

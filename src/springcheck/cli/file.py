@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -9,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from springcheck import checks, schemes, store
+from springcheck import checks, engines, schemes, store
 from springcheck.cli import start
 from springcheck.errors import IdentificationError, StoreError
 from springcheck.figures.views import units
@@ -27,6 +28,7 @@ from springcheck.text.lines import Lines, plain, table
 from springcheck.text.wording import count
 
 TIMES = "times were taken as whole numbers of steps from the first frame on"
+NOT_DOUBLE = "(single|mixed|fixed-point force) arithmetic explains every step"
 NOT_JUDGED = "not judged: nothing that applies to these states could tell the scheme from another"
 
 
@@ -94,9 +96,11 @@ def judge(
     step: float | None = None,
     trajectory: str | None = None,
     differences: bool = False,
+    arithmetic: str | None = None,
 ) -> Judgement:
     """Verdicts on the trajectory of a file; `differences` says that its velocities are those of positions,
-    which keep eps q/h of them.  Raises SpringcheckError where it is unreadable or not of the scene."""
+    which keep eps q/h of them, and `arithmetic` names a method whose program rounds like its own.  Raises
+    SpringcheckError where it is unreadable or not of the scene."""
     found = load_scene(scene) if isinstance(scene, str) else scene
     known = schemes.scheme(scheme)
     states = states_in(path, columns, step, trajectory)
@@ -104,12 +108,18 @@ def judge(
     if differences:
         run = replace(run, rebuilds_velocity=True)
         notes += ("velocities are differences of positions, as was said, and judged so",)
+    if arithmetic:
+        how = engines.arithmetic(engines.parse(arithmetic))
+        run = replace(run, arithmetic=replace(how, state=max(how.state, run.arithmetic.state)))
+        notes += (f"judged by the arithmetic of {arithmetic}, as was said: {str(how) or 'double'}",)
     verdicts = [
         replace(v, passed=None, value=np.nan, bound=np.nan, why=taken[v.check]) if v.check in taken else v
         for v in checks.explained(judged, run, checks.judge(judged, run), files.shown)
     ]
     if states.roundoff > 2.0**-53:
         verdicts.append(_shown(judged, run, states))
+    if not arithmetic and re.search(NOT_DOUBLE, checks.cause_of(verdicts)):
+        notes += ("of a program that computes so: --arithmetic, as --arithmetic openmm:verlet@CUDA-mixed",)
     return Judgement(
         path=path, scene=found.name, scheme=known.name, frames=len(run.t), notes=notes,
         verdicts=tuple(verdicts),

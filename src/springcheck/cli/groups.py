@@ -47,7 +47,7 @@ GROUPS: Mapping[str, Sequence[str]] = {
     "methods": (
         "--method", "--all", "--engine", "--stepper", "--command", "--scheme", "--timeout", "--fault",
     ),
-    "known of the motion": ("--mass", "--stiffness", "--differences"),
+    "known of the motion": ("--mass", "--stiffness", "--differences", "--arithmetic"),
     "how much is measured": ("--thorough", "--budget", "--quick", "--workers", "--cluster"),
     "figures": ("--particle", "--quantity", "--over"),
     "output": ("output", "--output", "--force", "--json", "--quiet", "--verdicts", "--rows", "--points"),
