@@ -17,7 +17,7 @@ BUDGETS = {
     ("engines/openmm", "engines/ase", "engines/sundials"): 1326,
     ("engines",): 2817,
     ("driver", "conformance", "doors"): 1257,
-    ("checks",): 5123,
+    ("checks",): 5127,
     ("identify",): 8789,
     ("formats", "store"): 5260,
     ("studies",): 1478,

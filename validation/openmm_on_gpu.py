@@ -40,7 +40,6 @@ import numpy as np
 
 from arguments import arguments, script
 from springcheck import checks, driver, engines
-from springcheck.engines import quiet
 from springcheck.errors import MethodError, SpringcheckError
 from springcheck.physics.bath import Bath
 from springcheck.physics.scene import Scene
@@ -113,24 +112,26 @@ def counted(rows: list[dict[str, Any]]) -> dict[str, int]:
     }
 
 
-def at_fixed_point(platform: str) -> dict[str, list[float]]:
-    """What each of `FORCES` comes out as, by mode: one particle, alone."""
+def alone(label: str, force: float) -> Any:
+    """OpenMM's context of one particle at 0 that is pulled by a force, on the platform of a label."""
     import openmm as mm
 
-    found: dict[str, list[float]] = {}
-    for mode in MODES:
-        found[mode] = []
-        for force in FORCES:
-            system, pull = mm.System(), mm.CustomExternalForce(f"-({force!r})*x")
-            system.addParticle(1.0)
-            pull.addParticle(0, [])
-            system.addForce(pull)
-            context = mm.Context(
-                system, mm.VerletIntegrator(1.0), mm.Platform.getPlatformByName(platform), {"Precision": mode}
-            )
-            context.setPositions([(0, 0, 0)])
-            found[mode].append(context.getState(forces=True).getForces(asNumpy=True)._value[0, 0])
-    return found
+    # as engines.start makes it: what a platform prints is caught, and its absence one line
+    from springcheck.engines.openmm.simulation import _context
+
+    system, pull = mm.System(), mm.CustomExternalForce(f"-({force!r})*x")
+    system.addParticle(1.0)
+    pull.addParticle(0, [])
+    system.addForce(pull)
+    context = _context(system, mm.VerletIntegrator(1.0), engines.parse(label))
+    context.setPositions([(0, 0, 0)])
+    return context
+
+
+def at_fixed_point(label: str) -> list[float]:
+    """What each of `FORCES` comes out as."""
+    contexts = (alone(label, force) for force in FORCES)
+    return [x.getState(forces=True).getForces(asNumpy=True)._value[0, 0] for x in contexts]
 
 
 def atlas(label: str) -> dict[str, Any]:
@@ -160,28 +161,16 @@ def cost(platform: str) -> dict[str, dict[str, float]]:
 
 
 def card(platform: str) -> dict[str, str]:
-    """The device as OpenMM names it, and OpenMM's version."""
-    import openmm as mm
-
-    system = mm.System()
-    system.addParticle(1.0)
-    on = mm.Platform.getPlatformByName(platform)
-    with quiet.caught(1):
-        context = mm.Context(system, mm.VerletIntegrator(1.0), on)
-    return {
-        "openmm": mm.Platform.getOpenMMVersion(),
-        "platform": platform,
-        "device": on.getPropertyValue(context, "DeviceName"),
-    }
+    """The device as OpenMM names it, and OpenMM's version.  MethodError where there is none."""
+    on = alone(f"openmm:verlet@{platform}", 0.0)
+    device = on.getPlatform().getPropertyValue(on, "DeviceName")
+    return {**engines.load("openmm").version(), "platform": platform, "device": device}
 
 
 def main() -> int:
     """Judge, print, keep; status 1 where something failed."""
-    given = arguments(__doc__, platform="CUDA", file=str)
-    try:
-        about = card(given.platform)
-    except Exception as error:  # OpenMM raises its own, of which this module imports nothing
-        raise SpringcheckError(f"OpenMM has no platform {given.platform} here: {error}") from error
+    given = arguments(__doc__, platform=("CUDA", "HIP", "OpenCL"), file=str)
+    about = card(given.platform)
     print(", ".join(about.values()), flush=True)
     began = perf_counter()
     rows: list[dict[str, Any]] = []
@@ -206,7 +195,7 @@ def main() -> int:
         outcomes = ", ".join(f"{n} {word}" for word, n in found["outcomes"].items())
         print(f"  {label}: {outcomes}; right for forces {found['windows']}; silently wrong {found['wrong']}")
     print(f"  {perf_counter() - began:.0f} s", flush=True)
-    forces = at_fixed_point(given.platform)
+    forces = {mode: at_fixed_point(f"openmm:verlet@{given.platform}-{mode}") for mode in MODES}
     for mode, values in forces.items():
         pairs = zip(FORCES, values, strict=True)
         print(f"  forces {mode}: " + ", ".join(f"{f:.1e} -> {x:.10g}" for f, x in pairs))

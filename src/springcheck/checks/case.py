@@ -15,7 +15,6 @@ from springcheck.checks.claim import Claim
 from springcheck.checks.stretch import DEVIATIONS, Stretch, follow
 from springcheck.physics.arrays import WIDE, Arithmetic, Extended, Floats, Force, Integers, Reals
 from springcheck.physics.driven import CLOCK
-from springcheck.physics.scene import Scene
 from springcheck.physics.term import Term
 from springcheck.physics.trajectory import Trajectory
 
@@ -308,10 +307,12 @@ def least_moved(moved: Reals) -> Reals:
     return np.asarray(np.minimum(moved, np.append(moved[:1], moved[:-1])))
 
 
-def too_strong(run: Trajectory, scene: Scene) -> str:
+def too_strong(case: Case) -> str:
     """A sentence where a force of some frame overflows the engine's fixed-point sum; "" elsewhere."""
-    how = run.arithmetic
-    peak = np.max(strongest(scene.terms, run.q.astype(np.longdouble))) if np.isfinite(how.overflow) else 0
+    run, how = case.trajectory, case.trajectory.arithmetic
+    peak = (
+        np.max(strongest(case.scene.terms, run.q.astype(np.longdouble))) if np.isfinite(how.overflow) else 0
+    )
     return f"the engine's limit: {overflows(how)}, and a force is {peak:.3g}" if peak >= how.overflow else ""
 
 

@@ -143,7 +143,7 @@ def line(case: Case) -> Finding:
     off = case.trajectory.off_axis
     assert off is not None
     # of a start whose forces overflow there may be no second frame, whose step would tell it
-    limit = too_strong(case.trajectory, case.scene) if off else ""
+    limit = too_strong(case) if off else ""
     return Finding(abs(off), 0.0, "L", limit or "every force along another axis is a product with 0")
 
 

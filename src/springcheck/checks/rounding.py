@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -61,7 +61,9 @@ def of_step(
     return np.asarray(of_q + h / m * lost + smallest), np.asarray(of_p + lost)
 
 
-def _evaluations(case: Claim, of: Any, places: list[Reals] | None, recorded: bool) -> list[Met]:
+def _evaluations(
+    case: Claim, of: Callable[..., Force], places: list[Reals] | None, recorded: bool
+) -> list[Met]:
     """Error bound `of` each evaluation of the force within a step."""
     scene, scheme = case.judged, case.scheme
     far, none = np.full(scene.n, scene.system.far, np.longdouble), np.zeros(scene.n, np.longdouble)

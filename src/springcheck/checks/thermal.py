@@ -89,10 +89,11 @@ def noise_direction(case: Case) -> Finding | str:
     where = f"; first at step {case.steps[0] + int(off[0]) + 1}" if len(off) else ""
     if limit := small_move(case.trajectory) if where else "":
         return limit
-    # a collision explains any momentum
-    if limit := too_strong(case.trajectory, case.scene) if where or found.hits is not None else "":
+    if limit := case.once(too_strong) if where or found.hits is not None else "":
         where = f"{where}; {limit}"
-        worst[-1] = worst[-1] if found.hits is None else 1 / case.trajectory.arithmetic.unit
+        if found.hits is not None:
+            # a collision explains any momentum
+            worst[-1] = 1 / case.trajectory.arithmetic.unit
     if (told := int(np.count_nonzero(worst != thermal.draws.UNTOLD))) < len(worst):
         where = f", judged to step {told}, where these have grown to all of the chain{where}"
     why = f"roundings along one step of {case.scheme.title}; does not grow with the run{where}"
@@ -104,7 +105,7 @@ def _draws(case: Case) -> Floats:
     scheme = THERMOSTATS[case.trajectory.scheme]
     if not scheme.draws:
         raise MethodError(NO_DRAWS)
-    if limit := small_move(case.trajectory) or too_strong(case.trajectory, case.scene):
+    if limit := small_move(case.trajectory) or case.once(too_strong):
         raise MethodError(limit)
     found = reading(case)
     if not found.known:
@@ -223,7 +224,7 @@ def collisions(case: Case) -> Chance | str:
         return "it has no collisions"
     if case.scene.places is not None:
         return "the axes of one particle may collide together"
-    if limit := small_move(case.trajectory) or too_strong(case.trajectory, case.scene):
+    if limit := small_move(case.trajectory) or case.once(too_strong):
         return limit
     p = thermal.draws.law_of(THERMOSTATS[case.trajectory.scheme], case.judged).collision
     hits, n = int(np.count_nonzero(found.hits)), found.hits.size

@@ -108,7 +108,7 @@ def judge(
     if differences:
         run = replace(run, rebuilds_velocity=True)
         notes += ("velocities are differences of positions, as was said, and judged so",)
-    if arithmetic:
+    if arithmetic is not None:
         how = engines.arithmetic(engines.parse(arithmetic))
         run = replace(run, arithmetic=replace(how, state=max(how.state, run.arithmetic.state)))
         notes += (f"judged by the arithmetic of {arithmetic}, as was said: {str(how) or 'double'}",)
@@ -118,7 +118,7 @@ def judge(
     ]
     if states.roundoff > 2.0**-53:
         verdicts.append(_shown(judged, run, states))
-    if not arithmetic and re.search(NOT_DOUBLE, checks.cause_of(verdicts)):
+    if arithmetic is None and re.search(NOT_DOUBLE, checks.cause_of(verdicts)):
         notes += ("of a program that computes so: --arithmetic, as --arithmetic openmm:verlet@CUDA-mixed",)
     return Judgement(
         path=path, scene=found.name, scheme=known.name, frames=len(run.t), notes=notes,
