@@ -18,7 +18,7 @@ import time
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     import subprocess
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterator, Sequence
     from pathlib import Path
     from typing import Any, ClassVar
 
@@ -32,7 +32,9 @@ GRACE = 1.5
 """Seconds from the signal to the end of the process, whatever it is doing: native code that does not return,
 a library that has swallowed the exception, a terminal that takes no more output."""
 
-SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT")
+_NAMES = ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT")
+SIGNALS = tuple(getattr(signal, name) for name in _NAMES if hasattr(signal, name))
+"""Signals that end a program, as far as this system has them."""
 
 
 class _State:
@@ -58,23 +60,11 @@ class _State:
 
 
 def install() -> None:
-    """Turn the first signal into a KeyboardInterrupt; ignore later ones; end the process in time.
-
-    Standard streams that are closed are redirected to the null device.
-    """
-    for stream in (0, 1, 2):
-        try:
-            os.fstat(stream)
-        except OSError:
-            # a file that is opened later would take its descriptor, and receive what is printed
-            os.dup2(os.open(os.devnull, os.O_RDWR), stream)
+    """Turn the first signal into a KeyboardInterrupt; ignore later ones; end the process in time."""
     _State.errors = os.dup(2)
     sys.excepthook, sys.unraisablehook = _uncaught, _unraisable
-    for name in SIGNALS:
-        number = getattr(signal, name, None)
-        # nohup and shells that start a command in the background have signals ignored
-        if number is not None and signal.getsignal(number) is not signal.SIG_IGN:
-            signal.signal(number, _raise)
+    for number in _heard():
+        signal.signal(number, _raise)
     if os.name == "posix":
         read, write = os.pipe()
         os.set_blocking(write, False)
@@ -83,6 +73,11 @@ def install() -> None:
     if _State.mask is not None:
         _thread.start_new_thread(_end_with_parent, (_State.lifeline,))
         signal.pthread_sigmask(signal.SIG_SETMASK, _State.mask)
+
+
+def _heard() -> list[signal.Signals]:
+    """Signals that are not ignored, as nohup and shells that start a command in the background have some."""
+    return [number for number in SIGNALS if signal.getsignal(number) is not signal.SIG_IGN]
 
 
 def _end_with_parent(lifeline: int) -> None:
@@ -96,26 +91,25 @@ def supervised() -> int | None:
 
     What a plug-in or a library does to it (`os._exit`, SIGSEGV, SIGABRT ...) ends the child alone.  Where it
     is known which of them was called (see `calling`), the program is started again: it resumes what was
-    finished, and refuses those that ended it (see `ended_by`).
+    finished, and refuses those that ended it (see `ended_by`).  Closed standard streams are redirected to the
+    null device.
     """
+    for stream in (0, 1, 2):
+        try:
+            os.fstat(stream)
+        except OSError:
+            # a file or a pipe that is opened later would take its descriptor, and receive what is printed
+            os.open(os.devnull, os.O_RDWR)
     if not hasattr(os, "fork") or os.environ.get("SPRINGCHECK_TRACEBACK"):
         return None
     import mmap
 
-    for number in (0, 1, 2):
-        # a standard stream that is closed is redirected: no pipe of ours may take its descriptor
-        with contextlib.suppress(OSError):
-            os.fstat(number)
-            continue
-        os.open(os.devnull, os.O_RDWR)
     _State.board = board = mmap.mmap(-1, _PAGE)
-    numbers = [getattr(signal, name) for name in SIGNALS]
-    # nohup and shells that start a command in the background have signals ignored
-    heard = [number for number in numbers if signal.getsignal(number) is not signal.SIG_IGN]
+    heard = _heard()
     while True:
         _State.lifeline, held = os.pipe()
         # a signal between here and `install` waits for it
-        _State.mask = signal.pthread_sigmask(signal.SIG_BLOCK, numbers)
+        _State.mask = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
         child = os.fork()
         if child == 0:
             for number in heard:
@@ -127,7 +121,7 @@ def supervised() -> int | None:
         os.close(held)
         if board[0]:
             return int(board[1])
-        if -status in (signal.SIGKILL, *numbers):
+        if -status in (signal.SIGKILL, *SIGNALS):
             # the child ended by a signal; end in the same way
             os.kill(os.getpid(), -status)
         name = bytes(board[2:]).partition(b"\0")[0].decode("utf-8", "replace")
@@ -170,9 +164,9 @@ def calling(name: str) -> None:
     """
     if _State.board is not None:
         _State.board[2:_PAGE] = name.encode("utf-8", "replace")[: _PAGE - 3].ljust(_PAGE - 2, b"\0")
-    for number in (getattr(signal, one, None) for one in SIGNALS if not name):
+    for number in () if name else SIGNALS:
         # Python does not notice a handler that is set in C; only the main thread may set one
-        if number is not None and signal.getsignal(number) is _raise:
+        if signal.getsignal(number) is _raise:
             with contextlib.suppress(ValueError):
                 signal.signal(number, _raise)
 
@@ -240,9 +234,8 @@ def say() -> None:
 
 def finish() -> None:
     """Ignore signals while the interpreter shuts down: nothing is left to interrupt."""
-    for name in SIGNALS:
-        if hasattr(signal, name):
-            signal.signal(getattr(signal, name), signal.SIG_IGN)
+    for number in SIGNALS:
+        signal.signal(number, signal.SIG_IGN)
 
 
 def leave() -> None:
@@ -261,17 +254,17 @@ def leave() -> None:
     os._exit(ends(STATUS))
 
 
-class held:  # noqa: N801  (a context manager reads as a word)
+@contextlib.contextmanager
+def held() -> Iterator[None]:
     """Defer an interrupt while files are made or removed that must not be left half done; be brief."""
-
-    def __enter__(self) -> None:
-        _State.held += 1
-
-    def __exit__(self, kind: type[BaseException] | None, error: object, trace: object) -> None:
+    _State.held += 1
+    try:
+        yield
+    finally:
         _State.held -= 1
-        if _State.seen and not (_State.held or _State.raised) and kind is None:
-            _State.raised = True
-            raise KeyboardInterrupt
+    if _State.seen and not (_State.held or _State.raised):
+        _State.raised = True
+        raise KeyboardInterrupt
 
 
 def takes(end: Callable[[], object]) -> None:
@@ -284,30 +277,28 @@ def forget(end: Callable[[], object]) -> None:
     _State.ends.discard(end)
 
 
-class folder:  # noqa: N801
+@contextlib.contextmanager
+def folder(*, prefix: str | None = None, dir: Path | None = None) -> Iterator[Path]:
     """A temporary folder, as `tempfile.mkdtemp` makes it, that no interrupt leaves behind."""
+    import shutil
+    from pathlib import Path
+    from tempfile import mkdtemp
 
-    def __init__(self, *, prefix: str | None = None, dir: Path | None = None) -> None:
-        self._prefix, self._dir, self._name = prefix, dir, ""
+    made: list[str] = []
 
-    def __enter__(self) -> Path:
-        from pathlib import Path
-        from tempfile import mkdtemp
+    def remove() -> None:
+        for name in made:
+            shutil.rmtree(name, ignore_errors=True)
 
-        takes(self._remove)
+    takes(remove)
+    try:
         with held():
-            self._name = mkdtemp(prefix=self._prefix, dir=self._dir)
-        return Path(self._name)
-
-    def __exit__(self, *_: object) -> None:
+            made.append(mkdtemp(prefix=prefix, dir=dir))
+        yield Path(made[0])
+    finally:
         with held():
-            self._remove()
-            forget(self._remove)
-
-    def _remove(self) -> None:
-        import shutil
-
-        shutil.rmtree(self._name, ignore_errors=True)
+            remove()
+            forget(remove)
 
 
 def called(words: Sequence[str], seconds: float, **how: Any) -> subprocess.CompletedProcess[bytes]:
@@ -355,8 +346,7 @@ def _raise(number: int, frame: object) -> None:
 
 def _watch(wakeup: int) -> None:
     """Wait for a signal in a thread, which works while native code has released the interpreter lock."""
-    numbers = {getattr(signal, name, -1) for name in SIGNALS}
-    while os.read(wakeup, 1)[0] not in numbers:
+    while os.read(wakeup, 1)[0] not in SIGNALS:
         pass
     time.sleep(GRACE)
     leave()
@@ -383,13 +373,12 @@ def _unraisable(found: sys.UnraisableHookArgs) -> None:
 
 def _again() -> None:
     """Raise the interrupt again, outside of the place that swallowed it."""
+
+    def once_more() -> None:
+        time.sleep(0.01)
+        ours = [number for number in SIGNALS if signal.getsignal(number) is _raise]
+        if ours:
+            _thread.interrupt_main(ours[0])
+
     _State.raised = False
-    _thread.start_new_thread(_once_more, ())
-
-
-def _once_more() -> None:
-    time.sleep(0.01)
-    for name in SIGNALS:
-        if hasattr(signal, name) and signal.getsignal(getattr(signal, name)) is _raise:
-            _thread.interrupt_main(getattr(signal, name))
-            return
+    _thread.start_new_thread(once_more, ())
