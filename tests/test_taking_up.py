@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 import springcheck
-from springcheck import cli, engines, store
+from springcheck import cli, engines, interrupts, store
 from springcheck.engines.contract import Label
 from springcheck.errors import StoreError
 from springcheck.physics import scenefile as scenes
@@ -174,7 +174,7 @@ def test_an_interrupted_study_says_that_the_same_command_goes_on(
     arguments = ["stability", "spring-uneven", *methods, "-o", str(tmp_path / "study.h5")]
     with monkeypatch.context() as patch:
         patch.setattr(limits, "measure", interrupted)
-        assert cli.main(arguments) == cli.INTERRUPTED
+        assert cli.main(arguments) == interrupts.STATUS
     assert capsys.readouterr().err == (
         "springcheck: interrupted; what was finished is kept, the same command goes on\n"
     )

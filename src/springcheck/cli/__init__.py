@@ -25,8 +25,6 @@ from springcheck.studies import STUDIES
 from springcheck.studies.arguments import REPORTING, REPORTS, reported
 from springcheck.studies.study import Study, study_of
 
-INTERRUPTED = interrupts.STATUS
-
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit status: 0 passed, 1 a verdict failed, 2 an error of the user."""
@@ -67,12 +65,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
             # so that a full disk is still reported
             sys.stdout.flush()
             return status
-    except KeyboardInterrupt:
-        return _interrupted()
-    except Exception as error:
-        if interrupts.seen():
-            # a library that was interrupted may raise an error of its own
-            return _interrupted()
+    except BaseException as error:
+        # a library that was interrupted may raise an error of its own
+        if isinstance(error, KeyboardInterrupt) or interrupts.seen():
+            interrupts.say()
+            return interrupts.STATUS
         if isinstance(error, SpringcheckError | OSError):
             return _mistake(error)
         raise
@@ -95,12 +92,6 @@ def _said() -> Iterator[None]:
         yield
 
 
-def _interrupted() -> int:
-    """Print what Ctrl-C has left; returns the exit status."""
-    interrupts.say()
-    return INTERRUPTED
-
-
 def _mistake(error: SpringcheckError | OSError) -> int:
     """Print an error in one line; returns the exit status."""
     if isinstance(error, BrokenPipeError):
@@ -121,7 +112,7 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
         prog="springcheck",
         description="Simulation engines judged to rounding by a mass on a spring.",
         epilog="Exit status: 0 every verdict passed; 1 some verdict failed; "
-        f"2 bad input, or nothing was measured; {INTERRUPTED} interrupted; "
+        f"2 bad input, or nothing was measured; {interrupts.STATUS} interrupted; "
         f"{interrupts.BROKEN_PIPE} nobody reads the output.",
     )
     version = f"springcheck {springcheck.__version__}"
@@ -157,15 +148,17 @@ def _study(study: Study, options: argparse.Namespace) -> int:
     doubts = output.doubts(source) if source else []
     with output.alone(), output.progress(study.name, quiet=options.quiet) as progress:
         found = study.perform(options, progress)
+    # of `run --vary` that of the ensemble
+    shown = study_of(found)
     output.warn(str(source), doubts)
     trusted = {"not_trusted": doubts} if source else {}
     broke: dict[str, str] = getattr(found, "broke", {})
     status = output.answer(
         options,
         lambda: {**found.document(), **trusted},
-        lambda: study.lines(found, options),
+        lambda: shown.lines(found, options),
         found.status or int(bool(doubts)),
-        study_of(found).name,
+        shown.name,
     )
     if options.quiet and not options.json and found.status == 2 and not broke:
         why = "nothing was measured, or not all could be judged; without --quiet the report says what"

@@ -158,9 +158,7 @@ def _identify(options: Namespace) -> int:
         known = each[0] if len(each) == 1 else {"identifications": each}
         documents.append({**({"file": file} if many else {}), **known, "not_trusted": doubts})
         if not options.json:
-            titles = {label: label for label in found}
-            if many:
-                titles = {label: titled(file, label) for label in found}
+            titles = {label: titled(file, label) if many else label for label in found}
             output.show([x for label, one in found.items() for x in identification(titles[label], one)])
             output.show([plain_line(f"{titles[x]}: {y}", "bold red") for x, y in unlike.items() if y])
         fits = all(one.fits or one.undecided or one.verdict == "adaptive" for one in found.values())

@@ -74,7 +74,6 @@ def _modes(runs: Runs, exact: Exact) -> Bank:
     order = np.argsort(np.argsort(scene.system.modes.w2))
     longest = runs.longest
     true = _energies(scene, *exact.at(longest))[:, chosen] / unit if exact.known else None
-    xs = Frame(float(longest.t[0]), float(longest.t[-1]))
     charts = []
     for j, mode in enumerate(chosen):
         mine = {label: x[:, j] for label, x in found.items()}
@@ -89,7 +88,7 @@ def _modes(runs: Runs, exact: Exact) -> Bank:
                 name="energy / its start",
                 lines=[] if true is None else [exact_curve(longest.t, true[:, j])],
                 short=f"{name}, {100 * start[mode] / total:.2g} % of the energy",
-                span=xs,
+                span=(float(longest.t[0]), float(longest.t[-1])),
                 height=2 * NAME_HIGH,
             )
         )

@@ -15,6 +15,7 @@ from springcheck.figures.views import units, with_unit
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory
+from springcheck.text.wording import few
 
 TRUTH = "exact solution"
 
@@ -74,16 +75,11 @@ class Runs:
         last = max(abs(float(run.t[-1])) for run in self.every)
         return looks.prefixed(last, units(self.scene).t)
 
-    @property
-    def times(self) -> Frame:
-        """The range of their times."""
-        ends = [float(run.t[i]) for run in self.every for i in (0, -1)]
-        return Frame(min(ends), max(ends))
-
-    def time(self, span: Frame | None = None) -> Scale:
-        """An axis of time in a readable unit; left out: of all of it."""
+    def time(self, span: tuple[float, float] | None = None) -> Scale:
+        """An axis of time in a readable unit, from one time to another; left out: of all of it."""
         factor, unit = self.time_unit
-        return Scale(name=with_unit("time t", unit), factor=factor, shown=(span or self.times).ends)
+        ends = [float(run.t[i]) for run in self.every for i in (0, -1)]
+        return Scale(name=with_unit("time t", unit), factor=factor, shown=span or (min(ends), max(ends)))
 
     @property
     def part(self) -> str:
@@ -95,10 +91,7 @@ class Runs:
     def wrong(self) -> str:
         """Which of them are wrong, to begin a title with; "" where none is."""
         names = [group.title for group in self.groups if group.failed]
-        if not names:
-            return ""
-        more = f" and {len(names) - 2} more" if len(names) > 2 else ""
-        return f"{', '.join(names[:2])}{more} {'is' if len(names) == 1 else 'are'} wrong (red); "
+        return f"{few(names, 2)} {'is' if len(names) == 1 else 'are'} wrong (red); " if names else ""
 
     def curves(
         self,
@@ -144,7 +137,7 @@ class Runs:
         name: str,
         lines: Sequence[Curve] = (),
         short: str = "",
-        span: Frame | None = None,
+        span: tuple[float, float] | None = None,
         alike: bool = True,
         height: float = naming.NAME_HIGH,
     ) -> Chart:
@@ -173,10 +166,10 @@ class Runs:
         """The charts of a figure, under what is said of them."""
         # of a long run every so many frames, between which it may be further off
         thinned = not self.errors and any(run.every > self.scene.every for run in self.every)
-        few = thinned and "at most" in said
+        partly = thinned and "at most" in said
         return Bank(
             name=name, title="Methods drawn", charts=charts, size=size, columns=columns,
-            heading=f"{self.scene.title}: {self.wrong}{said}{' (of the frames drawn)' * few}",
+            heading=f"{self.scene.title}: {self.wrong}{said}{' (of the frames drawn)' * partly}",
         )  # fmt: skip
 
     def leaving(self, when: Callable[[Trajectory], int | None]) -> str:
@@ -201,6 +194,6 @@ def exact_curve(x: Floats, y: Floats) -> Curve:
 
 def share(x: float) -> str:
     """A fraction in a readable form: in percent, or as a power of ten."""
-    return (
-        f"{100 * x:.2g} %" if 5e-4 <= x < 0.995 else f"{100 * x:.0f} %" if 0.995 <= x < 1000 else f"{x:.0e}"
-    )
+    if not 5e-4 <= x < 1000:
+        return f"{x:.0e}"
+    return f"{100 * x:.2g} %" if x < 0.995 else f"{100 * x:.0f} %"

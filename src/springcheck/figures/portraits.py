@@ -311,12 +311,11 @@ def _position(
         least = min((float(np.min(x[x > 0], initial=ys.high)) for x in inside), default=ys.high / 10)
         ys = Frame(least / 2, 2 * ys.high, ys.clipped, log=True)
     last = span[1] if runs.longest.step > 0 else -span[1]
-    xs = Frame(min(span[0], last), max(span[0], last))
     name = with_unit(view.x_name, unit_x)
     chart = Chart(
         title=f"{view.x_name}{f' of {view.title}' if view.title else ''} over time.".capitalize(),
         short="" if alone else view.title,
-        x=runs.time(xs),
+        x=runs.time((min(span[0], last), max(span[0], last))),
         y=Scale(name=f"|{name}|" if steep else name, log=steep, shown=ys.ends, factor=dy),
         curves=[*lines, *curves],
         note=runs.leaving(lambda run: ys.leaves(picked[run.label])) if span[0] == 0 else "",

@@ -58,6 +58,9 @@ DRAWN_UP_TO = 1e6
 LEGEND_LINE = 0.17
 """Height of a line of the legend with the space between entries [in]."""
 
+AROUND = [patheffects.withStroke(linewidth=2.5, foreground="white")]
+"""White around words and guides, so that lines do not run through them."""
+
 LETTERS, WIDEST = 11.3, 38
 """Letters of a title per inch; most letters of a line of the legend."""
 
@@ -191,15 +194,14 @@ def _chart(axes: Axes, chart: Chart, letters: int) -> None:
 
 
 def _label(axes: Axes, label: Naming) -> None:
-    """The label of a curve; white around it, so that lines do not run through it."""
+    """The label of a curve."""
     color = OTHER_LINES[label.group]["color"] if label.group in OTHER_LINES else looks.look(label.group).color
     beside, left = label.x >= 1, label.x > 0.6
     axes.annotate(
         textwrap.shorten(label.text, 34, placeholder="..."), (label.x, label.y), xycoords="axes fraction",
         xytext=(4 if beside or not left else -4, 0 if beside else 4), textcoords="offset points",
         ha="left" if beside or not left else "right", va="center" if beside else "bottom", fontsize=7.5,
-        color=color, zorder=5, annotation_clip=False,
-        path_effects=[patheffects.withStroke(linewidth=2.5, foreground="white")],
+        color=color, zorder=5, annotation_clip=False, path_effects=AROUND,
     )  # fmt: skip
 
 
@@ -221,14 +223,14 @@ def _curve(axes: Axes, curve: Curve, number: int, most: int, chart: Chart) -> No
         axes.plot(x, y, label=curve.name, **OTHER_LINES[curve.group])
         return
     if curve.group == GUIDE:
-        white = [patheffects.withStroke(linewidth=2.5, foreground="white")]
-        axes.plot(x, y, color="#333333", linewidth=0.9, path_effects=white, zorder=4)
-        how: dict[str, Any] = {"textcoords": "offset points", "fontsize": 8, "color": "#333333"}
+        axes.plot(x, y, color="#333333", linewidth=0.9, path_effects=AROUND, zorder=4)
         # in a map there is nothing beside it
         at = len(x) // 3 if tiled else -1
         side = "right" if tiled and x[at] > len(chart.x.values) / 2 else "left"
-        near = (3 if side == "left" else -3, -4)
-        axes.annotate(curve.name, (x[at], y[at]), xytext=near, ha=side, path_effects=white, zorder=5, **how)
+        axes.annotate(
+            curve.name, (x[at], y[at]), xytext=(3 if side == "left" else -3, -4), ha=side, zorder=5,
+            textcoords="offset points", fontsize=8, color="#333333", path_effects=AROUND,
+        )  # fmt: skip
         return
     drawn: dict[str, Any] = {"color": look.color, "label": curve.name, "zorder": 2 + 1.2 * high}
     if curve.band is not None:
@@ -265,9 +267,8 @@ def _rule(axes: Axes, rule: Rule, height: float) -> None:
     color = looks.look(rule.group).color if rule.group else color
     draw = axes.axvline if rule.axis == "x" else axes.axhline
     draw(rule.at, color=color, linestyle=line, linewidth=0.9, zorder=1.5)
-    white = [patheffects.withStroke(linewidth=2.5, foreground="white")]
     how: dict[str, Any] = {
-        "fontsize": 7.5, "color": color, "textcoords": "offset points", "path_effects": white, "zorder": 4.5
+        "fontsize": 7.5, "color": color, "textcoords": "offset points", "path_effects": AROUND, "zorder": 4.5
     }  # fmt: skip
     if rule.axis == "x":
         axes.annotate(rule.name, (rule.at, height), xycoords=("data", "axes fraction"), xytext=(3, -6), **how)
@@ -291,24 +292,21 @@ def _tiles(axes: Axes, chart: Chart) -> None:
 
 def _scale(axes: Axes, scale: Scale, which: Literal["x", "y"], *, tiled: bool) -> None:
     names, values = list(scale.names), np.asarray(scale.values, np.float64)
-    put = axes.set_xticks if which == "x" else axes.set_yticks
-    axes.ticklabel_format(axis=which, useOffset=False) if not (scale.log or tiled or names) else None
+    axis = axes.xaxis if which == "x" else axes.yaxis
     if names:
-        put(range(len(names)), names, fontsize=7, rotation=90 if which == "x" else 0)
-        if scale.shown:
-            (axes.set_xlim if which == "x" else axes.set_ylim)(*scale.shown)
+        axis.set_ticks(range(len(names)), names, fontsize=7, rotation=90 if which == "x" else 0)
     elif tiled and len(values) > EVEN and np.all(values > 0):
         decades = np.arange(np.ceil(np.log10(values[0])), np.log10(values[-1]) + 1e-9)
         at = np.interp(decades, np.log10(values), np.arange(len(values)))
-        put(at, [f"$10^{{{int(e)}}}$" for e in decades])
+        axis.set_ticks(at, [f"$10^{{{int(e)}}}$" for e in decades])
     elif tiled:
         shown = range(0, len(values), -(-len(values) // (MOST_TICKS if which == "x" else MOST_TICKS_UP)))
-        put(list(shown), [f"{values[i]:.3g}" for i in shown])
+        axis.set_ticks(list(shown), [f"{values[i]:.3g}" for i in shown])
+    elif scale.log:
+        axes.set(**{f"{which}scale": "log"})
+        axis.set_minor_formatter(LogFormatterSciNotation(labelOnlyBase=False, minor_thresholds=(1.5, 0.4)))
     else:
-        if scale.log:
-            (axes.set_xscale if which == "x" else axes.set_yscale)("log")
-            between = LogFormatterSciNotation(labelOnlyBase=False, minor_thresholds=(1.5, 0.4))
-            (axes.xaxis if which == "x" else axes.yaxis).set_minor_formatter(between)
-        if scale.shown:
-            (axes.set_xlim if which == "x" else axes.set_ylim)(*(scale.factor * x for x in scale.shown))
-    (axes.set_xlabel if which == "x" else axes.set_ylabel)(scale.name)
+        axes.ticklabel_format(axis=which, useOffset=False)
+    if scale.shown:
+        axes.set(**{f"{which}lim": tuple(scale.factor * x for x in scale.shown)})
+    axes.set(**{f"{which}label": scale.name})

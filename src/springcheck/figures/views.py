@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -38,9 +38,7 @@ _UNITS = {
 
 def units(scene: Scene) -> Units:
     """The units of a scene."""
-    if scene.kind == "rotor" and scene.units != "si":
-        return _UNITS[scene.units]
-    return _UNITS[scene.units if scene.kind == "particles" else scene.kind]
+    return _UNITS[scene.kind if scene.kind != "particles" and scene.units == "si" else scene.units]
 
 
 def with_unit(name: str, unit: str) -> str:
@@ -64,7 +62,7 @@ class View:
     """q and p (f, n) -> x and y (f,)."""
     turn: float = 0.0
     """The period of x, 0 where it has none."""
-    potential: Callable[[Floats], Floats] | None = field(default=None)
+    potential: Callable[[Floats], Floats] | None = None
     """The potential of x alone, where the motion of x is independent of other coordinates."""
     mass: float = 1.0
 

@@ -27,7 +27,7 @@ from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Comparison, Verdict
 from springcheck.store import Damage, Summary
 from springcheck.studies.run.drawable import drawable
-from springcheck.studies.run.page import of_drawable
+from springcheck.studies.run.page import banks
 from springcheck.studies.run.result import Stored
 from springcheck.text.lines import Lines, TextTable
 from springcheck.text.wording import STATES_SHOW
@@ -207,7 +207,7 @@ def gather(path: Path, doubts: Sequence[Damage] | None = None) -> Content:
 def _motion(run: Stored, most: int) -> dict[str, Any] | None:
     """The charts that `plot` draws of a run, with the first engine of each scheme visible."""
     shown = drawable(run.path, most)
-    found = of_drawable(shown, run, points=most)
+    found = banks(run, shown=shown, points=most)
     if not found:
         return None
     curves = [curve for bank in found for chart in bank.charts for curve in chart.curves]

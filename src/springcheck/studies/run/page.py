@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -29,32 +28,29 @@ POSITIONS_IN_BATH = 4
 TWO_ERRORS = "two standard errors"
 
 
-def banks(found: Stored | Report, *, particle: int | None = None) -> list[Bank]:
-    """Charts of the trajectories, or of the motion of one particle."""
-    return of_drawable(found.drawable, found, particle=particle)
-
-
-def of_drawable(
-    shown: Drawable, found: Stored | Report, *, particle: int | None = None, points: int = SMOOTH
+def banks(
+    found: Stored | Report,
+    *,
+    particle: int | None = None,
+    shown: Drawable | None = None,
+    points: int = SMOOTH,
 ) -> list[Bank]:
-    """These charts, of the frames of the run that are shown."""
-    failed = {verdict.method for verdict in found.verdicts if verdict.passed is False}
-    heated = temperatures(shown.scene, found.path) if found.path else ()
-    errors, compared = dict[str, float](), found.comparison
+    """Charts of the trajectories, or of the motion of one particle; of these frames by default all."""
+    shown = found.drawable if shown is None else shown
+    scene, path, errors = shown.scene, found.path, dict[str, float]()
+    heated: list[Heated] = []
+    if scene.bath is not None and path is not None:
+        # over all frames
+        heated = [heated_of(scene, keeper.windows(path, run.label)) for run in keeper.summary(path).runs]
+    compared = found.comparison
     if compared is not None and EXACT in compared.labels:
         row = compared.max_difference[compared.labels.index(EXACT)]
         errors = dict(zip(compared.labels, row.tolist(), strict=True))
+    failed = {verdict.method for verdict in found.verdicts if verdict.passed is False}
     return of_runs(
-        shown.scene, shown.runs, shown.followed, particle=particle, failed=failed, points=points,
-        heated=heated, errors=errors,
+        scene, shown.runs, shown.followed, particle=particle, failed=failed, points=points, heated=heated,
+        errors=errors,
     )  # fmt: skip
-
-
-def temperatures(scene: Scene, path: Path) -> tuple[Heated, ...]:
-    """Temperatures of every stored run in a bath, over all its frames; none without a bath."""
-    if scene.bath is None:
-        return ()
-    return tuple(heated_of(scene, keeper.windows(path, run.label)) for run in keeper.summary(path).runs)
 
 
 def of_runs(

@@ -6,26 +6,19 @@ import shlex
 from argparse import Namespace
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from springcheck import checks, schemes
 from springcheck.physics.trajectory import Comparison, Verdict
-from springcheck.studies.ensemble import STUDY as ENSEMBLE
 from springcheck.studies.run.result import MethodRun, Repeat, Repeats, Report, Stored
 from springcheck.studies.text import left_out, of_energy
 from springcheck.text.lines import Lines, Row, Text, TextTable, hanging, plain, table
 from springcheck.text.wording import count, few, number, seconds
 
-if TYPE_CHECKING:
-    from springcheck.studies.ensemble.result import Ensemble
 
-
-def lines(found: Report | Repeats | Stored | Ensemble, options: Namespace | None = None) -> Lines:
+def lines(found: Report | Repeats | Stored, options: Namespace | None = None) -> Lines:
     """Reports of `springcheck run`, `run --from`, and `inspect` of a stored run."""
-    if not isinstance(found, Report | Repeats | Stored):
-        return ENSEMBLE.lines(found, options)
     verdicts = getattr(options, "verdicts", False)
     if isinstance(found, Repeats):
         return [_repeat(one) for one in found.repeats]
