@@ -16,7 +16,6 @@ from browser import Browser
 from clock import steady
 from springcheck import schemes, store
 from springcheck.cli import main, page
-from springcheck.cli.page.content import Section
 from springcheck.cli.page.given import drawn
 from springcheck.errors import StoreError
 from springcheck.figures import charts, looks, overlay
@@ -176,10 +175,10 @@ def _hostile(content: page.Content) -> page.Content:
     assert content.same
     assert content.scene is not None
     said = plain(HOSTILE)
-    section = Section(
-        name="hostile", title=HOSTILE, banks=("hostile-0", "hostile-1"),
-        blocks=[said, table([HOSTILE, "b"], [said, (said, HOSTILE)])],
-    )  # fmt: skip
+    section = {
+        "name": "hostile", "title": HOSTILE, "banks": ("hostile-0", "hostile-1"),
+        "blocks": [said, table([HOSTILE, "b"], [said, (said, HOSTILE)])],
+    }  # fmt: skip
     scale = Scale(name=HOSTILE)
     curve = Curve(name=HOSTILE, group=HOSTILE, x=[0.0, 1.0], y=[0.0, 1.0], notes=[HOSTILE] * 2)
     tiles = Tiles(kinds=[(HOSTILE, "good")], rows=[[0, 0]], notes=[[HOSTILE] * 2])
@@ -209,7 +208,7 @@ def _hostile(content: page.Content) -> page.Content:
 
 def test_a_heading_in_a_table_stands_over_its_rows(content: page.Content) -> None:
     rows = [plain("velocity Verlet", "italic"), ("own:velocity-verlet", "2"), plain("about it", "dim")]
-    section = Section(name="a", title="A", banks=(), blocks=[table(("method", "limit"), rows)])
+    section = {"name": "a", "title": "A", "banks": (), "blocks": [table(("method", "limit"), rows)]}
     text = page.html(replace(content, sections=(section,)))
     assert '<th scope="rowgroup" colspan="2">velocity Verlet</th>' in text
     assert '<td class="why small" colspan="2">about it</td>' in text
@@ -329,10 +328,10 @@ def test_a_study_brings_its_charts_and_its_tables(studies: dict[str, Path], name
     text = page.html(content)
     assert len(text.encode()) < 500_000
     (section,) = content.sections
-    assert section.name == name
-    assert section.banks
-    assert all(f'<div id="{bank}"></div>' in text for bank in section.banks)
-    tables = [block for block in section.blocks if isinstance(block, TextTable)]
+    assert section["name"] == name
+    assert section["banks"]
+    assert all(f'<div id="{bank}"></div>' in text for bank in section["banks"])
+    tables = [block for block in section["blocks"] if isinstance(block, TextTable)]
     assert tables
     tags = Tags(text)
     assert all(

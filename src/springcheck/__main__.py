@@ -3,7 +3,6 @@
 import gc
 import os
 import sys
-import threading
 import warnings
 
 from springcheck import interrupts
@@ -49,10 +48,6 @@ def _main() -> int:
             status = 2
     if interrupts.seen():
         interrupts.leave()
-    if any(not one.daemon for one in threading.enumerate() if one is not threading.main_thread()):
-        # left by a plug-in or a library: nobody waits for them
-        sys.stdout.flush()
-        os._exit(interrupts.ends(status))
     return status
 
 

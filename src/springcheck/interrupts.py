@@ -192,12 +192,13 @@ def unread() -> int:
 
 
 def over(status: int) -> int:
-    """End the child that `supervised` has started, after libraries' exit handlers; elsewhere, the status.
+    """End the program, after libraries' exit handlers; under a profiler, a debugger or coverage, which have
+    work left to do, return its exit status.
 
-    The interpreter would tear down every module first, a twentieth of the smallest run's time.  Not under a
-    profiler, a debugger or coverage, which have work left to do.
+    The interpreter would tear down every module first, a twentieth of the smallest run's time, and wait for
+    threads that a plug-in or a library has left.
     """
-    if _State.board is not None and sys.getprofile() is None and sys.gettrace() is None:
+    if sys.getprofile() is None and sys.gettrace() is None:
         atexit._run_exitfuncs()
         for stream in (sys.stdout, sys.stderr):
             with contextlib.suppress(OSError, ValueError, AttributeError):

@@ -6,7 +6,6 @@ import argparse
 import os
 import re
 import sys
-from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -62,19 +61,12 @@ class Parser(argparse.ArgumentParser):
     def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
         found, extra = self.parse_known_args(args, namespace)
         if extra:
-            words = [word.partition("=")[0] for word in extra]
-            parsers = list(self._of(found))
-            near = nearest(words[0], [option for one in parsers for option in one._option_string_actions])
-            shows = f"`{parsers[-1].prog} -h` shows them"
+            (commands,) = (x for x in self._actions if isinstance(x, argparse._SubParsersAction))
+            command = commands.choices[found.name]
+            options = [*self._option_string_actions, *command._option_string_actions]
+            near, shows = nearest(extra[0].partition("=")[0], options), f"`{command.prog} -h` shows them"
             self.error(f"{' '.join(extra)}: unknown or too many arguments{near}; {shows}")
         return found
-
-    def _of(self, found: argparse.Namespace) -> Iterable[argparse.ArgumentParser]:
-        """This parser, and the one of the given command."""
-        yield self
-        for action in self._actions:
-            if isinstance(action, argparse._SubParsersAction):
-                yield from (one for name, one in action.choices.items() if name == found.name)
 
 
 def look(options: argparse.Namespace) -> None:

@@ -33,6 +33,11 @@ LEAST_DRAWN = 1e-4
 MOST_TURNING = 8
 """Particles among which some must turn for their motion to be called an orbit."""
 
+WAYS = {
+    "spirals out": "spiral out", "spirals in": "spiral in", "keeps to its orbit": "keep to their orbits",
+}  # fmt: skip
+"""What an orbit may do, of one scheme and of several."""
+
 CHANGED, EVENLY, FINDINGS_SAID = 0.05, 0.99, 3
 """Fraction of an energy, or logarithm of its ratio to the start's, that counts as a change; fraction of a
 change that is uniform, unlike an oscillation; and schemes that a title names."""
@@ -136,7 +141,7 @@ def steady(energies: Floats, every: int) -> float:
 def orbits(runs: Runs, parts: Runs, exact: Exact) -> str:
     """Whose orbits spiral, and the largest error of the states of others."""
     scene = runs.scene
-    said: dict[str, list[str]] = {"spirals out": [], "spirals in": [], "keeps to its orbit": []}
+    said: dict[str, list[str]] = {way: [] for way in WAYS}
     off = {}
     for group in runs.groups:
         run = group.members[0]
@@ -157,16 +162,15 @@ def orbits(runs: Runs, parts: Runs, exact: Exact) -> str:
             said[way].append(group.title)
     turns = max(periods(x) for x in parts.longest.q.T[:MOST_TURNING])
     if turns >= 1 and (said["spirals out"] or said["spirals in"]):
-        many = {"spirals out": "spiral out", "spirals in": "spiral in"}
-        many["keeps to its orbit"] = "keep to their orbits"
         return "; ".join(
-            f"{names[0]} {way}" if len(names) == 1 else f"{len(names)} {many[way]}"
+            f"{names[0]} {way}" if len(names) == 1 else f"{len(names)} {WAYS[way]}"
             for way, names in said.items()
             if names
         )
     some = {name: x for name, x in off.items() if np.isfinite(x)}
-    far = MOST_DRAWN * exact.reach(runs.longest) if some else np.inf
-    return extremes(some, "states off by at most {}", beyond=far) if some else ""
+    if not some:
+        return ""
+    return extremes(some, "states off by at most {}", beyond=MOST_DRAWN * exact.reach(runs.longest))
 
 
 def _scale(found: Sequence[Floats], true: Floats | None) -> Frame:

@@ -108,8 +108,8 @@ LOOKS = {
 FAILED = "#DD0033"
 """Colour of whatever is wrong, in figures and page."""
 
-FAILED_ON_SCREEN = (FAILED, "#FF5C7A", 0)
-"""Colours on white and on black, and the number of the line style."""
+FAILED_ON_SCREEN = (FAILED, "#FF5C7A")
+"""It on white and on black."""
 
 _REST = tuple(Look(c, line) for line in (TWO_DOTS, SPARSE) for c in (_OLIVE, _WINE, _SKY, _PINK, _RED, _BLUE))
 

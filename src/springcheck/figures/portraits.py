@@ -97,7 +97,7 @@ def _portrait(runs: Runs, view: View, truth: Motion | None, *, alone: bool) -> C
     sizes = xs.half, ys.half
     square = view.what == "path" or (alone and runs.scene.units == "reduced" and not view.turn)
     # where the motion itself runs away all of them leave
-    note = runs.leaving(when) if _steep(picked, true) is None else ""
+    note = runs.leaving(when) if _steep(picked[runs.every[0].label] if true is None else true) is None else ""
     of = f" of {view.title}" if view.title and view.what != "path" else ""
     chart = Chart(
         title=f"{view.y_name} over {view.x_name}{of}.".capitalize(),
@@ -144,7 +144,7 @@ def clouds(runs: Runs, view: View, thermal: float) -> Bank:
 
 def _frames(picked: Sequence[State], true: State | None, view: View) -> tuple[Frame, Frame]:
     """Limits of a phase portrait: a run that goes far in one direction does not set the scale."""
-    steep = _steep({str(i): one for i, one in enumerate(picked)}, true)
+    steep = _steep(picked[0] if true is None else true)
     if steep is not None:
         return steep
     sizes = [frames.frame([one[j] for one in picked], None if true is None else true[j]) for j in (0, 1)]
@@ -181,21 +181,16 @@ def _meets(x: Floats, y: Floats, xs: Frame, ys: Frame) -> bool:
     return bool(np.any(inside & ((y <= ys.high) | (-y >= ys.low))))
 
 
-def _steep(picked: Mapping[str, State], true: State | None) -> tuple[Frame, Frame] | None:
+def _steep(motion: State) -> tuple[Frame, Frame] | None:
     """The visible part of a motion that runs away: its beginning.  None where it does not."""
-    x, y = true if true is not None else next(iter(picked.values()))
-    size = np.abs(x)
+    size = np.abs(motion[0])
     start, end = float(size[0]), float(np.max(size))
     if not (end > STEEP * max(float(np.median(size)), start) and end == float(size[-1]) and start > 0):
         return None
     last = int(np.argmax(size > START_SHOWN * start))
-    return tuple(_beginning(one[: last + 1]) for one in (x, y))  # type: ignore[return-value]
-
-
-def _beginning(x: Floats) -> Frame:
-    """The frame from a little left of 0 to the last value."""
-    edges = float(x[-1]), -0.25 * float(x[-1])
-    return Frame(min(edges), max(edges), True)
+    # from a little beyond 0 to the last value
+    x, y = (sorted((float(one[last]), -0.25 * float(one[last]))) for one in motion)
+    return Frame(*x, clipped=True), Frame(*y, clipped=True)
 
 
 def _chords(run: Trajectory, truth: Motion | None, view: View, *frames: Frame) -> bool:
@@ -280,9 +275,9 @@ def _position(
 ) -> Chart:
     """One panel."""
     true = None if truth is None else view.pick(truth[1], truth[2])
-    states = {run.label: view.pick(run.q, run.p) for run in runs.every}
-    picked = {label: x for label, (x, _) in states.items()}
-    steep = _steep(states, true) is not None
+    picked = {run.label: view.pick(run.q, run.p)[0] for run in runs.every}
+    first = runs.every[0]
+    steep = _steep(view.pick(first.q, first.p) if true is None else true) is not None
     ys = frames.frame(list(picked.values()), None if true is None else true[0])
     if truth is not None and true is not None:
         span = span[0], min(span[1], _settles(np.abs(truth[0]), true[0]))

@@ -29,25 +29,13 @@ from springcheck.store import Damage, Summary
 from springcheck.studies.run.drawable import drawable
 from springcheck.studies.run.page import banks
 from springcheck.studies.run.result import Stored
-from springcheck.text.lines import Lines, TextTable
+from springcheck.text.lines import TextTable
 from springcheck.text.wording import STATES_SHOW
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Section:
-    """The page's section on one study."""
-
-    name: str
-    title: str
-    blocks: Lines
-    """Lines of text, and tables."""
-    banks: tuple[str, ...]
-    """Names of its charts in the data of the page."""
-
-
-def sections(summary: Summary) -> tuple[list[Section], dict[str, Any], Stored | None]:
+def sections(summary: Summary) -> tuple[list[dict[str, Any]], dict[str, Any], Stored | None]:
     """The studies of a store other than trajectories, the data of all their charts by name, and its run."""
-    found: list[Section] = []
+    found: list[dict[str, Any]] = []
     data: dict[str, Any] = {}
     run = None
     for study, result in inspect.held(summary):
@@ -58,12 +46,12 @@ def sections(summary: Summary) -> tuple[list[Section], dict[str, Any], Stored | 
         data |= mine
         lines = study.lines(result, path=summary.path)
         found.append(
-            Section(
-                name=study.name,
-                title=study.about[:1].upper() + study.about[1:],
-                blocks=[line for line in lines if isinstance(line, TextTable) or str(line).strip()],
-                banks=tuple(mine),
-            )
+            {
+                "name": study.name,
+                "title": study.about[:1].upper() + study.about[1:],
+                "blocks": [line for line in lines if isinstance(line, TextTable) or str(line).strip()],
+                "banks": list(mine),
+            }
         )
     return found, data, run
 
@@ -117,8 +105,8 @@ class Content:
     scene_text: str
     known: Mapping[str, Any]
     """Versions and machine, by name."""
-    sections: tuple[Section, ...]
-    """The sections of the studies."""
+    sections: Sequence[Mapping[str, Any]]
+    """Of each study name and title, its text as lines and tables, the names of its charts in the data."""
     summary: Summary
     not_trusted: tuple[Damage, ...]
     methods: tuple[Passed, ...]
@@ -179,13 +167,12 @@ def gather(path: Path, doubts: Sequence[Damage] | None = None) -> Content:
     wrong = {verdict.method for verdict in verdicts if verdict.passed is False}
     if run and summary.runs and (motion := _motion(run, most)):
         banks["motion"] = motion
-    title = scene.title if scene else path.name
     return Content(
-        title=title,
+        title=scene.title if scene else path.name,
         scene=scene,
         scene_text=text,
         known=_known(summary),
-        sections=tuple(studies),
+        sections=studies,
         summary=summary,
         not_trusted=tuple(store.doubts(path) if doubts is None else doubts),
         # failures come first

@@ -39,14 +39,15 @@ def banks(study: PrecisionStudy) -> list[Bank]:
     charts = []
     for name, title, cost in WAYS:
         known = [x for x in points if cost(x) > 0]
-        curves = _curves(study, known, cost) if known else []
-        if known and name == FORCE_CALLS:
+        if not known:
+            continue
+        curves = _curves(study, known, cost)
+        if name == FORCE_CALLS:
             curves += _slopes(study, known, cost)
-        if known:
-            charts.append(labelled(Chart(
-                title=f"Error against {title}.", short=f"against {name}", x=Scale(name=name, log=True),
-                y=error, curves=curves, rules=_floors(study),
-            )))  # fmt: skip
+        charts.append(labelled(Chart(
+            title=f"Error against {title}.", short=f"against {name}", x=Scale(name=name, log=True),
+            y=error, curves=curves, rules=_floors(study),
+        )))  # fmt: skip
     if not charts:
         return []
     return [Bank(name="precision", heading=_heading(study), title="Methods drawn", charts=charts)]

@@ -47,14 +47,7 @@ def banks(study: Sampling) -> list[Bank]:
             title=f"What <q\N{SUPERSCRIPT TWO}> is off, against {said}", short=f"against {said}",
             x=Scale(name=said, log=True), y=Scale(name="root mean square of k<q\N{SUPERSCRIPT TWO}>/kT - 1",
                                                   log=True),
-            curves=[
-                part
-                for x in study.methods
-                for part in (
-                    Curve(name=title(x.scheme), group=x.scheme, x=cost(x) * x.frames, y=x.off_law),
-                    _marks(x, cost(x) * x.frames, x.off, x.off_law),
-                )
-            ],
+            curves=[one for x in study.methods for one in _both(x, cost(x) * x.frames, x.off, x.off_law)],
         )
         for said, cost in (
             ("force calls a spring", attrgetter("force_calls")),
@@ -66,14 +59,7 @@ def banks(study: Sampling) -> list[Bank]:
         title="The largest stable step against friction: second moments stay bounded below.",
         x=Scale(name="friction \N{GREEK SMALL LETTER GAMMA}/\N{GREEK SMALL LETTER OMEGA}", log=True),
         y=Scale(name="largest h \N{GREEK SMALL LETTER OMEGA}", shown=(0.0, 4.2)),
-        curves=[
-            part
-            for x in shown
-            for part in (
-                Curve(name=title(x.scheme), group=x.scheme, x=x.friction, y=x.limit_law),
-                _marks(x, x.friction, x.limit, x.limit_law),
-            )
-        ],
+        curves=[one for x in shown for one in _both(x, x.friction, x.limit, x.limit_law)],
     )
     found = [
         Bank(name="sampling-temperatures", title="Schemes (lines) and engines (marks)", charts=temperatures,
@@ -120,6 +106,12 @@ def _laws(methods: Sequence[Sampled], of: str) -> list[Curve]:
     """One line for each scheme that has a law."""
     found = dict.fromkeys(one.scheme for one in methods if np.any(np.isfinite(one.configurational_law)))
     return [Curve(name=title(name), group=name, x=LINE_H_W, y=curve(name, LINE_H_W, of)) for name in found]
+
+
+def _both(one: Sampled, x: np.ndarray, y: np.ndarray, law: np.ndarray) -> list[Curve]:
+    """The law of its scheme as a line, and what was measured as marks."""
+    line = Curve(name=title(one.scheme), group=one.scheme, x=x, y=law)
+    return [line, _marks(one, x, y, law)]
 
 
 def _marks(one: Sampled, x: np.ndarray, y: np.ndarray, law: np.ndarray) -> Curve:

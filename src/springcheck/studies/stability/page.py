@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
@@ -49,12 +50,9 @@ def banks(study: Stability) -> list[Bank]:
 
 def _limits_said(limits: Sequence[Limit]) -> str:
     """How many methods are stable up to which h w, in a sentence."""
-    count: dict[float, int] = {}
-    for x in limits:
-        count[x.theory] = count.get(x.theory, 0) + 1
     said = [
         f"{n} never" if x <= 0 else f"{n} always" if not np.isfinite(x) else f"{n} up to {x:.4g}"
-        for x, n in sorted(count.items())
+        for x, n in sorted(Counter(one.theory for one in limits).items())
     ]
     return f"Stable in h \N{GREEK SMALL LETTER OMEGA}: of {len(limits)} methods {', '.join(said)}"
 
