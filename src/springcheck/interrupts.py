@@ -200,11 +200,16 @@ def over(status: int) -> int:
     """
     if sys.getprofile() is None and sys.gettrace() is None:
         atexit._run_exitfuncs()
-        for stream in (sys.stdout, sys.stderr):
-            with contextlib.suppress(OSError, ValueError, AttributeError):
-                stream.flush()
+        _flush()
         os._exit(status)
     return status
+
+
+def _flush() -> None:
+    """Write what standard streams hold, as far as they are open."""
+    for stream in (sys.stdout, sys.stderr):
+        with contextlib.suppress(OSError, ValueError, AttributeError):
+            stream.flush()
 
 
 def seen() -> bool:
@@ -227,10 +232,8 @@ def say() -> None:
         return
     # a progress bar may have hidden the cursor
     shown = "\x1b[?25h" if os.isatty(_State.errors) else ""
-    try:
+    with contextlib.suppress(OSError):
         os.write(_State.errors, f"{shown}springcheck: {message}\n".encode(errors="backslashreplace"))
-    except OSError:
-        return
 
 
 def finish() -> None:
@@ -242,16 +245,10 @@ def finish() -> None:
 def leave() -> None:
     """End an interrupted process now, with one line and none from the interpreter's shutdown."""
     for end in list(_State.ends):
-        try:
+        with contextlib.suppress(Exception):
             end()
-        except Exception:
-            continue
     say()
-    for stream in (sys.stdout, sys.stderr):
-        try:
-            stream.flush()
-        except (OSError, ValueError, AttributeError):
-            continue
+    _flush()
     os._exit(ends(STATUS))
 
 
@@ -325,14 +322,12 @@ def called(words: Sequence[str], seconds: float, **how: Any) -> subprocess.Compl
 
         takes(kill)
     try:
-        out, err = program.communicate(timeout=seconds)
-    except BaseException:
-        kill()
-        for stream in (program.stdout, program.stderr):
-            if stream is not None:
-                stream.close()
-        program.wait()
-        raise
+        with program:
+            try:
+                out, err = program.communicate(timeout=seconds)
+            except BaseException:
+                kill()
+                raise
     finally:
         forget(kill)
     return subprocess.CompletedProcess(words, program.returncode, out, err)

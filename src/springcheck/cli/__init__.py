@@ -121,17 +121,13 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
 
     every: tuple[Study | Command, ...] = (*STUDIES, *COMMANDS)
     for one in [one for one in every if one.name in words[:1]] or every:
+        # a study of a plug-in has none
+        examples = groups.EXAMPLES.get(one.name, [""])
         parser_of = commands.add_parser(
             one.name,
             help=one.about,
             description=one.about[:1].upper() + one.about[1:] + ".",
-            epilog="\n".join(
-                # a study of a plug-in has none
-                [
-                    "examples:",
-                    *(f"  springcheck {one.name} {x}".rstrip() for x in groups.EXAMPLES.get(one.name, [""])),
-                ]
-            ),
+            epilog="\n".join(["examples:", *(f"  springcheck {one.name} {x}".rstrip() for x in examples)]),
             formatter_class=groups.Formatter,
         )
         if one.name in words:

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 from springcheck import checks, engines, schemes
 from springcheck.physics import scenefile
+from springcheck.studies.arguments import Argument
 
-Arguments = Sequence[tuple[tuple[str, ...], dict[str, Any]]]
 
-
-def script(shell: str, commands: Mapping[str, Arguments]) -> str:
+def script(shell: str, commands: Mapping[str, Sequence[Argument]]) -> str:
     """A script for `eval` or a shell's completion folder, from the names and arguments of `commands`."""
     labels = [f"{name}:{one}" for name in engines.names() for one in engines.engine(name).methods]
     named = {"--method": labels, "--scheme": schemes.known(), "--scene": scenefile.names()}

@@ -64,13 +64,11 @@ ELSEWHERE: Mapping[str, Mapping[str, str]] = {
 """By command: options with another meaning there than in other commands, and their headings."""
 
 
-class Formatter(argparse.RawDescriptionHelpFormatter):
+class Formatter(argparse.HelpFormatter):
     """Wraps descriptions, and leaves the lines of examples as they are."""
 
     def _fill_text(self, text: str, width: int, indent: str) -> str:
-        if "\n" in text:
-            return super()._fill_text(text, width, indent)
-        return argparse.HelpFormatter._fill_text(self, text, width, indent)
+        return text if "\n" in text else super()._fill_text(text, width, indent)
 
 
 def heading(command: str, names: Sequence[str]) -> str:

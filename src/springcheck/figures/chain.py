@@ -125,35 +125,28 @@ def _wave(runs: Runs, exact: Exact) -> Bank:
         "above",
     ]
     errors = [(f"error {name}", f"s{i}") for i, name in enumerate(names)]
+
+    def panel(name: str, t: Floats, rows: np.ndarray, kinds: Sequence[tuple[str, str]]) -> Chart:
+        places = np.linspace(0, scene.n - 1, rows.shape[1])
+        times = np.linspace(dt * float(t[0]), dt * float(t[-1]), rows.shape[0])
+        return Chart(
+            title=f"{name}.",
+            short=name,
+            x=Scale(name="particle", values=places.round().tolist()),
+            y=Scale(name=with_unit("time t", t_unit), values=times.tolist()),
+            tiles=Tiles(kinds=kinds, rows=rows.tolist()),
+        )
+
     bounds = np.linspace(-1, 1, len(WAVE_SHADES) + 1)[1:-1]
-    images = [("exact solution", longest.t, np.searchsorted(bounds, _few(true / size, signed=True)), signed)]
-    largest = {}
+    wave = np.searchsorted(bounds, _few(true / size, signed=True))
+    charts, largest = [panel("exact solution", longest.t, wave, signed)], {}
     for group in runs.groups[: PANELS - 1]:
         run = group.members[0]
         with np.errstate(all="ignore"):
             off = np.nan_to_num(np.asarray(run.q - exact.at(run)[0], np.float64) / size, nan=np.inf)
             largest[group.title] = float(np.max(np.abs(off)))
-            images.append(
-                (
-                    f"{group.title}: {share(largest[group.title])}",
-                    run.t,
-                    np.searchsorted(SHARES, _few(off)),
-                    errors,
-                )
-            )
-    charts = []
-    for name, t, rows, kinds in images:
-        places = np.linspace(0, scene.n - 1, rows.shape[1])
-        times = np.linspace(dt * float(t[0]), dt * float(t[-1]), rows.shape[0])
-        charts.append(
-            Chart(
-                title=f"{name}.",
-                short=name,
-                x=Scale(name="particle", values=places.round().tolist()),
-                y=Scale(name=with_unit("time t", t_unit), values=times.tolist()),
-                tiles=Tiles(kinds=kinds, rows=rows.tolist()),
-            )
-        )
+            name = f"{group.title}: {share(largest[group.title])}"
+            charts.append(panel(name, run.t, np.searchsorted(SHARES, _few(off)), errors))
     said = extremes(largest, "the wave is off by at most {}")
     bank = runs.bank("wave", charts, said, (3.4, 2.9), columns=min(3, len(charts)))
     return replace(bank, title="The exact wave over its largest displacement, and errors")

@@ -147,11 +147,10 @@ def _frames(picked: Sequence[State], true: State | None, view: View) -> tuple[Fr
     steep = _steep(picked[0] if true is None else true)
     if steep is not None:
         return steep
-    sizes = [frames.frame([one[j] for one in picked], None if true is None else true[j]) for j in (0, 1)]
+    right = (None, None) if true is None else true
+    sizes = [frames.frame([one[j] for one in picked], right[j]) for j in (0, 1)]
     near = [one for one in picked if all(its.leaves(one[j]) is None for j, its in enumerate(sizes))]
-    x, y = (
-        frames.frame([one[j] for one in near or picked], None if true is None else true[j]) for j in (0, 1)
-    )
+    x, y = (frames.frame([one[j] for one in near or picked], right[j]) for j in (0, 1))
     clipped = len(near) < len(picked)
     if view.turn:
         # the whole turn, and all of the separatrix

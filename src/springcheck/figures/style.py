@@ -69,9 +69,7 @@ def save(figure: Figure, folder: Path, name: str) -> list[Path]:
     """
     texts = figure.findobj(Text)
     for text in texts:
-        shown = "\n".join(plain(line, LONGEST_LINE) for line in text.get_text().split("\n"))
-        if shown != text.get_text():
-            text.set_text(shown)
+        text.set_text("\n".join(plain(line, LONGEST_LINE) for line in text.get_text().split("\n")))
     written = []
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -166,8 +166,7 @@ def pooled(data: Any) -> list[Any]:
             return x
         long = len(x) > FEWEST_POOLED or any(type(value) is str for value in x)
         if long and all(type(value) is float or value in JSON_WORDS for value in x):
-            text = json.dumps(x)
-            return {"#": rows.setdefault(text, len(rows))}
+            return {"#": rows.setdefault(json.dumps(x), len(rows))}
         if len(x) > FEWEST_POOLED and all(type(value) is str for value in x):
             return {"$": rows.setdefault(json.dumps(x), len(rows))}
         return [put(value) for value in x]

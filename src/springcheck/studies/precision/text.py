@@ -83,17 +83,9 @@ def _points(points: Sequence[Point]) -> TextTable:
     for point in points:
         where, found = _where(point).replace("tolerance ", "tol "), point.accuracy
         if found is None:
-            rows.append((plain(point.method), plain(where), plain(point.outcome, "red")))
+            rows.append((point.method, where, plain(point.outcome, "red")))
             continue
-        cells = (
-            point.method,
-            where,
-            f"{found.max_error:.1e}",
-            f"{found.end_error:.1e}",
-            number(found.phase_error, "+.0e"),
-            f"{found.energy_error:.0e}",
-            seconds(point.seconds),
-            str(point.force_calls),
-        )
-        rows.append(tuple(map(plain, cells)))
+        errors = f"{found.max_error:.1e}", f"{found.end_error:.1e}", number(found.phase_error, "+.0e")
+        costs = seconds(point.seconds), str(point.force_calls)
+        rows.append((point.method, where, *errors, f"{found.energy_error:.0e}", *costs))
     return table(("method", "at", "error", "end", "phase", "energy", "run", "calls"), rows)
