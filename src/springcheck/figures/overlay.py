@@ -15,7 +15,6 @@ from springcheck.figures.views import units, with_unit
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory
-from springcheck.text.wording import few
 
 TRUTH = "exact solution"
 
@@ -91,7 +90,10 @@ class Runs:
     def wrong(self) -> str:
         """Which of them are wrong, to begin a title with; "" where none is."""
         names = [group.title for group in self.groups if group.failed]
-        return f"{few(names, 2)} {'is' if len(names) == 1 else 'are'} wrong (red); " if names else ""
+        if not names:
+            return ""
+        more = f" and {len(names) - 2} more" if len(names) > 2 else ""
+        return f"{', '.join(names[:2])}{more} {'is' if len(names) == 1 else 'are'} wrong (red); "
 
     def curves(
         self,
@@ -166,10 +168,10 @@ class Runs:
         """The charts of a figure, under what is said of them."""
         # of a long run every so many frames, between which it may be further off
         thinned = not self.errors and any(run.every > self.scene.every for run in self.every)
-        partly = thinned and "at most" in said
+        few = thinned and "at most" in said
         return Bank(
             name=name, title="Methods drawn", charts=charts, size=size, columns=columns,
-            heading=f"{self.scene.title}: {self.wrong}{said}{' (of the frames drawn)' * partly}",
+            heading=f"{self.scene.title}: {self.wrong}{said}{' (of the frames drawn)' * few}",
         )  # fmt: skip
 
     def leaving(self, when: Callable[[Trajectory], int | None]) -> str:
