@@ -120,11 +120,7 @@ def alone() -> Iterator[None]:
     """
     sys.stdout.flush()
     shown = sys.stdout
-    try:
-        kept, out = os.dup(1), os.dup(2)
-    except OSError:
-        yield
-        return
+    kept, out = os.dup(1), os.dup(2)
     stream = open(out, "w", errors="backslashreplace")  # noqa: SIM115
     try:
         os.dup2(2, 1)
@@ -153,11 +149,11 @@ def readable(file: str | None) -> Iterator[None]:
     except Exception as error:
         if file is None or interrupts.seen():
             raise
-        trace = error.__traceback__
-        while trace is not None and trace.tb_next is not None:
-            trace = trace.tb_next
-        where = f", line {trace.tb_lineno} of {Path(trace.tb_frame.f_code.co_filename).name}" if trace else ""
-        raise StoreError(f"{file}: cannot be made sense of ({type(error).__name__}{where})") from error
+        from traceback import extract_tb
+
+        last = extract_tb(error.__traceback__)[-1]
+        where = f"line {last.lineno} of {Path(last.filename).name}"
+        raise StoreError(f"{file}: cannot be made sense of ({type(error).__name__}, {where})") from error
 
 
 @contextmanager

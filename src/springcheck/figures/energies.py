@@ -33,7 +33,7 @@ LEAST_DRAWN = 1e-4
 MOST_TURNING = 8
 """Particles among which some must turn for their motion to be called an orbit."""
 
-WAYS = {
+ORBIT_WORDS = {
     "spirals out": "spiral out", "spirals in": "spiral in", "keeps to its orbit": "keep to their orbits",
 }  # fmt: skip
 """What an orbit may do, of one scheme and of several."""
@@ -141,7 +141,7 @@ def steady(energies: Floats, every: int) -> float:
 def orbits(runs: Runs, parts: Runs, exact: Exact) -> str:
     """Whose orbits spiral, and the largest error of the states of others."""
     scene = runs.scene
-    said: dict[str, list[str]] = {way: [] for way in WAYS}
+    said: dict[str, list[str]] = {way: [] for way in ORBIT_WORDS}
     off = {}
     for group in runs.groups:
         run = group.members[0]
@@ -163,7 +163,7 @@ def orbits(runs: Runs, parts: Runs, exact: Exact) -> str:
     turns = max(periods(x) for x in parts.longest.q.T[:MOST_TURNING])
     if turns >= 1 and (said["spirals out"] or said["spirals in"]):
         return "; ".join(
-            f"{names[0]} {way}" if len(names) == 1 else f"{len(names)} {WAYS[way]}"
+            f"{names[0]} {way}" if len(names) == 1 else f"{len(names)} {ORBIT_WORDS[way]}"
             for way, names in said.items()
             if names
         )

@@ -82,27 +82,24 @@ def of_runs(
         out = [
             portraits.clouds(usable, shown[0], scene.thermal),
             portraits.positions(few, shown, None, usable),
-            energies.means(usable, scene.thermal),
-            *_temperatures(usable, heated or [heated_of(scene, [run]) for run in usable.every]),
         ]
-        return [_of_particle(one, particle) for one in out[: 2 if particle is not None else None]]
-    truth, said = true_motion(scene, parts.every, points), energies.orbits(usable, parts, exact)
-    out = [
-        portraits.phase_portraits(parts, shown, truth, said),
-        portraits.positions(parts, shown, truth, usable),
-    ]
+    else:
+        truth, said = true_motion(scene, parts.every, points), energies.orbits(usable, parts, exact)
+        out = [
+            portraits.phase_portraits(parts, shown, truth, said),
+            portraits.positions(parts, shown, truth, usable),
+        ]
     if particle is not None:
-        return [_of_particle(one, particle) for one in out]
+        return [replace(bank, name=f"{bank.name}-particle-{particle}") for bank in out]
+    if scene.bath is not None:
+        heated = heated or [heated_of(scene, [run]) for run in usable.every]
+        return [*out, energies.means(usable, scene.thermal), *_temperatures(usable, heated)]
     if planes := paths(scene):
         out.append(portraits.phase_portraits(parts, planes, truth, said))
     out.append(energies.energy(usable, exact))
     if exact.known:
         out.append(energies.error(usable, exact))
     return [*out, *chain.banks(usable, exact)]
-
-
-def _of_particle(bank: Bank, particle: int | None) -> Bank:
-    return bank if particle is None else replace(bank, name=f"{bank.name}-particle-{particle}")
 
 
 def _temperatures(runs: Runs, heated: Sequence[Heated]) -> list[Bank]:

@@ -28,9 +28,11 @@ def lines(study: Stability, options: Namespace | None = None) -> Lines:
         for x in study.limits:
             off = 0.0 if x.limit == x.theory else abs(x.limit - x.theory)
             predicted = np.nan if np.isnan(x.growth_above) else x.growth_predicted
+            largest = study.largest(x)
             cells = (
                 x.method, *(number(y, ".9f", "none") for y in (x.limit, x.theory)), f"{off:.0e}",
-                *(number(y, ".7f") for y in (x.growth_above, predicted)), _step(study.largest(x)),
+                *(number(y, ".7f") for y in (x.growth_above, predicted)),
+                "none" if largest == 0 else number(largest, ".4g", "any"),
             )  # fmt: skip
             rows.append([plain(cell, "" if x.agrees else "bold red") for cell in cells])
         titles = ("method", "limit h w", "theory", "off", "growth above", "predicted", "largest h here")
@@ -75,7 +77,3 @@ def _of_scene(study: Stability) -> Lines:
         said = "limits of small oscillations there; an anharmonic or modulated motion may be lost below them"
         out.append(plain(f"  {said}", "dim"))
     return out
-
-
-def _step(h: float) -> str:
-    return "none" if h == 0 else number(h, ".4g", "any")
