@@ -21,8 +21,8 @@ BUDGETS = {
     ("identify",): 8789,
     ("formats", "store"): 5260,
     ("studies",): 1478,
-    ("studies/*",): 9803,
-    ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 7110,
+    ("studies/*",): 9770,
+    ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 7025,
 }
 """Lines of each room, or of several: of an engine in one file, and of what all studies share, in the first
 folder."""

@@ -12,8 +12,9 @@ from browser import Browser
 from springcheck.cli import page
 from springcheck.cli.page.given import bath
 from springcheck.physics import scenefile as scenes
+from springcheck.studies import keeper
 from springcheck.studies.run import measure
-from springcheck.studies.run import page as charts
+from springcheck.thermal.heat import heated_of
 
 METHODS = ("own:baoab", "own:obabo", "own:andersen")
 
@@ -42,7 +43,8 @@ def test_temperatures_are_those_of_all_frames_though_few_are_drawn(
     stored: Path, content: page.Content
 ) -> None:
     assert content.stride > 1
-    whole = charts.temperatures(scenes.load_scene("bath-spring").derived(steps=3000), stored)
+    scene = scenes.load_scene("bath-spring").derived(steps=3000)
+    whole = [heated_of(scene, keeper.windows(stored, one.label)) for one in keeper.summary(stored).runs]
     shown = marks(content.data["banks"]["motion"])
     assert len(shown) == 6
     for one in whole:

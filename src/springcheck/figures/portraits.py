@@ -189,7 +189,7 @@ def _steep(motion: State) -> tuple[Frame, Frame] | None:
     last = int(np.argmax(size > START_SHOWN * start))
     # from a little beyond 0 to the last value
     x, y = (sorted((float(one[last]), -0.25 * float(one[last]))) for one in motion)
-    return Frame(*x, clipped=True), Frame(*y, clipped=True)
+    return Frame(x[0], x[1], clipped=True), Frame(y[0], y[1], clipped=True)
 
 
 def _chords(run: Trajectory, truth: Motion | None, view: View, *frames: Frame) -> bool:
