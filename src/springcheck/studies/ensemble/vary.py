@@ -149,11 +149,10 @@ def _finite(*values: float) -> None:
 class Varied:
     """A scene with varied fields, which an option of the command line names."""
 
-    def __init__(self, scene: Scene, plan: Plan, option: str = "--vary") -> None:
+    def __init__(self, scene: Scene, text: str, option: str = "--vary") -> None:
+        """`text` is that of the scene file; "" for the one that the scene writes."""
         self.scene, self._option = scene, option
-        self._data = tomllib.loads(plan.text or scene.to_toml())
-        for axis in plan.axes:
-            self._at(axis.field)
+        self._data = tomllib.loads(text or scene.to_toml())
 
     def substitutions(self, values: Mapping[str, Floats]) -> dict[Place, Floats]:
         """The numbers of the scene that change, with their values in every cell (c,).

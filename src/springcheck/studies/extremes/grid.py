@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from springcheck.engines.contract import Label, Need
+from springcheck.engines.contract import Need
 from springcheck.physics.builders import spring
 from springcheck.physics.scene import Scene
 from springcheck.studies.stability.propagators import MASS, STEP
@@ -118,7 +118,7 @@ def special() -> Iterator[Spec]:
             yield Spec(block="special", m=m, k=k, q=q, p=p, h=0.11)
 
 
-def scene(cells: list[Spec], label: Label, requires: frozenset[Need]) -> Scene:
+def scene(cells: list[Spec], requires: frozenset[Need]) -> Scene:
     """Cells of one step and one length as a scene of particles side by side."""
     first = cells[0]
     m = np.array([x.m for x in cells])
