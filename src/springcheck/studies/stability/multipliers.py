@@ -69,15 +69,15 @@ def measure(scene: Scene, label: Label) -> Multiplier:
     starts = [(rest + 1, 0.0), (rest, size)]
     right = _powers(scene, label, starts, rest, size)
     largest_seen = np.max(np.abs(right), axis=(1, 2))
-    if not np.all((largest_seen <= INVERTIBLE_NORM) & (largest_seen >= 1 / INVERTIBLE_NORM)):
-        return _unknown(label, steps, "the products of its scheme's steps are beyond what doubles can invert")
     try:
+        if not np.all((largest_seen <= INVERTIBLE_NORM) & (largest_seen >= 1 / INVERTIBLE_NORM)):
+            raise np.linalg.LinAlgError
         # a rounding of the state after each step, propagated to the end
         carried = [
             np.linalg.norm(right[-1] @ np.linalg.inv(one), 2) * np.linalg.norm(one, 2) for one in right
         ]
     except np.linalg.LinAlgError:
-        return _unknown(label, steps, "doubles cannot invert the products of its scheme's steps")
+        return _unknown(label, steps, "the products of its scheme's steps are beyond what doubles can invert")
     runs = [driver.run(replace(scene, q=np.array([q]), p=np.array([p])), label) for q, p in starts]
     lost = next((run.outcome for run in runs if run.outcome.status != "complete"), None)
     if lost and np.max(largest_seen) > OVERFLOWING_SIZE:
