@@ -197,7 +197,7 @@ def _scales(many: Scene, copies: int, alone: Alone) -> Extended:
     q, p = (x.astype(np.longdouble)[None] for x in (many.q, many.p))
     found = _energies(many, q, p, copies, np.abs)[0]
     for j in np.flatnonzero(found == 0):
-        found[j] = alone(j).system.norm.unit ** 2
+        found[j] = alone(int(j)).system.norm.unit ** 2
     return np.asarray(found, np.longdouble)
 
 
