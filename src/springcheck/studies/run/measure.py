@@ -17,12 +17,13 @@ from springcheck import checks, driver, engines, interrupts
 from springcheck.checks import compare
 from springcheck.engines.contract import Label
 from springcheck.errors import MethodError, SpringcheckError, StoreError
-from springcheck.physics import exact, memory, scenefile
+from springcheck.physics import exact, memory
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import NOT_KNOWN, Comparison, Trajectory, Verdict
 from springcheck.studies import keeper
 from springcheck.studies.arguments import Progress
 from springcheck.studies.choose import LeftOut, choose
+from springcheck.studies.run.changes import changed
 from springcheck.studies.run.result import FAULT, Repeat, Repeats, Report, Stored
 from springcheck.studies.run.tally import Tally, line, solution
 
@@ -70,12 +71,7 @@ def perform(options: Namespace, progress: Progress | None) -> Report | Repeats |
         return ensemble.perform(options, progress)
     if options.source is not None:
         return Repeats(repeats=tuple(repeat(Path(options.source), methods=options.method, progress=progress)))
-    if changes:
-        from springcheck.studies.run.changes import changed
-
-        scene = changed(options)
-    else:
-        scene = scenefile.load_scene(options.scene)
+    scene = changed(options)
     return run(
         scene,
         Path(options.output or f"{scene.name}.h5"),
