@@ -140,29 +140,11 @@ def size(scene: Scene) -> int:
 
 
 def write_attributes(node: Any, values: Mapping[str, Any]) -> None:
-    """Attributes: strings as variable-length UTF-8, sequences of strings as arrays of them.
-
-    As h5py's own `attrs` writes them, in half the time: types are made once, not for each attribute.
-    """
+    """Attributes: strings as variable-length UTF-8, sequences of strings as arrays of them."""
     for name, value in values.items():
         first = value[0] if isinstance(value, list | tuple) and value else value
-        if isinstance(first, str):
-            text = value.replace("\0", "") if isinstance(value, str) else list(value)
-            data, (kind, memory) = np.array(text, dtype=object), _types(_STRING)
-        else:
-            data = np.asarray(value)
-            kind, memory = _types(data.dtype)
-        key = name.encode()
-        if h5py.h5a.exists(node.id, key):
-            h5py.h5a.delete(node.id, key)
-        space = h5py.h5s.create_simple(data.shape) if data.shape else h5py.h5s.create(h5py.h5s.SCALAR)
-        h5py.h5a.create(node.id, key, kind, space).write(data, memory)
-
-
-@cache
-def _types(kind: np.dtype) -> tuple[Any, Any]:
-    """The types of HDF5, in the file and in memory, for one of numpy's; attributes have a handful of them."""
-    return h5py.h5t.py_create(kind, logical=True), h5py.h5t.py_create(kind)
+        kind = _STRING if isinstance(first, str) else None
+        node.attrs.create(name, value.replace("\0", "") if isinstance(value, str) else value, dtype=kind)
 
 
 def begin(file: Any) -> None:
