@@ -47,11 +47,11 @@ def collection(
         for source in sources:
             with access.opened(source) as part:
                 _take(file, part)
-        provenance = pieces.Provenance()
-        for table in pieces.joined(found.tables, provenance):
+        by: list[tuple[str, pieces.Worker]] = []
+        for table in pieces.joined(found.tables, by):
             tables.write(file, table)
             _compare(file[table.name], table)
-        for table in (*extra, *provenance.tables()):
+        for table in (*extra, *pieces.provenance(by)):
             tables.write(file, table)
         for name, document in documents.items():
             file.require_group("documents").create_dataset(
