@@ -15,6 +15,7 @@ from __future__ import annotations
 import ctypes
 import importlib.metadata
 from collections.abc import Iterator
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -49,7 +50,7 @@ INNER = 8
 ATTENTIVE = 5000
 """Steps in one call, which hears no Ctrl-C: some milliseconds."""
 
-_DRAWS = "LAMMPS, Marsaglia"
+_drawn = partial(thermostat, generator="LAMMPS, Marsaglia", terms=SPRINGS)
 
 MPI = "libmpi.so.12"
 
@@ -365,20 +366,19 @@ ENGINE = Engine(
         ),
     ),
     thermostats=named(
-        thermostat(
-            "langevin", "lammps-langevin", "fix langevin, fix nve, bond_style harmonic", _DRAWS, SPRINGS
-        ),
-        thermostat(
+        _drawn("langevin", "lammps-langevin", "fix langevin, fix nve, bond_style harmonic"),
+        _drawn(
             "rattle-langevin", "lammps-langevin", "fix langevin, fix nve, fix rattle, tolerance 1e-13",
-            _DRAWS, EVERY_POTENTIAL | RODS, requires=frozenset({Need.RODS}),
+            terms=EVERY_POTENTIAL | RODS, requires=frozenset({Need.RODS}),
         ),
-        thermostat("csvr", "bussi-after", "fix temp/csvr, fix nve, bond_style harmonic", _DRAWS, SPRINGS,
-                   default=False),
-        thermostat("nvt", "nose-hoover", "fix nvt, bond_style harmonic", NO_NUMBERS, SPRINGS, default=False),
+        _drawn("csvr", "bussi-after", "fix temp/csvr, fix nve, bond_style harmonic", default=False),
+        _drawn(
+            "nvt", "nose-hoover", "fix nvt, bond_style harmonic", generator=NO_NUMBERS, default=False
+        ),
         *(
-            thermostat(
-                f"gjf-{i}{half}", f"gj-{number}{half}", f"fix gjf, method {i}, {said} velocity", _DRAWS,
-                SPRINGS, default=i == 1,
+            _drawn(
+                f"gjf-{i}{half}", f"gj-{number}{half}", f"fix gjf, method {i}, {said} velocity",
+                default=i == 1,
             )
             for i, number in enumerate(GJ, 1)
             for half, said in (("", "on-site"), ("-half", "half-step"))
