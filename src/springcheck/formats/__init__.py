@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from springcheck.errors import StoreError
-from springcheck.formats import libraries, molecular, numbers, octave, tables, trr
+from springcheck.formats import libraries, molecular, numbers, octave, tables
 from springcheck.formats.columns import Reader, States, fitting, moving
 from springcheck.formats.hdf5 import is_foreign, read_hdf5
 from springcheck.store import apart, files
@@ -71,7 +71,7 @@ FORMATS: tuple[Format, ...] = (
     Format("LAMMPS log", _matches(rb"^LAMMPS \("), molecular.read_log, LINES),
     Format("DCD", lambda head, path: head[4:8] == b"CORD", libraries.read_dcd, LIBRARY),
     Format("GROMACS .xtc", _starts(b"\0\0\x07\xcb", b"\0\0\x07\xe7"), libraries.read_xtc, LIBRARY),
-    Format(".trr", _starts(b"\0\0\x07\xc9"), trr.read_trr),
+    Format(".trr", _starts(b"\0\0\x07\xc9"), molecular.read_trr),
     Format(".gro", lambda head, path: ".gro" in path.suffixes, molecular.read_gro, LINES),
     Format("Amber NetCDF", _starts(b"CDF\x01", b"CDF\x02"), libraries.read_amber, LIBRARY),
     Format("ASE .traj", _starts(b"- of Ulm"), libraries.read_ase, LIBRARY),

@@ -19,7 +19,7 @@ import numpy as np
 from springcheck.errors import StoreError
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
-from springcheck.store import access, digests, files, layout, seal, space
+from springcheck.store import access, digests, files, layout, seal
 from springcheck.store.access import Scalar
 
 if TYPE_CHECKING:
@@ -196,7 +196,7 @@ class Draft:
                 "kind": self.scene.kind,
                 "frames": self.rows,
                 "particles": self.scene.n,
-                **({} if self.scene.places is None else {"axes": space.axes_of(self.scene)}),
+                **({} if self.scene.places is None else {"axes": layout.axes_of(self.scene)}),
                 "quantities": " ".join(n for n in layout.QUANTITIES if n in self._columns),
                 "sequence": self.sequence,
                 "finished": now,
