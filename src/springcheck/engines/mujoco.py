@@ -123,8 +123,8 @@ class _Steps:
             )
         self.force_calls = 0
         self._step = mujoco.mj_step
-        # MuJoCo would write its warnings to a file in the current folder
-        mujoco.set_mju_user_warning(_unheard)
+        # MuJoCo would write its warnings to a file in the current folder; the states show what it warns of
+        mujoco.set_mju_user_warning(lambda message: None)
         self._model = _model(mujoco, scene, label, step)
         self._data = mujoco.MjData(self._model)
         self._q, self._v, self._control = self._data.qpos, self._data.qvel, self._data.ctrl
@@ -163,10 +163,6 @@ def arithmetic(label: Label) -> Arithmetic:
 def _has_motor(label: Label) -> bool:
     """Whether the force is ours, by a motor."""
     return label.method.startswith("motor")
-
-
-def _unheard(message: str) -> None:
-    """Conditions that MuJoCo warns of are visible in the states."""
 
 
 ENGINE = Engine(

@@ -45,6 +45,8 @@ class Format:
 
 
 LIBRARY, LINES = "library", "lines"
+XLSX = rb"(?s)\APK\x03\x04.*(\[Content_Types\]\.xml|xl/)"
+"""A ZIP archive of these among its first members."""
 
 
 def _starts(*with_: bytes) -> Callable[[bytes, Path], bool]:
@@ -55,13 +57,9 @@ def _matches(pattern: bytes) -> Callable[[bytes, Path], bool]:
     return lambda head, path: re.search(pattern, head, re.MULTILINE) is not None
 
 
-def _is_xlsx(head: bytes, path: Path) -> bool:
-    return head.startswith(b"PK\x03\x04") and (b"[Content_Types].xml" in head or b"xl/" in head)
-
-
 FORMATS: tuple[Format, ...] = (
     Format("NPY", _starts(b"\x93NUMPY"), numbers.read_npy),
-    Format(".xlsx", _is_xlsx, partial(libraries.read_pandas, "read_excel"), LIBRARY),
+    Format(".xlsx", _matches(XLSX), partial(libraries.read_pandas, "read_excel"), LIBRARY),
     Format("NPZ", _starts(b"PK\x03\x04"), numbers.read_npz),
     Format("Parquet", _starts(b"PAR1"), partial(libraries.read_pandas, "read_parquet"), LIBRARY),
     Format("Feather", _starts(b"ARROW1", b"FEA1"), partial(libraries.read_pandas, "read_feather"), LIBRARY),

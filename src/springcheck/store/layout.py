@@ -111,11 +111,6 @@ def check_label(label: str) -> None:
         )
 
 
-def units(scene: Scene) -> UnitsOf:
-    """Unit strings of q, p, energy, velocity, time and mass."""
-    return UNITS[scene.kind, scene.units]
-
-
 def shape(name: str, frames: int, n: int) -> tuple[int, ...]:
     """The shape of one of the quantities."""
     return (frames, n) if name in ("q", "p") else (frames,)
@@ -254,7 +249,8 @@ def _particles(file: Any, label: str, scene: Scene, found: Mapping[str, Column],
         return element.create_virtual_dataset("value", view, fillvalue=0.0)
 
     group = file.create_group(f"particles/{label}")
-    write_particles(group, units(scene), scene.masses.astype("<f8"), axis, "velocity" in found, viewed)
+    units = UNITS[scene.kind, scene.units]
+    write_particles(group, units, scene.masses.astype("<f8"), axis, "velocity" in found, viewed)
     write_box(group, scene.box)
 
 
