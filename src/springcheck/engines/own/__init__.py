@@ -70,7 +70,7 @@ def _method(scheme: Scheme) -> Method:
 
 _SCHEMES = sorted(
     (scheme for scheme in SCHEMES.values() if scheme.has("one-step")),
-    key=lambda scheme: (*ABOUT, scheme.name).index(scheme.name) if scheme.name in ABOUT else len(ABOUT),
+    key=lambda scheme: [*ABOUT, scheme.name].index(scheme.name),
 )
 
 ENGINE = Engine(
