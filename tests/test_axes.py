@@ -16,7 +16,7 @@ from springcheck.physics import scenefile
 from springcheck.physics.builders import spring
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Damping, Spring, WallSpring
-from springcheck.store import space
+from springcheck.store import layout
 
 IN_SPACE = ("ase:velocity-verlet", "openmm:verlet", "openmm:leapfrog", "openmm:euler")
 
@@ -209,10 +209,10 @@ def test_columns_of_a_store_find_their_axes() -> None:
         of = np.array(places)
         n = int(of.max()) // 3 + 1
         each = ",".join("".join("xyz"[p % 3] for p in places if p // 3 == i) for i in range(n))
-        assert space.places_of(each, len(places)).tolist() == places
+        assert layout.places_of(each, len(places)).tolist() == places
         out = np.zeros((2, n, 3))
         q = np.arange(2.0 * len(places)).reshape(2, -1) + 1
-        for columns, particles, axis in space.lines(of):
+        for columns, particles, axis in layout.lines(of):
             out[:, particles, axis] = q[:, columns]
         assert np.array_equal(out.reshape(2, -1)[:, of], q)
         assert np.count_nonzero(out) == q.size

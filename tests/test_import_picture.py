@@ -29,7 +29,7 @@ HOMES = {
     "matplotlib": ("plot.py", "cli/drawing.py", "figures"),
     "openmm": tuple(f"engines/openmm/{name}.py" for name in ("simulation", "thermostats", "variable")),
     "ase": ("engines/ase/simulation.py", "formats/libraries.py"),
-    "sksundae": ("engines/sundials/simulation.py", "engines/sundials/circuit.py"),
+    "sksundae": ("engines/sundials/simulation.py",),
     "numba": ("engines/own",),
     "jinja2": ("cli/page/writing.py",),
     "markupsafe": ("cli/page/writing.py",),

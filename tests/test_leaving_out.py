@@ -14,7 +14,8 @@ import numpy as np
 import pytest
 
 from springcheck import driver
-from springcheck.engines.own import forces, kernels, layout
+from springcheck.engines.own import kernels, layout
+from springcheck.engines.own import loops as own_loops
 from springcheck.engines.own import simulation as own
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.arrays import Reals
@@ -166,13 +167,13 @@ def test_own_methods_evaluate_the_terms_of_the_scene_and_no_others(
     called: list[str] = []
 
     def watch(loop: str) -> None:
-        original = getattr(forces, loop)
+        original = getattr(own_loops, loop)
 
         def watched(*arguments: Any) -> None:
             called.append(loop)
             original(*arguments)
 
-        for module in (forces, kernels):
+        for module in (own_loops, kernels):
             if hasattr(module, loop):
                 monkeypatch.setattr(module, loop, watched)
 
@@ -180,8 +181,8 @@ def test_own_methods_evaluate_the_terms_of_the_scene_and_no_others(
         called.extend(key for key, rows in zip(layout.KINDS, terms, strict=True) if len(rows[0]))
         indexed(terms, *arguments)
 
-    indexed = forces.indexed
-    monkeypatch.setattr(forces, "indexed", by_index)
+    indexed = own_loops.indexed
+    monkeypatch.setattr(own_loops, "indexed", by_index)
     for loop in ("held", "tensions", "slowed"):
         watch(loop)
     scene = scenes.load_scene(name)

@@ -22,7 +22,7 @@ import pytest
 
 from springcheck import checks, driver, engines, schemes
 from springcheck.engines import Need, parse
-from springcheck.engines.own import ENGINE, compiled, forces, kernels, simulation, solver, tiles, updates
+from springcheck.engines.own import ENGINE, compiled, kernels, loops, simulation, solver, tiles
 from springcheck.errors import MethodError
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
@@ -351,8 +351,8 @@ def test_force_calls_are_the_evaluations_that_took_place(
     scheme: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     calls = []
-    indexed = forces.indexed
-    monkeypatch.setattr(forces, "indexed", lambda *args: (calls.append(1), indexed(*args))[1])
+    indexed = loops.indexed
+    monkeypatch.setattr(loops, "indexed", lambda *args: (calls.append(1), indexed(*args))[1])
     for seed in (0, 1):
         calls.clear()
         what = random_scene("joined", seed, scheme)
@@ -464,18 +464,18 @@ def test_sine_and_exponential_are_right_to_a_rounding_at_any_size() -> None:
     with mpmath.workprec(2400):
         for x in (*(rng.normal(size=50) * 10.0 ** rng.integers(-8, 20, 50)), 2.0**55, 1e111, 1.7e308):
             true = mpmath.sin(mpmath.mpf(float(x)))
-            assert abs(mpmath.mpf(forces.sine(float(x))) - true) <= 2.0**-52 * abs(true)
+            assert abs(mpmath.mpf(loops.sine(float(x))) - true) <= 2.0**-52 * abs(true)
         for x in rng.uniform(-740, 709.7, 50):
             true = mpmath.exp(mpmath.mpf(float(x)))
-            assert abs(mpmath.mpf(forces.exponential(float(x))) - true) <= 2.0**-52 * true + 5e-324
+            assert abs(mpmath.mpf(loops.exponential(float(x))) - true) <= 2.0**-52 * true + 5e-324
     for x in (np.inf, -np.inf, np.nan):
-        assert np.isnan(forces.sine(x))
-    assert (forces.exponential(710.0), forces.exponential(np.inf), forces.exponential(-np.inf)) == (
+        assert np.isnan(loops.sine(x))
+    assert (loops.exponential(710.0), loops.exponential(np.inf), loops.exponential(-np.inf)) == (
         np.inf,
         np.inf,
         0,
     )
-    assert np.isnan(forces.exponential(np.nan))
+    assert np.isnan(loops.exponential(np.nan))
 
 
 def test_far_out_pendulums_move_alike_compiled_and_interpreted() -> None:
@@ -563,7 +563,7 @@ def test_200_steps_import_no_compiler_and_a_long_run_does(steps: int, imported: 
 
 
 def test_without_numba_a_long_run_is_interpreted(monkeypatch: pytest.MonkeyPatch) -> None:
-    compiled._jit.cache_clear()
+    compiled._COMPILED.clear()
     monkeypatch.setitem(sys.modules, "numba", None)
     spring = scene(3.7, 0.3, 0.7, wall(2.9), steps=10**9)
     assert simulation.prepare(spring, "explicit-euler", 0.1).compiled is False
@@ -578,7 +578,7 @@ def test_where_compiled_code_cannot_be_saved_it_is_compiled_for_the_process(
     numba = pytest.importorskip("numba")
     # numba has modules that use njit, which it imports as it first compiles
     numba.njit(lambda: 0)()
-    compiled._jit.cache_clear()
+    compiled._COMPILED.clear()
     njit = numba.njit
     asked = []
 
@@ -592,7 +592,7 @@ def test_where_compiled_code_cannot_be_saved_it_is_compiled_for_the_process(
     spring = scene(3.7, 0.3, 0.7, wall(2.9), steps=10**9)
     assert simulation.prepare(spring, "explicit-euler", 0.1).compiled is True
     assert asked == [True, False]
-    compiled._jit.cache_clear()
+    compiled._COMPILED.clear()
 
 
 def test_arguments_that_look_alike_are_of_one_type_to_the_compiler() -> None:
@@ -627,7 +627,7 @@ def test_damaged_compiled_code_is_compiled_anew(
     monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
 
     def look(into: int) -> None:
-        compiled._jit.cache_clear()
+        compiled._COMPILED.clear()
         q, p = np.zeros((1, 1)), np.full((1, 1), 3.7)
         kernel: Any = compiled.compiled(doubled, (2.0, q, p))
         kernel(2.0, q, p)
@@ -667,7 +667,7 @@ def test_damaged_compiled_code_is_compiled_anew(
             assert loaded(), "and is mended"
     # numba watches the file of the kernel alone, and its helpers change as well
     (changed := tmp_path / "changed.py").write_text("# another source")
-    for module in (compiled, forces, updates, kernels):
+    for module in (compiled, loops, kernels):
         with monkeypatch.context() as patch:
             before = compiled._digest(path.parent, doubled)
             patch.setattr(module, "__file__", str(changed))
@@ -679,5 +679,5 @@ def test_what_the_engine_says_of_itself_is_its_method_table() -> None:
         assert "same time" in ENGINE.convention(method)
     assert ENGINE.arithmetic(parse("own:euler")).state == 2.0**-53
     assert simulation.version()["numpy"] == np.__version__
-    assert {forces.indexed, forces.force_at, updates.kick, updates.solve} < set(compiled.HELPERS)
+    assert {loops.indexed, loops.force_at, loops.kick, loops.solve} < set(compiled.HELPERS)
     assert kernels.many not in compiled.HELPERS

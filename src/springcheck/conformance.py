@@ -156,23 +156,21 @@ def _served(label: Label) -> list[Scene]:
     """The uneven scenes that a method serves, or scenes made for it where it serves none."""
     found = _some(label)
     if not found:
-        raise AssertionError(f"{label} serves none of the scenes: {_refusal(label)}")
+        why = engines.refusal(next(uneven_scenes()), label)
+        raise AssertionError(f"{label} serves none of the scenes: {why}")
     return found
-
-
-def _refusal(label: Label) -> str | None:
-    return engines.refusal(next(uneven_scenes()), label)
 
 
 def _some(label: Label) -> list[Scene]:
     several = list(uneven_scenes())
+    bath = Bath(temperature=1.7, friction=0.8)
     for scenes in (
         several,
         (_damped(scene) for scene in several[:2]),
         (_in_haste(scene) for scene in several[8:10]),
         (load_scene(name) for name in ("lc-circuit", "rlc-circuit", "pendulum", "torsion-pendulum")),
-        (load_scene(name) for name in ("dumbbell",)),
-        (_in_a_bath(scene) for scene in several if not scene.system.is_damped),
+        (load_scene("dumbbell"),),
+        (replace(x, bath=bath, steps=400, every=1) for x in several if not x.system.is_damped),
     ):
         found = [scene for scene in scenes if engines.refusal(scene, label) is None]
         if found:
@@ -182,10 +180,6 @@ def _some(label: Label) -> list[Scene]:
 
 def _damped(scene: Scene) -> Scene:
     return replace(scene, terms=(*scene.terms, Damping(i=np.arange(scene.n), c=0.3 * scene.m)))
-
-
-def _in_a_bath(scene: Scene) -> Scene:
-    return replace(scene, bath=Bath(temperature=1.7, friction=0.8), steps=400, every=1)
 
 
 def _in_haste(scene: Scene) -> Scene:

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from time import perf_counter
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -43,14 +43,9 @@ UNTOUCHED = np.array(0x7FF8_0000_5C5C_5C5C).view(np.float64)
 """Fill value of rows before an engine writes them: a NaN that no arithmetic produces."""
 
 
-class Sink(Protocol):
-    """Receives recorded frames: t (f,), q and p (f, n), energy and last steps (f,) or None.  The arrays are
-    reused."""
-
-    def __call__(
-        self, t: Floats, q: Floats, p: Floats, energy: Floats | None, last_step: Floats | None, /
-    ) -> None: ...
-
+Sink: TypeAlias = Callable[[Floats, Floats, Floats, Floats | None, Floats | None], None]
+"""Receives recorded frames: t (f,), q and p (f, n), energy and last steps (f,) or None.  The arrays are
+reused."""
 
 Progress = Callable[[int], None]
 """Called with the number of steps done since the last call."""

@@ -9,7 +9,7 @@ from springs import SPRINGS, Batch, called, placed
 
 from springcheck.engines import Engine, named
 from springcheck.engines.contract import Need, by_name, thermostat
-from springcheck.formats.trr import read_trr
+from springcheck.formats.molecular import read_trr
 from springcheck.physics.arrays import Arithmetic
 
 BOLTZMANN = 0.00831446261815324  # kJ/mol/K

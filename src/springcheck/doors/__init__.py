@@ -56,10 +56,8 @@ class Brought:
 
     def _stated(self, name: str) -> str:
         """The scheme that is stated for a function or a program, or ""."""
-        own = [
-            text.partition("=")[2] for text in self.schemes if text.partition("=")[0] == name and "=" in text
-        ]
-        return next(iter([*own, *(text for text in self.schemes if "=" not in text)]), "")
+        stated = {of: scheme for of, _, scheme in (text.rpartition("=") for text in reversed(self.schemes))}
+        return stated.get(name, stated.get("", ""))
 
 
 @cache

@@ -119,14 +119,15 @@ class _Command:
             self._q, self._p = self._run(every)
         stride, rest = divmod(every, self._every)
         if rest:
-            raise MethodError(f"command {self._name}: frames {self._scene.every} steps apart; 65536 at most")
+            raise self._failed(f": frames {self._scene.every} steps apart; 65536 at most")
         rows = self._row + stride * np.arange(1, len(q) + 1)
         if rows[-1] >= len(self._q):
-            raise MethodError(
-                f"command {self._name}: too few rows: {len(self._q)}, {rows[-1] + 1} are needed"
-            )
+            raise self._failed(f": too few rows: {len(self._q)}, {rows[-1] + 1} are needed")
         q[:], p[:] = self._q[rows], self._p[rows]
         self._row = int(rows[-1])
+
+    def _failed(self, what: str) -> MethodError:
+        return MethodError(f"command {self._name}{what}")
 
     def _run(self, every: int) -> tuple[Floats, Floats]:
         with interrupts.folder(prefix="springcheck-") as folder:
@@ -136,18 +137,15 @@ class _Command:
             try:
                 done = interrupts.called(words, self._seconds)
             except subprocess.TimeoutExpired as error:
-                raise MethodError(
-                    f"command {self._name} did not end within {self._seconds:g} s; --timeout gives it more"
-                ) from error
+                said = f" did not end within {self._seconds:g} s; --timeout gives it more"
+                raise self._failed(said) from error
             except OSError as error:
-                raise MethodError(f"command {self._name} cannot be run: {error.strerror}") from error
+                raise self._failed(f" cannot be run: {error.strerror}") from error
             if done.returncode:
                 said = " ".join((done.stderr or done.stdout).decode(errors="replace").split())[-300:]
-                raise MethodError(
-                    f"command {self._name} ended with status {done.returncode}{f': {said}' if said else ''}"
-                )
+                raise self._failed(f" ended with status {done.returncode}{f': {said}' if said else ''}")
             if not out.is_file():
-                raise MethodError(f"command {self._name} wrote no file {{out}}")
+                raise self._failed(" wrote no file {out}")
             return self._read(out, every)
 
     def _read(self, out: Path, every: int) -> tuple[Floats, Floats]:
@@ -157,26 +155,22 @@ class _Command:
 
             states = formats.moving(out, next(iter(formats.read(out).values())))
         except StoreError as error:
-            raise MethodError(
-                f"command {self._name}: its output{str(error).removeprefix(str(out))}"
-            ) from error
+            raise self._failed(f": its output{str(error).removeprefix(str(out))}") from error
         scene = self._scene
         if states.q.shape[1] != scene.n:
-            raise MethodError(
-                f"command {self._name}: positions in a row of its output: {states.q.shape[1]}, not {scene.n}"
-            )
+            raise self._failed(f": positions in a row of its output: {states.q.shape[1]}, not {scene.n}")
         p = states.p if states.p is not None else np.asarray(states.v) * scene.m
         t = np.arange(len(states.t)) * every * self._h
         # a time may be a sum of steps, rounded at each
         off = np.abs(states.t - t) > 1e-9 * (np.abs(t) + abs(self._h))
         if np.any(off):
             row = int(np.argmax(off))
-            raise MethodError(
-                f"command {self._name}: row {row + 1} is at t = {states.t[row]:.12g}, not {t[row]:.12g}; the "
-                f"first row is the start, the next {every} x {self._h:g} later"
+            raise self._failed(
+                f": row {row + 1} is at t = {states.t[row]:.12g}, not {t[row]:.12g}; the first row is the "
+                f"start, the next {every} x {self._h:g} later"
             )
         if not (np.array_equal(states.q[0], scene.q) and np.array_equal(p[0], scene.p)):
             close = np.allclose(states.q[0], scene.q, rtol=1e-9) and np.allclose(p[0], scene.p, rtol=1e-9)
             why = "; write numbers with 17 digits" if close else ""
-            raise MethodError(f"command {self._name}: its first row is not the scene's start{why}")
+            raise self._failed(f": its first row is not the scene's start{why}")
         return states.q, p

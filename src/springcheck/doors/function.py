@@ -181,7 +181,8 @@ def _file(function: Callable[..., Any]) -> str:
 class _Pull:
     """The argument `force` of a function: force(q, p, t), the last two optional.
 
-    `t` is the time at which the step starts, at which the force is taken unless the function gives a time.
+    Its attribute `t` (see the README of the engines) is the time at which the step starts, at which the force
+    is taken unless the function gives a time.
     """
 
     def __init__(self, scene: Scene) -> None:

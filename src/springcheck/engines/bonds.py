@@ -266,16 +266,12 @@ def hinges(scene: Scene, label: Label) -> Iterator[tuple[int, float, tuple[float
     depth, at = np.zeros((2, scene.n))
     for term in scene.terms:
         if isinstance(term, Cosine):
-            if (
-                np.any(depth[term.i])
-                or len(set(term.i.tolist())) < len(term)
-                or np.any((term.wave != 1) | (term.depth < 0))
-            ):
+            twice = np.any(depth[term.i]) or len(set(term.i.tolist())) < len(term)
+            if twice or np.any((term.wave != 1) | (term.depth < 0)):
                 raise MethodError(f"{label}: gravity makes one pendulum of a rotor, of wave 1")
             depth[term.i], at[term.i] = term.depth, term.at
-    for i, (inertia, pull, angle) in enumerate(
-        zip(scene.m.tolist(), depth.tolist(), at.tolist(), strict=True)
-    ):
+    rotors = zip(scene.m.tolist(), depth.tolist(), at.tolist(), strict=True)
+    for i, (inertia, pull, angle) in enumerate(rotors):
         away = inertia / (2 * pull) if pull else 0.0
         mass = pull / away if pull else 1.0
         yield i, mass, (away * np.cos(angle), -away * np.sin(angle), 0.0), inertia / 2 if pull else inertia

@@ -67,16 +67,10 @@ ENGINE = Engine(
     module="Box2D",
     extra="box2d",
     methods=named(
+        by_name("force", "semi-implicit-euler", "ApplyForceToCenter before each step", EVERY_FORCE,
+            note="the wheel is Box2D of 2013"),
         by_name(
-            "force",
-            "semi-implicit-euler",
-            "ApplyForceToCenter before each step",
-            EVERY_FORCE,
-            note="the wheel is Box2D of 2013",
-        ),
-        by_name(
-            "distance-joint",
-            "implicit-euler",
+            "distance-joint", "implicit-euler",
             "b2DistanceJoint with a frequency and no damping, its length far from 0",
             frozenset({"wall-spring"}),
             note="the wheel is Box2D of 2013; its soft joints are implicit, as documented",
@@ -85,4 +79,4 @@ ENGINE = Engine(
     start=_World,
     version=installed_version("box2d"),
     arithmetic=single,
-)
+)  # fmt: skip

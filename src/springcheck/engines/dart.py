@@ -87,20 +87,15 @@ ENGINE = Engine(
     methods=named(
         by_name("force", "semi-implicit-euler", "Skeleton.setForces before each step", EVERY_FORCE),
         by_name(
-            "hinge",
-            "semi-implicit-euler",
-            "revolute joint, gravity and Skeleton.setForces",
-            frozenset({"wall-spring", "cosine"}),
-            kinds=frozenset({"rotor"}),
+            "hinge", "semi-implicit-euler", "revolute joint, gravity and Skeleton.setForces",
+            frozenset({"wall-spring", "cosine"}), kinds=frozenset({"rotor"}),
         ),
         by_name(
-            "joint-spring",
-            "implicit-euler",
-            "spring and damping of the joint",
+            "joint-spring", "implicit-euler", "spring and damping of the joint",
             frozenset({"wall-spring", "damping"}),
             note="as documented for stiff joints; dartsim/dart#846 asks where the energy goes",
         ),
     ),
     start=_World,
     version=version_of("dartpy", "dart"),
-)
+)  # fmt: skip

@@ -72,9 +72,7 @@ ENGINE = Engine(
     extra="drake",
     methods=named(
         by_name(
-            "prismatic-spring",
-            "semi-implicit-euler",
-            "PrismaticSpring in a discrete plant",
+            "prismatic-spring", "semi-implicit-euler", "PrismaticSpring in a discrete plant",
             frozenset({"wall-spring"}),
         ),
         by_name(

@@ -15,6 +15,7 @@ from __future__ import annotations
 import ctypes
 import importlib.metadata
 from collections.abc import Iterator
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -49,7 +50,7 @@ INNER = 8
 ATTENTIVE = 5000
 """Steps in one call, which hears no Ctrl-C: some milliseconds."""
 
-_DRAWS = "LAMMPS, Marsaglia"
+_drawn = partial(thermostat, generator="LAMMPS, Marsaglia", terms=SPRINGS)
 
 MPI = "libmpi.so.12"
 
@@ -121,12 +122,8 @@ class _Run:
             self._pull(scene, step)
         self._rods, self._reach = scene.system.rods, 2 * step / scene.m
         moved = _thermostat(scene, method, seed) if method.generator else ["fix move mobile nve"]
-        for line in (
-            *moved,
-            *(() if ours else _drives(scene, step)),
-            f"timestep {step!r}",
-            "thermo_modify lost ignore",
-        ):
+        drives = () if ours else _drives(scene, step)
+        for line in (*moved, *drives, f"timestep {step!r}", "thermo_modify lost ignore"):
             self._lammps.command(line)
         if rods:
             self._begin(label, _constraint(method.name, rods))
@@ -207,9 +204,8 @@ class _Run:
             command(f"variable k{number} atom d_k{number}")
             # the fix takes the present positions for those of rest
             command(f"fix spring{number} mobile spring/self v_k{number}")
-        for number, (a, b, k, rest, _) in enumerate(
-            _bonds(scene, [t for t in held if isinstance(t, Spring)], self._origins)
-        ):
+        restrained = _bonds(scene, [t for t in held if isinstance(t, Spring)], self._origins)
+        for number, (a, b, k, rest, _) in enumerate(restrained):
             command(f"fix bond{number} all restrain bond {a + 1} {b + 1} {0.5 * k!r} {0.5 * k!r} {rest!r}")
         return np.asarray(x)
 
@@ -365,20 +361,17 @@ ENGINE = Engine(
         ),
     ),
     thermostats=named(
-        thermostat(
-            "langevin", "lammps-langevin", "fix langevin, fix nve, bond_style harmonic", _DRAWS, SPRINGS
-        ),
-        thermostat(
+        _drawn("langevin", "lammps-langevin", "fix langevin, fix nve, bond_style harmonic"),
+        _drawn(
             "rattle-langevin", "lammps-langevin", "fix langevin, fix nve, fix rattle, tolerance 1e-13",
-            _DRAWS, EVERY_POTENTIAL | RODS, requires=frozenset({Need.RODS}),
+            terms=EVERY_POTENTIAL | RODS, requires=frozenset({Need.RODS}),
         ),
-        thermostat("csvr", "bussi-after", "fix temp/csvr, fix nve, bond_style harmonic", _DRAWS, SPRINGS,
-                   default=False),
-        thermostat("nvt", "nose-hoover", "fix nvt, bond_style harmonic", NO_NUMBERS, SPRINGS, default=False),
+        _drawn("csvr", "bussi-after", "fix temp/csvr, fix nve, bond_style harmonic", default=False),
+        _drawn("nvt", "nose-hoover", "fix nvt, bond_style harmonic", generator=NO_NUMBERS, default=False),
         *(
-            thermostat(
-                f"gjf-{i}{half}", f"gj-{number}{half}", f"fix gjf, method {i}, {said} velocity", _DRAWS,
-                SPRINGS, default=i == 1,
+            _drawn(
+                f"gjf-{i}{half}", f"gj-{number}{half}", f"fix gjf, method {i}, {said} velocity",
+                default=i == 1,
             )
             for i, number in enumerate(GJ, 1)
             for half, said in (("", "on-site"), ("-half", "half-step"))

@@ -10,7 +10,6 @@ unless that is switched off.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -38,55 +37,41 @@ DAMPED = SPRINGS | {"damping"}
 IMPLICIT_FRICTION = "semi-implicit-euler-implicit-friction"
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _How:
-    """The options of MuJoCo behind a method."""
+INTEGRATORS = {
+    "joint-spring-implicit": "IMPLICIT", "joint-spring-implicitfast": "IMPLICITFAST",
+    "joint-spring-rk4": "RK4", "joint-damping-implicitfast": "IMPLICITFAST", "motor-rk4": "RK4",
+}  # fmt: skip
+"""MuJoCo's integrator of a method, where it is not Euler's."""
 
-    integrator: str = "EULER"
-    substeps: int = 1
-    motor: bool = False
-    explicit_damping: bool = False
-    hinge: bool = False
-
-
-HOW = {
-    "joint-spring": _How(),
-    "joint-spring-implicit": _How(integrator="IMPLICIT"),
-    "joint-spring-implicitfast": _How(integrator="IMPLICITFAST"),
-    "joint-spring-rk4": _How(integrator="RK4"),
-    "joint-damping": _How(),
-    "joint-damping-implicitfast": _How(integrator="IMPLICITFAST"),
-    "joint-damping-explicit": _How(explicit_damping=True),
-    "hinge": _How(hinge=True),
-    "motor": _How(motor=True),
-    "motor-rk4": _How(integrator="RK4", motor=True),
-    "motor-frame-skip-5": _How(motor=True, substeps=5),
-}
+SUBSTEPS = {"motor-frame-skip-5": 5}
+"""Steps of MuJoCo in one of a method; of all others 1."""
 
 
-def _model(mujoco: Any, scene: Scene, how: _How, step: float, label: Label) -> Any:
+def _model(mujoco: Any, scene: Scene, label: Label, step: float) -> Any:
+    """A body for each particle, on a slide or a hinge, and what pulls it."""
+    name, hinge, motor = label.method, label.method == "hinge", _has_motor(label)
     spec = mujoco.MjSpec()
-    spec.option.timestep = step / how.substeps
-    spec.option.gravity = [float(how.hinge), 0.0, 0.0]
-    spec.option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{how.integrator}")
+    spec.option.timestep = step / SUBSTEPS.get(name, 1)
+    spec.option.gravity = [float(hinge), 0.0, 0.0]
+    spec.option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{INTEGRATORS.get(name, 'EULER')}")
     # beyond 1e10 MuJoCo would set the state back to the start of the model, and go on
     flags = mujoco.mjtDisableBit.mjDSBL_AUTORESET
-    if how.explicit_damping:
+    if name == "joint-damping-explicit":
         flags |= mujoco.mjtDisableBit.mjDSBL_EULERDAMP
     spec.option.disableflags = int(flags)
     slide = ((i, m, (0.0, 0.0, 0.0), 1.0) for i, m in enumerate(scene.m.tolist()))
     kind, axis = (mujoco.mjtJoint.mjJNT_SLIDE, [1.0, 0.0, 0.0])
-    if how.hinge:
+    if hinge:
         kind, axis = (mujoco.mjtJoint.mjJNT_HINGE, [0.0, 0.0, 1.0])
     joints = []
-    for i, mass, centre, inertia in hinges(scene, label) if how.hinge else slide:
+    for i, mass, centre, inertia in hinges(scene, label) if hinge else slide:
         body = spec.worldbody.add_body(name=f"b{i}", mass=mass, ipos=centre, inertia=[inertia] * 3)
         body.explicitinertial = True
         joints.append(body.add_joint(name=f"j{i}", type=kind, axis=axis))
-        if how.motor:
-            motor = spec.add_actuator(name=f"m{i}", target=f"j{i}", trntype=mujoco.mjtTrn.mjTRN_JOINT)
-            motor.set_to_motor()
-    if not how.motor:
+        if motor:
+            actuator = spec.add_actuator(name=f"m{i}", target=f"j{i}", trntype=mujoco.mjtTrn.mjTRN_JOINT)
+            actuator.set_to_motor()
+    if not motor:
         _springs(spec, joints, scene)
     return spec.compile()
 
@@ -132,24 +117,23 @@ class _Steps:
     def __init__(self, scene: Scene, method: Method, label: Label, step: float) -> None:
         import mujoco
 
-        how = HOW[method.name]
         if (least := float(np.min(scene.m))) < mujoco.mjMINVAL:
             raise MethodError(
                 f"{label}: MuJoCo takes no mass below {mujoco.mjMINVAL:g}, and one is {least:g}"
             )
         self.force_calls = 0
         self._step = mujoco.mj_step
-        # MuJoCo would write its warnings to a file in the current folder
-        mujoco.set_mju_user_warning(_unheard)
-        self._model = _model(mujoco, scene, how, step, label)
+        # MuJoCo would write its warnings to a file in the current folder; the states show what it warns of
+        mujoco.set_mju_user_warning(lambda message: None)
+        self._model = _model(mujoco, scene, label, step)
         self._data = mujoco.MjData(self._model)
         self._q, self._v, self._control = self._data.qpos, self._data.qvel, self._data.ctrl
         self._q[:], self._v[:] = scene.q, scene.p / scene.m
         self._m = scene.m
-        self._force = scene.system.force if how.motor else None
-        self._substeps = how.substeps
+        self._force = scene.system.force if _has_motor(label) else None
+        self._substeps = SUBSTEPS.get(method.name, 1)
         self._bad_control = int(mujoco.mjtWarning.mjWARN_BADCTRL)
-        self._each = 4 if how.integrator == "RK4" and not how.motor else 1
+        self._each = 4 if method.name == "joint-spring-rk4" else 1
 
     def advance(self, every: int, q: Floats, p: Floats) -> None:
         step, model, data, v_now, q_now = self._step, self._model, self._data, self._v, self._q
@@ -173,11 +157,12 @@ class _Steps:
 
 def arithmetic(label: Label) -> Arithmetic:
     """Double precision; MuJoCo takes no control beyond 1e10."""
-    return Arithmetic(overflow=1e10) if HOW[label.method].motor else Arithmetic()
+    return Arithmetic(overflow=1e10) if _has_motor(label) else Arithmetic()
 
 
-def _unheard(message: str) -> None:
-    """Conditions that MuJoCo warns of are visible in the states."""
+def _has_motor(label: Label) -> bool:
+    """Whether the force is ours, by a motor."""
+    return label.method.startswith("motor")
 
 
 ENGINE = Engine(

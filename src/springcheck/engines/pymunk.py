@@ -74,21 +74,14 @@ ENGINE = Engine(
     distribution="pymunk",
     extra="pymunk",
     methods=named(
+        by_name("force", "explicit-euler", "Body.force, set before each step", EVERY_FORCE,
+            note="a force set before a step acts after the positions have moved"),
         by_name(
-            "force",
-            "explicit-euler",
-            "Body.force, set before each step",
-            EVERY_FORCE,
-            note="a force set before a step acts after the positions have moved",
-        ),
-        by_name(
-            "damped-spring",
-            "semi-implicit-euler-drift-kick",
-            "DampedSpring without damping, its rest length far from 0",
-            SPRINGS,
+            "damped-spring", "semi-implicit-euler-drift-kick",
+            "DampedSpring without damping, its rest length far from 0", SPRINGS,
         ),
     ),
     start=_Space,
     version=version,
     arithmetic=arithmetic,
-)
+)  # fmt: skip

@@ -71,21 +71,14 @@ ENGINE = Engine(
     distribution="rapier3d",
     extra="rapier",
     methods=named(
+        by_name("force", "force-held-4", "RigidBody.add_force before each step of 4 substeps", EVERY_FORCE,
+            note="documented: a force is held over the substeps"),
         by_name(
-            "force",
-            "force-held-4",
-            "RigidBody.add_force before each step of 4 substeps",
-            EVERY_FORCE,
-            note="documented: a force is held over the substeps",
-        ),
-        by_name(
-            "spring-joint",
-            "implicit-euler-4",
-            "SpringJoint without damping, its length far from 0, in 4 substeps",
-            frozenset({"wall-spring"}),
+            "spring-joint", "implicit-euler-4",
+            "SpringJoint without damping, its length far from 0, in 4 substeps", frozenset({"wall-spring"}),
         ),
     ),
     start=_World,
     version=version_of("rapier3d"),
     arithmetic=single,
-)
+)  # fmt: skip

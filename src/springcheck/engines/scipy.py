@@ -30,7 +30,16 @@ from springcheck.physics.driven import timed
 from springcheck.physics.scene import Scene
 from springcheck.schemes import solver
 
-SOLVERS = {"rk45": "RK45", "dop853": "DOP853", "radau": "Radau", "bdf": "BDF", "lsoda": "LSODA"}
+SOLVERS = {
+    "rk45": ("RK45", "Dormand-Prince 5(4), adaptive", "Dormand & Prince, J. Comput. Appl. Math. 6 (1980) 19"),
+    "dop853": ("DOP853", "DOP853, order 8, adaptive", "Hairer, Norsett & Wanner, Solving ODEs I, II.5"),
+    "radau": ("Radau", "Radau IIA, order 5, adaptive", "Hairer & Wanner, Solving ODEs II, IV.8"),
+    "bdf": ("BDF", "quasi-constant step BDF, orders 1-5",
+            "Shampine & Reichelt, SIAM J. Sci. Comput. 18 (1997) 1"),
+    "lsoda": ("LSODA", "LSODA, Adams and BDF by turns",
+              "Petzold, SIAM J. Sci. Stat. Comput. 4 (1983) 136"),
+}  # fmt: skip
+"""SciPy's class of each method, its title, and its source."""
 
 EXPLICIT_SOLVERS = ("RK45", "DOP853")
 
@@ -44,7 +53,7 @@ class _Solver:
     def __init__(self, scene: Scene, method: Method, label: Label, step: float) -> None:
         from scipy import integrate
 
-        name = SOLVERS[method.name]
+        name, *_ = SOLVERS[method.name]
         solvers.refuse_hours(scene, label, step, explicit=name in EXPLICIT_SOLVERS)
         self.force_calls = 0
         self._n, self._h, self._done = scene.n, step, 0
@@ -60,7 +69,7 @@ class _Solver:
             "rtol": max(scene.tolerance, SMALLEST_TOLERANCE),
             "atol": scene.tolerance * np.where(sizes > 0, sizes, 1.0),
         }
-        if name in ("Radau", "BDF", "LSODA"):
+        if name not in EXPLICIT_SOLVERS:
             options["jac"] = lambda t, y: jacobian(t, y[:n], y[n:])
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -89,17 +98,6 @@ class _Solver:
                 self._done += every
 
 
-SCHEMES = (
-    solver("scipy-rk45", "Dormand-Prince 5(4), adaptive",
-           "Dormand & Prince, J. Comput. Appl. Math. 6 (1980) 19"),
-    solver("scipy-dop853", "DOP853, order 8, adaptive", "Hairer, Norsett & Wanner, Solving ODEs I, II.5"),
-    solver("scipy-radau", "Radau IIA, order 5, adaptive", "Hairer & Wanner, Solving ODEs II, IV.8"),
-    solver("scipy-bdf", "quasi-constant step BDF, orders 1-5",
-           "Shampine & Reichelt, SIAM J. Sci. Comput. 18 (1997) 1"),
-    solver("scipy-lsoda", "LSODA, Adams and BDF by turns",
-           "Petzold, SIAM J. Sci. Stat. Comput. 4 (1983) 136"),
-)  # fmt: skip
-
 ENGINE = Engine(
     name="scipy",
     title="SciPy",
@@ -107,13 +105,13 @@ ENGINE = Engine(
     methods=named(
         *(
             by_name(
-                name, f"scipy-{name}", f"scipy.integrate.{solver}, as solve_ivp steps it",
+                name, f"scipy-{name}", f"scipy.integrate.{its_class}, as solve_ivp steps it",
                 EVERY_FORCE | DRIVEN | FIELD | BRAKES, adaptive=True, kinds=EVERY_KIND,
             )
-            for name, solver in SOLVERS.items()
+            for name, (its_class, *_) in SOLVERS.items()
         )
     ),
-    schemes=SCHEMES,
+    schemes=tuple(solver(f"scipy-{x}", title, source) for x, (_, title, source) in SOLVERS.items()),
     start=_Solver,
     version=version_of("scipy"),
     any_axis=True,

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from springcheck.errors import StoreError
-from springcheck.formats import libraries, molecular, numbers, octave, tables, trr
+from springcheck.formats import libraries, molecular, numbers, octave, tables
 from springcheck.formats.columns import Reader, States, fitting, moving
 from springcheck.formats.hdf5 import is_foreign, read_hdf5
 from springcheck.store import apart, files
@@ -45,6 +45,8 @@ class Format:
 
 
 LIBRARY, LINES = "library", "lines"
+XLSX = rb"(?s)\APK\x03\x04.*(\[Content_Types\]\.xml|xl/)"
+"""A ZIP archive of these among its first members."""
 
 
 def _starts(*with_: bytes) -> Callable[[bytes, Path], bool]:
@@ -55,13 +57,9 @@ def _matches(pattern: bytes) -> Callable[[bytes, Path], bool]:
     return lambda head, path: re.search(pattern, head, re.MULTILINE) is not None
 
 
-def _is_xlsx(head: bytes, path: Path) -> bool:
-    return head.startswith(b"PK\x03\x04") and (b"[Content_Types].xml" in head or b"xl/" in head)
-
-
 FORMATS: tuple[Format, ...] = (
     Format("NPY", _starts(b"\x93NUMPY"), numbers.read_npy),
-    Format(".xlsx", _is_xlsx, partial(libraries.read_pandas, "read_excel"), LIBRARY),
+    Format(".xlsx", _matches(XLSX), partial(libraries.read_pandas, "read_excel"), LIBRARY),
     Format("NPZ", _starts(b"PK\x03\x04"), numbers.read_npz),
     Format("Parquet", _starts(b"PAR1"), partial(libraries.read_pandas, "read_parquet"), LIBRARY),
     Format("Feather", _starts(b"ARROW1", b"FEA1"), partial(libraries.read_pandas, "read_feather"), LIBRARY),
@@ -71,7 +69,7 @@ FORMATS: tuple[Format, ...] = (
     Format("LAMMPS log", _matches(rb"^LAMMPS \("), molecular.read_log, LINES),
     Format("DCD", lambda head, path: head[4:8] == b"CORD", libraries.read_dcd, LIBRARY),
     Format("GROMACS .xtc", _starts(b"\0\0\x07\xcb", b"\0\0\x07\xe7"), libraries.read_xtc, LIBRARY),
-    Format(".trr", _starts(b"\0\0\x07\xc9"), trr.read_trr),
+    Format(".trr", _starts(b"\0\0\x07\xc9"), molecular.read_trr),
     Format(".gro", lambda head, path: ".gro" in path.suffixes, molecular.read_gro, LINES),
     Format("Amber NetCDF", _starts(b"CDF\x01", b"CDF\x02"), libraries.read_amber, LIBRARY),
     Format("ASE .traj", _starts(b"- of Ulm"), libraries.read_ase, LIBRARY),

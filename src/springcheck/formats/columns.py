@@ -197,11 +197,8 @@ def is_single(x: Floats) -> bool:
 def listed(names: Iterable[str]) -> str:
     """Names separated by commas, the first eight of them."""
     names = list(names)
-    return (
-        ", ".join(plain(name, 40) for name in names[:8]) + (" ..." if len(names) > 8 else "")
-        if names
-        else "none"
-    )
+    shown = ", ".join(plain(name, 40) for name in names[:8]) if names else "none"
+    return f"{shown} ..." if len(names) > 8 else shown
 
 
 def named(path: Path, values: Floats, names: Sequence[str]) -> Columns:

@@ -1,4 +1,4 @@
-"""Text files of molecular programs: LAMMPS dumps and logs, GROMACS .gro, plain .xyz.
+"""Files of molecular programs: LAMMPS dumps and logs, GROMACS .gro and .trr, plain .xyz.
 
 Each in its own units: GROMACS' are nm, ps and u, those of a dump are LAMMPS' own.
 """
@@ -6,6 +6,7 @@ Each in its own units: GROMACS' are nm, ps and u, those of a dump are LAMMPS' ow
 from __future__ import annotations
 
 import re
+import struct
 from array import array
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -31,7 +32,7 @@ def clock(path: Path, said: Sequence[float | None], step: float | None, unit: st
     return np.array(known)
 
 
-def of_frames(path: Path, t: Any, q: Any, v: Any, mass: Any, roundoff: float = 2.0**-53) -> States:
+def of_frames(path: Path, t: Any, q: Any, v: Any, mass: Any, roundoff: float) -> States:
     """States of frames: t (f,), q and v (f, n, 3), v None where there are none, mass (n,) or None."""
     try:
         at, positions, velocities = (np.asarray(x, np.float64) for x in (t, q, q if v is None else v))
@@ -298,3 +299,45 @@ def read_xyz(path: Path, columns: list[str], step: float | None) -> States:
     table = np.frombuffer(numbers).reshape(len(t), n or 1, width or 3)
     v = table[:, :, 3:] if width == 6 else None
     return of_frames(path, clock(path, t, step), table[:, :, :3], v, None, roundoff(first, range(width)))
+
+
+TRR_MARK = 1993
+"""The first number of every frame of a .trr file."""
+
+TRR_NUMBERS = {4: (">f4", 2.0**-24), 8: (">f8", 2.0**-53)}
+"""Numbers of so many bytes: dtype and unit roundoff."""
+
+
+def read_trr(path: Path, columns: list[str], step: float | None) -> States:
+    """A GROMACS .trr file in the precision in which it was written; MDAnalysis reads single precision alone.
+
+    Positions [nm] and velocities [nm/ps].  Frames are XDR, big-endian: a mark, the format's name, the bytes
+    of each array, the numbers of atoms and of the step, time and coupling, then box, virial, pressure,
+    positions, velocities and forces.
+    """
+    if path.stat().st_size > 8 * MOST_NUMBERS:
+        raise StoreError(f"{path}: more than {MOST_NUMBERS:,} numbers: keep fewer frames")
+    data, at, found, written = path.read_bytes(), 0, [], 0.0
+    try:
+        while at < len(data):
+            magic, _, name = struct.unpack_from(">3i", data, at)
+            *sizes, atoms, _, _ = struct.unpack_from(">13i", data, at + 12 + name)
+            if magic != TRR_MARK or atoms < 1 or min(name, *sizes) < 0 or not any(sizes):
+                raise StoreError(f"{path}: is no .trr file from byte {at} on")
+            # bytes of positions, velocities or forces, or of the box where there are none
+            width = max(sizes[7:]) // (3 * atoms) or sizes[2] // 9
+            kind, coarse = TRR_NUMBERS[width]
+            written = max(written, coarse)
+            begin = at + 64 + name
+            time = float(np.frombuffer(data, kind, 1, begin)[0])
+            begin += 2 * width + sum(sizes[:7])
+            at = begin + sum(sizes[7:])
+            if sizes[7] and sizes[8]:
+                both = np.frombuffer(data, kind, 6 * atoms, begin).reshape(2, atoms, 3)
+                found.append((time, *both.astype(np.float64)))
+    except (struct.error, KeyError, ValueError) as error:
+        raise StoreError(f"{path}: the .trr file is cut off or damaged in frame {len(found)}") from error
+    if not found:
+        raise StoreError(f"{path}: has no frame with both positions and velocities")
+    t, q, v = zip(*found, strict=True)
+    return of_frames(path, t, q, v, None, written)

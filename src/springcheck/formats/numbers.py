@@ -21,21 +21,20 @@ LARGEST = 16 * MOST_NUMBERS
 
 
 def _load(path: Path) -> Any:
-    most = LARGEST
     try:
         if zipfile.is_zipfile(path):
             with zipfile.ZipFile(path) as packed:
                 found = sum(member.file_size for member in packed.infolist())
         else:
             found = path.stat().st_size
-        if found <= most:
+        if found <= LARGEST:
             # NumPy leaves a damaged file open; this one is in memory
             loaded = np.load(BytesIO(path.read_bytes()), allow_pickle=False)
             return dict(loaded) if hasattr(loaded, "files") else loaded
     except Exception as error:
         raise StoreError(f"{path}: NumPy cannot read it: {' '.join(str(error).split())[:200]}") from error
     raise StoreError(
-        f"{path}: {found / 1e6:.0f} MB of arrays, {most / 1e6:.0f} can be read: keep fewer frames"
+        f"{path}: {found / 1e6:.0f} MB of arrays, {LARGEST / 1e6:.0f} can be read: keep fewer frames"
     )
 
 
@@ -53,13 +52,8 @@ def states_of(path: Path, arrays: Mapping[str, Any], names: Sequence[str] = ()) 
     """
     given = arrays
     first, *more = arrays.values() or [np.empty(0)]
-    if (
-        not more
-        and not isinstance(first, StoreError)
-        and np.issubdtype(first.dtype, np.number)
-        and first.ndim == 2
-        and "=" not in "".join(names)
-    ):
+    alone = not (more or isinstance(first, StoreError) or "=" in "".join(names))
+    if alone and np.issubdtype(first.dtype, np.number) and first.ndim == 2:
         return of_table(path, first, names)
     arrays = _chosen(path, arrays, names)
     arrays = {name: arrays[name] for name in kinds(arrays)}

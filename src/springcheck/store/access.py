@@ -113,11 +113,6 @@ def find(group: Any, path: str) -> Any:
     return node
 
 
-def address(node: Any) -> int:
-    """Where an object lies in its file: the same for each of its names."""
-    return int(h5py.h5o.get_info(node.id).addr)
-
-
 def _has_one_name(node: Any) -> Any:
     """The object if it has one hard link, as ours have; an object with more would be read once for each."""
     if h5py.h5o.get_info(node.id).rc > 1:
@@ -134,7 +129,7 @@ def walk(
     them alone (later None).  `into(path, object)` decides whether a group is entered.  StoreError where there
     are more than `most`.
     """
-    seen, count = {address(group)}, 0
+    seen, count = {h5py.h5o.get_info(group.id).addr}, 0
 
     def below(node: Any, before: str, depth: int) -> Iterator[tuple[str, int, Any]]:
         nonlocal count
@@ -187,14 +182,13 @@ def dataset_at(file: Any, path: str, *, packed: bool = False) -> Any:
         raise refuse(node, f"has {node.ndim} dimensions")
     if how.external:
         raise refuse(node, "lies outside the file: what other files hold is not read")
+    is_packed = how.layout in (h5py.h5d.VIRTUAL, h5py.h5d.CHUNKED)
+    if (is_packed and not packed) or how.filters - _FILTERS:
+        raise refuse(node, "is stored in a way that is not read")
     if how.layout == h5py.h5d.VIRTUAL:
-        if not packed:
-            raise refuse(node, "is stored in a way that is not read")
         _look_at_views(node, how.views)
     elif how.layout == h5py.h5d.CHUNKED:
         chunk = int(np.prod(how.chunk, dtype=object)) * node.dtype.itemsize
-        if not packed or how.filters - _FILTERS:
-            raise refuse(node, "is stored in a way that is not read")
         stored = node.id.get_storage_size()
         # libhdf5 makes room for as many bytes as a chunk says that it takes in the file
         if chunk > LARGEST_CHUNK or stored > size or claimed > EXPANSION * stored:

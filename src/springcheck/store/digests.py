@@ -102,7 +102,8 @@ def contents(file: Any) -> tuple[dict[str, str], list[Extent]]:
             found[f"/{below}"] = known[at]
     for label in access.children(file, "parameters"):
         found[f"/parameters/{label}"] = of_run(file, label)
-    for name in tables.all_names(file):
+    every_store_has = {"comparison", "verdicts"} & {*access.members(file)}
+    for name in (*tables.names(file), *sorted(every_store_has)):
         found[f"/{name}"] = of_table(access.group_at(file, name))
     for name in access.children(file, "documents"):
         text = access.text(file, f"documents/{name}")

@@ -19,7 +19,7 @@ import numpy as np
 from springcheck.errors import StoreError
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
-from springcheck.store import access, digests, files, layout, seal, space
+from springcheck.store import access, digests, files, layout, seal
 from springcheck.store.access import Scalar
 
 if TYPE_CHECKING:
@@ -73,16 +73,17 @@ class Draft:
 
         Quantities that the scene does not record are ignored.  Raises StoreError when the disk is full.
         """
-        given = {"time": t, "q": q, "p": p, "energy": energy, "last_step": last_step}
         if last_step is not None and not self.rows:
             self._lay_out(steps=True)
         f = len(t)
-        for name, values in given.items():
+        given: dict[str, Floats] = {}
+        for name, values in zip(("time", *layout.QUANTITIES), (t, q, p, energy, last_step), strict=True):
             if name in self._columns:
                 expected = (f, *self._columns[name].shape[1:])
                 if values is None or values.shape != expected:
                     found = None if values is None else values.shape
                     raise ValueError(f"{name} of {self.label}: shape {found}, not {expected}")
+                given[name] = values
         if self.rows + f > self.scene.frames:
             raise ValueError(f"{self.label}: more frames than the scene's {self.scene.frames}")
         done = 0
@@ -90,8 +91,7 @@ class Draft:
             count = min(f - done, self._length - self._held)
             rows, into = slice(done, done + count), slice(self._held, self._held + count)
             for name, values in given.items():
-                if name in self._columns and values is not None:
-                    self._buffer[name][into] = values[rows]
+                self._buffer[name][into] = values[rows]
             if "velocity" in self._columns:
                 with np.errstate(over="ignore"):
                     np.divide(p[rows], self.scene.m, out=self._buffer["velocity"][into])
@@ -196,7 +196,7 @@ class Draft:
                 "kind": self.scene.kind,
                 "frames": self.rows,
                 "particles": self.scene.n,
-                **({} if self.scene.places is None else {"axes": space.axes_of(self.scene)}),
+                **({} if self.scene.places is None else {"axes": layout.axes_of(self.scene)}),
                 "quantities": " ".join(n for n in layout.QUANTITIES if n in self._columns),
                 "sequence": self.sequence,
                 "finished": now,

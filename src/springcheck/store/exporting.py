@@ -11,7 +11,7 @@ import numpy as np
 
 from springcheck.errors import StoreError
 from springcheck.physics.arrays import Integers
-from springcheck.store import access, checking, files, layout, merge, parts, reading, space
+from springcheck.store import access, checking, files, layout, merge, parts, reading
 from springcheck.store.checking import Damage
 
 
@@ -47,7 +47,7 @@ def export(path: str | Path, label: str, out: str | Path) -> list[Damage]:
         base, group = f"observables/{label}", f"particles/{label}"
         if access.group_at(file, group) is None:
             raise StoreError(f"{path} is an exported trajectory already: copy it")
-        places = space.places_of(known.axes, known.particles)
+        places = layout.places_of(known.axes, known.particles)
         arrays = reading.arrays_of(file, label, known)
         if "velocity" in access.children(file, base):
             arrays["velocity"] = access.array(file, f"{base}/velocity/value", arrays["p"].shape)
@@ -103,6 +103,6 @@ def _copy_values(source: Any, target: Any, places: Integers) -> Any:
     made = target.create_dataset("value", shape, "<f8", chunks=(rows, particles, 1), fillvalue=0.0)
     for start in range(0, frames, rows):
         part = np.asarray(source[start : start + rows])
-        for columns, of, axis in space.lines(places):
+        for columns, of, axis in layout.lines(places):
             made[start : start + rows, of, axis] = part[:, columns]
     return made

@@ -85,16 +85,8 @@ def shown(path: Path) -> Path:
 
 
 BROKEN = (
-    OSError,
-    KeyError,
-    ValueError,
-    TypeError,
-    RuntimeError,
-    AttributeError,
-    IndexError,
-    ArithmeticError,
-    MemoryError,
-)
+    OSError, LookupError, ValueError, TypeError, RuntimeError, AttributeError, ArithmeticError, MemoryError
+)  # fmt: skip
 """Exceptions that reading a damaged file may raise."""
 
 

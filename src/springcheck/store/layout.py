@@ -31,9 +31,9 @@ import numpy as np
 
 import springcheck
 from springcheck.errors import StoreError, plain
-from springcheck.physics.arrays import Floats
+from springcheck.physics.arrays import Floats, Integers
 from springcheck.physics.scene import Scene
-from springcheck.store import access, files, space
+from springcheck.store import access, files
 from springcheck.store.access import Scalar
 
 FORMAT = "springcheck store 2"
@@ -111,11 +111,6 @@ def check_label(label: str) -> None:
         )
 
 
-def units(scene: Scene) -> UnitsOf:
-    """Unit strings of q, p, energy, velocity, time and mass."""
-    return UNITS[scene.kind, scene.units]
-
-
 def shape(name: str, frames: int, n: int) -> tuple[int, ...]:
     """The shape of one of the quantities."""
     return (frames, n) if name in ("q", "p") else (frames,)
@@ -140,29 +135,11 @@ def size(scene: Scene) -> int:
 
 
 def write_attributes(node: Any, values: Mapping[str, Any]) -> None:
-    """Attributes: strings as variable-length UTF-8, sequences of strings as arrays of them.
-
-    As h5py's own `attrs` writes them, in half the time: types are made once, not for each attribute.
-    """
+    """Attributes: strings as variable-length UTF-8, sequences of strings as arrays of them."""
     for name, value in values.items():
         first = value[0] if isinstance(value, list | tuple) and value else value
-        if isinstance(first, str):
-            text = value.replace("\0", "") if isinstance(value, str) else list(value)
-            data, (kind, memory) = np.array(text, dtype=object), _types(_STRING)
-        else:
-            data = np.asarray(value)
-            kind, memory = _types(data.dtype)
-        key = name.encode()
-        if h5py.h5a.exists(node.id, key):
-            h5py.h5a.delete(node.id, key)
-        space = h5py.h5s.create_simple(data.shape) if data.shape else h5py.h5s.create(h5py.h5s.SCALAR)
-        h5py.h5a.create(node.id, key, kind, space).write(data, memory)
-
-
-@cache
-def _types(kind: np.dtype) -> tuple[Any, Any]:
-    """The types of HDF5, in the file and in memory, for one of numpy's; attributes have a handful of them."""
-    return h5py.h5t.py_create(kind, logical=True), h5py.h5t.py_create(kind)
+        kind = _STRING if isinstance(first, str) else None
+        node.attrs.create(name, value.replace("\0", "") if isinstance(value, str) else value, dtype=kind)
 
 
 def begin(file: Any) -> None:
@@ -267,12 +244,13 @@ def _particles(file: Any, label: str, scene: Scene, found: Mapping[str, Column],
         column = found[source]
         view = h5py.VirtualLayout((column.shape[0], scene.particles, 3), "<f8")
         numbers = h5py.VirtualSource(".", column.path, column.shape, "<f8")
-        for columns_, particles, direction in space.lines(scene.all_places):
+        for columns_, particles, direction in lines(scene.all_places):
             view[:, particles, direction] = numbers[:, columns_]
         return element.create_virtual_dataset("value", view, fillvalue=0.0)
 
     group = file.create_group(f"particles/{label}")
-    write_particles(group, units(scene), scene.masses.astype("<f8"), axis, "velocity" in found, viewed)
+    units = UNITS[scene.kind, scene.units]
+    write_particles(group, units, scene.masses.astype("<f8"), axis, "velocity" in found, viewed)
     write_box(group, scene.box)
 
 
@@ -311,6 +289,42 @@ def write_box(group: Any, lengths: Sequence[float] | None, axis: Axis | None = N
     element["value"] = np.broadcast_to(lengths, (len(axis["time"]), 3))
     write_unit(element["value"], group["position/value"].attrs["unit"])
     element.update(axis)
+
+
+def axes_of(scene: Scene) -> str:
+    """Axes along which particles move, of all or with commas of each: "x", "xyz", "xy,xyz"."""
+    if scene.places is None:
+        return "x"
+    of, axis = np.divmod(scene.places, 3)
+    each = ["".join("xyz"[a] for a in axis[of == i]) for i in range(scene.particles)]
+    return each[0] if len(set(each)) == 1 else ",".join(each)
+
+
+def places_of(axes: str, n: int) -> Integers:
+    """The place, 3 particle + axis, of each of n columns.  StoreError where these are not the axes of n."""
+    each = axes.split(",")
+    if "," not in axes:
+        each *= max(1, n // max(1, len(axes)))
+    found = [3 * i + "xyz".find(axis) for i, own in enumerate(each) for axis in own]
+    if len(found) != n or len(set(found)) < n or not set(axes) <= set("xyz,") or not all(each):
+        raise StoreError(f"axes {axes[:40]!r} are not those of {n} coordinates")
+    return np.array(found)
+
+
+def lines(places: Integers) -> Iterator[tuple[slice, slice, int]]:
+    """Slices of columns of (frames, n) that move along one axis, those of their particles, and the axis."""
+    for axis in range(3):
+        columns = np.flatnonzero(places % 3 == axis)
+        steps = np.diff(np.stack([columns, places[columns] // 3]), axis=1)
+        cuts = np.flatnonzero(np.any(np.diff(steps, axis=1) != 0, axis=0)) + 2
+        for part in np.split(columns, cuts):
+            if len(part):
+                yield _even(part), _even(places[part] // 3), axis
+
+
+def _even(index: Integers) -> slice:
+    step = int(index[1] - index[0]) if len(index) > 1 else 1
+    return slice(int(index[0]), int(index[-1]) + 1, step)
 
 
 @cache

@@ -31,7 +31,8 @@ def collection(
     sources = [part for part in found.runs if part != base]
     total = sum(source.stat().st_size for source in (*sources, *found.tables))
     text = sum(len(document.encode()) for document in documents.values())
-    margin = (1 << 20) + text + 1024 * len(sources) + 8 * sum(_bytes(table) for table in extra)
+    margin = (1 << 20) + text + 1024 * len(sources)
+    margin += 512 * sum(np.asarray(column).size for table in extra for column in table.columns.values())
     if base is None:
         kept: tuple[seal.Extent, ...] = ()
         made = layout.fresh(path, total + margin)
@@ -47,11 +48,11 @@ def collection(
         for source in sources:
             with access.opened(source) as part:
                 _take(file, part)
-        provenance = pieces.Provenance()
-        for table in pieces.joined(found.tables, provenance):
+        by: list[tuple[str, pieces.Worker]] = []
+        for table in pieces.joined(found.tables, by):
             tables.write(file, table)
             _compare(file[table.name], table)
-        for table in (*extra, *provenance.tables()):
+        for table in (*extra, *pieces.provenance(by)):
             tables.write(file, table)
         for name, document in documents.items():
             file.require_group("documents").create_dataset(
@@ -90,10 +91,6 @@ def image(root: Mapping[str, Scalar], content: Iterable[Table]) -> bytes:
         file.flush()
         body: bytes = file.id.get_file_image()
     return seal.sealed(body, str(root["run"]))
-
-
-def _bytes(table: Table) -> int:
-    return sum(np.asarray(column).size * 64 for column in table.columns.values())
 
 
 def _compare(group: Any, table: Table) -> None:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
@@ -40,43 +40,31 @@ def by_text(by: Sequence[Worker]) -> dict[str, str]:
 def by_of(file: Any) -> list[dict[str, str]]:
     """The workers that measured an open part."""
     try:
-        found: list[dict[str, str]] = access.json(
-            str(access.attribute(file, BY) or "[]"), list[dict[str, str]]
-        )
-        return found
+        return list(access.json(str(access.attribute(file, BY) or "[]"), list[dict[str, str]]))
     except ValueError:
         return []
 
 
-class Provenance:
-    """Who measured which piece, collected while a collection is written."""
-
-    def __init__(self) -> None:
-        self._records: dict[str, int] = {}
-        self._pieces: dict[tuple[str, int], None] = {}
-
-    def note(self, piece: str, by: Iterable[Worker]) -> None:
-        """A piece was measured by these."""
-        for record in by:
-            number = self._records.setdefault(json.dumps(dict(record), sort_keys=True), len(self._records))
-            self._pieces[piece, number] = None
-
-    def tables(self) -> list[Table]:
-        """A row for each worker, and one for each piece with the row of its worker."""
-        if not self._pieces:
-            return []
-        found: list[dict[str, str]] = [json.loads(text) for text in self._records]
-        names = list(dict.fromkeys(name for record in found for name in record))
-        columns = {name: [record.get(name, "") for record in found] for name in names}
-        piece, worker = zip(*sorted(self._pieces), strict=True)
-        return [
-            Table(name=WORKERS, columns=columns, attributes={"about": "a row for each who measured pieces"}),
-            Table(
-                name=PIECES,
-                columns={"piece": list(piece), "worker": np.array(worker, np.int32)},
-                attributes={"about": f"worker: the row of {WORKERS}, from 0 on"},
-            ),
-        ]
+def provenance(by: Sequence[tuple[str, Worker]]) -> list[Table]:
+    """Pieces and who measured them as tables: a row for each worker, and one for each piece with the row of
+    its worker."""
+    if not by:
+        return []
+    texts = [json.dumps(worker, sort_keys=True) for _, worker in by]
+    rows = {text: row for row, text in enumerate(dict.fromkeys(texts))}
+    found: list[dict[str, str]] = [json.loads(text) for text in rows]
+    names = list(dict.fromkeys(name for record in found for name in record))
+    columns = {name: [record.get(name, "") for record in found] for name in names}
+    pairs = {(piece, rows[text]) for (piece, _), text in zip(by, texts, strict=True)}
+    piece, worker = zip(*sorted(pairs), strict=True)
+    return [
+        Table(name=WORKERS, columns=columns, attributes={"about": "a row for each who measured pieces"}),
+        Table(
+            name=PIECES,
+            columns={"piece": list(piece), "worker": np.array(worker, np.int32)},
+            attributes={"about": f"worker: the row of {WORKERS}, from 0 on"},
+        ),
+    ]
 
 
 def measured(found: Mapping[str, Table]) -> Iterator[tuple[str, dict[str, str]]]:
@@ -94,13 +82,13 @@ def measured(found: Mapping[str, Table]) -> Iterator[tuple[str, dict[str, str]]]
         raise StoreError(f"the tables of who measured what do not fit together: {error}") from error
 
 
-def joined(parts: Sequence[Path], provenance: Provenance) -> Iterator[Table]:
-    """The tables of these parts, rows of one table joined."""
+def joined(parts: Sequence[Path], by: list[tuple[str, Worker]]) -> Iterator[Table]:
+    """The tables of these parts, rows of one table joined; adds each piece to `by`, and who measured it."""
     for name, group in groupby(sorted(parts, key=lambda part: (table_of(part), name_of(part))), key=table_of):
-        yield _joined(name, list(group), provenance)
+        yield _joined(name, list(group), by)
 
 
-def _joined(name: str, parts: Sequence[Path], provenance: Provenance) -> Table:
+def _joined(name: str, parts: Sequence[Path], by: list[tuple[str, Worker]]) -> Table:
     lengths: Counter[str] = Counter()
     for part in reversed(parts):
         known = seal.find(part)
@@ -108,7 +96,7 @@ def _joined(name: str, parts: Sequence[Path], provenance: Provenance) -> Table:
             raise StoreError(f"{part.name} is damaged: give the same command again, and it is measured again")
         with access.opened(part) as source:
             rows = source[name_of(part)]
-            provenance.note(name_of(part), by_of(source))
+            by += [(name_of(part), worker) for worker in by_of(source)]
             if part == parts[0]:
                 first = tables.read(rows, name)
             if len(parts) == 1:

@@ -194,15 +194,8 @@ def summary(path: str | Path) -> Summary:
         with opened(source) as file:
             known, rest = known_of(file, label)
             arrays_of(file, label, known)
-            runs.append(
-                Run(
-                    label=label,
-                    frames=known.frames,
-                    n=known.particles,
-                    quantities=known.kept,
-                    parameters=rest,
-                )
-            )
+        run = Run(label=label, frames=known.frames, n=known.particles, quantities=known.kept, parameters=rest)
+        runs.append(run)
     root: dict[str, Scalar] = {}
     documents: tuple[str, ...] = ()
     if path.is_file():
@@ -311,10 +304,7 @@ def decoded(path: str | Path, name: str) -> Any:
 def scene_text(path: str | Path) -> str:
     """The TOML text of the scene that a store was made from."""
     path = Path(path)
-    source = path
-    if not path.is_file():
-        source = next(iter(sources(path).values()), path)
-    with opened(source) as file:
+    with opened(path if path.is_file() else next(iter(sources(path).values()), path)) as file:
         known = access.attributes(file)
         if "scene" in known:
             return str(known["scene"])

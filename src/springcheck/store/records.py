@@ -63,7 +63,7 @@ class RunRecord(msgspec.Struct, frozen=True, kw_only=True):
     particles: Size
     """Number of coordinates: of particles, where each moves along one axis."""
     axes: Annotated[str, msgspec.Meta(max_length=1 << 20)] = "x"
-    """See `space.axes_of`."""
+    """See `layout.axes_of`."""
     quantities: Name
     sequence: Count = 0
     sha256: Name

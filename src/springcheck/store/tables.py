@@ -127,11 +127,6 @@ def _is_table(node: Any) -> bool:
     return access.is_group(node) and access.attribute(node, "kind") == "table"
 
 
-def all_names(file: Any) -> list[str]:
-    """Names of all tables of an open file."""
-    return [*names(file), *(name for name in ("comparison", "verdicts") if name in access.members(file))]
-
-
 def of_verdicts(verdicts: Sequence[Verdict]) -> Table:
     """Verdicts as a table; passed is 1, 0, or -1 where the check does not apply."""
     rows = [

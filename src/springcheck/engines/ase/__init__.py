@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from springcheck.engines.contract import (
     EVERY_POTENTIAL,
     NO_NUMBERS,
@@ -14,7 +16,7 @@ from springcheck.engines.contract import (
     thermostat,
 )
 
-_DRAWS = "NumPy, PCG64"
+_drawn = partial(thermostat, generator="NumPy, PCG64", terms=EVERY_POTENTIAL, rebuilds_velocity=True)
 
 ENGINE = Engine(
     name="ase",
@@ -28,30 +30,18 @@ ENGINE = Engine(
         ),
     ),
     thermostats=named(
-        thermostat(
-            "langevin", "vanden-eijnden-ciccotti", "ase.md.langevin.Langevin", _DRAWS, EVERY_POTENTIAL,
-            scripted=True, rebuilds_velocity=True,
-        ),
-        thermostat(
+        _drawn("langevin", "vanden-eijnden-ciccotti", "ase.md.langevin.Langevin", scripted=True),
+        _drawn(
             "langevin-rods", "vanden-eijnden-ciccotti",
-            "ase.md.langevin.Langevin with FixBondLengths, tolerance 1e-13", _DRAWS, EVERY_POTENTIAL | RODS,
-            scripted=True, rebuilds_velocity=True, requires=frozenset({Need.RODS}),
+            "ase.md.langevin.Langevin with FixBondLengths, tolerance 1e-13", scripted=True,
+            terms=EVERY_POTENTIAL | RODS, requires=frozenset({Need.RODS}),
         ),
-        thermostat(
-            "langevin-baoab", "baoab", "ase.md.langevinbaoab.LangevinBAOAB", _DRAWS, EVERY_POTENTIAL,
-            rebuilds_velocity=True,
-        ),
-        thermostat(
-            "andersen", "andersen-after-kick", "ase.md.andersen.Andersen", _DRAWS, EVERY_POTENTIAL,
-            rebuilds_velocity=True,
-        ),
-        thermostat(
-            "bussi", "bussi-unsigned", "ase.md.bussi.Bussi", _DRAWS, EVERY_POTENTIAL, scripted=True,
-            rebuilds_velocity=True, default=False,
-        ),
-        thermostat(
-            "nose-hoover", "nose-hoover-fourth", "ase.md.nose_hoover_chain.NoseHooverChainNVT", NO_NUMBERS,
-            EVERY_POTENTIAL, default=False,
+        _drawn("langevin-baoab", "baoab", "ase.md.langevinbaoab.LangevinBAOAB"),
+        _drawn("andersen", "andersen-after-kick", "ase.md.andersen.Andersen"),
+        _drawn("bussi", "bussi-unsigned", "ase.md.bussi.Bussi", scripted=True, default=False),
+        _drawn(
+            "nose-hoover", "nose-hoover-fourth", "ase.md.nose_hoover_chain.NoseHooverChainNVT",
+            generator=NO_NUMBERS, rebuilds_velocity=False, default=False,
             note="it counts three degrees of freedom for each atom, whatever is fixed of it",
         ),
     ),

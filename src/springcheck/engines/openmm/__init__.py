@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 from springcheck.engines.contract import (
@@ -30,7 +31,7 @@ _DRIVEN = _TERMS | DRIVEN
 _ON_A_LINE = _TERMS - {"morse"}
 """The terms that noise across the line does not bend: a bond of rest length 0 pulls along each axis alike."""
 
-_DRAWS = "OpenMM, SFMT"
+_drawn = partial(thermostat, generator="OpenMM, SFMT", terms=_ON_A_LINE, rebuilds_velocity=True)
 
 _MODULE = deferred(f"{__name__}.simulation", "arithmetic", "convention")
 
@@ -78,20 +79,16 @@ ENGINE = Engine(
             "langevin", "langevin-middle", "LangevinIntegrator at T = 0, started and read synchronised",
             _DRIVEN | {"damping"}, Need.DAMPING, one_friction=True,
         ),
-        by_default(
-            "verlet-rods", "velocity-verlet",
-            "VerletIntegrator, constraint tolerance 1e-13, started and read synchronised", _TERMS | RODS,
-            Need.RODS, rebuilds_velocity=True,
-        ),
-        by_name(
-            "verlet-rods-8", "velocity-verlet",
-            "VerletIntegrator, constraint tolerance 1e-8, started and read synchronised", _TERMS | RODS,
-            Need.RODS, rebuilds_velocity=True,
-        ),
-        by_default(
-            "verlet-rods-as-it-is", "velocity-verlet",
-            "VerletIntegrator, its own constraint tolerance 1e-5, started and read synchronised",
-            _TERMS | RODS, Need.RODS, rebuilds_velocity=True,
+        *(
+            by_default(
+                name, "velocity-verlet", f"VerletIntegrator, {tolerance}, started and read synchronised",
+                _TERMS | RODS, Need.RODS, rebuilds_velocity=True, default=name != "verlet-rods-8",
+            )
+            for name, tolerance in (
+                ("verlet-rods", "constraint tolerance 1e-13"),
+                ("verlet-rods-8", "constraint tolerance 1e-8"),
+                ("verlet-rods-as-it-is", "its own constraint tolerance 1e-5"),
+            )
         ),
         by_name(
             "boris", "boris", "Boris' rotation by CustomIntegrator", (_DRIVEN - {"morse"}) | FIELD, Need.FIELD
@@ -107,53 +104,44 @@ ENGINE = Engine(
         ),
     ),
     thermostats=named(
-        thermostat(
-            "langevin-middle-bath", "baoa", "LangevinMiddleIntegrator, as it stores velocities", _DRAWS,
-            _ON_A_LINE, rebuilds_velocity=True,
-        ),
-        thermostat(
+        _drawn("langevin-middle-bath", "baoa", "LangevinMiddleIntegrator, as it stores velocities"),
+        _drawn(
             "langevin-middle-rods", "baoa",
-            "LangevinMiddleIntegrator, constraint tolerance 1e-13, as it stores velocities", _DRAWS,
-            _ON_A_LINE | RODS, requires=frozenset({Need.RODS}), rebuilds_velocity=True,
+            "LangevinMiddleIntegrator, constraint tolerance 1e-13, as it stores velocities",
+            terms=_ON_A_LINE | RODS, requires=frozenset({Need.RODS}),
         ),
-        thermostat(
+        _drawn(
             "langevin-middle-synchronised", "baoab",
-            "LangevinMiddleIntegrator, half a kick added to what is read", _DRAWS, _ON_A_LINE,
-            rebuilds_velocity=True,
+            "LangevinMiddleIntegrator, half a kick added to what is read",
         ),
-        thermostat(
-            "langevin-bath", "baoa", "LangevinIntegrator, as it stores velocities", _DRAWS, _ON_A_LINE,
-            default=False, rebuilds_velocity=True,
-        ),
-        thermostat(
-            "brownian", "brownian", "BrownianIntegrator", _DRAWS, _ON_A_LINE, default=False,
-            rebuilds_velocity=True,
-        ),
-        thermostat(
+        _drawn("langevin-bath", "baoa", "LangevinIntegrator, as it stores velocities", default=False),
+        _drawn("brownian", "brownian", "BrownianIntegrator", default=False),
+        _drawn(
             "andersen", "andersen-leapfrog",
-            "VerletIntegrator with AndersenThermostat, as it stores velocities", _DRAWS, _ON_A_LINE,
-            rebuilds_velocity=True, note="on GPU platforms it collides at most 2/pi as often as asked",
+            "VerletIntegrator with AndersenThermostat, as it stores velocities",
+            note="on GPU platforms it collides at most 2/pi as often as asked",
         ),
-        thermostat(
+        _drawn(
             "nose-hoover-bath", "nose-hoover-middle", "NoseHooverIntegrator, as it stores velocities",
-            NO_NUMBERS, _ON_A_LINE, default=False, rebuilds_velocity=True,
+            generator=NO_NUMBERS, default=False,
             note="it counts three degrees of freedom for each particle, whatever moves it",
         ),
-        thermostat(
-            "mts-langevin", "baoab", "MTSLangevinIntegrator, one group of forces once a step", _DRAWS,
-            _ON_A_LINE, default=False,
+        _drawn(
+            "mts-langevin", "baoab", "MTSLangevinIntegrator, one group of forces once a step",
+            default=False, rebuilds_velocity=False,
         ),
         *(
-            thermostat(
+            _drawn(
                 f"mts-langevin-{n}", f"baoab-respa{n}",
-                f"MTSLangevinIntegrator, fast springs {n} times a step", _DRAWS, _ON_A_LINE, default=False,
+                f"MTSLangevinIntegrator, fast springs {n} times a step", default=False,
+                rebuilds_velocity=False,
             )
             for n in (2, 3, 4)
         ),
-        thermostat(
+        _drawn(
             "variable-langevin", "baoa",
             "VariableLangevinIntegrator, its longest step that of the scene, at a tolerance that allows it",
-            _DRAWS, _ON_A_LINE, default=False, rebuilds_velocity=True,
+            default=False,
         ),
     ),
     atlas=tuple(f"verlet@{place}" for place in ("CPU", "OpenCL-single", "OpenCL-mixed", "OpenCL-double")),

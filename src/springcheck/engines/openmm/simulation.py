@@ -336,11 +336,12 @@ class _Context:
         try:
             for row in range(len(q)):
                 if self._set_time:
-                    self._take_each(self._done + row * every, every)
-                for _ in range(0 if self._set_time else every // ATTENTIVE):
-                    take(ATTENTIVE)
-                if every % ATTENTIVE and not self._set_time:
-                    take(every % ATTENTIVE)
+                    for i in range(self._done + row * every, self._done + (row + 1) * every):
+                        self._context.setParameter("time", i * self._step)
+                        take(1)
+                else:
+                    for left in range(every, 0, -ATTENTIVE):
+                        take(min(left, ATTENTIVE))
                 self._read(q[row], p[row])
             row += 1
         except mm.OpenMMException as error:
@@ -358,12 +359,6 @@ class _Context:
         state._getVectorAsNumpy(mm.State.Positions, self._x)
         state._getVectorAsNumpy(mm.State.Velocities, self._v)
         q[:], p[:] = self._x.reshape(-1)[self._where], self._v.reshape(-1)[self._where]
-
-    def _take_each(self, done: int, steps: int) -> None:
-        """Take these steps one by one, setting the time before each."""
-        for i in range(done, done + steps):
-            self._context.setParameter("time", i * self._step)
-            self._integrator.step(1)
 
     def _synchronise(self, every: int, q: Floats, p: Floats) -> None:
         with np.errstate(over="ignore", invalid="ignore"):

@@ -10,6 +10,7 @@ from springcheck.engines.contract import (
     BRAKES,
     DRIVEN,
     EVERY_FORCE,
+    EVERY_KIND,
     EVERY_POTENTIAL,
     FIELD,
     NO_NUMBERS,
@@ -18,6 +19,7 @@ from springcheck.engines.contract import (
     Engine,
     Method,
     Need,
+    by_name,
     deferred,
     named,
     thermostat,
@@ -60,7 +62,7 @@ def _method(scheme: Scheme) -> Method:
         scheme=scheme.name,
         about=ABOUT.get(scheme.name, scheme.title),
         terms=DRIVEN | _terms(scheme),
-        kinds=frozenset({"particles", "circuit", "rotor"}),
+        kinds=EVERY_KIND,
         requires=_requires(scheme),
         default=scheme.name in ABOUT,
     )
@@ -68,7 +70,7 @@ def _method(scheme: Scheme) -> Method:
 
 _SCHEMES = sorted(
     (scheme for scheme in SCHEMES.values() if scheme.has("one-step")),
-    key=lambda scheme: (*ABOUT, scheme.name).index(scheme.name) if scheme.name in ABOUT else len(ABOUT),
+    key=lambda scheme: [*ABOUT, scheme.name].index(scheme.name),
 )
 
 ENGINE = Engine(
@@ -76,14 +78,7 @@ ENGINE = Engine(
     title="springcheck",
     methods=named(
         *map(_method, _SCHEMES),
-        Method(
-            name="boris",
-            scheme="boris",
-            about=ATTACHED["boris"].title,
-            terms=EVERY_POTENTIAL | DRIVEN | FIELD,
-            requires=frozenset({Need.FIELD}),
-            default=False,
-        ),
+        by_name("boris", "boris", ATTACHED["boris"].title, EVERY_POTENTIAL | DRIVEN | FIELD, Need.FIELD),
     ),
     any_axis=True,
     periodic=True,
@@ -91,17 +86,12 @@ ENGINE = Engine(
     thermostats=named(
         *(
             thermostat(
-                one.name,
-                one.name,
-                one.title,
-                "NumPy, PCG64" if one.draws else NO_NUMBERS,
+                one.name, one.name, one.title, "NumPy, PCG64" if one.draws else NO_NUMBERS,
                 EVERY_POTENTIAL | (RODS if one.held else frozenset()),
-                scripted=one.draws > 0,
-                kinds=frozenset({"particles", "circuit", "rotor"}),
-                default=one.name in BY_DEFAULT,
+                scripted=one.draws > 0, kinds=EVERY_KIND, default=one.name in BY_DEFAULT,
             )
             for one in THERMOSTATS.values()
         )
     ),
     **deferred(f"{__name__}.simulation"),
-)
+)  # fmt: skip

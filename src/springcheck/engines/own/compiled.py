@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from springcheck.engines.own import forces, kernels, updates
+from springcheck.engines.own import kernels, loops
 
 HELP: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
 """How numba compiles: division by zero gives inf instead of an exception, and there is no fastmath, which
@@ -29,9 +29,8 @@ FLAGS: dict[str, Any] = {**HELP, "nogil": True}
 
 HELPERS: tuple[Callable[..., Any], ...] = tuple(
     thing
-    for module in (forces, updates)
-    for thing in vars(module).values()
-    if inspect.isfunction(thing) and thing.__module__ == module.__name__
+    for thing in vars(loops).values()
+    if inspect.isfunction(thing) and thing.__module__ == loops.__name__
 )
 """The functions that the kernels call."""
 
@@ -51,50 +50,37 @@ def compiled(kernel: Callable[..., Any], arguments: tuple[Any, ...]) -> Callable
     Raises:
         ImportError: numba is not here.
     """
-    looks = tuple(map(_look, arguments))
-    if looks not in _TYPES:
-        _TYPES[looks] = _types(arguments)
-    try:
-        return _jit(kernel, looks, saved=True)
-    except ImportError:
-        raise
-    except Exception:
-        # the cache cannot be read, or written: compile for this process alone
-        return _jit(kernel, looks, saved=False)
+    key = kernel, *map(_look, arguments)
+    if key not in _COMPILED:
+        import numba
+
+        types = [numba.typeof(argument) for argument in arguments]
+        # rows may be part of a wider array
+        types[-2:] = (kind.copy(layout="A") for kind in types[-2:])
+        try:
+            _COMPILED[key] = _jit(kernel, tuple(types), saved=True)
+        except Exception:
+            # the cache cannot be read, or written: compile for this process alone
+            _COMPILED[key] = _jit(kernel, tuple(types), saved=False)
+    return _COMPILED[key]
 
 
-_TYPES: dict[tuple[Any, ...], tuple[Any, ...]] = {}
-"""Types of arguments by their description: numba takes a millisecond to find and compare them."""
+_COMPILED: dict[tuple[Any, ...], Callable[..., Any]] = {}
+"""Kernels by what their arguments look like: numba takes a millisecond to find and compare types."""
 
 
 def _look(argument: Any) -> Any:
     """The properties of an argument on which its numba type depends."""
     if isinstance(argument, np.ndarray):
         flags = argument.flags
-        return (
-            argument.dtype,
-            argument.ndim,
-            flags.c_contiguous,
-            flags.f_contiguous,
-            flags.writeable,
-            flags.aligned,
-        )
+        layout = flags.c_contiguous, flags.f_contiguous, flags.writeable, flags.aligned
+        return argument.dtype, argument.ndim, *layout
     return (type(argument), *map(_look, argument)) if isinstance(argument, tuple) else type(argument)
 
 
-def _types(arguments: tuple[Any, ...]) -> tuple[Any, ...]:
+def _jit(kernel: Callable[..., Any], types: tuple[Any, ...], *, saved: bool) -> Callable[..., Any]:
     import numba
 
-    found = [numba.typeof(argument) for argument in arguments]
-    # rows may be part of a wider array
-    return (*found[:-2], *(kind.copy(layout="A") for kind in found[-2:]))
-
-
-@cache
-def _jit(kernel: Callable[..., Any], looks: tuple[Any, ...], *, saved: bool) -> Callable[..., Any]:
-    import numba
-
-    types = _TYPES[looks]
     _registered()
     found: Any = numba.njit(cache=saved, **FLAGS)(kernel)
     written = saved and not _unbroken(Path(found.stats.cache_path), kernel)
@@ -113,7 +99,7 @@ def _files(folder: Path, kernel: Callable[..., Any]) -> list[Path]:
 
 def _digest(folder: Path, kernel: Callable[..., Any]) -> str:
     """Digest of the cached code of a kernel and of the sources that it was compiled from."""
-    sources = [Path(__file__), *(Path(inspect.getfile(module)) for module in (forces, updates, kernels))]
+    sources = [Path(__file__), *(Path(inspect.getfile(module)) for module in (loops, kernels))]
     sums = [(path.name, hashlib.sha256(path.read_bytes()).hexdigest()) for path in _files(folder, kernel)]
     return repr([*sums, *(hashlib.sha256(path.read_bytes()).hexdigest() for path in sources)])
 

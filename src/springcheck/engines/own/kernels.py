@@ -13,18 +13,23 @@ from __future__ import annotations
 
 from typing import Any, TypeAlias
 
-from springcheck.engines.own.forces import Numbers, Slot, force_at, held, pulled, tensions
-from springcheck.engines.own.updates import (
+from springcheck.engines.own.loops import (
+    Numbers,
+    Slot,
     Solver,
     add,
     chain_implicit,
     chain_kick_drift,
     drift,
+    force_at,
+    held,
     held_implicit,
     held_kick_drift,
     implicit,
     kick,
     kick_drift,
+    pulled,
+    tensions,
 )
 
 Rows: TypeAlias = Any
@@ -167,13 +172,13 @@ def single(
     divisor: float,
     m: float,
     k: float,
-    q: float,
-    p: float,
+    state_q: Numbers,
+    state_p: Numbers,
     qs: Rows,
     ps: Rows,
-) -> tuple[float, float]:
-    """`many` of one particle on one spring; returns its last state."""
-    stages = len(v)
+) -> None:
+    """`many` of one particle on one spring."""
+    stages, q, p = len(v), state_q[0], state_p[0]
     for row in range(len(qs)):
         for _ in range(every):
             for s in range(len(code)):
@@ -210,4 +215,5 @@ def single(
                         p = p + c * f[s]
         qs[row, 0] = q
         ps[row, 0] = p
-    return q, p
+    state_q[0] = q
+    state_p[0] = p

@@ -8,12 +8,12 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from springcheck.engines.own.forces import Slot
+from springcheck.engines.own.loops import Slot
 from springcheck.physics.arrays import Floats, Integers
 from springcheck.physics.terms import Damping, Spring, Term, WallSpring, known
 
 KINDS = ("wall-spring", "spring", "quartic", "cosine", "morse", "damping", "drive", "modulated-spring")
-"""The terms that the kernels have, in the order in which `forces.indexed` takes them."""
+"""The terms that the kernels have, in the order in which `loops.indexed` takes them."""
 
 NO_INDEX: Integers = np.empty(0, np.int64)
 NOTHING: Floats = np.empty(0)

@@ -124,12 +124,13 @@ def _one(plan: Program, scene: Scene) -> tiles.Job | None:
         return None
     if any(o.force not in ("", "all", "potential") for o in plan.operations):
         return None
-    k, m, q, p = (float(x[0]) for x in (walls[0].k, scene.m, scene.q, scene.p))
+    k, m = float(walls[0].k[0]), float(scene.m[0])
+    state = np.array(scene.q, np.float64), np.array(scene.p, np.float64)
     divisor = float(solver.factors(scene, plan.implicit_step)[0][0])
     code, _, x, y = plan.arrays
     v, f = np.zeros((2, plan.a.shape[1]))
     head = code, x, y, plan.a, v, f, divisor, m, k
-    return tiles.Job(kernel=kernels.single, head=head, state=(q, p), n=1, work=plan.stages)
+    return tiles.Job(kernel=kernels.single, head=head, state=state, n=1, work=plan.stages)
 
 
 def _many(plan: Program, scene: Scene) -> tiles.Job:

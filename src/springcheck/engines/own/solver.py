@@ -13,7 +13,7 @@ from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Spring, WallSpring
 
 Factors: TypeAlias = tuple[Floats, tuple[Floats, Floats, Floats], tuple[Any, ...]]
-"""See `updates.solve`: what is empty is not used."""
+"""See `loops.solve`: what is empty is not used."""
 
 _NO_THREE = (NOTHING, NOTHING, NOTHING)
 _NO_BAND = (np.empty((0, 0)), NO_INDEX, NO_INDEX, NOTHING, 0)

@@ -46,7 +46,7 @@ class Job:
 
     kernel: Callable[..., Any]
     head: tuple[Any, ...]
-    state: tuple[Any, Any]
+    state: tuple[Floats, Floats]
     n: int
     work: float
     m: Floats | None = None
@@ -70,13 +70,10 @@ class Job:
 
     @property
     def whole(self) -> tuple[Any, ...]:
-        """The arguments for all particles, but the state of a single one."""
-        return self.head if self.m is None else self.arguments(self.head, self.m, *self.state, 0)
-
-    @property
-    def carried(self) -> tuple[Any, ...]:
-        """The state of a single particle, which its kernel takes and returns."""
-        return self.state if self.m is None else ()
+        """The arguments for all particles."""
+        if self.m is None:
+            return *self.head, *self.state
+        return self.arguments(self.head, self.m, *self.state, 0)
 
 
 def processors() -> int:
@@ -89,19 +86,19 @@ def compiled(job: Job) -> Job:
     from springcheck.engines.own.compiled import compiled as compile_for
 
     none = np.empty((0, job.n))
-    return replace(job, kernel=compile_for(job.kernel, (1, *job.whole, *job.carried, none, none)))
+    return replace(job, kernel=compile_for(job.kernel, (1, *job.whole, none, none)))
 
 
 class Whole:
     """All particles in one call, interpreted or compiled."""
 
     def __init__(self, job: Job, *, compiled: bool) -> None:
-        self._kernel, self._state = job.kernel, job.carried
+        self._kernel = job.kernel
         self._arguments = job.whole if compiled else as_lists(job.whole)
 
     def advance(self, every: int, q: Floats, p: Floats) -> None:
         """Fill q and p (f, n)."""
-        self._state = self._kernel(every, *self._arguments, *self._state, q, p) or ()
+        self._kernel(every, *self._arguments, q, p)
 
 
 class Tiled:

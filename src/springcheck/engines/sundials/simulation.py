@@ -1,5 +1,12 @@
 """One scene by CVODE or IDA, SUNDIALS' adaptive multistep solvers, through scikit-sundae.
 
+A circuit is handed to IDA as the equations that Kirchhoff's laws give, unsolved for the currents.  The
+unknowns of a loop are its charge q, the flux p of its coil, and the current i::
+
+    q' = i        p' = -(voltages of its capacitors and resistors)        0 = p - L i
+
+The last has no derivative: a differential-algebraic system of index 1, because L is not 0.
+
 The tolerance is relative and per step.  The absolute tolerance is the same fraction of the amplitude
 that the energy of the start allows each component, because q and p may differ in size by many orders
 (p ~ m w q).  The Jacobian is supplied: a difference quotient would call the force behind our back.
@@ -8,16 +15,19 @@ that the energy of the start allows each component, because q and p may differ i
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import sksundae
+from scipy.sparse import coo_array
 from sksundae.cvode import CVODE
+from sksundae.ida import IDA
 
 from springcheck.engines import quiet, solvers
 from springcheck.engines.contract import Label, Method, Simulation, Stopped
-from springcheck.engines.sundials import circuit, sparse
 from springcheck.errors import MethodError
-from springcheck.physics.arrays import Floats
+from springcheck.physics.arrays import Floats, Reals
 from springcheck.physics.driven import timed
 from springcheck.physics.scene import Scene
 
@@ -61,6 +71,9 @@ def absolute_tolerance(scene: Scene) -> Floats:
     return np.asarray(np.where(found > 0, found, scene.tolerance))
 
 
+LARGE = 32
+"""Particles above which the sparse solver is taken; below, the dense one is faster."""
+
 MOST_ALIKE = 1e3
 """Ratio of stiffnesses up to which they may be summed in one matrix: three digits are lost then.  A soft
 spring beside a stiff one would lose more, and is evaluated spring by spring."""
@@ -79,6 +92,71 @@ def _matrix(scene: Scene) -> tuple[Floats, Floats]:
     """Slope (2n, 2n) and constant part (2n,) of the right-hand side of a linear scene."""
     zero = np.zeros(scene.n)
     return scene.system.jacobian(zero), np.concatenate([zero, scene.system.force(zero, zero)])
+
+
+def _sparse(scene: Scene) -> dict[str, Any]:
+    """What CVODE needs for a Jacobian of a large scene by its elements that are not 0: cost grows with the
+    springs, not the cube."""
+    n = scene.n
+    rows, columns = [np.arange(n), n + np.arange(n)], [n + np.arange(n)] * 2
+    for i, j, _ in scene.system.elements(scene.q):
+        rows.append(n + i)
+        columns.append(j)
+    by_place = scene.system.brakes_by_place
+    if by_place:
+        rows.append(n + np.arange(n))
+        columns.append(np.arange(n))
+    where = np.concatenate(rows).astype(np.int32), np.concatenate(columns).astype(np.int32)
+    constant: list[Reals] = [1 / scene.m, -scene.system.friction_rates.astype(np.float64)]
+
+    def matrix(values: Reals) -> Any:
+        # elements of the same place are added up, in the order of columns that SuperLU takes
+        return coo_array((values, where), shape=(2 * n, 2 * n)).tocsc()
+
+    def jacobian(t: float, y: Floats, yp: Floats, out: Floats) -> None:
+        values = [*constant, *(-k for *_, k in scene.system.elements(y[:n]))]
+        if by_place:
+            rate, bend = scene.system.friction_at(y[:n])
+            values[1] = -rate
+            values.append(-bend * y[n:])
+        out[:] = matrix(np.concatenate(values)).data
+
+    pattern = matrix(np.ones(len(where[0])))
+    pattern.data[:] = 1
+    return {"linsolver": "sparse", "sparsity": pattern, "jacfn": jacobian}
+
+
+def _circuit(scene: Scene, atol: Floats, called: Callable[[float], None]) -> IDA:
+    """IDA standing at the start, its vector (q, p, i).  `atol` is of (q, p); `called` gets every t asked."""
+    n, m = scene.n, scene.m
+    force = scene.system.force
+    stiffness = np.asarray(scene.system.hessian(scene.q), np.float64)
+    resistance = np.asarray(scene.system.friction_rates * m, np.float64)
+    one = np.eye(n)
+
+    def residual(t: float, y: Floats, yp: Floats, out: Floats) -> None:
+        called(t)
+        q, p, i = y[:n], y[n : 2 * n], y[2 * n :]
+        out[:n] = yp[:n] - i
+        out[n : 2 * n] = yp[n : 2 * n] - force(q, m * i)
+        out[2 * n :] = p - m * i
+
+    def jacobian(t: float, y: Floats, yp: Floats, out: Floats, cj: float, matrix: Floats) -> None:
+        matrix[:n, :n], matrix[:n, 2 * n :] = cj * one, -one
+        matrix[n : 2 * n, :n], matrix[n : 2 * n, n : 2 * n] = stiffness, cj * one
+        matrix[n : 2 * n, 2 * n :] = np.diag(resistance)
+        matrix[2 * n :, n : 2 * n], matrix[2 * n :, 2 * n :] = one, -np.diag(m)
+
+    pull = force(scene.q, scene.p)
+    found = IDA(
+        residual, rtol=scene.tolerance, atol=np.concatenate([atol, atol[n:] / m]), jacfn=jacobian,
+        algebraic_idx=list(range(2 * n, 3 * n)), max_num_steps=MOST_STEPS,
+    )  # fmt: skip
+    current = scene.p / m
+    found.init_step(
+        0.0, np.concatenate([scene.q, scene.p, current]), np.concatenate([current, pull, pull / m])
+    )
+    return found
 
 
 class Solver:
@@ -110,7 +188,7 @@ class Solver:
         self._n, self._step, self._done = n, step, 0
         atol = absolute_tolerance(scene)
         if method == "IDA":
-            self._solver = circuit.solver(scene, atol, MOST_STEPS, self._called)
+            self._solver = _circuit(scene, atol, self._called)
             return
         with warnings.catch_warnings():
             # scikit-sundae warns that our Jacobian replaces its own, as is intended
@@ -121,7 +199,7 @@ class Solver:
                 rtol=scene.tolerance,
                 atol=atol,
                 max_num_steps=most_steps(scene, step),
-                **({"jacfn": jacobian} if n <= sparse.LARGE else sparse.options(scene)),
+                **({"jacfn": jacobian} if n <= LARGE else _sparse(scene)),
             )
         self._solver.init_step(0.0, np.concatenate([scene.q, scene.p]))
 
