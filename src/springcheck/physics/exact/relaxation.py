@@ -18,7 +18,7 @@ from springcheck.physics.exact.closedform import FORM_EPS, ClosedForm, States, w
 from springcheck.physics.exact.digits import digits, exactly, extended
 from springcheck.physics.exact.normal import exact_sums
 from springcheck.physics.system import System
-from springcheck.physics.vanderpol import VanDerPol
+from springcheck.physics.terms import VanDerPol
 
 RADAU_STAGES = 16
 TIME_ERROR = FORM_EPS / 4
