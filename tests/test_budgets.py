@@ -10,7 +10,7 @@ import springcheck
 HOME = Path(springcheck.__file__).parent
 
 BUDGETS = {
-    ("physics",): 6978,
+    ("physics",): 6979,
     ("schemes",): 1620,
     ("thermal",): 3169,
     ("engines/own",): 1648,
