@@ -20,11 +20,11 @@ from springcheck.physics.terms import (
     RadialSpring,
     Rod,
     Spring,
+    VanDerPol,
     WallRod,
     WallSpring,
     Weight,
 )
-from springcheck.physics.vanderpol import VanDerPol
 
 
 def exactly(x: Any) -> Any:

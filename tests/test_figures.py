@@ -21,7 +21,7 @@ from springcheck.figures.views import views
 from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory
-from springcheck.schemes.attached import ATTACHED
+from springcheck.schemes.catalogue import ATTACHED
 from springcheck.studies.faults import page as faults_page
 from springcheck.studies.faults.result import FaultReport, Result
 from springcheck.studies.run.page import of_runs

@@ -277,15 +277,12 @@ class Case(Claim):
 
 
 def strongest(parts: tuple[Term, ...], q: Reals) -> Reals:
-    """The largest |force| at q (..., n) -> (...) of one row of a term, or of all on a particle."""
-    each = ((parts, q), *(((alone,), where) for alone, where in (term.separated(q) for term in parts)))
-    found = []
-    for some, where in each:
-        out = np.zeros_like(where)
-        for term in some:
-            term.add_force(where, np.zeros_like(where), out)
-        found.append(np.abs(out))
-    return np.asarray(np.max(np.concatenate(found, axis=-1), axis=-1))
+    """The largest |force| at q (..., n) -> (...) of one row of a term, or of all on a particle at rest."""
+    whole, none = np.zeros_like(q), np.zeros_like(q)
+    for term in parts:
+        term.add_force(q, none, whole)
+    rows = (term.pull(q) for term in parts if term.kind in ("potential", "drive"))
+    return np.asarray(np.max(np.abs(np.concatenate([whole, *rows], axis=-1)), axis=-1))
 
 
 def overflows(how: Arithmetic) -> str:

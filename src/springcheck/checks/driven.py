@@ -7,7 +7,7 @@ rounding alone is the cause.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -30,16 +30,6 @@ NEWTON_STEPS = 4
 """Newton steps of the search for a time: the force is linear in a small shift up to its curvature."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Clock:
-    """Where in a step the time is taken: later by a fraction of it, and held over the stages or not."""
-
-    later: float = 0.0
-    held: bool = False
-    summed: bool = False
-    """Whether it is a sum of steps, rounded at each."""
-
-
 def found(case: Case) -> str:
     """The cause in one sentence, or "" where no cause known here explains the states, or nothing is
     driven; every step is recorded."""
@@ -47,22 +37,22 @@ def found(case: Case) -> str:
         return ""
     case = case.clocked
     title, right = case.scheme.title, _abscissae(case)
-    for clock in (*(_Clock(later=s) for s in (-1.0, -0.5, 0.5, 1.0)),
-                  *(_Clock(later=s, held=True) for s in (0.0, 0.5, 1.0))):  # fmt: skip
-        taken = {clock.later} if clock.held else {c + clock.later for c in right}
-        if taken != right and _fits(case, clock):
-            held = ", held over it," if clock.held and len(right) > 1 else ""
+    clocks = [(s, False) for s in (-1.0, -0.5, 0.5, 1.0)] + [(s, True) for s in (0.0, 0.5, 1.0)]
+    for later, held in clocks:
+        taken = {later} if held else {c + later for c in right}
+        if taken != right and _fits(case, later, held=held):
+            over = ", held over it," if held and len(right) > 1 else ""
             of = "" if max(taken) in (-1.0, 2.0) else " of the step"
             return (
-                f"the drive is taken at {_words(taken)}{of}{held} where {title} takes it at {_words(right)}"
+                f"the drive is taken at {_words(taken)}{of}{over} where {title} takes it at {_words(right)}"
             )
     for words, scene in _other_drives(case.scene):
-        if _fits(replace(case, scene=scene), _Clock()):
+        if _fits(replace(case, scene=scene)):
             return words
-    if _fits(case, _Clock(summed=True), 1.0):
+    if _fits(case, summed=True):
         return "the time of the drive is a sum of steps, rounded at each; take their number times the step"
     later = _later(case)
-    if abs(later) > _delay(case)[1] and _fits(case, _Clock(later=later)):
+    if abs(later) > _delay(case)[1] and _fits(case, later):
         way = f"{'of a step' if abs(later) <= 1 else 'steps'} {'later' if later > 0 else 'earlier'}"
         return f"the drive is taken {abs(later):.6g} {way} than {title} takes it"
     return ""
@@ -81,21 +71,23 @@ def _abscissae(case: Case) -> set[float]:
     return {round((float(at[0, -1]) - first) / case.trajectory.step, 6) + 0.0 for at in met}
 
 
-def _off(case: Case, clock: _Clock) -> Extended:
-    """Distance of the particles from the scheme's step by this clock (2, f-1, n)."""
+def _off(case: Case, later: float, *, held: bool = False, summed: bool = False) -> Extended:
+    """Distance of the particles from the scheme's step (2, f-1, n) where the time is taken later by a part of
+    a step, and is held over the stages, or is a sum of steps, rounded at each."""
     run = case.trajectory
     q, p = (x[:-1].astype(np.longdouble) for x in (run.q, run.p))
-    if clock.summed:
+    if summed:
         q[:, -1] = np.concatenate([[0.0], np.cumsum(np.full(case.steps[-1], run.step))])[case.steps[:-1]]
-    q[:, -1] += clock.later * np.longdouble(run.step)
-    p[:, -1] = 0 if clock.held else CLOCK
+    q[:, -1] += later * np.longdouble(run.step)
+    p[:, -1] = 0 if held else CLOCK
     off = np.stack(case.step(q, p)) - np.stack([run.q[1:], run.p[1:]])
     return np.asarray(off[..., :-1])
 
 
-def _fits(case: Case, clock: _Clock, slack: float = SLACK) -> bool:
+def _fits(case: Case, later: float = 0.0, *, held: bool = False, summed: bool = False) -> bool:
+    slack = 1.0 if summed else SLACK
     allowed = np.stack(case.allowance)[..., :-1] * case.roundings * slack
-    return bool(np.all(np.abs(_off(case, clock)) <= allowed))
+    return bool(np.all(np.abs(_off(case, later, held=held, summed=summed)) <= allowed))
 
 
 def _later(case: Case) -> float:
@@ -109,7 +101,7 @@ def _later(case: Case) -> float:
 def _delay(case: Case, later: float = 0.0) -> tuple[float, float]:
     """Further delay of the drive's time, in steps, by linear least squares, and its rounding."""
     unit, change = np.stack(case.allowance)[..., :-1], 1e-6
-    off, moved = (_off(case, _Clock(later=at)) / unit for at in (later, later + change))
+    off, moved = (_off(case, at) / unit for at in (later, later + change))
     slope = np.where(unit > 0, (moved - off) / change, 0)
     weight = np.sum(slope * slope)
     more = -np.sum(np.where(unit > 0, off, 0) * slope) / weight

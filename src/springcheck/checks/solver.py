@@ -24,9 +24,9 @@ def tolerance(case: Case) -> Finding | str:
     # sizes of the exact solution: a diverging one would excuse itself
     true = replace(run, q=np.asarray(q, np.float64), p=np.asarray(p, np.float64))
     known = exact.uncertainty(case.scene, float(case.steps[-1]) * run.step)
-    begun, rebuilt = _first_step(case), _rebuilt(case, true.q, true.p)
+    begun, rebuilt, grown = _first_step(case), _rebuilt(case, true.q, true.p), flow_growth(case)
     bound = tolerance_bound(Case(trajectory=true, scene=case.scene)) + known
-    bound += (begun + rebuilt) * flow_growth(case)
+    bound += (begun + rebuilt) * grown
     if not np.isfinite(bound) or not np.isfinite([q, p]).all():
         return "the exact flow leaves the range of numbers"
     moved = np.max(case.system.norm(q - case.scene.q, p - case.scene.p))
@@ -34,7 +34,7 @@ def tolerance(case: Case) -> Finding | str:
         return "standing still would pass: it allows all of the motion"
     why = (
         f"{run.tolerance:g} a step of every component, at most {most_steps(case):.0f} internal steps, "
-        f"each error enlarged by the exact flow at most {flow_growth(case):.3g} times"
+        f"each error enlarged by the exact flow at most {grown:.3g} times"
         + (f", and {begun:.2g} of the first step, as its rule has it" if begun else "")
         + (f"; {rebuilt:.2g} rounding of velocities rebuilt from positions" if rebuilt else "")
         + _not_believed(case)

@@ -245,22 +245,18 @@ def _off(ahead: Stretch, to_q: Floats, to_p: Floats) -> Reals:
 
 def _beyond_range(case: Case, off: NDArray[np.bool_]) -> str:
     """The limit of the engine's arithmetic that explains all steps that are off (f-1,), or ""."""
-    how = case.trajectory.arithmetic
-    if how.stale and np.any(off) and case.trajectory.every == 1:
-        moved = least_moved(np.max(np.abs(np.diff(case.trajectory.q, axis=0)), axis=1))
-        if np.all(moved[off] <= 2 * how.stale):
-            first = int(np.argmax(off))
-            return (
-                f"the engine's limit: {keeps(how)}, and step {case.steps[first + 1]}, the first that is off, "
-                f"moves by {moved[first]:.3g}"
-            )
-    if not np.isfinite(how.overflow) or not np.any(off) or not np.all(case.strongest[off] >= how.overflow):
+    run, how, limit, does = case.trajectory, case.trajectory.arithmetic, "", ""
+    if not np.any(off):
         return ""
     first = int(np.argmax(off))
-    return (
-        f"the engine's limit: {overflows(how)}, and step {case.steps[first + 1]}, the first that is off, "
-        f"has a force of {case.strongest[first]:.3g}"
-    )
+    if np.isfinite(how.overflow) and np.all(case.strongest[off] >= how.overflow):
+        limit, does = overflows(how), f"has a force of {case.strongest[first]:.3g}"
+    if how.stale and run.every == 1:
+        moved = least_moved(np.max(np.abs(np.diff(run.q, axis=0)), axis=1))
+        if np.all(moved[off] <= 2 * how.stale):
+            limit, does = keeps(how), f"moves by {moved[first]:.3g}"
+    step = case.steps[first + 1]
+    return f"the engine's limit: {limit}, and step {step}, the first that is off, {does}" if limit else ""
 
 
 SHORTEST = float(np.sqrt(np.finfo(np.float64).smallest_normal))

@@ -34,8 +34,6 @@ from numpy.typing import NDArray
 from springcheck.checks import rounding
 from springcheck.checks.claim import Claim
 from springcheck.physics.arrays import WIDE, Arithmetic, Extended, Force, Reals
-from springcheck.physics.scene import Scene
-from springcheck.physics.system import System
 from springcheck.physics.term import Term
 
 JOINED = 32
@@ -182,17 +180,13 @@ def _sampled(case: Claim, q: Extended, p: Extended, steps: int) -> Stretch:
     signs = np.array([-1.0, 1.0])
     fixed, walk = rng.choice(signs, size=(3, 2, SAMPLES, 1, q.shape[1])), np.sqrt(_walk(case))
     off = np.zeros((2, SAMPLES, *q.shape), dtype=np.longdouble)
-    on, forces = np.stack([q, p]), variational(case.system)
+    on = np.stack([q, p])
     reach, turns = np.abs(on), np.zeros(len(q), dtype=np.longdouble)
     last = np.zeros_like(on)
-
-    def slope(q: Reals) -> tuple[Extended, bool]:
-        return case.system.slope(q[0])[0][None], True
-
     with np.errstate(all="ignore"):
         for _ in range(steps):
             both = np.concatenate([on[:, None], off], axis=1)
-            off = np.stack(case.step(*both, forces=forces, slope=slope, varied=True))[:, 1:]
+            off = np.stack(_varied(case, *both))[:, 1:]
             before = on
             on, last = _one(case, *on)
             alike = np.sum(fixed * _alike(case, before, on)[:, :, None], axis=0)
@@ -281,18 +275,19 @@ def tangent(case: Claim, q: Extended, p: Extended) -> Extended:
         dq[1 + each, :, each] = 1
         dp[1 + n + each, :, each] = 1
 
+    return _joined(separate)([np.moveaxis(x[1:], 0, -1) for x in _varied(case, dq, dp)], axis=-2)
+
+
+def _varied(case: Claim, q: Extended, p: Extended) -> tuple[Extended, Extended]:
+    """One step of states (1 + d, ..., n): the first is a motion, the others are its perturbations."""
+    system = case.system
+
     def slope(q: Reals) -> tuple[Extended, bool]:
         # the changes solve the linear equations that belong to the motion
-        return case.system.slope(q[0])[0][None], not separate
+        k, joined = system.slope(q[0])
+        return k[None], joined
 
-    q, p = case.step(dq, dp, forces=variational(case.system), slope=slope, varied=True)
-    return _joined(separate)([np.moveaxis(x[1:], 0, -1) for x in (q, p)], axis=-2)
-
-
-def variational(system: System[Scene]) -> Callable[[Iterable[Term]], Force]:
-    """Function of forces on states (1 + d, ..., n): the first is a motion, the others its perturbations."""
-
-    def of(terms: Iterable[Term]) -> Force:
+    def forces(terms: Iterable[Term]) -> Force:
         terms = tuple(terms)
         whole = system.force_of(terms)
         # friction, and a magnetic field, are linear in p, and so their own change where the motion is
@@ -306,4 +301,4 @@ def variational(system: System[Scene]) -> Callable[[Iterable[Term]], Force]:
 
         return force
 
-    return of
+    return case.step(q, p, forces=forces, slope=slope, varied=True)

@@ -20,7 +20,7 @@ R = TypeVar("R")
 
 def _is_number(x: Any) -> bool:
     with suppress(TypeError, ValueError, OverflowError):
-        return not isinstance(x, str) and np.ndim(x) == 0 and float(x) is not None
+        return not isinstance(x, str | bytes) and np.ndim(x) == 0 and float(x) is not None
     return False
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -44,10 +44,6 @@ class _Driven(Term):
         """Roundings of `wave`: its own, and of its argument at times of this size (..., n) -> (..., s)."""
         time = np.abs(size[..., -1:]) if self.clock else 0
         return np.asarray(1 + np.abs(self.frequency) * time + np.abs(self.phase))
-
-    def separated(self, q: Reals) -> tuple[Self, Reals]:
-        alone, where = Term.separated(self, q)
-        return alone, np.concatenate([where, q[..., -1:]], axis=-1) if self.clock else where
 
     def __getstate__(self) -> dict[str, Any]:
         return Term.__getstate__(self) | ({"clock": True} if self.clock else {})

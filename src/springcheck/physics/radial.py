@@ -81,7 +81,10 @@ class RadialSpring(LinearLaw, Term):
 
     def elements(self, q: Reals) -> Iterator[tuple[Integers, Integers, Reals]]:
         d, s = self._vectors(q)
-        one, other = np.nonzero(self._bond[:, None] == self._bond)
+        # each row beside all rows of its bond, without a matrix of all rows
+        each = np.bincount(self._bond)[self._bond]
+        one = np.repeat(np.arange(len(self)), each)
+        other = np.repeat(self._starts[self._bond] + each - np.cumsum(each), each) + np.arange(len(one))
         bent, e = (self.rest / s)[..., one], d / s
         k = self.k[one] * ((1 - bent) * (one == other) + bent * e[..., one] * e[..., other])
         for here in self.particles:

@@ -236,7 +236,8 @@ def _quantities(given: Any) -> tuple[str, ...]:
 
 
 def _check_text(given: Any, field: str) -> None:
+    wanted = "a text of printable characters" if field == "name" else "a text without unpaired surrogates"
     for text in given if isinstance(given, tuple) else (given,):
         right = isinstance(text, str) and not any("\ud800" <= c <= "\udfff" for c in text)
         if not right or (field == "name" and not (text and text.isprintable())):
-            raise SceneError(f"{field} = {text!r}: a text is needed, without unpaired surrogates")
+            raise SceneError(f"{field} = {text!r}: {wanted} is needed")

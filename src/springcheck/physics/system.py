@@ -18,11 +18,10 @@ from springcheck.physics import graph, memory
 from springcheck.physics.arrays import WIDE, Extended, Floats, Force, Integers, Reals, in_pieces
 from springcheck.physics.driven import Drive, with_clock
 from springcheck.physics.fields import SceneFields
-from springcheck.physics.magnetic import Magnetic
 from springcheck.physics.norm import SMALLEST_ENERGY, Norm, kinetic_energy
 from springcheck.physics.rods import Rods, rods_of
 from springcheck.physics.term import Term
-from springcheck.physics.terms import Damping, VanDerPol
+from springcheck.physics.terms import Damping, Magnetic, VanDerPol
 
 Fields = TypeVar("Fields", bound=SceneFields)
 

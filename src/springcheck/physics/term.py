@@ -247,12 +247,6 @@ class Term:
         rows = other.arrays
         return self._changed(**{name: np.append(values, rows[name]) for name, values in self.arrays.items()})
 
-    def separated(self, q: Reals) -> tuple[Self, Reals]:
-        """The term with separate particles for each row, and their positions for q (..., n)."""
-        own = np.arange(self.bodies * len(self)).reshape(self.bodies, -1)
-        where = np.concatenate([np.take(q, index, axis=-1) for index in self.particles], axis=-1)
-        return self._changed(**dict(zip(self.ends, own, strict=True))), where
-
     def __getstate__(self) -> dict[str, Any]:
         return self.arrays | ({"fast": True} if self.fast else {})
 

@@ -1,4 +1,4 @@
-"""The terms: springs, quartic potentials, pendulums, Morse bonds, friction, and driven terms.
+"""The terms: springs, quartic potentials, pendulums, Morse bonds, friction, fields, and driven terms.
 
 To add one, write its class with its law and put `@register` before it, here or in a file of your own:
 data/README.md shows the ten lines.
@@ -15,11 +15,9 @@ import numpy as np
 from springcheck.physics import termcheck
 from springcheck.physics.arrays import Floats, Integers, Reals
 from springcheck.physics.driven import Drive, ModulatedSpring
-from springcheck.physics.magnetic import Magnetic
 from springcheck.physics.radial import RadialSpring
 from springcheck.physics.rods import Rod, WallRod
 from springcheck.physics.term import Column, LinearLaw, OnPairs, OnParticles, Origin, Term, WithoutPotential
-from springcheck.physics.vanderpol import VanDerPol
 
 __all__ = [
     "Column", "Cosine", "Damping", "Drive", "Magnetic", "ModulatedSpring", "Morse", "OnPairs", "OnParticles",
@@ -221,6 +219,92 @@ class Damping(WithoutPotential):
 
     def pull_rounding(self, q: Reals, v: Reals, near: Reals | None, exact: bool) -> Reals:
         return Term.pull_rounding(self, v, q, v, exact)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class VanDerPol(WithoutPotential):
+    """Position-dependent friction of particles i: force c (1 - ((q - at)/width)**2) v.
+
+    c [M/T], width and at [L].  On a spring k, m q'' = c (1 - x**2) q' - k q has mu = c/sqrt(k m). B. van der
+    Pol, Phil. Mag. 2 (1926) 978.
+    """
+
+    key: ClassVar[str] = "van-der-pol"
+    formula: ClassVar[str] = "force c (1 - ((q - at)/width)**2) p/m"
+    columns: ClassVar[tuple[Column, ...]] = (
+        Column("coefficient", "c", sign="nonnegative", single=False),
+        Column("width", "width", 1.0, sign="positive", single=False),
+        Column("at", "at", 0.0, single=False),
+    )
+    ends: ClassVar[tuple[str, ...]] = ("i",)
+    kind: ClassVar[Origin] = "friction"
+    i: Integers
+    c: Floats
+    width: Floats
+    at: Floats
+
+    def resistance(self, q: Reals) -> tuple[Reals, Reals]:
+        """Friction coefficient of each row, and its derivative by q: (..., s) each [M/T], [M/(L T)]."""
+        x = (np.take(q, self.i, axis=-1) - self.at) / self.width
+        # (x - 1) (x + 1) keeps its digits where the friction changes its sign
+        return np.asarray(self.c * ((x - 1) * (x + 1))), np.asarray(2 * self.c * x / self.width)
+
+    def add_force(self, q: Reals, v: Reals, out: Reals) -> None:
+        self.add_pull(self.resistance(q)[0] * np.take(v, self.i, axis=-1), out)
+
+    def add_change(self, q: Reals, v: Reals, dq: Reals, dv: Reals, out: Reals) -> None:
+        v, dq = (np.take(x, self.i, axis=-1) for x in (v, dq))
+        self.add_pull(self.resistance(q)[1] * v * dq, out)
+
+    def pull_rounding(self, q: Reals, v: Reals, near: Reals | None, exact: bool) -> Reals:
+        x = (np.abs(np.take(q if near is None else near, self.i, axis=-1)) + np.abs(self.at)) / self.width
+        # a rounding of the position counts twice in its square
+        return self.c * (1 + 3 * x * x) * np.abs(np.take(v, self.i, axis=-1))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Magnetic(WithoutPotential):
+    """A force strength (v_b, -v_a) in the plane of the coordinates a and b of one particle.
+
+    strength [M/T]: charge times field, along z where a is x and b is y; for Coriolis' force 2 m Omega.  It
+    does no work.
+    """
+
+    key: ClassVar[str] = "magnetic"
+    formula: ClassVar[str] = "force strength (v_y, -v_x)"
+    columns: ClassVar[tuple[Column, ...]] = (Column("strength", "strength", single=False),)
+    ends: ClassVar[tuple[str, ...]] = ("a", "b")
+    kind: ClassVar[Origin] = "magnetic"
+    a: Integers
+    b: Integers
+    strength: Floats
+
+    def add_force(self, q: Reals, v: Reals, out: Reals) -> None:
+        one, other = (np.take(v, index, axis=-1) for index in self.particles)
+        self._add(out, self.strength * other, -self.strength * one)
+
+    def add_rounding(self, q: Reals, v: Reals, out: Reals, near: Reals | None, exact: bool) -> None:
+        one, other = (np.abs(np.take(v, index, axis=-1) * self.strength) for index in self.particles)
+        self._add(out, other, one)
+
+    def _add(self, out: Reals, *pushes: Reals) -> None:
+        for index, push in zip(self.particles, pushes, strict=True):
+            where: Any = (..., index)
+            np.add.at(out, where, push)
+
+    def by_velocity(self, m: Floats) -> Floats:
+        """Derivatives of the force by the momenta (n, n) [1/T]."""
+        out = np.zeros((len(m), len(m)))
+        np.add.at(out, (self.a, self.b), self.strength / m[self.b])
+        np.subtract.at(out, (self.b, self.a), self.strength / m[self.a])
+        return out
+
+    def turns(self, m: Floats) -> Floats:
+        """Angular frequency at which the field alone rotates the velocity of each coordinate (n,) [1/T]."""
+        out = np.zeros(len(m))
+        for index in (self.a, self.b):
+            np.add.at(out, index, np.abs(self.strength) / m[index])
+        return out
 
 
 _KNOWN: dict[str, type[Term]] = {

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from springcheck.physics.exact.powers import propagate, rotation
-from springcheck.schemes.attached import ATTACHED
-from springcheck.schemes.catalogue import SCHEMES, Scheme, number, solver
+from springcheck.schemes.catalogue import ATTACHED, SCHEMES, Scheme, number, solver
 from springcheck.schemes.kinds import KINDS
 from springcheck.schemes.law import Law, Trait
 from springcheck.schemes.linear import amplification, condition, invariant, matrix

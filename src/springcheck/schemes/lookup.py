@@ -7,8 +7,7 @@ from fractions import Fraction
 import numpy as np
 
 from springcheck.errors import MethodError, nearest
-from springcheck.schemes.attached import ATTACHED
-from springcheck.schemes.catalogue import SCHEMES, Scheme
+from springcheck.schemes.catalogue import ATTACHED, SCHEMES, Scheme
 from springcheck.schemes.kinds import KINDS
 
 # like an imported module, a scheme that an engine brings stays for the life of the process

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
-from typing import Any
+from functools import partial
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -13,6 +14,9 @@ from springcheck.physics.rods import Rods
 from springcheck.schemes.catalogue import Scheme, number
 from springcheck.schemes.kinds import Setting
 from springcheck.schemes.stepping import sparse_solver, weighted_sum
+
+Applied: TypeAlias = Callable[[Reals], Reals]
+"""x (..., n) -> a matrix times x (..., n)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -148,92 +152,67 @@ def _implicit_stage(
         raise ValueError("an implicit stage needs the stiffness of the scene")
     none = np.zeros_like(p)
     factor = x * x / (m * slowed)
-    solve: _Separate | _Joined | _Sparse
     if not here.joined:
-        solve = _Separate(here.stiffness, factor)
+        inverse, kicked = _separate(here.stiffness, factor)
     elif isinstance(here.stiffness, np.ndarray):
-        solve = _Joined(here.stiffness, factor)
+        inverse, kicked = _joined(here.stiffness, factor)
     else:
-        solve = _Sparse(here.stiffness, factor)
+        inverse, kicked = _sparse(here.stiffness, factor)
+
+    def turned(of_p: Reals) -> Reals:
+        """|M A^-1 M^-1| of_p."""
+        return np.asarray(m * inverse(of_p / m)) if here.joined else inverse(of_p)
+
     right = q + x * p / (m * slowed)
     if here.q is None or way is None:
-        found = solve.inverse(right + factor * here.magnitude(none, none))
-        end = solve.turned((p + x * here.magnitude(q, none)) / slowed, m)
+        found = inverse(right + factor * here.magnitude(none, none))
+        end = turned((p + x * here.magnitude(q, none)) / slowed)
         way = end, q + x * (2 * p + end) / m, p + end
     else:
         found = np.abs(here.q)
     there = here.magnitude(found, way[0])
     residual = right + found + factor * there
-    of_velocity = solve.turned(x * (here.magnitude(*way[1:]) + here.joints), m) + solve.kicked(q) * m / x
-    return np.maximum(there + solve.kicked(residual) * m * slowed / (x * x), of_velocity / x)
+    of_velocity = turned(x * (here.magnitude(*way[1:]) + here.joints)) + kicked(q) * m / x
+    return np.maximum(there + kicked(residual) * m * slowed / (x * x), of_velocity / x)
 
 
-class _Separate:
-    """|A^-1| and its relatives for A = 1 + factor K, all (..., n)."""
-
-    def __init__(self, stiffness: Reals, factor: Reals) -> None:
-        self._change = np.abs(factor * stiffness)
-        with np.errstate(divide="ignore"):
-            self._inverse = 1 / np.abs(1 + factor * stiffness)
-
-    def inverse(self, x: Reals) -> Reals:
-        return np.asarray(self._inverse * x)
-
-    def kicked(self, x: Reals) -> Reals:
-        """|factor K A^-1| x."""
-        return np.asarray(self._change * self._inverse * x)
-
-    def turned(self, x: Reals, m: Reals) -> Reals:
-        """|M A^-1 M^-1| x."""
-        return np.asarray(self._inverse * x)
+def _separate(stiffness: Reals, factor: Reals) -> tuple[Applied, Applied]:
+    """|A^-1| x and |factor K A^-1| x of x (..., n), for A = 1 + factor K, K (..., n)."""
+    change = np.abs(factor * stiffness)
+    with np.errstate(divide="ignore"):
+        inverse = 1 / np.abs(1 + factor * stiffness)
+    return lambda x: np.asarray(inverse * x), lambda x: np.asarray(change * inverse * x)
 
 
-class _Joined:
-    """The same for matrices (..., n, n)."""
-
-    def __init__(self, stiffness: Reals, factor: Reals) -> None:
-        wide = np.asarray(factor, np.float64)[..., :, None] * np.asarray(stiffness, np.float64)
-        try:
-            found = np.linalg.inv(np.eye(wide.shape[-1]) + wide)
-        except np.linalg.LinAlgError:
-            found = np.full(wide.shape, np.inf)
-        self._inverse = np.abs(found)
-        self._change = np.abs(wide @ found)
-
-    def inverse(self, x: Reals) -> Reals:
-        return _product(self._inverse, x)
-
-    def kicked(self, x: Reals) -> Reals:
-        return _product(self._change, x)
-
-    def turned(self, x: Reals, m: Reals) -> Reals:
-        return np.asarray(m * _product(self._inverse, x / m))
+def _joined(stiffness: Reals, factor: Reals) -> tuple[Applied, Applied]:
+    """The same for matrices K (..., n, n)."""
+    wide = np.asarray(factor, np.float64)[..., :, None] * np.asarray(stiffness, np.float64)
+    try:
+        found = np.linalg.inv(np.eye(wide.shape[-1]) + wide)
+    except np.linalg.LinAlgError:
+        found = np.full(wide.shape, np.inf)
+    return partial(_product, np.abs(found)), partial(_product, np.abs(wide @ found))
 
 
-class _Sparse:
+def _sparse(stiffness: Any, factor: Reals) -> tuple[Applied, Applied]:
     """The same for a sparse K whose elements off the diagonal are none of them > 0.
 
     A is then an M-matrix, and its inverse has no element < 0 (Berman & Plemmons, Nonnegative Matrices in the
-    Mathematical Sciences, chapter 6), so that |A^-1| x is A^-1 x; `kicked` is an upper bound.
+    Mathematical Sciences, chapter 6), so that |A^-1| x is A^-1 x; the second is an upper bound.
     """
+    size, solve = abs(stiffness), sparse_solver(stiffness, factor)
 
-    def __init__(self, stiffness: Any, factor: Reals) -> None:
-        self._factor = factor
-        self._size = abs(stiffness)
-        self._solve = sparse_solver(stiffness, factor)
-
-    def inverse(self, x: Reals) -> Reals:
+    def inverse(x: Reals) -> Reals:
         # 0 up to rounding may come out below 0
-        return np.maximum(self._solve(x), 0)
+        return np.maximum(solve(x), 0)
 
-    def kicked(self, x: Reals) -> Reals:
-        inner = np.asarray(self.inverse(x), np.float64)
-        product = (self._size @ inner.reshape(-1, inner.shape[-1]).T).T.reshape(x.shape)
+    def kicked(x: Reals) -> Reals:
+        inner = np.asarray(inverse(x), np.float64)
+        product = (size @ inner.reshape(-1, inner.shape[-1]).T).T.reshape(x.shape)
         # factor K A^-1 is 1 - A^-1 as well: the one bound is good for small steps, the other for large ones
-        return np.asarray(np.minimum(self._factor * product, x + inner))
+        return np.asarray(np.minimum(factor * product, x + inner))
 
-    def turned(self, x: Reals, m: Reals) -> Reals:
-        return np.asarray(m * self.inverse(x / m))
+    return inverse, kicked
 
 
 def _product(matrix: Reals, x: Reals) -> Reals:

@@ -8,7 +8,6 @@ in full: near the separatrix m1 would be lost in m.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,16 +15,6 @@ from springcheck.physics.arrays import EPS, Extended
 
 MOST_MEANS = 40
 """Most rounds of the mean: six for ordinary moduli, a dozen for m1 near the smallest number."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Jacobi:
-    """am, sn, cn and dn of the same arguments."""
-
-    am: Extended
-    sn: Extended
-    cn: Extended
-    dn: Extended
 
 
 def _means(m: Extended, m1: Extended) -> Iterator[tuple[Extended, Extended, Extended]]:
@@ -40,7 +29,7 @@ def _means(m: Extended, m1: Extended) -> Iterator[tuple[Extended, Extended, Exte
         a, b, c = mean, np.sqrt(a * b), c * c / (4 * mean)
 
 
-def jacobi(u: Extended, m: Extended, m1: Extended) -> Jacobi:
+def jacobi(u: Extended, m: Extended, m1: Extended) -> tuple[Extended, Extended, Extended, Extended]:
     """am(u | m) and sn, cn, dn, for 0 <= m <= 1 and m1 = 1 - m.  am grows with u, beyond pi."""
     u, m, m1 = np.broadcast_arrays(*(np.asarray(x, np.longdouble) for x in (u, m, m1)))
     edge = m1 == 0
@@ -56,7 +45,7 @@ def jacobi(u: Extended, m: Extended, m1: Extended) -> Jacobi:
     am = np.where(edge, np.arctan2(np.tanh(u), far), phi)
     sn, cn = np.where(edge, np.tanh(u), np.sin(phi)), np.where(edge, far, np.cos(phi))
     dn = np.where(edge, far, np.sqrt(m1 + m * cn * cn))
-    return Jacobi(am=np.asarray(am), sn=np.asarray(sn), cn=np.asarray(cn), dn=np.asarray(dn))
+    return np.asarray(am), np.asarray(sn), np.asarray(cn), np.asarray(dn)
 
 
 def argument(sine: Extended, cosine: Extended, m: Extended, m1: Extended) -> Extended:

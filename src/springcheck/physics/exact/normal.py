@@ -35,7 +35,7 @@ class Start(NamedTuple):
     v: Extended
     slow: Extended
     fast: Extended
-    sizes: tuple[Extended, Extended, Extended, Extended]
+    sizes: tuple[Extended, ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -167,12 +167,11 @@ def normal_modes(system: System[Any]) -> Modes:
     return _modes(system, w2=w2, pull=pulls, root_m=root_m, rate=rate, vectors=vectors, doubt=doubt)
 
 
-def _modes(system: System[Any], *, start: Start | None = None, **parts: Any) -> Modes:
-    """Modes as computed, with the start of the scene where none is given."""
-    nothing = np.zeros_like(parts["w2"])
-    blank = Start(u=nothing, v=nothing, slow=nothing, fast=nothing, sizes=(nothing,) * 4)
-    found = Modes(**parts, start=start or blank)
-    return found if start else replace(found, start=_start(system, found))
+def _modes(system: System[Any], **parts: Any) -> Modes:
+    """Modes with the start of the scene."""
+    none = np.zeros_like(parts["w2"])
+    found = Modes(**parts, start=Start(none, none, none, none, (none,) * 4))
+    return replace(found, start=_start(system, found))
 
 
 def _start(system: System[Any], modes: Modes) -> Start:
@@ -200,7 +199,7 @@ def _start(system: System[Any], modes: Modes) -> Start:
             ):
                 out[chosen] = extended(x)
                 like[chosen] = np.abs(out[chosen])
-    return Start(u=u, v=v, slow=slow, fast=fast, sizes=(sizes[0], sizes[1], sizes[2], sizes[3]))
+    return Start(u, v, slow, fast, tuple(sizes))
 
 
 def exact_sums(system: System[Any], of: Callable[[Wide], Wide]) -> tuple[Wide, Wide, Wide]:
@@ -243,14 +242,13 @@ def _in_many_digits(system: System[Any]) -> Modes:
         of_u = (np.abs(vectors.T) @ np.abs(root * q) + np.abs(y - u)) * vast
         of_v = np.abs(vectors.T) @ np.abs(p / root) * left
         of_both = split(of_u, of_v, w2, np.max(rates))[2]
-        lost = (extended(x) / EPS for x in (of_u, of_v, of_both, of_both))
+        lost = [extended(x) / EPS for x in (of_u, of_v, of_both, of_both)]
         parts = tuple(extended(x) for x in (u, v, slow, fast))
-        found = {"w2": extended(w2), "pull": extended(pull), "vectors": extended(vectors)}
-    u, v, slow, fast = parts
-    most = [np.maximum(np.abs(x), least) for x, least in zip(parts, lost, strict=True)]
-    start = Start(u=u, v=v, slow=slow, fast=fast, sizes=(most[0], most[1], most[2], most[3]))
-    found |= {"root_m": extended(root), "rate": system.friction_rates, "doubt": np.zeros_like(u)}
-    return _modes(system, start=start, **found)
+        sizes = tuple(np.maximum(np.abs(x), least) for x, least in zip(parts, lost, strict=True))
+        return Modes(
+            w2=extended(w2), pull=extended(pull), rate=system.friction_rates, root_m=extended(root),
+            vectors=extended(vectors), start=Start._make((*parts, sizes)), doubt=np.zeros_like(parts[0]),
+        )  # fmt: skip
 
 
 def _digits_for(system: System[Any], k: Wide) -> int:

@@ -53,12 +53,12 @@ class _Swing:
         safe = np.where(m > 0, m, 1)
         modulus, other = np.where(over, 1 / safe, m), np.where(over, -m1 / safe, m1)
         phase = argument(np.where(over, np.sign(r) * s, s), np.where(over, c, r), modulus, other)
-        at = jacobi(self.w * t * fast + phase, modulus, other)
+        am, sn, cn, dn = jacobi(self.w * t * fast + phase, modulus, other)
         root = np.sqrt(m)
-        swing = np.arctan2(root * at.sn, at.dn)
+        swing = np.arctan2(root * sn, dn)
         return (
-            np.asarray(np.where(over, np.sign(r) * at.am, swing)),
-            np.asarray(np.where(over, np.sign(r) * root * at.dn, root * at.cn)),
+            np.asarray(np.where(over, np.sign(r) * am, swing)),
+            np.asarray(np.where(over, np.sign(r) * root * dn, root * cn)),
         )
 
     @property

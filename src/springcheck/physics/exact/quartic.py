@@ -147,8 +147,8 @@ def _cn(well: _Duffing, t: Extended) -> States:
     turn = w * np.sqrt(m1 + m * cosine * cosine)
     # the top of the barrier is reached after an infinite time
     sine = np.where(turn > 0, -well.v / np.where(turn > 0, turn, 1), 1)
-    at = jacobi(t * w + argument(sine, well.u, m, m1), m, m1)
-    return np.asarray(amplitude * at.cn), np.asarray(-amplitude * w * at.sn * at.dn)
+    _, sn, cn, dn = jacobi(t * w + argument(sine, well.u, m, m1), m, m1)
+    return np.asarray(amplitude * cn), np.asarray(-amplitude * w * sn * dn)
 
 
 def _dn(well: _Duffing, t: Extended) -> States:
@@ -161,13 +161,14 @@ def _dn(well: _Duffing, t: Extended) -> States:
     large = np.sqrt((well.root + np.abs(x)) / 2)
     small = np.abs(y) / (2 * np.where(large > 0, large, 1))
     sine, cosine = np.where(x < 0, large, small), np.where(x < 0, small, large)
-    at = jacobi(t * w + argument(np.copysign(sine, y), cosine, m, m1), m, m1)
-    return np.asarray(amplitude * at.dn), np.asarray(-amplitude * w * m * at.sn * at.cn)
+    _, sn, cn, dn = jacobi(t * w + argument(np.copysign(sine, y), cosine, m, m1), m, m1)
+    return np.asarray(amplitude * dn), np.asarray(-amplitude * w * m * sn * cn)
 
 
 def _sn(well: _Duffing, t: Extended) -> States:
     """Below the barriers of a softening spring: u = A sn(w t + phase), w**2 = (k + root)/2."""
     m, m1, w = well.m, well.m1, well.w
-    dn = np.sqrt((well.root + well.pull) / well.plus)
-    at = jacobi(t * w + argument(well.u, well.v / (w * np.where(dn > 0, dn, 1)), m, m1), m, m1)
-    return np.asarray(well.amplitude * at.sn), np.asarray(well.amplitude * w * at.cn * at.dn)
+    begun = np.sqrt((well.root + well.pull) / well.plus)
+    phase = argument(well.u, well.v / (w * np.where(begun > 0, begun, 1)), m, m1)
+    _, sn, cn, dn = jacobi(t * w + phase, m, m1)
+    return np.asarray(well.amplitude * sn), np.asarray(well.amplitude * w * cn * dn)

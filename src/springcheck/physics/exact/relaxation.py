@@ -18,7 +18,7 @@ from springcheck.physics.exact.closedform import FORM_EPS, ClosedForm, States, w
 from springcheck.physics.exact.digits import digits, exactly, extended
 from springcheck.physics.exact.normal import exact_sums
 from springcheck.physics.system import System
-from springcheck.physics.vanderpol import VanDerPol
+from springcheck.physics.terms import VanDerPol
 
 RADAU_STAGES = 16
 TIME_ERROR = FORM_EPS / 4
@@ -53,11 +53,8 @@ class _Law(NamedTuple):
 
 @by_identity
 class _Path(NamedTuple):
-    """One particle: the ends of its steps t (j + 1,), u at their starts (j,), and the series of u' (j, s)."""
+    """The ends of its steps t (j + 1,), u at their starts (j,), and the series of u' (j, s)."""
 
-    at: np.longdouble
-    width: np.longdouble
-    start: tuple[float, float]
     t: Extended
     u: Extended
     series: Extended
@@ -148,16 +145,15 @@ def _step(law: _Law, u: Any, v: Any, h: Any, guess: Extended) -> _Nodes | None:
 
 
 @lru_cache(maxsize=8)
-def _path(law: _Law, u: Any, v: Any, end: Any) -> tuple[Any, ...] | None:
-    """Ends of the steps up to a time, u at their starts, series of u', the largest |u|, |u'|, |u''|, and the
-    derivatives of the ends of steps by their starts (j, 2, 2)."""
+def _path(law: _Law, u: Any, v: Any, end: Any) -> _Path | None:
+    """The motion from (u, v) up to a time, None where Newton's iteration or the steps come to no end."""
     t, ts = wide(0), [wide(0)]
     us: list[Any] = []
     rows: list[Extended] = []
     maps: list[Floats] = []
     rate = abs(law.g) * (1 + u * u) + abs(law.r) + np.sqrt(abs(law.w2))
     h, rule = 1 / np.where(rate > 0, rate, 1), _rule()
-    most = [abs(u), abs(v), np.longdouble(0)]
+    most: Any = [abs(u), abs(v), np.longdouble(0)]
     series, before = np.zeros(RADAU_STAGES, np.longdouble), wide(0)
     while t < end:
         if len(rows) == MOST_RADAU_STEPS or not t + h > t:
@@ -182,7 +178,10 @@ def _path(law: _Law, u: Any, v: Any, end: Any) -> tuple[Any, ...] | None:
         most = [max(x, np.max(np.abs(y))) for x, y in zip(most, met[:3], strict=True)]
         t, u, v, series, before = wide(t + h), met.u[-1], met.v[-1], wide(of), wide(h)
         h = h * np.clip(factor, 0.3, 3)
-    return np.stack(ts), np.stack(us), np.stack(rows), tuple(float(x) for x in most), np.stack(maps)
+    slow = float(np.sqrt(np.abs(law.w2))) or 1 / float(t)
+    growth, felt = _growth(np.stack(maps), slow, np.stack(us).astype(float))
+    fastest: Any = tuple(float(x) for x in most)
+    return _Path(np.stack(ts), np.stack(us), np.stack(rows), fastest, growth, felt)
 
 
 def _growth(maps: Floats, w: float, u: Floats) -> tuple[float, tuple[float, float]]:
@@ -206,7 +205,8 @@ class VanDerPolMotion(ClosedForm):
     def __init__(self, system: System[Any]) -> None:
         """At most one such friction on a particle; backwards in time the motion diverges."""
         super().__init__(system)
-        found: list[_Path] = []
+        self.paths: list[tuple[np.longdouble, np.longdouble, tuple[float, float], _Path]] = []
+        """Of each particle the place and the width of its friction, its start, and its motion."""
         term = next(term for term in system.terms if isinstance(term, VanDerPol))
         self.need(system.scene.step > 0 and len(term) == len(np.unique(term.i)) == system.n)
         with digits():
@@ -223,19 +223,15 @@ class VanDerPolMotion(ClosedForm):
             start = float(system.q[i]), float(system.p[i])
             u, v = (system.q[i] - wide_at) / wall, np.longdouble(system.p[i]) / m / wall
             self.need(u != centre or v != 0)
-            done: Any = _path(law, u, v, np.longdouble(system.scene.step) * system.scene.steps)
-            self.need(done)
-            t, us, series, most, maps = done
-            slow = float(np.sqrt(np.abs(w2))) or 1 / float(t[-1])
-            found.append(
-                _Path(wide_at, wall, start, t, us, series, most, *_growth(maps, slow, us.astype(float)))
-            )
-        self.paths, self.growth = found, max(path.growth for path in found)
+            path: Any = _path(law, u, v, np.longdouble(system.scene.step) * system.scene.steps)
+            self.need(path)
+            self.paths.append((wide_at, wall, start, path))
+        self.growth = max(path.growth for *_, path in self.paths)
 
     def at(self, t: Extended) -> States:
         """NaN beyond the end of the scene."""
         q, p = np.full((2, len(t), self.system.n), np.nan, dtype=np.longdouble)
-        for i, path in enumerate(self.paths):
+        for i, (at, width, start, path) in enumerate(self.paths):
             inside = np.flatnonzero((t[:, 0] >= 0) & (t[:, 0] <= path.t[-1]))
             times = t[inside, 0]
             j = np.clip(np.searchsorted(path.t, times) - 1, 0, len(path.u) - 1)
@@ -243,18 +239,17 @@ class VanDerPolMotion(ClosedForm):
             x = 2 * (times - path.t[j]) / h - 1
             series = path.series[j]
             u = path.u[j] + h / 2 * np.sum(series * _integrals(x, RADAU_STAGES), axis=-1)
-            q[inside, i] = path.at + path.width * u
-            p[inside, i] = (
-                path.width * np.sum(series * _legendre(x, RADAU_STAGES), axis=-1) * self.system.m[i]
-            )
-            q[t[:, 0] == 0, i], p[t[:, 0] == 0, i] = path.start
+            q[inside, i] = at + width * u
+            p[inside, i] = width * np.sum(series * _legendre(x, RADAU_STAGES), axis=-1) * self.system.m[i]
+            q[t[:, 0] == 0, i], p[t[:, 0] == 0, i] = start
         return q, p
 
     def doubt(self, t: np.longdouble) -> States:
         """Errors of size and position, and the larger of a time known to `TIME_ERROR` and amplified
         rounding."""
-        u, v, a = (np.array([path.fastest[j] * float(path.width) for path in self.paths]) for j in range(3))
-        late, at = TIME_ERROR * np.abs(t), np.array([np.abs(path.at) for path in self.paths])
-        felt = FELT_ROUNDING * np.array([path.width * np.array(path.felt) for path in self.paths]).T
+        ats, widths, _, paths = zip(*self.paths, strict=True)
+        u, v, a = np.array([np.array(x.fastest) * float(w) for x, w in zip(paths, widths, strict=True)]).T
+        late, at = TIME_ERROR * np.abs(t), np.abs(ats)
+        felt = FELT_ROUNDING * np.array([w * np.array(x.felt) for x, w in zip(paths, widths, strict=True)]).T
         dq, dv = np.maximum(FORM_EPS * u + late * v, felt[0]), np.maximum(FORM_EPS * v + late * a, felt[1])
         return np.asarray(FORM_EPS * at + dq), np.asarray(dv * self.system.m)

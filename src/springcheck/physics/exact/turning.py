@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from springcheck.physics import graph
 from springcheck.physics.arrays import Extended, Integers
 from springcheck.physics.exact.closedform import FORM_EPS, ClosedForm, States, wide
 from springcheck.physics.exact.digits import Wide, digits, exactly, extended, summed
@@ -31,7 +32,7 @@ class TurningRods(ClosedForm):
         super().__init__(system)
         rods, places, n = system.rods, system.scene.all_places, system.scene.particles
         assert rods is not None
-        of, at = _bodies(rods, n), np.zeros(system.n)
+        of, at = _bodies(system, rods), np.zeros(system.n)
         self.need(of is not None)
         assert of is not None
         for term in system.terms:
@@ -89,11 +90,11 @@ class TurningWallRods(TurningRods):
     terms = frozenset({"wall-rod"})
 
 
-def _bodies(rods: Rods, particles: int) -> Integers | None:
+def _bodies(system: System[Any], rods: Rods) -> Integers | None:
     """The body of each particle (particles,), None where some body is flexible, or has redundant rods."""
-    of = np.arange(particles)
-    for ends in rods.ends * (len(rods) if rods.share else 1):
-        of[of == max(of[list(ends)])] = min(of[list(ends)])
+    places = system.scene.all_places
+    of = np.arange(system.scene.particles)
+    of[places // 3] = places[graph.lowest_joined(system.n, system.terms)] // 3
     size, joined = Counter(of.tolist()), Counter(int(of[ends[0]]) for ends in rods.ends)
     fixed = Counter(int(of[ends[0]]) for ends in rods.ends if len(ends) == 1)
     rigid = all(

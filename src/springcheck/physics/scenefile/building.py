@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, TypeAlias
 
 import msgspec
@@ -34,30 +35,33 @@ class MistakeError(ValueError):
     """A value of the right type that is invalid."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class _Bodies:
-    """The moving bodies: m, q, p (n,), and their name in the file."""
+    """The moving bodies: m, q, p (n,) by coordinate, their name in the file, and the axes of each body."""
 
     m: Floats
     q: Floats
     p: Floats
     name: str
+    axes: Sequence[str]
     terms: tuple[Term, ...] = ()
-    axes: tuple[str, ...] = ()
-    """The axes of each particle, where some particle has more than x."""
+
+    @cached_property
+    def coordinates(self) -> dict[tuple[int, str], int]:
+        """The number of each coordinate, by its body and its axis."""
+        every = [(i, x) for i, axes in enumerate(self.axes) for x in axes]
+        return {coordinate: j for j, coordinate in enumerate(every)}
 
     @property
     def places(self) -> Integers | None:
-        """Position of each coordinate, as in `Scene.places`."""
-        return np.array([3 * i + "xyz".index(x) for i, x in self._coordinates]) if self.axes else None
-
-    @property
-    def _coordinates(self) -> list[tuple[int, str]]:
-        return [(i, x) for i, axes in enumerate(self.axes) for x in axes]
+        """Position of each coordinate, as in `Scene.places`; None where each body moves along x alone."""
+        if set(self.axes) == {"x"}:
+            return None
+        return np.array([3 * i + "xyz".index(x) for i, x in self.coordinates])
 
     def number(self, value: int, field: str) -> int:
         """The number of a body in a field of the file.  MistakeError where there is no such body."""
-        n = len(self.axes) or len(self.m)
+        n = len(self.axes)
         if not 0 <= value < n:
             several = tables.BODIES[self.name].several
             raise MistakeError(f"{field} = {value}: {several} here are numbered from 0 to {n - 1}")
@@ -65,18 +69,12 @@ class _Bodies:
 
     def along(self, field: str, axis: str | None, *bodies: int) -> list[tuple[int, ...]]:
         """Coordinates of these bodies along an axis, or along each of their axes.  MistakeError."""
-        numbers = [self.number(value, field) for value in bodies]
-        if not self.axes:
-            if axis not in (None, "x"):
-                raise MistakeError(f"{field}: axis = {axis!r}, but everything moves along x")
-            return [tuple(numbers)]
-        shared = [self.axes[i] for i in numbers]
+        shared = [self.axes[self.number(value, field)] for value in bodies]
         if axis is None and len({frozenset(axes) for axes in shared}) > 1:
             raise MistakeError(f"{field}: the two move along {' and '.join(shared)}; say along which axis")
         if any(axis not in axes for axes in shared if axis):
             raise MistakeError(f"{field}: axis = {axis!r}, along which it cannot move")
-        at = {coordinate: j for j, coordinate in enumerate(self._coordinates)}
-        return [tuple(at[i, x] for i in numbers) for x in (axis or shared[0])]
+        return [tuple(self.coordinates[i, x] for i in bodies) for x in (axis or shared[0])]
 
 
 FILE_PATHS = {
@@ -146,12 +144,12 @@ def _bodies(table: Any) -> _Bodies:
     name = given[0]
     if name == "chain":
         made = _chain(table.chain)
-        return _Bodies(m=made.m, q=made.q, p=made.p, name=name, terms=made.terms)
+        return _Bodies(m=made.m, q=made.q, p=made.p, name=name, axes="x" * made.n, terms=made.terms)
     columns = tables.BODIES[name].columns
     if name == "particle":
         return _particles(table.particle)
     m, q, p = (np.array([getattr(row, column) for row in getattr(table, name)]) for column in columns)
-    return _Bodies(m=m, q=q, p=p, name=name)
+    return _Bodies(m=m, q=q, p=p, name=name, axes="x" * len(m))
 
 
 def _particles(rows: Sequence[Any]) -> _Bodies:
@@ -162,24 +160,18 @@ def _particles(rows: Sequence[Any]) -> _Bodies:
     p: list[float] = []
     for j, row in enumerate(rows):
         given = {"position": row.position, "momentum": row.momentum}
-        lengths = {name: len(x) for name, x in given.items() if isinstance(x, tuple)}
-        along = row.axes or "xyz"[: max(lengths.values(), default=1)]
+        along = row.axes or "xyz"[: max(len(x) if isinstance(x, tuple) else 1 for x in given.values())]
         if len(set(along)) < len(along):
             raise MistakeError(f"particle[{j}].axes = {along!r}: each axis once")
-        for name, length in lengths.items():
-            if length != len(along):
-                raise MistakeError(f"particle[{j}].{name}: one for each of {along} is needed, not {length}")
-        start = [x if isinstance(x, tuple) else (x,) * len(along) for x in given.values()]
-        for name, x in given.items():
-            if name not in lengths and x and len(along) > 1:
+        for (name, x), out in zip(given.items(), (q, p), strict=True):
+            if isinstance(x, tuple) and len(x) != len(along):
+                raise MistakeError(f"particle[{j}].{name}: one for each of {along} is needed, not {len(x)}")
+            if not isinstance(x, tuple) and x and len(along) > 1:
                 raise MistakeError(f"particle[{j}].{name} = {x:g}: a number for each of {along} is needed")
+            out.extend(x if isinstance(x, tuple) else (x,) * len(along))
         axes.append(along)
         m += [row.mass] * len(along)
-        q += start[0]
-        p += start[1]
-    several = any(one != "x" for one in axes)
-    along_each = tuple(axes) if several else ()
-    return _Bodies(name="particle", axes=along_each, m=np.array(m), q=np.array(q), p=np.array(p))
+    return _Bodies(name="particle", axes=axes, m=np.array(m), q=np.array(q), p=np.array(p))
 
 
 def _chain(table: Any) -> Scene:
@@ -289,7 +281,7 @@ def _magnetic(rows: Sequence[Any], bodies: _Bodies) -> _Rows:
     for j, row in enumerate(rows):
         field = f"magnetic[{j}].particle"
         plane = {"x": "yz", "y": "zx", "z": "xy"}[row.axis]
-        if not set(plane) <= set(bodies.axes[bodies.number(row.particle, field)] if bodies.axes else "x"):
+        if not set(plane) <= set(bodies.axes[bodies.number(row.particle, field)]):
             raise MistakeError(
                 f"{field}: a field along {row.axis} needs a particle along {plane[0]} and {plane[1]}"
             )

@@ -9,9 +9,8 @@ from dataclasses import replace
 import numpy as np
 
 from springcheck.physics.arrays import Floats, Reals
-from springcheck.physics.magnetic import Magnetic
 from springcheck.physics.scene import Scene
-from springcheck.physics.terms import Drive, Spring
+from springcheck.physics.terms import Drive, Magnetic, Spring
 from springcheck.physics.trajectory import Trajectory
 from springcheck.studies.faults.seeded import FRAME_CHECKS, Case, Fault, each, half_step, single
 from springcheck.studies.faults.steppers import State, Step, textbook
