@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -115,17 +116,29 @@ def one_rounding(
     `met` is what rods have met in the step itself.
     """
     assert scene.bath is not None
-    size, unit, x = np.abs(start[0]), how.unit, scene.bath.friction * abs(scene.step)
-    once = unit * roundings_of(sizer.scheme, scene)
-
-    def pull(terms: Sequence[Term]) -> Force:
-        plain, lost = scene.system.magnitude(terms=terms), how.quantum * scene.system.pulls(terms)
-        # each term's force on a particle is truncated once in a kick, and lost below the quantum, no more
-        return lambda q, p: (of := plain(q, p)) + np.minimum(lost, of) / once
-
-    sizes = forces(sizer.scheme, scene.system, pull)
+    size, unit, x = np.abs(start[0]), how.state, scene.bath.friction * abs(scene.step)
+    once, wide = unit * roundings_of(sizer.scheme, scene), how.force / unit * (how.force > unit)
     loose = how.lengths / once
-    q, p = sizer(size, np.abs(start[1]), sizes, draws, hit, met=met, loose=loose)
+    fine: list[Reals] = []
+
+    def pull(terms: Sequence[Term], *, first: bool) -> Force:
+        plain, lost = scene.system.magnitude(terms=terms), how.quantum * scene.system.pulls(terms)
+
+        def of(q: Reals, p: Reals) -> Reals:
+            sizes = plain(q, p)
+            if first:
+                fine.append(sizes)
+                return sizes
+            # each term's force on a particle is truncated once in a kick, and lost below the quantum, no more
+            bound = sizes + np.minimum(lost, sizes) / once
+            return np.asarray(bound + wide * fine.pop(0)) if wide else bound
+
+        return of
+
+    # the error of a coarse force is no size of the next: sizes without it come first
+    for first in [True, False] if wide else [False]:
+        sizes = forces(sizer.scheme, scene.system, partial(pull, first=first))
+        q, p = sizer(size, np.abs(start[1]), sizes, draws, hit, met=met, loose=loose)
     if how.cancels:
         # coefficients of all that is added to q, and of p
         lost = max(x, 1 / x) ** how.cancels
@@ -138,7 +151,8 @@ def one_rounding(
 class _Reader:
     def __init__(self, scheme: Thermostat, scene: Scene, how: Arithmetic, rebuilt: bool) -> None:
         self.scheme, self.scene, self.how, self.rebuilt = scheme, scene, how, rebuilt
-        self.stepper = Stepper.of(scheme, scene, single=how.parameters == "single")
+        real = np.float32 if how.force > how.state else np.float64
+        self.stepper = Stepper.of(scheme, scene, single=how.parameters == "single", real=real)
         self.sizer = Stepper.of(scheme, scene, absolute=True)
         self._force = forces(scheme, scene.system)
         self.roundings = roundings_of(scheme, scene)
@@ -254,7 +268,7 @@ class _Reader:
             if M * i * np.max(np.diag(squares)) > LOST**2:
                 across[i:] = UNTOLD
                 break
-            moved = 1e4 * self.how.unit * (usual + np.abs(state[:M]))
+            moved = 1e4 * self.how.state * (usual + np.abs(state[:M]))
             stepper.chain = np.repeat(state[:, None], M + 1, axis=1)
             stepper.chain[range(M), range(1, M + 1)] += moved
             both = np.stack(stepper(q[i], np.tile(p[i], (M + 1, 1)), self._force, []))
@@ -269,7 +283,7 @@ class _Reader:
             off = np.abs(np.stack([q[i + 1], p[i + 1]]) - both[:, 0])
             across[i] = np.max(off / (of * hidden), axis=0)
             twice = np.sum(np.maximum(p[i] ** 2, both[1, 0] ** 2) / m)
-            new = self.how.unit * chain.rounding(state, twice, part * h, **about)
+            new = self.how.state * chain.rounding(state, twice, part * h, **about)
             # and those of the momenta that it begins from
             new[0] += part * h * self.roundings * np.sum(2 * np.abs(both[1, 0]) * of[1] / m)
             J = ((after[:M, 1:] - after[:M, :1]) / moved * usual / usual[:, None]).astype(np.float64)
