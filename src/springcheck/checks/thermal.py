@@ -71,7 +71,7 @@ def noise_direction(case: Case) -> Finding | str:
         assert bath is not None
         # of momenta, and of the links
         squares = scene.thermal * min(np.min(scene.m), scene.thermal / bath.friction**2)
-        if not squares > thermal.draws.SMALLEST / case.trajectory.arithmetic.unit:
+        if not squares > thermal.rounding.SMALLEST / case.trajectory.arithmetic.unit:
             return "squares of so small momenta underflow"
     found = reading(case)
     if found.across is None:
