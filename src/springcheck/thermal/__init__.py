@@ -18,9 +18,7 @@ if TYPE_CHECKING:
 
 __all__ = ["THERMOSTATS", "Law", "Stepper", "Thermostat", "chance", "draws", "jointly", "rigid", "rounding"]
 
-_LATER = {"Law": "laws", "Stepper": "stepper"} | {
-    x: x for x in ("chance", "draws", "jointly", "rigid", "rounding")
-}
+_LATER = {"Law": "laws", "Stepper": "stepper"} | {x: x for x in __all__ if x.islower()}
 """Names that no run without a bath needs, and the modules that they are imported from on first use."""
 
 
