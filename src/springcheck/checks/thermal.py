@@ -173,8 +173,8 @@ def draws_repeat(case: Case) -> Chance | str:
     """The draws of one step do not come again, nor opposite, any number of steps later."""
     if len(case.trajectory.t) < 1010:
         return "fewer than a thousand steps"
-    x = _drawn(case)
-    return Chance(thermal.chance.repeats(x), f"largest correlation of all lags, of {count(x.size, 'draw')}")
+    found, words = thermal.chance.repeats(x := _drawn(case))
+    return Chance(found, f"{words}, of {count(x.size, 'draw')}")
 
 
 @check("apart", family="noise", requires={"company", "every-step"})
