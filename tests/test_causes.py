@@ -18,6 +18,7 @@ from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory
 from springcheck.studies.faults import baths
 from springcheck.studies.faults.table import FAULTS
+from springcheck.thermal import THERMOSTATS, chance
 
 
 @pytest.mark.parametrize(
@@ -198,3 +199,88 @@ def test_a_run_in_a_bath_says_what_its_draws_show_as_the_judge_of_a_file_does() 
     scene = scenefile.load_scene("bath-spring").derived(steps=400)
     report = springcheck.run(scene, "own:baoab", faults=["calories"], seed=3)
     assert "the noise is 2.0" in checks.cause_of(report.verdicts)
+
+
+def loop(scene: Scene, draws: np.ndarray, c: float = 1.0, size: object = 1.0) -> Trajectory:
+    """BAOAB by a loop of these draws (steps, n), of `size`, with `c` times the friction."""
+    h, m, force = scene.step, scene.m, scene.system.force
+    left = np.exp(-c * scene.bath.friction * h)  # type: ignore[union-attr]
+    q, p = [scene.q], [scene.p]
+    for x in draws:
+        v = p[-1] + h / 2 * force(q[-1], p[-1])
+        y = q[-1] + h / 2 * v / m
+        v = left * v + size * np.sqrt((1 - left * left) * m * scene.thermal) * x
+        q.append(y + h / 2 * v / m)
+        p.append(v + h / 2 * force(q[-1], v))
+    like = driver.run(scene, "own:baoab", seed=1)
+    return replace(like, q=np.array(q), p=np.array(p), energy=scene.system.energy(np.array(q), np.array(p)))
+
+
+def failed_and_said(scene: Scene, run: Trajectory) -> tuple[list[str], str]:
+    verdicts = checks.explained(scene, run, checks.judge(scene, run), files.shown)
+    return [x.check for x in verdicts if x.passed is False], checks.cause_of(verdicts)
+
+
+def test_draws_that_come_again_late_in_a_run_are_seen_and_said() -> None:
+    """A restart with the same seed after the middle of a run passed, and one at its half all but passed."""
+    scene = baths.springs(3, steps=3000)
+    x = np.random.default_rng(3).standard_normal((3000, 3))
+    assert failed_and_said(scene, loop(scene, x)) == ([], "")
+    for at in (1500, 2400, 2900):
+        again = np.concatenate([x[:at], x[: 3000 - at]])
+        failed, said = failed_and_said(scene, loop(scene, again))
+        assert "draws-repeat" in failed
+        assert said == f"the random numbers from row {at} on are those from row 0 on, again"
+
+
+def test_chances_of_repeated_draws_are_no_smaller_than_they_are() -> None:
+    rng = np.random.default_rng(5)
+    chances = [chance.repeats(rng.standard_normal((1000, 2)))[0] for _ in range(300)]
+    # ten times as large as they are, so that a tenth of a share is below it
+    assert np.mean(np.array(chances) < 0.5) < 0.15
+
+
+def test_noise_of_other_masses_is_said_of_each_coordinate() -> None:
+    scene = baths.springs(3, steps=3000)
+    x = np.random.default_rng(4).standard_normal((3000, 3))
+    size = np.sqrt(scene.m[[1, 0, 2]] / scene.m)
+    _, said = failed_and_said(scene, loop(scene, x, size=size))
+    told = [float(part.split()[-1]) for part in said.split(" +- ")[:3]]
+    assert np.allclose(told, size, rtol=0.05), said
+
+
+def test_a_friction_that_is_halved_with_its_noise_is_said_to_be_one() -> None:
+    scene = baths.springs(3, steps=3000)
+    x = np.random.default_rng(6).standard_normal((3000, 3))
+    failed, said = failed_and_said(scene, loop(scene, x, c=0.5))
+    assert "draws-variance" in failed
+    assert "go with the momentum before them" in said
+    assert "the noise is" not in said
+
+
+@pytest.mark.parametrize(
+    ("made", "claimed"), [("baoa", "baoab"), ("baoab", "obabo"), ("bbk", "lammps-langevin")]
+)
+def test_a_right_thermostat_is_named_and_not_said_to_be_noisy(made: str, claimed: str) -> None:
+    """BAOA judged as BAOAB had noise "1.46 times as large as the temperature asks"."""
+    scene = baths.springs(3, steps=3000)
+    run = replace(driver.run(scene, f"own:{made}", seed=2), scheme=claimed)
+    failed, said = failed_and_said(scene, run)
+    assert failed
+    assert THERMOSTATS[made].title in said or f"{made} or" in said
+    assert "the noise is" not in said
+
+
+def test_what_a_scheme_may_be_is_no_cause_of_its_failure() -> None:
+    scene = baths.springs(3, steps=3000)
+    x = np.random.default_rng(8).uniform(-np.sqrt(3), np.sqrt(3), (3000, 3))
+    failed, said = failed_and_said(scene, loop(scene, x))
+    assert "draws-shape" in failed
+    assert said == ""
+
+
+def test_a_passed_verdict_does_not_say_that_draws_are_unlike_all_along() -> None:
+    scene = baths.springs(3, steps=3000)
+    for seed in range(1, 7):
+        for one in checks.judge(scene, driver.run(scene, "own:baoab", seed=seed)):
+            assert not (one.passed and "but not alike" in one.why)

@@ -120,6 +120,32 @@ def test_noise_that_cuda_wrote_passes_but_for_the_collisions(name: str, method: 
         assert failed(scene, finer)[seen] != failed(scene, run).get(seen)
 
 
+@pytest.mark.parametrize(
+    ("method", "number", "error"),
+    [
+        ("brownian", "p", 1e-7), ("langevin-middle-bath", "q", 1e-7), ("langevin-middle-bath", "p", 3e-6),
+        ("nose-hoover-bath", "q", 1e-5), ("nose-hoover-bath", "p", 1e-4),
+    ],
+)  # fmt: skip
+def test_an_error_above_the_rounding_of_forces_is_seen_in_mixed_in_a_bath(
+    method: str, number: str, error: float, need: Callable[[str], None]
+) -> None:
+    """There forces are floats, and the weights of a chain's step, and nothing else: three times what is just
+    seen, and what single precision hides."""
+    label = f"openmm:{method}@OpenCL-mixed"
+    need(label)
+    scene = scene_of("spring-uneven", bath=True)
+    run = driver.run(scene, engines.parse(label), seed=7)
+    assert failed(scene, run) == {}
+    moved = np.copy(getattr(run, number))
+    moved[100] *= 1 + error
+    off = replace(run, **{number: moved})
+    off = replace(off, energy=np.asarray(scene.system.energy(off.q, off.p)))
+    assert "noise-direction" in failed(scene, off)
+    single = engines.arithmetic(engines.parse(f"openmm:{method}@OpenCL-single"))
+    assert "noise-direction" not in failed(scene, replace(off, arithmetic=single))
+
+
 @pytest.mark.parametrize("method", ["mts-langevin", "nose-hoover-bath", "langevin-middle-bath"])
 def test_a_bath_on_opencl_is_judged_to_rounding(method: str, need: Callable[[str], None]) -> None:
     """MTSLangevinIntegrator is a CustomIntegrator, and a chain's kernel takes step and rate as floats."""

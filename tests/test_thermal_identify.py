@@ -500,3 +500,39 @@ def test_forces_off_by_a_random_factor_are_no_noise_of_a_scheme(off: float) -> N
     found = identify(h * np.arange(1000), x, v=u, mass=m)
     assert found.verdict != "named"
     assert found.candidates == ()
+
+
+@pytest.mark.parametrize("name", ["gj-ii", "gj-iii", "gj-iv", "gj-vii"])
+def test_numbers_of_a_stretched_step_have_the_errors_of_its_decay(name: str) -> None:
+    """Frequency and friction of GJ schemes had twelve digits, of which none or one was right."""
+    of = scene(3000)
+    off = []
+    for seed in (1, 2, 3):
+        made = driver.run(of, f"own:{name}", seed=seed)
+        found = identify_thermal(made.t, made.q[:, 0], made.p[:, 0] / M)
+        one = next(x for x in found.candidates if x.scheme == name)
+        off += [(one.omega - OMEGA) / one.omega_error, (one.friction - RATE) / one.friction_error]
+    assert 0.05 < np.sqrt(np.mean(np.square(off))) < 2.5
+
+
+def test_what_is_stated_contradicts_a_stretched_step() -> None:
+    of = scene(3000)
+    made = driver.run(of, "own:gj-iv", seed=4)
+    k, c = K, M * RATE
+    right = identify(made.t, made.q, made.p, mass=of.m, stiffness=k, friction=c)
+    assert right.scheme == "gj-iv"
+    assert right.fits
+    wrong = identify(made.t, made.q, made.p, mass=of.m, stiffness=30 * k, friction=3 * c)
+    assert not wrong.fits
+    assert f"where {30 * k:g} is stated" in wrong.statement
+    assert f"where {3 * c:.6g} is stated" in wrong.statement
+
+
+def test_a_frequency_has_no_more_digits_than_the_file() -> None:
+    of = scene(3000)
+    made = driver.run(of, "own:baoab", seed=5)
+    q, v = (np.round(x, 6) for x in (made.q, made.p / of.m))
+    found = next(x for x in identify(made.t, q, v=v, mass=of.m).candidates if x.scheme == "baoab")
+    digits = len(f"{found.omega[0]!r}".replace(".", "").lstrip("0"))
+    assert digits <= 7
+    assert np.isclose(found.omega[0], OMEGA, rtol=1e-4)

@@ -15,10 +15,11 @@ from springcheck.checks import driven, other
 from springcheck.checks.case import Case
 from springcheck.checks.requires import MAP, missing
 from springcheck.checks.steps import step_defect
-from springcheck.checks.thermal import reading
+from springcheck.checks.thermal import draws_particles, noise_direction, reading, thermostat
 from springcheck.physics.arrays import Floats, Reals
 from springcheck.thermal import THERMOSTATS
 from springcheck.thermal.catalogue import ENERGY_LEFT
+from springcheck.thermal.draws import Reading
 
 PUSH_ROUNDINGS = 64
 """Roundings of the positions whose difference is an impulse: of a free step, and of the frame as recorded."""
@@ -28,6 +29,9 @@ STANDARD_ERRORS = 6.0
 
 FEWEST_DRAWS = 50
 """Draws from which a size is reported: its standard error is a tenth then."""
+
+MOST_SIZES = 6
+"""Coordinates whose noise a cause tells."""
 
 FIT_ROUNDS = 20
 """Iterations of a fit whose weights are its own variances."""
@@ -45,7 +49,8 @@ def found(case: Case, shown: Callable[[], str] = str) -> str:
     run, system = case.trajectory, case.scene.system
     ways: list[Callable[[Case], str]] = []
     if run.every == 1 and run.scheme in THERMOSTATS:
-        ways = [_of_bath]
+        # of draws that are read by the map of another scheme the size says nothing
+        ways = [_of_bath, lambda case: shown(), _of_size]
     elif run.every == 1 and not missing(case, MAP):
         ways = [_of_differences, driven.found, _of_rods]
     # of one particle by itself states show more than which number is another
@@ -106,12 +111,12 @@ def _of_rods(case: Case) -> str:
 
 
 def _of_bath(case: Case) -> str:
-    """Draws that two coordinates share, or noise whose size is not the bath's."""
+    """Draws that two coordinates share or that come again, or a factor of momenta that is not the bath's."""
     seen = reading(case)
     if seen.rescaled is not None:
         return _rescaled(case, seen.rescaled)
     x = seen.draws
-    if not seen.known or x.size < FEWEST_DRAWS or not np.all(np.isfinite(x)):
+    if not _told(seen):
         return ""
     size = np.sqrt(np.mean(x * x))
     for i in range(x.shape[1]):
@@ -119,14 +124,47 @@ def _of_bath(case: Case) -> str:
             for words, sign in (("the same as", 1), ("the opposite of", -1)):
                 if np.all(np.abs(x[:, i] - sign * x[:, j]) <= SAME_DRAWS * size):
                     return f"the random numbers of coordinate {i} are {words} those of coordinate {j}"
-    of = x * x
-    error = np.std(of) / np.sqrt(of.size)
-    if abs(np.mean(of) - 1) > STANDARD_ERRORS * error:
-        return (
-            f"the noise is {size:.4g} +- {error / (2 * size):.1g} times as large as the temperature, the "
-            "masses and the friction ask"
-        )
+    # pairs of equal numbers, and the distance that most of them have
+    order = np.argsort(x[:, 0])
+    lags = np.abs(np.diff(order)[np.diff(x[order, 0]) <= SAME_DRAWS * size])
+    lag = int(np.argmax(np.bincount(lags, minlength=2)))
+    again = np.flatnonzero(np.all(np.abs(x[lag:] - x[:-lag]) <= SAME_DRAWS * size, axis=1)) if lag else lags
+    if len(again) >= FEWEST_DRAWS:
+        return f"the random numbers from row {lag + again[0]} on are those from row {again[0]} on, again"
     return ""
+
+
+def _told(seen: Reading) -> bool:
+    return seen.known and seen.draws.size >= FEWEST_DRAWS and bool(np.all(np.isfinite(seen.draws)))
+
+
+def _of_size(case: Case) -> str:
+    """Draws that hold a part of the momentum before them; else noise whose size is not the bath's, of each
+    coordinate where these are unlike, and of none where coordinates share draws."""
+    seen, rods = reading(case), case.scene.system.rods
+    if seen.rescaled is not None or not _told(seen) or noise_direction(case).passed is False:
+        return ""
+    of = seen.draws**2
+    mean, error = np.mean(of, axis=0), np.std(of, axis=0) / np.sqrt(len(of))
+    if not rods:
+        rows = max(thermostat(case).fresh, 1)
+        before = np.repeat(case.trajectory.p[-(len(of) // rows) - 1 : -1], rows, axis=0)
+        held = [float(np.corrcoef(x, y)[0, 1]) for x, y in zip(seen.draws.T, before.T, strict=True)]
+        i = int(np.argmax(np.abs(held)))
+        if abs(held[i]) * np.sqrt(len(of)) > STANDARD_ERRORS:
+            return (
+                f"the draws of coordinate {i} go with the momentum before them, with a correlation of "
+                f"{held[i]:+.2g}: the drag is not the one that the friction asks for"
+            )
+    if draws_particles(case).passed is False:
+        return ""
+    asked = "as large as the temperature, the masses and the friction ask"
+    sizes = [(np.mean(of), np.std(of) / np.sqrt(of.size)), *zip(mean, error, strict=True)]
+    told = [f"{np.sqrt(y):.4g} +- {e / (2 * np.sqrt(y)):.1g} times" for y, e in sizes]
+    if np.any(np.abs(mean - sizes[0][0]) > STANDARD_ERRORS * error):
+        more = ", ..." * (len(mean) > MOST_SIZES)
+        return f"the noise of the coordinates is {', '.join(told[1 : MOST_SIZES + 1])}{more} {asked}"
+    return f"the noise is {told[0]} {asked}" if abs(sizes[0][0] - 1) > STANDARD_ERRORS * sizes[0][1] else ""
 
 
 def _rescaled(case: Case, kinetic: Floats) -> str:

@@ -33,7 +33,7 @@ def rod_length(case: Case) -> Finding:
     rods, how = _rods(case), case.trajectory.arithmetic
     q = case.trajectory.q[1:].astype(np.longdouble)
     heated = case.law.has("random")
-    roundings = thermal.draws.roundings_of(thermostat(case), case.judged) if heated else case.roundings
+    roundings = thermal.rounding.roundings_of(thermostat(case), case.judged) if heated else case.roundings
     off = np.abs(rods.strain(q))
     bound = roundings * how.state * (1 + rods.magnitude(q)) + how.lengths
     worst = largest(off / bound)

@@ -19,7 +19,8 @@ from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory
 from springcheck.thermal import THERMOSTATS, Stepper, Thermostat, chance
 from springcheck.thermal.catalogue import NO_NORMAL_NUMBERS
-from springcheck.thermal.draws import LARGEST_DRAW, law_of, one_rounding, read, roundings_of
+from springcheck.thermal.draws import LARGEST_DRAW, law_of, read
+from springcheck.thermal.rounding import one_rounding, roundings_of
 from springcheck.thermal.stepper import Met, forces
 
 FEW = 8

@@ -71,7 +71,7 @@ def noise_direction(case: Case) -> Finding | str:
         assert bath is not None
         # of momenta, and of the links
         squares = scene.thermal * min(np.min(scene.m), scene.thermal / bath.friction**2)
-        if not squares > thermal.draws.SMALLEST / case.trajectory.arithmetic.unit:
+        if not squares > thermal.rounding.SMALLEST / case.trajectory.arithmetic.unit:
             return "squares of so small momenta underflow"
     found = reading(case)
     if found.across is None:
@@ -173,8 +173,8 @@ def draws_repeat(case: Case) -> Chance | str:
     """The draws of one step do not come again, nor opposite, any number of steps later."""
     if len(case.trajectory.t) < 1010:
         return "fewer than a thousand steps"
-    x = _drawn(case)
-    return Chance(thermal.chance.repeats(x), f"largest correlation of all lags, of {count(x.size, 'draw')}")
+    found, words = thermal.chance.repeats(x := _drawn(case))
+    return Chance(found, f"{words}, of {count(x.size, 'draw')}")
 
 
 @check("apart", family="noise", requires={"company", "every-step"})

@@ -23,12 +23,13 @@ from springcheck.physics import scenefile as scenes
 from springcheck.physics.arrays import Floats, Integers
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory
+from springcheck.thermal import THERMOSTATS
 
 MOST_FRAMES = 20_000
 """Most frames that are identified, from the first on: every step shows the scheme."""
 
-MOST_FAILED = 1000
-"""Most frames that are identified of a trajectory that has failed."""
+MOST_FAILED, MOST_RANDOM = 1000, 4000
+"""Most frames that are identified of a trajectory that has failed, and of one with noise."""
 
 MOST_OSCILLATORS = 16
 """Most moving coordinates that are identified."""
@@ -235,14 +236,20 @@ def sentence(run: Trajectory, mass: Floats, stiffness: Floats | None = None, *, 
     """One sentence that identifies a trajectory around a frame, for a failed verdict; "" where the states
     show nothing.  `stiffness` (n,) where each particle has a spring of its own."""
     chosen, _ = _chosen(run.q, run.p, [])
-    first = max(0, min(about - MOST_FAILED // 2, len(run.t) - MOST_FAILED))
-    frames = slice(first, first + MOST_FAILED)
+    most = MOST_RANDOM if run.scheme in THERMOSTATS else MOST_FAILED
+    first = max(0, min(about - most // 2, len(run.t) - most))
+    frames = slice(first, first + most)
     q, p = (x[frames, chosen] for x in (run.q, run.p))
     k = None if stiffness is None else stiffness[chosen]
     try:
         found = identify_arrays(run.t[frames], q, p, mass=mass[chosen], stiffness=k)
     except IdentificationError:
         return ""
+    if run.scheme in THERMOSTATS:
+        # that it is random is no cause, nor which schemes it may be of where its own is one of them
+        names = {x.scheme for x in found.candidates}
+        other = bool(names) and (run.scheme not in names or bool(found.explanations))
+        return found.statement if other or any(x.local for x in found.explanations) else ""
     # that they are of the scheme which they failed to be is no cause, but that they are so in single may be
     plain = found.precision in ("double", UNTOLD) or run.arithmetic.state > 2.0**-53
     return "" if plain and found.fits and run.scheme in (found.scheme, *found.aliases) else found.statement

@@ -166,11 +166,11 @@ def _against(one: Any, first: Thermal, h: float, m: float, stated: Mapping[str, 
     # where noise leaves a combination of the states alone, omega is as exact as the digits of the states
     stiff = max(2 * omega[0] * omega[1], first.misfit / step**2)
     found = {"step": (step, 0.0), "stiffness": (m * omega[0] ** 2, m * stiff)}
-    found["friction"] = (m * friction[0], m * friction[1])
+    found["friction c"] = (m * friction[0], m * friction[1])
     return [
-        f"{name} {x:.6g} where {given:.6g} is stated"
+        f"{name} {_rounded(x, error):.9g} where {given:.6g} is stated"
         for name, (x, error) in found.items()
-        if (given := stated.get(name)) is not None and (m or name == "step")
+        if (given := stated.get(name.partition(" ")[0])) is not None and (m or name == "step")
         if abs(x - given) > SURE * error + AGREES * abs(x)
     ]
 
@@ -186,7 +186,7 @@ def _said(
 ) -> Identification:
     """Identification by what each oscillator shows, of masses m (n,), in frames h [T] apart."""
     first = found[0]
-    each = [{y.scheme: y for y in one.candidates} for one in found]
+    each = [{y.scheme: _of_digits(y, one.misfit, h) for y in one.candidates} for one in found]
     rows = {name: [x[name] for x in each] for name in each[0] if all(name in x for x in each)}
     best = next(iter(rows), None)
     named = best is not None and all(one.named and one.candidates[0].scheme == best for one in found)
@@ -210,10 +210,10 @@ def _said(
     candidates = tuple(
         Candidate(
             scheme=name, aliases=(), stride=stride, step=h / stride, turns=0,
-            omega=tuple(y.omega if stride == first_stride[name] else math.nan for y in rows[name]),
-            stiffness=tuple(float(k * y.omega**2) for k, y in zip(m, rows[name], strict=True))
+            omega=tuple(_shown(y)[0] if stride == first_stride[name] else math.nan for y in rows[name]),
+            stiffness=tuple(_shown(y, float(k))[1] for k, y in zip(m, rows[name], strict=True))
             if with_mass and not joined and stride == first_stride[name] else None,
-            friction=tuple(y.friction if stride == first_stride[name] else math.nan for y in rows[name]),
+            friction=tuple(_shown(y)[2] if stride == first_stride[name] else math.nan for y in rows[name]),
             law="of the bath",
         )
         for name in kept
@@ -319,6 +319,29 @@ def _numbers(name: str, one: Any, m: float | None) -> str:
     return f"{_with_strides(name, one.strides[:1])}: " + ", ".join(
         f"{word} {_measured(x, error)}" for word, x, error in of if math.isfinite(x)
     )
+
+
+def _of_digits(y: Any, misfit: float, h: float) -> Any:
+    """A candidate whose omega is no more exact than the digits of frames h [T] apart, by the `misfit` of what
+    they leave free of noise."""
+    if not misfit > FREE_OF_NOISE:
+        return y
+    step = h / y.strides[0]
+    least = misfit / (2 * step * max(y.omega * step, math.sqrt(misfit)))
+    return replace(y, omega_error=float(np.maximum(y.omega_error, least)))
+
+
+def _shown(y: Any, m: float = 1.0) -> tuple[float, float, float]:
+    """Frequency, stiffness of a mass m and friction rate of a candidate, to one digit beyond their errors."""
+    of_k = 2 * m * y.omega * y.omega_error
+    return (
+        _rounded(y.omega, y.omega_error), _rounded(m * y.omega**2, of_k),
+        _rounded(y.friction, y.friction_error),
+    )  # fmt: skip
+
+
+def _rounded(x: float, error: float) -> float:
+    return float(_measured(x, error).partition(" ")[0])
 
 
 def _measured(x: float, error: float) -> str:

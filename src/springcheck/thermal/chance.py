@@ -30,6 +30,12 @@ MISSED = 0.05
 USUAL = 1e-8
 """Chance of a largest draw below, and of one above, the range that the report gives as usual."""
 
+REJECTED = 1e-6
+"""Chance below which what comes and goes is mentioned: a verdict fails by it where it is the only one."""
+
+FEWEST_AGAIN = 40
+"""Fewest numbers of which an exact repetition shows: their sum of squares is sqrt(40) standard deviations."""
+
 FEW_TIMES = 30.0
 """How much of its usual sum of squares what foretells may lack before it is seen less well."""
 
@@ -135,7 +141,7 @@ def steady(one: Statistic, z: Floats) -> Statistic:
 
     def law(n: int, one: Statistic, inside: tuple[float, str], sums: Floats) -> tuple[float, str]:
         (found, words), (chance, period) = one.found, min(inside, _periodic(sums, "pieces"))
-        return min(1.0, 2 * min(found, chance)), words + period * (chance < found)
+        return min(1.0, 2 * min(found, chance)), words + period * (chance < min(found, REJECTED))
 
     def join(a: Sums, b: Sums) -> Sums:
         return a[0] + b[0], (1.0, ""), np.concatenate([a[2], b[2]])
@@ -325,19 +331,27 @@ def count(hits: int, n: int, p: float) -> Statistic:
     return Statistic(draws=n, sums=(hits,), law=law, limits=limits)
 
 
-def repeats(x: Floats) -> float:
-    """Chance of the largest autocorrelation of draws x (f, n), taken one after the other, row by row: of each
-    number and any that comes more than n later.
+def repeats(x: Floats) -> tuple[float, str]:
+    """Chance of the largest autocorrelation of draws x (f, n), taken one after the other, row by row, and the
+    correlation in words: of each number and any that comes more than n later.
 
-    Each is nearly normal, more so the longer the record; ten times its chance stands for the difference.
+    Of numbers more than half a record apart the sum is normal given the first ones; others are nearly normal,
+    more so the longer the record: ten times its chance stands for the difference.
     """
     f, n = len(x), x.size // len(x)
-    padded = np.fft.rfft(x.ravel(), 2 * x.size)
-    sums = np.fft.irfft(np.abs(padded) ** 2)[n + 1 : n * (f // 2)]
-    if f < 1000 or not np.all(np.isfinite(sums)):
-        return 1.0
-    sizes = np.sqrt(x.size - np.arange(n + 1, n * (f // 2)))
-    return min(1.0, 10 * len(sums) * of_normal(float(np.max(np.abs(sums) / sizes))))
+    flat = x.ravel()
+    lags = np.arange(n + 1, x.size - FEWEST_AGAIN)
+    if f < 1000 or not np.all(np.isfinite(flat)):
+        return 1.0, "largest correlation of all lags"
+    sums = np.fft.irfft(np.abs(np.fft.rfft(flat, 2 * x.size)) ** 2)[lags]
+    both = x.size - lags
+    z = sums / np.sqrt(np.where(lags < both, both, np.cumsum(flat * flat)[both - 1]))
+    at = int(np.argmax(np.abs(z)))
+    lag = lags[at]
+    size = math.sqrt(float(np.sum(flat[:-lag] ** 2) * np.sum(flat[lag:] ** 2)))
+    later = f"{lag // n} rows" if lag % n == 0 else f"{lag} numbers, of {n} a row,"
+    words = f"largest correlation {sums[at] / size:+.2e}, with those {later} later"
+    return min(1.0, 10 * len(lags) * of_normal(float(z[at]))), words
 
 
 MOST_PAIRED = 512

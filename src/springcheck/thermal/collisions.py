@@ -97,7 +97,7 @@ def _fitted(changes: Floats, known: Floats) -> tuple[bool, Floats, Floats]:
     sizes = np.std(rest, axis=0)
     drawn = len(changes) >= FEWEST_OF_EACH and bool(np.max(sizes) > NO_COLLISION)
     for x in (rest / sizes).T[sizes > NO_COLLISION] if drawn else ():
-        one = min(chance.neighbours(x[:, None]).chance, chance.repeats(x[:, None]), chance.together(x))
+        one = min(chance.neighbours(x[:, None]).chance, chance.repeats(x[:, None])[0], chance.together(x))
         drawn = drawn and one > LEAST_CHANCE
     return drawn, np.asarray(entries), rest
 

@@ -6,23 +6,19 @@ acts in two steps, they overdetermine it: the residual is rounding, at every ste
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from springcheck.physics.arrays import Arithmetic, Extended, Floats, Force, Reals
+from springcheck.physics.arrays import Arithmetic, Extended, Floats, Reals
 from springcheck.physics.scene import Scene
-from springcheck.physics.term import Term
 from springcheck.thermal.catalogue import ENERGY_LEFT, Thermostat, value_of
 from springcheck.thermal.jointly import MOST_JOINTLY, independent_sums, jointly
 from springcheck.thermal.laws import Law
-from springcheck.thermal.stepper import Met, Stepper, forces
-
-PER_ACT, IN_AND_OUT = 6, 4
-"""Roundings of a stage at most (a force 4, its product and sum 2), and of the first and last state."""
+from springcheck.thermal.rounding import SMALLEST, one_rounding, roundings_of
+from springcheck.thermal.stepper import Stepper, forces
 
 HOTTEST = 1e4
 """Noncentrality of a chi-squared distribution up to which its rank is computed to all digits."""
@@ -35,9 +31,6 @@ the contradictions of the frames from there on."""
 
 LARGEST_DRAW = 8.0
 """Size that no draw of a run of a few steps exceeds: the chance is 1e-15 for each."""
-
-SMALLEST = np.longdouble(np.finfo(np.float64).smallest_normal)
-"""Loss of an operation to underflow: at rest at 0 nothing else rounds."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -100,45 +93,11 @@ def read(
     return _Reader(scheme, scene, how or Arithmetic(), rebuilt).read(q, p)
 
 
-def roundings_of(scheme: Thermostat, scene: Scene) -> int:
-    """Roundings along one step; those of rods as `schemes.roundings` counts them."""
-    acts = scheme.held if scene.system.rods else scheme.acts
-    return IN_AND_OUT + sum({"shake": 12, "project": 8}.get(act.kind, PER_ACT) for act in acts)
-
-
-def one_rounding(
-    scene: Scene, sizer: Stepper, start: tuple[Reals, Reals], draws: Sequence[Any], hit: Any,
-    how: Arithmetic, rebuilt: bool, met: list[Met] | None = None,
-) -> tuple[Extended, Extended]:  # fmt: skip
-    """One rounding of everything that a step of absolute values adds up, of q and of p (..., n).
-
-    `met` is what rods have met in the step itself.
-    """
-    assert scene.bath is not None
-    size, unit, x = np.abs(start[0]), how.unit, scene.bath.friction * abs(scene.step)
-    once = unit * roundings_of(sizer.scheme, scene)
-
-    def pull(terms: Sequence[Term]) -> Force:
-        plain, lost = scene.system.magnitude(terms=terms), how.quantum * scene.system.pulls(terms)
-        # each term's force on a particle is truncated once in a kick, and lost below the quantum, no more
-        return lambda q, p: (of := plain(q, p)) + np.minimum(lost, of) / once
-
-    sizes = forces(sizer.scheme, scene.system, pull)
-    loose = how.lengths / once
-    q, p = sizer(size, np.abs(start[1]), sizes, draws, hit, met=met, loose=loose)
-    if how.cancels:
-        # coefficients of all that is added to q, and of p
-        lost = max(x, 1 / x) ** how.cancels
-        q, p = q + lost * (q - size), p + lost * p
-    if rebuilt:
-        p = p + scene.m * q / abs(scene.step)
-    return np.asarray(unit * q + SMALLEST), np.asarray(unit * p + SMALLEST)
-
-
 class _Reader:
     def __init__(self, scheme: Thermostat, scene: Scene, how: Arithmetic, rebuilt: bool) -> None:
         self.scheme, self.scene, self.how, self.rebuilt = scheme, scene, how, rebuilt
-        self.stepper = Stepper.of(scheme, scene, single=how.parameters == "single")
+        real = np.float32 if how.force > how.state else np.float64
+        self.stepper = Stepper.of(scheme, scene, single=how.parameters == "single", real=real)
         self.sizer = Stepper.of(scheme, scene, absolute=True)
         self._force = forces(scheme, scene.system)
         self.roundings = roundings_of(scheme, scene)
@@ -254,7 +213,7 @@ class _Reader:
             if M * i * np.max(np.diag(squares)) > LOST**2:
                 across[i:] = UNTOLD
                 break
-            moved = 1e4 * self.how.unit * (usual + np.abs(state[:M]))
+            moved = 1e4 * self.how.state * (usual + np.abs(state[:M]))
             stepper.chain = np.repeat(state[:, None], M + 1, axis=1)
             stepper.chain[range(M), range(1, M + 1)] += moved
             both = np.stack(stepper(q[i], np.tile(p[i], (M + 1, 1)), self._force, []))
@@ -269,7 +228,7 @@ class _Reader:
             off = np.abs(np.stack([q[i + 1], p[i + 1]]) - both[:, 0])
             across[i] = np.max(off / (of * hidden), axis=0)
             twice = np.sum(np.maximum(p[i] ** 2, both[1, 0] ** 2) / m)
-            new = self.how.unit * chain.rounding(state, twice, part * h, **about)
+            new = self.how.state * chain.rounding(state, twice, part * h, **about)
             # and those of the momenta that it begins from
             new[0] += part * h * self.roundings * np.sum(2 * np.abs(both[1, 0]) * of[1] / m)
             J = ((after[:M, 1:] - after[:M, :1]) / moved * usual / usual[:, None]).astype(np.float64)

@@ -62,7 +62,7 @@ def grows(left: Floats, *places: Floats) -> bool:
 
 def is_white(x: Floats) -> bool:
     """Whether residuals (f,) tell nothing of later ones."""
-    return min(chance.neighbours(x[:, None]).chance, chance.repeats(x[:, None])) > WHITE
+    return min(chance.neighbours(x[:, None]).chance, chance.repeats(x[:, None])[0]) > WHITE
 
 
 def is_of_digits(x: Floats) -> bool:

@@ -17,7 +17,8 @@ import numpy as np
 from springcheck.physics.arrays import Arithmetic, Extended, Floats, Reals
 from springcheck.physics.scene import Scene
 from springcheck.thermal.catalogue import Thermostat
-from springcheck.thermal.draws import Reading, one_rounding, roundings_of
+from springcheck.thermal.draws import Reading
+from springcheck.thermal.rounding import one_rounding, roundings_of
 from springcheck.thermal.stepper import Met, Stepper, forces
 
 SMALL_DRAW = 1e-4

@@ -39,6 +39,12 @@ NOISE = 1e-3
 COARSE = 0.01
 """Ratio of a file's rounding to the noise, from which on it hides whether a step had a collision."""
 
+STANDARD_ERRORS = 5.0
+"""Standard errors of a fitted decay that bound its error."""
+
+SMALL_CHANGE = 1e-4
+"""Relative change of a friction over which its effect is linear."""
+
 UNIT_ROOT = 20.0
 """Bias and spread of a root that is 1, in units of 1 over the number of frames."""
 
@@ -287,7 +293,7 @@ def _decay(q: Floats, v: Floats) -> tuple[float, float, float]:
     z = np.stack([(x - np.mean(x)) / np.std(x) for x in (q, v)])
     A, n = np.linalg.lstsq(z[:, :-1].T, z[:, 1:].T, rcond=None)[0], len(q)
     decay = float(np.linalg.det(A))
-    error = 5 * float(np.sqrt(max(1 - decay * decay, 0.0) / n)) + UNIT_ROOT / n
+    error = STANDARD_ERRORS * float(np.sqrt(max(1 - decay * decay, 0.0) / n)) + UNIT_ROOT / n
     return decay, 2 - 2 * float(np.trace(A)) / (1 + decay), error
 
 
@@ -297,21 +303,31 @@ def _as_gj(
     """What a GJ scheme would mean by the null vector (1, -t, -1, -t), of a decay and an (h w)**2 of its
     stretched step that are known to an error, the latter to two such in its trace and its determinant; t
     leaves an (h w)**2 of 0 known to `least`."""
+
+    def stretched(x: Any) -> tuple[Any, Any]:
+        stretch = np.sqrt(2 * GJ[number].lost(x) / (GJ[number].both(x) * x))
+        return stretch, 4 * (1 - stretch * h / (2 * t)) / stretch**2
+
     x = np.geomspace(1e-9, 1e4, 4000)
     if near := _rate(GJ[number], decay):
         x = np.append(x, near)
     with np.errstate(all="ignore"):
-        stretch = np.sqrt(2 * GJ[number].lost(x) / (GJ[number].both(x) * x))
-        a = 4 * (1 - stretch * h / (2 * t)) / stretch**2
+        stretch, a = stretched(x)
         fits = (a > -least) & (np.abs(a * stretch**2 - slow) <= 4 * error)
         off = np.where(fits, np.abs(GJ[number](x) - decay), np.inf)
     best = int(np.argmin(off))
     if not off[best] <= error:
         return None
-    # GJ-I does not stretch, and knows its spring whatever its friction
-    known = 0.0 if number == "i" else nan
-    omega = float(np.sqrt(max(a[best], 0.0)) / h)
-    return Candidate(scheme=f"gj-{number}", omega=omega, omega_error=known, friction=float(x[best] / h))
+    # what a friction that is off by its standard error makes of the decay, and of the spring; GJ-I does not
+    # stretch, and knows its spring whatever its friction
+    ends = x[best] * (1 + np.array([-SMALL_CHANGE, SMALL_CHANGE]))
+    rate = error / STANDARD_ERRORS * np.ptp(ends) / max(float(np.ptp(GJ[number](ends))), 1e-300)
+    of_a = 0.0 if number == "i" else float(np.ptp(stretched(ends)[1]) / np.ptp(ends) * rate)
+    turn = float(np.sqrt(max(a[best], 0.0)))
+    return Candidate(
+        scheme=f"gj-{number}", omega=turn / h, omega_error=of_a / (2 * h * max(turn, of_a**0.5, 1e-300)),
+        friction=float(x[best] / h), friction_error=float(rate / h),
+    )  # fmt: skip
 
 
 def _of_no_memory(q: Floats, v: Floats, close: float, carried: bool) -> tuple[str, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -36,8 +37,9 @@ class Stepper:
 
     `rate` is the friction rate gamma [1/T], > 0; `thermal` is kT [M L2/T2].  A chain swings on from step to
     step, at rest before the first, beside so many `freedoms`, one for each mass by default; with `single` it
-    keeps its step and its rate so.  Rods `hold` where the scheme says so.  With `absolute` every difference
-    is taken as a sum of sizes: a unit roundoff of these, times the roundings of a step, bounds its rounding.
+    keeps its step and its rate so, and its weights are `real`.  Rods `hold` where the scheme says so.  With
+    `absolute` every difference is taken as a sum of sizes: a unit roundoff of these, times the roundings of a
+    step, bounds its rounding.
     """
 
     @classmethod
@@ -52,15 +54,17 @@ class Stepper:
     def __init__(
         self, scheme: Thermostat, *, h: float, m: Reals, rate: Reals | float, thermal: float, width: Any,
         absolute: bool = False, freedoms: int = 0, hold: Rods | None = None, single: bool = False,
+        real: Any = np.float64,
     ) -> None:  # fmt: skip
         self.scheme, self.h, self.m = scheme, width(h), np.asarray(m, width)
         if scheme.chain:
             kept, times = (np.float32, scheme.chain.times) if single else (width, 1)
+            chain = replace(scheme.chain, weights=tuple(map(float, map(real, scheme.chain.weights))))
             # a part of the step, and the square of the rate, are rounded as those are
             freedoms, self._clock = freedoms or self.m.size, width(kept(h) / kept(times)) * times
             Q = scheme.chain.masses(freedoms, width(thermal), kept(rate))
             self.of_chain = {"freedoms": freedoms, "thermal": width(thermal), "Q": Q}
-            self.chain, self._swing = scheme.chain.start().astype(width), scheme.chain.swing
+            self.chain, self._swing = chain.start().astype(width), chain.swing
         self._hold, acts = hold, scheme.held if hold else scheme.acts
         x = np.asarray(self.h * width(rate), width)
         self.collision = np.asarray(-np.expm1(-x), np.float64)[()]

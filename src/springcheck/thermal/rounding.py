@@ -1,0 +1,68 @@
+"""Rounding of one step of a random scheme: its running error bound, and the number of roundings."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from springcheck.physics.arrays import Arithmetic, Extended, Force, Reals
+from springcheck.physics.scene import Scene
+from springcheck.physics.term import Term
+from springcheck.thermal.catalogue import Thermostat
+from springcheck.thermal.stepper import Met, Stepper, forces
+
+PER_ACT, IN_AND_OUT = 6, 4
+"""Roundings of a stage at most (a force 4, its product and sum 2), and of the first and last state."""
+
+SMALLEST = np.longdouble(np.finfo(np.float64).smallest_normal)
+"""Loss of an operation to underflow: at rest at 0 nothing else rounds."""
+
+
+def roundings_of(scheme: Thermostat, scene: Scene) -> int:
+    """Roundings along one step; those of rods as `schemes.roundings` counts them."""
+    acts = scheme.held if scene.system.rods else scheme.acts
+    return IN_AND_OUT + sum({"shake": 12, "project": 8}.get(act.kind, PER_ACT) for act in acts)
+
+
+def one_rounding(
+    scene: Scene, sizer: Stepper, start: tuple[Reals, Reals], draws: Sequence[Any], hit: Any,
+    how: Arithmetic, rebuilt: bool, met: list[Met] | None = None,
+) -> tuple[Extended, Extended]:  # fmt: skip
+    """One rounding of everything that a step of absolute values adds up, of q and of p (..., n).
+
+    `met` is what rods have met in the step itself.
+    """
+    assert scene.bath is not None
+    size, unit, x = np.abs(start[0]), how.state, scene.bath.friction * abs(scene.step)
+    once, wide = unit * roundings_of(sizer.scheme, scene), how.force / unit * (how.force > unit)
+    loose = how.lengths / once
+    fine: list[Reals] = []
+
+    def pull(terms: Sequence[Term], *, first: bool) -> Force:
+        plain, lost = scene.system.magnitude(terms=terms), how.quantum * scene.system.pulls(terms)
+
+        def of(q: Reals, p: Reals) -> Reals:
+            sizes = plain(q, p)
+            if first:
+                fine.append(sizes)
+                return sizes
+            # each term's force on a particle is truncated once in a kick, and lost below the quantum, no more
+            bound = sizes + np.minimum(lost, sizes) / once
+            return np.asarray(bound + wide * fine.pop(0)) if wide else bound
+
+        return of
+
+    # the error of a coarse force is no size of the next: sizes without it come first
+    for first in [True, False] if wide else [False]:
+        sizes = forces(sizer.scheme, scene.system, partial(pull, first=first))
+        q, p = sizer(size, np.abs(start[1]), sizes, draws, hit, met=met, loose=loose)
+    if how.cancels:
+        # coefficients of all that is added to q, and of p
+        lost = max(x, 1 / x) ** how.cancels
+        q, p = q + lost * (q - size), p + lost * p
+    if rebuilt:
+        p = p + scene.m * q / abs(scene.step)
+    return np.asarray(unit * q + SMALLEST), np.asarray(unit * p + SMALLEST)
