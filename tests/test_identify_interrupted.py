@@ -211,3 +211,35 @@ def test_frames_of_a_cause_are_those_of_the_run() -> None:
     """Of a long run a part about the first step off is looked at, in which frames have other numbers."""
     scene, run = interrupted("spring-uneven", 1400, lambda n, p: p * (1.01 if n == 1000 else 1))
     assert "at frame 599; frames are counted from frame 401 of the run" in judged(scene, run)
+
+
+@pytest.mark.parametrize("every", [1, 4])
+def test_steps_of_the_scheme_in_another_number_are_a_cause(every: int) -> None:
+    """Four substeps of h/4 were no cause at all, as the name of the scheme agrees."""
+    scene, run = right("spring-uneven", 80, every)
+    assert sentence(run, scene.m, np.array([2.9])) == ""
+    finer = driver.run(scene.derived(step=scene.step / 4, steps=320, every=4 * every), run.label)
+    said = sentence(replace(finer, every=every, step=scene.step), scene.m, np.array([2.9]))
+    assert said.startswith(f"Velocity Verlet, {4 * every} steps to a frame")
+    assert said.endswith(", of 0.025 and not of 0.1")
+
+
+def test_the_exact_flow_has_no_step_that_is_another() -> None:
+    scene, run = right("spring-uneven", 80, 4)
+    q, p = true_motion(scene, 4 * np.arange(len(run.t)), scene.step)
+    flow = replace(run, q=q.astype(np.float64), p=p.astype(np.float64), scheme="exact")
+    assert identify(flow.t, flow.q, flow.p, mass=3.7, stiffness=2.9).scheme == "exact"
+    assert sentence(flow, scene.m, np.array([2.9])) == ""
+
+
+def test_a_stepper_of_four_substeps_is_said_to_be_one() -> None:
+    def substeps(q: Any, p: Any, h: float, force: Any, mass: Any) -> Any:
+        for _ in range(4):
+            p = p + h / 8 * force(q)
+            q = q + h / 4 * p / mass
+            p = p + h / 8 * force(q)
+        return q, p
+
+    scene = right("spring-uneven", 80)[0]
+    run = replace(springcheck.simulate(scene, substeps), scheme="velocity-verlet")
+    assert "Velocity Verlet, 4 steps to a frame" in judged(scene, run)

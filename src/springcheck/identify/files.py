@@ -255,6 +255,9 @@ def sentence(
             first > 0 and "frame" in found.statement
         )
         return f"{found.statement}{of}"
+    # the exact flow of a frame is that of its steps
+    if found.stride not in (None, run.every) and not schemes.scheme(run.scheme).flow:
+        return f"{found.statement}, of {found.step:.9g} and not of {run.step:.9g}"
     return "" if plain else found.statement
 
 
