@@ -60,6 +60,23 @@ def test_without_a_stated_stiffness_every_scheme_of_the_map_is_said_with_its_amp
     assert "0.43 cos(0.87 t + 0.6) by implicit midpoint" in why
 
 
+def test_a_drive_of_which_no_scheme_is_told_is_one_for_each_unit_of_mass_too() -> None:
+    """0.43 on a mass of 3.7 that is not stated was "about 0.12", as of a force."""
+    q, v, states = 0.3, 0.7 / 3.7, []
+    for n in range(401):
+        states.append((q, v))
+        # the second half kick takes the drive at another time
+        drives = [0.43 * np.cos(1.37 * (n + x) * 0.1 + 0.6) for x in (0, 0.37)]
+        v += 0.05 * (drives[0] - 2.9 * q) / 3.7
+        q += 0.1 * v
+        v += 0.05 * (drives[1] - 2.9 * q) / 3.7
+    q, v = np.array(states).T
+    found = springcheck.identify(0.1 * np.arange(401), q, v=v)
+    assert "about 0.12 cos(1.37 t + 0.63) for each unit of mass, or" in found.statement
+    found = springcheck.identify(0.1 * np.arange(401), q, v=v, mass=3.7, stiffness=2.9)
+    assert "about 0.43 cos(1.37 t + 0.63), the phase" in found.statement
+
+
 @pytest.mark.parametrize(("name", "frequency"), [("mathieu-stable", 1.3723), ("mathieu-tongue", 1.7706)])
 def test_a_modulated_stiffness_is_said_to_first_order(name: str, frequency: float) -> None:
     why = said(scenes.load_scene(name), "own:velocity-verlet", mass=3.7, stiffness=2.9)

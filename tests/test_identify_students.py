@@ -55,6 +55,16 @@ def test_a_frame_twice_or_missing_is_no_rounding_of_tidy_times(h: float, kept: l
         identify(t, q, v=v)
 
 
+def test_the_frame_at_which_a_restart_takes_another_step_is_named() -> None:
+    """It was any, as all intervals are as far from their mean."""
+    rows = states(verlet, 0.07, 301)
+    rows[150:, 0] = rows[150, 0] + 0.05 * np.arange(151)
+    with pytest.raises(
+        IdentificationError, match=r"150 and 151 are 0\.05 apart, and the two before them 0\.07"
+    ):
+        seen(rows)
+
+
 @pytest.mark.parametrize(("h", "form"), [(1 / 30, ".3f"), (1 / 3, ".1f"), (math.pi / 50, ".4f")])
 @pytest.mark.parametrize("step", [verlet, kick_drift])
 def test_times_of_few_digits_beside_states_of_all_name_no_wrong_cause(

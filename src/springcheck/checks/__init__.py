@@ -39,7 +39,7 @@ from springcheck.checks.replayed import energy_gain, replay
 from springcheck.checks.requires import CONTRACTED, REQUIREMENTS
 from springcheck.checks.rods import rod_length, rod_velocity, turn
 from springcheck.checks.solver import tolerance, tolerance_bound
-from springcheck.checks.steps import BLIND, arithmetic, border, bridges, first_off, step_defect
+from springcheck.checks.steps import BLIND, arithmetic, border, bridges, step_defect
 from springcheck.errors import MethodError
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Limits, Trajectory, Verdict
@@ -48,7 +48,7 @@ from springcheck.text.wording import STATES_SHOW
 __all__ = [
     "ALL", "BLIND", "CHECKS", "CONTRACTED", "RANDOM", "SPECIAL", "STATES_SHOW", "TELLING", "THOROUGH",
     "Bench", "Case", "Check", "Run", "angular_momentum", "arithmetic", "bridges", "cause_of",
-    "closed_form", "energies", "experiments_of", "first_off", "frequency", "judge", "judge_thoroughly",
+    "closed_form", "energies", "experiments_of", "frequency", "judge", "judge_thoroughly",
     "momentum", "not_judged", "shadow_energy", "shared", "start", "status", "step_defect", "summary",
     "tolerance", "tolerance_bound", "worst",
 ]  # fmt: skip
@@ -110,11 +110,15 @@ def summary(verdicts: Sequence[Verdict]) -> str:
 
 
 def explained(
-    scene: Scene, run: Trajectory, verdicts: Sequence[Verdict], shown: Callable[[Scene, Trajectory, int], str]
+    scene: Scene,
+    run: Trajectory,
+    verdicts: Sequence[Verdict],
+    shown: Callable[[Scene, Trajectory, int, bool], str],
 ) -> list[Verdict]:
     """The verdicts, the first failed one with its cause appended, by the states around its first step off.
 
-    `shown(scene, run, frame)` is that sentence, "" where the states show nothing.
+    `shown(scene, run, frame, few)` is that sentence, "" where the states show nothing; if few steps are off
+    it is of these alone.
     """
     first = next((v for v in verdicts if v.passed is False and v.check in TELLING), None)
     if first is None:
@@ -123,7 +127,7 @@ def explained(
     from springcheck.checks import causes
 
     case = Case(trajectory=run, scene=scene)
-    said = causes.found(case, lambda: shown(scene, run, first_off(case) or 0))
+    said = causes.found(case, lambda first, few: shown(scene, run, first, few))
     why = f"{first.why}{STATES_SHOW}{said}" if said else first.why
     return [replace(v, why=why) if v is first else v for v in verdicts]
 

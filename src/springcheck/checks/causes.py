@@ -14,7 +14,7 @@ import numpy as np
 from springcheck.checks import driven, other
 from springcheck.checks.case import Case
 from springcheck.checks.requires import MAP, missing
-from springcheck.checks.steps import step_defect
+from springcheck.checks.steps import seldom_off, step_defect
 from springcheck.checks.thermal import draws_particles, noise_direction, reading, thermostat
 from springcheck.physics.arrays import Floats, Reals
 from springcheck.thermal import THERMOSTATS
@@ -44,7 +44,7 @@ SAME_DRAWS = 1e-6
 
 
 @np.errstate(all="ignore")
-def found(case: Case, shown: Callable[[], str] = str) -> str:
+def found(case: Case, shown: Callable[[int, bool], str] = lambda *_: "") -> str:
     """The cause in one sentence, or "" where nothing known here, nor what the states show, explains them."""
     run, system = case.trajectory, case.scene.system
     ways: list[Callable[[Case], str]] = []
@@ -54,9 +54,10 @@ def found(case: Case, shown: Callable[[], str] = str) -> str:
     elif run.every == 1 and not missing(case, MAP):
         ways = [_of_differences, driven.found, _of_rods]
     # of one particle by itself states show more than which number is another
-    looks: list[Callable[[Case], str]] = [lambda case: shown(), other.found]
+    first, few = seldom_off(case)
+    looks: list[Callable[[Case], str]] = [lambda _: shown(first, bool(few)), other.found]
     ways += looks if system.is_linear and system.is_separate else reversed(looks)
-    return next(filter(None, (way(case) for way in ways)), "")
+    return next(filter(None, (way(case) for way in ways)), few)
 
 
 def _of_differences(case: Case) -> str:

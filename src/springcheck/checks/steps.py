@@ -17,7 +17,7 @@ from springcheck.checks.stretch import Stretch, known
 from springcheck.physics import exact
 from springcheck.physics.arrays import Arithmetic, Floats, Integers, Reals
 from springcheck.physics.trajectory import Limits
-from springcheck.text.wording import count
+from springcheck.text.wording import count, regularly
 
 
 def bridges(case: Case) -> bool:
@@ -193,14 +193,32 @@ def _sees(case: Case, bound: Floats, told: NDArray[np.bool_]) -> tuple[Limits, s
     return sight.of_steps(case, told, part)
 
 
-def first_off(case: Case) -> int | None:
-    """The first frame that is not the scheme's own after the frame before; None where none is."""
+SELDOM = 0.25
+"""Largest share of frames off that something which acts in some steps alone explains."""
+
+STANDS_APART = 64.0
+"""Ratio to the bound from which frames off stand apart: of what acts in every step, and keeps the bound in
+three of four, none is so far above it."""
+
+
+def seldom_off(case: Case) -> tuple[int, str]:
+    """The first frame that is not the scheme's own after the frame before, 0 where none is; and where few
+    are, and far off, so that nothing which acts in every step explains them, a sentence on these."""
     if missing(case, MAP):
-        return None
+        return 0, ""
     case = case.clocked
     bound, told = _allowed(case)
-    off = ~(_in_roundings(case, case.trajectory.q[1:], case.trajectory.p[1:]) <= bound) & told
-    return int(np.argmax(off)) + 1 if np.any(off) else None
+    seen = _in_roundings(case, case.trajectory.q[1:], case.trajectory.p[1:]) / bound
+    off = ~(seen <= 1) & told
+    first, number, of = int(np.argmax(off)) + 1, int(np.count_nonzero(off)), int(np.count_nonzero(told))
+    if not 0 < number <= SELDOM * of or np.any(seen[off] <= STANDS_APART):
+        return first * (number > 0), ""
+    where = f"{'the first ' * (number > 1)}at step {case.steps[first]}{_regularly(case, off)}"
+    does = "does not follow" if number == 1 else "do not follow"
+    return first, (
+        f"{number} of {of} frames {does} from the one before, {where}, and all others do to rounding: "
+        "something acts there alone"
+    )
 
 
 def _where(case: Case, off: NDArray[np.bool_]) -> str:
@@ -208,8 +226,13 @@ def _where(case: Case, off: NDArray[np.bool_]) -> str:
     if not np.any(off):
         return ""
     step, number = case.steps[int(np.argmax(off)) + 1], int(np.count_nonzero(off))
-    several = f"the first of {number} frames off is at step {step}"
+    several = f"the first of {number} frames off is at step {step}{_regularly(case, off)}"
     return f"; {several}" if number > 1 else f"; one frame is off, at step {step}"
+
+
+def _regularly(case: Case, off: NDArray[np.bool_]) -> str:
+    """How often runs of frames that are off (f-1,) begin, if it is regular."""
+    return regularly(case.steps[1:][off & ~np.append(False, off[:-1])].tolist(), "step")
 
 
 STILL = "standing still would pass: rounding may be as large as"

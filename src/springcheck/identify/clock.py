@@ -61,9 +61,13 @@ def clock_of(t: Floats) -> Clock:
     if quantum is None:
         quantum = next((x for x in grids[: 1 + single] if off[worst] <= (4 + MOST_ADDED / 2) * x), None)
     if quantum is None:
+        each = np.diff(wide)
+        change = np.abs(np.diff(each))
+        # of changes there and back, which roundings alone tell apart, the first
+        at = int(np.argmax(change >= np.max(change) - 4 * even))
         raise IdentificationError(
-            f"the states are not at a constant interval: frames {worst} and {worst + 1} are "
-            f"{float(wide[worst + 1] - wide[worst]):.9g} apart, the mean is {float(interval):.9g}; "
+            f"the states are not at a constant interval: frames {at + 1} and {at + 2} are "
+            f"{float(each[at + 1]):.9g} apart, and the two before them {float(each[at]):.9g}; "
             "give a part of the trajectory with one interval"
         )
     jitter = quantum / abs(float(span)) + ROUNDING

@@ -126,7 +126,7 @@ def said(e: Evidence, forced: bool, turn: float) -> str:
     unit = float(e.found.size[1]) / float(e.record.interval) ** 2
     unit *= 1.0 if e.record.mass is None else float(e.record.mass[e.j])
     about = [
-        f"about {_wave((x[3, 1] - 1j * x[4, 1]) * unit, y / float(e.record.interval), '.2g', '.6g')}"
+        f"about {_wave((x[3, 1] - 1j * x[4, 1]) * unit, y / float(e.record.interval), '.2g', '.6g')}{of}"
         for y, x in drives
     ]
     return f": {', or '.join(about)}{more}, the phase at the first frame"

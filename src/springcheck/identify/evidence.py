@@ -26,6 +26,9 @@ LEFT_BY_ROUNDING = 64
 FIXED = LEFT_BY_ROUNDING * 2.0**-52
 """The same residual in double precision, relative to the state."""
 
+SPARE = 6
+"""Degrees of freedom of each row that a map of all coordinates has to leave."""
+
 AGREES = 1e-6
 """Relative difference up to which a number from a map agrees with a known or stated one."""
 

@@ -65,6 +65,13 @@ def _vague(e: Evidence) -> Explanation:
     )
 
 
+def _misplaced(e: Evidence) -> Explanation | None:
+    """Misplaced numbers, which make two bad pairs of a frame: none where one map of all coordinates holds but
+    for single pairs."""
+    found = misplaced(e)
+    return found and (broken(e, regular=True) or found)
+
+
 def _solver(e: Evidence) -> Explanation | None:
     """The exact solution to within a tolerance: an adaptive or high-order solver."""
     if min(regression(e, law).left for law in (laws.PARITY, laws.POWERS)) < 1 / FALLS:
@@ -213,7 +220,7 @@ def _unexplained(e: Evidence, counted: float) -> Explanation:
 
 
 SEARCHED = (
-    misplaced, partial(alone, laws.DRY), memory, few_bad_frames, two_parts, broken,
+    _misplaced, partial(alone, laws.DRY), memory, few_bad_frames, two_parts, broken,
     partial(alone, laws.COUPLED), lasting, _solver,
 )  # fmt: skip
 """Causes of the map's residuals, in the order in which they are looked for; `_law` comes last."""

@@ -232,9 +232,12 @@ def _turns_back(arm: Floats) -> bool:
     return bool(near and np.min(along) < -RIGID * np.max(along))
 
 
-def sentence(run: Trajectory, mass: Floats, stiffness: Floats | None = None, *, about: int = 0) -> str:
+def sentence(
+    run: Trajectory, mass: Floats, stiffness: Floats | None = None, *, about: int = 0, few: bool = False
+) -> str:
     """One sentence that identifies a trajectory around a frame, for a failed verdict; "" where the states
-    show nothing.  `stiffness` (n,) where each particle has a spring of its own."""
+    show nothing.  `stiffness` (n,) where each particle has a spring of its own; `few` if the steps are the
+    scheme's own but for a few, which no cause explains that acts in every step."""
     chosen, _ = _chosen(run.q, run.p, [])
     most = MOST_RANDOM if run.scheme in THERMOSTATS else MOST_FAILED
     first = max(0, min(about - most // 2, len(run.t) - most))
@@ -250,18 +253,28 @@ def sentence(run: Trajectory, mass: Floats, stiffness: Floats | None = None, *, 
         names = {x.scheme for x in found.candidates}
         other = bool(names) and (run.scheme not in names or bool(found.explanations))
         return found.statement if other or any(x.local for x in found.explanations) else ""
+    if few and not any(x.local for x in found.explanations[:1]):
+        return ""
     # that they are of the scheme which they failed to be is no cause, but that they are so in single may be
     plain = found.precision in ("double", UNTOLD) or run.arithmetic.state > 2.0**-53
-    return "" if plain and found.fits and run.scheme in (found.scheme, *found.aliases) else found.statement
+    if not (found.fits and run.scheme in (found.scheme, *found.aliases)):
+        of = f"; frames are counted from frame {first} of the run" * (
+            first > 0 and "frame" in found.statement
+        )
+        return f"{found.statement}{of}"
+    # the exact flow of a frame is that of its steps
+    if found.stride not in (None, run.every) and not schemes.scheme(run.scheme).flow:
+        return f"{found.statement}, of {found.step:.9g} and not of {run.step:.9g}"
+    return "" if plain else found.statement
 
 
-def shown(scene: Scene, run: Trajectory, about: int) -> str:
-    """One sentence that identifies a run around a frame; "" where nothing is known of it."""
+def shown(scene: Scene, run: Trajectory, about: int, few: bool = False) -> str:
+    """One sentence that identifies a run around a frame, `few` as in `sentence`; "" where none is known."""
     if not scene.system.is_linear:
         return seen_to_take(scene, run, about)
     alone = scene.system.is_separate
     k = scene.system.hessian_diagonal(scene.q).astype(np.float64) if alone else None
-    said = sentence(run, scene.m, k, about=about)
+    said = sentence(run, scene.m, k, about=about, few=few)
     # springs couple the particles of a scene that has them
     return said if alone or not said.startswith(str(COUPLED.cause).partition(":")[0]) else ""
 

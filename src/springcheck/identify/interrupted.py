@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -10,15 +11,24 @@ from numpy.typing import NDArray
 
 from springcheck.identify.coarse import is_white
 from springcheck.identify.compare import compare
-from springcheck.identify.evidence import FALLS, LEFT_BY_ROUNDING, SINGLE_ROOM, Evidence, Measured, matched
+from springcheck.identify.evidence import (
+    AGREES,
+    FALLS,
+    LEFT_BY_ROUNDING,
+    SINGLE_ROOM,
+    SPARE,
+    Evidence,
+    Measured,
+    matched,
+)
 from springcheck.identify.families import FAMILIES, OF_HALF_A_STEP_AGO, VERLET, titles
 from springcheck.identify.fit import Map, fit
-from springcheck.identify.hypothesis import FEW, Joint, distinct
+from springcheck.identify.hypothesis import FEW, Joint, Match, distinct
 from springcheck.identify.maps import powers, unit
 from springcheck.identify.result import Explanation
 from springcheck.identify.storage import ROUNDING
 from springcheck.physics.arrays import Extended, Floats
-from springcheck.text.wording import count, few
+from springcheck.text.wording import count, few, regularly
 
 FEW_BAD = 0.06
 """Largest share of bad pairs."""
@@ -30,7 +40,7 @@ LARGER = 10.0
 """Ratio of sizes of frames from which an anharmonic force, or noise of one size, shows in some alone."""
 
 HALF_STEP = 1e-3
-"""Relative difference up to which a residual is half a step's kick."""
+"""Relative difference up to which a residual is half a step's kick, or kicks are one."""
 
 AT_AN_END = 3
 """Bad pairs among the smallest, or largest, `AT_AN_END` times as many pairs are there by no chance."""
@@ -40,6 +50,15 @@ OF_ROUNDING = 8.0
 
 LEFT_BY_ALL = 1e-10
 """Largest residual of a map of all coordinates, relative to their sizes, that is rounding."""
+
+OFTEN_BAD = 0.25
+"""Largest share of bad pairs that are single ones, equally far apart: that is no chance."""
+
+DRAWS = 256
+"""Most draws of pairs of a coupled motion: of 13 pairs, a tenth of all bad, one in 4 has no bad one."""
+
+NUMBER = re.compile(r"[-+]?\d[\d.]*(e[-+]\d+)?")
+"""Numbers in a cause, without which interruptions of one kind are the same."""
 
 FEWEST_PAIRS = 8
 """Fewest pairs beside the bad ones, and of those that move."""
@@ -126,18 +145,20 @@ def few_bad_frames(e: Evidence) -> Explanation | None:
         # what is left of the rest is no arithmetic's, and makes its map so uncertain that wrong schemes fit
         whose = ""
     runs = np.split(bad, np.flatnonzero(np.diff(bad) > 1) + 1)
-    spacing = set(np.diff([run[0] for run in runs]).tolist())
     ranks = np.argsort(np.argsort(size))[bad]
     several = len(runs) > 1 and float(np.max(size)) > LARGER * float(np.min(size))
     if several and float(np.max(ranks)) < AT_AN_END * len(bad):
         # several interruptions, all where the motion is smallest: an error of one size, which shows there
         return None
-    cause, remedy = _interruption(e, found, runs[0], whose)
-    if len(runs) > 2 and len(spacing) == 1:
-        cause = f"{cause}, and so every {spacing.pop()} steps"
-    elif len(runs) > 1:
-        at = ", ".join(str(run[0] + 1) for run in runs[1:5])
-        cause = f"{cause}, and {len(runs) - 1} more like it, at frame{'s' * (len(runs) > 2)} {at}"
+    # what happens at the last frame does not show
+    known = runs[:-1] if len(runs) > 1 and bad[-1] == e.pairs - 1 else runs
+    told = [_interruption(e, found, [run], whose, fitting) for run in known]
+    alike = len({NUMBER.sub("", one) for one, _ in told}) == 1
+    cause, remedy = _interruption(e, found, runs, whose, fitting) if alike else told[0]
+    at = ", ".join(str(run[0] + 1) for run in runs[1:5])
+    more = f", and {len(runs) - 1} more{' like it' if alike else ', not all like it'}, at frame"
+    regular = regularly([int(run[0]) for run in runs]) if alike else ""
+    cause += regular or f"{more}{'s' * (len(runs) > 2)} {at}" * (len(runs) > 1)
     largest = float(np.min(size[bad])) > max(float(np.max(size[kept])) / 2, LARGER * middle)
     if (len(bad) > 1 and largest) or (several and float(np.min(ranks)) >= e.pairs - AT_AN_END * len(bad)):
         cause = (
@@ -179,32 +200,63 @@ def two_parts(e: Evidence) -> Explanation | None:
     return None
 
 
-def broken(e: Evidence) -> Explanation | None:
-    """A few bad pairs of a coupled motion: one map of all coordinates takes every other frame to the next."""
+def broken(e: Evidence, *, regular: bool = False) -> Explanation | None:
+    """A few bad pairs of a coupled motion, equally far apart if `regular`: one map of all coordinates takes
+    every other frame to the next.  It is that of a few pairs drawn at random, none of which is bad."""
     moving, record = e.record.moving, e.record
     z = np.concatenate([record.q[:, moving], record.v[:, moving]], axis=1).astype(np.float64)
     quanta = np.concatenate([record.q_quantum[:, moving], record.v_quantum[:, moving]], axis=1)
     size = np.maximum(np.max(np.abs(z), axis=0), np.finfo(np.float64).tiny)
     columns, ends = np.column_stack([z[:-1] / size, np.ones(e.pairs)]), z[1:] / size
-    part, room = e.pairs // 3, LEFT_BY_ALL + 32 * float(np.max(quanta / size))
-    if len(moving) < 2 or part < 2 * columns.shape[1]:
+    part, room = columns.shape[1] + SPARE, LEFT_BY_ALL + 32 * float(np.max(quanta / size))
+    if len(moving) < 2 or e.pairs < 2 * part:
         return None
-    for begin in (0, part, 2 * part):
-        kept = np.arange(e.pairs) // part == begin // part
-        for _ in range(2):
-            off = np.max(np.abs(ends - columns @ np.linalg.lstsq(columns[kept], ends[kept])[0]), axis=1)
-            left = float(np.max(off[kept]))
+    rng = np.random.default_rng(0)
+    for _ in range(DRAWS):
+        kept = np.isin(np.arange(e.pairs), rng.choice(e.pairs, part, replace=False))
+        for _ in range(3):
+            x = np.linalg.lstsq(columns[kept], ends[kept])[0]
+            missed = ends - columns @ x
+            off = np.max(np.abs(missed), axis=1)
+            if not (left := float(np.max(off[kept]))) < room:
+                break
             kept = off <= LARGER**2 * max(left, ROUNDING)
-        bad = np.flatnonzero(~kept)
-        if left < room and 0 < len(bad) <= max(3, FEW_BAD * e.pairs):
-            runs = np.split(bad, np.flatnonzero(np.diff(bad) > 1) + 1)
-            at = [f"from frame {x[0]} to {x[-1] + 1}" for x in runs]
-            return Explanation(
-                f"The coupled motion is that of one map of all coordinates, but not {few(at, 3)}",
-                "look at how those frames are written, at the start and at restarts, or leave them out",
-                local=True,
-            )
-    return None
+        # of two maps one has most pairs, and no other draw finds that of more
+        if left < room and 2 * np.count_nonzero(kept) > e.pairs:
+            break
+    else:
+        return None
+    bad = np.flatnonzero(~kept)
+    runs = np.split(bad, np.flatnonzero(np.diff(bad) > 1) + 1)
+    single = len(bad) == len(runs)
+    often = regularly(bad.tolist()) if single else ""
+    most = OFTEN_BAD * e.pairs if often else 0 if regular else max(3, FEW_BAD * e.pairs)
+    if not 0 < len(bad) <= most:
+        return None
+    at = [f"from frame {x[0]} to {x[-1] + 1}" for x in runs]
+    where = at[0] + often if often else few(at, 3)
+    what = _at_once(z[bad + 1], missed[bad] * size) if single else ""
+    return Explanation(
+        f"The coupled motion is that of one map of all coordinates, but not {where}{what}",
+        "look at what happens there: a restart, how those frames are written, or what acts at them alone, as "
+        "a removed drift of the centre of mass; or leave them out",
+        local=True,
+    )
+
+
+def _at_once(states: Floats, off: Floats) -> str:
+    """What happens to all velocities in states (r, 2n) that are `off` one map by this much; "" if nothing is
+    common to them."""
+    (q, v), (dq, dv) = (np.split(x, 2, axis=1) for x in (states, off))
+    v, moved = v - dv, AGREES * np.max(np.abs(dv), axis=1, keepdims=True)
+    factor = float(np.sum(dv * v)) / max(float(np.sum(v * v)), 1e-300)
+    if np.max(np.abs(dq)) * np.max(np.abs(v)) > np.max(moved) * np.max(np.abs(q)):
+        return ""
+    if np.all(np.abs(dv - factor * v) <= moved):
+        return f": there all velocities are multiplied by {1 + factor:.6g}"
+    alike = np.all(np.abs(dv - np.mean(dv, axis=1, keepdims=True)) <= moved)
+    removed = "all velocities change by the same, as where the drift of the centre of mass is removed"
+    return f": there {removed}" if alike else ""
 
 
 def _damped(found: Map, e: Evidence) -> str:
@@ -217,9 +269,12 @@ def _damped(found: Map, e: Evidence) -> str:
     return f" of {titles(x.scheme for x in every)} with {law}"
 
 
-def _interruption(e: Evidence, found: Map, run: NDArray[np.intp], whose: str) -> tuple[str, str]:
-    """Cause and remedy of consecutive bad pairs, by the map of the other frames."""
-    z, b = found.z, found.entries
+def _interruption(
+    e: Evidence, found: Map, runs: list[NDArray[np.intp]], whose: str, fitting: list[Match]
+) -> tuple[str, str]:
+    """Cause and remedy of the first of several runs of consecutive bad pairs, by the map of the other frames,
+    which is that of `fitting` schemes; of kicks, those of all of them."""
+    z, b, run = found.z, found.entries, runs[0]
     first, last = int(run[0]), int(run[-1])
 
     def near(x: Extended, y: Extended) -> bool:
@@ -250,9 +305,9 @@ def _interruption(e: Evidence, found: Map, run: NDArray[np.intp], whose: str) ->
             cause = f"{but} frame {at}, the last, is wrong: {_amount(off, to)}"
             return cause, "look at how the last frame is written"
         back = np.linalg.lstsq(b.astype(np.float64), off)[0]
-        for kick, state, when in ((back, from_, first), (off, to, at)):
+        for kick, later in ((back, False), (off, True)):
             if abs(kick[0]) < 1e-2 * abs(kick[1]):
-                return _kicked(e, found, float(kick[1]), float(state[0]), when, whose)
+                return _kicked(e, found, np.array([x[0] for x in runs]), later, whose, fitting)
         size = max(float(np.max(np.abs(back))), 1e-16)
         jumps = f"The motion{whose} jumps by {size:.1e} of its size between frames {first} and {at}, as"
         if (digits := round(-math.log10(size))) < 1:
@@ -273,22 +328,38 @@ def _interruption(e: Evidence, found: Map, run: NDArray[np.intp], whose: str) ->
     return cause, f"look at what happens there, or give the part {part} it"
 
 
-def _kicked(e: Evidence, found: Map, kick: float, q: float, at: int, whose: str) -> tuple[str, str]:
-    """Cause and remedy of one kick of the velocity at a frame of position `q`, in units of its size."""
-    for match in matched(found, e.terms):
+def _kicked(
+    e: Evidence, found: Map, bad: NDArray[np.intp], later: bool, whose: str, fitting: list[Match]
+) -> tuple[str, str]:
+    """Cause and remedy of kicks of the velocity in the `bad` pairs (r,), after their steps if `later`, else
+    before: what they have in common, or their range."""
+    begin, ends = found.z[bad], found.z[bad] @ found.entries.T
+    off = (found.z[bad + 1] - ends).astype(np.float64)
+    kick = (off if later else np.linalg.solve(found.entries.astype(np.float64), off.T).T)[:, 1]
+    q, v = found.z[bad + later, 0].astype(np.float64), (ends if later else begin)[:, 1].astype(np.float64)
+    at, room = int(bad[0]) + later, np.maximum(e.unit[bad], HALF_STEP * np.abs(kick))
+    but, look = f"The motion is one{whose}, but", "look for what acts at that step alone"
+    for match in fitting:
         # half a step of the force there, T h F/m = -a s q of s steps: what a leapfrog is early by
         half = match.a * match.stride * q * float(found.size[0] / found.size[1]) / 2
-        if abs(abs(kick) - abs(half)) < HALF_STEP * abs(half):
-            side = "before" if kick * half > 0 else "after"
+        side = np.sign(kick[0] * half[0])
+        if np.all(np.abs(kick - side * half) < HALF_STEP * np.abs(half)):
             return (
-                f"The motion is one{whose}, but from frame {at} on its velocity is that of half a step {side}"
-                ", as after a restart from a leapfrog's velocities",
+                f"{but} from frame {at} on its velocity is that of half a step "
+                f"{'before' if side > 0 else 'after'}, as after a restart from a leapfrog's velocities",
                 "move a leapfrog's velocities by half a kick where they are read, or restart with one scheme",
             )
-    size = kick * float(found.size[1] / e.record.interval)
+    sizes, factor = (
+        kick * float(found.size[1] / e.record.interval),
+        float(kick @ v) / max(float(v @ v), 1e-300),
+    )
+    if len(kick) == 1 or np.all(np.abs(kick - np.mean(kick)) <= room):
+        return f"{but} for one kick of {sizes[0]:+.3g} of the velocity at frame {at}", look
+    if np.all(np.abs(kick - factor * v) <= room):
+        return f"{but} its velocity is multiplied by {1 + factor:.6g} at frame {at}", look
     return (
-        f"The motion is one{whose}, but for one kick of {size:+.3g} of the velocity at frame {at}",
-        "look for what acts at that step alone",
+        f"{but} for kicks of {np.min(sizes):+.3g} to {np.max(sizes):+.3g} of the velocity at frame {at}",
+        look,
     )
 
 

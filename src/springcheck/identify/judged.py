@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from springcheck.errors import IdentificationError
-from springcheck.identify.evidence import FIXED, Measured
+from springcheck.identify.evidence import FIXED, SPARE, Measured
 from springcheck.identify.fit import Map, fit
 from springcheck.identify.hypothesis import SURE
 from springcheck.identify.noise import least_squares
@@ -144,9 +144,6 @@ def _uncoupled(record: Record, maps: dict[int, Map]) -> Record | None:
     found = _modes(record, list(maps))
     return found[0] if found is not None and found[1] <= 1e-3 * single else None
 
-
-SPARE = 6
-"""Degrees of freedom of each row that a map of all coordinates has to leave."""
 
 SAME_MODE = 1e-5
 """Relative difference of eigenvalues below which any combination of two modes is one."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 
 STATES_SHOW = ". What the states show: "
 """Separator between the reason of a failed verdict and its cause."""
@@ -24,6 +25,12 @@ def few(names: Sequence[str], most: int, joint: str = ", ") -> str:
     """The first names, and how many more there are: a, b and 3 more."""
     more = len(names) - most
     return joint.join(names[:most]) + (f" and {more} more" if more > 0 else "")
+
+
+def regularly(at: Sequence[int], what: str = "frame") -> str:
+    """How often something is that is in at least three places, equally far apart; "" where it is not so."""
+    apart = {b - a for a, b in pairwise(at)}
+    return f", and so every {count(apart.pop(), what)}" if len(at) > 2 and len(apart) == 1 else ""
 
 
 def either(names: Sequence[str]) -> str:
