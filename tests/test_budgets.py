@@ -10,19 +10,19 @@ import springcheck
 HOME = Path(springcheck.__file__).parent
 
 BUDGETS = {
-    ("physics",): 7034,
+    ("physics",): 7052,
     ("schemes",): 1651,
-    ("thermal",): 3201,
+    ("thermal",): 3214,
     ("engines/own",): 1648,
     ("engines/openmm", "engines/ase", "engines/sundials"): 1326,
     ("engines",): 2817,
     ("driver", "conformance", "doors"): 1257,
-    ("checks",): 5128,
+    ("checks",): 5179,
     ("identify",): 8789,
-    ("formats", "store"): 5260,
+    ("formats", "store"): 5338,
     ("studies",): 1478,
     ("studies/*",): 9803,
-    ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 7110,
+    ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 7124,
 }
 """Lines of each room, or of several: of an engine in one file, and of what all studies share, in the first
 folder."""

@@ -63,7 +63,9 @@ def _of_differences(case: Case) -> str:
         right, size = made + kick * run.step * case.system.force(q, p), np.abs(p) + np.abs(made)
         if rods := case.system.rods:
             right, size = rods.projected(q, right), np.max(size, axis=1, keepdims=True)
-        off = np.abs(p - right) / (DIFFERENCE_ROUNDINGS * run.arithmetic.state)
+        # and those of decimals, of the positions that are subtracted too
+        half = run.arithmetic.recorded(m, n * run.step, True)[1]
+        off = (np.abs(p - right) - half) / (DIFFERENCE_ROUNDINGS * run.arithmetic.state)
         are = not run.rebuilds_velocity and np.all(off <= size)
         if are and step_defect(replace(case, trajectory=replace(run, rebuilds_velocity=True))).passed:
             return (

@@ -244,7 +244,7 @@ def sentence(run: Trajectory, mass: Floats, stiffness: Floats | None = None, *, 
     except IdentificationError:
         return ""
     # that they are of the scheme which they failed to be is no cause, but that they are so in single may be
-    plain = found.precision in ("double", UNTOLD) or run.arithmetic.state > 2.0**-53
+    plain = found.precision in ("double", UNTOLD) or not run.arithmetic.is_double
     return "" if plain and found.fits and run.scheme in (found.scheme, *found.aliases) else found.statement
 
 
