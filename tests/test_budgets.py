@@ -18,7 +18,7 @@ BUDGETS = {
     ("engines",): 2817,
     ("driver", "conformance", "doors"): 1257,
     ("checks",): 5179,
-    ("identify",): 8789,
+    ("identify",): 8815,
     ("formats", "store"): 5338,
     ("studies",): 1478,
     ("studies/*",): 9803,
