@@ -19,7 +19,7 @@ BUDGETS = {
     ("driver", "conformance", "doors"): 1257,
     ("checks",): 5179,
     ("identify",): 8815,
-    ("formats", "store"): 5338,
+    ("formats", "store"): 5341,
     ("studies",): 1478,
     ("studies/*",): 9803,
     ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 7124,

@@ -322,12 +322,14 @@ def test_which_columns_have_fixed_decimals() -> None:
         found = fixed([[x, y] for x, y in zip(cells[::2], cells[1::2], strict=True)], [0], [1])
         return found and (found.q, found.v, found.beside)
 
-    assert of("0.12345678", "1.00", "-0.02345678", "1.25", "2.10000000", "2.50") == (5e-9, 5e-3, 2.0**-53)
+    assert of("0.12345678", "1.00", "-0.02345678", "0.25", "2.10000000", "2.50") == (5e-9, 5e-3, 2.0**-53)
     # the start is written otherwise, and a number that does not change has the decimals of those that do
     assert of("0.5", "0.00000000", "0.49876543", "0.00000000", "0.01234567", "0.00000000") == (
         5e-9, 5e-9, 2.0**-53,
     )  # fmt: skip
     assert of("0.5", "0.0", "0.49876543", "0.0", "0.01234567", "0.0") == (5e-9, 0.0, 2.0**-53)
+    # of one decade they may be digits
+    assert of("0.5", "1", "0.4987654", "2", "0.1234567", "3") == (5e-8, 0.5, 0.5)
     # digits are relative, and so are exponents
     assert of("0.12345678", "1", "1.2345678", "2", "0.012345678", "3e-3") is None
     assert of("1.2345678e-01", "1e0", "2.2345678e+00", "2e1", "1.2345678e+01", "3e0") is None

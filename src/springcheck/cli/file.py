@@ -271,8 +271,8 @@ def as_trajectory(
         each = " and ".join(f"{np.max(x):.1g}" for x in (fixed.q, fixed.v))
         of = "positions and " + ("velocities" if states.p is None else "momenta")
         notes.append(f"{of} are rounded to decimals, by up to {each}, and judged to that")
-    elif states.roundoff > 2.0**-53:
-        notes.append(f"numbers are written to {states.roundoff:.1g}, and judged to that")
+    if (unit := fixed.beside if fixed else states.roundoff) > 2.0**-53:
+        notes.append(f"numbers are written to {unit:.1g}, and judged to that")
     steps = (len(q) - 1) * every
     if steps != scene.steps:
         notes.append(f"ends after step {steps:,}, the scene after {scene.steps:,}")
@@ -304,8 +304,7 @@ def as_trajectory(
     else:
         # a line that is no axis is rounded in each of its coordinates
         off_axis = beside if beside > 8 * states.roundoff else None
-        state = fixed.beside if fixed else states.roundoff
-        arithmetic = Arithmetic(name=AS_WRITTEN, state=state, written=halves if fixed else ((), ()))
+        arithmetic = Arithmetic(name=AS_WRITTEN, state=unit, written=halves if fixed else ((), ()))
         tolerance = scene.tolerance if schemes.scheme(scheme).has("adaptive") else None
         run = Trajectory(**known, arithmetic=arithmetic, off_axis=off_axis, tolerance=tolerance)
         if tolerance is not None:

@@ -172,6 +172,9 @@ def fixed(rows: Sequence[Sequence[str]], q: Iterable[int], v: Iterable[int]) -> 
             halves[part] = max(halves[part], half)
             known.add(most)
             single &= bool(np.all(rest <= half))
+            if len(cells) < FEWEST_CELLS or np.ptp(places):
+                # numbers of one decade without their last zeros may be of as many digits
+                coarse += [i] if np.ptp(digits[places == most]) == 0 else []
         else:
             coarse.append(i)
             single &= roundoff(rows, [i]) > 2.0**-53 or not np.any(rest)
