@@ -342,3 +342,28 @@ def test_a_view_of_another_file_is_refused_and_the_program_ends_in_order() -> No
     assert (done.returncode, done.stdout) == (2, b"")
     assert b"shows another file, other.h5" in done.stderr
     assert done.stderr.count(b"\n") == 1
+
+
+def test_decimals_of_momenta_are_known_where_velocities_are_made_of_them(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """ASE's velocities are momenta over masses in other units, and seemed to be doubles of no scheme."""
+    ase, extxyz = pytest.importorskip("ase"), pytest.importorskip("ase.io.extxyz")
+    q, p = np.array([[0.83, -0.2, 0.4], [-0.47, 0.3, 0.1]]), np.array([[0.7, 0.1, -0.3], [0.2, -0.4, 0.5]])
+    m, k, c, h = (np.array([[x], [y]]) for x, y in ((3.7, 9.2), (2.9, 4.1), (0.9, 1.3), (0.07, 0.07)))
+    v, frames = p / m, []
+    for i in range(401):
+        atoms = ase.Atoms("He2", positions=q, masses=m[:, 0], info={"time": i * 0.07 / ase.units.fs})
+        atoms.set_velocities(v)
+        frames.append(atoms)
+        v = v - h / 2 * k * q / m
+        q = q + h / 2 * v
+        v = np.exp(-c / m * h) * v
+        q = q + h / 2 * v
+        v = v - h / 2 * k * q / m
+    with Path("x.xyz").open("w") as out:
+        extxyz.write_xyz(out, frames)
+    assert main(["identify", "x.xyz"]) == 0
+    said = capsys.readouterr().out
+    assert said.startswith("x.xyz: langevin-middle\n")
+    assert "text, 8 decimals" in said

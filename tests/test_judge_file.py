@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import clean
-from springcheck import driver
+from springcheck import driver, schemes
 from springcheck.cli import file, main
 from springcheck.errors import StoreError
-from springcheck.physics import scenefile
+from springcheck.formats.tables import fixed
+from springcheck.physics import scenefile, terms
 from springcheck.physics.arrays import Floats
-from springcheck.physics.trajectory import Verdict
+from springcheck.physics.scene import Scene
+from springcheck.physics.trajectory import Trajectory, Verdict
+from springcheck.studies.faults import steppers
 
 SCENE = scenefile.load_scene("spring-uneven")
 RUN = driver.run(SCENE, "own:velocity-verlet")
@@ -50,8 +54,6 @@ def test_frames_that_the_scene_does_not_ask_for_are_no_fact_of_its_grid(tmp_path
 
 
 def test_twice_as_many_steps_are_none_either(tmp_path: Path) -> None:
-    from dataclasses import replace
-
     run = driver.run(replace(SCENE, steps=2 * SCENE.steps), "own:velocity-verlet")
     found, notes = verdicts(tmp_path, np.c_[run.t, run.q, run.p])
     assert found["grid"].passed is None
@@ -251,3 +253,86 @@ def test_a_table_of_an_adaptive_solver_is_no_failure_and_cannot_be_judged(
     text = " ".join(capsys.readouterr().out.split())
     assert "tolerance: the file does not say what tolerance its solver has" in text
     assert "0 failed" in text
+
+
+PULLED = clean.walls(np.array([2.9, 4.1]), np.zeros(2))
+DECIMALS = {
+    "verlet": ("velocity-verlet", (), 1),
+    "every third frame": ("velocity-verlet", (), 3),
+    "joined": (
+        "velocity-verlet",
+        (terms.Spring(a=PULLED.i[:1], b=PULLED.i[1:], k=np.array([3.1]), rest=np.array([0.2])),),
+        1,
+    ),
+    "damped": ("langevin-middle", (terms.Damping(i=PULLED.i, c=np.array([0.9, 2.0])),), 1),
+    "implicit": ("implicit-midpoint", (), 1),
+    "quartic": ("rk4", (terms.Quartic(i=PULLED.i, b=np.ones(2), at=np.zeros(2)),), 1),
+}
+
+
+def in_text(path: Path, run: Trajectory, of_q: str, of_v: str, m: Floats, wrong: float = 0.0) -> Path:
+    """A table of positions and velocities in these formats; one position is off in one frame."""
+    rows = np.c_[run.t, run.q, run.p / m]
+    rows[30, 1] += wrong
+    n = len(m)
+    names = ",".join(["t", *(f"q{i}" for i in range(n)), *(f"v{i}" for i in range(n))])
+    np.savetxt(path, rows, fmt=["%.17g"] + n * [of_q] + n * [of_v], delimiter=",", header=names, comments="")
+    return path
+
+
+def failing(path: Path, scene: Scene, scheme: str) -> list[str]:
+    found = file.judge(path, scene=scene, scheme=scheme).verdicts
+    return [v.reason for v in found if v.passed is False and v.check in ("step-defect", "noise-direction")]
+
+
+@pytest.mark.parametrize("name", DECIMALS)
+def test_decimals_are_half_a_unit_off_however_small_a_number_is(tmp_path: Path, name: str) -> None:
+    """Relative to each number, right files failed at turning points, by 2 to 10 times what was allowed."""
+    scheme, more, every = DECIMALS[name]
+    m, q, p = np.array([3.7, 1.3]), np.array([0.83, -0.47]), np.array([0.7, 0.2])
+    scene = clean.scene(m, (PULLED, *more), q, p, step=0.07, steps=60 * every, every=every)
+    run = steppers.record(scene, schemes.scheme(scheme), steppers.textbook(scene, schemes.scheme(scheme)))
+    for of_v in ("%.10f", "%.17g"):
+        assert failing(in_text(tmp_path / "a.csv", run, "%.10f", of_v, m), scene, scheme) == []
+        assert failing(in_text(tmp_path / "a.csv", run, "%.10f", of_v, m, 4e-10), scene, scheme), of_v
+    # of few digits the other numbers have a relative rounding beside it
+    assert failing(in_text(tmp_path / "a.csv", run, "%.10f", "%.9e", m), scene, scheme) == []
+
+
+@pytest.mark.parametrize("scheme", ["baoab", "gj-i", "nose-hoover"])
+def test_decimals_of_a_bath_are_half_a_unit_off(tmp_path: Path, scheme: str) -> None:
+    scene = replace(scenefile.load_scene("bath-spring"), steps=100, every=1)
+    run = driver.run(scene, f"own:{scheme}")
+    assert failing(in_text(tmp_path / "a.csv", run, "%.9f", "%.9f", scene.m), scene, scheme) == []
+    wrong = in_text(tmp_path / "a.csv", run, "%.9f", "%.9f", scene.m, 5e-9)
+    assert failing(wrong, scene, scheme)
+
+
+def test_a_program_in_single_precision_may_print_decimals_that_hold_its_numbers(tmp_path: Path) -> None:
+    rows = np.c_[RUN.t, np.float32(RUN.q), np.float32(RUN.p)].astype(np.float64)
+    for digits, state in (("%.6f", 2.0**-24), ("%.10f", 2.0**-24), ("%.17g", None)):
+        np.savetxt(tmp_path / "a.csv", rows, fmt=digits, delimiter=",", header="t,q,p", comments="")
+        found = file.states_in(tmp_path / "a.csv").fixed
+        assert (found and found.beside) == state
+        assert failing(tmp_path / "a.csv", SCENE, "velocity-verlet") == []
+
+
+def test_which_columns_have_fixed_decimals() -> None:
+    def of(*cells: str) -> tuple[float, float, float] | None:
+        found = fixed([[x, y] for x, y in zip(cells[::2], cells[1::2], strict=True)], [0], [1])
+        return found and (found.q, found.v, found.beside)
+
+    assert of("0.12345678", "1.00", "-0.02345678", "0.25", "2.10000000", "2.50") == (5e-9, 5e-3, 2.0**-53)
+    # the start is written otherwise, and a number that does not change has the decimals of those that do
+    assert of("0.5", "0.00000000", "0.49876543", "0.00000000", "0.01234567", "0.00000000") == (
+        5e-9, 5e-9, 2.0**-53,
+    )  # fmt: skip
+    assert of("0.5", "0.0", "0.49876543", "0.0", "0.01234567", "0.0") == (5e-9, 0.0, 2.0**-53)
+    # of one decade they may be digits
+    assert of("0.5", "1", "0.4987654", "2", "0.1234567", "3") == (5e-8, 0.5, 0.5)
+    # digits are relative, and so are exponents
+    assert of("0.12345678", "1", "1.2345678", "2", "0.012345678", "3e-3") is None
+    assert of("1.2345678e-01", "1e0", "2.2345678e+00", "2e1", "1.2345678e+01", "3e0") is None
+    full = [repr(x) for x in np.random.default_rng(0).normal(size=40).tolist()]
+    assert of(*full) is None
+    assert of("-0.0", "0.0", "0.0", "-0.0", "0.0", "0.0") is None

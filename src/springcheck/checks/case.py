@@ -125,7 +125,10 @@ class Case(Claim):
         # the increment of p may be rounded like the sum of forces, and separately from that of P
         moved = np.abs(p) + np.abs(end_p) + abs(run.step) * pulls
         sizes = np.abs(q) + np.abs(end_q) + np.abs(way) * moved + self.origins
-        return way, np.asarray(run.arithmetic.state * sizes + rounding.SMALLEST)
+        half = run.arithmetic.recorded(self.judged.m, run.step, run.rebuilds_velocity)
+        # of both ends
+        written = 2 * (half[0] + np.abs(way) * half[1]) / self.roundings
+        return way, np.asarray(run.arithmetic.state * sizes + rounding.SMALLEST + written)
 
     @property
     def _starts(self) -> tuple[Extended, Extended]:
@@ -159,7 +162,9 @@ class Case(Claim):
         if self.placed:
             self.step(q.astype(np.longdouble), p.astype(np.longdouble), met=places)
         with np.errstate(all="ignore"):
-            return rounding.of_step(self, q, p, places, smallest=smallest, paired=paired)
+            one = rounding.of_step(self, q, p, places, smallest=smallest, paired=paired)
+            written = rounding.of_recording(self, q, p, places)
+            return one[0] + written[0] / self.roundings, one[1] + written[1] / self.roundings
 
     @cached_property
     def allowance_of_stretches(self) -> Extended:
@@ -234,7 +239,7 @@ class Case(Claim):
         is h w, that of the modes unless it is given.
         """
         how, plain = self.trajectory.arithmetic, self.law.has("plain", "undamped", "linear")
-        double = how.state == how.force == 2.0**-53 and not how.quantum
+        double = how.is_double and how.force == 2.0**-53 and not how.quantum
         if not WIDE or not plain or not double:
             return np.full(len(steps), np.inf)
         n = steps.astype(np.float64)

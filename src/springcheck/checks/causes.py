@@ -47,17 +47,18 @@ SAME_DRAWS = 1e-6
 def found(case: Case, shown: Callable[[int, bool], str] = lambda *_: "") -> str:
     """The cause in one sentence, or "" where nothing known here, nor what the states show, explains them."""
     run, system = case.trajectory, case.scene.system
+    first, few = seldom_off(case)
+    looks: list[Callable[[Case], str]] = [lambda _: shown(first, bool(few)), other.found]
+    if not (system.is_linear and system.is_separate):
+        # of one particle by itself states show more than which number is another
+        looks.reverse()
     ways: list[Callable[[Case], str]] = []
     if run.every == 1 and run.scheme in THERMOSTATS:
         # of draws that are read by the map of another scheme the size says nothing
-        ways = [_of_bath, lambda case: shown(), _of_size]
+        ways, looks = [_of_bath], [*looks, _of_size]
     elif run.every == 1 and not missing(case, MAP):
         ways = [_of_differences, driven.found, _of_rods]
-    # of one particle by itself states show more than which number is another
-    first, few = seldom_off(case)
-    looks: list[Callable[[Case], str]] = [lambda _: shown(first, bool(few)), other.found]
-    ways += looks if system.is_linear and system.is_separate else reversed(looks)
-    return next(filter(None, (way(case) for way in ways)), few)
+    return next(filter(None, (way(case) for way in ways + looks)), few)
 
 
 def _of_differences(case: Case) -> str:
@@ -69,7 +70,9 @@ def _of_differences(case: Case) -> str:
         right, size = made + kick * run.step * case.system.force(q, p), np.abs(p) + np.abs(made)
         if rods := case.system.rods:
             right, size = rods.projected(q, right), np.max(size, axis=1, keepdims=True)
-        off = np.abs(p - right) / (DIFFERENCE_ROUNDINGS * run.arithmetic.state)
+        # and those of decimals, of the positions that are subtracted too
+        half = run.arithmetic.recorded(m, n * run.step, True)[1]
+        off = (np.abs(p - right) - half) / (DIFFERENCE_ROUNDINGS * run.arithmetic.state)
         are = not run.rebuilds_velocity and np.all(off <= size)
         if are and step_defect(replace(case, trajectory=replace(run, rebuilds_velocity=True))).passed:
             return (

@@ -17,7 +17,7 @@ def start(case: Case) -> Finding:
     """Row 0 is the start, exactly, or rounded once to the numbers of a recording."""
     run, scene = case.trajectory, case.scene
     off = np.abs([run.q[0] - scene.q, run.p[0] - scene.p])
-    recorded = run.arithmetic.name == AS_WRITTEN and run.arithmetic.state > 2.0**-53
+    recorded = run.arithmetic.name == AS_WRITTEN and not run.arithmetic.is_double
     # momenta that are made of velocities have two roundings of a double more
     most = (run.arithmetic.state + 2.0**-51) * recorded * np.abs([scene.q, scene.p])
     worst = np.unravel_index(np.argmax(off - most), off.shape)

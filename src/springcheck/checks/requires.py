@@ -151,7 +151,7 @@ _ALL = (
         lambda x: x.scheme.has("reversible") or (len(x.scheme.stages) == 2 and not x.scene.system.rods),
         "{title} is not its own adjoint: only another scheme undoes its steps")),
     Requirement("double", "double precision", _unless(
-        lambda x: not x.trajectory.arithmetic.quantum and x.trajectory.arithmetic.state <= 2.0**-53,
+        lambda x: not x.trajectory.arithmetic.quantum and x.trajectory.arithmetic.is_double,
         "the rounding of its forces hides that of its steps")),
     Requirement("linear", "a linear scene", _trait(
         "linear", "an anharmonic or driven step, or one in a field, is no matrix; step-defect judges it")),

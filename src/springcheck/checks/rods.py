@@ -35,7 +35,8 @@ def rod_length(case: Case) -> Finding:
     heated = case.law.has("random")
     roundings = thermal.rounding.roundings_of(thermostat(case), case.judged) if heated else case.roundings
     off = np.abs(rods.strain(q))
-    bound = roundings * how.state * (1 + rods.magnitude(q)) + how.lengths
+    half = how.recorded(case.judged.m, case.trajectory.step, rebuilt=False)[0]
+    bound = roundings * how.state * (1 + rods.magnitude(q)) + how.lengths + rods.spans(half) / rods.length
     worst = largest(off / bound)
     why = f"roundings along one step of {case.scheme.title}, of lengths and of positions"
     if how.lengths:

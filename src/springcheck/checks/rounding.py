@@ -61,6 +61,31 @@ def of_step(
     return np.asarray(of_q + h / m * lost + smallest), np.asarray(of_p + lost)
 
 
+def of_recording(case: Claim, q: Reals, p: Reals, places: list[Reals] | None) -> tuple[Extended, Extended]:
+    """Bound on what decimals take off the state after a step from states (..., n), (..., n) each: that of its
+    own numbers, and that of the numbers before, which the step carries on.  0 where there are none.
+
+    The running error bound is affine in the sizes of a state, and so carries their errors.
+    """
+    run, m = case.trajectory, case.judged.m.astype(np.longdouble)
+    half = run.arithmetic.recorded(m, run.step, run.rebuilds_velocity)
+    if not np.any(half):
+        return 0 * q, 0 * p
+
+    def plain(terms: tuple[Term, ...], near: Reals | None, whole: float, exact: bool) -> Force:
+        return case.system.magnitude(near, terms)
+
+    met = _evaluations(case, plain, places, recorded=False)
+    off, none = (
+        schemes.magnitude_step(
+            case.scheme, q + np.copysign(part * half[0], q), p + np.copysign(part * half[1], p), h=run.step,
+            m=m, rate=case.law.rate, turns=case.law.turns, met=met, hold=case.system.rods,
+        )
+        for part in (1, 0)
+    )  # fmt: skip
+    return half[0] + off[0] - none[0], half[1] + off[1] - none[1]
+
+
 def _evaluations(
     case: Claim, of: Callable[..., Force], places: list[Reals] | None, recorded: bool
 ) -> list[Met]:

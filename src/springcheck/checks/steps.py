@@ -139,12 +139,14 @@ def _blind(case: Case, told: NDArray[np.bool_], *, passed: bool) -> str:
     hidden = ~np.any(moves > most, axis=1) & np.any(moves > 0, axis=1)
     worst = np.max(most, axis=1)
     digits, way = np.max(np.abs(states), axis=1), np.ptp(states, axis=1)
-    known = (worst <= OF_DIGITS * run.arithmetic.state * digits) & (worst <= OF_WAY * way)
+    half = run.arithmetic.recorded(case.judged.m, run.step, run.rebuilds_velocity)
+    known = (worst <= OF_DIGITS * (run.arithmetic.state * digits + half)) & (worst <= OF_WAY * way)
     if passed:
         ends = states[:, 1:]
         off = np.max(np.abs(ahead.end - ends)[:, told], axis=1)
         coarser = run.arithmetic.state / Arithmetic().state
-        known &= off <= OF_RECORDING * coarser * np.spacing(np.max(np.abs(ends), axis=1)) / 2
+        last = coarser * np.spacing(np.max(np.abs(ends), axis=1)) / 2
+        known &= off <= OF_RECORDING * (last + half)
     coarse = (way > 0) & ~hidden & ~known
     return _list(case, hidden, BLIND) + _list(case, coarse, NO_BETTER, worst)
 
@@ -318,7 +320,7 @@ def arithmetic(case: Case) -> Finding | str:
     named = case.trajectory.arithmetic
     # a tolerance of lengths is no rounding
     plain = Arithmetic(lengths=named.lengths)
-    if named.state <= plain.state and named.force <= plain.force and not named.quantum:
+    if named.is_double and named.force <= plain.force and not named.quantum:
         return "plain double precision: the step defect says it all"
     case = case.clocked
     seen = case.once(_step_defect)

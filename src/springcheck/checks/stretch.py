@@ -97,7 +97,7 @@ def follow(case: Claim, q: Extended, p: Extended, steps: int) -> Stretch:
     """Steps from states (f, n), with bounds on the growth of their roundings."""
     if steps == 1:
         near = None if case.system.is_linear else case.trajectory.q[1:].astype(np.longdouble)
-        end, bound = _one(case, q, p, near=near)
+        end, bound, written = _one(case, q, p, near=near)
         reach = np.maximum(np.abs([q, p]), np.abs(end))
         turns = np.zeros(len(q), dtype=np.longdouble)
         # the solver of an implicit step forms sums of n products
@@ -106,8 +106,8 @@ def follow(case: Claim, q: Extended, p: Extended, steps: int) -> Stretch:
         spread = bound * np.sqrt(_walk(case) + _to_one_side(case) ** 2 + (2 + solved) / 3)
         # stiff bonds carry a solver's residual along few directions, with one sign
         random = not implicit or separate or bool(np.max(_turn(case, q)) < 1)
-        allowance = _allowed(case, bound, bound, spread, DEVIATIONS, random=random)
-        return Stretch(end=end, allowance=allowance, last=bound, reach=reach, turns=turns)
+        allowance = _allowed(case, bound, bound, spread, DEVIATIONS, random=random) + written
+        return Stretch(end=end, allowance=allowance, last=bound + written, reach=reach, turns=turns)
     n, many = q.shape[1], _many
     if case.system.is_separate or n <= JOINED:
         wide = 2 if case.system.is_separate else 2 * n
@@ -124,12 +124,16 @@ def follow(case: Claim, q: Extended, p: Extended, steps: int) -> Stretch:
     return Stretch(**whole)
 
 
-def _one(case: Claim, q: Extended, p: Extended, near: Extended | None = None) -> tuple[Extended, Extended]:
-    """One step, and the allowance of that step, (2, ..., n) each."""
+def _one(
+    case: Claim, q: Extended, p: Extended, near: Extended | None = None
+) -> tuple[Extended, Extended, Extended]:
+    """One step, the allowance of that step, and of the decimals of recorded states, (2, ..., n) each."""
     places: list[Reals] | None = [] if case.placed else None
     end = case.step(q, p, met=places, near=near)
     with np.errstate(all="ignore"):
-        return np.stack(end), np.stack(rounding.of_step(case, q, p, places, recorded=near is not None))
+        one = rounding.of_step(case, q, p, places, recorded=near is not None)
+        written = np.stack(rounding.of_recording(case, q, p, places)) / case.roundings
+        return np.stack(end), np.stack(one), written
 
 
 def _many(case: Claim, q: Extended, p: Extended, steps: int) -> Stretch:
@@ -141,7 +145,7 @@ def _many(case: Claim, q: Extended, p: Extended, steps: int) -> Stretch:
             on[:, i + 1] = case.step(*on[:, i])
         # terms of single steps are computed for all steps at once
         at_q, at_p = on[:, :-1].reshape(2, -1, q.shape[1])
-        _, bound = _one(case, at_q, at_p)
+        _, bound, _ = _one(case, at_q, at_p)
         each = bound.reshape(2, steps, *q.shape)
         bounds = _joined(separate)(list(each), axis=-1)
         if case.system.is_linear:
@@ -166,6 +170,8 @@ def _many(case: Claim, q: Extended, p: Extended, steps: int) -> Stretch:
                 power = power @ maps[i]
         spread = np.sqrt(walk * _walk(case) + np.sum(drifts * drifts, axis=(0, -1)))
         carried = _allowed(case, worst, bounds[-1], spread, DEVIATIONS, random=not case.law.has("implicit"))
+        if np.any(half := _joined(separate)(list(_recorded(case)), axis=-1)):
+            carried = carried + half + _apply(np.abs(power @ maps[0]), half)
     allowance = np.moveaxis(carried, -1, 0) if separate else np.stack(np.split(carried, 2, axis=-1))
     reach = np.max(np.abs(on), axis=1)
     return Stretch(end=on[:, -1], allowance=allowance, last=each[:, -1], reach=reach, turns=turns)
@@ -179,7 +185,10 @@ def _sampled(case: Claim, q: Extended, p: Extended, steps: int) -> Stretch:
     rng = np.random.default_rng(0)
     signs = np.array([-1.0, 1.0])
     fixed, walk = rng.choice(signs, size=(3, 2, SAMPLES, 1, q.shape[1])), np.sqrt(_walk(case))
-    off = np.zeros((2, SAMPLES, *q.shape), dtype=np.longdouble)
+    half = _recorded(case)
+    # what decimals take off the first state is spread evenly within half a unit
+    begun = half[:, None, None] * rng.choice(signs, size=(2, SAMPLES, *q.shape)) if np.any(half) else 0.0
+    off = np.zeros((2, SAMPLES, *q.shape), dtype=np.longdouble) + begun * case.roundings / np.sqrt(3)
     on = np.stack([q, p])
     reach, turns = np.abs(on), np.zeros(len(q), dtype=np.longdouble)
     last = np.zeros_like(on)
@@ -188,7 +197,7 @@ def _sampled(case: Claim, q: Extended, p: Extended, steps: int) -> Stretch:
             both = np.concatenate([on[:, None], off], axis=1)
             off = np.stack(_varied(case, *both))[:, 1:]
             before = on
-            on, last = _one(case, *on)
+            on, last, _ = _one(case, *on)
             alike = np.sum(fixed * _alike(case, before, on)[:, :, None], axis=0)
             off = off + last[:, None] * (walk * rng.choice(signs, size=off.shape) + alike)
             reach = np.maximum(reach, np.abs(on))
@@ -197,6 +206,7 @@ def _sampled(case: Claim, q: Extended, p: Extended, steps: int) -> Stretch:
         spread = np.sqrt(np.mean(off * off, axis=1))
         worst = np.maximum(last, spread * np.sqrt(2 * q.shape[1] * steps) / walk * WIDENED)
         allowance = _allowed(case, worst, last, spread, T_SIXTEEN, random=not case.law.has("implicit"))
+        allowance = allowance + half[:, None]
     return Stretch(end=on, allowance=allowance, last=last, reach=reach, turns=turns)
 
 
@@ -223,6 +233,12 @@ def _times(case: Claim) -> int:
     kinds = case.scheme.kinds
     moves = sum(kind.drifts for kind in kinds), sum(not kind.drifts for kind in kinds)
     return max(1, len(case.scheme.b), *moves)
+
+
+def _recorded(case: Claim) -> Extended:
+    """Half a unit of the last decimal of recorded states (2, n), over the roundings of a step."""
+    run = case.trajectory
+    return run.arithmetic.recorded(case.judged.m, run.step, run.rebuilds_velocity) / case.roundings
 
 
 def _allowed(

@@ -110,7 +110,8 @@ def judge(
         notes += ("velocities are differences of positions, as was said, and judged so",)
     if arithmetic is not None:
         how = engines.arithmetic(engines.parse(arithmetic))
-        run = replace(run, arithmetic=replace(how, state=max(how.state, run.arithmetic.state)))
+        state, written = max(how.state, run.arithmetic.state), run.arithmetic.written
+        run = replace(run, arithmetic=replace(how, state=state, written=written))
         notes += (f"judged by the arithmetic of {arithmetic}, as was said: {str(how) or 'double'}",)
     verdicts = [
         replace(v, passed=None, value=np.nan, bound=np.nan, why=taken[v.check]) if v.check in taken else v
@@ -206,13 +207,18 @@ def as_trajectory(
                 f"{path}: the {name} of row {int(np.argmin(good)) + 1} are not finite numbers; leave out the "
                 "frames from there on, and those before it are judged"
             )
-    beside = 0.0
+    beside, fixed = 0.0, states.fixed
+    halves = np.zeros((2, q.shape[1]))
+    if fixed:
+        halves[0], halves[1] = fixed.q, fixed.v
     off = max(1e-6, 4 * states.roundoff)
     if scene.places is not None and q.shape[1] == 3 * scene.particles > scene.n:
         q, other, beside = _in_plane(path, q, other, scene, off)
+        halves = halves[:, scene.where]
     elif q.shape[1] == 3 * scene.n:
         far = float(np.max(np.abs(q), initial=0.0))
-        q, other, beside = _along(path, q, other, scene, notes, off)
+        q, other, beside, line = _along(path, q, other, scene, notes, off)
+        halves = halves.reshape(2, -1, 3) @ np.abs(line)
         if moved := _beside_start(q, scene, off):
             # displaced from 0 by as much as the points are, since they are rounded there
             notes.append(f"positions counted from {moved:.6g} along it, where the scene has its 0")
@@ -221,7 +227,9 @@ def as_trajectory(
             beside /= max(1.0, far / (float(np.ptp(q)) or 1.0))
     if q.shape[1] != scene.n:
         raise StoreError(f"{path}: positions in a frame: {q.shape[1]}, in scene {scene.name}: {scene.n}")
-    p = other if states.p is not None else other * scene.m
+    if states.p is None:
+        other, halves[1] = other * scene.m, halves[1] * scene.m
+    p = other
     if len(q) < 2:
         raise StoreError(f"{path}: holds {len(q)} frame; two are needed")
     if not np.isfinite(states.t).all():
@@ -249,7 +257,8 @@ def as_trajectory(
         taken["times"] = f"{TIMES}; they are up to {np.max(off):.2g} beside them" if np.any(off) else TIMES
     size = scene.system.norm(q[0] - scene.q, p[0] - scene.p)
     # far from 0 the rounding of a coordinate is larger relative to the amplitude
-    rounded = scene.system.norm.most(*(states.roundoff * np.abs(x) for x in (q[0], p[0])))
+    both = zip((q[0], p[0]), halves, strict=True)
+    rounded = scene.system.norm.most(*(states.roundoff * np.abs(x) + half for x, half in both))
     if not size <= max(1e-9, 10 * states.roundoff) and not 0 < size * scene.system.norm.unit <= 2 * rounded:
         raise StoreError(
             f"{path}: its first frame is {float(size):.2g} of the amplitude off the start of {scene.name}: "
@@ -258,8 +267,12 @@ def as_trajectory(
     if size > 0 or moved:
         taken["start"] = f"the start was taken as it is written in the file, {size:.2g} of the amplitude off"
         notes += [taken["start"]] if size > 0 else []
-    if states.roundoff > 2.0**-53:
-        notes.append(f"numbers are written to {states.roundoff:.1g}, and judged to that")
+    if fixed:
+        each = " and ".join(f"{np.max(x):.1g}" for x in (fixed.q, fixed.v))
+        of = "positions and " + ("velocities" if states.p is None else "momenta")
+        notes.append(f"{of} are rounded to decimals, by up to {each}, and judged to that")
+    if (unit := fixed.beside if fixed else states.roundoff) > 2.0**-53:
+        notes.append(f"numbers are written to {unit:.1g}, and judged to that")
     steps = (len(q) - 1) * every
     if steps != scene.steps:
         notes.append(f"ends after step {steps:,}, the scene after {scene.steps:,}")
@@ -291,7 +304,7 @@ def as_trajectory(
     else:
         # a line that is no axis is rounded in each of its coordinates
         off_axis = beside if beside > 8 * states.roundoff else None
-        arithmetic = Arithmetic(name=AS_WRITTEN, state=states.roundoff)
+        arithmetic = Arithmetic(name=AS_WRITTEN, state=unit, written=halves if fixed else ((), ()))
         tolerance = scene.tolerance if schemes.scheme(scheme).has("adaptive") else None
         run = Trajectory(**known, arithmetic=arithmetic, off_axis=off_axis, tolerance=tolerance)
         if tolerance is not None:
@@ -324,9 +337,9 @@ def _beside_start(q: Floats, scene: Scene, off: float) -> float:
 
 def _along(
     path: Path, q: Floats, other: Floats, scene: Scene, notes: list[str], off: float
-) -> tuple[Floats, Floats, float]:
+) -> tuple[Floats, Floats, float, Floats]:
     """Motions in space (f, 3n) projected onto their common line (f, n), which they may leave by `off` of
-    their size; and the distance from it relative to their size."""
+    their size; the distance from it relative to their size; and its direction (3,)."""
     r, rates = q.reshape(len(q), -1, 3), other.reshape(len(q), -1, 3)
     moved = (r - r[0]).reshape(-1, 3)
     _, sizes, axes = np.linalg.svd(moved, full_matrices=False)
@@ -348,4 +361,4 @@ def _along(
     where = ", ".join(f"{x:.4g}" for x in line)
     notes.append(f"motion along ({where}), at most {beside:.1g} of its size beside it")
     # across a line that is no axis the roundings of all frames add up
-    return positions, rest, beside / (len(r) if np.max(np.abs(line)) < 1 - off else 1)
+    return positions, rest, beside / (len(r) if np.max(np.abs(line)) < 1 - off else 1), line

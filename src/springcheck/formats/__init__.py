@@ -22,7 +22,7 @@ import numpy as np
 
 from springcheck.errors import StoreError
 from springcheck.formats import libraries, molecular, numbers, octave, tables
-from springcheck.formats.columns import Reader, States, fitting, moving
+from springcheck.formats.columns import Fixed, Reader, States, fitting, moving
 from springcheck.formats.hdf5 import is_foreign, read_hdf5
 from springcheck.store import apart, files
 
@@ -79,6 +79,9 @@ FORMATS: tuple[Format, ...] = (
     Format("text tables", lambda head, path: True, tables.read_table, LINES),
 )
 """In the order in which they are tried; a file that no other format matches is a text table."""
+
+OF_DECIMALS = "half_q", "half_v", "beside"
+"""Names of the parts of `Fixed` in what a library has read."""
 
 BY_NAME = {one.name: one for one in FORMATS}
 KNOWN = f"read are HDF5, {', '.join(BY_NAME)}, texts gzipped too"
@@ -141,13 +144,16 @@ def _apart(found: Format, path: Path, columns: list[str], step: float | None) ->
         raise StoreError(f"{path}: is damaged, or no {found.name} file: reading it {error}") from error
     with np.load(BytesIO(said), allow_pickle=False) as arrays:
         known = {name: arrays.get(name) for name in ("p", "v", "mass")}
-        return States(t=arrays["t"], q=arrays["q"], roundoff=float(arrays["roundoff"]), **known)
+        decimals = Fixed(*(arrays[part] for part in OF_DECIMALS)) if OF_DECIMALS[0] in arrays else None
+        unit = float(arrays["roundoff"])
+        return States(t=arrays["t"], q=arrays["q"], roundoff=unit, fixed=decimals, **known)
 
 
 def packed(path: Path, name: str, columns: str, step: str) -> bytes:
     """The states that a format's reader finds, as NPZ."""
     found = BY_NAME[name].read(path, json.loads(columns), float(step) if step else None)
     known: dict[str, Any] = {part: getattr(found, part) for part in ("t", "q", "p", "v", "mass", "roundoff")}
+    known |= dict(zip(OF_DECIMALS, found.fixed or (), strict=False))
     out = BytesIO()
     np.savez(out, **{part: x for part, x in known.items() if x is not None})
     return out.getvalue()

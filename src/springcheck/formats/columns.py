@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -39,6 +39,17 @@ ALONE = "positions alone are the same for leapfrog, Verlet and semi-implicit Eul
 """Note on a file that cannot distinguish schemes which share one recurrence of the positions."""
 
 
+class Fixed(NamedTuple):
+    """Numbers with a fixed number of decimals, whose rounding is absolute."""
+
+    q: Any
+    """Half a unit of the last decimal of positions [L], of all or each (n,); 0 where it is not fixed."""
+    v: Any
+    """The same of momenta, or else velocities."""
+    beside: float
+    """Unit roundoff of other columns, or of single precision where the decimals do not exclude it."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class States:
     """Recorded states: t (f,), q and p or v (f, n) or neither, mass (n,) or None, and the precision of the
@@ -51,6 +62,8 @@ class States:
     mass: Floats | None
     roundoff: float = 2.0**-53
     """Unit roundoff of the numbers: 2**-24 for single precision, 5e-d for d significant digits."""
+    fixed: Fixed | None = None
+    """How text with fixed decimals is rounded; None for other numbers."""
     units: Mapping[str, str] = field(default_factory=dict)
     """Units of q, v, t and mass, as an H5MD file states them."""
     notes: tuple[str, ...] = ()
@@ -65,7 +78,8 @@ def fitting(path: Path, found: States) -> States:
     """States whose masses fit their positions; StoreError where they do not."""
     if found.mass is not None and (not len(found.mass) or found.q.shape[1] % len(found.mass)):
         raise StoreError(f"{path}: masses: {len(found.mass)}, columns of q: {found.q.shape[1]}")
-    return found
+    # decimals that hold numbers of single precision have no more of its digits
+    return replace(found, roundoff=max(found.roundoff, found.fixed.beside)) if found.fixed else found
 
 
 def times(path: Path, steps: Any, step: float | None, unit: str = "") -> Floats:

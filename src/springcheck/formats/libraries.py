@@ -5,6 +5,7 @@ Each in its own units: ASE's in Angstrom, fs and u, GROMACS' in nm, ps and u, Am
 
 from __future__ import annotations
 
+import re
 import warnings
 from codecs import BOM_UTF8
 from collections.abc import Iterator, Mapping
@@ -18,11 +19,11 @@ import msgspec
 import numpy as np
 
 from springcheck.errors import StoreError, plain
-from springcheck.formats.columns import States
+from springcheck.formats.columns import Fixed, Floats, States
 from springcheck.formats.lines import MOST_NUMBERS
 from springcheck.formats.molecular import clock, of_frames
 from springcheck.formats.numbers import of_table, shortened, states_of
-from springcheck.formats.tables import roundoff
+from springcheck.formats.tables import fixed, roundoff
 
 MOST_FRAMES = 1 << 20
 LONGEST_JSON = 1 << 25
@@ -65,13 +66,16 @@ def read_ase(path: Path, columns: list[str], step: float | None) -> States:
             if len(v) not in (0, i + 1):
                 raise StoreError(f"{path}: some frames have velocities, and others have none")
         t = clock(path, [atoms.info.get("time", atoms.info.get("t")) for atoms in found], step, "fs")
-        written = 2.0**-53 if kind == "traj" else _written(path.read_text().splitlines())
-        q = [atoms.positions for atoms in found]
-        return of_frames(path, t, q, v or None, found[0].get_masses(), written)
+        q, m = [atoms.positions for atoms in found], found[0].get_masses()
+        told: tuple[Any, ...] = ()
+        if kind == "extxyz":
+            told = _written(path.read_text().splitlines(), np.repeat(units.fs / m, 3))
+        return of_frames(path, t, q, v or None, m, *told)
 
 
-def _written(lines: list[str]) -> float:
-    """Precision of an extended XYZ file, whose atoms are rows of a name and numbers."""
+def _written(lines: list[str], of_momenta: Floats) -> tuple[float, Fixed | None]:
+    """Precision of an extended XYZ file, whose atoms are rows of a name and numbers; `of_momenta` are the
+    velocities of momenta of 1 (3 n,)."""
     rows: list[list[str]] = []
     i = 0
     while i < len(lines) and lines[i].strip():
@@ -79,8 +83,16 @@ def _written(lines: list[str]) -> float:
         rows += [line.split() for line in lines[i + 2 : i + 2 + n]]
         i += n + 2
     if len({len(row) for row in rows}) != 1:
-        return 2.0**-53
-    return roundoff(rows, [i for i, cell in enumerate(rows[0]) if "." in cell])
+        return 2.0**-53, None
+    places, end = dict[str, range](), 0
+    for name, width in re.findall(r"(\w+):[A-Z]:(\d+)", lines[1]):
+        places[name.lower()] = range(end, end := end + int(width))
+    bare = places.get("velocities", places.get("vel"))
+    v = bare or places.get("momenta", range(0))
+    found = fixed(rows, places.get("pos", range(0)), v)
+    if found and not bare and v:
+        found = found._replace(v=found.v * of_momenta)
+    return roundoff(rows, [i for i, cell in enumerate(rows[0]) if "." in cell]), found
 
 
 def read_xtc(path: Path, columns: list[str], step: float | None) -> States:

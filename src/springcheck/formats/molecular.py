@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 
 from springcheck.errors import StoreError
-from springcheck.formats.columns import ALONE, Floats, States, kind, listed, times
+from springcheck.formats.columns import ALONE, Fixed, Floats, States, kind, listed, times
 from springcheck.formats.lines import MOST_NUMBERS, Lines, number
-from springcheck.formats.tables import SHOWN, of_rows, roundoff
+from springcheck.formats.tables import SHOWN, fixed, of_rows, roundoff
 
 
 def clock(path: Path, said: Sequence[float | None], step: float | None, unit: str = "") -> Floats:
@@ -32,7 +32,9 @@ def clock(path: Path, said: Sequence[float | None], step: float | None, unit: st
     return np.array(known)
 
 
-def of_frames(path: Path, t: Any, q: Any, v: Any, mass: Any, roundoff: float) -> States:
+def of_frames(
+    path: Path, t: Any, q: Any, v: Any, mass: Any, roundoff: float, fixed: Fixed | None = None
+) -> States:
     """States of frames: t (f,), q and v (f, n, 3), v None where there are none, mass (n,) or None."""
     try:
         at, positions, velocities = (np.asarray(x, np.float64) for x in (t, q, q if v is None else v))
@@ -48,7 +50,8 @@ def of_frames(path: Path, t: Any, q: Any, v: Any, mass: Any, roundoff: float) ->
         raise StoreError(f"{path}: holds {frames} frame; two are needed")
     m = None if mass is None else np.repeat(np.asarray(mass, np.float64), positions.shape[2])
     flat = None if v is None else velocities.reshape(frames, -1)
-    return States(t=at, q=positions.reshape(frames, -1), p=None, v=flat, mass=m, roundoff=roundoff)
+    where = positions.reshape(frames, -1)
+    return States(t=at, q=where, p=None, v=flat, mass=m, roundoff=roundoff, fixed=fixed)
 
 
 @contextmanager
@@ -145,7 +148,8 @@ def read_lammps(path: Path, columns: list[str], step: float | None) -> States:
     # LAMMPS writes 6 digits unless dump_modify asks for more
     known = step is None and len(clock) == len(steps)
     when = np.array(clock) if known else times(path, steps, step)
-    return of_frames(path, when, q, v, mass, roundoff(first, range(6)))
+    told = roundoff(first, range(6)), fixed(first, range(3), range(3, 6))
+    return of_frames(path, when, q, v, mass, *told)
 
 
 def _crossed(q: Floats, boxes: Floats) -> Floats:
@@ -260,9 +264,11 @@ def read_gro(path: Path, columns: list[str], step: float | None) -> States:
     q, v = table[:, :, :3], table[:, :, 3:]
     # decimals are fixed: 3 of positions and 4 of velocities unless GROMACS is told otherwise
     sizes = (float(np.max(np.abs(q), initial=0)), float(np.max(np.abs(v), initial=0)))
-    halves = (0.5 * 10.0 ** (5 - wide), 0.5 * 10.0 ** (4 - thin))
+    halves = 0.5 * 10.0 ** (5 - wide), 0.5 * 10.0 ** (4 - thin)
     written = max([half / size for half, size in zip(halves, sizes, strict=True) if size > 0], default=1.0)
-    return of_frames(path, clock(path, t, step, "ps"), q, v, None, written)
+    single = all(np.all(np.abs(np.float32(x) - x) <= half) for x, half in zip((q, v), halves, strict=True))
+    of_all = Fixed(*halves, 2.0**-24 if single else 2.0**-53)
+    return of_frames(path, clock(path, t, step, "ps"), q, v, None, written, of_all)
 
 
 COUNT = rb"\A[^\S\n]*\d+[^\S\n]*\n"
@@ -298,7 +304,8 @@ def read_xyz(path: Path, columns: list[str], step: float | None) -> States:
                     first.append(cells[:width])
     table = np.frombuffer(numbers).reshape(len(t), n or 1, width or 3)
     v = table[:, :, 3:] if width == 6 else None
-    return of_frames(path, clock(path, t, step), table[:, :, :3], v, None, roundoff(first, range(width)))
+    told = roundoff(first, range(width)), fixed(first, range(3), range(3, width))
+    return of_frames(path, clock(path, t, step), table[:, :, :3], v, None, *told)
 
 
 TRR_MARK = 1993

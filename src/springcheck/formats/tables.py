@@ -5,12 +5,13 @@ from __future__ import annotations
 import re
 from array import array
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from springcheck.errors import StoreError
-from springcheck.formats.columns import Floats, States, kinds, named, split, times
+from springcheck.formats.columns import Fixed, Floats, States, kinds, named, split, times
 from springcheck.formats.lines import Lines, number
 
 SHOWN = 1000
@@ -79,8 +80,9 @@ def of_rows(
         i, values, chosen = counted[0], values.copy(), [*chosen]
         values[:, i], chosen[i] = times(path, values[:, i], step), "t"
     meant = kinds(chosen)
-    states = [i for i, name in enumerate(chosen[:width]) if meant.get(name) in ("q", "p", "v")]
-    return split(path, named(path, values, chosen), roundoff(first, states))
+    of = {what: [i for i, name in enumerate(chosen[:width]) if meant.get(name) == what] for what in "qpv"}
+    states = split(path, named(path, values, chosen), roundoff(first, [*of["q"], *of["p"], *of["v"]]))
+    return replace(states, fixed=fixed(first, of["q"], of["p"] or of["v"]))
 
 
 def _cells(line: str) -> list[str]:
@@ -141,6 +143,46 @@ def roundoff(rows: Sequence[Sequence[str]], columns: Iterable[int]) -> float:
                 single = len(cells) >= FEWEST_CELLS and np.all(np.abs(np.float32(x) - x) <= half * np.abs(x))
             found = max(found, half, 2.0**-24 if single else 0.0)
     return found
+
+
+def fixed(rows: Sequence[Sequence[str]], q: Iterable[int], v: Iterable[int]) -> Fixed | None:
+    """How columns of positions and of momenta or velocities are rounded to decimals; None where none is.
+
+    The numbers of the largest decade have as many decimals as any, and few digits, or fewer of them the
+    smaller they are.  A column that is constant has fixed decimals where others have as many.
+    """
+    halves, known, constant, coarse = [0.0, 0.0], set[int](), list[tuple[int, int]](), list[int]()
+    single = True
+    for part, i in [(0, i) for i in q] + [(1, i) for i in v]:
+        cells = {row[i] for row in rows[:SHOWN]}
+        x = np.array([*map(number, cells)])
+        places = np.array([len(cell.partition(".")[2]) for cell in cells])
+        digits = np.array([*map(_digits, cells)])
+        most = int(np.max(places))
+        with np.errstate(divide="ignore"):
+            decade = np.floor(np.log10(np.abs(x)))
+        plain = not any(re.search(r"[eEdD]|\d[+-]", cell) for cell in cells)
+        lossy = np.max(digits) < 16 or (np.min(places) == most and np.any((digits > 0) & (digits < 15)))
+        half = 0.5 * 10.0**-most
+        with np.errstate(over="ignore"):
+            rest = np.abs(np.float32(x) - x)
+        if np.ptp(x) == 0:
+            constant.append((part, most))
+        elif plain and lossy and np.max(places[decade == np.max(decade)]) == most:
+            halves[part] = max(halves[part], half)
+            known.add(most)
+            single &= bool(np.all(rest <= half))
+            if len(cells) < FEWEST_CELLS or np.ptp(places):
+                # numbers of one decade without their last zeros may be of as many digits
+                coarse += [i] if np.ptp(digits[places == most]) == 0 else []
+        else:
+            coarse.append(i)
+            single &= roundoff(rows, [i]) > 2.0**-53 or not np.any(rest)
+    for part, most in constant:
+        if most in known:
+            halves[part] = max(halves[part], 0.5 * 10.0**-most)
+    beside = max(roundoff(rows, coarse), 2.0**-24 if single else 0.0)
+    return Fixed(halves[0], halves[1], beside) if known else None
 
 
 def _digits(cell: str) -> int:

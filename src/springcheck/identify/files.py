@@ -59,6 +59,8 @@ class FileStates(formats.States):
     """The title of the adaptive solver that one of our own stores says made them."""
     whole: Floats | None = None
     """Every coordinate of the file (f, N), those that were left out among them."""
+    last: Floats | None = None
+    """Unit of the last decimal of velocities (n,), where these were written as momenta."""
 
 
 def read(
@@ -99,6 +101,8 @@ def of_arrays(name: str, found: formats.States) -> FileStates:
     if len(found.t) > MOST_FRAMES:
         notes.append(f"the first {MOST_FRAMES} frames were looked at")
     p, v, mass = found.p, found.v, found.mass
+    # one for each where velocities are momenta over masses, whose decimals the numbers do not show
+    last = 2 * found.fixed.v if found.fixed and np.ndim(found.fixed.v) else None
     if v is not None and found.units:
         v = v * _velocity_factor(found.units, notes)
     chosen, remarks = _chosen(found.q[kept], speed[kept], notes)
@@ -108,6 +112,7 @@ def of_arrays(name: str, found: formats.States) -> FileStates:
     return FileStates(
         label=name, t=found.t[kept], q=found.q[kept][:, chosen], p=p, v=v, notes=remarks, whole=found.q[kept],
         mass=None if mass is None else mass[chosen], roundoff=found.roundoff,
+        last=None if last is None else last[chosen],
     )  # fmt: skip
 
 
@@ -256,7 +261,7 @@ def sentence(
     if few and not any(x.local for x in found.explanations[:1]):
         return ""
     # that they are of the scheme which they failed to be is no cause, but that they are so in single may be
-    plain = found.precision in ("double", UNTOLD) or run.arithmetic.state > 2.0**-53
+    plain = found.precision in ("double", UNTOLD) or not run.arithmetic.is_double
     if not (found.fits and run.scheme in (found.scheme, *found.aliases)):
         of = f"; frames are counted from frame {first} of the run" * (
             first > 0 and "frame" in found.statement
@@ -324,7 +329,15 @@ def identify_states(
     """Identify the states of a file; a stated mass overrides the file's.  Raises IdentificationError."""
     m = states.mass if mass is None else np.full(states.q.shape[1], mass)
     found = identify_arrays(
-        states.t, states.q, states.p, v=states.v, mass=m, stiffness=stiffness, friction=friction, step=step
+        states.t,
+        states.q,
+        states.p,
+        v=states.v,
+        mass=m,
+        stiffness=stiffness,
+        friction=friction,
+        step=step,
+        last=None if states.p is not None else states.last,
     )
     if states.adaptive and found.verdict == "none":
         why = f"made by {states.adaptive}: an adaptive solver has no fixed scheme to find"

@@ -135,9 +135,15 @@ def of_size(name: str, x: ArrayLike | None, n: int = 1, *, zero: bool = False) -
 
 
 def read(
-    t: ArrayLike, q: ArrayLike, p: ArrayLike | None, v: ArrayLike | None, mass: ArrayLike | None
+    t: ArrayLike,
+    q: ArrayLike,
+    p: ArrayLike | None,
+    v: ArrayLike | None,
+    mass: ArrayLike | None,
+    last: Floats | None = None,
 ) -> Record:
-    """Record of times (f,), positions, and momenta or velocities (f, n).  Raises IdentificationError."""
+    """Record of times (f,), positions, and momenta or velocities (f, n).  `last` is the unit of the last
+    decimal of velocities (n,), where they were written in other units.  Raises IdentificationError."""
     times = np.asarray(t, dtype=np.float64)
     if times.ndim != 1 or not np.all(np.isfinite(times)):
         raise IdentificationError(f"times must be one row of finite numbers; found shape {np.shape(t)}")
@@ -181,7 +187,10 @@ def read(
     # the start is what a program was given; only what it computed shows how it computes
     computed = slice(1 if len(times) > FEWEST_STATES else 0, None)
     q_storage, v_storage = storage(positions[computed]), storage(moving[computed])
-    if v is None and masses is not None and v_storage.name == "double":
+    if v is not None and last is not None and np.any(last) and v_storage.name == "double":
+        v_storage, quantum = Storage(name="text, fixed decimals"), np.broadcast_to(last, moving.shape)
+        v_storage = q_storage if q_storage.decimals is not None else v_storage
+    elif v is None and masses is not None and v_storage.name == "double":
         # momenta made as m v from single-precision velocities are single only after the division
         velocities = storage(moving[computed] / masses)
         v_storage = velocities if velocities.name == "single" else v_storage

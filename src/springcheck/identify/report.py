@@ -37,6 +37,7 @@ def identify_arrays(
     stiffness: ArrayLike | None = None,
     friction: float | None = None,
     step: float | None = None,
+    last: ArrayLike | None = None,
 ) -> Identification:
     """The scheme that made a trajectory of oscillators, from its states alone.
 
@@ -44,25 +45,28 @@ def identify_arrays(
     follows from them; where neither is, `positions` reports what is left open.  With momenta alone and no
     mass, symmetric schemes look alike on a spring, which the notes report.  Coupled oscillators are replaced
     by their normal modes.  `mass` [M], `stiffness` [M/T2], `friction` c [M/T] and `step` [T] are stated
-    values, which the states are tested against. Raises IdentificationError where the states cannot show a
-    map: too few, not finite, at rest, at uneven times, or not spanning the plane.
+    values, which the states are tested against; `last` is the unit of the last decimal of velocities (n,)
+    that were written in other units. Raises IdentificationError where the states cannot show a map: too few,
+    not finite, at rest, at uneven times, or not spanning the plane.
     """
     if p is None and v is None:
         return identify_positions(read(t, q, None, np.zeros(np.shape(q)), mass), stiffness, friction, step)
     stated: dict[str, Any] = {"mass": mass, "stiffness": stiffness, "friction": friction, "step": step}
     times = np.asarray(t, dtype=np.float64)
     if not (times.ndim == 1 and len(times) > 1 and times[-1] < times[0]):
-        return _of_states(t, q, p, v, **stated)
+        return _of_states(t, q, p, v, last, **stated)
     # steps back in time, or frames that stand in reverse order
     given, turned = (x is None or np.sign(x) == side for x, side in ((step, -1), (step, 1)))
-    reverse: list[Any] = [None if x is None else np.asarray(x)[::-1] for x in (t, q, p, v)]
-    ways = [_of_states(t, q, p, v, **stated)] if given or not turned else []
+    reverse: list[Any] = [*(None if x is None else np.asarray(x)[::-1] for x in (t, q, p, v)), last]
+    ways = [_of_states(t, q, p, v, last, **stated)] if given or not turned else []
     return either_way([*ways, *([_of_states(*reverse, **stated)] if turned else [])])
 
 
-def _of_states(t: Any, q: Any, p: Any, v: Any, *, mass: ArrayLike | None, **stated: Any) -> Identification:
+def _of_states(
+    t: Any, q: Any, p: Any, v: Any, last: Any, *, mass: ArrayLike | None, **stated: Any
+) -> Identification:
     """Identify the scheme from times, positions, momenta or velocities, of which one may be None."""
-    record = read(t, q, p, v, mass)
+    record = read(t, q, p, v, mass, last)
     try:
         found = of_few(record, _of_record(record, **stated))
         found = found if found.fits and stated["stiffness"] is not None else of_rotation(record, found)

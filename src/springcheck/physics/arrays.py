@@ -18,7 +18,7 @@ numbers for "reduced".
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Literal, TypeAlias, TypeVar
 
 import numpy as np
@@ -92,6 +92,24 @@ class Arithmetic:
     """Whether positions are stored as displacements from the start, as total Lagrangian elements do."""
     joints: bool = False
     """Whether springs are joints of length `System.far`, whose rounding each force has."""
+    written: Any = field(default=((), ()), compare=False)
+    """Half a unit of the last decimal of recorded positions and momenta (2, n); empty where these are not
+    rounded to decimals.  It bounds what a recording adds to states that were computed with more digits."""
+
+    @property
+    def is_double(self) -> bool:
+        """Whether states are computed and recorded in double precision."""
+        return self.state <= 2.0**-53 and not np.any(self.written)
+
+    def recorded(self, m: Reals, h: float, rebuilt: bool) -> Extended:
+        """`written` of these masses (2, n).  Momenta that are differences of positions over a step h may have
+        been made of recorded ones (`rebuilt`)."""
+        out, given = np.zeros((2, len(m)), np.longdouble), np.asarray(self.written)
+        # a clock beside the particles is exact
+        out[:, : given.shape[1]] = given
+        if rebuilt and not self.keeps_displacement:
+            out[1] += 2 * m * out[0] / abs(h)
+        return out
 
     @property
     def unit(self) -> float:

@@ -65,4 +65,17 @@ def one_rounding(
         q, p = q + lost * (q - size), p + lost * p
     if rebuilt:
         p = p + scene.m * q / abs(scene.step)
+    half = how.recorded(scene.m, scene.step, rebuilt)
+    if np.any(half):
+        # what decimals take off the state before, which the step carries on, and off this one
+        near = None if scene.system.is_linear else start[0]
+        plain = forces(sizer.scheme, scene.system, lambda terms: scene.system.magnitude(near, terms))
+        off, none = (
+            np.stack(sizer(size + x[0], np.abs(start[1]) + x[1], plain, draws, hit, met=met))
+            for x in (half, 0 * half)
+        )
+        carried = (half.reshape(2, *(1,) * (size.ndim - 1), -1) + off - none) / roundings_of(
+            sizer.scheme, scene
+        )
+        return unit * q + SMALLEST + carried[0], unit * p + SMALLEST + carried[1]
     return np.asarray(unit * q + SMALLEST), np.asarray(unit * p + SMALLEST)
