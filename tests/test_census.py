@@ -122,13 +122,13 @@ def held(n: float) -> Trajectory:
 )
 def test_a_held_force_is_told_from_its_map(n: float, name: str) -> None:
     scene, run = load_scene("spring-uneven"), held(n)
-    assert census._name(scene, run, census._identified(scene, run)) == name
+    assert census._name(scene, census._identified(scene, run)) == name
 
 
 @pytest.mark.parametrize("n", [1.5, 2.5])
 def test_a_held_force_over_no_whole_number_of_substeps_is_none(n: float) -> None:
     scene, run = load_scene("spring-uneven"), held(n)
-    assert census._name(scene, run, census._identified(scene, run)) == "none that is known"
+    assert census._name(scene, census._identified(scene, run)) == "none that is known"
 
 
 def test_states_of_another_scheme_are_no_held_force() -> None:

@@ -292,7 +292,7 @@ def test_another_scheme_is_not_taken_for_another_time(scheme: str, other: str, s
     scene = replace(scenes.load_scene("driven-spring"), steps=60)
     law = schemes.SCHEMES[scheme]
     if other == "late":
-        run = steppers.record(scene, law, space.late(Case(scene=scene, scheme=law, x=0.0), 1.0))
+        run = steppers.record(scene, law, space.clocked(Case(scene=scene, scheme=law, x=0.0), 1.0))
     else:
         run = steppers.record(scene, law, steppers.textbook(scene, schemes.SCHEMES[other]))
     why = sentence(scene, run)
@@ -304,7 +304,7 @@ def test_a_modulation_at_the_wrong_time_is_named_too(name: str) -> None:
     scene = replace(scenes.load_scene(name), steps=60)
     law = schemes.SCHEMES["rk4"]
     assert "the start of the step, held over it" in sentence(
-        scene, steppers.record(scene, law, space.held(Case(scene=scene, scheme=law, x=0.0)))
+        scene, steppers.record(scene, law, space.clocked(Case(scene=scene, scheme=law, x=0.0), pace=0.0))
     )
 
 

@@ -53,7 +53,7 @@ def test_a_cell_has_the_numbers_of_a_run_of_its_own(
     scene = scenefile.load_scene(name)
     cells = vary.plan(given, text=text_of(name))
     found = measure.record(scene, cells, tmp_path / "e.h5", methods)
-    varied = vary.Varied(scene, cells)
+    varied = vary.Varied(scene, cells.text)
     assert store.check(tmp_path / "e.h5") == []
     assert found.tallies
     for tally in found.tallies:
@@ -78,7 +78,7 @@ def test_own_cells_are_equal_bit_for_bit_to_runs_of_their_own(tmp_path: Path) ->
     scene = scenefile.load_scene("spring-uneven")
     cells = vary.plan(["spring.0.stiffness=0.5:8:7:log"])
     measure.record(scene, cells, tmp_path / "e.h5", ["own:*"])
-    varied = vary.Varied(scene, cells)
+    varied = vary.Varied(scene, cells.text)
     for method in ("own:euler", "own:semi-implicit-euler", "own:implicit-euler"):
         columns = measure.stored(tmp_path / "e.h5").of(method)
         assert len(columns["q0"]) == 7

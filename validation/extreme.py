@@ -104,7 +104,7 @@ def off_alone(cell: Cell) -> float:
     values = {name: cell.parameters[name] for name in ("m", "k", "q", "p", "h")}
     spec = grid.Spec(block=cell.block, steps=int(cell.parameters["steps"]), **values)
     with np.errstate(all="ignore"):
-        run = driver.run(grid.scene([spec], engines.parse(cell.method), method.requires), cell.method)
+        run = driver.run(grid.scene([spec], method.requires), cell.method)
     if len(run.t) <= spec.steps:
         return np.inf
     with mpmath.workdps(60):

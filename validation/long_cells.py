@@ -64,7 +64,7 @@ def last(label: Label, specs: Sequence[Spec]) -> list[Cell]:
     """Cells of one long run each, judged by the closed form of the scheme's motion at ten frames."""
     found = []
     for spec in specs:
-        scene = grid.scene([spec], label, engines.method(label).requires)
+        scene = grid.scene([spec], engines.method(label).requires)
         scene = replace(scene, every=max(1, spec.steps // 10))
         with np.errstate(all="ignore"):
             run = driver.run(scene, label)

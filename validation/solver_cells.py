@@ -61,7 +61,7 @@ MOST = 20_000
 
 def solve(label: Label, spec: Spec) -> Cell:
     """One cell by an adaptive solver, judged at its end."""
-    scene = grid.scene([spec], label, frozenset())
+    scene = grid.scene([spec], frozenset())
     said, value, bound, whole, unmeasured = "", np.nan, np.nan, False, ""
     with np.errstate(all="ignore"):
         try:

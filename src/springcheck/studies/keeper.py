@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from argparse import Namespace
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from functools import cache, partial, wraps
 from pathlib import Path
@@ -148,12 +148,9 @@ class Keeper:
         done = len(pieces) - len(left)
         self._tell(done, pieces, left[:1])
         with closing(self.carried_out([piece.measure for piece in left])) as measured:
-            for j, result, by in measured:
+            for count, (j, result, by) in enumerate(measured, 1):
                 self.keep(left[j].form, left[j].key, result, by)
-                done += 1
-                # the next of the pieces that are still to be measured
-                following = len(left) - (len(pieces) - done)
-                self._tell(done, pieces, left[following : following + 1])
+                self._tell(done + count, pieces, left[count : count + 1])
                 yield left[j], result
 
     def carried_out(
@@ -195,12 +192,10 @@ def kept(path: str | Path | None, command: str, **how: Unpack[How]) -> Iterator[
 
     Raises StoreError, before anything is measured, when the file exists or cannot be written.
     """
-    progress, team = how.get("progress"), how.get("team", ALONE)
-    if path is None:
-        yield Keeper(None, progress, team)
-        return
-    with open_new(path, command, force=how.get("force", False)) as journal:
-        yield Keeper(journal, progress, team, Path(path))
+    opened = nullcontext() if path is None else open_new(path, command, force=how.get("force", False))
+    with opened as journal:
+        where = None if path is None else Path(path)
+        yield Keeper(journal, how.get("progress"), how.get("team", ALONE), where)
 
 
 def study(

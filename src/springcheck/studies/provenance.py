@@ -7,7 +7,6 @@ too, and its report says so.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from hashlib import sha256
@@ -67,25 +66,22 @@ def bits() -> dict[str, str]:
 
 def sentences(pieces: Iterable[tuple[str, Mapping[str, str]]]) -> list[str]:
     """Sentences on the processors that measured these pieces; none where all were of one kind."""
-    counts: Counter[tuple[str, ...]] = Counter()
-    hosts: dict[tuple[str, ...], dict[str, None]] = {}
+    measured: dict[tuple[str, ...], list[str]] = {}
     for _, by in pieces:
         kind = (by.get("processor", ""), *(by.get(f"bits of {name}", "") for name in BITS))
-        counts[kind] += 1
-        hosts.setdefault(kind, {})[by.get("host", "")] = None
-    if len(counts) < 2:
+        measured.setdefault(kind, []).append(by.get("host", ""))
+    if len(measured) < 2:
         return []
-    kinds = [kind for kind, _ in counts.most_common()]
-    parts = [f"{counts[kind]} on {kind[0]} ({few(list(hosts[kind]), MOST_HOSTS)})" for kind in kinds]
+    kinds = sorted(measured, key=lambda kind: -len(measured[kind]))
+    hosts = {kind: few([*dict.fromkeys(measured[kind])], MOST_HOSTS) for kind in kinds}
+    parts = [f"{len(measured[kind])} on {kind[0]} ({hosts[kind]})" for kind in kinds]
     said = [f"Pieces were measured on {len(kinds)} kinds of processors: {'; '.join(parts)}."]
-    most = few(list(hosts[kinds[0]]), MOST_HOSTS)
     for kind in kinds[1:]:
         differ = [name for name, one, other in zip(BITS, kinds[0][1:], kind[1:], strict=True) if one != other]
         if differ:
-            here = few(list(hosts[kind]), MOST_HOSTS)
             said.append(
-                f"The processors differ in a bit: {', '.join(differ)} round otherwise on {here} than on "
-                f"{most}; so may the last digits of what was measured there."
+                f"The processors differ in a bit: {', '.join(differ)} round otherwise on {hosts[kind]} than "
+                f"on {hosts[kinds[0]]}; so may the last digits of what was measured there."
             )
     if len(said) == 1:
         said.append(f"They agree bit for bit in {', '.join(BITS)}, as far as it was tried.")

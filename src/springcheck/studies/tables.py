@@ -119,18 +119,14 @@ class Documents(Form[T]):
         return msgspec.json.decode(str(table.columns["document"][0]), type=self.kind)  # type: ignore[no-any-return]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class _Field:
     name: str
     hint: Any
     optional: bool
     keys: tuple[str, ...]
     has_default: bool
-
-    @property
-    def is_array(self) -> bool:
-        # from NumPy 2.5 on an array's hint is an alias with an origin of its own
-        return get_origin(self.hint) in (tuple, np.ndarray, NDArray) or self.hint is np.ndarray
+    is_array: bool
 
 
 def _fields(kind: Any) -> tuple[_Field, ...]:
@@ -143,8 +139,10 @@ def _fields(kind: Any) -> tuple[_Field, ...]:
             optional = True
         if get_origin(hint) is Literal:
             hint = str
+        # from NumPy 2.5 on an array's hint is an alias with an origin of its own
+        array = get_origin(hint) in (tuple, np.ndarray, NDArray) or hint is np.ndarray
         keys, late = one.metadata.get("keys", ()), one.default is not MISSING
-        found.append(_Field(name=one.name, hint=hint, optional=optional, keys=keys, has_default=late))
+        found.append(_Field(one.name, hint, optional, keys, has_default=late, is_array=array))
     return tuple(found)
 
 

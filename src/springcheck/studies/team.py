@@ -10,27 +10,15 @@ from argparse import ArgumentTypeError, Namespace
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Protocol, TypeVar
+from typing import TYPE_CHECKING, TypeAlias, TypeVar
 
 from springcheck.studies.arguments import Argument, argument
 
 if TYPE_CHECKING:
     from springcheck.doors import Brought
+    from springcheck.studies.cluster import Cluster
 
 T = TypeVar("T")
-
-
-class Team(Protocol):
-    """Carries out pieces of work."""
-
-    @property
-    def workers(self) -> int:
-        """Number of pieces that are measured at the same time."""
-        ...
-
-    def carried_out(self, parts: Sequence[Callable[[], T]]) -> Generator[tuple[int, T], None, None]:
-        """Index and result of each part, as it finishes.  Close the iterator where it is left early."""
-        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,11 +26,12 @@ class Processes:
     """Processes of this machine; a single one is the program itself."""
 
     workers: int = 1
+    """Number of pieces that are measured at the same time."""
     brought: Brought | None = None
     """Engines that the call has brought."""
 
     def carried_out(self, parts: Sequence[Callable[[], T]]) -> Generator[tuple[int, T], None, None]:
-        """Index and result of each part, as it finishes."""
+        """Index and result of each part, as it finishes.  Close the iterator where it is left early."""
         from springcheck.studies.workers import carried_out
 
         if self.workers > 1 and self.brought is not None:
@@ -57,6 +46,9 @@ def _after(brought: Brought, part: Callable[[], T]) -> T:
     doors.bring_once(brought)
     return part()
 
+
+Team: TypeAlias = "Processes | Cluster"
+"""Carries out pieces of work."""
 
 ALONE = Processes()
 
@@ -88,6 +80,6 @@ def of(options: Namespace) -> Team:
     """The team that the command line asks for."""
     if not options.cluster:
         return Processes(options.workers, getattr(options, "brought", None))
-    from springcheck.studies.cluster import Cluster
+    from springcheck.studies import cluster
 
-    return Cluster(options.cluster, workers=max(2, options.workers))
+    return cluster.Cluster(options.cluster, workers=max(2, options.workers))

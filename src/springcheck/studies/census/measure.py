@@ -118,7 +118,7 @@ def entry(label: Label) -> Entry:
     held = rigid.is_rigid(label)
     found = None if method.adaptive or held else _identified(uneven, run)
     limit = np.nan if method.adaptive else first_limit(uneven, label)
-    name = "adaptive" if method.adaptive else rigid.name(uneven, run) if held else _name(uneven, run, found)
+    name = "adaptive" if method.adaptive else rigid.name(uneven, run) if held else _name(uneven, found)
     one_step = np.full((2, 2), np.nan) if method.adaptive else rigid.fitted(run.q[:, 0], run.p[:, 0])
     steps = max(run.outcome.step, 1)
     states = np.concatenate([orbit.q[:, 0], orbit.p[:, 0]])
@@ -162,7 +162,7 @@ def _identified(scene: Scene, run: Trajectory) -> Identification | None:
         return None
 
 
-def _name(scene: Scene, run: Trajectory, found: Identification | None) -> str:
+def _name(scene: Scene, found: Identification | None) -> str:
     """The scheme that the states show: of the catalogue, or a force held over substeps, or none."""
     if found is not None and found.verdict == "named" and found.fits and found.scheme:
         inside = f"{found.scheme}-{found.stride}"

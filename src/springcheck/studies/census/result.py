@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from math import nan
@@ -98,18 +99,16 @@ class Census(Studied):
     @property
     def partners(self) -> Mapping[str, tuple[str, ...]]:
         """For each method the others whose orbits of the blog's spring are bitwise identical."""
-        same: dict[str, list[str]] = {}
-        for entry in self.entries:
-            same.setdefault(entry.digest, []).append(entry.method)
-        return {x.method: tuple(y for y in same[x.digest] if y != x.method) for x in self.entries}
+        return {
+            x.method: tuple(y.method for y in self.entries if y.digest == x.digest and y is not x)
+            for x in self.entries
+        }
 
     @property
     def grouped(self) -> Mapping[str, tuple[Entry, ...]]:
         """Entries by the scheme that was found, the most frequent first."""
-        found: dict[str, list[Entry]] = {}
-        for entry in self.entries:
-            found.setdefault(entry.found, []).append(entry)
-        return {name: tuple(found[name]) for name in sorted(found, key=lambda name: -len(found[name]))}
+        found = Counter(entry.found for entry in self.entries)
+        return {name: tuple(x for x in self.entries if x.found == name) for name, _ in found.most_common()}
 
     @property
     def status(self) -> int:

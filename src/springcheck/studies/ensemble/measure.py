@@ -8,10 +8,10 @@ neither the file nor memory holds trajectories, however many cells there are.
 from __future__ import annotations
 
 from argparse import Namespace
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any, Unpack
+from typing import Any, TypeAlias, Unpack
 
 import numpy as np
 
@@ -54,7 +54,7 @@ def record(
     if scene.bath:
         raise SceneError(f"scene {scene.name} has a bath: cells of an ensemble are of motion without noise")
     labels, left, _ = choose(scene, methods)
-    varied, first = Varied(scene, cells), cells.values(0)
+    varied, first = Varied(scene, cells.text), cells.values(0)
     varied.check(first, varied.substitutions(first))
     measure = partial(_measure, scene, cells, labels, left)
     return keeper.study("ensemble", path, labels, measure, repr(cells), scene=scene, **how)
@@ -74,33 +74,25 @@ def _measure(
         for label in labels
         for chunk in cells.chunks
     ]
-    held: dict[str, Columns] = {}
+    held: dict[str, dict[str, Columns]] = {name: {} for name in tallies}
     for piece, found in kept.stream(pieces):
-        name = piece.key.rpartition("/")[0]
+        name, _, chunk = piece.key.rpartition("/")
         tallies[name] = tallies[name].plus(found)
         if kept.path is None:
-            held[piece.key] = found
+            held[name][chunk] = found
     return Ensemble(
         scene=scene,
         fields=tuple(axis.field for axis in cells.axes),
         grid=cells.samples is None,
         tallies=tuple(tallies.values()),
         left_out=tuple(left),
-        columns=_joined(held),
+        columns={label: _joined([mine[x] for x in sorted(mine)]) for label, mine in held.items() if mine},
     )
 
 
-def _joined(chunks: Mapping[str, Columns]) -> dict[str, Columns]:
-    """Join chunks, given by label and number, into columns by label."""
-    found: dict[str, dict[str, list[np.ndarray]]] = {}
-    for key in sorted(chunks):
-        columns = found.setdefault(key.rpartition("/")[0], {})
-        for name, values in chunks[key].items():
-            columns.setdefault(name, []).append(values)
-    return {
-        label: {name: np.concatenate(parts) for name, parts in columns.items()}
-        for label, columns in found.items()
-    }
+def _joined(chunks: Sequence[Columns]) -> Columns:
+    """Columns of all of these chunks, in their order."""
+    return {name: np.concatenate([one[name] for one in chunks]) for name in chunks[0]}
 
 
 @keeper.restoring("ensemble")
@@ -120,7 +112,7 @@ def stored(kept: keeper.Kept) -> Ensemble:
 def measure(scene: Scene, cells: Plan, chunk: int, label: Label) -> Columns:
     """The numbers of the cells of one chunk by one method."""
     values = cells.values(chunk)
-    varied = Varied(scene, cells)
+    varied = Varied(scene, cells.text)
     changes = varied.substitutions(values)
     varied.check(values, changes)
     count = len(next(iter(values.values())))
@@ -158,6 +150,10 @@ def _run(scene: Scene, changes: Any, chosen: np.ndarray, label: Label, found: di
         _run(scene, changes, chosen[half:], label, found)
         return
     copies = len(chosen)
+
+    def alone(j: int) -> Scene:
+        return together(scene, changes, chosen[j : j + 1])
+
     states = q.reshape(len(q), copies, -1), p.reshape(len(p), copies, -1)
     finite = np.all(np.isfinite(states[0]) & np.isfinite(states[1]), axis=2)
     frames = np.where(finite.all(axis=0), len(q), np.argmin(finite, axis=0))
@@ -166,9 +162,9 @@ def _run(scene: Scene, changes: Any, chosen: np.ndarray, label: Label, found: di
     for name, x in zip(("q0", "p0"), states, strict=True):
         found[name][chosen] = x[frames - 1, np.arange(copies), 0]
     with np.errstate(all="ignore"):
-        scale = _scales(scene, changes, chosen, many)
-        drift = np.asarray(_drifts(scene, changes, chosen, many, q, p) / scale, np.float64)
-        error = _errors(scene, changes, chosen, many, q, p, scale)
+        scale = _scales(many, copies, alone)
+        drift = np.asarray(_drifts(many, copies, alone, q, p) / scale, np.float64)
+        error = _errors(many, copies, alone, q, p, scale)
     held = np.arange(len(q))[:, None] < frames
     drift = np.take_along_axis(drift, np.argmax(np.where(held, np.abs(drift), -1), axis=0)[None], axis=0)[0]
     # a cell with no frame but the start has neither error nor drift
@@ -192,29 +188,30 @@ def _energies(
     return energy
 
 
-def _scales(scene: Scene, changes: Any, chosen: np.ndarray, many: Scene) -> Extended:
+Alone: TypeAlias = Callable[[int], Scene]
+"""Number of a copy -> its scene."""
+
+
+def _scales(many: Scene, copies: int, alone: Alone) -> Extended:
     """The square of the unit of each copy's `Norm` (copies,): its initial T + |V| unless that is 0."""
     q, p = (x.astype(np.longdouble)[None] for x in (many.q, many.p))
-    found = _energies(many, q, p, len(chosen), np.abs)[0]
+    found = _energies(many, q, p, copies, np.abs)[0]
     for j in np.flatnonzero(found == 0):
-        found[j] = together(scene, changes, chosen[j : j + 1]).system.norm.unit ** 2
+        found[j] = alone(int(j)).system.norm.unit ** 2
     return np.asarray(found, np.longdouble)
 
 
-def _solved(
-    scene: Scene, changes: Any, chosen: np.ndarray, steps: Integers
-) -> Iterator[tuple[int, Scene, Extended, Extended]]:
+def _solved(copies: int, alone: Alone, steps: Integers) -> Iterator[tuple[int, Scene, Extended, Extended]]:
     """Copies whose exact solution is known: number, scene, q and p (f, n)."""
-    for j in range(len(chosen)):
-        one = together(scene, changes, chosen[j : j + 1])
+    for j in range(copies):
+        one = alone(j)
         if exact.has_true_motion(one):
             yield j, one, *exact.true_motion(one, steps, one.step)
 
 
-def _drifts(scene: Scene, changes: Any, chosen: np.ndarray, many: Scene, q: Floats, p: Floats) -> Reals:
+def _drifts(many: Scene, copies: int, alone: Alone, q: Floats, p: Floats) -> Reals:
     """H - H0 of each copy (f, copies).  With friction or a drive the energy of the exact solution replaces
     H0, where it is known."""
-    copies = len(chosen)
     energy = _energies(many, q, p, copies)
     least, most = np.finfo(np.float64).smallest_normal / np.finfo(np.float64).eps, np.finfo(np.float64).max
     if not np.all((np.abs(energy) > least) & (np.abs(energy) <= most)):
@@ -227,28 +224,24 @@ def _drifts(scene: Scene, changes: Any, chosen: np.ndarray, many: Scene, q: Floa
             true = exact.true_motion(many, steps, many.step)
             right = np.asarray(_energies(many, *true, copies), np.float64)
         else:
-            for j, one, q_j, p_j in _solved(scene, changes, chosen, steps):
+            for j, one, q_j, p_j in _solved(copies, alone, steps):
                 right[:, j] = one.system.energy(q_j, p_j)
     return np.asarray(energy - right)
 
 
-def _errors(
-    scene: Scene, changes: Any, chosen: np.ndarray, many: Scene, q: Floats, p: Floats, scale: Extended
-) -> Floats:
+def _errors(many: Scene, copies: int, alone: Alone, q: Floats, p: Floats, scale: Extended) -> Floats:
     """Distance of each copy from its exact solution, relative to the initial energy norm (f, copies), the
     root of the `scale`; NaN where that is unknown."""
-    copies, frames = len(chosen), len(q)
-    steps = np.arange(frames) * many.every
-    system = many.system
+    steps, system = np.arange(len(q)) * many.every, many.system
     if not (system.is_separate and system.is_linear) or system.free_groups:
-        error = np.full((frames, copies), np.nan)
-        for j, one, true_q, true_p in _solved(scene, changes, chosen, steps):
+        error = np.full((len(q), copies), np.nan)
+        for j, one, true_q, true_p in _solved(copies, alone, steps):
             here = slice(j * one.n, (j + 1) * one.n)
             off = one.system.norm(q[:, here] - true_q, p[:, here] - true_p)
             error[:, j] = np.maximum(off, exact.uncertainty(one, float(steps[-1]) * one.step))
         return error
     true_q, true_p = exact.true_motion(many, steps, many.step)
-    solution, m = many.system.solution, many.m.astype(np.longdouble)
+    solution, m = system.solution, many.m.astype(np.longdouble)
     assert solution is not None
     known_q, known_p = solution.doubt(float(steps[-1]) * many.step)
     # errors below the uncertainty of the exact solution are not reported

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -67,13 +67,8 @@ class Tally:
             if len(values):
                 low[name] = float(min(low.get(name, np.inf), np.min(values)))
                 high[name] = float(max(high.get(name, -np.inf), np.max(values)))
-        return Tally(
-            method=self.method,
-            cells=self.cells + len(good),
-            complete=self.complete + int(np.count_nonzero(good)),
-            smallest=low,
-            largest=high,
-        )
+        complete = self.complete + int(np.count_nonzero(good))
+        return replace(self, cells=self.cells + len(good), complete=complete, smallest=low, largest=high)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)

@@ -10,6 +10,7 @@ import math
 import re
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
+from copy import deepcopy
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -117,43 +118,35 @@ def _axis(text: str, *, random: bool) -> Axis:
     field, equals, rest = text.partition("=")
     parts = rest.split(":")
     log = parts[-1] == "log"
+    numbers = parts[: len(parts) - log]
     try:
-        if not (field and equals):
-            raise ValueError
         if random:
-            low, high = map(float, parts[: len(parts) - log])
-            _finite(low, high)
-            if log and not (low > 0 and high > 0):
-                raise ValueError
-            return Axis(field=field, low=low, high=high, log=log)
-        if len(parts) == 1:
-            values = tuple(float(x) for x in rest.split(","))
-            _finite(*values)
-            return Axis(field=field, values=values)
-        first, last, number = parts[: len(parts) - log]
-        found = Axis(field=field, low=float(first), high=float(last), count=int(number), log=log)
-        with np.errstate(all="raise"):
-            _finite(*replace(found, count=min(found.count, 3)).at(np.arange(min(found.count, 3))).tolist())
-        if found.count < 1:
+            low, high = map(float, numbers)
+            found, some = Axis(field=field, low=low, high=high, log=log), [low, high]
+            valid = not log or min(some) > 0
+        elif len(parts) == 1:
+            some = [float(x) for x in rest.split(",")]
+            found, valid = Axis(field=field, values=tuple(some)), True
+        else:
+            first, last, number = numbers
+            found = Axis(field=field, low=float(first), high=float(last), count=int(number), log=log)
+            few, valid = min(found.count, 3), found.count > 0
+            with np.errstate(all="raise"):
+                some = replace(found, count=few).at(np.arange(few)).tolist()
+        if not (field and equals and valid and all(map(math.isfinite, some))):
             raise ValueError
     except (ValueError, FloatingPointError):
         raise SpringcheckError(f"--vary {text}: {FORM} is needed") from None
     return found
 
 
-def _finite(*values: float) -> None:
-    if not all(map(math.isfinite, values)):
-        raise ValueError
-
-
 class Varied:
     """A scene with varied fields, which an option of the command line names."""
 
-    def __init__(self, scene: Scene, plan: Plan, option: str = "--vary") -> None:
+    def __init__(self, scene: Scene, text: str, option: str = "--vary") -> None:
+        """`text` is that of the scene file; "" for the one that the scene writes."""
         self.scene, self._option = scene, option
-        self._data = tomllib.loads(plan.text or scene.to_toml())
-        for axis in plan.axes:
-            self._at(axis.field)
+        self._data = tomllib.loads(text or scene.to_toml())
 
     def substitutions(self, values: Mapping[str, Floats]) -> dict[Place, Floats]:
         """The numbers of the scene that change, with their values in every cell (c,).
@@ -175,9 +168,8 @@ class Varied:
                 found[place] = np.array([effect.get(place, known) for effect in effects])[where]
         return found
 
-    def _at(self, field: str) -> tuple[Any, Any]:
-        """The table that holds a field, and the key in it."""
-        found: Any = self._data
+    def _at(self, found: Any, field: str) -> tuple[Any, Any, Any]:
+        """The table that holds a field in the tables of a file, the key in it, and its value there."""
         try:
             *parts, last = re.findall(r"[^.\[\]]+", field)
             for part in parts:
@@ -192,26 +184,17 @@ class Varied:
                 f"{nearest(field, fields(self._data))}; "
                 "fields are named as in its file, such as spring.0.stiffness or time.step"
             ) from None
-        return found, key
+        return found, key, held
 
     def whole(self, values: Mapping[str, float]) -> Scene:
         """The scene with these values in its file.  SpringcheckError where they are invalid."""
-        before = []
-        try:
-            for field, value in values.items():
-                table, key = self._at(field)
-                held = table.get(key) if isinstance(table, dict) else table[key]
-                before.append((table, key, held))
-                is_count = isinstance(held, int) and not isinstance(held, bool) and value == int(value)
-                table[key] = int(value) if is_count else value
-            where = f"{self._option} " + ", ".join(f"{field}={value:g}" for field, value in values.items())
-            return scenefile.from_tables(self._data, name=self.scene.name, where=where)
-        finally:
-            for table, key, held in reversed(before):
-                if held is None:
-                    del table[key]
-                else:
-                    table[key] = held
+        tables = deepcopy(self._data)
+        for field, value in values.items():
+            table, key, held = self._at(tables, field)
+            is_count = isinstance(held, int) and not isinstance(held, bool) and value == int(value)
+            table[key] = int(value) if is_count else value
+        where = f"{self._option} " + ", ".join(f"{field}={value:g}" for field, value in values.items())
+        return scenefile.from_tables(tables, name=self.scene.name, where=where)
 
     def check(self, values: Mapping[str, Floats], changes: Mapping[Place, Floats]) -> None:
         """Raise SpringcheckError where fields interact, so that combined changes differ from the file.
@@ -245,14 +228,8 @@ def _key(table: Any, part: str) -> Any:
 
 
 def _differences(one: Scene, other: Scene, field: str) -> Iterator[tuple[Place, float]]:
-    alike = one.n == other.n and [(t.key, len(t)) for t in one.terms] == [
-        (t.key, len(t)) for t in other.terms
-    ]
-    if not alike or any(
-        not np.array_equal(a, b)
-        for mine, its in zip(one.terms, other.terms, strict=True)
-        for a, b in zip(mine.particles, its.particles, strict=True)
-    ):
+    joins, its = ([(t.key, [i.tolist() for i in t.particles]) for t in x.terms] for x in (one, other))
+    if one.n != other.n or joins != its:
         raise SpringcheckError(f"--vary {field}: it changes what acts on what, which no ensemble can")
     before = _arrays(one)
     for key, after in _arrays(other).items():

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from springcheck.engines.contract import Label, Need
+from springcheck.engines.contract import Need
 from springcheck.physics.builders import spring
 from springcheck.physics.scene import Scene
 from springcheck.studies.stability.propagators import MASS, STEP
@@ -59,7 +59,7 @@ class Spec:
             return float(max(k * abs(self.q), np.sqrt(k / m) * abs(self.p)))
 
     @property
-    def turn(self) -> float:
+    def h_w(self) -> float:
         """|h| w."""
         return float(abs(np.longdouble(self.h)) * np.sqrt(abs(np.longdouble(self.k)) / np.longdouble(self.m)))
 
@@ -118,10 +118,10 @@ def special() -> Iterator[Spec]:
             yield Spec(block="special", m=m, k=k, q=q, p=p, h=0.11)
 
 
-def scene(cells: list[Spec], label: Label, requires: frozenset[Need]) -> Scene:
+def scene(cells: list[Spec], requires: frozenset[Need]) -> Scene:
     """Cells of one step and one length as a scene of particles side by side."""
     first = cells[0]
-    m = np.array([x.m for x in cells])
+    m, k, q, p = (np.array([getattr(x, name) for x in cells]) for name in ("m", "k", "q", "p"))
     c = None
     if Need.DAMPING in requires:
         # methods that require damping get friction: h c/m = 1/80
@@ -129,17 +129,6 @@ def scene(cells: list[Spec], label: Label, requires: frozenset[Need]) -> Scene:
         with np.errstate(over="ignore", under="ignore"):
             c = np.where(first.block == "force", np.minimum(rate * m, 1e300), 0.0)
     return spring(
-        m=m,
-        k=np.array([x.k for x in cells]),
-        q=np.array([x.q for x in cells]),
-        p=np.array([x.p for x in cells]),
-        c=c,
-        fast=Need.FAST_SPRINGS in requires,
-        step=first.h,
-        steps=first.steps,
-        name="extreme",
-        title="extreme cases side by side",
-        source="springcheck",
-        tolerance=first.tolerance,
-        quantities=("q", "p"),
-    )
+        m, k, q, p, first.h, first.steps, c=c, fast=Need.FAST_SPRINGS in requires, name="extreme",
+        tolerance=first.tolerance, quantities=("q", "p"),
+    )  # fmt: skip

@@ -67,13 +67,9 @@ def cell(
     **more: float,
 ) -> Cell:  # fmt: skip
     """The cell of a spring, with `more` of its parameters."""
-    parameters = {
-        "m": spec.m, "k": spec.k, "q": spec.q, "p": spec.p, "h": spec.h, "steps": spec.steps,
-        "h_w": spec.turn, "force": spec.force, **more,
-    }  # fmt: skip
     return Cell(
-        method=str(label), block=spec.block, parameters=parameters, outcome=outcome, reason=reason,
-        value=float(value), bound=float(bound),
+        method=str(label), block=spec.block, outcome=outcome, reason=reason, value=float(value),
+        bound=float(bound), parameters={name: getattr(spec, name) for name in PARAMETERS} | more,
     )  # fmt: skip
 
 

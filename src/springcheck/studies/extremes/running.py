@@ -40,7 +40,7 @@ def cells(label: Label, specs: Sequence[Spec]) -> list[Cell]:
     if half and engines.arithmetic(label).joints:
         # all joints of a run are as long as the largest motion needs them
         return [cell for spec in specs for cell in cells(label, [spec])]
-    scene = grid.scene(list(specs), label, engines.method(label).requires)
+    scene = grid.scene(list(specs), engines.method(label).requires)
     try:
         q, p, stop = raw(scene, label)
     except MethodError as error:

@@ -127,19 +127,11 @@ def forgetting(scene: Scene) -> float:
     return scene.step * scene.bath.friction
 
 
-class Row:
+def row(seed: Any) -> np.random.Generator:
     """One stream of numbers for all seeds, each of which starts at an offset of its own."""
-
-    def __init__(self, seed: Any) -> None:
-        self._rng, self._at, self._ahead = np.random.default_rng(1), int(seed) % 1000, np.empty(0)
-
-    def standard_normal(self, n: int) -> Floats:
-        """The next n numbers."""
-        while len(self._ahead) < self._at + n:
-            self._ahead = np.concatenate([self._ahead, self._rng.standard_normal(1000 + n)])
-        found, self._ahead = self._ahead[self._at : self._at + n], self._ahead[self._at + n :]
-        self._at = 0
-        return found
+    rng = np.random.default_rng(1)
+    rng.standard_normal(int(seed) % 1000)
+    return rng
 
 
 class Each:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from springcheck.studies.faults.baths import Each, Row, by, forgetting, heavy, of_rank, played
+from springcheck.studies.faults.baths import Each, by, forgetting, heavy, of_rank, played, row
 from springcheck.studies.faults.rigid import Late, alike, solved
 from springcheck.studies.faults.seeded import Fault, each
 from springcheck.thermal import THERMOSTATS
@@ -72,7 +72,7 @@ OF_NOISE = each(
     Fault("seed-ignored", "the seed is ignored", _KEPT, lambda c: played(c, seed=lambda seed: None)),
     Fault("seed-fixed", "the seed is always 1", _KEPT, lambda c: played(c, seed=lambda seed: 1)),
     Fault("seeds-in-a-row", "seeds begin at neighbouring places of one stream of numbers", _APART,
-          lambda c: played(c, seed=Row)),
+          lambda c: played(c, seed=row)),
     Fault("seed-of-particle", "a generator for each particle, of the seed and its number", _APART,
           lambda c: played(c, seed=Each)),
     scheme="baoab", scene="bath",

@@ -136,14 +136,9 @@ BOX = each(
 )  # fmt: skip
 
 
-def late(c: Case, part: float) -> Step:
-    """The step with a drive that is late by this part of it."""
-    return textbook(c.scene, c.scheme, clock=lambda i: ((i + part) * c.scene.step, 1.0))
-
-
-def held(c: Case) -> Step:
-    """The step with the drive at its start held over all stages."""
-    return textbook(c.scene, c.scheme, clock=lambda i: (i * c.scene.step, 0.0))
+def clocked(c: Case, late: float = 0.0, pace: float = 1.0) -> Step:
+    """The step with a drive that is late by this part of it, and whose clock goes at this pace."""
+    return textbook(c.scene, c.scheme, clock=lambda i: ((i + late) * c.scene.step, pace))
 
 
 def other(scene: Scene, change: Callable[[Drive], Drive]) -> Scene:
@@ -153,10 +148,11 @@ def other(scene: Scene, change: Callable[[Drive], Drive]) -> Scene:
 
 DRIVES = each(
     Fault("late-drive", "the drive is taken later by a part of the step",
-          textbook=lambda c: late(c, c.x), size=1e-9),
-    Fault("held-drive", "the drive of the step's start is held over its stages", textbook=held),
+          textbook=lambda c: clocked(c, c.x), size=1e-9),
+    Fault("held-drive", "the drive of the step's start is held over its stages",
+          textbook=lambda c: clocked(c, pace=0.0)),
     Fault("drive-of-the-step-before", "the drive is that of the step before, as of a callback that is late",
-          textbook=lambda c: late(c, -1.0)),
+          textbook=lambda c: clocked(c, -1.0)),
     Fault("drive-phase", "the phase of the drive has the wrong sign",
           moves=lambda c: other(c.scene, lambda d: replace(d, phase=-d.phase))),
     Fault("drive-over-mass", "the amplitude of the drive is divided by the mass",

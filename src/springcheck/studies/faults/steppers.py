@@ -11,11 +11,10 @@ from typing import TypeAlias
 import numpy as np
 
 from springcheck import schemes
-from springcheck.physics.arrays import Arithmetic, Floats, Force, Reals
+from springcheck.physics.arrays import Arithmetic, Floats, Force
 from springcheck.physics.rods import Rods
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Outcome, Trajectory, of_scene
-from springcheck.schemes.stepping import Slope
 
 State: TypeAlias = tuple[Floats, Floats]
 Step: TypeAlias = Callable[[int, Floats, Floats], State]
@@ -37,23 +36,15 @@ def textbook(
     """The scheme's own step in double precision, with the scene's force or another, a clock for a drive, or
     other rods than the scene's."""
     n, scene = scene.n, scene.system.clocked
-    pull = force or scene.system.force
-    m, h = scene.m, scene.step
-    stiff: Reals | Slope | None = None
-    if scheme.has("implicit"):
-        constant = scene.system.hessian(scene.q).astype(np.float64)
-        linear = scene.system.is_linear
-        stiff = constant if linear else lambda q: (scene.system.hessian(q), True)
-    parts = scene.system.parts
-    rate = scene.system.friction_rates if scene.system.is_damped else None
+    law, m, h = schemes.Law(scheme=scheme, scene=scene, h=scene.step), scene.m, scene.step
 
     def one(i: int, q: Floats, p: Floats) -> State:
         if len(m) > n:
             time, pace = clock(i) if clock else (i * h, 1.0)
             q, p = np.append(q, time), np.append(p, pace * scene.p[n])
         a, b = schemes.step(
-            scheme, q, p, h=h, m=m, force=pull, stiffness=stiff, parts=parts, rate=rate,
-            hold=hold or scene.system.rods,
+            scheme, q, p, h=h, m=m, force=force or scene.system.force, stiffness=law.stiffness,
+            parts=scene.system.parts, rate=law.rate, hold=hold or scene.system.rods,
         )  # fmt: skip
         return np.asarray(a[:n], np.float64), np.asarray(b[:n], np.float64)
 

@@ -243,11 +243,6 @@ def given_up(c: Case, r: Trajectory) -> Trajectory:
     return replace(r.at(half), outcome=Outcome(status="stopped", step=(half.stop - 1) * r.every))
 
 
-def late_start(c: Case) -> Trajectory:
-    """Record the state after the first step as the first frame."""
-    return record(c.scene, c.scheme, c.right, start=c.right(0, c.scene.q, c.scene.p))
-
-
 REPORTS = (
     Fault("early-momenta", "momenta of half a step before, reported as synchronised",
           ("step-defect", "shadow-energy"), reports=lambda c, r: half_step(c, -1, r)),
@@ -256,7 +251,7 @@ REPORTS = (
     Fault("delayed-momenta", "momenta one frame behind the positions", FRAME_CHECKS,
           reports=lambda c, r: replace(r, p=np.concatenate([r.p[:1], r.p[:-1]]))),
     Fault("late-start", "the first frame is the state after the first step", ("start", "closed-form"),
-          late_start),
+          lambda c: record(c.scene, c.scheme, c.right, start=c.right(0, c.scene.q, c.scene.p))),
     Fault("swapped-frames", "two frames have changed places", FRAME_CHECKS, reports=swapped_frames),
     Fault("length-unit", "positions are reported too large", ("start", *FRAME_CHECKS),
           reports=lambda c, r: replace(r, q=r.q * (1 + c.x)), size=1e-12),

@@ -116,15 +116,13 @@ class Errors:
         """`judged` is the scene with parameters as the engine stores them, for the rounding error alone."""
         self._truth, self._h, self._every = known, h, every
         self._frame = 0
-        self._largest = self._end = self._energy = 0.0
-        self._phase, self._last = 0.0, np.zeros(0, dtype=np.longdouble)
+        self._largest = self._end = self._energy = self._phase = self._rounded = 0.0
         modes = known.turning
         u, v = self._turned(known.scene.q[None], known.scene.p[None])
         size = np.hypot(u, v)[0]
         self._clear = (modes.w2 > 0) & (size >= LEAST_AMPLITUDE * np.max(size)) & (size > 0)
         self._last = np.zeros(int(np.count_nonzero(self._clear)), dtype=np.longdouble)
         self._own = _own_motion(judged or known.scene, scheme, h)
-        self._rounded = 0.0
 
     def __call__(self, t: Floats, q: Floats, p: Floats, *_: Floats | None) -> None:
         """Accumulate the errors of these frames."""

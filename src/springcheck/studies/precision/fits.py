@@ -70,20 +70,13 @@ class Point:
         return min(self.run_seconds_repeats, default=float("nan"))
 
     @property
-    def quartiles(self) -> tuple[float, float] | None:
-        """First and third quartile of the run times."""
-        if not self.run_seconds_repeats:
-            return None
-        low, high = np.quantile(self.run_seconds_repeats, [0.25, 0.75])
-        return float(low), float(high)
-
-    @property
     def said(self) -> str:
         """The outcome, and why."""
         return f"{self.outcome}: {self.message}" if self.message else self.outcome
 
     def document(self) -> dict[str, Any]:
         """For JSON."""
+        runs = self.run_seconds_repeats
         return {
             "method": self.method,
             "step": self.step,
@@ -91,7 +84,7 @@ class Point:
             "steps": self.steps,
             **{one.name: getattr(self.accuracy, one.name, None) for one in fields(Accuracy)},
             "run_seconds": self.seconds,
-            "run_seconds_quartiles": self.quartiles,
+            "run_seconds_quartiles": np.quantile(runs, [0.25, 0.75]).tolist() if runs else None,
             "start_seconds": min(self.start_seconds_repeats, default=None),
             "read_seconds": min(self.read_seconds_repeats, default=None),
             "force_calls": self.force_calls,

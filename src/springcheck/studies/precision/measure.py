@@ -198,25 +198,17 @@ def _open(sweeps: list[Sweep]) -> list[Sweep]:
 
 def _level(sweeps: list[Sweep], known: Truth, tell: Callable[[str], None]) -> None:
     """Measure the next point of each of these sweeps: errors one by one, then timings in turn."""
-    points: list[Point] = []
-    spent: list[float] = []
+    clocks: list[Clock] = []
     for sweep in sweeps:
         tell(f"{sweep.label}, errors")
         began = perf_counter()
-        points.append(sweep.known or _errors(sweep, known))
-        spent.append(perf_counter() - began)
+        point = sweep.known or _errors(sweep, known)
+        spent = perf_counter() - began
+        clocks.append(Clock(sweep=sweep, scene=to_time(known.scene, sweep), point=point, spent=spent))
     tell(f"timing {count(len(sweeps), 'method')} in turn")
-    clocks = [
-        Clock(sweep=sweep, scene=to_time(known.scene, sweep))
-        for sweep, point in zip(sweeps, points, strict=True)
-        if point.complete
-    ]
-    take_turns(clocks)
-    timed = {id(clock.sweep): clock for clock in clocks}
-    for sweep, point, seconds in zip(sweeps, points, spent, strict=True):
-        clock = timed.get(id(sweep))
-        whole = point if clock is None else clock.onto(point)
-        take(sweep, replace(whole, spent_seconds=seconds + (clock.spent if clock else 0.0)))
+    take_turns([clock for clock in clocks if clock.point.complete])
+    for clock in clocks:
+        take(clock.sweep, clock.timed)
 
 
 def _errors(sweep: Sweep, known: Truth) -> Point:

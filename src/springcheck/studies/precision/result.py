@@ -130,14 +130,9 @@ class PrecisionStudy(Studied):
         return tuple(point for method in self.methods for point in method.points)
 
     @property
-    def timed(self) -> list[Point]:
-        """Points with both an error and a run time."""
-        return [point for point in self.points if point.complete and point.run_seconds_repeats]
-
-    @property
     def front(self) -> list[Point]:
         """The Pareto front of error and run time, the fastest first."""
-        return fits.front(self.timed)
+        return fits.front(self.points)
 
     @property
     def cheapest(self) -> list[tuple[float, Point | None]]:
@@ -146,7 +141,7 @@ class PrecisionStudy(Studied):
         Its message gives the numbers of steps between which it is interpolated; it is empty where it was
         measured.
         """
-        return [(target, fits.cheapest(self.timed, target)) for target in TARGETS]
+        return [(target, fits.cheapest(self.points, target)) for target in TARGETS]
 
     @property
     def status(self) -> Literal[0, 2]:

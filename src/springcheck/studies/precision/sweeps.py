@@ -89,28 +89,26 @@ def begin(scene: Scene, label: Label, known: Truth) -> Sweep:
         arithmetic=Arithmetic(),
         condition=None,
     )
-    reason = engines.obstacle(scene, label)
-    if reason is None:
-        try:
-            sweep.arithmetic = engines.arithmetic(label)
-            sweep.condition = fits.condition(method, sweep.arithmetic, known.angle)
-            sweep.scene = next(sweep.scenes, None)
-            if sweep.scene is None:
-                needed = coarsest(known, limit)
-                raise MethodError(f"its coarsest run takes {needed:.0e} steps, more than {MOST_STEPS:.0e}")
-            began = perf_counter()
-            driver.bare(replace(sweep.scene, steps=1), label, planned=PLANNED)
-            sweep.first_start = perf_counter() - began
-            first = driver.bare(to_time(plain, sweep), label, planned=PLANNED).timing
-            sweep.start, sweep.cost = first.start, first.run
-        except MethodError as error:
-            reason = str(error)
-        except Stopped:
-            # the run for the errors stops likewise and reports it as a row
-            pass
-    if reason is not None:
+    try:
+        if reason := engines.obstacle(scene, label):
+            raise MethodError(reason)
+        sweep.arithmetic = engines.arithmetic(label)
+        sweep.condition = fits.condition(method, sweep.arithmetic, known.angle)
+        sweep.scene = next(sweep.scenes, None)
+        if sweep.scene is None:
+            needed = coarsest(known, limit)
+            raise MethodError(f"its coarsest run takes {needed:.0e} steps, more than {MOST_STEPS:.0e}")
+        began = perf_counter()
+        driver.bare(replace(sweep.scene, steps=1), label, planned=PLANNED)
+        sweep.first_start = perf_counter() - began
+        first = driver.bare(to_time(plain, sweep), label, planned=PLANNED).timing
+        sweep.start, sweep.cost = first.start, first.run
+    except MethodError as error:
         sweep.scene = None
-        sweep.points.append(blank(sweep, "cannot run", reason))
+        sweep.points.append(blank(sweep, "cannot run", str(error)))
+    except Stopped:
+        # the run for the errors stops likewise and reports it as a row
+        pass
     return sweep
 
 
@@ -123,7 +121,10 @@ def take(sweep: Sweep, point: Point) -> None:
         sweep.overhead = max(0.0, point.spent_seconds - runs(run + sweep.start) * run)
         growth = max(1.2, run / before) if sweep.method.adaptive and before else 2.0
         sweep.cost, sweep.read = growth * run, growth * min(point.read_seconds_repeats, default=np.inf)
-    sweep.scene = None if is_finished(sweep) else next(sweep.scenes, None)
+    errors = [point.error for point in sweep.complete]
+    # while the leading term dominates, a smaller step reduces the error; only rounding can make it grow
+    finished = not sweep.method.adaptive and fits.turned(errors) is not None
+    sweep.scene = None if finished else next(sweep.scenes, None)
 
 
 def coarsest(known: Truth, limit: float) -> int:
@@ -212,15 +213,6 @@ def _seconds(sweep: Sweep, run: float) -> float:
 def price(sweep: Sweep) -> float:
     """Seconds for the next point."""
     return _seconds(sweep, sweep.cost)
-
-
-def is_finished(sweep: Sweep) -> bool:
-    """Whether the error of a method of fixed step has begun to grow.
-
-    While the leading term dominates, a smaller step reduces it; only rounding can make it grow.
-    """
-    errors = [point.error for point in sweep.complete]
-    return not sweep.method.adaptive and fits.turned(errors) is not None
 
 
 def to_time(scene: Scene, sweep: Sweep) -> Scene:

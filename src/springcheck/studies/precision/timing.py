@@ -51,12 +51,15 @@ class Clock:
 
     sweep: Sweep
     scene: Scene
+    point: Point
+    """The point with its errors, or with the reason why it has none and is not timed."""
     copies: int = 1
     count: int = 0
     runs: list[driver.Bare] = field(default_factory=list)
     reads: list[float] = field(default_factory=list)
     gave_up: str = ""
-    spent: float = 0.0
+    spent: float
+    """Seconds of all its runs so far."""
 
     def warm_up(self, shortest: float) -> None:
         """Determine how many runs fit into one timing, and how many timings to take."""
@@ -89,10 +92,14 @@ class Clock:
         finally:
             self.spent += perf_counter() - began
 
-    def onto(self, point: Point) -> Point:
+    @property
+    def timed(self) -> Point:
         """The point with its timings."""
+        point = replace(self.point, spent_seconds=self.spent)
         if self.gave_up:
             return replace(point, outcome="stopped", message=self.gave_up, accuracy=None)
+        if not self.runs:
+            return point
         return replace(
             point,
             run_seconds_repeats=tuple(run.timing.run for run in self.runs),

@@ -11,7 +11,7 @@ from springcheck.errors import SpringcheckError
 from springcheck.physics import builders, scenefile
 from springcheck.physics.bath import KELVIN, Bath
 from springcheck.physics.scene import Scene
-from springcheck.studies.ensemble.vary import Axis, Plan, Varied, fields
+from springcheck.studies.ensemble.vary import Varied, fields
 
 
 def changed(options: Namespace) -> Scene:
@@ -37,11 +37,7 @@ def changed(options: Namespace) -> Scene:
         given[field] = _number(option, field, str(value))
     if not given:
         return bathed(scene, options)
-    plan = Plan(
-        axes=tuple(Axis(field=field, values=(value,)) for field, value in given.items()),
-        samples=None, seed=0, text=text,
-    )  # fmt: skip
-    found = Varied(scene, plan, option="--set").whole(given)
+    found = Varied(scene, text, option="--set").whole(given)
     said = ", ".join(f"{field} = {value:g}" for field, value in given.items())
     return bathed(replace(found, title=f"{scene.title}, with {said}"), options)
 

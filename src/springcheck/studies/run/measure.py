@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from argparse import Namespace
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from fnmatch import fnmatchcase
 from itertools import zip_longest
@@ -17,12 +17,13 @@ from springcheck import checks, driver, engines, interrupts
 from springcheck.checks import compare
 from springcheck.engines.contract import Label
 from springcheck.errors import MethodError, SpringcheckError, StoreError
-from springcheck.physics import exact, memory, scenefile
+from springcheck.physics import exact, memory
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import NOT_KNOWN, Comparison, Trajectory, Verdict
 from springcheck.studies import keeper
 from springcheck.studies.arguments import Progress
 from springcheck.studies.choose import LeftOut, choose
+from springcheck.studies.run.changes import changed
 from springcheck.studies.run.result import FAULT, Repeat, Repeats, Report, Stored
 from springcheck.studies.run.tally import Tally, line, solution
 
@@ -70,12 +71,7 @@ def perform(options: Namespace, progress: Progress | None) -> Report | Repeats |
         return ensemble.perform(options, progress)
     if options.source is not None:
         return Repeats(repeats=tuple(repeat(Path(options.source), methods=options.method, progress=progress)))
-    if changes:
-        from springcheck.studies.run.changes import changed
-
-        scene = changed(options)
-    else:
-        scene = scenefile.load_scene(options.scene)
+    scene = changed(options)
     return run(
         scene,
         Path(options.output or f"{scene.name}.h5"),
@@ -216,8 +212,10 @@ def judge(
     tallies = {name: Tally(scene) for name in sources}
     parts: list[Comparison] = []
     last, failed = dict[str, Trajectory](), dict[str, Trajectory]()
-    streams = {name: keeper.windows(source, name, rows, stride) for name, source in sources.items()}
-    for pieces in _together(streams):
+    streams = (keeper.windows(source, name, rows, stride) for name, source in sources.items())
+    for windows in zip_longest(*streams):
+        # over the same frames; runs that have ended are left out
+        pieces = {name: one for name, one in zip(sources, windows, strict=True) if one is not None}
         judged_frames += max(len(piece.t) for piece in pieces.values())
         known = solution(scene, pieces.values()) if exact.has_true_motion(scene) else None
         for name, piece in pieces.items():
@@ -288,17 +286,6 @@ def _bridged(worst: Sequence[Verdict], pieces: Sequence[Sequence[Verdict]], fram
         else v
         for v in worst
     ]
-
-
-def _together(streams: Mapping[str, Iterator[Trajectory]]) -> Iterator[dict[str, Trajectory]]:
-    """Windows of several trajectories over the same frames; those that have ended are left out."""
-    while True:
-        pieces = {
-            name: piece for name, stream in streams.items() if (piece := next(stream, None)) is not None
-        }
-        if not pieces:
-            return
-        yield pieces
 
 
 def repeat(path: Path, *, methods: Sequence[str] = (), progress: Progress | None = None) -> list[Repeat]:

@@ -54,11 +54,12 @@ def record(
 
 def _measure(scene: Scene, labels: Sequence[Label], kept: Keeper) -> Stability:
     def why(label: Label) -> str | None:
-        absent = engines.absence(label.engine)
-        if absent or propagators.has_one_step(label):
-            return absent or propagators.absence(label)
-        adaptive = not scheme(engines.method(label).scheme).has("one-step")
-        return "it has no fixed step and no limit" if adaptive else "it moves no springs"
+        method = engines.method(label)
+        if absent := engines.absence(label.engine):
+            return absent
+        if not scheme(method.scheme).has("one-step"):
+            return "it has no fixed step and no limit"
+        return propagators.absence(label) if "wall-spring" in method.terms else "it moves no springs"
 
     usable, left_out = sorted_out(labels, why, "has a limit to measure")
     braked = [label for label in usable if "damping" in engines.method(label).terms]

@@ -61,23 +61,25 @@ def measure(scene: Scene, label: Label) -> Multiplier:
     """Run a period from two starts, with the whole number of steps, `MOST_STEPS` at most, that is nearest to
     the scene's step."""
     found = floquet(scene.system)
+    spring = scene.terms[0]
     assert found is not None
+    assert isinstance(spring, ModulatedSpring)
     _, period, _ = found
     steps = int(np.clip(round(period / abs(scene.step)), 1, MOST_STEPS))
     scene = replace(scene, step=np.copysign(period / steps, scene.step), steps=steps, every=steps)
-    rest, size = float(_spring(scene).at[0]), float(scene.m[0] * 2 * np.pi / period)
+    rest, size = float(spring.at[0]), float(scene.m[0] * 2 * np.pi / period)
     starts = [(rest + 1, 0.0), (rest, size)]
     right = _powers(scene, label, starts, rest, size)
     largest_seen = np.max(np.abs(right), axis=(1, 2))
-    if not np.all((largest_seen <= INVERTIBLE_NORM) & (largest_seen >= 1 / INVERTIBLE_NORM)):
-        return _unknown(label, steps, "the products of its scheme's steps are beyond what doubles can invert")
     try:
+        if not np.all((largest_seen <= INVERTIBLE_NORM) & (largest_seen >= 1 / INVERTIBLE_NORM)):
+            raise np.linalg.LinAlgError
         # a rounding of the state after each step, propagated to the end
         carried = [
             np.linalg.norm(right[-1] @ np.linalg.inv(one), 2) * np.linalg.norm(one, 2) for one in right
         ]
     except np.linalg.LinAlgError:
-        return _unknown(label, steps, "doubles cannot invert the products of its scheme's steps")
+        return _unknown(label, steps, "the products of its scheme's steps are beyond what doubles can invert")
     runs = [driver.run(replace(scene, q=np.array([q]), p=np.array([p])), label) for q, p in starts]
     lost = next((run.outcome for run in runs if run.outcome.status != "complete"), None)
     if lost and np.max(largest_seen) > OVERFLOWING_SIZE:
@@ -105,12 +107,6 @@ def measure(scene: Scene, label: Label) -> Multiplier:
 
 def _scheme(label: Label) -> schemes.Scheme:
     return schemes.scheme(engines.method(label).scheme)
-
-
-def _spring(scene: Scene) -> ModulatedSpring:
-    term = scene.terms[0]
-    assert isinstance(term, ModulatedSpring)
-    return term
 
 
 def _largest(values: np.ndarray) -> complex:

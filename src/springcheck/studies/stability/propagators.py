@@ -68,19 +68,9 @@ def scene(springs: Springs, q: Floats, p: Floats, *, steps: int = 1) -> Scene:
     has_friction = np.any(springs.brake) or Need.DAMPING in requires
     c = np.broadcast_to(springs.brake, springs.turn.shape) * (MASS / STEP)
     return spring(
-        m=MASS,
-        k=springs.k,
-        q=q,
-        p=p,
-        c=c if has_friction else None,
-        fast=Need.FAST_SPRINGS in requires,
-        step=STEP,
-        steps=steps,
-        quantities=("q", "p"),
-        name="scan",
-        title="springs side by side",
-        source="springcheck",
-    )
+        MASS, springs.k, q, p, STEP, steps, c=c if has_friction else None,
+        fast=Need.FAST_SPRINGS in requires, quantities=("q", "p"), name="scan",
+    )  # fmt: skip
 
 
 def units(springs: Springs) -> tuple[Floats, Floats]:
@@ -190,12 +180,6 @@ def first(
             break
         grid = np.linspace(low, high, fine)
     return float((low + high) / 2)
-
-
-def has_one_step(label: Label) -> bool:
-    """Whether a method has a one-step map and moves particles on springs."""
-    method = engines.method(label)
-    return schemes.scheme(method.scheme).has("one-step") and "wall-spring" in method.terms
 
 
 def absence(label: Label) -> str | None:
