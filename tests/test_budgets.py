@@ -11,7 +11,7 @@ HOME = Path(springcheck.__file__).parent
 
 BUDGETS = {
     ("physics",): 7034,
-    ("schemes",): 1651,
+    ("schemes",): 1696,
     ("thermal",): 3201,
     ("engines/own",): 1648,
     ("engines/openmm", "engines/ase", "engines/sundials"): 1326,
@@ -21,8 +21,8 @@ BUDGETS = {
     ("identify",): 8789,
     ("formats", "store"): 5260,
     ("studies",): 1459,
-    ("studies/*",): 9667,
-    ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 7110,
+    ("studies/*",): 9654,
+    ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 7111,
 }
 """Lines of each room, or of several: of an engine in one file, and of what all studies share, in the first
 folder."""

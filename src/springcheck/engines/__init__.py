@@ -44,7 +44,7 @@ from springcheck.engines.registry import (
     unusable,
     while_here,
 )  # fmt: skip
-from springcheck.errors import MethodError, nearest, told
+from springcheck.errors import MOST_LIKELY, MethodError, nearest, told
 from springcheck.physics.arrays import Arithmetic
 from springcheck.physics.scene import Scene
 from springcheck.thermal import THERMOSTATS
@@ -184,7 +184,9 @@ def parse(text: str) -> Label:
     every = {**found.methods, **found.thermostats}
     if method not in every:
         known = ", ".join(f"{name}:{m}" for m in every)
-        near = nearest(method, every, f"{name}:")
+        so_called = [f"{name}:{m}" for m, one in every.items() if one.scheme in schemes.textbook(method)]
+        likely = " or ".join(so_called[:MOST_LIKELY])
+        near = f", did you mean {likely}?" if likely else nearest(method, every, f"{name}:")
         raise MethodError(f"unknown method {text!r}{near}; {found.title} has {known}")
     if "@" in text and place not in found.platforms:
         known, near = ", ".join(found.platforms), nearest(place, found.platforms, f"{name}:{method}@")

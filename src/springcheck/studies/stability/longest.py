@@ -125,9 +125,8 @@ def _scaled(system: System[Scene], q: Reals) -> Extended:
 def fastest(scene: Scene) -> float:
     """Largest angular frequency of a scene without its friction [1/T], 0 where nothing oscillates.
 
-    For an anharmonic scene, of small oscillations where it is `stiffest`; of a modulated spring at its largest
-    stiffness.  SceneError where forces overflow
-    there.
+    For an anharmonic scene, of small oscillations where it is `stiffest`; for a modulated spring, at its
+    largest stiffness.  SceneError where forces overflow there.
     """
     system = _at_its_stiffest(scene).system
     largest = float(np.max(system.modes.w2)) if system.has_modes else _largest(system, stiffest(scene))
