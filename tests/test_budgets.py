@@ -18,7 +18,7 @@ BUDGETS = {
     ("engines",): 2817,
     ("driver", "conformance", "doors"): 1257,
     ("checks",): 5128,
-    ("identify",): 8789,
+    ("identify",): 8806,
     ("formats", "store"): 5260,
     ("studies",): 1459,
     ("studies/*",): 9654,
