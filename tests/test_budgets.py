@@ -15,14 +15,14 @@ BUDGETS = {
     ("thermal",): 3201,
     ("engines/own",): 1648,
     ("engines/openmm", "engines/ase", "engines/sundials"): 1326,
-    ("engines",): 2817,
+    ("engines",): 2818,
     ("driver", "conformance", "doors"): 1257,
     ("checks",): 5128,
     ("identify",): 8806,
     ("formats", "store"): 5260,
     ("studies",): 1459,
-    ("studies/*",): 9654,
-    ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 7111,
+    ("studies/*",): 9655,
+    ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 7113,
 }
 """Lines of each room, or of several: of an engine in one file, and of what all studies share, in the first
 folder."""
