@@ -19,7 +19,7 @@ BUDGETS = {
     ("driver", "conformance", "doors"): 1257,
     ("checks",): 5128,
     ("identify",): 8806,
-    ("formats", "store"): 5260,
+    ("formats", "store"): 5268,
     ("studies",): 1459,
     ("studies/*",): 9655,
     ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 7113,
