@@ -452,7 +452,7 @@ def test_judge_without_a_scheme_says_in_a_line_how_to_find_it() -> None:
     with pytest.raises(SpringcheckError, match=r"identify.*which scheme.*scheme=") as error:
         springcheck.judge(scene, made)
     assert "forest-ruth" not in str(error.value)
-    with pytest.raises(SpringcheckError, match="did you mean velocity-verlet or position-verlet[?]"):
+    with pytest.raises(SpringcheckError, match=r"did you mean velocity-verlet or position-verlet[?]"):
         springcheck.judge(scene, replace(made, scheme="verlet"))
 
 
