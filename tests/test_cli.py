@@ -23,7 +23,7 @@ from springcheck.text.lines import table
 
 pytestmark = pytest.mark.usefixtures("own_folder")
 
-OWN = ["--method", "own:*"]
+OWN = ["--method", "own:*euler"]
 
 
 def document(capsys: pytest.CaptureFixture[str]) -> dict:
@@ -78,7 +78,7 @@ def test_the_text_names_methods_motions_and_the_store(capsys: pytest.CaptureFixt
 def test_text_in_a_pipe_has_no_trailing_blanks(capsys: pytest.CaptureFixture[str]) -> None:
     text = (scenes.folder() / "spring.toml").read_text().replace("steps = 200", "steps = 1")
     Path("one.toml").write_text(text)
-    assert main(["run", "one.toml", "--method", "own:*", "--verdicts"]) == 0
+    assert main(["run", "one.toml", "--method", "own:*euler", "--verdicts"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == "Mass on a spring: 1 step of 0.1"
     assert len(lines) > 20

@@ -25,7 +25,7 @@ from springcheck import driver, formats
 from springcheck.cli import main
 from springcheck.errors import StoreError
 from springcheck.formats.lines import number
-from springcheck.formats.tables import roundoff
+from springcheck.formats.tables import read_table, roundoff
 from springcheck.physics.scenefile import load_scene
 from springcheck.physics.trajectory import Trajectory
 from springcheck.store import apart
@@ -600,6 +600,10 @@ BAD = [
     ("q,p\n0,1\n", "no column of times"),
     ("t,q,p\n0,1,2\n1,2\n", "line 3"),
     ("t,q,p\n0,1,2\n1,x,2\n", "'x' is no number"),
+    (
+        "Zeit,Ort,Geschwindigkeit\n0,1,2\n1,3,2\n",
+        "Ort, Geschwindigkeit; name all columns, as --columns",
+    ),
     ("t,q,p\n0,0.3,0.7\n0.1,inf,1\n", "row 2 of q is not finite"),
     ("t,q,p\n0,0.3,0.7\n0.1,0.3,0.7\nnan,0.3,0.7\n", "row 3 of t is not finite"),
     ("t,q,p\n0,0.3,0.7\ninf,0.3,0.7\n", "row 2 of t is not finite"),
@@ -748,6 +752,27 @@ def test_names_that_are_wrong_are_one_line(capsys: pytest.CaptureFixture[str]) -
     assert "did you mean rk4?" in capsys.readouterr().err
     assert main(["judge", "nowhere.csv", "--scene", "spring", "--scheme", "rk4"]) == 2
     assert "nowhere.csv" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("names", "units"), [("t,x,v", "s,m,m/s"), ("time;x;v", "[s];[m];[m/s]"), ("t x v", "ms - 1/s")]
+)
+def test_a_row_of_units_below_the_names_is_left_out_and_said(names: str, units: str) -> None:
+    separator = next(x for x in ",; " if x in names)
+    rows = [separator.join(map(str, (0.1 * i, np.cos(0.1 * i), -np.sin(0.1 * i)))) for i in range(4)]
+    Path("x.csv").write_text("\n".join([names, units, *rows]))
+    found = read_table(Path("x.csv"), [], None)
+    assert found.q[1, 0] == np.cos(0.1)
+    assert found.v is not None
+    (note,) = found.notes
+    assert note.startswith("line 2 left out as units (")
+    # a row of a table that is damaged is no row of units, and a second row of names replaces the first
+    for bad, said in (("x,1,2", "'x' is no number"), ("1,x,2", "'x' is no number")):
+        Path("x.csv").write_text("\n".join(["t,x,v", bad, "0,1,2", "1,2,3"]))
+        with pytest.raises(StoreError, match=said):
+            read_table(Path("x.csv"), [], None)
+    Path("x.csv").write_text("a,time,c\nt,q,v\n0,1,2\n1,2,3\n")
+    assert read_table(Path("x.csv"), [], None).notes == ()
 
 
 def test_a_table_of_counted_steps_takes_its_time_step_from_the_command(

@@ -22,8 +22,8 @@ def verlet(q: float, v: float, h: float, k: float = K) -> tuple[float, float]:
     return q, v + h / 2 * (a - k * q / M)
 
 
-def kick_drift(q: float, v: float, h: float) -> tuple[float, float]:
-    v = v - h * K * q / M
+def kick_drift(q: float, v: float, h: float, k: float = K) -> tuple[float, float]:
+    v = v - h * k * q / M
     return q + h * v, v
 
 
@@ -175,3 +175,35 @@ def test_a_spring_that_pushes_and_wrapped_positions_show_a_force() -> None:
         identify(t, q)
     t, q, _ = states(verlet).T
     assert "not those of one linear scheme" in identify(t, (q + 0.25) % 0.5).statement
+
+
+@pytest.mark.parametrize("step", [verlet, kick_drift])
+def test_a_force_of_the_wrong_sign_is_no_matter_of_units(step: Callable[..., tuple[float, float]]) -> None:
+    rows = states(lambda q, v, h: step(q, v, h, -K), frames=101)
+    (cause,) = seen(rows, mass=M, stiffness=K).explanations
+    assert cause.cause.endswith("of a spring -1 times as stiff as stated: the force has the wrong sign")
+    assert "sign of the force" in cause.remedy
+    assert "units" not in cause.remedy
+    # of another size too, both are said
+    (cause,) = seen(rows, mass=M, stiffness=K / 2).explanations
+    assert cause.cause.endswith("the force has the wrong sign, and k q**2 taken for k/2 q**2")
+    assert "sign of the force" in cause.remedy
+    assert "units" in cause.remedy
+
+
+def test_a_friction_stated_as_0_hides_no_mark_of_a_wrong_scheme() -> None:
+    def new_force(q: float, v: float, h: float) -> tuple[float, float]:
+        q = q + h * v - h * h / 2 * K * q / M
+        return q, v - h * K * q / M
+
+    rows = states(new_force)
+    for stated in ({"stiffness": K, "friction": 0.0}, {"friction": 0.0}):
+        found = seen(rows, mass=M, **stated)
+        assert not found.fits
+        assert "where 0 is stated, which loses as much area as h k/(2 m): the mark" in found.statement
+        assert "factors 1/2" in found.explanations[0].remedy
+    # a friction of another size is no mark, and has no unit to look at
+    damped = seen(states(lambda q, v, h: verlet(q, v * math.exp(-0.05 * h), h)), mass=M, friction=0.0)
+    assert "where 0 is stated" in damped.statement
+    assert "unit" not in damped.explanations[0].remedy
+    assert "look for a friction" in damped.explanations[0].remedy

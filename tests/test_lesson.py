@@ -150,6 +150,22 @@ def test_a_hint_names_the_slip_and_only_where_it_is_asked_for(
     assert "answer" not in out
 
 
+@pytest.mark.parametrize("option", ["--hint", "--answer"])
+def test_an_aim_by_another_name_is_told_in_a_line_and_one_that_identify_names_has_a_hint(
+    option: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = VERLET.replace("two", "mine") % "(q, p + h / 3 * force(q))"
+    status, out = graded(tmp_path, text.replace("velocity-verlet", "leapfrog"), capsys, option)
+    assert status == 2
+    assert out == (
+        "mine.py: AIMS: mine: 'leapfrog' is no scheme here, did you mean velocity-verlet or "
+        "semi-implicit-euler?\n"
+    )
+    status, out = graded(tmp_path, text.replace("velocity-verlet", "pefrl"), capsys, option)
+    assert status == 1
+    assert "hold it beside PEFRL" in out
+
+
 def test_the_answer_is_given_to_who_asks_for_it_and_what_is_right_passes(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

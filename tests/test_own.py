@@ -24,6 +24,7 @@ from springcheck import checks, driver, engines, schemes
 from springcheck.engines import Need, parse
 from springcheck.engines.own import ENGINE, compiled, kernels, loops, simulation, solver, tiles
 from springcheck.errors import MethodError
+from springcheck.physics import scenefile
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import (
@@ -38,6 +39,7 @@ from springcheck.physics.terms import (
     WallSpring,
 )
 from springcheck.schemes.rounding import Met
+from springcheck.studies.choose import choose
 
 SCHEMES = tuple(x.scheme for x in ENGINE.methods.values() if x.scheme in schemes.SCHEMES)
 IMPLICIT = tuple(name for name in SCHEMES if schemes.SCHEMES[name].has("implicit"))
@@ -157,6 +159,13 @@ def test_every_scheme_of_one_step_is_an_own_method_and_three_of_them_run_unasked
     ]
     # and Boris beside the catalogue
     assert len(engines.match(("own:?*",))) == len(SCHEMES) + 1
+    # in an argument a glob stands for all that it matches
+    assert engines.match(("own:*",), every=True) == engines.match(("own:?*",))
+    found, left, others = choose(scenefile.load_scene("spring"), ["own:*"])
+    assert [str(label) for label in found][:5:4] == ["own:euler", "own:velocity-verlet"]
+    assert len(found) + len(left) == len(SCHEMES) + 1
+    assert all(one.reason for one in left)
+    assert others == ()
     assert [str(label) for label in engines.match(("own:yoshida4",))] == ["own:yoshida4"]
 
 

@@ -14,9 +14,11 @@ import numpy as np
 import pytest
 
 import identify_corpus as corpus
+from springcheck import schemes
 from springcheck.cli.page import given, writing
 from springcheck.formats import columns
 from springcheck.identify import Identification, identify
+from springcheck.identify.candidates import other_names
 from springcheck.physics.arrays import Floats
 
 SCRIPTS = [writing.HERE / name for name in ("drawing.js", "loops.js", "files.js")]
@@ -62,6 +64,25 @@ def test_where_the_page_names_a_scheme_the_command_names_it(tmp_path: Path) -> N
         command = identify(case.t, case.q, case.p, v=case.v)
         assert isinstance(command, Identification)
         assert command.scheme == scheme, case.name
+
+
+def test_schemes_of_the_same_map_are_named_together_as_the_command_lists_them(tmp_path: Path) -> None:
+    rows, q, p = [], 0.3, 0.7
+    for i in range(40):
+        rows.append((0.1 * i, q, p))
+        # Heun's
+        q1, p1 = q + 0.1 * p, p - 0.1 * q
+        q, p = q + 0.05 * (p + p1), p - 0.05 * (q + q1)
+    t, x, v = np.array(rows).T
+    command = identify(t, x, v=v)
+    assert isinstance(command, Identification)
+    titles = {one["scheme"]: one["title"] for one in given.plain_schemes()}
+    assert titles["rk2-midpoint"] == "Explicit midpoint (RK2) (on a spring the same map: Heun (RK2))"
+    assert {command.scheme, *command.aliases} == {"rk2-midpoint", "rk2-heun"}
+    for name, title in titles.items():
+        assert all(schemes.title(other) in title for other in other_names(name, damped=False))
+    (found,) = said([text(t=t, q=x, v=v)], tmp_path)
+    assert found["title"] == titles["rk2-midpoint"]
 
 
 def motion(

@@ -22,6 +22,7 @@ from springcheck.studies.precision import STUDY, accuracy, fits, sweeps
 from springcheck.studies.precision import measure as precision
 from springcheck.studies.precision.accuracy import Accuracy
 from springcheck.studies.precision.fits import POINTS, Point
+from springcheck.studies.stability import longest
 
 pytestmark = pytest.mark.usefixtures("steady_clock")
 
@@ -232,6 +233,33 @@ def test_a_sweep_begins_just_below_the_limit_of_stability() -> None:
     assert known.angle / steps < 2 <= known.angle / (steps - 1)
     for limit in (0.0, np.inf):
         assert 0.9 < known.angle / sweeps.coarsest(known, limit) <= 1
+
+
+@pytest.mark.parametrize("name", ["mathieu-stable", "anharmonic", "hinged-pendulum"])
+def test_the_frequency_is_the_largest_along_the_motion_as_in_the_study_of_stability(name: str) -> None:
+    scene = scenes.load_scene(name)
+    known = accuracy.truth(scene)
+    assert known.w == longest.fastest(scene)
+    if name == "mathieu-stable":
+        (term,) = scene.terms
+        # at t = 0 the stiffness is a tenth of k, and half a turn later 1.9 k
+        slack = replace(term, depth=np.array([0.9]), phase=np.array([np.pi]))
+        known = accuracy.truth(replace(scene, terms=(slack,)))
+        assert known.w == pytest.approx(np.sqrt(2.9 * 1.9 / 3.7), rel=1e-12)
+        assert known.angle / sweeps.coarsest(known, 2.0) < 2
+
+
+def test_of_many_separate_particles_the_stiffest_moment_of_any_is_searched() -> None:
+    one = scenes.load_scene("anharmonic")
+    n = longest.MOST_MODES + 1
+    # all but the last rest
+    moving = np.arange(n) == n - 1
+    terms = tuple(
+        type(term)(i=np.arange(n), **{x: np.repeat(getattr(term, x), n) for x in also})
+        for term, also in zip(one.terms, (("k", "at"), ("b", "at")), strict=True)
+    )
+    scene = one.derived(m=np.repeat(one.m, n), q=moving * one.q, p=moving * one.p, terms=terms)
+    assert accuracy.truth(scene).w == pytest.approx(accuracy.truth(one).w, rel=1e-12)
 
 
 def test_the_same_study_twice_gives_the_same_errors_and_force_calls() -> None:

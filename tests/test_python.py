@@ -42,6 +42,19 @@ def need(library: str) -> Any:
     return __import__(library)
 
 
+def test_every_study_of_schemes_takes_a_function() -> None:
+    def rk2(q: Any, p: Any, h: Any, force: Callable[..., Any], mass: Any) -> tuple[Any, Any]:
+        middle = p + h / 2 * force(q)
+        return q + h * middle / mass, p + h * force(q + h / 2 * p / mass)
+
+    study = springcheck.stability("spring", [leapfrog, "own:velocity-verlet"])
+    mine, ours = study.limits
+    assert mine.method == "stepper:leapfrog"
+    assert mine.limit == pytest.approx(ours.limit, rel=1e-9)
+    (entry,) = springcheck.census(rk2).entries
+    assert entry.method == "stepper:rk2"
+
+
 def test_a_function_of_ones_own_is_a_method_for_its_call_alone() -> None:
     scene = springcheck.load_scene("spring-uneven")
     run = springcheck.simulate(scene, leapfrog)
@@ -439,7 +452,7 @@ def test_judge_without_a_scheme_says_in_a_line_how_to_find_it() -> None:
     with pytest.raises(SpringcheckError, match=r"identify.*which scheme.*scheme=") as error:
         springcheck.judge(scene, made)
     assert "forest-ruth" not in str(error.value)
-    with pytest.raises(SpringcheckError, match="did you mean velocity-verlet or position-verlet or"):
+    with pytest.raises(SpringcheckError, match=r"did you mean velocity-verlet or position-verlet[?]"):
         springcheck.judge(scene, replace(made, scheme="verlet"))
 
 

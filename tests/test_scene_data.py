@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -119,6 +120,71 @@ def test_a_scene_cannot_be_invalid(name: str) -> None:
         with pytest.raises(SceneError, match=message) as caught:
             make()
         assert "\n" not in str(caught.value)
+
+
+WRITTEN = """
+[[particle]]
+mass = 1
+momentum = 1
+[[spring]]
+ends = ["wall", 0]
+stiffness = 1
+[time]
+step = 0.1
+steps = 5
+"""
+"""A scene file that is right."""
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong", "said"),
+    [
+        ("[[particle]]", "[particle]", "particle: there may be several of it: write [[particle]], in double"),
+        (
+            "[[spring]]",
+            "[spring]",
+            "spring: there may be several of it: write [[spring]], in double brackets",
+        ),
+        ("[time]", "[[time]]", "time: there is one of it: write [time], in single brackets, once"),
+        (
+            '"wall"',
+            '"Wall"',
+            "spring[0].ends[0] = 'Wall': one of \"wall\", the number of a particle is needed",
+        ),
+        ('"wall"', "0.5", 'spring[0].ends[0] = 0.5: one of "wall", the number of a particle is needed'),
+        ('["wall", 0]', "0", "spring[0].ends = 0: a list in brackets is needed"),
+        ('["wall", 0]', "[0]", "spring[0].ends = [0]: a list in brackets of length 2 is needed"),
+        ("steps = 5", "steps = 5.0", "time.steps = 5.0: a whole number is needed"),
+        ("steps = 5", "steps = 0", "time.steps = 0: a whole number >= 1 is needed"),
+        ("steps = 5", 'steps = "5"', "time.steps = '5': a whole number is needed, without quotes"),
+        ("mass = 1", "mass = true", "particle[0].mass = true: a number is needed"),
+        ("mass = 1", "mass = -1", "particle[0].mass = -1: a number > 0.0 is needed"),
+        ("mass = 1", 'mass = 1\naxes = "w"', "particle[0].axes = 'w': letters of x, y and z are needed"),
+        ("mass = 1", "mass = 1\nposition = 'a'", "position = 'a': a number or a list in brackets is needed"),
+        (
+            "mass = 1",
+            "mas = 1",
+            "it has the unknown field `mas`, did you mean mass?; its fields are mass, pos",
+        ),
+        ("mass = 1", "", "particle[0]: it lacks the field `mass`; its fields are mass, position, momentum"),
+        ("stiffness = 1", "stiffness = 1\nfast = 1", "spring[0].fast = 1: true or false is needed"),
+        ("[time]", "[tine]", "it has the unknown field `tine`, did you mean time?"),
+        ("[time]\nstep = 0.1\nsteps = 5", "", "the scene: it lacks the table [time]"),
+        ("[[particle]]", "title = 5\n[[particle]]", "title = 5: text in quotes is needed"),
+        (
+            "[time]",
+            "[[bond]]\nends = ['wall', 0]\n[time]",
+            "bond[0].ends[0] = 'wall': a whole number is needed",
+        ),
+        ("mass = 1", "mass = 0,25", "(at line 3, column 9): mass = 0,25; numbers are written as 0.25"),
+        ("steps = 5", "[time]", "Cannot declare [time] twice (at line 10, column 6): [time]"),
+    ],
+)
+def test_a_mistake_in_a_scene_file_is_said_in_words_of_toml(right: str, wrong: str, said: str) -> None:
+    assert scenes.parse(WRITTEN, name="one").n == 1
+    with pytest.raises(SceneError, match=re.escape(said)) as caught:
+        scenes.parse(WRITTEN.replace(right, wrong, 1), name="one")
+    assert not any(word in str(caught.value) for word in ("`float`", "`int`", "`str`", "array`", "object"))
 
 
 @pytest.mark.parametrize(

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import re
 from fractions import Fraction
 
 import mpmath
 import numpy as np
 import pytest
 
+import springcheck
 from springcheck import schemes
+from springcheck.errors import MethodError, SpringcheckError
 from springcheck.schemes import SCHEMES, Scheme
+from springcheck.schemes.lookup import TEXTBOOK
 
 M, K, H = 3.7, 2.9, 0.31
 A = H * H * K / M
@@ -127,6 +131,34 @@ def test_fractions_are_rounded_once() -> None:
     third = schemes.number(Fraction(1, 3), np.longdouble)
     assert third == np.longdouble(1) / np.longdouble(3)
     assert schemes.number(Fraction(7, 24), np.float64) == 7 / 24
+
+
+@pytest.mark.parametrize("name", [name for names in TEXTBOOK for name in names])
+def test_a_textbook_s_name_is_answered_with_the_schemes_that_it_means(name: str) -> None:
+    called = next(found for names, found in TEXTBOOK.items() if name in names)
+    assert set(called) <= set(SCHEMES)
+    assert name not in schemes.known()
+    with pytest.raises(MethodError, match=f", did you mean {' or '.join(called)}[?]$"):
+        schemes.scheme(name)
+
+
+@pytest.mark.parametrize(
+    ("name", "found"),
+    [
+        ("Symplectic_Euler", "semi-implicit-euler or semi-implicit-euler-drift-kick"),
+        ("St\xf6rmer-Verlet", "velocity-verlet or position-verlet"),
+        ("newmark", "trapezoidal"),
+        ("velocity-verlt", "velocity-verlet"),
+        ("heun", "rk2-heun"),
+    ],
+)
+def test_a_scheme_is_found_however_it_is_spelled(name: str, found: str) -> None:
+    said = f", did you mean {found}?"
+    assert schemes.meant(name) == said
+    with pytest.raises(MethodError, match=re.escape(said)):
+        schemes.scheme(name)
+    with pytest.raises(SpringcheckError, match=re.escape(said)):
+        springcheck.explain(name)
 
 
 def test_irrational_coefficients_are_those_of_the_cube_root_of_two() -> None:

@@ -121,6 +121,13 @@ def test_numbers_names_and_options_that_serve_nothing(
         ),
         ("run spring --metod=own:euler", "did you mean --method?"),
         ("run spring --method own:eular", "did you mean own:euler?"),
+        ("run spring --method own:euler-cromer", "did you mean own:semi-implicit-euler?"),
+        ("run spring --method own:rk2", "did you mean own:rk2-midpoint or own:rk2-heun?"),
+        ("explain forward-euler", "did you mean explicit-euler?"),
+        (
+            "judge a.h5 --scene spring --scheme leapfrog",
+            "did you mean velocity-verlet or semi-implicit-euler?",
+        ),
         ("run spring --method openmm:verlet@cpu", "did you mean openmm:verlet@CPU?"),
         ("run spring --method own:euler@cpu", "springcheck has no platforms: own:euler is all"),
         ("run spring --method opemm:verlet", "did you mean openmm"),

@@ -41,7 +41,7 @@ STORES = {
     "chain": ("run", "chain", "--method", "openmm:verlet"),
     "pendulum": ("run", "pendulum", "--method", "own:euler"),
     "precision": ("precision", "spring", "--budget", "5"),
-    "stability": ("stability", "overdamped", "--method", "own:*"),
+    "stability": ("stability", "overdamped", "--method", "own:*euler"),
     "resonance": ("stability", "multiple-time-steps", "--method", "openmm:mts"),
     "extremes": ("extremes", "--quick", "--method", "own:euler"),
 }

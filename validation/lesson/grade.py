@@ -24,6 +24,7 @@ from springcheck import schemes
 from springcheck.engines import module_of
 from springcheck.errors import SpringcheckError
 from springcheck.identify import identify_stepper
+from springcheck.identify.families import FAMILIES, title
 
 AIMS = {
     "one": "semi-implicit-euler",
@@ -34,6 +35,9 @@ AIMS = {
     "six": "rk4",
 }
 """What each is meant to be, whatever the file says; of other exercises the file's own `AIMS` does."""
+
+NAMED = {*schemes.known(), *(family.scheme for family in FAMILIES.values())}
+"""What a function may be meant to be: the schemes that have a name here."""
 
 SECONDS = 5.0
 
@@ -108,7 +112,9 @@ def hint(step: Step, aim: str, seen: str) -> str:
     for said, undone in SLIPS.items():
         if shows(undone(step), aim)[0]:
             return said
-    scheme = schemes.scheme(aim)
+    scheme = schemes.known().get(aim)
+    if scheme is None:
+        return f"hold it beside {title(aim)}; try a mass that is not 1"
     if scheme.has("implicit") and " on a spring, and another scheme on forces that are not linear" in seen:
         return "it is right for a force that is proportional to q; solve the equation for any force"
     if scheme.has("implicit"):
@@ -186,6 +192,10 @@ def main(arguments: list[str]) -> int:
     finally:
         sys.path.remove(str(path.parent))
     asked = asked_of(module)
+    for name, aim in asked.items():
+        if isinstance(aim, str) and aim not in NAMED:
+            print(f"{path.name}: AIMS: {name}: {aim!r} is no scheme here{schemes.meant(aim)}")
+            return 2
     if not any(hasattr(module, name) for name in asked):
         beside = Path(__file__).with_name("temperature_questions.py").is_file()
         more = "" if beside else "; those of temperature need temperature_questions.py beside grade.py"

@@ -48,11 +48,13 @@ def precision(
 
 @typed
 def stability(
-    scene: Scene | str | Path, methods: str | Sequence[str] = (), *, path: str | Path | None = None,
-    force: bool = False, workers: int = 1,
+    scene: Scene | str | Path, methods: str | Step | Sequence[str | Step] = (), *,
+    path: str | Path | None = None, force: bool = False, workers: int = 1,
 ) -> Stability:  # fmt: skip
-    """Measure limits of stability of these labels or globs (by default all) against theory, with the h omega
-    and the largest step [T] on this scene."""
+    """Measure limits of stability against theory, with the h omega and the largest step [T] on this scene.
+
+    Methods as in `run`.
+    """
     from springcheck.studies.stability import measure
 
     with taken(methods, force, workers, path) as (named, how):
@@ -61,7 +63,7 @@ def stability(
 
 @typed
 def extremes(
-    methods: str | Sequence[str] = (), *, quick: bool = False,
+    methods: str | Step | Sequence[str | Step] = (), *, quick: bool = False,
     path: str | Path | None = None, force: bool = False, workers: int = 1,
 ) -> Atlas:  # fmt: skip
     """The atlas of extreme cases: steps, masses, amplitudes to the ends of the range, and who is right.
@@ -85,8 +87,8 @@ def faults(*, path: str | Path | None = None, force: bool = False, workers: int 
 
 @typed
 def census(
-    methods: str | Sequence[str] = (), *, thermostats: bool = False, path: str | Path | None = None,
-    force: bool = False, workers: int = 1,
+    methods: str | Step | Sequence[str | Step] = (), *, thermostats: bool = False,
+    path: str | Path | None = None, force: bool = False, workers: int = 1,
 ) -> Census:  # fmt: skip
     """Identify the integrator that every installed engine really runs, by its states; `methods` are labels or
     globs.

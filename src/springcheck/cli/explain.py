@@ -14,7 +14,7 @@ import numpy as np
 
 from springcheck import checks, engines, schemes
 from springcheck.checks.seeds import SEEDED
-from springcheck.errors import SpringcheckError, nearest
+from springcheck.errors import SpringcheckError
 from springcheck.schemes import Scheme
 from springcheck.studies.faults.seeded import Fault
 from springcheck.studies.faults.table import FAULTS
@@ -81,7 +81,8 @@ def lines(name: str) -> Iterator[str]:
     methods = [
         f"{engine}:{method}" for engine in engines.names() for method in engines.engine(engine).methods
     ]
-    near = nearest(name, (*_CHECKS, *known, *methods, *(fault.name for fault in FAULTS), *MEANINGS, *WORDS))
+    others = (*_CHECKS, *methods, *(fault.name for fault in FAULTS), *MEANINGS, *WORDS)
+    near = schemes.meant(name, others)
     raise SpringcheckError(
         f"{name!r} is no check, scheme, method, fault, finding or word{near}; `springcheck list` names "
         f"checks and methods, `springcheck faults` faults; findings are {', '.join(MEANINGS)}; schemes are "

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import importlib.util
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from fnmatch import fnmatchcase
 from functools import cache, partial
@@ -44,7 +44,7 @@ from springcheck.engines.registry import (
     unusable,
     while_here,
 )  # fmt: skip
-from springcheck.errors import MethodError, nearest, told
+from springcheck.errors import MOST_LIKELY, MethodError, nearest, told
 from springcheck.physics.arrays import Arithmetic
 from springcheck.physics.scene import Scene
 from springcheck.thermal import THERMOSTATS
@@ -184,7 +184,9 @@ def parse(text: str) -> Label:
     every = {**found.methods, **found.thermostats}
     if method not in every:
         known = ", ".join(f"{name}:{m}" for m in every)
-        near = nearest(method, every, f"{name}:")
+        so_called = [f"{name}:{m}" for m, one in every.items() if one.scheme in schemes.textbook(method)]
+        likely = " or ".join(so_called[:MOST_LIKELY])
+        near = f", did you mean {likely}?" if likely else nearest(method, every, f"{name}:")
         raise MethodError(f"unknown method {text!r}{near}; {found.title} has {known}")
     if "@" in text and place not in found.platforms:
         known, near = ", ".join(found.platforms), nearest(place, found.platforms, f"{name}:{method}@")
@@ -200,13 +202,14 @@ def method(label: Label) -> Method:
     return found.methods.get(label.method) or found.thermostats[label.method]
 
 
-def _methods_meant(name: str, glob: str, bath: bool | None) -> list[str]:
-    """The methods of an engine that a glob may match: the default ones where it does not name methods."""
+def _methods_meant(name: str, glob: str, bath: bool | None, every: bool) -> list[str]:
+    """The methods of an engine that a glob may match: unless `every` may, the default ones where it does not
+    name methods."""
     found, meant = engine(name), list[str]()
     for of_bath, methods in ((False, found.methods), (True, found.thermostats)):
         if bath in (None, of_bath):
             default = [m for m, declared in methods.items() if declared.default]
-            all_of_them = glob != "*" and (not default or glob.rpartition(":")[2] != "*")
+            all_of_them = every or (glob != "*" and (not default or glob.rpartition(":")[2] != "*"))
             meant += methods if all_of_them else default
     return meant
 
@@ -215,14 +218,14 @@ UNNAMED = "**"
 """Pattern of what runs where nobody names a method: a scene's own list, or `*`."""
 
 
-def match(patterns: tuple[str, ...], *, bath: bool | None = False) -> tuple[Label, ...]:
+def match(patterns: Iterable[str], *, bath: bool | None = False, every: bool = False) -> tuple[Label, ...]:
     """Labels that glob patterns match, each once, in the order of the engines.
 
     A pattern without a wildcard is a label and may name a platform.  With a wildcard the part before `@` is
     the glob and the platform is carried over to every engine that has it.  With a `bath` it matches
     thermostats, without one none of them, and both where that is None.  `*` alone stands for the methods that
     are declared as default, and so does `engine:*` of an engine that has such; every other glob stands for
-    all that it matches.
+    all that it matches, and with `every`, as in an argument, these two do as well.
     """
     chosen: dict[str, Label] = {}
     for pattern in patterns:
@@ -233,7 +236,7 @@ def match(patterns: tuple[str, ...], *, bath: bool | None = False) -> tuple[Labe
         found = [
             f"{name}:{m}{at}{place}"
             for name in names(head.partition(":")[0] if ":" in head else "*")
-            for m in _methods_meant(name, head, bath)
+            for m in _methods_meant(name, head, bath, every and pattern != UNNAMED)
             if fnmatchcase(f"{name}:{m}", head) and (not at or place in engine(name).platforms)
         ]
         if not found:

@@ -163,7 +163,8 @@ def split(path: Path, columns: Columns, roundoff: float = 2.0**-53) -> States:
             parts[what] = [parts[what][places[what].index(place)] for place in places["q"]]
     for what, why in (("t", "times"), ("q", "positions")):
         if what not in parts:
-            raise StoreError(f"{path}: no column of {why} among {listed(columns)}; name them, as t,q,v")
+            how = "name all columns, as --columns t,q,v"
+            raise StoreError(f"{path}: no column of {why} among {listed(columns)}; {how}")
     t = np.hstack(parts["t"])
     if t.shape[1] != 1:
         times = [name for name, what in meant.items() if what == "t"]

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from springcheck.errors import StoreError
-from springcheck.formats.columns import Fixed, Floats, States, kinds, named, split, times
+from springcheck.formats.columns import Fixed, Floats, States, kinds, listed, named, split, times
 from springcheck.formats.lines import Lines, number
 
 SHOWN = 1000
@@ -23,8 +23,9 @@ COMMENT = ("#", "%")
 
 
 def read_table(path: Path, columns: list[str], step: float | None) -> States:
-    """The states of a text table; the last line before the numbers names the columns."""
+    """The states of a text table; the last line before the numbers names the columns, or has their units."""
     header: list[str] = []
+    units = ""
     first: list[list[str]] = []
     numbers, width = array("d"), 0
     unlike: StoreError | None = None
@@ -47,7 +48,11 @@ def read_table(path: Path, columns: list[str], step: float | None) -> States:
                     raise wrong
                 # the first row: as many numbers as the rows that follow, or names of columns
                 unlike = wrong if not is_comment and 2 * len(bad) <= len(cells) else None
-                header = cells
+                of_names, here = (kinds(names).values() for names in (header, cells))
+                if not unlike and len(cells) == len(header) and "t" in of_names and "t" not in here:
+                    units = f"line {lines.number} left out as units ({listed(cells)}): no number is converted"
+                    continue
+                header, units = cells, ""
                 continue
             if not width and unlike and len(header) == len(row):
                 raise unlike
@@ -61,7 +66,8 @@ def read_table(path: Path, columns: list[str], step: float | None) -> States:
     if not width:
         # a row with some numbers in it was meant to be one
         raise wrong if header and len(bad) < len(header) else StoreError(f"{path}: holds no row of numbers")
-    return of_rows(path, np.frombuffer(numbers).reshape(-1, width), first, columns, header, step)
+    states = of_rows(path, np.frombuffer(numbers).reshape(-1, width), first, columns, header, step)
+    return replace(states, notes=(*states.notes, *([units] if units else [])))
 
 
 def of_rows(

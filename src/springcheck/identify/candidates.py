@@ -92,6 +92,9 @@ def stated_stiffness(
     stiff = stiff if stated[j] else f"of stiffness {found:.9g} where 0 is stated"
     cause = f"{title(simplest.scheme)}, but of a spring {stiff}"
     remedy = "look at the units of the force constant, and at whether V is k/2 q**2"
+    if ratio < 0:
+        sign = "look at the sign of the force, F = -k q, and of the kick, p + h F"
+        remedy = sign if abs(ratio + 1) < 1e-5 else f"{sign}; {remedy}"
     cause = f"{cause}: {meaning}" if meaning else cause
     return [Explanation(cause, remedy, abs(ratio - 1))], against
 

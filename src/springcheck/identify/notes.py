@@ -114,7 +114,7 @@ def of_either_sign(found: Identification, against: Explanation | None) -> Identi
 
 
 def of_stated_friction(found: Identification, stated: float, mass: float) -> Identification:
-    """The cause where no law gives the stated friction c [M/T]."""
+    """The cause where no law gives the stated friction c [M/T]; of a stated 0 the mark of a fault."""
     rates = sorted(mass * x.friction[0] for x in found.candidates)
     whose = titles(x.scheme for x in found.candidates)
     low, high = rates[0], rates[-1]
@@ -126,6 +126,10 @@ def of_stated_friction(found: Identification, stated: float, mass: float) -> Ide
         share = _between(*sorted((low / stated, high / stated)))
         cause = f"{whose}, but with a friction {share} times the stated"
     remedy = "look at the unit of the friction, c or c/m, and at how often a step applies it"
+    if not stated:
+        remedy = "look for a friction that the program has, and for a scheme that is written down wrongly"
+        if (fault := _fault(found, stated=True)) is not None:
+            cause, remedy = fault.cause, fault.remedy
     return replace(
         found.noting("the stated friction does not fit by any of the laws that are known"),
         statement=found.statement if found.explanations else cause,
@@ -141,10 +145,17 @@ def _between(low: float, high: float) -> str:
 
 
 def of_unasked_friction(found: Identification) -> Identification:
-    """Reject a friction c/m = h k/(n m), n an integer: the mark of a faulty or implicit scheme.  A scheme
-    without friction of the stated stiffness is not rejected."""
-    if not found.fits or not found.friction or not found.step or not all(x.law for x in found.candidates):
-        return found
+    """Reject the friction of a faulty or implicit scheme, unless a scheme without friction has the stated
+    stiffness."""
+    fault = _fault(found) if found.fits else None
+    return found if fault is None else found.refuted(fault.cause, fault)
+
+
+def _fault(found: Identification, *, stated: bool = False) -> Explanation | None:
+    """A friction c/m = h k/(n m), n an integer: the mark of a faulty or implicit scheme; None for another.
+    `stated` is whether a friction of 0 is."""
+    if not found.friction or not found.step or not all(x.law for x in found.candidates):
+        return None
     for one in found.candidates:
         for w, rate, det in zip(one.omega, one.friction, found.determinant, strict=True):
             a = (w * one.step) ** 2
@@ -156,14 +167,14 @@ def of_unasked_friction(found: Identification) -> Identification:
                 continue
             n = parts[0]
             part = "h k/m" if n == 1 else f"h k/({n} m)"
+            unasked = "where 0 is stated, which" if stated else "that was not stated and"
             cause = (
-                f"{titles([one.scheme])} with a friction c/m = {rate:.6g} that was not stated and loses as "
-                f"much area as {part}: the mark of a scheme that is written down wrongly, or of an implicit "
-                "one; state the friction if not"
+                f"{titles([one.scheme])} with a friction c/m = {rate:.6g} {unasked} loses as much area as "
+                f"{part}: the mark of a scheme that is written down wrongly, or of an implicit one"
             )
-            remedy = "compare the factors 1/2 of the step with the scheme's"
-            return found.refuted(cause, Explanation(cause, remedy))
-    return found
+            cause += "" if stated else "; state the friction if not"
+            return Explanation(cause, "compare the factors 1/2 of the step with the scheme's")
+    return None
 
 
 def hidden_friction(record: Record, found: Map) -> float:

@@ -234,6 +234,9 @@ def faults_of(seen: Measured, friction: float | None) -> list[Explanation]:
 
 def stiffness_ratio(ratio: float, mass: float | None) -> str:
     """Meaning of a stiffness that is `ratio` times the stated one; "" where there is none."""
+    if ratio < 0:
+        also = "" if abs(ratio + 1) < 1e-5 else stiffness_ratio(-ratio, mass)
+        return "the force has the wrong sign" + f", and {also}" * bool(also)
     m = math.nan if mass is None else mass
     known = (
         (1 / 4.184, "kcal taken for kJ"), (4.184, "kJ taken for kcal"),

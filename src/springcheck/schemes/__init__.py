@@ -7,12 +7,12 @@ from springcheck.schemes.catalogue import ATTACHED, SCHEMES, Scheme, number, sol
 from springcheck.schemes.kinds import KINDS
 from springcheck.schemes.law import Law, Trait
 from springcheck.schemes.linear import amplification, condition, invariant, matrix
-from springcheck.schemes.lookup import bring, known, scheme, title
+from springcheck.schemes.lookup import bring, known, meant, scheme, textbook, title
 from springcheck.schemes.rounding import magnitude_step, roundings
 from springcheck.schemes.stepping import step
 
 __all__ = [
-    "ATTACHED", "KINDS", "Law", "Scheme", "Trait", "SCHEMES", "bring", "known", "scheme",
+    "ATTACHED", "KINDS", "Law", "Scheme", "Trait", "SCHEMES", "bring", "known", "meant", "scheme", "textbook",
     "solver", "title", "number", "step", "magnitude_step", "roundings", "amplification", "condition",
     "invariant", "matrix", "propagate", "rotation",
 ]  # fmt: skip

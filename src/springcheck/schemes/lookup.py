@@ -2,13 +2,38 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterable
 from fractions import Fraction
 
 import numpy as np
 
-from springcheck.errors import MethodError, nearest
+from springcheck.errors import MOST_LIKELY, MethodError, nearest
 from springcheck.schemes.catalogue import ATTACHED, SCHEMES, Scheme
 from springcheck.schemes.kinds import KINDS
+
+TEXTBOOK = {
+    ("euler", "forward-euler", "euler-forward", "euler-explicit"): ("explicit-euler",),
+    ("backward-euler", "euler-backward", "euler-implicit"): ("implicit-euler",),
+    ("euler-cromer", "cromer", "newton-stormer-verlet"): ("semi-implicit-euler",),
+    ("symplectic-euler", "semi-explicit-euler", "euler-symplectic"):
+        ("semi-implicit-euler", "semi-implicit-euler-drift-kick"),
+    # by whether the velocities belong to the times of the positions, or to half a step before
+    ("leapfrog", "leap-frog"): ("velocity-verlet", "semi-implicit-euler"),
+    ("verlet", "stormer", "stormer-verlet", "stoermer", "stoermer-verlet"):
+        ("velocity-verlet", "position-verlet"),
+    ("kick-drift-kick", "kdk"): ("velocity-verlet",),
+    ("drift-kick-drift", "dkd"): ("position-verlet",),
+    ("rk2", "modified-euler", "runge-kutta-2"): ("rk2-midpoint", "rk2-heun"),
+    ("euler-richardson",): ("rk2-midpoint",),
+    ("improved-euler", "explicit-trapezoidal"): ("rk2-heun",),
+    ("runge-kutta", "runge-kutta-4", "rk"): ("rk4",),
+    ("crank-nicolson", "implicit-trapezoidal"): ("trapezoidal",),
+}  # fmt: skip
+"""Names of textbooks, and the schemes here that they may mean (Hairer, Lubich & Wanner, I.1; Cromer, Am. J.
+Phys. 49 (1981) 455; Gould & Tobochnik)."""
+
+_MEANT = {name.replace("-", " "): found for names, found in TEXTBOOK.items() for name in names}
 
 # like an imported module, a scheme that an engine brings stays for the life of the process
 _brought: dict[str, Scheme] = dict(ATTACHED)
@@ -18,11 +43,31 @@ def scheme(name: str) -> Scheme:
     """The scheme of this name, of the catalogue or brought by an engine.  MethodError where there is none."""
     found = SCHEMES.get(name) or _brought.get(name)
     if found is None:
-        close = nearest(name, (*SCHEMES, *_brought)) or f"; there are {', '.join(SCHEMES)}"
+        close = meant(name) or f"; there are {', '.join(SCHEMES)}"
         raise MethodError(
             f"scheme {name!r} is neither in the catalogue nor brought by an engine that is here{close}"
         )
     return found
+
+
+def meant(name: str, beside: Iterable[str] = ()) -> str:
+    """ ", did you mean ...?" for an unknown name: the schemes that textbooks call so, else the nearest name
+    of a scheme or of those `beside`, else those whose titles have these words."""
+    found, bare = textbook(name), _bare(name)
+    close = "" if found else nearest(name, (*known(), *beside))
+    if bare and not (found or close):
+        found = tuple(x.name for x in known().values() if f" {bare} " in f" {_bare(x.title)} ")
+    return f", did you mean {' or '.join(found[:MOST_LIKELY])}?" if found else close
+
+
+def textbook(name: str) -> tuple[str, ...]:
+    """Names of the schemes that textbooks call so, if any."""
+    return _MEANT.get(_bare(name.replace("\xf6", "oe")), ())
+
+
+def _bare(name: str) -> str:
+    """The words of a name, in small letters."""
+    return " ".join(re.findall(r"[^\W_]+", name.casefold()))
 
 
 def known() -> dict[str, Scheme]:

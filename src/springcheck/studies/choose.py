@@ -34,10 +34,6 @@ def sorted_out(
     return usable, left
 
 
-ALL = "*:?*"
-"""Pattern of every method, beyond the default ones."""
-
-
 def choose(scene: Scene, patterns: Sequence[str]) -> tuple[list[Label], list[LeftOut], tuple[str, ...]]:
     """Methods that can serve a scene, of those that the patterns (or the scene) name, and those left out.
 
@@ -45,25 +41,23 @@ def choose(scene: Scene, patterns: Sequence[str]) -> tuple[list[Label], list[Lef
     Raises MethodError when a method that is named in full cannot run: it was requested.
     """
     # in a scene `*` stands for the default methods, in an argument for all
-    patterns = patterns or [engines.UNNAMED]
-    own = engines.UNNAMED in patterns
-    named = [
-        name
-        for x in patterns
-        for name in (scene.include if x == engines.UNNAMED else [ALL if x == "*" else x])
-    ]
+    own, bath = not patterns or engines.UNNAMED in patterns, scene.bath is not None
+    matched: dict[Label, None] = {}
     try:
-        matched = engines.match(tuple(named), bath=scene.bath is not None)
+        for one in patterns or [engines.UNNAMED]:
+            of_scene = one == engines.UNNAMED
+            named = engines.match(scene.include if of_scene else (one,), bath=bath, every=not of_scene)
+            matched |= dict.fromkeys(named)
     except MethodError as error:
         if not own:
             raise
         raise MethodError(f"methods.include of scene {scene.name}: {error}") from error
     chosen, left = sorted_out(matched, partial(engines.obstacle, scene))
-    for one in left:
-        if one.method in patterns:
-            raise MethodError(f"{one.method} cannot run scene {scene.name}: {one.reason}")
+    for out in left:
+        if out.method in patterns:
+            raise MethodError(f"{out.method} cannot run scene {scene.name}: {out.reason}")
     if not chosen:
         raise MethodError(f"no method can serve scene {scene.name}: {left[0].reason}")
-    rest = engines.match((ALL,), bath=scene.bath is not None) if own else ()
+    rest = engines.match(("*",), bath=bath, every=True) if own else ()
     others = (x for x in rest if x not in matched and not engines.obstacle(scene, x))
     return chosen, left, tuple(map(str, others))

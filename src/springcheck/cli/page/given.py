@@ -17,6 +17,7 @@ from springcheck.errors import SpringcheckError
 from springcheck.figures import charts
 from springcheck.figures.charts import EXACTLY, Bank, Chart, Curve, Rule, Scale, numbers
 from springcheck.formats import columns
+from springcheck.identify.candidates import other_names
 from springcheck.identify.families import title
 from springcheck.identify.hypothesis import distinct
 from springcheck.physics.arrays import Floats
@@ -62,10 +63,14 @@ def to_scripts(scene: Scene | None, pieces: Sequence[Trajectory], wrong: Collect
 
 
 def plain_schemes() -> list[dict[str, Any]]:
-    """One scheme for every undamped one-step map that `identify` distinguishes."""
-    known = laws(schemes.SCHEMES)
-    names = [family.scheme for family in distinct(damped=False)]
-    return [{"scheme": name, "title": title(name), "law": known[name]} for name in names]
+    """One scheme for every undamped one-step map that `identify` distinguishes; its title names those of the
+    same map too."""
+    known, found = laws(schemes.SCHEMES), []
+    for name in (family.scheme for family in distinct(damped=False)):
+        others = ", ".join(map(schemes.title, other_names(name, damped=False)))
+        also = f" (on a spring the same map: {others})" if others else ""
+        found.append({"scheme": name, "title": title(name) + also, "law": known[name]})
+    return found
 
 
 def _live() -> Bank:

@@ -12,7 +12,7 @@ from typing import Any
 
 import msgspec
 
-from springcheck.errors import SceneError, nearest
+from springcheck.errors import SceneError, nearest, plain
 from springcheck.physics.scene import Scene
 from springcheck.physics.scenefile import building, tables
 
@@ -80,7 +80,9 @@ def parse(text: str, *, name: str, where: str | None = None) -> Scene:
         raise SceneError(f"{where}: not valid as a scene: it is nested too deep") from error
     except ValueError as error:
         # an integer of thousands of digits raises another ValueError than tomllib's
-        raise SceneError(f"{where}: not valid TOML: {str(error).partition(';')[0]}") from error
+        raise SceneError(
+            f"{where}: not valid TOML: {_unreadable(str(error).partition(';')[0], text)}"
+        ) from error
     return from_tables(data, name=name, where=where)
 
 
@@ -97,6 +99,16 @@ def from_tables(data: Any, *, name: str, where: str) -> Scene:
         return building.scene(table, name=name)
     except building.MistakeError as error:
         raise SceneError(f"{where}: {error}") from error
+
+
+def _unreadable(message: str, text: str) -> str:
+    """tomllib's message with the line that it names."""
+    what = re.sub(r"\('(.*?)',?\)", lambda x: "[" + x[1].replace("', '", ".") + "]", message)
+    at = re.search(r"at line (\d+)", message)
+    line = ": " + plain(text.split("\n")[int(at[1]) - 1].strip(), 60) if at else ""
+    if what.startswith(("Expected newline", "Invalid value")):
+        line += "; numbers are written as 0.25 or 1e-3, without arithmetic, and text in quotes"
+    return what + line
 
 
 def _numbers(data: Any, path: str = "") -> Iterator[tuple[str, float]]:
@@ -116,8 +128,15 @@ def _numbers(data: Any, path: str = "") -> Iterator[tuple[str, float]]:
             yield path, math.inf
 
 
+_WORDS = {
+    "float": "a number", "int": "a whole number", "str": "text in quotes", "bool": "true or false",
+    "array": "a list in brackets", "object": "a table",
+}  # fmt: skip
+"""The types of msgspec's messages, as a scene file has them."""
+
+
 def _explain(message: str, data: Any) -> str:
-    """msgspec's message with the field first, the value found, and the accepted fields."""
+    """msgspec's message in the words of TOML: the field first, the value found, and what is accepted."""
     what, _, path = message.partition(" - at `$")
     field = path.rstrip("`").lstrip(".")
     found = data
@@ -126,14 +145,24 @@ def _explain(message: str, data: Any) -> str:
             found = found[int(part)] if part.isdigit() else found[part]
         except (KeyError, IndexError, TypeError):
             found = None
-    what = (what[0].lower() + what[1:]).replace("missing required field", "lacks the field")
-    what = what.replace("contains unknown field", "has the unknown field")
-    names = re.sub(r"\[\d+\]$", "[]", field), field.rpartition(".")[2]
-    accepted = next((one for name in names if (one := tables.CHOICES.get(name))), None)
-    if accepted:
-        return f"{field} = {found!r}: one of {', '.join(accepted)} is needed"
-    if "unknown field" in what or "lacks the field" in what:
-        table = tables.named(re.sub(r"\[.*", "", field))
-        known = f"; its fields are {', '.join(table.__struct_encode_fields__)}" if table else ""
-        return f"{field or 'the scene'}: {what.replace('object', 'it')}{known}"
-    return f"{field} = {found!r}: {what}"
+    table = tables.named(re.sub(r"\[.*", "", field))
+    if strange := re.match(r"Object (missing required|contains unknown) field `(.*)`", what):
+        name, known = strange[2], table.__struct_encode_fields__ if table else ()
+        named = f"table [{name}]" if tables.named(name) and not field else f"field `{name}`"
+        said = f"lacks the {named}" if "missing" in what else f"has the unknown {named}{nearest(name, known)}"
+        return f"{field or 'the scene'}: it {said}" + f"; its fields are {', '.join(known)}" * bool(known)
+    wanted = re.sub(r", got .*|^Expected ", "", what).replace(" | null", "")
+    if wanted.startswith("`array`") and ((table and "[" not in field) or isinstance(found, dict)):
+        return f"{field}: there may be several of it: write [[{field}]], in double brackets, for each"
+    if isinstance(found, list) and wanted == "`object`" and "[" not in field:
+        return f"{field}: there is one of it: write [{field}], in single brackets, once"
+    shown = str(found).lower() if isinstance(found, bool) else repr(found)
+    last = re.sub(r"\[\d+\]$", "[]", field)
+    accepted = tables.CHOICES.get(last) or tables.CHOICES.get(last.rpartition(".")[2])
+    if accepted and wanted != "`int`":
+        return f"{field} = {shown}: one of {', '.join(accepted)} is needed"
+    if "regex" in wanted:
+        return f"{field} = {shown}: letters of x, y and z are needed, as 'xy'"
+    each = re.sub(r"`(.*?)`", lambda x: " or ".join(_WORDS.get(y, y) for y in x[1].split(" | ")), wanted)
+    quoted = isinstance(found, str) and re.fullmatch(r"[-+.\deE]+", found) and "number" in each
+    return f"{field} = {shown}: {each} is needed" + ", without quotes" * bool(quoted)

@@ -261,6 +261,7 @@ CHOICES: dict[str, tuple[str, ...]] = {
     "kind": get_args(Kind),
     "record.quantities[]": get_args(Quantity),
     "axis": get_args(Axis),
+    "ends[]": ('"wall"', "the number of a particle"),
 }
 """Accepted words of a field, for messages; for a list, of each of its entries."""
 

@@ -49,7 +49,8 @@ def record(
     With `thermostats` globs name those too.  An unfinished census of the same command is resumed.  Raises
     MethodError where none of them can be run.
     """
-    labels = engines.match(tuple(methods) or (EVERY,), bath=None if thermostats else False)
+    bath = None if thermostats else False
+    labels = engines.match(methods or (EVERY,), bath=bath, every=bool(methods))
     return keeper.study("census", path, labels, partial(_measure, labels), **how)
 
 

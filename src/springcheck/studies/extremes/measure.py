@@ -55,7 +55,7 @@ def record(
             "extremes judges numbers from 1e-300 to 1e300 by wider ones, and long double is no wider than "
             "double on this machine: run it on Linux on x86-64"
         )
-    labels = engines.match(tuple(methods) or everything())
+    labels = engines.match(methods or everything(), every=bool(methods))
     cells = partial(measure, labels, quick=quick)
     return keeper.study("extremes", path, labels, cells, "quick" if quick else "whole", **how)
 

@@ -18,6 +18,7 @@ from springcheck.physics import exact
 from springcheck.physics.arrays import WIDE, Extended, Floats, Integers, Reals
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Spring, WallSpring
+from springcheck.studies.stability.longest import fastest
 
 LEAST_AMPLITUDE = 1e-3
 """Least amplitude, relative to the largest, of modes whose phase is reported: in a mode that hardly moves,
@@ -84,27 +85,12 @@ def truth(scene: Scene) -> Truth:
         )
     if not scene.system.norm.of:
         raise SceneError(f"scene {scene.name} rests in equilibrium: give a particle a position or a momentum")
-    w = _frequency(scene)
+    rods = scene.system.rods
+    w = float(np.max(rods.rates(scene.q, scene.p))) if rods else fastest(scene)
     if not np.isfinite(w):
         raise SceneError(f"scene {scene.name}: its forces are beyond the range of numbers")
     springs = tuple(term for term in scene.terms if isinstance(term, WallSpring | Spring))
     return Truth(scene=scene, turning=replace(scene, terms=springs).system.modes, w=w)
-
-
-def _frequency(scene: Scene) -> float:
-    """The largest w along the motion: from the modes, or from the curvature along the exact path."""
-    if scene.system.has_modes:
-        return float(np.sqrt(np.maximum(np.max(scene.system.modes.w2), 0)))
-    if scene.system.rods:
-        return float(np.max(scene.system.rods.rates(scene.q, scene.p)))
-    samples = 256
-    q, _ = exact.true_motion(scene, np.arange(samples + 1), scene.step * scene.steps / samples)
-    root = np.sqrt(scene.m)
-    w2 = [
-        np.linalg.eigvalsh(np.asarray(scene.system.hessian(row), np.float64) / root[:, None] / root)
-        for row in q
-    ]
-    return float(np.sqrt(max(float(np.max(w2)), 0.0)))
 
 
 class Errors:

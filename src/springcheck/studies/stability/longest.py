@@ -85,7 +85,8 @@ def _at_its_stiffest(scene: Scene) -> Scene:
 def stiffest(scene: Scene) -> Floats:
     """Positions (n,) where the exact solution of an anharmonic scene is stiffest; otherwise the start."""
     system = scene.system
-    if system.is_linear or scene.n > MOST_MODES or not exact.has_true_motion(scene):
+    many = scene.n > MOST_MODES and not system.is_separate
+    if system.is_linear or many or not exact.has_true_motion(scene):
         return np.asarray(scene.q)
     found, number = np.asarray(scene.q), SAMPLED_STATES
     steps = np.arange(SAMPLED_STATES + 1)
@@ -124,8 +125,8 @@ def _scaled(system: System[Scene], q: Reals) -> Extended:
 def fastest(scene: Scene) -> float:
     """Largest angular frequency of a scene without its friction [1/T], 0 where nothing oscillates.
 
-    For an anharmonic scene, of small oscillations where it is `stiffest`.  SceneError where forces overflow
-    there.
+    For an anharmonic scene, of small oscillations where it is `stiffest`; for a modulated spring, at its
+    largest stiffness.  SceneError where forces overflow there.
     """
     system = _at_its_stiffest(scene).system
     largest = float(np.max(system.modes.w2)) if system.has_modes else _largest(system, stiffest(scene))

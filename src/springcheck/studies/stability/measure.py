@@ -48,7 +48,7 @@ def record(
             f"a step below h w = 1, here h < {1 / rate if rate else np.inf:.6g}, and none beyond"
         )
     fastest(scene)
-    labels = engines.match(tuple(methods) or ("*",))
+    labels = engines.match(methods or ("*",), every=bool(methods))
     return keeper.study("stability", path, labels, partial(_measure, scene, labels), scene=scene, **how)
 
 
