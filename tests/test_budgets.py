@@ -10,7 +10,7 @@ import springcheck
 HOME = Path(springcheck.__file__).parent
 
 BUDGETS = {
-    ("physics",): 7034,
+    ("physics",): 7036,
     ("schemes",): 1651,
     ("thermal",): 3201,
     ("engines/own",): 1648,
@@ -18,11 +18,11 @@ BUDGETS = {
     ("engines",): 2817,
     ("driver", "conformance", "doors"): 1257,
     ("checks",): 5128,
-    ("identify",): 8789,
+    ("identify",): 8844,
     ("formats", "store"): 5260,
     ("studies",): 1478,
     ("studies/*",): 9803,
-    ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 7110,
+    ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 7134,
 }
 """Lines of each room, or of several: of an engine in one file, and of what all studies share, in the first
 folder."""
