@@ -18,7 +18,7 @@ BUDGETS = {
     ("engines",): 2817,
     ("driver", "conformance", "doors"): 1257,
     ("checks",): 5128,
-    ("identify",): 8844,
+    ("identify",): 8861,
     ("formats", "store"): 5260,
     ("studies",): 1478,
     ("studies/*",): 9803,
