@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -50,8 +51,6 @@ def test_frames_that_the_scene_does_not_ask_for_are_no_fact_of_its_grid(tmp_path
 
 
 def test_twice_as_many_steps_are_none_either(tmp_path: Path) -> None:
-    from dataclasses import replace
-
     run = driver.run(replace(SCENE, steps=2 * SCENE.steps), "own:velocity-verlet")
     found, notes = verdicts(tmp_path, np.c_[run.t, run.q, run.p])
     assert found["grid"].passed is None
@@ -171,6 +170,22 @@ def test_a_start_that_is_not_the_scenes_is_named(
 ) -> None:
     with pytest.raises(StoreError, match=f"off the start of spring-uneven: .*{said}"):
         verdicts(tmp_path, np.column_stack(columns), header)
+
+
+def test_velocities_by_np_gradient_are_one_sided_at_the_ends_alone(tmp_path: Path) -> None:
+    """Half a kick was to be taken off in every frame, which would have spoilt all but the first."""
+    scene = replace(SCENE, p=np.zeros(1))
+    rest = driver.run(scene, "own:velocity-verlet")
+    states = np.column_stack([rest.t, rest.q, M * np.gradient(rest.q[:, 0], H)])
+    np.savetxt(tmp_path / "a.csv", states, fmt="%.17g", delimiter=",", header="t,q,p", comments="")
+    with pytest.raises(StoreError, match=r"half a kick after the scene's there alone, .* as np.gradient has"):
+        file.judge(tmp_path / "a.csv", scene=scene, scheme="velocity-verlet")
+    with pytest.raises(StoreError, match="half a kick after the scene's there; see"):
+        file.judge(tmp_path / "a.csv", scene=scene, scheme="explicit-euler")
+    states = np.column_stack([rest.t, rest.q, rest.p + H / 2 * scene.system.force(rest.q, rest.p)])
+    np.savetxt(tmp_path / "a.csv", states, fmt="%.17g", delimiter=",", header="t,q,p", comments="")
+    with pytest.raises(StoreError, match=r"take off 0.5 h F\(q\) in every frame"):
+        file.judge(tmp_path / "a.csv", scene=scene, scheme="velocity-verlet")
 
 
 def test_a_start_that_is_nearly_right_is_no_matter_of_a_mass_of_one(tmp_path: Path) -> None:

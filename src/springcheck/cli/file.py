@@ -277,7 +277,7 @@ def as_trajectory(
     if not size <= max(1e-9, 10 * states.roundoff) and not 0 < size * scene.system.norm.unit <= 2 * rounded:
         raise StoreError(
             f"{path}: its first frame is {float(size):.2g} of the amplitude off the start of {scene.name}: "
-            + start.differs(scene, scheme, q[0], p[0], velocities=states.p is None)
+            + start.differs(scene, scheme, states, q, p, every)
         )
     if size > 0 or moved:
         taken["start"] = f"the start was taken as it is written in the file, {size:.2g} of the amplitude off"
