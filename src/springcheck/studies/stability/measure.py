@@ -57,8 +57,10 @@ def _measure(scene: Scene, labels: Sequence[Label], kept: Keeper) -> Stability:
         absent = engines.absence(label.engine)
         if absent or propagators.has_one_step(label):
             return absent or propagators.absence(label)
-        adaptive = not scheme(engines.method(label).scheme).has("one-step")
-        return "it has no fixed step and no limit" if adaptive else "it moves no springs"
+        claimed = scheme(engines.method(label).scheme)
+        if not claimed.has("named"):
+            return "its scheme is not known; --scheme NAME states it, and its limit is then measured"
+        return "it moves no springs" if claimed.has("one-step") else "it has no fixed step and no limit"
 
     usable, left_out = sorted_out(labels, why, "has a limit to measure")
     braked = [label for label in usable if "damping" in engines.method(label).terms]
