@@ -266,3 +266,14 @@ def test_a_table_of_an_adaptive_solver_is_no_failure_and_cannot_be_judged(
     text = " ".join(capsys.readouterr().out.split())
     assert "tolerance: the file does not say what tolerance its solver has" in text
     assert "0 failed" in text
+
+
+def test_energies_in_a_table_are_said_to_be_left_unread(tmp_path: Path) -> None:
+    """Half of them was missing, and `the scene keeps no energies` was the answer."""
+    scene = replace(SCENE, quantities=("q", "p", "energy"))
+    wrong = 2 * scene.system.energy(RUN.q, RUN.p)
+    np.savetxt(tmp_path / "a.csv", np.c_[table(), wrong], delimiter=",", header="t,q,p,energy", comments="")
+    found = file.judge(tmp_path / "a.csv", scene=scene, scheme="velocity-verlet")
+    (energies,) = (v for v in found.verdicts if v.check == "energies")
+    assert energies.passed is None
+    assert "is read from a store alone" in energies.reason

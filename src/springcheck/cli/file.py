@@ -298,6 +298,8 @@ def as_trajectory(
     if ours is not None and ours.rebuilds_velocity:
         notes.append("velocities are rebuilt from positions, as its run declared, and judged so")
     kept = ("q", "p") if ours is None or ours.energy is None else ("q", "p", "energy")
+    if "energy" in scene.quantities and "energy" not in kept:
+        taken["energies"] = "the scene keeps energies, and a column of them is read from a store alone"
     begun: dict[str, Any] = {"q": q[0].copy(), "p": p[0].copy()}
     grid: dict[str, Any] = {"steps": steps, "every": every, "quantities": kept}
     if scene.system.rods and states.roundoff > 2.0**-53:
