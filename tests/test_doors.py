@@ -60,6 +60,18 @@ def test_a_students_function_is_found_to_be_its_scheme_and_judged(
     assert {"step-defect", "closed-form"} <= judged
 
 
+def test_a_function_whose_scheme_is_not_known_has_a_limit_by_the_scheme_that_is_stated(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """It was left out as one that has `no fixed step and no limit`."""
+    (tmp_path / "mine.py").write_text(VERLET.replace("/ 2", "/ 2.2"))
+    mine = ["--method", "stepper:*", "--stepper", "mine.py:leapfrog"]
+    assert main(["stability", "spring", *mine, "--method", "own:euler"]) == 0
+    assert "its scheme is not known; --scheme NAME states it" in " ".join(capsys.readouterr().out.split())
+    main(["stability", "spring", *mine, "--scheme", "velocity-verlet", "--force"])
+    assert "stepper:leapfrog  " in capsys.readouterr().out
+
+
 def test_a_function_that_is_not_the_scheme_that_it_claims_fails(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -160,3 +160,31 @@ def test_positions_that_a_step_wraps_into_a_box_are_named(box: float, begins: fl
     found = identify_stepper(step)
     assert (found.scheme, found.fits) == (None, False)
     assert found.statement.startswith(f"The positions are wrapped into a box of {box:g},")
+
+
+def test_positions_that_a_step_rounds_are_wrapped_into_no_box() -> None:
+    """An array of integers cuts off positions: all jump at once, and they were a box of 0.924678."""
+
+    def step(q: Any, p: Any, h: float, force: Force, m: Any) -> tuple[Any, Any]:
+        q = int(q)
+        p = p + h * force(q)
+        return q + h * p / m, p
+
+    found = identify_stepper(step)
+    assert (found.scheme, found.fits) == (None, False)
+    assert found.statement.startswith("Positions are rounded in the step, to about 1:")
+
+
+def test_a_step_that_remembers_an_earlier_position_wraps_none_into_a_box() -> None:
+    """One leap, at the first place that is visited, was a box of 5.33125."""
+    old: dict[str, Any] = {}
+
+    def stoermer(q: Any, p: Any, h: float, force: Force, m: Any) -> tuple[Any, Any]:
+        before = old.get("q", q - h * p / m)
+        after = 2 * q - before + h * h * force(q) / m
+        old["q"] = q
+        return after, m * (after - before) / (2 * h)
+
+    found = identify_stepper(stoermer)
+    assert (found.scheme, found.fits) == (None, False)
+    assert found.statement.startswith("A step depends on an earlier call")

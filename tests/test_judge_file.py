@@ -175,6 +175,22 @@ def test_a_start_that_is_not_the_scenes_is_named(
         verdicts(tmp_path, np.column_stack(columns), header)
 
 
+def test_velocities_by_np_gradient_are_one_sided_at_the_ends_alone(tmp_path: Path) -> None:
+    """Half a kick was to be taken off in every frame, which would have spoilt all but the first."""
+    scene = replace(SCENE, p=np.zeros(1))
+    rest = driver.run(scene, "own:velocity-verlet")
+    states = np.column_stack([rest.t, rest.q, M * np.gradient(rest.q[:, 0], H)])
+    np.savetxt(tmp_path / "a.csv", states, fmt="%.17g", delimiter=",", header="t,q,p", comments="")
+    with pytest.raises(StoreError, match=r"half a kick after the scene's there alone, .* as np.gradient has"):
+        file.judge(tmp_path / "a.csv", scene=scene, scheme="velocity-verlet")
+    with pytest.raises(StoreError, match="half a kick after the scene's there; see"):
+        file.judge(tmp_path / "a.csv", scene=scene, scheme="explicit-euler")
+    states = np.column_stack([rest.t, rest.q, rest.p + H / 2 * scene.system.force(rest.q, rest.p)])
+    np.savetxt(tmp_path / "a.csv", states, fmt="%.17g", delimiter=",", header="t,q,p", comments="")
+    with pytest.raises(StoreError, match=r"take off 0.5 h F\(q\) in every frame"):
+        file.judge(tmp_path / "a.csv", scene=scene, scheme="velocity-verlet")
+
+
 def test_a_start_that_is_nearly_right_is_no_matter_of_a_mass_of_one(tmp_path: Path) -> None:
     """Of a mass of 1 momenta 1e-8 off were said to be divided by the mass."""
     rows = np.array([[0.0, 0.0, 1 + 1e-8], [0.1, 0.1, 1.0]])
@@ -336,3 +352,14 @@ def test_which_columns_have_fixed_decimals() -> None:
     full = [repr(x) for x in np.random.default_rng(0).normal(size=40).tolist()]
     assert of(*full) is None
     assert of("-0.0", "0.0", "0.0", "-0.0", "0.0", "0.0") is None
+
+
+def test_energies_in_a_table_are_said_to_be_left_unread(tmp_path: Path) -> None:
+    """Half of them was missing, and `the scene keeps no energies` was the answer."""
+    scene = replace(SCENE, quantities=("q", "p", "energy"))
+    wrong = 2 * scene.system.energy(RUN.q, RUN.p)
+    np.savetxt(tmp_path / "a.csv", np.c_[table(), wrong], delimiter=",", header="t,q,p,energy", comments="")
+    found = file.judge(tmp_path / "a.csv", scene=scene, scheme="velocity-verlet")
+    (energies,) = (v for v in found.verdicts if v.check == "energies")
+    assert energies.passed is None
+    assert "is read from a store alone" in energies.reason

@@ -445,6 +445,26 @@ def test_judge_says_what_the_states_show_as_the_command_does(tmp_path: Path) -> 
     assert springcheck.judge(scene, springcheck.simulate(scene, "own:euler")).cause == ""
 
 
+def test_what_is_not_judged_says_so_and_what_the_states_show() -> None:
+    """`4 verdicts passed, 0 failed` of a function whose scheme is not known was read as a pass."""
+
+    def new_force(q: Any, p: Any, h: float, force: Any, mass: Any) -> Any:
+        q = q + h * p / mass + h * h / 2 * force(q) / mass
+        return q, p + h * force(q)
+
+    scene = springcheck.load_scene("spring-uneven")
+    verdicts = springcheck.judge(scene, springcheck.simulate(scene, new_force))
+    assert not verdicts.passed
+    assert repr(verdicts).startswith("Verdicts(not judged: stepper:new_force: nothing that applied tells")
+    assert "Velocity Verlet with a friction" in verdicts.cause
+    assert verdicts.cause in repr(verdicts)
+    html = verdicts._repr_html_()
+    assert "not judged" in html
+    assert "Velocity Verlet with a friction" in html
+    still = replace(scene, q=0 * scene.q, p=0 * scene.p)
+    assert springcheck.judge(still, springcheck.simulate(still, "own:euler")).cause == ""
+
+
 def test_judge_without_a_scheme_says_in_a_line_how_to_find_it() -> None:
     scene = springcheck.load_scene("spring")
     run = springcheck.simulate(scene, "own:velocity-verlet")

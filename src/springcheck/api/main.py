@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -88,7 +89,7 @@ def simulate(
 @typed
 def judge(scene: Scene | str | Path, trajectory: Trajectory) -> Verdicts:
     """Verdicts of all checks on a trajectory of this scene; `passed` is None for those that do not apply, and
-    the first failed one says what the states show.
+    the first failed one says what the states show; `cause` does where nothing that applied tells the scheme.
 
     Raises SpringcheckError for frames of another shape, or without a step, or of no scheme.
     """
@@ -118,10 +119,14 @@ def judge(scene: Scene | str | Path, trajectory: Trajectory) -> Verdicts:
     # trajectories made from arrays get the energies of their states
     run = run if run.scene or run.origin else run.of_scene(found)
     verdicts = checks.judge(found, run)
-    if checks.status(verdicts) == 1:
-        from springcheck.identify import files
+    if (status := checks.status(verdicts)) == 0:
+        return Verdicts(verdicts)
+    from springcheck.identify import files
 
-        verdicts = checks.explained(found, run, verdicts, files.shown)
+    if status == 1:
+        return Verdicts(checks.explained(found, run, verdicts, files.shown))
+    with suppress(ArithmeticError, ValueError), np.errstate(all="ignore"):
+        return Verdicts(verdicts, shown=files.shown(found, run, 0))
     return Verdicts(verdicts)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 from springcheck import checks
@@ -10,6 +11,10 @@ from springcheck.physics.trajectory import Verdict, html_table, library
 
 class Verdicts(list[Verdict]):
     """Verdicts and their summary; `print` shows the summary and the failed verdicts."""
+
+    def __init__(self, verdicts: Iterable[Verdict] = (), *, shown: str = "") -> None:
+        super().__init__(verdicts)
+        self._shown = shown
 
     @property
     def passed(self) -> bool:
@@ -23,13 +28,15 @@ class Verdicts(list[Verdict]):
 
     @property
     def summary(self) -> str:
-        """How many passed, or which failed, in one line."""
-        return checks.summary(self)
+        """How many passed, or which failed, or which are not judged, in one line."""
+        said, without = checks.summary(self), ", ".join(checks.not_judged(self)[: checks.MOST_NAMED])
+        return f"not judged: {without}: nothing that applied tells the scheme; {said}" if without else said
 
     @property
     def cause(self) -> str:
-        """What the states show to be the cause of a failure, in a sentence; "" where nothing is known."""
-        return checks.cause_of(self)
+        """What the states show to be the cause of a failure, or of no judgement, in a sentence; "" where
+        nothing is known."""
+        return checks.cause_of(self) or self._shown
 
     def __repr__(self) -> str:
         said = [f"  What the states show: {self.cause}"] if self.cause else []
@@ -38,7 +45,8 @@ class Verdicts(list[Verdict]):
     def _repr_html_(self) -> str:
         words = {True: "passed", False: "FAILED", None: "does not apply"}
         rows = [(x.check, words[x.passed], f"{x.value:.3g}", f"{x.bound:.3g}", x.reason) for x in self]
-        return html_table(self.summary, [("check", "verdict", "value", "bound", "why"), *rows])
+        said = f"{self.summary}. What the states show: {self.cause}" if self.cause else self.summary
+        return html_table(said, [("check", "verdict", "value", "bound", "why"), *rows])
 
     def to_dataframe(self) -> Any:
         """A pandas DataFrame with a row for each verdict."""

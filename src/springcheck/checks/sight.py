@@ -60,15 +60,16 @@ NAMES = ("stiffness", "step", "friction", *OF_A_DRIVE)
 def limits(
     right: States, motions: Callable[[str], Sequence[States]], change: float, part: Part,
     coarse: Callable[[str], Sequence[States]] | None = None,
-) -> tuple[Limits, int]:  # fmt: skip
-    """The limits of a check, and how many springs and frictions are invisible however far they are off.
+) -> tuple[Limits, dict[str, int]]:  # fmt: skip
+    """The limits of a check, and, by the name of a limit, how many are invisible where they are off by
+    `LARGEST`.
 
     `motions(name)` are the right one with a parameter larger by `change`, one for each spring or friction,
     none where that is not known, and `part` expresses changes (r, n) of it in bounds.  Those whose effect is
     below the reference's own rounding are tried again at `COARSER` times that, if it is known.
     """
     found: dict[str, float | None] = {}
-    hidden = 0
+    hidden = {}
 
     def effects(wrong: Sequence[States]) -> list[float]:
         return [_largest(part((q - right[0], p - right[1]))) for q, p in wrong]
@@ -85,7 +86,7 @@ def limits(
                 if size <= 8 * unknown and more > min(8 * unknown, 1)
             ]
         found[name] = max((x for x in least if x < LARGEST), default=None)
-        hidden += sum(not x < LARGEST for x in least)
+        hidden[name] = sum(not x < LARGEST for x in least)
     return Limits(**found), hidden
 
 
@@ -195,7 +196,10 @@ def of_steps(
         return motions(name, COARSER * change)
 
     found, hidden = limits(ends(case, at), motions, change, lambda off: part(at, off), coarse)
-    said = f"; {count(hidden, 'spring')} could be off by any part and not be seen in a step" if hidden else ""
+    names = {"stiffness": "spring", "friction": "friction"}
+    blind = [count(hidden[name], noun) for name, noun in names.items() if hidden[name]]
+    blind += ["the step"] * hidden["step"]
+    said = f"; {' and '.join(blind)} could be off by {LARGEST:.0%} and not be seen in a step" if blind else ""
     return found, said
 
 

@@ -15,6 +15,8 @@ from springcheck.text.wording import count
 
 CLOSE_STATE = 1e-6
 """Distance, relative to the amplitude, within which a state explains a first frame."""
+ROUNDINGS = 4
+"""Roundings in the difference of a frame from a step: two of each number of both."""
 MOST_STEPS, MOST_PARTICLES = 100, 1000
 """Steps of the scheme that are tried, and the most particles of a scene for it."""
 
@@ -46,15 +48,16 @@ def contradicted(path: Path, states: States, scene: Scene) -> None:
     )
 
 
-def differs(scene: Scene, scheme: str, q: Floats, p: Floats, *, velocities: bool) -> str:
-    """Explain a first frame (n,) that is not the scene's start, with a remedy; `velocities` says that the
-    file holds these."""
+def differs(scene: Scene, scheme: str, states: States, q: Floats, p: Floats, every: int) -> str:
+    """Explain a first frame of q, p (f, n), made from the states of a file, that is not the scene's start,
+    with a remedy."""
+    at, velocities = (q[0], p[0]), states.p is None
     with np.errstate(all="ignore"):
-        found = _single(scene, q, p)
-        if not (found or _is_at(scene, q, p, scene.q, scene.p)):
-            found = _weighted(scene, q, p, velocities) or _kicked(scene, q, p)
-            found = found or _later(scene, scheme, q, p) or _scaled(scene, q, p, velocities)
-        return found or _largest(scene, q, p)
+        found = _single(scene, *at)
+        if not (found or _is_at(scene, *at, scene.q, scene.p)):
+            found = _weighted(scene, *at, velocities) or _kicked(scene, scheme, q, p, every, states.roundoff)
+            found = found or _later(scene, scheme, *at) or _scaled(scene, *at, velocities)
+        return found or _largest(scene, *at)
 
 
 def _is_at(scene: Scene, q: Floats, p: Floats, there_q: Reals, there_p: Reals) -> bool:
@@ -109,17 +112,44 @@ def _ten(x: float) -> float:
     return float(10.0 ** np.rint(np.log10(x))) if 0 < x < np.inf else 1.0
 
 
-def _kicked(scene: Scene, q: Floats, p: Floats) -> str:
-    kick = scene.step * np.asarray(scene.system.force(scene.q, scene.p), np.float64)
+def _kicked(scene: Scene, scheme: str, q: Floats, p: Floats, every: int, roundoff: float) -> str:
+    kick = scene.step * np.asarray(scene.system.force(q, p), np.float64)
     for part, name in ((0.5, "half a kick"), (1.0, "a kick")):
         for side, late, back in ((-1, "before", "add"), (1, "after", "take off")):
-            if _is_at(scene, q, p, scene.q, scene.p + side * part * kick):
+            if not _is_at(scene, q[0], p[0], scene.q, scene.p + side * part * kick[0]):
+                continue
+            found = f"its momenta are {name} {late} the scene's"
+            if _follows(scene, scheme, q, p - side * part * kick, every, roundoff):
                 return (
-                    f"its momenta are {name} {late} the scene's, as leapfrog has them between the times of "
-                    f"the positions; {back} {part:g} h F(q) in every frame, or see what "
-                    "`springcheck identify` reads"
+                    f"{found}, as leapfrog has them between the times of the positions; {back} {part:g} h "
+                    "F(q) in every frame, or see what `springcheck identify` reads"
                 )
+            if len(q) > 3 and _follows(scene, scheme, q[1:-1], p[1:-1], every, roundoff):
+                return (
+                    f"{found} there alone, and the frames after it are those of {schemes.title(scheme)}: "
+                    "differences to one side, as np.gradient has at both ends; put the scene's own there, "
+                    "and leave out the last frame if it is one"
+                )
+            return f"{found} there; see what `springcheck identify` reads of all frames"
     return ""
+
+
+def _follows(scene: Scene, scheme: str, q: Floats, p: Floats, every: int, roundoff: float) -> bool:
+    """Whether each of the first frames leads to the next by a scheme, as far as their digits can tell it from
+    half a kick."""
+    law = schemes.Law(scheme=schemes.scheme(scheme), scene=scene, h=scene.step)
+    q, p = (x[: MOST_STEPS + 1] for x in (q, p))
+    at: tuple[Reals, Reals] = q[:-1].astype(np.longdouble), p[:-1].astype(np.longdouble)
+    half, norm = scene.step / 2 * np.asarray(scene.system.force(q, p)), scene.system.norm
+    rounded = norm.most(*(ROUNDINGS * roundoff * np.max(np.abs(x), axis=0) for x in (q, p)))
+    close = max(CLOSE_STATE, float(rounded / norm.unit))
+    try:
+        for _ in range(every):
+            at = law.step(*at)
+    except (SpringcheckError, ArithmeticError, ValueError):
+        return False
+    right = np.all(norm(at[0] - q[1:], at[1] - p[1:]) <= close)
+    return bool(right and 2 * close <= np.max(norm(np.zeros_like(q), half)))
 
 
 def _later(scene: Scene, scheme: str, q: Floats, p: Floats) -> str:

@@ -39,7 +39,7 @@ TINY_STEP = 1e-6, 1e-3
 RUNAWAY = 1e5
 """Growth of a state at which a run ends."""
 
-ALONG, MANY_PLACES = 4.0, 257
+ALONG, MANY_PLACES = 16.0, 1025
 """Largest position, and number of positions, at which jumps are sought."""
 
 LONG = 16
@@ -149,7 +149,7 @@ def identify_stepper(step: Stepper) -> Identification:
     found = results[0]
     if not found.fits and _draws(step):
         return _identified(step, frames=BATH_FRAMES)
-    if not all(x.fits for x in results) and (leaps := _leaps(step)):
+    if not all(x.fits for x in results) and (leaps := _leaps(step, found)):
         # a motion that is torn says nothing else
         return replace(found.refuted(leaps.cause, leaps), nearest=None)
     wrong = [*_on_springs(step, results), *_unasked_friction(found)]
@@ -276,15 +276,32 @@ def _unasked_friction(found: Identification) -> list[Explanation]:
     return [Explanation(cause, "set the damping to 0, which many engines do not by default")]
 
 
-def _leaps(step: Stepper) -> Explanation | None:
-    """Explain positions wrapped into a box: linear in the starting position, except for equal jumps."""
+def _leaps(step: Stepper, found: Identification) -> Explanation | None:
+    """Explain positions that are wrapped into a box, linear in the starting position except for equal jumps,
+    or rounded, in jumps alone; or steps that depend on earlier calls, where a first run shows no scheme."""
     m, k, h = SPRINGS[0]
     places = np.linspace(-ALONG, ALONG, MANY_PLACES)
-    moved = np.diff([_one(step, q, 0.7 * m, h, _spring(k), m)[0] for q in places])
+    ends, again = (
+        np.array([_one(step, q, 0.7 * m, h, _spring(k), m)[0] for q in way]) for way in (places, places[::-1])
+    )
+    moved = np.diff(ends)
     usual = float(np.median(moved))
     off = np.abs(moved - usual)
     leaps, rest = off[off > abs(usual)], off[off <= abs(usual)]
-    if not len(leaps) or np.ptp(leaps) > 1e-9 * leaps[0] or np.max(rest) > 1e-9 * abs(usual):
+    if not np.array_equal(ends, again[::-1]):
+        cause = "A step depends on an earlier call: after another one it ends elsewhere from the same state"
+        remedy = "make each step follow from its arguments: an old position or force is that of another state"
+        return None if found.fits else Explanation(cause, remedy)
+    if len(leaps) < 2:
+        return None
+    if usual == 0:
+        apart = float(np.median(np.diff(places[1:][off > 0])))
+        cause = (
+            f"Positions are rounded in the step, to about {apart:.3g}: between the jumps it ends in one place"
+        )
+        remedy = "keep positions in floating point: an array of integers cuts off what is put into it"
+        return Explanation(cause, remedy)
+    if np.ptp(leaps) > 1e-9 * leaps[0] or np.max(rest) > 1e-9 * abs(usual):
         return None
     cause = f"The positions are wrapped into a box of {leaps[0]:.6g}, and forces are those of wrapped ones"
     remedy = "do not wrap positions between steps, or take the nearest image where forces are worked out"

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from springcheck.physics.arrays import Reals
+from springcheck.identify.arithmetic import SINGLE
+from springcheck.identify.storage import storage
+from springcheck.physics.arrays import Floats, Integers, Reals
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory
-from springcheck.schemes import SCHEMES, Law, title
+from springcheck.schemes import SCHEMES, Law, Scheme, matrix, propagate, title
 from springcheck.text.wording import either
 
 OF_ERROR = 1e-3
@@ -40,6 +42,59 @@ def takers(
             if all(np.all(np.abs(a - b) <= c) for a, b, c in zip(once, end, room, strict=True)):
                 found.append(name)
     return tuple(found)
+
+
+def springs_of(scene: Scene) -> Floats:
+    """Mass, stiffness and friction (3, n) [M, M/T2, M/T] of each coordinate, the last two NaN where other
+    forces act, or some join two coordinates."""
+    system, kinds = scene.system, {term.kind for term in scene.terms}
+    alone = system.is_linear and system.is_separate and kinds <= {"potential", "friction"}
+    if not alone or scene.bath or scene.box:
+        return np.stack([scene.m, *np.full((2, scene.n), np.nan)])
+    c = system.friction_rates * scene.m
+    return np.stack([scene.m, system.hessian_diagonal(scene.q), c]).astype(np.float64)
+
+
+def has_a_start(
+    scheme: Scheme, h: float, springs: Sequence[Floats], steps: Integers, q: Floats, p: Floats,
+    roundoff: float,
+) -> bool:  # fmt: skip
+    """Whether a scheme leads from some start to all of these states q, p (f, n) of oscillators with mass,
+    stiffness and friction `springs` [M, M/T2, M/T] after so many steps (f,), as far as their digits show.
+
+    A start and an equilibrium are fitted by least squares, in units of the last digit and of what a program
+    in single precision rounds on its way.  Numbers that are rounded are half a unit off at most, and cut off
+    one unit: so is then the root mean square with the start that is best.
+    """
+    for j, (m, k, c) in enumerate(np.transpose(springs)):
+        units = [_unit(x[:, j], steps, roundoff) for x in (q, p)]
+        with np.errstate(all="ignore"):
+            one_step = matrix(scheme, h=h, m=np.array([m]), k=np.array([k]), c=np.array([c]))
+            try:
+                ways = [
+                    np.stack(propagate(one_step, y, z, steps, area_preserving=False))[:, :, 0]
+                    for y, z in np.eye(2, dtype=np.longdouble)[:, :, None]
+                ]
+            except ValueError:
+                return True
+            # an equilibrium displaces positions alone
+            ways.append(np.stack([np.ones(len(steps)), np.zeros(len(steps))]))
+            design = (np.array(ways) / np.stack(units)).reshape(3, -1).T.astype(np.float64)
+            size = np.max(np.abs(design), axis=0)
+        if not (k and np.all(np.isfinite(design)) and np.all(size > 0)):
+            return True
+        wanted = np.concatenate([q[:, j] / units[0], p[:, j] / units[1]])
+        left = wanted - design / size @ np.linalg.lstsq(design / size, wanted)[0]
+        if not np.mean(left * left) <= 1:
+            return False
+    return True
+
+
+def _unit(x: Floats, steps: Integers, roundoff: float) -> Floats:
+    """The last digit of numbers (f,), and one rounding of single precision in each of so many steps."""
+    form = storage(x)
+    unit = 2 * roundoff * np.max(np.abs(x)) if form.name == "double" else form.quantum(x)
+    return np.asarray(unit + SINGLE * steps * np.maximum.accumulate(np.abs(x)))
 
 
 def seen_to_take(scene: Scene, run: Trajectory, about: int) -> str:

@@ -374,7 +374,9 @@ class Verdict:
     @property
     def reason(self) -> str:
         """The reason, and the smallest faults that the check would have detected."""
-        exact = "would see any other value" if self.passed and self.bound == 0 else ""
+        # what is identified is known to the digits of the states
+        counted = self.bound == 0 and self.check != "identified"
+        exact = "would see any other value" if self.passed and counted else ""
         return "; ".join(filter(None, (self.why, str(self.sees) or exact)))
 
     def __repr__(self) -> str:

@@ -57,7 +57,10 @@ def _measure(scene: Scene, labels: Sequence[Label], kept: Keeper) -> Stability:
         method = engines.method(label)
         if absent := engines.absence(label.engine):
             return absent
-        if not scheme(method.scheme).has("one-step"):
+        claimed = scheme(method.scheme)
+        if not claimed.has("named"):
+            return "its scheme is not known; --scheme NAME states it, and its limit is then measured"
+        if not claimed.has("one-step"):
             return "it has no fixed step and no limit"
         return propagators.absence(label) if "wall-spring" in method.terms else "it moves no springs"
 

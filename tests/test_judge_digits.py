@@ -1,0 +1,156 @@
+"""Files of few digits: each step alone allows almost anything, and all steps together very little."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import clean
+from springcheck import driver, engines
+from springcheck.cli import file
+from springcheck.identify.taken import has_a_start, springs_of
+from springcheck.physics.arrays import Floats
+from springcheck.physics.scene import Scene
+from springcheck.physics.terms import Damping, WallSpring
+from springcheck.physics.trajectory import Verdict
+from springcheck.schemes import SCHEMES
+
+
+def spring(k: float = 4.9, c: float = 0.0, step: float = 0.02, every: int = 1) -> Scene:
+    """A mass of 0.25 pulled out by 0.08, at 4.43 turns a unit of time."""
+    one = np.array([0])
+    terms = (WallSpring(i=one, k=np.array([k]), at=np.zeros(1)), Damping(i=one, c=np.array([c])))
+    return clean.scene(
+        np.array([0.25]), terms[: 1 + (c > 0)], np.array([0.08]), np.zeros(1), step=step, steps=250 * every,
+        every=every,
+    )  # fmt: skip
+
+
+def old_force(scene: Scene) -> Floats:
+    """q, v (f, 2) of a velocity Verlet whose second half kick takes the force of the old position."""
+    (x, v), h = (0.08, 0.0), scene.step
+    out = [(x, v)]
+    for _ in range(scene.steps):
+        a = -4.9 / 0.25 * x
+        x, v = x + v * h + 0.5 * a * h * h, v + a * h
+        out.append((x, v))
+    return np.array(out)
+
+
+def states(scene: Scene, label: str = "own:velocity-verlet") -> Floats:
+    """q, v (f, 2 n) of an engine."""
+    run = driver.run(scene, label)
+    return np.c_[run.q, run.p / scene.m]
+
+
+def identified(
+    tmp_path: Path, scene: Scene, rows: Floats, form: str, scheme: str = "velocity-verlet"
+) -> Verdict:
+    t = scene.step * scene.every * np.arange(len(rows))
+    head = ",".join(["t", *(f"{what}{i}" for what in "xv" for i in range(scene.n))])
+    forms = ["%.8g"] + [form] * rows.shape[1]
+    np.savetxt(tmp_path / "a.csv", np.c_[t, rows], fmt=forms, delimiter=",", header=head, comments="")
+    found = file.judge(tmp_path / "a.csv", scene=scene, scheme=scheme)
+    return next(v for v in found.verdicts if v.check == "identified")
+
+
+@pytest.mark.parametrize(
+    ("form", "wrong", "said"),
+    [
+        ("%.4f", "old force", "second half kick uses the old force"),
+        ("%.3f", "old force", "second half kick uses the old force"),
+        ("%.4f", 5.2, "1.0612"),
+        ("%.3f", 6.0, "1.2245"),
+        ("%.5f", 4.905, "1.00102"),
+    ],
+)
+def test_what_few_digits_refute_fails_with_its_cause(
+    tmp_path: Path, form: str, wrong: float | str, said: str
+) -> None:
+    scene = spring()
+    rows = old_force(scene) if isinstance(wrong, str) else states(spring(wrong))
+    found = identified(tmp_path, scene, rows, form)
+    assert found.passed is False
+    assert said in found.why
+
+
+@pytest.mark.parametrize("form", ["%.3f", "%.4f", "%.4g", "%.5e"])
+@pytest.mark.parametrize("c", [0.0, 0.02])
+@pytest.mark.parametrize("every", [1, 3])
+def test_what_is_right_to_its_few_digits_does_not_fail(
+    tmp_path: Path, form: str, c: float, every: int
+) -> None:
+    scene = spring(c=c, every=every)
+    for label in ("own:velocity-verlet", "own:rk4"):
+        scheme = engines.method(engines.parse(label)).scheme
+        assert identified(tmp_path, scene, states(scene, label), form, scheme).passed is not False
+
+
+def test_numbers_that_are_cut_off_instead_of_rounded_do_not_fail(tmp_path: Path) -> None:
+    scene = spring()
+    rows = np.trunc(states(scene) * 1e4) / 1e4
+    assert identified(tmp_path, scene, rows, "%.4f").passed is not False
+
+
+def test_a_motion_that_grows_has_no_cause_to_its_one_digit(tmp_path: Path) -> None:
+    """Of explicit Euler to one decimal a thermostat was read: some start does lead to all of it."""
+    scene = clean.scene(
+        np.array([0.3]), (WallSpring(i=np.zeros(1, int), k=np.array([0.4]), at=np.zeros(1)),),
+        np.array([0.7]), np.zeros(1), step=0.13, steps=300,
+    )  # fmt: skip
+    rows = states(scene, "own:euler")
+    assert identified(tmp_path, scene, rows, "%.1f", "explicit-euler").passed is not False
+
+
+@pytest.mark.parametrize("digits", [4, 5])
+def test_some_start_leads_to_the_right_states_and_none_to_those_of_another_stiffness(digits: int) -> None:
+    """250 steps turn by 22 radians, half of the relative error of k times that."""
+    steps, scheme, springs = np.arange(251), SCHEMES["velocity-verlet"], springs_of(spring())
+
+    def found(k: float) -> bool:
+        run = driver.run(spring(k), "own:velocity-verlet")
+        q, p = (np.round(x, digits) for x in (run.q, run.p))
+        return has_a_start(scheme, 0.02, springs, steps, q, p, 5e-4)
+
+    assert found(4.9)
+    assert not found(4.9 * (1 + 40 * 10.0**-digits))
+
+
+def test_a_pass_does_not_claim_to_see_any_other_stiffness(tmp_path: Path) -> None:
+    found = identified(tmp_path, spring(), states(spring()), "%.4f")
+    assert found.passed
+    assert "any other value" not in found.reason
+
+
+@pytest.mark.parametrize("k", [4.9, 5.2])
+def test_points_in_space_of_few_digits_are_those_of_the_scenes_axes(tmp_path: Path, k: float) -> None:
+    """Along an axis, and along a line that is none: each of the three coordinates has the same spring."""
+    scene = spring()
+    rows = states(spring(k))
+    for way in (np.array([0, 1, 0]), np.array([0.6, 0, 0.8])):
+        space = np.c_[rows[:, :1] * way, rows[:, 1:] * way]
+        t = scene.step * np.arange(len(rows))
+        head = "t,x,y,z,vx,vy,vz"
+        np.savetxt(tmp_path / "a.csv", np.c_[t, space], fmt="%.5f", delimiter=",", header=head, comments="")
+        found = file.judge(tmp_path / "a.csv", scene=scene, scheme="velocity-verlet")
+        verdict = next(v for v in found.verdicts if v.check == "identified")
+        assert verdict.passed is (k == 4.9)
+
+
+@pytest.mark.parametrize(("k", "seen"), [(4.9, False), (4.9 * 1.02, False), (6.0, True)])
+def test_what_single_steps_do_not_see_is_one_spring_and_its_step(
+    tmp_path: Path, k: float, seen: bool
+) -> None:
+    """`2 springs could be off by any part` was said of one, of which 22 % are seen."""
+    rows = states(spring(k))
+    np.savetxt(
+        tmp_path / "a.csv", np.c_[0.02 * np.arange(251), rows], fmt=["%.2f", "%.4f", "%.4f"], delimiter=",",
+        header="t,x,v", comments="",
+    )  # fmt: skip
+    found = file.judge(tmp_path / "a.csv", scene=spring(), scheme="velocity-verlet").verdicts
+    step = next(v for v in found if v.check == "step-defect")
+    assert step.passed is not seen
+    assert "any part" not in step.why
+    assert seen or "1 spring and the step could be off by 3% and not be seen in a step" in step.why
