@@ -12,7 +12,7 @@ HOME = Path(springcheck.__file__).parent
 BUDGETS = {
     ("physics",): 7029,
     ("schemes",): 1665,
-    ("thermal",): 3244,
+    ("thermal",): 3245,
     ("engines/own",): 1621,
     ("engines/openmm", "engines/ase", "engines/sundials"): 1281,
     ("engines",): 2763,
@@ -21,7 +21,7 @@ BUDGETS = {
     ("identify",): 9029,
     ("formats", "store"): 5250,
     ("studies",): 1453,
-    ("studies/*",): 9624,
+    ("studies/*",): 9626,
     ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 7122,
 }
 """Lines of each room, or of several: of an engine in one file, and of what all studies share, in the first

@@ -21,16 +21,13 @@ from numpy.polynomial.legendre import Legendre, leggauss
 from springcheck.physics.arrays import Floats
 from springcheck.physics.trajectory import NOT_KNOWN, Limits
 
-FACTOR_LAGS = 20
-"""Lags at which a factor of momenta that persists would show."""
-
 MISSED = 0.05
 """Share of runs in which an error as large as the limit of detection is not detected."""
 
 USUAL = 1e-8
 """Chance of a largest draw below, and of one above, the range that the report gives as usual."""
 
-REJECTED = 1e-6
+NOT_ALIKE = 1e-6
 """Chance below which what comes and goes is mentioned: a verdict fails by it where it is the only one."""
 
 FEWEST_AGAIN = 40
@@ -141,7 +138,7 @@ def steady(one: Statistic, z: Floats) -> Statistic:
 
     def law(n: int, one: Statistic, inside: tuple[float, str], sums: Floats) -> tuple[float, str]:
         (found, words), (chance, period) = one.found, min(inside, _periodic(sums, "pieces"))
-        return min(1.0, 2 * min(found, chance)), words + period * (chance < min(found, REJECTED))
+        return min(1.0, 2 * min(found, chance)), words + period * (chance < min(found, NOT_ALIKE))
 
     def join(a: Sums, b: Sums) -> Sums:
         return a[0] + b[0], (1.0, ""), np.concatenate([a[2], b[2]])
@@ -395,15 +392,3 @@ def normal_scores(x: Any) -> Floats:
     # the ends of the range are known to a rounding
     u = np.where((u <= 0) & (u > -1e-9), 1e-12, np.where((u >= 1) & (u < 1 + 1e-9), 1 - 1e-12, u))
     return np.where((u > 0) & (u < 1), ndtri(np.clip(u, 1e-300, 1 - 2.0**-53)), np.inf)
-
-
-def together(x: Floats) -> float:
-    """Chance of the correlations of x (f,) over `FACTOR_LAGS` steps together (Ljung & Box, Biometrika 65
-    (1978) 297); 1 of a few."""
-    from scipy.special import gammaincc
-
-    n, size = len(x), float(x @ x)
-    if n < 4 * FACTOR_LAGS:
-        return 1.0
-    squares = [float(x[j:] @ x[:-j]) ** 2 / (n - j) for j in range(1, FACTOR_LAGS + 1)]
-    return float(gammaincc(FACTOR_LAGS / 2, n * (n + 2) * sum(squares) / size**2 / 2)) if size else 0.0

@@ -12,6 +12,7 @@ from springcheck.thermal import chance
 from springcheck.thermal.catalogue import THERMOSTATS
 from springcheck.thermal.laws import Law
 from springcheck.thermal.likelihood import Candidate
+from springcheck.thermal.residuals import together
 
 TRIPLES = 30000
 """Triples of frames that each give a map: of one that holds for every tenth frame 24 are expected."""
@@ -97,7 +98,7 @@ def _fitted(changes: Floats, known: Floats) -> tuple[bool, Floats, Floats]:
     sizes = np.std(rest, axis=0)
     drawn = len(changes) >= FEWEST_OF_EACH and bool(np.max(sizes) > NO_COLLISION)
     for x in (rest / sizes).T[sizes > NO_COLLISION] if drawn else ():
-        one = min(chance.neighbours(x[:, None]).chance, chance.repeats(x[:, None])[0], chance.together(x))
+        one = min(chance.neighbours(x[:, None]).chance, chance.repeats(x[:, None])[0], together(x))
         drawn = drawn and one > LEAST_CHANCE
     return drawn, np.asarray(entries), rest
 

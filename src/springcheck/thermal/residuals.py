@@ -7,6 +7,9 @@ import numpy as np
 from springcheck.physics.arrays import Floats
 from springcheck.thermal import chance
 
+FACTOR_LAGS = 20
+"""Lags at which a factor of momenta that persists would show."""
+
 FEWEST = 200
 """Fewest frames from which draws are inferred."""
 
@@ -48,7 +51,7 @@ def is_added(noisy: Floats, left: Floats, u: Floats, every: int) -> bool:
     large = [np.sign(np.abs(x) - np.median(np.abs(x))) for x in (left, made)]
     after = (np.sign(left * made), left / max(float(np.std(left)), 1e-300))
     chances = [chance.neighbours(x[j::every, None]).chance for x in after for j in range(every)]
-    chances += [chance.together(x[j::every]) for x in noisy for j in range(every)]
+    chances += [together(x[j::every]) for x in noisy for j in range(every)]
     return min(chance.mean(large[0] * large[1]).chance, *chances) > EVEN
 
 
@@ -90,3 +93,15 @@ def regressed(known: Floats, x: Floats) -> tuple[Floats, Floats, Floats]:
     size = np.linalg.norm(known, axis=0)
     of = np.sqrt(np.diag(np.linalg.inv((known / size).T @ (known / size)))) / size
     return np.asarray(entries), np.asarray(left), np.asarray(np.std(left) * of)
+
+
+def together(x: Floats) -> float:
+    """Chance of the correlations of x (f,) over `FACTOR_LAGS` steps together (Ljung & Box, Biometrika 65
+    (1978) 297); 1 of a few."""
+    from scipy.special import gammaincc
+
+    n, size = len(x), float(x @ x)
+    if n < 4 * FACTOR_LAGS:
+        return 1.0
+    squares = [float(x[j:] @ x[:-j]) ** 2 / (n - j) for j in range(1, FACTOR_LAGS + 1)]
+    return float(gammaincc(FACTOR_LAGS / 2, n * (n + 2) * sum(squares) / size**2 / 2)) if size else 0.0

@@ -39,7 +39,7 @@ NOISE = 1e-3
 COARSE = 0.01
 """Ratio of a file's rounding to the noise, from which on it hides whether a step had a collision."""
 
-STANDARD_ERRORS = 5.0
+DECAY_ERRORS = 5.0
 """Standard errors of a fitted decay that bound its error."""
 
 SMALL_CHANGE = 1e-4
@@ -293,7 +293,7 @@ def _decay(q: Floats, v: Floats) -> tuple[float, float, float]:
     z = np.stack([(x - np.mean(x)) / np.std(x) for x in (q, v)])
     A, n = np.linalg.lstsq(z[:, :-1].T, z[:, 1:].T, rcond=None)[0], len(q)
     decay = float(np.linalg.det(A))
-    error = STANDARD_ERRORS * float(np.sqrt(max(1 - decay * decay, 0.0) / n)) + UNIT_ROOT / n
+    error = DECAY_ERRORS * float(np.sqrt(max(1 - decay * decay, 0.0) / n)) + UNIT_ROOT / n
     return decay, 2 - 2 * float(np.trace(A)) / (1 + decay), error
 
 
@@ -321,7 +321,7 @@ def _as_gj(
     # what a friction that is off by its standard error makes of the decay, and of the spring; GJ-I does not
     # stretch, and knows its spring whatever its friction
     ends = x[best] * (1 + np.array([-SMALL_CHANGE, SMALL_CHANGE]))
-    rate = error / STANDARD_ERRORS * np.ptp(ends) / max(float(np.ptp(GJ[number](ends))), 1e-300)
+    rate = error / DECAY_ERRORS * np.ptp(ends) / max(float(np.ptp(GJ[number](ends))), 1e-300)
     of_a = 0.0 if number == "i" else float(np.ptp(stretched(ends)[1]) / np.ptp(ends) * rate)
     turn = float(np.sqrt(max(a[best], 0.0)))
     return Candidate(

@@ -11,7 +11,6 @@ from springcheck.errors import SpringcheckError
 from springcheck.physics import builders, scenefile
 from springcheck.physics.bath import KELVIN, Bath
 from springcheck.physics.scene import Scene
-from springcheck.studies.ensemble.vary import Varied, fields
 
 
 def changed(options: Namespace) -> Scene:
@@ -26,6 +25,11 @@ def changed(options: Namespace) -> Scene:
         for name in ("step", "steps")
         if getattr(options, name) is not None
     ]
+    if not named:
+        return bathed(scene, options)
+    # imported here: few runs change anything
+    from springcheck.studies.ensemble.vary import Varied, fields
+
     given: dict[str, float] = {}
     for option, field, value in named:
         if "." not in field and (
@@ -35,8 +39,6 @@ def changed(options: Namespace) -> Scene:
         if field in given:
             raise SpringcheckError(f"{field} is set twice")
         given[field] = _number(option, field, str(value))
-    if not given:
-        return bathed(scene, options)
     found = Varied(scene, text, option="--set").whole(given)
     said = ", ".join(f"{field} = {value:g}" for field, value in given.items())
     return bathed(replace(found, title=f"{scene.title}, with {said}"), options)
