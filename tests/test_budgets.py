@@ -19,7 +19,7 @@ BUDGETS = {
     ("driver", "conformance", "doors"): 1239,
     ("checks",): 5230,
     ("identify",): 9029,
-    ("formats", "store"): 5250,
+    ("formats", "store"): 5261,
     ("studies",): 1453,
     ("studies/*",): 9626,
     ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 7122,

@@ -13,7 +13,7 @@ import clean
 from springcheck import driver, schemes
 from springcheck.cli import file, main
 from springcheck.errors import StoreError
-from springcheck.formats.tables import fixed
+from springcheck.formats.tables import fixed, roundoff
 from springcheck.physics import scenefile, terms
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
@@ -363,3 +363,29 @@ def test_energies_in_a_table_are_said_to_be_left_unread(tmp_path: Path) -> None:
     (energies,) = (v for v in found.verdicts if v.check == "energies")
     assert energies.passed is None
     assert "is read from a store alone" in energies.reason
+
+
+def test_text_of_sixteen_digits_is_no_double_and_shortest_text_of_singles_is_single() -> None:
+    """Excel keeps 16 digits, off by up to 4.5 roundings of a double, and pandas writes singles as 0.0796864
+    and as 0.007968642: right files of both failed."""
+    x = np.random.default_rng(2).normal(size=300)
+    full, half = 2.0**-53, 0.5 * 10.0**-15
+    assert roundoff([[repr(y)] for y in x.tolist()], [0]) == full
+    assert roundoff([[f"{y:.16g}"] for y in x], [0]) == roundoff([[f"{y:.15e}"] for y in x], [0]) == half
+    # of a few numbers no double may need 17 digits
+    assert roundoff([[f"{y:.16g}"] for y in x[:5]], [0]) == full
+    assert roundoff([[str(y)] for y in x.astype(np.float32)], [0]) == 2.0**-24
+    assert roundoff([[f"{y:.9g}"] for y in x], [0]) == 0.5 * 10.0**-8
+
+
+def test_a_right_file_of_sixteen_digits_passes(tmp_path: Path) -> None:
+    for seed in range(12):
+        m, k, q, p = np.random.default_rng(seed).uniform(0.3, 9, 4)[:, None]
+        walls = (clean.walls(k, np.zeros(1)),)
+        scene = clean.scene(m, walls, q, p, step=0.11, steps=200)
+        made = schemes.scheme("semi-implicit-euler")
+        run = steppers.record(scene, made, steppers.textbook(scene, made))
+        path = in_text(tmp_path / "a.csv", run, "%.16g", "%.16g", m)
+        assert failing(path, scene, "semi-implicit-euler") == []
+        wrong = in_text(tmp_path / "a.csv", run, "%.16g", "%.16g", m, 1e-13)
+        assert failing(wrong, scene, "semi-implicit-euler")

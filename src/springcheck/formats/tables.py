@@ -18,6 +18,8 @@ SHOWN = 1000
 """Rows whose digits are counted."""
 FEWEST_CELLS = 8
 """Different numbers of nine digits, too many to be of single precision by chance."""
+FEWEST_LONG = 20
+"""Numbers that would need 17 digits as doubles, by expectation, of which none has them in text of 16."""
 COMMENT = ("#", "%")
 """Prefix of a comment, which may name the columns and holds no row of numbers."""
 
@@ -135,18 +137,22 @@ def _are_counted(column: Floats) -> bool:
 def roundoff(rows: Sequence[Sequence[str]], columns: Iterable[int]) -> float:
     """Half a unit of the last digit, relative to the largest number, of the column with the fewest digits.
 
-    That of a double from 16 digits on, and of single precision at least where all numbers equal single ones
-    to their digits.  A column that is constant, or 0, does not count.
+    That of a double from 16 digits on, or 17 where many doubles would need them; and of single precision at
+    least where all numbers equal single ones to their digits, or are the shortest text of such.  A column
+    that is constant, or 0, does not count.
     """
     found = 2.0**-53
     for i in columns:
         cells = {row[i] for row in rows[:SHOWN]}
-        digits = max(map(_digits, cells))
-        if len(cells) > 1 and 0 < digits < 16:
-            half = 0.5 * 10.0 ** (1 - digits)
-            x = np.array([*map(number, cells)])
+        x, digits = np.array([*map(number, cells)]), max(map(_digits, cells))
+        size = np.abs(x[x != 0])
+        long = np.sum(np.maximum(1 - np.spacing(size) / 10.0 ** (np.floor(np.log10(size)) - 15), 0))
+        if len(cells) > 1 and 0 < digits < 16 + (long > FEWEST_LONG):
+            half, many = 0.5 * 10.0 ** (1 - digits), len(cells) >= FEWEST_CELLS
             with np.errstate(over="ignore"):
-                single = len(cells) >= FEWEST_CELLS and np.all(np.abs(np.float32(x) - x) <= half * np.abs(x))
+                near = x.astype(np.float32)
+                short = np.array([float(str(y)) for y in near]) == x
+                single = many and np.all((np.abs(near - x) <= half * np.abs(x)) | short)
             found = max(found, half, 2.0**-24 if single else 0.0)
     return found
 
