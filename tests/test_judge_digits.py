@@ -146,7 +146,7 @@ def test_what_single_steps_do_not_see_is_one_spring_and_its_step(
     """`2 springs could be off by any part` was said of one, of which 22 % are seen."""
     rows = states(spring(k))
     np.savetxt(
-        tmp_path / "a.csv", np.c_[0.02 * np.arange(251), rows], fmt=["%.2f", "%.4f", "%.4f"], delimiter=",",
+        tmp_path / "a.csv", np.c_[0.02 * np.arange(251), rows], fmt=["%.2f", "%.3g", "%.3g"], delimiter=",",
         header="t,x,v", comments="",
     )  # fmt: skip
     found = file.judge(tmp_path / "a.csv", scene=spring(), scheme="velocity-verlet").verdicts

@@ -80,7 +80,8 @@ def test_schemes_of_the_same_map_are_named_together_as_the_command_lists_them(tm
     assert titles["rk2-midpoint"] == "Explicit midpoint (RK2) (on a spring the same map: Heun (RK2))"
     assert {command.scheme, *command.aliases} == {"rk2-midpoint", "rk2-heun"}
     for name, title in titles.items():
-        assert all(schemes.title(other) in title for other in other_names(name, damped=False))
+        others = [x for x in other_names(name, damped=False) if not x.endswith(" friction")]
+        assert all(schemes.title(other) in title for other in others)
     (found,) = said([text(t=t, q=x, v=v)], tmp_path)
     assert found["title"] == titles["rk2-midpoint"]
 

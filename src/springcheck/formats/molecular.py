@@ -33,7 +33,7 @@ def clock(path: Path, said: Sequence[float | None], step: float | None, unit: st
 
 
 def of_frames(
-    path: Path, t: Any, q: Any, v: Any, mass: Any, roundoff: float, fixed: Fixed | None = None
+    path: Path, t: Any, q: Any, v: Any, mass: Any, roundoff: float = 2.0**-53, fixed: Fixed | None = None
 ) -> States:
     """States of frames: t (f,), q and v (f, n, 3), v None where there are none, mass (n,) or None."""
     try:

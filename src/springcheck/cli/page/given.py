@@ -67,7 +67,9 @@ def plain_schemes() -> list[dict[str, Any]]:
     same map too."""
     known, found = laws(schemes.SCHEMES), []
     for name in (family.scheme for family in distinct(damped=False)):
-        others = ", ".join(map(schemes.title, other_names(name, damped=False)))
+        # whoever drops a plain file did not ask for friction
+        names = [x for x in other_names(name, damped=False) if not x.endswith(" friction")]
+        others = ", ".join(map(schemes.title, names))
         also = f" (on a spring the same map: {others})" if others else ""
         found.append({"scheme": name, "title": title(name) + also, "law": known[name]})
     return found
