@@ -328,17 +328,11 @@ def identify_states(
 ) -> Identification:  # fmt: skip
     """Identify the states of a file; a stated mass overrides the file's.  Raises IdentificationError."""
     m = states.mass if mass is None else np.full(states.q.shape[1], mass)
+    last = None if states.p is not None else states.last
     found = identify_arrays(
-        states.t,
-        states.q,
-        states.p,
-        v=states.v,
-        mass=m,
-        stiffness=stiffness,
-        friction=friction,
-        step=step,
-        last=None if states.p is not None else states.last,
-    )
+        states.t, states.q, states.p, v=states.v, mass=m, stiffness=stiffness, friction=friction, step=step,
+        last=last,
+    )  # fmt: skip
     if states.adaptive and found.verdict == "none":
         why = f"made by {states.adaptive}: an adaptive solver has no fixed scheme to find"
         return replace(found, verdict="adaptive", statement=why, explanations=(), notes=(*states.notes, why))

@@ -210,10 +210,18 @@ def _said(
     candidates = tuple(
         Candidate(
             scheme=name, aliases=(), stride=stride, step=h / stride, turns=0,
-            omega=tuple(_shown(y)[0] if stride == first_stride[name] else math.nan for y in rows[name]),
-            stiffness=tuple(_shown(y, float(k))[1] for k, y in zip(m, rows[name], strict=True))
-            if with_mass and not joined and stride == first_stride[name] else None,
-            friction=tuple(_shown(y)[2] if stride == first_stride[name] else math.nan for y in rows[name]),
+            omega=tuple(
+                _rounded(y.omega, y.omega_error) if stride == first_stride[name] else math.nan
+                for y in rows[name]
+            ),
+            stiffness=tuple(
+                _rounded(float(k) * y.omega**2, 2 * float(k) * y.omega * y.omega_error)
+                for k, y in zip(m, rows[name], strict=True)
+            ) if with_mass and not joined and stride == first_stride[name] else None,
+            friction=tuple(
+                _rounded(y.friction, y.friction_error) if stride == first_stride[name] else math.nan
+                for y in rows[name]
+            ),
             law="of the bath",
         )
         for name in kept
@@ -331,16 +339,8 @@ def _of_digits(y: Any, misfit: float, h: float) -> Any:
     return replace(y, omega_error=float(np.maximum(y.omega_error, least)))
 
 
-def _shown(y: Any, m: float = 1.0) -> tuple[float, float, float]:
-    """Frequency, stiffness of a mass m and friction rate of a candidate, to one digit beyond their errors."""
-    of_k = 2 * m * y.omega * y.omega_error
-    return (
-        _rounded(y.omega, y.omega_error), _rounded(m * y.omega**2, of_k),
-        _rounded(y.friction, y.friction_error),
-    )  # fmt: skip
-
-
 def _rounded(x: float, error: float) -> float:
+    """A number to one digit beyond its error."""
     return float(_measured(x, error).partition(" ")[0])
 
 

@@ -65,7 +65,7 @@ def one_rounding(
         q, p = q + lost * (q - size), p + lost * p
     if rebuilt:
         p = p + scene.m * q / abs(scene.step)
-    half = how.recorded(scene.m, scene.step, rebuilt)
+    half, carried = how.recorded(scene.m, scene.step, rebuilt), np.zeros(2)
     if np.any(half):
         # what decimals take off the state before, which the step carries on, and off this one
         near = None if scene.system.is_linear else start[0]
@@ -74,8 +74,6 @@ def one_rounding(
             np.stack(sizer(size + x[0], np.abs(start[1]) + x[1], plain, draws, hit, met=met))
             for x in (half, 0 * half)
         )
-        carried = (half.reshape(2, *(1,) * (size.ndim - 1), -1) + off - none) / roundings_of(
-            sizer.scheme, scene
-        )
-        return unit * q + SMALLEST + carried[0], unit * p + SMALLEST + carried[1]
-    return np.asarray(unit * q + SMALLEST), np.asarray(unit * p + SMALLEST)
+        written = half.reshape(2, *(1,) * (size.ndim - 1), -1)
+        carried = (written + off - none) / roundings_of(sizer.scheme, scene)
+    return np.asarray(unit * q + SMALLEST + carried[0]), np.asarray(unit * p + SMALLEST + carried[1])
