@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from time import perf_counter
 from typing import Any, NamedTuple, TypeAlias
 
@@ -113,7 +112,7 @@ def play(
     elif seed is not None:
         raise MethodError(f"{label}: it has no noise, and takes no seed")
     began = perf_counter()
-    simulation = engines.start(ahead, label, seed)
+    simulation = engines.Started(ahead, label, seed)
     start_seconds = perf_counter() - began
     how, origin = engines.arithmetic(label), {**engines.origin_of(label), **origin}
 
@@ -124,32 +123,26 @@ def play(
     ready = min(rows, FIRST, WORK // (piece * scene.n) or 1) if whole else 1
     # an engine that fills nothing must not be taken for one that has
     q, p = np.full((2, rows, scene.n), UNTOUCHED)
-    told = hasattr(simulation, "last_steps")
-    _hand_over(scene, sink, 0, scene.q[None], scene.p[None], np.zeros(1) if told else None)
+    first = np.zeros(1) if simulation.tells_steps else None
+    _hand_over(scene, sink, 0, scene.q[None], scene.p[None], first)
     run_seconds = 0.0
     outcome = Outcome(status="complete", step=scene.steps)
     frame = 1
     while frame < scene.frames:
         f = min(ready, scene.frames - frame)
         q[f - 1], p[f - 1] = UNTOUCHED, UNTOUCHED
-        ended, seconds = _advance(label, simulation, scene.every, piece, q[:f], p[:f], progress)
+        ended, seconds = _advance(simulation, scene.every, piece, q[:f], p[:f], progress)
         good = ended.step // scene.every
         run_seconds += seconds
         ready = min(rows, 4 * ready) if whole and seconds < QUICK else ready
         if good:
-            last = None
-            if told:
-                last = _said(label, simulation, "last_steps", f"{good} lengths", partial(_rows, good))
-            _hand_over(scene, sink, frame, q[:good], p[:good], last)
+            _hand_over(scene, sink, frame, q[:good], p[:good], simulation.last_steps(good))
         frame += good
         if ended.status != "complete":
             outcome = replace(ended, step=(frame - 1) * scene.every)
             break
         if 0 < max(np.max(np.abs(q[f - 1])), np.max(np.abs(p[f - 1]))) < TINY:
             outcome = Outcome(status="complete", step=scene.steps, message=SUBNORMAL)
-    off_axis = None
-    if getattr(simulation, "off_axis", None) is not None:
-        off_axis = _said(label, simulation, "off_axis", "a number", float)
     return Trajectory(
         label=str(label),
         scheme=method.scheme,
@@ -161,40 +154,16 @@ def play(
         tolerance=scene.tolerance if method.adaptive else None,
         outcome=outcome,
         timing=Timing(start=start_seconds, run=run_seconds),
-        force_calls=_said(label, simulation, "force_calls", CALLS, _count),
+        force_calls=simulation.force_calls,
         arithmetic=how,
         rebuilds_velocity=method.rebuilds_velocity,
-        off_axis=off_axis,
+        off_axis=simulation.off_axis,
         origin=origin,
     )
 
 
-def _said(label: Label, simulation: Simulation, name: str, what: str, taken: Callable[[Any], Any]) -> Any:
-    """What an engine reports of its run, as `taken` converts it.  MethodError where it cannot."""
-    said: Any = engines.guarded(label, lambda: getattr(simulation, name))
-    try:
-        return taken(said)
-    except (TypeError, ValueError, OverflowError):
-        raise MethodError(f"{label}: its {name} is {said!r:.60}, not {what}") from None
-
-
-CALLS = "a whole number of calls"
-
-
-def _rows(number: int, said: Any) -> Floats:
-    return np.asarray(said, np.float64)[:number].reshape(number)
-
-
-def _count(said: Any) -> int:
-    whole = int(said)
-    if whole != said or not 0 <= whole < 2**63:
-        raise ValueError
-    return whole
-
-
 def _advance(
-    label: Label,
-    simulation: Simulation,
+    simulation: engines.Started,
     every: int,
     piece: int,
     q: Floats,
@@ -210,13 +179,13 @@ def _advance(
     try:
         for left in range(every, 0, -piece):
             steps = min(left, piece)
-            engines.guarded(label, simulation.advance, steps, q, p, form="advance(every, q, p)")
+            simulation.advance(steps, q, p)
             if progress and left > piece:
                 progress(steps)
                 told += steps
     except Stopped as stop:
         if stop.rows not in range(len(q) + 1):
-            raise MethodError(f"{label}: Stopped after {stop.rows!r} rows of {len(q)}") from stop
+            raise MethodError(f"{simulation.label}: Stopped after {stop.rows!r} rows of {len(q)}") from stop
         # a row that is filled before its last piece is no frame
         good = stop.rows if left <= piece else 0
         outcome = Outcome(status="stopped", step=0, message=str(stop), fastest=stop.fastest)
@@ -227,7 +196,7 @@ def _advance(
         untouched = UNTOUCHED.tobytes() * q.shape[1]
         if unfilled := [name for name, x in (("q", q), ("p", p)) if x[good].tobytes() == untouched]:
             raise MethodError(
-                f"{label} failed: its advance(every, q, p) has left row {good} of "
+                f"{simulation.label} failed: its advance(every, q, p) has left row {good} of "
                 f"{' and '.join(unfilled)} as it was; it writes every row into these arrays: q[row] = ..."
             )
         outcome = Outcome(status="diverged", step=0, message="not finite from the next frame on")
@@ -318,14 +287,15 @@ def bare(scene: Scene, label: Label, *, copies: int = 1, read: bool = False, pla
     engines.load(label.engine)
     ahead = scene if method.adaptive else scene.derived(steps=max(scene.steps, planned))
     began = perf_counter()
-    simulations = [engines.start(ahead, label, 1) for _ in range(copies)]
+    simulations = [engines.Started(ahead, label, 1) for _ in range(copies)]
     start_seconds = perf_counter() - began
+    alone = [one.simulation for one in simulations]
     rows = min(CHUNK // scene.n or 1, scene.steps) if read else 1
     q, p = np.empty((rows, scene.n)), np.empty((rows, scene.n))
 
     def timed() -> float:
         began = perf_counter()
-        for simulation in simulations:
+        for simulation in alone:
             if read:
                 for left in range(scene.steps, 0, -rows):
                     simulation.advance(1, q[:left], p[:left])
@@ -336,7 +306,7 @@ def bare(scene: Scene, label: Label, *, copies: int = 1, read: bool = False, pla
     run_seconds = engines.guarded(label, timed)
     return Bare(
         timing=Timing(start=start_seconds / copies, run=run_seconds / copies),
-        force_calls=_said(label, simulations[0], "force_calls", CALLS, _count),
+        force_calls=simulations[0].force_calls,
     )
 
 

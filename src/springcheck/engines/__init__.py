@@ -15,6 +15,8 @@ from fnmatch import fnmatchcase
 from functools import cache, partial
 from typing import Any, TypeVar
 
+import numpy as np
+
 from springcheck import schemes
 from springcheck.engines.contract import (
     ANY_POTENTIAL,
@@ -45,16 +47,16 @@ from springcheck.engines.registry import (
     while_here,
 )  # fmt: skip
 from springcheck.errors import MOST_LIKELY, MethodError, nearest, told
-from springcheck.physics.arrays import Arithmetic
+from springcheck.physics.arrays import Arithmetic, Floats
 from springcheck.physics.scene import Scene
 from springcheck.thermal import THERMOSTATS
 
 __all__ = [
     "ANY_POTENTIAL", "BRAKES", "UNNAMED", "DRIVEN", "EVERY_FORCE", "EVERY_POTENTIAL", "OURS", "Arithmetic",
-    "Engine", "Label", "Method", "Need", "Simulation", "Stopped", "absence", "bring", "engine", "foreign",
-    "from_file", "guarded", "installed_version", "is_brought", "load", "match", "method", "module_name",
-    "module_of", "named", "names", "obstacle", "origin", "parse", "refusal", "start", "unusable",
-    "while_here",
+    "Engine", "Label", "Method", "Need", "Simulation", "Started", "Stopped", "absence", "bring", "engine",
+    "foreign", "from_file", "guarded", "installed_version", "is_brought", "load", "match", "method",
+    "module_name", "module_of", "named", "names", "obstacle", "origin", "parse", "refusal", "start",
+    "unusable", "while_here",
 ]  # fmt: skip
 
 T = TypeVar("T")
@@ -164,6 +166,54 @@ def origin_of(label: Label) -> dict[str, str]:
         "method": run_by.about,
         "velocity": str(guarded(label, driver.convention, run_by, form="convention(method)")),
     }
+
+
+class Started:
+    """A simulation at a scene's start: what its engine raises is a MethodError, what it reports is checked.
+
+    Raises MethodError, with the reason, where it cannot start.
+    """
+
+    def __init__(self, scene: Scene, label: Label, seed: Any = None) -> None:
+        self.label, self.simulation = label, start(scene, label, seed)
+        self.tells_steps = hasattr(self.simulation, "last_steps")
+
+    def advance(self, every: int, q: Floats, p: Floats) -> None:
+        """Fill rows; `Stopped` passes through."""
+        guarded(self.label, self.simulation.advance, every, q, p, form="advance(every, q, p)")
+
+    @property
+    def force_calls(self) -> int:
+        """Force evaluations so far."""
+        return self._reported("force_calls", "a whole number of calls", _count)
+
+    @property
+    def off_axis(self) -> float | None:
+        """The largest |coordinate| along axes that the scene leaves out, where the engine looks at them."""
+        seen = getattr(self.simulation, "off_axis", None) is not None
+        return self._reported("off_axis", "a number", float) if seen else None
+
+    def last_steps(self, rows: int) -> Floats | None:
+        """Lengths (rows,) of the steps that ended at the rows filled last, where the engine chooses them."""
+        if not self.tells_steps:
+            return None
+        return self._reported(
+            "last_steps", f"{rows} lengths", lambda x: np.asarray(x, np.float64)[:rows].reshape(rows)
+        )
+
+    def _reported(self, name: str, what: str, taken: Callable[[Any], T]) -> T:
+        said: Any = guarded(self.label, lambda: getattr(self.simulation, name))
+        try:
+            return taken(said)
+        except (TypeError, ValueError, OverflowError):
+            raise MethodError(f"{self.label}: its {name} is {said!r:.60}, not {what}") from None
+
+
+def _count(said: Any) -> int:
+    whole = int(said)
+    if whole != said or not 0 <= whole < 2**63:
+        raise ValueError
+    return whole
 
 
 def parse(text: str) -> Label:
