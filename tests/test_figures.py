@@ -17,7 +17,7 @@ from springcheck.errors import SpringcheckError
 from springcheck.figures import chain, energies, frames, looks, overlay, portraits, render, style
 from springcheck.figures.charts import Bank, Chart, Curve, Scale
 from springcheck.figures.motion import Exact, periods, smooth
-from springcheck.figures.views import views
+from springcheck.figures.views import units, views
 from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory
@@ -140,6 +140,15 @@ def test_axes_are_in_units_in_which_numbers_are_read_easily(
     found, name = looks.prefixed(largest, unit)
     assert name == shown
     assert found == pytest.approx(factor, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("given", "angle", "momentum", "time"),
+    [("si", "rad", "N m s", "s"), ("md", "rad", "u nm\u00b2/ps", "ps"), ("reduced", "", "", "")],
+)
+def test_the_angle_of_a_rotor_is_no_length(given: Any, angle: str, momentum: str, time: str) -> None:
+    (view,) = views(scene := replace(scenefile.load_scene("torsion-pendulum"), units=given))
+    assert (view.x_unit, view.y_unit, units(scene).t) == (angle, momentum, time)
 
 
 def test_a_legend_has_one_entry_for_each_scheme() -> None:
