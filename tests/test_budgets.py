@@ -17,7 +17,7 @@ BUDGETS = {
     ("engines/openmm", "engines/ase", "engines/sundials"): 1281,
     ("engines",): 2765,
     ("driver", "conformance", "doors"): 1239,
-    ("checks",): 5230,
+    ("checks",): 5232,
     ("identify",): 9023,
     ("formats", "store"): 5261,
     ("studies",): 1453,
