@@ -124,6 +124,15 @@ def test_numbers_names_and_options_that_serve_nothing(
         ("run spring --method own:euler-cromer", "did you mean own:semi-implicit-euler?"),
         ("run spring --method own:rk2", "did you mean own:rk2-midpoint or own:rk2-heun?"),
         ("explain forward-euler", "did you mean explicit-euler?"),
+        # adaptive: no relation of rk4
+        ("run spring --method own:rk45", "did you mean scipy:rk45?"),
+        ("run spring --method own:adams", "did you mean sundials:adams?"),
+        ("explain rk45", "chooses its steps"),
+        (
+            "judge a.h5 --scene spring --scheme RK45",
+            "--method scipy:rk45`",
+        ),
+        ("judge a.h5 --scene spring --scheme ode45", "chooses its steps"),
         (
             "judge a.h5 --scene spring --scheme leapfrog",
             "did you mean velocity-verlet or semi-implicit-euler?",
