@@ -338,6 +338,21 @@ def test_the_title_of_energies_says_who_gains_and_who_loses() -> None:
     assert "explicit Euler spirals out; implicit Euler spirals in; semi-implicit Euler" in title
 
 
+def test_marks_on_an_edge_are_whole_and_none_lies_beyond_it() -> None:
+    """Of a run of one step half of its only error was drawn."""
+    for steps, step in ((1, 0.1), (12, 0.5), (12, -0.5)):
+        scene = replace(scenefile.load_scene("spring"), steps=steps, step=step)
+        for figure in figures(scene, runs(scene, *OWN)).values():
+            for axes in figure.axes:
+                ends = [sorted(axes.get_xlim()), sorted(axes.get_ylim())]
+                for line in axes.lines:
+                    if line.get_marker() != "o":
+                        continue
+                    assert not line.get_clip_on()
+                    for x, (low, high) in zip(line.get_data(), ends, strict=True):
+                        assert np.all((low <= x) & (x <= high))
+
+
 def test_an_axis_of_energies_shows_no_millionths() -> None:
     ys = energies._scale([np.array([1.0, 1 + 3e-8]), np.array([1.0, 1 - 1e-9])], np.ones(2))
     assert ys.half >= 0.01
