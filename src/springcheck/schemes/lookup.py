@@ -33,7 +33,7 @@ TEXTBOOK = {
 """Names of textbooks, and the schemes here that they may mean (Hairer, Lubich & Wanner, I.1; Cromer, Am. J.
 Phys. 49 (1981) 455; Gould & Tobochnik)."""
 
-ADAPTIVE = {
+ADAPTIVE_SOLVERS = {
     **dict.fromkeys(("rk45", "ode45", "dopri5", "dormand prince"), "rk45"),
     **{name: name for name in ("dop853", "radau", "lsoda")},
 }
@@ -61,10 +61,10 @@ def meant(name: str, beside: Iterable[str] = ()) -> str:
     of a scheme or of those `beside`, else those whose titles have these words.  Of a solver that chooses its
     steps ": it is ...", with what runs it."""
     found, bare = textbook(name), _bare(name)
-    if bare in ADAPTIVE:
+    if bare in ADAPTIVE_SOLVERS:
         return (
             ": it is a solver that chooses its steps, and has no one-step map; `springcheck run SCENE "
-            f"--method scipy:{ADAPTIVE[bare]}` runs and judges it"
+            f"--method scipy:{ADAPTIVE_SOLVERS[bare]}` runs and judges it"
         )
     close = "" if found else nearest(name, (*known(), *beside))
     if bare and not (found or close):
