@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import product
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from springcheck.physics.trajectory import Trajectory
 from springcheck.studies.faults import baths
 from springcheck.studies.faults.table import FAULTS
 from springcheck.thermal import THERMOSTATS, chance
+from springcheck.thermal.draws import Reading
 
 
 @pytest.mark.parametrize(
@@ -231,6 +233,24 @@ def test_draws_that_come_again_late_in_a_run_are_seen_and_said() -> None:
         failed, said = failed_and_said(scene, loop(scene, again))
         assert "draws-repeat" in failed
         assert said == f"the random numbers from row {at} on are those from row 0 on, again"
+
+
+@pytest.mark.parametrize(("i", "j", "sign"), [(299, 4, 1), (150, 149, -1), (1, 0, 1)])
+def test_two_of_three_hundred_coordinates_that_share_draws_are_named(
+    i: int, j: int, sign: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    x = np.random.default_rng(5).standard_normal((60, 300))
+    # alike to 1e-6 of the size, and in the first row to nothing more
+    x[:, i] = sign * x[:, j] + 0.9 * causes.SAME_DRAWS
+    seen = Reading(draws=x, across=None, roundings=0, error=np.zeros_like(x))
+    monkeypatch.setattr(causes, "reading", lambda _: seen)
+    words = "the same as" if sign > 0 else "the opposite of"
+    case: Any = None
+    assert (
+        causes._of_bath(case) == f"the random numbers of coordinate {i} are {words} those of coordinate {j}"
+    )
+    x[-1, i] += 10 * causes.SAME_DRAWS
+    assert causes._of_bath(case) == ""
 
 
 def test_chances_of_repeated_draws_are_no_smaller_than_they_are() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import shutil
@@ -15,6 +16,7 @@ from xml.etree import ElementTree
 import pytest
 
 from springcheck.cli import ci, main
+from springcheck.store import files
 from springcheck.studies.arguments import reported
 
 HERE = Path(__file__).parent
@@ -262,6 +264,23 @@ def test_a_report_takes_no_other_files_place(
     assert len(error.splitlines()) == 1
     assert Path("notes.txt").read_text() == "mine"
     assert Path("a.csv").read_text() == "t,q,v\n0,1,0\n"
+
+
+@pytest.mark.parametrize("before", [b"", b'{"schemaVersion":1}'])
+def test_a_full_disk_leaves_a_report_as_it_was(
+    before: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    if before:
+        Path("b.json").write_bytes(before)
+
+    def full(path: Path) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(files, "sync", full)
+    assert main(["identify", "none.csv", "--badge", "b.json"]) == 2
+    assert "b.json: the disk is full" in capsys.readouterr().err
+    assert {x.name: x.read_bytes() for x in Path().iterdir()} == ({"b.json": before} if before else {})
 
 
 def test_what_a_file_says_breaks_no_report() -> None:

@@ -17,7 +17,7 @@ from springcheck.errors import SpringcheckError
 from springcheck.figures import chain, energies, frames, looks, overlay, portraits, render, style
 from springcheck.figures.charts import Bank, Chart, Curve, Scale
 from springcheck.figures.motion import Exact, periods, smooth
-from springcheck.figures.views import views
+from springcheck.figures.views import units, views
 from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory
@@ -140,6 +140,15 @@ def test_axes_are_in_units_in_which_numbers_are_read_easily(
     found, name = looks.prefixed(largest, unit)
     assert name == shown
     assert found == pytest.approx(factor, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("given", "angle", "momentum", "time"),
+    [("si", "rad", "N m s", "s"), ("md", "rad", "u nm\u00b2/ps", "ps"), ("reduced", "", "", "")],
+)
+def test_the_angle_of_a_rotor_is_no_length(given: Any, angle: str, momentum: str, time: str) -> None:
+    (view,) = views(scene := replace(scenefile.load_scene("torsion-pendulum"), units=given))
+    assert (view.x_unit, view.y_unit, units(scene).t) == (angle, momentum, time)
 
 
 def test_a_legend_has_one_entry_for_each_scheme() -> None:
@@ -327,6 +336,21 @@ def test_the_title_of_energies_says_who_gains_and_who_loses() -> None:
     assert "semi-implicit Euler, kick-drift loses" not in title
     (title,) = (bank.heading for bank in of_runs(scene, made, made) if bank.name == "phase-portrait")
     assert "explicit Euler spirals out; implicit Euler spirals in; semi-implicit Euler" in title
+
+
+def test_marks_on_an_edge_are_whole_and_none_lies_beyond_it() -> None:
+    """Of a run of one step half of its only error was drawn."""
+    for steps, step in ((1, 0.1), (12, 0.5), (12, -0.5)):
+        scene = replace(scenefile.load_scene("spring"), steps=steps, step=step)
+        for figure in figures(scene, runs(scene, *OWN)).values():
+            for axes in figure.axes:
+                ends = [sorted(axes.get_xlim()), sorted(axes.get_ylim())]
+                for line in axes.lines:
+                    if line.get_marker() != "o":
+                        continue
+                    assert not line.get_clip_on()
+                    for x, (low, high) in zip(line.get_data(), ends, strict=True):
+                        assert np.all((low <= x) & (x <= high))
 
 
 def test_an_axis_of_energies_shows_no_millionths() -> None:

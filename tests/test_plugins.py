@@ -165,6 +165,10 @@ def bad(path: Path, **parts: str) -> Path:
         ({"name": "'a b'"}, "must be of letters"),
         ({"scheme": "'velocity-verlett'"}, "did you mean velocity-verlet?"),
         (
+            {"by_name": "{}, thermostats=named", "scheme": "'baoab'"},
+            "its thermostat 'm': the `generator` of its Method must say what draws",
+        ),
+        (
             {"start": "return scene.mass"},
             "object has no attribute 'mass' (bad.py, line 8)",
         ),

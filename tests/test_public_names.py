@@ -81,6 +81,17 @@ def test_what_is_shown_is_short(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     assert repr(run) == "Trajectory('own:euler', 201 frames, 1 particle, t = 0 to 20, complete)"
     shown = Comparison(labels=("a", "<b>"), max_difference=np.array([[0, 0.5], [0.5, 0]]))
     assert repr(shown) == "Comparison of a, <b>: differences up to 0.5"
+    none = np.full((3, 3), np.nan)
+    none[1, 0] = none[0, 1] = 0.5
+    for labels, said in (
+        ("a", "no two runs to compare"),
+        ("ab", "differences up to 0.5"),
+        ("abc", "differences up to 0.5 between those that are complete"),
+    ):
+        size = len(labels)
+        compared = Comparison(labels=tuple(labels), max_difference=none[:size, :size])
+        assert repr(compared) == f"Comparison of {', '.join(labels)}: {said}"
+    assert "nan" not in repr(Comparison(labels=("a", "b"), max_difference=none[1:, 1:]))
     spring = springcheck.load_scene("spring")
     assert repr(spring) == "Scene('spring', 1 particle, 1 wall-spring, 200 steps of 0.1)"
     start = springcheck.judge(spring, run)[0]

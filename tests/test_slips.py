@@ -124,6 +124,15 @@ def test_numbers_names_and_options_that_serve_nothing(
         ("run spring --method own:euler-cromer", "did you mean own:semi-implicit-euler?"),
         ("run spring --method own:rk2", "did you mean own:rk2-midpoint or own:rk2-heun?"),
         ("explain forward-euler", "did you mean explicit-euler?"),
+        # adaptive: no relation of rk4
+        ("run spring --method own:rk45", "did you mean scipy:rk45?"),
+        ("run spring --method own:adams", "did you mean sundials:adams?"),
+        ("explain rk45", "chooses its steps"),
+        (
+            "judge a.h5 --scene spring --scheme RK45",
+            "--method scipy:rk45`",
+        ),
+        ("judge a.h5 --scene spring --scheme ode45", "chooses its steps"),
         (
             "judge a.h5 --scene spring --scheme leapfrog",
             "did you mean velocity-verlet or semi-implicit-euler?",
@@ -188,11 +197,16 @@ def test_any_title_in_a_pipe_of_any_encoding() -> None:
 
 @pytest.mark.skipif(os.name != "posix", reason="a shell is needed")
 def test_closed_streams_lead_nowhere_and_not_into_the_store() -> None:
-    for i, closed in enumerate((">&-", "2>&-", "<&-", ">&- 2>&- <&-")):
+    # a report that nobody gets is said, as on a full disk, and none is missed where --quiet prints nothing
+    unsaid = "springcheck: cannot write the output: standard output is closed\n"
+    for i, (closed, status, said) in enumerate(
+        ((">&-", 2, unsaid), (">&- --quiet", 0, ""), ("2>&-", 0, ""), ("<&-", 0, ""), (">&- 2>&- <&-", 2, ""))
+    ):
         done = program(f"run spring --method own:euler -o {i}.h5 {closed}")
-        assert done.returncode == 0, closed
-        assert done.stderr == ""
+        assert (done.returncode, done.stderr) == (status, said), closed
         assert main(["check", f"{i}.h5"]) == 0
+    assert (done := program("list >&-")).returncode == 2
+    assert done.stderr == unsaid
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full here")

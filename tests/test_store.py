@@ -168,16 +168,18 @@ def test_a_file_alone_tells_what_was_run_by_what_on_which_machine(tmp_path: Path
 def test_an_existing_file_is_never_touched_unless_forced(tmp_path: Path) -> None:
     path = tmp_path / "s.h5"
     path.write_bytes(b"precious")
-    with pytest.raises(StoreError, match="exists"):
-        store.open_new(path, "run")
+    # nothing is said of --force, which replaces none either
+    for force in (False, True):
+        with pytest.raises(StoreError, match=r"no store of springcheck, and is not replaced; -o writes"):
+            store.open_new(path, "run", force=force)
     assert list(tmp_path.iterdir()) == [path]
-    with pytest.raises(StoreError, match="no store of springcheck"):
-        store.open_new(path, "run", force=True)
     assert path.read_bytes() == b"precious"
     path.unlink()
     s = scene()
     written(path, s)
     before = path.read_bytes()
+    with pytest.raises(StoreError, match="exists: --force writes it anew"):
+        store.open_new(path, "run")
     with store.open_new(path, "run", force=True) as journal:
         journal.save(trajectory(s, "own:euler"), s)
         assert path.read_bytes() == before

@@ -172,7 +172,8 @@ def test_the_public_function_and_the_command_say_it(
     main(["identify", str(path)])
     said = capsys.readouterr()
     assert "one of: obabo" in said.out
-    assert "friction" in said.out
+    # a rate, where --friction states c
+    assert "friction c/m " in said.out
     assert "does not fit" not in said.out
     assert "do not span" not in said.out + said.err
 

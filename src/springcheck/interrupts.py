@@ -92,14 +92,14 @@ def supervised() -> int | None:
     What a plug-in or a library does to it (`os._exit`, SIGSEGV, SIGABRT ...) ends the child alone.  Where it
     is known which of them was called (see `calling`), the program is started again: it resumes what was
     finished, and refuses those that ended it (see `ended_by`).  Closed standard streams are redirected to the
-    null device.
+    null device; what is printed to a closed standard output fails (EBADF).
     """
     for stream in (0, 1, 2):
         try:
             os.fstat(stream)
         except OSError:
             # a file or a pipe that is opened later would take its descriptor, and receive what is printed
-            os.open(os.devnull, os.O_RDWR)
+            os.open(os.devnull, os.O_RDONLY if stream == 1 else os.O_RDWR)
     if not hasattr(os, "fork") or os.environ.get("SPRINGCHECK_TRACEBACK"):
         return None
     import mmap

@@ -124,7 +124,9 @@ def _of_bath(case: Case) -> str:
         return ""
     size = np.sqrt(np.mean(x * x))
     for i in range(x.shape[1]):
-        for j in range(i):
+        # coordinates whose first numbers are of unlike size share none
+        near = np.abs(np.abs(x[0, :i]) - np.abs(x[0, i])) <= SAME_DRAWS * size
+        for j in np.flatnonzero(near):
             for words, sign in (("the same as", 1), ("the opposite of", -1)):
                 if np.all(np.abs(x[:, i] - sign * x[:, j]) <= SAME_DRAWS * size):
                     return f"the random numbers of coordinate {i} are {words} those of coordinate {j}"

@@ -7,6 +7,7 @@ no NumPy that they do not use.
 from __future__ import annotations
 
 import argparse
+import errno
 import gc
 import os
 import sys
@@ -98,7 +99,9 @@ def _mistake(error: SpringcheckError | OSError) -> int:
         # the program ends without a message
         raise error
     # the library names its files; any other OSError is of our own output, on a full disk for example
-    said = f"cannot write the output: {error.strerror}" if isinstance(error, OSError) else error
+    closed = getattr(error, "errno", None) == errno.EBADF
+    why = "standard output is closed" if closed else getattr(error, "strerror", "")
+    said = f"cannot write the output: {why}" if isinstance(error, OSError) else error
     print(f"springcheck: {said}", file=sys.stderr)
     if isinstance(error, OSError):
         # nothing more can be written, not even by the interpreter's shutdown

@@ -215,13 +215,21 @@ def _text(text: str) -> str:
 
 def _write(options: Namespace, found: list[Case], status: int) -> None:
     if options.junit:
-        _put(options.junit, "wb", junit(options.name, found))
+        _put(options.junit, junit(options.name, found))
     if options.badge:
-        _put(options.badge, "wb", badge(found, status))
+        _put(options.badge, badge(found, status))
     if options.summary:
-        _put(options.summary, "ab", summary(options.name, found, status).encode())
+        text = summary(options.name, found, status).encode()
+        where = Path(options.summary)
+        with files.told(where, "write"), interrupts.held(), where.open("ab") as file:
+            file.write(text)
 
 
-def _put(path: str, mode: str, data: bytes) -> None:
-    with files.told(Path(path), "write"), interrupts.held(), open(path, mode) as file:
-        file.write(data)
+def _put(name: str, data: bytes) -> None:
+    """Write a report whole or not at all, behind a link too; as a stream into a device."""
+    path = Path(name)
+    with files.told(path, "write"):
+        if path.exists() and not path.is_file():
+            path.write_bytes(data)
+        else:
+            files.put_bytes(data, path.resolve())

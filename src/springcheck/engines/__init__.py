@@ -235,6 +235,7 @@ def parse(text: str) -> Label:
     if method not in every:
         known = ", ".join(f"{name}:{m}" for m in every)
         so_called = [f"{name}:{m}" for m, one in every.items() if one.scheme in schemes.textbook(method)]
+        so_called = so_called or [f"{x}:{method}" for x in names() if method in engine(x).methods]
         likely = " or ".join(so_called[:MOST_LIKELY])
         near = f", did you mean {likely}?" if likely else nearest(method, every, f"{name}:")
         raise MethodError(f"unknown method {text!r}{near}; {found.title} has {known}")

@@ -160,6 +160,8 @@ def _checked(found: object, name: str = "") -> Engine:
         for term in one.terms:
             if term not in known:
                 raise MethodError(f"its method {key!r}: there is no term {term!r}{nearest(str(term), known)}")
+        if found.thermostats.get(key) is one and not one.generator:
+            raise MethodError(f"its thermostat {key!r}: the `generator` of its Method must say what draws")
         if one.generator:
             if one.scheme not in THERMOSTATS:
                 raise MethodError(f"the scheme {one.scheme!r} of its thermostat {key!r} is not known")

@@ -199,7 +199,7 @@ def _label(axes: Axes, label: Naming) -> None:
     beside, left = label.x >= 1, label.x > 0.6
     axes.annotate(
         textwrap.shorten(label.text, 34, placeholder="..."), (label.x, label.y), xycoords="axes fraction",
-        xytext=(4 if beside or not left else -4, 0 if beside else 4), textcoords="offset points",
+        xytext=(6 if beside else -4 if left else 4, 0 if beside else 4), textcoords="offset points",
         ha="left" if beside or not left else "right", va="center" if beside else "bottom", fontsize=7.5,
         color=color, zorder=5, annotation_clip=False, path_effects=AROUND,
     )  # fmt: skip
@@ -243,6 +243,12 @@ def _curve(axes: Axes, curve: Curve, number: int, most: int, chart: Chart) -> No
     elif curve.line and not curve.over:
         axes.plot(x, y, linestyle=look.linestyle, linewidth=1.2 + 0.7 * high, **drawn)
     mark = looks.mark(looks.engine(curve.name))[0]
+    # a mark on the edge of the picture is drawn whole, and none beyond it
+    inside = np.ones(len(x), bool)
+    for values, scale in zip((x, y), scales, strict=True):
+        if scale.shown is not None:
+            least, largest = sorted(scale.factor * end for end in scale.shown)
+            inside &= (least <= values) & (values <= largest)
     if curve.marks:
         many = len(x) > MANY and not (curve.line or curve.over or curve.dots)
         apart = 1 if many or chart.y.names else max(1, len(x) // most)
@@ -250,15 +256,16 @@ def _curve(axes: Axes, curve: Curve, number: int, most: int, chart: Chart) -> No
         estimated = np.asarray(curve.open, bool) if len(curve.open) else np.zeros(len(x), bool)
         for some, face in ((~estimated, look.color if len(curve.open) else "white"), (estimated, "white")):
             here = np.flatnonzero(some)[first::apart]
+            here = here[inside[here]]
             if len(here):
                 axes.plot(
                     x[here], y[here], linestyle="none", marker=mark, markersize=1.8 if many else 4.1,
                     markerfacecolor=face, markeredgecolor=look.color, markeredgewidth=0.9, zorder=3 + high,
-                    label=curve.name,
+                    label=curve.name, clip_on=False,
                 )  # fmt: skip
-    elif curve.line and ":" in curve.name and len(x):
+    elif curve.line and ":" in curve.name and inside[-1:].any():
         # where it ends
-        axes.plot(x[-1:], y[-1:], marker=mark, color=look.color, markersize=4, zorder=3)
+        axes.plot(x[-1:], y[-1:], marker=mark, color=look.color, markersize=4, zorder=3, clip_on=False)
 
 
 def _rule(axes: Axes, rule: Rule, height: float) -> None:

@@ -28,17 +28,17 @@ class Units:
 
 
 _UNITS = {
-    "reduced": Units(),
-    "md": Units(q="nm", p="u nm/ps", t="ps"),
-    "si": Units(q="m", p="kg m/s", t="s"),
-    "circuit": Units(q="C", p="Wb", t="s"),
-    "rotor": Units(q="rad", p="N m s", t="s"),
+    ("particles", "md"): Units(q="nm", p="u nm/ps", t="ps"),
+    ("particles", "si"): Units(q="m", p="kg m/s", t="s"),
+    ("circuit", "si"): Units(q="C", p="Wb", t="s"),
+    ("rotor", "md"): Units(q="rad", p="u nm\u00b2/ps", t="ps"),
+    ("rotor", "si"): Units(q="rad", p="N m s", t="s"),
 }
 
 
 def units(scene: Scene) -> Units:
     """The units of a scene."""
-    return _UNITS[scene.kind if scene.kind != "particles" and scene.units == "si" else scene.units]
+    return _UNITS.get((scene.kind, scene.units), Units())
 
 
 def with_unit(name: str, unit: str) -> str:

@@ -321,7 +321,7 @@ def _numbers(name: str, one: Any, m: float | None) -> str:
     """The numbers that a candidate implies, each with its standard error."""
     scale = 1.0 if m is None else m
     of = (
-        ("omega", one.omega, one.omega_error), ("friction", one.friction, one.friction_error),
+        ("omega", one.omega, one.omega_error), ("friction c/m", one.friction, one.friction_error),
         ("kT/m" if m is None else "kT", one.thermal * scale, one.thermal_error * scale),
     )  # fmt: skip
     return f"{_with_strides(name, one.strides[:1])}: " + ", ".join(

@@ -285,7 +285,12 @@ class Comparison:
     max_difference: Floats
 
     def __repr__(self) -> str:
-        return f"Comparison of {', '.join(self.labels)}: differences up to {self.max_difference.max():.3g}"
+        known = self.max_difference[np.tril_indices(len(self.labels), -1)]
+        largest = np.max(known, where=~np.isnan(known), initial=-np.inf)
+        said = f"differences up to {largest:.3g}" if largest >= 0 else "no two runs to compare"
+        if largest >= 0 and np.any(np.isnan(known)):
+            said += " between those that are complete"
+        return f"Comparison of {', '.join(self.labels)}: {said}"
 
     def _repr_html_(self) -> str:
         """The differences as a table for notebooks."""

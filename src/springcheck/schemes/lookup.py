@@ -33,6 +33,12 @@ TEXTBOOK = {
 """Names of textbooks, and the schemes here that they may mean (Hairer, Lubich & Wanner, I.1; Cromer, Am. J.
 Phys. 49 (1981) 455; Gould & Tobochnik)."""
 
+ADAPTIVE_SOLVERS = {
+    **dict.fromkeys(("rk45", "ode45", "dopri5", "dormand prince"), "rk45"),
+    **{name: name for name in ("dop853", "radau", "lsoda")},
+}
+"""Names of solvers that choose their steps, and the method of SciPy's that each is."""
+
 _MEANT = {name.replace("-", " "): found for names, found in TEXTBOOK.items() for name in names}
 
 # like an imported module, a scheme that an engine brings stays for the life of the process
@@ -52,8 +58,14 @@ def scheme(name: str) -> Scheme:
 
 def meant(name: str, beside: Iterable[str] = ()) -> str:
     """ ", did you mean ...?" for an unknown name: the schemes that textbooks call so, else the nearest name
-    of a scheme or of those `beside`, else those whose titles have these words."""
+    of a scheme or of those `beside`, else those whose titles have these words.  Of a solver that chooses its
+    steps ": it is ...", with what runs it."""
     found, bare = textbook(name), _bare(name)
+    if bare in ADAPTIVE_SOLVERS:
+        return (
+            ": it is a solver that chooses its steps, and has no one-step map; `springcheck run SCENE "
+            f"--method scipy:{ADAPTIVE_SOLVERS[bare]}` runs and judges it"
+        )
     close = "" if found else nearest(name, (*known(), *beside))
     if bare and not (found or close):
         found = tuple(x.name for x in known().values() if f" {bare} " in f" {_bare(x.title)} ")

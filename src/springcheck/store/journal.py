@@ -60,12 +60,12 @@ def open_new(path: str | Path, command: str, *, force: bool = False) -> Journal:
     with files.told(path, "write"):
         if not _is_free(parts):
             raise StoreError(f"cannot write {path}: {parts} stands where its journal goes; move it away")
-        if path.exists() and not force and not parts.is_dir():
-            raise StoreError(f"{path} exists: --force writes it anew, -o writes another file")
         if path.exists() and not _is_ours(path):
             raise StoreError(
                 f"{path} is no store of springcheck, and is not replaced; -o writes another file"
             )
+        if path.exists() and not force and not parts.is_dir():
+            raise StoreError(f"{path} exists: --force writes it anew, -o writes another file")
     with files.told(folder, "write into"):
         parts.mkdir(exist_ok=True)
         lock = files.Lock(parts / "lock")

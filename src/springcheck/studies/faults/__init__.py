@@ -10,7 +10,7 @@ from springcheck.studies.study import Study
 
 STUDY = Study(
     name="faults",
-    about="engines broken on purpose: what sees them, how small",
+    about="engines broken on purpose: what sees them, how small; about seven minutes on two cores",
     arguments=(
         *team.arguments(default=min(2, os.cpu_count() or 1)),
         argument("-o", "--output", metavar="FILE", help="keep it in a store, for plot and report"),

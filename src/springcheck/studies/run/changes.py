@@ -21,9 +21,9 @@ def changed(options: Namespace) -> Scene:
     scene, text = scenefile.load_scene(options.scene), scenefile.text_of(options.scene)
     named = [(f"--set {one}", *one.partition("=")[::2]) for one in options.set]
     named += [
-        (f"--{name}", f"time.{name}", getattr(options, name))
+        (f"--{name} {value:.12g}", f"time.{name}", value)
         for name in ("step", "steps")
-        if getattr(options, name) is not None
+        if (value := getattr(options, name)) is not None
     ]
     if not named:
         return bathed(scene, options)
@@ -39,7 +39,7 @@ def changed(options: Namespace) -> Scene:
         if field in given:
             raise SpringcheckError(f"{field} is set twice")
         given[field] = _number(option, field, str(value))
-    found = Varied(scene, text, option="--set").whole(given)
+    found = Varied(scene, text, option="--set").whole(given, ", ".join(option for option, *_ in named))
     said = ", ".join(f"{field} = {value:g}" for field, value in given.items())
     return bathed(replace(found, title=f"{scene.title}, with {said}"), options)
 
