@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -35,6 +37,17 @@ def test_a_title_that_the_census_prints_is_a_name_too() -> None:
     assert len(schemes.known()) > 30
     for scheme in schemes.known().values():
         assert next(iter(explain.lines(scheme.title))) == f"{scheme.name}: {scheme.title}"
+
+
+@pytest.mark.parametrize("command", [["explain", "scipy-rk45"], ["judge", "a.csv", "--scheme", "scipy-rk45"]])
+def test_a_scheme_that_an_engine_brings_is_known_where_no_engine_is_asked_for(
+    command: list[str], tmp_path: Path
+) -> None:
+    (tmp_path / "a.csv").write_text("t,q,p\n0,0,1\n0.1,0.0998,0.995\n0.2,0.1987,0.98\n")
+    scene = ["--scene", "spring"] if command[0] == "judge" else []
+    run = [sys.executable, "-m", "springcheck", *command, *scene]
+    done = subprocess.run(run, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert "Dormand-Prince 5(4), adaptive" in done.stdout, done.stderr
 
 
 def test_the_steps_are_the_formulas() -> None:

@@ -81,6 +81,9 @@ def lines(name: str) -> Iterator[str]:
     methods = [
         f"{engine}:{method}" for engine in engines.names() for method in engines.engine(engine).methods
     ]
+    # engines that are not asked for have schemes of their own
+    if name in schemes.known():
+        return scheme_lines(schemes.scheme(name))
     others = (*_CHECKS, *methods, *(fault.name for fault in FAULTS), *MEANINGS, *WORDS)
     near = schemes.meant(name, others)
     raise SpringcheckError(
