@@ -18,11 +18,11 @@ BUDGETS = {
     ("engines",): 2763,
     ("driver", "conformance", "doors"): 1239,
     ("checks",): 5230,
-    ("identify",): 9114,
+    ("identify",): 9118,
     ("formats", "store"): 5261,
     ("studies",): 1453,
     ("studies/*",): 9626,
-    ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 7124,
+    ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 7132,
 }
 """Lines of each room, or of several: of an engine in one file, and of what all studies share, in the first
 folder."""
