@@ -104,6 +104,23 @@ def test_a_motion_that_grows_has_no_cause_to_its_one_digit(tmp_path: Path) -> No
     assert identified(tmp_path, scene, rows, "%.1f", "explicit-euler").passed is not False
 
 
+@pytest.mark.parametrize("form", ["%.3f", "%.3g", "%.8g"])
+@pytest.mark.parametrize(("label", "scheme", "turn"), [
+    ("own:euler", "explicit-euler", 0.57), ("own:rk2-heun", "rk2-heun", 1.34),
+    ("own:position-verlet", "position-verlet", 2.02),
+])  # fmt: skip
+def test_a_motion_that_grows_passes_or_fails_by_its_own_spring(
+    tmp_path: Path, form: str, label: str, scheme: str, turn: float
+) -> None:
+    """Of a start at rest 0 has no digits, and states of a stiffness off by 5 % that show no scheme passed."""
+    step = round(turn / float(np.sqrt(4.9 / 0.25)), 4)
+    rows = states(spring(step=step), label)
+    grown = len(rows) - np.count_nonzero(np.max(np.abs(rows), axis=1) > 1e4)
+    assert identified(tmp_path, spring(step=step), rows[:grown], form, scheme).passed is not False
+    other = states(spring(4.9 * 1.05, step=step), label)[:grown]
+    assert identified(tmp_path, spring(step=step), other, form, scheme).passed is False
+
+
 @pytest.mark.parametrize("digits", [4, 5])
 def test_some_start_leads_to_the_right_states_and_none_to_those_of_another_stiffness(digits: int) -> None:
     """250 steps turn by 22 radians, half of the relative error of k times that."""

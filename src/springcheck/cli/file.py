@@ -31,6 +31,10 @@ from springcheck.text.wording import count
 
 TIMES = "times were taken as whole numbers of steps from the first frame on"
 NOT_DOUBLE = "(single|mixed|fixed-point force) arithmetic explains every step"
+NO_START = (
+    "no start leads to all of these states by {} with the scene's masses, springs and friction, to the "
+    "digits that they have: look for another stiffness, mass, friction or step, or another scheme"
+)
 NOT_JUDGED = "not judged: nothing that applies to these states could tell the scheme from another"
 
 
@@ -165,21 +169,25 @@ def _shown(scene: Scene, run: Trajectory, states: States) -> Verdict:
         record = of_arrays(run.label, replace(states, mass=m, **parts))
         found = identify_states(record, step=scene.step, **stated)
     except (IdentificationError, ArithmeticError, ValueError) as error:
-        return verdict(None, f"no scheme can be read from these states: {error}")
-    said = f"all states together: {found.statement}"
-    if not (found.fits and found.verdict in ("named", "not told apart")):
+        unread, said = f"no scheme can be read from these states: {error}", ""
+    else:
+        unread, said = "no one scheme is read from these states", f"all states together: {found.statement}"
+        if found.fits and found.verdict in ("named", "not told apart"):
+            names = {found.scheme, *found.aliases}
+            for one in found.candidates:
+                names |= {one.scheme, *one.aliases}
+            return verdict(run.scheme in names, said)
         # of the few digits of a motion that dies down or grows a cause may be read that is none
-        shown = known and not found.undecided and any(x.shown for x in found.explanations[:1])
-        springs = (m, k, c) if states.p is not None else (np.ones_like(m), k / m, c / m)
-        steps, scheme = np.arange(len(run.t)) * run.every, schemes.scheme(run.scheme)
-        numbers = parts["q"], other[:, columns]
-        if shown and not has_a_start(scheme, run.step, springs, steps, *numbers, states.roundoff):
-            return verdict(False, said)
-        return verdict(None, "no one scheme is read from these states")
-    names = {found.scheme, *found.aliases}
-    for one in found.candidates:
-        names |= {one.scheme, *one.aliases}
-    return verdict(run.scheme in names, said)
+        said = "" if found.undecided or not any(x.shown for x in found.explanations[:1]) else said
+    springs = (m, k, c) if states.p is not None else (np.ones_like(m), k / m, c / m)
+    steps, scheme = np.arange(len(run.t)) * run.every, schemes.scheme(run.scheme)
+    numbers = parts["q"], other[:, columns]
+    if (
+        known and not run.rebuilds_velocity
+        and not has_a_start(scheme, run.step, springs, steps, *numbers, states.roundoff)
+    ):  # fmt: skip
+        return verdict(False, said or NO_START.format(scheme.title))
+    return verdict(None, unread)
 
 
 def states_in(

@@ -13,13 +13,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from springcheck.errors import IdentificationError
-from springcheck.identify.evidence import FIXED, SPARE, Measured
-from springcheck.identify.fit import Map, fit
+from springcheck.identify.evidence import FALLS, FIXED, LEFT_BY_ROUNDING, SPARE, Measured
+from springcheck.identify.fit import FLOOR, Map, fit
 from springcheck.identify.hypothesis import SURE
+from springcheck.identify.maps import powers
 from springcheck.identify.noise import least_squares
 from springcheck.identify.record import AT_REST, Record, of_size, stated_stride
 from springcheck.identify.search import terms_of
 from springcheck.identify.storage import ROUNDING
+from springcheck.identify.together import distance
 from springcheck.physics.arrays import Extended
 
 
@@ -62,7 +64,7 @@ def _oscillators(record: Record) -> tuple[Record, list[int], list[Map], list[str
         good = [i for i, found in kept.items() if found.conditioned and _forced(found)]
         # what no springs couple, as a field that turns velocities, has modes that are not alone either
         if good and not any(found.spans and not found.conditioned for found in kept.values()):
-            whose = f"{len(maps)} normal modes were judged instead of them"
+            whose = f"{modes.q.shape[1]} normal modes were judged instead of them"
             notes.append(f"the coordinates are coupled, and their {whose}")
             return modes, good, [kept[i] for i in good], notes
     good = [j for j, found in maps.items() if found.conditioned and _forced(found)]
@@ -138,23 +140,25 @@ def _forced(found: Map) -> bool:
 
 def _uncoupled(record: Record, maps: dict[int, Map]) -> Record | None:
     """The record of the normal modes, if the coordinates are coupled and the modes are not."""
-    single = max(float(np.max(found.residual)) for found in maps.values())
-    if single < max(64 * FIXED, 1e-8) or not record.fine:
+    block = coupled(record, maps, 1e-3 if record.fine else 1 / FALLS)
+    basis = None if block is None else _modes(block)
+    parts = _moving_parts(record, list(maps))
+    # of two particles that are bound to each other alone the distance is judged
+    if basis is None or (len(parts) > len(basis) and distance(record) is not None):
         return None
-    found = _modes(record, list(maps))
-    return found[0] if found is not None and found[1] <= 1e-3 * single else None
+    own = parts @ basis if record.fine else _of_orbit(record, list(maps), parts @ basis)
+    return None if own is None else _along(record, list(maps), own)
 
 
-SAME_MODE = 1e-5
-"""Relative difference of eigenvalues below which any combination of two modes is one."""
-
-
-def _modes(record: Record, chosen: list[int]) -> tuple[Record, float] | None:
-    """Positions and velocities of the normal modes of the chosen coordinates as a record, and the root mean
-    square residual of the map (2m, 2m) of all coordinates together, relative to the states; None where frames
-    are too few, or no modes are found."""
-    z = np.concatenate([record.q[:, chosen], record.v[:, chosen] * record.interval], axis=1)
-    frames, n = len(z), len(chosen)
+def coupled(record: Record, maps: dict[int, Map], share: float = 1 / FALLS) -> Extended | None:
+    """The force's block (m, m) of the map of all moving parts of the coordinates together, where that leaves
+    a `share` at most of what the maps of single coordinates leave over; None where it leaves more."""
+    single = max(float(np.max(found.residual)) for found in maps.values())
+    if len(maps) < 2 or single < max(64 * FIXED, 1e-8):
+        return None
+    parts, h = _moving_parts(record, list(maps)), abs(float(record.interval))
+    z = np.concatenate([x[:, list(maps)] @ parts for x in (record.q, record.v * record.interval)], axis=1)
+    frames, n = len(z), z.shape[1] // 2
     if frames - 1 < 2 * n + 1 + SPARE:
         return None
     size = np.sqrt(np.mean(z**2, axis=0)).astype(np.float64)
@@ -164,12 +168,41 @@ def _modes(record: Record, chosen: list[int]) -> tuple[Record, float] | None:
         return None
     scaled = z / size
     columns = np.concatenate([scaled[:-1], np.ones((frames - 1, 1), dtype=np.longdouble)], axis=1)
-    x = least_squares(columns, scaled[1:])
-    left = float(np.sqrt(np.mean((scaled[1:] - columns @ x).astype(np.float64) ** 2)))
-    # the force's block: proportional to the springs' matrix for every scheme, to leading order in the step
-    block = x[:-1].T[n:, :n]
+    ends = scaled[1:]
+    if not record.fine:
+        # frames count by their digits
+        unit = [np.max(x[:, list(maps)], axis=1) for x in (record.q_quantum, record.v_quantum * h)]
+        each = np.maximum(unit[0] / size[0], unit[1] / size[-1])
+        each = np.maximum(np.maximum(each[1:], each[:-1]), FLOOR * np.max(each))[:, None]
+        each = each * np.sqrt(np.mean((ends / each) ** 2))
+        columns, ends = columns / each, ends / each
+    x = least_squares(columns, ends)
+    left = float(np.sqrt(np.mean((ends - columns @ x).astype(np.float64) ** 2)))
+    # proportional to the springs' matrix for every scheme, to leading order in the step
+    return np.asarray(x[:-1].T[n:, :n]) if left <= share * single else None
+
+
+def _moving_parts(record: Record, chosen: list[int]) -> Extended:
+    """Orthogonal combinations (n, m) of coordinates that move, beyond what roundings add up to: all that
+    there are, unless one rests, as the centre of mass of a chain without walls."""
+    q = record.q[:, chosen].astype(np.float64)
+    _, sizes, ways = np.linalg.svd(q - np.mean(q, axis=0), full_matrices=False)
+    coarse = 0.0 if record.fine else math.sqrt(len(q)) * float(np.max(record.q_quantum[:, chosen]))
+    moving = sizes > LEFT_BY_ROUNDING * ROUNDING * len(q) * sizes[0] + coarse
+    return (np.eye(len(chosen)) if np.all(moving) else ways[moving].T).astype(np.longdouble)
+
+
+SAME_MODE = 1e-5
+"""Relative difference of eigenvalues below which any combination of two modes is one."""
+
+UNLIKE = 1e6
+"""Largest condition number of the modes' basis."""
+
+
+def _modes(block: Extended) -> Extended | None:
+    """Basis (m, m) of the eigenvectors of a force's block (m, m); None where they are not real."""
     values, vectors = np.linalg.eig(block.astype(np.float64))
-    if np.max(np.abs(np.imag(vectors))) > 1e-6 or np.linalg.cond(np.real(vectors)) > 1e6:
+    if np.max(np.abs(np.imag(vectors))) > 1e-6 or np.linalg.cond(np.real(vectors)) > UNLIKE:
         return None
     basis = np.real(vectors).astype(np.longdouble)
     spread = np.real(values)
@@ -178,32 +211,69 @@ def _modes(record: Record, chosen: list[int]) -> tuple[Record, float] | None:
     for _ in range(3):
         # eigenvectors of double precision, corrected to first order with what they leave off the diagonal
         inside = _inverse(basis) @ block @ basis
-        basis = basis @ (np.eye(n) + np.where(far, inside / np.where(far, gap, 1), 0) * (1 - np.eye(n)))
+        step = np.where(far, inside / np.where(far, gap, 1), 0) * (1 - np.eye(len(block)))
+        basis = basis @ (np.eye(len(block)) + step)
+    return np.asarray(basis)
+
+
+def _along(record: Record, chosen: list[int], basis: Extended) -> Record:
+    """The record of the modes of the chosen coordinates, by their basis (n, m)."""
     inverse = _inverse(basis)
-    q = record.q[:, chosen] @ inverse.T
-    v = record.v[:, chosen] @ inverse.T
     spreading = np.abs(inverse).astype(np.float64)
-    return (
-        replace(
-            record,
-            q=q,
-            v=v,
-            q_quantum=record.q_quantum[:, chosen] @ spreading.T,
-            v_quantum=record.v_quantum[:, chosen] @ spreading.T,
-            parts=(
-                np.abs(record.q[:, chosen]).astype(np.float64) @ spreading.T,
-                np.abs(record.v[:, chosen]).astype(np.float64) @ spreading.T,
-            ),
-            mass=None,
-            momenta=False,
+    return replace(
+        record,
+        q=record.q[:, chosen] @ inverse.T,
+        v=record.v[:, chosen] @ inverse.T,
+        q_quantum=record.q_quantum[:, chosen] @ spreading.T,
+        v_quantum=record.v_quantum[:, chosen] @ spreading.T,
+        parts=(
+            np.abs(record.q[:, chosen]).astype(np.float64) @ spreading.T,
+            np.abs(record.v[:, chosen]).astype(np.float64) @ spreading.T,
         ),
-        left,
+        mass=None,
+        momenta=False,
     )
 
 
+ROUNDS_OF_ORBIT = 3
+"""Rounds of maps and modes: the errors of either are of second order in those of the other."""
+
+
+def _of_orbit(record: Record, chosen: list[int], basis: Extended) -> Extended | None:
+    """Basis (n, m) of the modes of a file of few digits, by all frames together: each coordinate is a sum of
+    the motions that the modes' own maps give, whose amplitudes are fitted.  None where two modes are one, or
+    where the sums are off by more than digits that are cut off are."""
+    h, frames = abs(float(record.interval)), len(record.q)
+    wanted = np.stack([record.q[:, chosen], record.v[:, chosen] * record.interval]).astype(np.float64)
+    unit = np.stack([np.max(x[:, chosen], axis=1) for x in (record.q_quantum, record.v_quantum * h)])
+    weight = 1 / np.maximum(unit, FLOOR * np.max(unit, axis=1, keepdims=True))[:, :, None]
+    rest = np.stack([np.ones(frames), np.zeros(frames)])[:, :, None]
+    off = np.inf
+    for _ in range(ROUNDS_OF_ORBIT):
+        modes = _along(record, chosen, basis)
+        straight = [_straight(modes, i) for i in range(basis.shape[1])]
+        maps = [np.array([[1, 1], [0, 1]]) if x else fit(modes, i).unscaled for i, x in enumerate(straight)]
+        ways = [powers(x.astype(np.float64), frames).transpose(1, 0, 2) for x in maps]
+        columns = np.concatenate([*ways, rest], axis=2)
+        size = np.max(np.abs(columns), axis=(0, 1))
+        if not np.all(np.isfinite(size)):
+            return None
+        flat, right = ((x * weight).reshape(2 * frames, -1) for x in (columns / size, wanted))
+        x = np.linalg.lstsq(flat, right)[0]
+        off = float(np.mean((right - flat @ x) ** 2))
+        rows = (x / size[:, None])[:-1].reshape(-1, 2, len(chosen))
+        # the constant of a motion in a straight line is where the coordinates are
+        shapes = [x[1] if free else np.linalg.svd(x)[2][0] for x, free in zip(rows, straight, strict=True)]
+        basis = np.array(shapes, np.longdouble).T
+        if np.linalg.cond(basis.astype(np.float64)) > UNLIKE:
+            return None
+    return basis if off <= 1 else None
+
+
 def _inverse(x: Extended) -> Extended:
-    """Inverse in extended precision: that of double precision, refined by Newton's iteration."""
-    out = np.linalg.inv(x.astype(np.float64)).astype(np.longdouble)
+    """(Pseudo-)inverse in extended precision: that of double precision, refined by Newton's iteration."""
+    by = np.linalg.inv if len(x) == len(x.T) else np.linalg.pinv
+    out = by(x.astype(np.float64)).astype(np.longdouble)
     for _ in range(2):
         out = out @ (2 * np.eye(len(x)) - x @ out)
     return np.asarray(out)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Any
 
@@ -14,7 +15,7 @@ from springcheck.identify.compare import nearest
 from springcheck.identify.evidence import Measured
 from springcheck.identify.explain import explain
 from springcheck.identify.hypothesis import FEW, Joint, distinct
-from springcheck.identify.judged import judged
+from springcheck.identify.judged import coupled, judged
 from springcheck.identify.misplaced import turned
 from springcheck.identify.named import determinants, difference, named
 from springcheck.identify.notes import CERTAIN_STEPS, of_few
@@ -94,7 +95,7 @@ def _of_record(
         return found
     other = _of_coordinates(pair, None, friction, step)
     # a coordinate of a pair is no oscillator, and what is said of it alone is wrong
-    return of_a_pair(record, other) if other.fits or other.defect_ulp < found.defect_ulp else found
+    return of_a_pair(record, other) if other.fits or not other.defect_ulp >= found.defect_ulp else found
 
 
 def _of_coordinates(
@@ -128,6 +129,9 @@ def _unknown(seen: Measured, strides: range) -> Identification:
         return max(max(map(abs, difference(found, m))) for found, m in zip(maps, joint.parts, strict=True))
 
     near: dict[str, Any] = {}
+    if coupled(seen.record, dict(zip(seen.moving, maps, strict=True))) is not None:
+        # what one coordinate's map shows of a motion of several is no number of a scheme
+        return nothing(explain(seen), determinant=(math.nan,) * len(maps), notes=seen.notes)
     tried = nearest(maps, seen.terms, distinct(damped=False), strides)
     if tried and not turned(seen.record, seen.moving):
         least = min(map(distance, tried))

@@ -155,8 +155,8 @@ def nothing(
     explanations: tuple[Explanation, ...],
     *,
     determinant: tuple[float, ...],
-    symplectic_defect: float,
-    defect_ulp: float,
+    symplectic_defect: float = math.nan,
+    defect_ulp: float = math.nan,
     notes: Sequence[str],
     **near: Any,
 ) -> Identification:

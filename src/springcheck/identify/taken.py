@@ -6,8 +6,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from springcheck.identify.arithmetic import SINGLE
-from springcheck.identify.storage import storage
+from springcheck.identify.storage import BINARY, storage
 from springcheck.physics.arrays import Floats, Integers, Reals
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory
@@ -91,10 +90,14 @@ def has_a_start(
 
 
 def _unit(x: Floats, steps: Integers, roundoff: float) -> Floats:
-    """The last digit of numbers (f,), and one rounding of single precision in each of so many steps."""
+    """The last digit of numbers (f,), and one rounding of each of so many steps, in single precision or in
+    the shorter format that they are stored in."""
     form = storage(x)
     unit = 2 * roundoff * np.max(np.abs(x)) if form.name == "double" else form.quantum(x)
-    return np.asarray(unit + SINGLE * steps * np.maximum.accumulate(np.abs(x)))
+    # a 0 is written with no digit, and is that of a start mostly
+    unit = np.where(unit > 0, unit, np.min(unit, where=unit > 0, initial=np.max(unit)))
+    own = 2.0 ** -BINARY.get(form.name, BINARY["single"])
+    return np.asarray(unit + own * steps * np.maximum.accumulate(np.abs(x)))
 
 
 def seen_to_take(scene: Scene, run: Trajectory, about: int) -> str:

@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from springcheck.identify.evidence import LEFT_BY_ROUNDING
+from springcheck.identify.hypothesis import SURE
 from springcheck.identify.misplaced import MOST_COMPARED, unsorted
 from springcheck.identify.record import Record
-from springcheck.identify.result import ONLY_TURNS, Explanation, Identification
+from springcheck.identify.result import ONLY_TURNS, Explanation, Identification, nothing
 from springcheck.identify.storage import ROUNDING
 from springcheck.physics.arrays import Floats, Reals
 
@@ -123,11 +124,12 @@ def distance(record: Record) -> Record | None:
 def of_rotation(record: Record, found: Identification) -> Identification:
     """Add a rotation of the velocity as a cause, or as an alternative to springs."""
     if found.explanations and (cause := (not found.fits and unsorted(record)) or of_plane(record)):
-        return replace(found, statement=cause.cause, explanations=(cause,))
+        # numbers of one coordinate are none of what moves both
+        return nothing((cause,), determinant=(math.nan,) * len(found.determinant), notes=found.notes)
     if not found.fits or (pair := _turning(record)) is None:
         return found
-    i, j, factor = pair
-    grows = abs(abs(factor) - 1) > LEFT_BY_ROUNDING * ROUNDING
+    i, j, factor, error = pair
+    grows = abs(abs(factor) - 1) > LEFT_BY_ROUNDING * ROUNDING + error
     how = f"turns and grows by {abs(factor) - 1:+.3g} in each frame" if grows else "only turns"
     field = "" if grows else " (Boris)"
     return found.doubted(
@@ -137,22 +139,23 @@ def of_rotation(record: Record, found: Identification) -> Identification:
     )
 
 
-def _turning(record: Record) -> tuple[int, int, complex] | None:
+def _turning(record: Record) -> tuple[int, int, complex, float] | None:
     """Two coordinates whose complex velocity v_i + i v_j is multiplied by one complex factor in every frame,
-    and that factor: a charge in a magnetic field, or a circular orbit on an isotropic spring."""
+    that factor and its error: a charge in a magnetic field, or a circular orbit on an isotropic spring."""
     v = record.v.astype(np.float64)
     for i, j in combinations(range(min(v.shape[1], MOST_COMPARED)), 2):
         w = v[:, i] + 1j * v[:, j]
         size = np.abs(w)
         if not np.all(size > 0):
             continue
-        factor = complex(np.mean(w[1:] / w[:-1]))
+        ratios = w[1:] / w[:-1]
+        factor, error = complex(np.mean(ratios)), SURE * float(np.std(ratios)) / math.sqrt(len(ratios))
         room = LEFT_BY_ROUNDING * ROUNDING * (size[1:] + size[:-1]) + 2 * np.max(
             record.v_quantum[1:, [i, j]], axis=1
         )
         turns = abs(np.angle(factor)) * len(w) > 1
         if turns and np.all(np.abs(w[1:] - factor * w[:-1]) <= room):
-            return i, j, factor
+            return i, j, factor, error
     return None
 
 
@@ -189,33 +192,48 @@ def _of_two(record: Record, i: int, j: int) -> Explanation | None:
     weight = 1 / each if np.all(each > 0) else 1.0
     scaled = weight * z[:-1] / size
     rows = np.linalg.lstsq(scaled, weight * z[1:] / size)[0]
-    off = np.max(np.abs(weight * z[1:] / size - scaled @ rows))
-    entries = np.asarray((rows * size / size[:, None]).T[:2, :2], np.complex128)
+    left = np.abs(weight * z[1:] / size - scaled @ rows)[:, :2]
+    # half a unit of both coordinates, at either end of a step
+    unit = np.hypot(*(record.quanta(k) for k in (i, j))) * (0.0 if record.fine else 0.5) / size[:2]
+    if np.any(left > LEFT + weight * (unit[1:] + unit[:-1] @ np.abs(rows[:2, :2]))):
+        return None
+    spread = np.sqrt(np.diag(np.linalg.pinv(np.real(scaled.conj().T @ scaled), hermitian=True))[:2])
     size = size[:2]
-    if off > LEFT or np.max(np.abs(entries.imag) * size / size[:, None]) < LEFT:
+    scale = size[:, None] / size
+    entries = np.asarray(rows[:2, :2].T * scale, np.complex128)
+    error = SURE * np.sqrt(np.mean(left**2, axis=0))[:, None] * spread * scale
+    if np.all(np.abs(entries.imag) < LEFT * scale + error):
         return None
     interval = abs(float(record.interval))
     det = complex(np.linalg.det(entries))
-    angle = cmath.phase(det)
-    if abs(angle) < LEFT:
+    angle, open_to = cmath.phase(det), float(np.sum(np.abs(entries[::-1, ::-1]) * error))
+    if abs(angle) < LEFT + open_to:
         # the velocities are other numbers than these positions', and nothing turns them
         return None
     of = f" of coordinates {i} and {j}" if record.q.shape[1] > 2 else ""
-    turned = f"{angle:.9g}" if abs(abs(det) - 1) < KEPT else f"about {angle:.2g}"
+    turned = _known(angle, open_to) if abs(abs(det) - 1) < KEPT else f"about {angle:.2g}"
     cause = (
         f"The velocity{of} turns by {turned} in each frame beside what springs alike along both axes do: a "
         "magnetic field across the plane, or Coriolis' force in a turning frame"
     )
+    # to few digits any central force that is nearly linear turns its ellipse at a constant rate
+    cause += "" if record.fine else ", or a central force that is not quite linear"
     half = math.tan(-angle / 2)
     turn = cmath.exp(1j * angle)
     stiff = (-2 * entries[1, 0] / (1 + turn)).real
     boris = _boris(stiff, turn)
-    if np.max(np.abs(boris - entries)) <= BORIS_AGREES * np.max(np.abs(entries)):
+    if np.all(np.abs(boris - entries) <= BORIS_AGREES * np.max(np.abs(entries)) + error):
         cause += (
-            f". By Boris, if every step was recorded: strength over mass {2 * half / interval:.9g}, "
-            f"stiffness over mass {stiff / interval**2:.9g}"
+            f". By Boris, if every step was recorded: strength over mass "
+            f"{_known(2 * half / interval, open_to / interval)}, stiffness over mass "
+            f"{_known(stiff / interval**2, float(error[1, 0]) / interval**2)}"
         )
-    return Explanation(cause, "judge it against a scene with [[magnetic]]", float(off), local=True)
+    return Explanation(cause, "judge it against a scene with [[magnetic]]", float(np.max(left)), local=True)
+
+
+def _known(x: float, error: float) -> str:
+    """A number to the digits that its error leaves, nine at most."""
+    return f"{x:.{max(1, min(9, math.floor(math.log10(abs(x) / max(error, 1e-300)))))}g}" if x else "0"
 
 
 def _boris(stiff: float, turn: complex) -> NDArray[np.complex128]:
