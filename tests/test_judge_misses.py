@@ -88,6 +88,21 @@ def test_a_slow_stiffness_of_multiple_time_steps_is_judged_however_far_apart_fra
     assert "step-defect" in failed(scene, plain(scene, "respa8", fast_and_slow(2.9 * (1 + 1e-9))))
 
 
+@pytest.mark.parametrize("step", [0.05, 0.4])
+def test_multiple_time_steps_of_fast_springs_alone_with_friction_are_judged_by_their_closed_form(
+    step: float,
+) -> None:
+    def scene(c: float) -> Scene:
+        terms = (*fast_and_slow(0.0).terms[1:], Damping(i=np.array([0]), c=np.array([c])))
+        return fast_and_slow(0.0).derived(terms=terms, step=step, steps=100)
+
+    right = scene(0.85)
+    made = plain(right, "respa8")
+    assert {v.check for v in checks.judge(right, made) if v.passed} >= {"closed-form", "shadow-energy"}
+    assert failed(right, made) == []
+    assert "closed-form" in failed(right, plain(right, "respa8", scene(0.85 * (1 + 1e-10))))
+
+
 @pytest.mark.parametrize("every", [10, 200])
 def test_an_anharmonic_coefficient_is_judged_however_far_apart_frames_are(every: int) -> None:
     def scene(b: float) -> Scene:

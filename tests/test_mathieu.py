@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ from springcheck.physics.exact.mathieu import floquet
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import ModulatedSpring
 from springcheck.physics.trajectory import Outcome
-from springcheck.studies.stability import longest, measure, multipliers
+from springcheck.studies.stability import longest, measure, multipliers, page
 
 ORDERS = 60
 """Of Hill's series to both sides: the terms fall like (r/4 n**2)**n."""
@@ -216,9 +217,90 @@ def test_a_place_of_rest_far_from_0_rounds_what_is_displaced_from_it() -> None:
     assert far.bound == pytest.approx(near.bound * (1 + 1e6), rel=1e-6)
 
 
-def test_the_largest_step_of_a_modulated_spring_is_that_of_its_stiffest_moment() -> None:
+def test_the_frequency_of_a_modulated_spring_is_that_of_its_stiffest_moment() -> None:
     scene = scenefile.load_scene("mathieu-tongue")
     # at the start cos(phase) = 0.92 of the modulation is there
-    w = np.sqrt(2.9 * (1 + 0.3) / 3.7)
-    assert longest.fastest(scene) == pytest.approx(w, rel=1e-12)
-    assert longest.longest(schemes.scheme("velocity-verlet"), scene) == pytest.approx(2 / w, rel=1e-9)
+    assert longest.fastest(scene) == pytest.approx(np.sqrt(2.9 * (1 + 0.3) / 3.7), rel=1e-12)
+
+
+def by_hand(scene: Scene, steps: int) -> float:
+    """Logarithm of the growth of velocity Verlet a step, from one start in doubles."""
+    (spring,), h, m = scene.terms, scene.step, scene.m[0]
+    assert isinstance(spring, ModulatedSpring)
+    wave = np.cos(spring.frequency * h * np.arange(steps + 1) + spring.phase)
+    k, total = (spring.k * (1 + spring.depth * wave)).tolist(), 0.0
+    q, p = 0.3, 0.7
+    for now, then in pairwise(k):
+        p -= h / 2 * now * q
+        q += h * p / m
+        p -= h / 2 * then * q
+        size = abs(q) + abs(p)
+        q, p, total = q / size, p / size, total + np.log(size)
+    return float(total / steps)
+
+
+@pytest.mark.parametrize(
+    ("step", "grows"),
+    [(0.37, False), (1.74, False), (1.8, True), (-1.8, True), (1.95, True), (2.01, False), (2.04, True)],
+)
+def test_a_step_is_beyond_a_limit_where_the_product_of_its_maps_grows(step: float, grows: bool) -> None:
+    """At its stiffest moment the scene has 2/w = 1.981, which is neither necessary nor sufficient."""
+    scene = replace(scenefile.load_scene("mathieu-stable"), step=step)
+    found, right = longest.resonating("velocity-verlet", scene), by_hand(scene, 20_000)
+    assert (found is not None) == grows == (right > 1e-3)
+    if found is not None:
+        assert np.log(found) == pytest.approx(right, rel=0.02)
+
+
+def test_of_several_modulated_springs_the_one_that_grows_tells() -> None:
+    one = replace(scenefile.load_scene("mathieu-stable"), step=1.8)
+    (spring,) = one.terms
+    assert isinstance(spring, ModulatedSpring)
+    names = ("k", "depth", "frequency", "phase", "at")
+    pair = {x: np.repeat(getattr(spring, x), 2) for x in names} | {"k": np.append(0.3 * spring.k, spring.k)}
+    two = one.derived(m=np.repeat(one.m, 2), q=np.repeat(one.q, 2), p=np.repeat(one.p, 2),
+                      terms=(ModulatedSpring(i=np.arange(2), **pair),))  # fmt: skip
+    for name in ("velocity-verlet", "semi-implicit-euler"):
+        assert longest.resonating(name, two) == pytest.approx(longest.resonating(name, one), rel=1e-12)
+    # explicit Euler has no stable step, and in a tongue the exact solution grows
+    assert longest.resonating("explicit-euler", one) is None
+    assert longest.resonating("velocity-verlet", scenefile.load_scene("mathieu-tongue")) is None
+
+
+def test_implicit_midpoint_resonates_though_it_is_bounded_on_every_spring() -> None:
+    """Two steps to a period, on springs of w = 1.66 and 2.04: angles of 2 atan(h w/2) that add up to pi."""
+    term = ModulatedSpring(i=np.array([0]), k=7.9, depth=0.3, frequency=2.9, phase=0.4, at=0.15)
+    scene = Scene(m=[2.3], q=[0.7], p=[1.4], terms=(term,), step=np.pi / 2.9, steps=10)
+    h, maps = scene.step, []
+    for t in (h / 2, 3 * h / 2):
+        half = h / 2 * np.array([[0, 1 / 2.3], [-7.9 * (1 + 0.3 * np.cos(2.9 * t + 0.4)), 0]])
+        maps.append(np.linalg.solve(np.eye(2) - half, np.eye(2) + half))
+    largest = np.max(np.abs(np.linalg.eigvals(maps[1] @ maps[0])))
+    assert largest > 1.05
+    assert longest.resonating("implicit-midpoint", scene) == pytest.approx(np.sqrt(largest), rel=1e-3)
+    assert np.isnan(longest.longest(schemes.scheme("implicit-midpoint"), scene))
+
+
+@pytest.mark.parametrize(("step", "said"), [(1.8, True), (2.01, False)])
+def test_a_run_is_warned_of_a_step_that_resonates_with_the_modulation(step: float, said: bool) -> None:
+    scene = replace(scenefile.load_scene("mathieu-stable"), step=step, steps=30)
+    text = str(springcheck.run(scene, methods=["own:velocity-verlet"]))
+    warned = "makes velocity Verlet grow by a factor of 1.1927 a step, and the exact solution stays bounded"
+    assert (warned in " ".join(text.split())) == said
+    assert "beyond the limit" not in text
+
+
+@pytest.mark.parametrize("name", ["mathieu-stable", "mathieu-tongue"])
+def test_of_a_modulated_spring_no_largest_step_is_known_and_why_is_said(name: str) -> None:
+    found = springcheck.stability(
+        scenefile.load_scene(name), ["own:velocity-verlet", "own:implicit-midpoint"]
+    )
+    assert np.isnan([found.largest(x) for x in found.limits]).all()
+    assert [x["largest_step"] for x in found.document()["methods"]] == [None, None]
+    text = " ".join(str(found).split())
+    assert "one may resonate with the modulation below its limit on a spring" in text
+    assert "limit of every method" not in text
+    # nor does a chart mark the scene beside limits
+    (chart,) = page.banks(found)[0].charts
+    assert "limit 2" in {rule.name for rule in chart.rules}
+    assert not [rule for rule in chart.rules if rule.look == "here"]

@@ -14,11 +14,13 @@ import pytest
 from springcheck import driver, engines, store
 from springcheck.engines.contract import Label
 from springcheck.errors import SceneError, StoreError
+from springcheck.physics import builders
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.arrays import WIDE
 from springcheck.physics.scene import Scene
-from springcheck.schemes import SCHEMES
-from springcheck.studies.precision import STUDY, accuracy, fits, sweeps
+from springcheck.physics.terms import Damping, WallSpring
+from springcheck.schemes import SCHEMES, matrix
+from springcheck.studies.precision import STUDY, accuracy, fits, sweeps, text
 from springcheck.studies.precision import measure as precision
 from springcheck.studies.precision.accuracy import Accuracy
 from springcheck.studies.precision.fits import POINTS, Point
@@ -192,6 +194,52 @@ def test_a_phase_is_followed_past_half_a_turn() -> None:
     for piece in (slice(0, 100), slice(100, 101), slice(101, 401)):
         errors(t[piece], q[piece], p[piece], None)
     assert errors.result.phase_error == pytest.approx(0.05 * t[-1], rel=1e-12)
+
+
+def damped(c: float, steps: int) -> Scene:
+    one = scenes.load_scene("spring-uneven")
+    (wall,) = one.terms
+    assert isinstance(wall, WallSpring)
+    # at 0, where a mode that dies down loses no digits to its centre
+    at = replace(wall, at=np.zeros(1))
+    return replace(one, terms=(at, Damping(i=np.array([0]), c=np.array([c]))), steps=steps)
+
+
+@pytest.mark.parametrize(("c", "steps", "count"), [(0.3, 200, 200), (0.3, 200, 800), (1.1, 3000, 3000)])
+def test_the_phase_error_of_a_damped_spring_is_that_of_its_eigenvalues_while_it_moves(
+    c: float, steps: int, count: int
+) -> None:
+    scene = damped(c, steps)
+    (point,) = measure(scene, "own:rk4", [count])
+    h, m, k = point.step or 0.0, scene.m, scene.system.hessian_diagonal(scene.q)
+    one = matrix(SCHEMES["rk4"], h=h, m=m, k=k, c=c)[0].astype(np.float64)
+    w = float(np.sqrt(k[0] / m[0] - (c / m[0] / 2) ** 2))
+    ahead = np.max(np.angle(np.linalg.eigvals(one))) / h - w
+    # until it moves by a thousandth of what it did, from which on its angle is that of rounding
+    lasts = min(h * count, np.log(1 / accuracy.LEAST_AMPLITUDE) / (c / m[0] / 2))
+    assert (lasts < h * count) == (c == 1.1)
+    assert point.accuracy is not None
+    assert point.accuracy.phase_error is not None
+    # the ellipses of the scheme differ from circles by an error of one step
+    assert point.accuracy.phase_error == pytest.approx(ahead * lasts, rel=0.05)
+
+
+@pytest.mark.parametrize("name", ["foucault", "a damped pair", "an overdamped spring"])
+def test_there_is_no_phase_where_springs_alone_have_no_say(name: str) -> None:
+    """Friction or a field couples their modes; what is overdamped does not turn."""
+    pair = builders.chain(2, np.array([2.3, 0.9]), 3.1, q=np.array([0.3, 0.1]), step=0.1, steps=40)
+    two = replace(pair, terms=(*pair.terms, Damping(i=np.arange(2), c=np.array([0.35, 1.9]))))
+    scene = {"a damped pair": two, "an overdamped spring": damped(20.0, 40)}.get(name)
+    scene = scene or replace(scenes.load_scene(name), steps=40)
+    (point,) = measure(scene, "own:rk4", [80])
+    assert point.accuracy is not None
+    assert point.accuracy.phase_error is None
+    assert point.document()["phase_error"] is None
+    # with one rate the modes stay, and so does their phase
+    even = replace(two, terms=(*pair.terms, Damping(i=np.arange(2), c=0.2 * two.m)))
+    (point,) = measure(even, "own:rk4", [80])
+    assert point.accuracy is not None
+    assert point.accuracy.phase_error
 
 
 def test_the_energy_error_of_explicit_euler_is_its_growth() -> None:
@@ -439,6 +487,51 @@ def test_a_fit_leaves_out_what_is_coarse_and_what_is_rounding() -> None:
     assert fit is not None
     assert fit.points == 4
     assert fit.order == pytest.approx(2, rel=1e-12)
+
+
+RATIOS = 24.0, 30.0, 31.0, 31.0, 29.0, 27.1, 24.9
+"""Errors of RK4 on a pendulum near its top, each over the next: there the term of order 5 is the larger."""
+
+
+def falling(first: float, *ratios: float) -> list[float]:
+    return list(first / np.cumprod([1.0, *ratios]))
+
+
+@pytest.mark.parametrize("ends", [1, 2, 3])
+def test_points_at_an_unknown_floor_are_in_no_fit(ends: int) -> None:
+    """As where a budget ends right after the floor: 3.0897 of order 4."""
+    errors = falling(4.5e-3, 16.7, 16.2, 16.0, 16.1, 16.0, 16.0, 15.6, *(2.9, 1.1, 1.05)[:ends])
+    fit = fits.order(made_up(errors))
+    assert fit is not None
+    assert abs(fit.order - 4) < fit.standard_error < 0.02
+    # and points just above it by the growth of one rounding a step
+    how = fits.Condition(name="sqrt(N)", why="", eps=4e-11, angle=1.0)
+    found = fits.order(made_up(falling(4.5e-3, *[16.0] * 4, 13.0, 11.0)), how)
+    assert found is not None
+    assert (found.points, found.order) == (5, pytest.approx(4, abs=1e-9))
+
+
+def test_no_order_is_claimed_where_the_slope_changes_ever_faster() -> None:
+    assert fits.order(made_up(falling(5.4e-2, *RATIOS))) is None
+    # as it slows down again the change so far is the error
+    fit = fits.order(made_up(falling(5.4e-2, *RATIOS, 22.9, 21.0, 19.5, 18.3, 17.5)))
+    assert fit is not None
+    assert abs(fit.order - 4) < fit.standard_error * 2
+    # one that tells no order from the next is none
+    assert fits.order(made_up(falling(5.4e-2, *RATIOS, 20.0, 12.0))) is None
+    # within what rounding does to an error that is a hundred times as large, it may
+    fit = fits.order(made_up(falling(1e-3, 16.0, 16.0, 16.0, 16.3, 15.7)))
+    assert fit is not None
+    assert fit.order == pytest.approx(4, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("order", "error", "said"),
+    [(3.0897, 2.24, "3(2e+00)"), (4.7598, 0.13, "4.8(1e-01)"), (2.00004, 5e-6, "2.0000(5e-06)"),
+     (1.0, 0.0, "1.0000(0e+00)"), (4.0015, 0.0013, "4.002(1e-03)")],
+)  # fmt: skip
+def test_an_order_has_the_digits_that_its_error_allows(order: float, error: float, said: str) -> None:
+    assert text._order(fits.Fit(order=order, standard_error=error, constant=1.0, points=4)) == said
 
 
 def test_no_order_is_claimed_from_three_points() -> None:

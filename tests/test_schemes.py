@@ -12,6 +12,8 @@ import pytest
 import springcheck
 from springcheck import schemes
 from springcheck.errors import MethodError, SpringcheckError
+from springcheck.physics.scene import Scene
+from springcheck.physics.terms import Damping, WallSpring
 from springcheck.schemes import SCHEMES, Scheme
 from springcheck.schemes.lookup import TEXTBOOK
 
@@ -51,6 +53,23 @@ def test_a_scheme_has_the_matrix_of_the_textbooks(name: str) -> None:
     expected = np.array(MATRICES[name])
     # the expectation itself is rounded a few times in double precision
     assert np.max(np.abs(one(SCHEMES[name])[0] - expected) / np.abs(expected)) <= 8 * ULP
+
+
+def test_multiple_time_steps_have_friction_in_the_outer_kicks_as_their_steps_of_a_scene_do() -> None:
+    """As `Law.step`, which takes the terms of the scene."""
+    w, rate, part = 0.5, 0.3, 1 / 8
+    kick = np.array([[1, 0], [-w * part / 2, 1]])
+    drift = np.array([[1, w * part], [0, 1]])
+    brake = np.diag([1, 1 - rate / 2])
+    expected = brake @ np.linalg.matrix_power(kick @ drift @ kick, 8) @ brake
+    found = schemes.matrix(SCHEMES["respa8"], h=1.0, m=np.ones(1), k=np.array([w * w]), c=rate)[0]
+    np.testing.assert_allclose(found * [[1, w], [1 / w, 1]], expected, rtol=0, atol=8 * ULP)
+    assert expected[0] == pytest.approx([0.87754353, 0.40777159], abs=1e-8)
+    wall = WallSpring(i=[0], k=[w * w], at=[0.0], fast=True)
+    scene = Scene(m=[1.0], q=[0.3], p=[0.7], terms=(wall, Damping(i=[0], c=[rate])), step=1.0, steps=1)
+    states = np.eye(2, dtype=np.longdouble)[:, :, None]
+    ends = schemes.Law(scheme=SCHEMES["respa8"], scene=scene, h=1.0).step(*states)
+    np.testing.assert_allclose(found, np.array(ends)[:, :, 0], rtol=0, atol=8 * ULP)
 
 
 @pytest.mark.parametrize("scheme", ONE_STEP, ids=lambda scheme: scheme.name)

@@ -90,7 +90,9 @@ def test_a_kick_that_is_a_hundred_thousandth_too_strong_moves_the_limit_out_of_i
     assert abs(moved.limit - 2 / np.sqrt(1.00001)) < 1e-9
 
 
-@pytest.mark.parametrize("name", [x for x in LABELS if "damping" in engines.method(engines.parse(x)).terms])
+@pytest.mark.parametrize(
+    "name", [*(x for x in LABELS if "damping" in engines.method(engines.parse(x)).terms), "own:respa8"]
+)
 def test_the_damped_plane_is_divided_as_theory_says(name: str, need: Need) -> None:
     need(name)
     found = regions.measure(engines.parse(name), points=60)

@@ -60,7 +60,7 @@ def failures(study: PrecisionStudy) -> list[str]:
     for method in study.methods:
         scheme = SCHEMES[engines.method(engines.parse(method.method)).scheme]
         fit = method.fit
-        if fit and not (abs(fit.order - scheme.order) < 0.02 > 2 * fit.standard_error):
+        if fit and not (abs(fit.order - scheme.order) < 0.02 and fit.standard_error < 0.05):
             out.append(
                 f"{study.scene.name} {method.method}: order {fit.order:.4f} +- {fit.standard_error:.4f}"
             )

@@ -15,7 +15,8 @@ def matrix(scheme: Scheme, *, h: float, m: Reals, k: Reals, c: Reals | float = 0
     """One-step matrices on (q, p) of springs m, k (n,), each with friction c -> (n, 2, 2), extended.
 
     Its columns are steps of the unit vectors, so the scheme is written down once.  A scheme that parts slow
-    from fast takes each spring for a fast one; that of the exact flow is its closed form.
+    from fast takes each spring for a fast one, and friction for a slow force, as `System.slow` does; that of
+    the exact flow is its closed form.
     """
     wide: list[Extended] = [np.atleast_1d(np.asarray(x, np.longdouble)) for x in (m, k, c)]
     m, k, c = np.broadcast_arrays(*wide)
@@ -27,9 +28,6 @@ def matrix(scheme: Scheme, *, h: float, m: Reals, k: Reals, c: Reals | float = 0
     def force(q: Reals, p: Reals) -> Reals:
         return np.asarray(-k * q - c * (p / m))
 
-    def none(q: Reals, p: Reals) -> Reals:
-        return np.zeros_like(q)
-
     q, p = step(
         scheme,
         *(np.broadcast_to(x[:, None], (2, len(m))) for x in np.eye(2, dtype=np.longdouble)),
@@ -38,7 +36,7 @@ def matrix(scheme: Scheme, *, h: float, m: Reals, k: Reals, c: Reals | float = 0
         force=force,
         stiffness=k,
         rate=c / m if np.any(c) else None,
-        parts=(none, force),
+        parts=(lambda q, p: np.asarray(-c * (p / m)), lambda q, p: np.asarray(-k * q)),
     )
     return np.asarray(np.stack([q.T, p.T], axis=1), np.longdouble)
 

@@ -21,8 +21,8 @@ from springcheck.physics.terms import Spring, WallSpring
 from springcheck.studies.stability.longest import fastest
 
 LEAST_AMPLITUDE = 1e-3
-"""Least amplitude, relative to the largest, of modes whose phase is reported: in a mode that hardly moves,
-the rounding of the others is a large angle."""
+"""Least amplitude, relative to the largest at the start, at which the phase of a mode is taken: in a mode
+that hardly moves, or no longer does, the rounding of the others is a large angle."""
 
 MOST_COMPARED_FRAMES = 4096
 """Most frames at which a run is compared with the exact solution.  Their spacing is below a 250th of a period
@@ -38,9 +38,10 @@ class Accuracy:
     """Errors of one run, over its whole trajectory unless stated otherwise.
 
     `max_error` and `end_error` are relative to the initial energy norm (`System.norm`); `phase_error` is the
-    largest phase lead (> 0) or lag of a mode [rad], None where nothing oscillates; `energy_error` is the
-    largest |H - H exact| in units of the start's kinetic plus absolute potential energy; `rounding_error` is
-    the largest distance from the scheme's own motion in exact arithmetic, None where that has no closed form.
+    largest phase lead (> 0) or lag of a mode [rad], None where nothing oscillates, or a field or friction
+    couples modes; `energy_error` is the largest |H - H exact| in units of the start's kinetic plus absolute
+    potential energy; `rounding_error` is the largest distance from the scheme's own motion in exact
+    arithmetic, None where that has no closed form.
     """
 
     max_error: float
@@ -56,7 +57,10 @@ class Truth:
 
     scene: Scene
     turning: exact.Modes
-    """Normal modes of its springs alone, in which the phase is measured."""
+    """Normal modes of its springs alone, in which the phase is measured; of none where a field or friction
+    couples them."""
+    rate: Extended
+    """Rates of friction of these modes (n,) [1/T]."""
     w: float
     """Largest angular frequency along the motion [1/T], 0 where nothing oscillates."""
 
@@ -89,8 +93,11 @@ def truth(scene: Scene) -> Truth:
     w = float(np.max(rods.rates(scene.q, scene.p))) if rods else fastest(scene)
     if not np.isfinite(w):
         raise SceneError(f"scene {scene.name}: its forces are beyond the range of numbers")
-    springs = tuple(term for term in scene.terms if isinstance(term, WallSpring | Spring))
-    return Truth(scene=scene, turning=replace(scene, terms=springs).system.modes, w=w)
+    system = scene.system
+    joined = "magnetic" in system.acting or (system.is_damped and not system.has_modes)
+    springs = tuple(term for term in scene.terms if isinstance(term, WallSpring | Spring) and not joined)
+    rate = system.modes.rate if system.is_damped and not joined else np.zeros(scene.n, np.longdouble)
+    return Truth(scene=scene, turning=replace(scene, terms=springs).system.modes, rate=rate, w=w)
 
 
 class Errors:
@@ -106,7 +113,9 @@ class Errors:
         modes = known.turning
         u, v = self._turned(known.scene.q[None], known.scene.p[None])
         size = np.hypot(u, v)[0]
-        self._clear = (modes.w2 > 0) & (size >= LEAST_AMPLITUDE * np.max(size)) & (size > 0)
+        self._least = LEAST_AMPLITUDE * np.max(size)
+        # an overdamped mode does not oscillate
+        self._clear = (modes.w2 > known.rate**2 / 4) & (size >= self._least) & (size > 0)
         self._last = np.zeros(int(np.count_nonzero(self._clear)), dtype=np.longdouble)
         self._own = _own_motion(judged or known.scene, scheme, h)
 
@@ -145,10 +154,11 @@ class Errors:
         )
 
     def _turned(self, q: Reals, p: Reals) -> tuple[Extended, Extended]:
-        """Mode coordinates (f, n) in which the exact solution moves clockwise on circles."""
-        modes = self._truth.turning
+        """Mode coordinates (f, n) in which the exact solution moves clockwise on circles, or with friction on
+        logarithmic spirals."""
+        modes, half = self._truth.turning, self._truth.rate / 2
         y, v = modes.about_centres(q, p)
-        return np.sqrt(np.abs(modes.w2)) * y, v
+        return np.sqrt(np.abs(modes.w2 - half * half)) * y, v + half * y
 
     def _turn(self, q: Floats, p: Floats, true_q: Extended, true_p: Extended) -> None:
         if not len(self._last):
@@ -158,8 +168,10 @@ class Errors:
         with np.errstate(over="ignore", invalid="ignore"):
             ahead = np.arctan2(u * true_v - v * true_u, u * true_u + v * true_v)
             # the phase is unwrapped from frame to frame, across pieces
-            ahead = np.unwrap(np.concatenate([self._last[None], ahead]), axis=0)
+            ahead = np.unwrap(np.concatenate([self._last[None], ahead]), axis=0)[1:]
+            decayed = (self._truth.rate[self._clear] > 0) & (np.hypot(true_u, true_v) < self._least)
         self._last = ahead[-1]
+        ahead = np.where(decayed, 0, ahead)
         worst = ahead.flat[int(np.argmax(np.abs(ahead)))]
         if not abs(worst) <= abs(self._phase) and not np.isnan(self._phase):
             self._phase = float(worst)

@@ -133,10 +133,19 @@ FEWEST_FITTED = 4
 MOST_CURVATURE = 3.0
 """Standard errors of a curvature from which the coarsest points are not asymptotic."""
 
+MOST_SLOPE_LOST = 2 / 3
+"""Slope beyond the usual one that a halving of the step may lose: a term of order n + 2 above one of order n,
+x/(1 + x) of their sum, takes 2 x/(1 + x) - 2 x/(4 + x), 2/3 where x = 2.  More is lost to rounding alone."""
+
+MOST_DRIFT = 4 / (ABOVE_FLOOR * np.log(2))
+"""Change of the slope from one halving to the next of which rounding is capable: of three errors, each off by
+1 / `ABOVE_FLOOR`, one counts twice."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fit:
-    """Error = constant * step**order; `order` is a signed slope, with its standard error."""
+    """Error = constant * step**order; `order` is a signed slope, with its standard error, at least the range
+    of the slopes between neighbours: the next term of the error is systematic, not scatter."""
 
     order: float
     standard_error: float
@@ -152,29 +161,50 @@ def turned(errors: Sequence[float], *, by: int = 1) -> int | None:
     return best if best < len(errors) - by and errors[best] < ASYMPTOTIC_ERROR else None
 
 
-def order(points: Sequence[Point]) -> Fit | None:
-    """Order of a method of fixed step from points of ever finer steps; None with fewer than four usable."""
+def order(points: Sequence[Point], how: Condition | None = None) -> Fit | None:
+    """Order of a method of fixed step from points of ever finer steps; None with fewer than four usable,
+    where the slope changes ever faster, as before a term of the error takes over, and where it does not
+    distinguish one order from the next.  Rounding that was not measured is the floor, or typical by `how`.
+    """
     best = turned([point.error for point in points])
     floor = points[best].error if best is not None else 0.0
-    chosen = [
-        point
-        for point in points[: None if best is None else best]
-        if 0 < point.error <= ASYMPTOTIC_ERROR
-        and point.error >= ABOVE_FLOOR * (floor if point.rounding is None else point.rounding)
-    ][-MOST_FITTED:]
+    chosen = [point for point in points[:best] if 0 < point.error <= ASYMPTOTIC_ERROR]
+    if best is None and len(chosen) > 2:
+        *_, last = slopes = _slopes(*_logarithms(chosen))
+        floor = chosen[-1].error if last < np.median(slopes) - MOST_SLOPE_LOST else 0.0
+
+    def rounding(point: Point) -> float:
+        if point.rounding is not None:
+            return point.rounding
+        grown = TYPICAL_ROUNDING * how.eps * how.value(point.steps) if how and point.steps else 0.0
+        return max(floor, grown)
+
+    chosen = [point for point in chosen if point.error >= ABOVE_FLOOR * rounding(point)][-MOST_FITTED:]
     if len(chosen) < FEWEST_FITTED:
         return None
-    x, y = np.log([abs(x.step or 0.0) for x in chosen]), np.log([x.error for x in chosen])
+    x, y = _logarithms(chosen)
     while len(x) > FEWEST_FITTED and _curvature(x, y) > MOST_CURVATURE:
         x, y = x[1:], y[1:]
-    found = line(x, y)
+    found, slopes = line(x, y), _slopes(x, y)
+    *_, before, last = np.abs(np.diff(slopes))
+    error = max(found.standard_error, float(np.ptp(slopes)))
+    if last > max(before, MOST_DRIFT) or error > 0.5:
+        return None
     return Fit(
         order=found.slope,
-        # the remaining curvature is a systematic error, not scatter
-        standard_error=max(found.standard_error, abs(found.slope - (y[-1] - y[-2]) / (x[-1] - x[-2]))),
+        standard_error=error,
         constant=float(np.exp(found.intercept)),
         points=len(x),
     )
+
+
+def _logarithms(points: Sequence[Point]) -> tuple[Floats, Floats]:
+    """Of the steps and of the errors (j,)."""
+    return np.log([abs(x.step or 0.0) for x in points]), np.log([x.error for x in points])
+
+
+def _slopes(x: Floats, y: Floats) -> Floats:
+    return np.asarray(np.diff(y) / np.diff(x))
 
 
 def _curvature(x: Floats, y: Floats) -> float:

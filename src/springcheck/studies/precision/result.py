@@ -42,7 +42,7 @@ class MethodSummary:
     @cached_property
     def fit(self) -> Fit | None:
         """Error = constant * step**order; None also with too few points."""
-        return None if self.is_adaptive else fits.order(self.complete)
+        return None if self.is_adaptive else fits.order(self.complete, self.condition)
 
     @cached_property
     def lowest(self) -> Point | None:

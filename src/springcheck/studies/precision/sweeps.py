@@ -179,7 +179,7 @@ def fitting(sweeps: list[Sweep], known: Truth, left: float) -> list[Sweep]:
 def _need(sweep: Sweep, duration: float) -> float:
     """Seconds until a method of fixed step has passed its floor; infinite while these cannot be estimated."""
     points = sweep.complete
-    fit = fits.order(points) if not sweep.method.adaptive else None
+    fit = fits.order(points, sweep.condition) if not sweep.method.adaptive else None
     if fit is None or sweep.condition is None:
         return np.inf
     steps, _ = fits.expected_floor(points, fit, sweep.condition, duration)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from argparse import Namespace
 from collections.abc import Sequence
 
-from springcheck.studies.precision.fits import Point
+from springcheck.studies.precision.fits import Fit, Point
 from springcheck.studies.precision.result import MethodSummary, PrecisionStudy
 from springcheck.studies.text import left_out, resumed
 from springcheck.text.lines import Lines, Row, TextTable, plain, table
@@ -54,7 +55,7 @@ def _methods(methods: Sequence[MethodSummary]) -> TextTable:
     rows = [
         (
             m.method,
-            "-" if m.fit is None else f"{m.fit.order:.4f}({m.fit.standard_error:.0e})",
+            "-" if m.fit is None else _order(m.fit),
             number(m.floor, ".1e"),
             number(m.floor_ratio, ".2g"),
             *map(seconds, (m.least("run", "steps"), m.least("read", "steps"), m.least("start"))),
@@ -62,6 +63,12 @@ def _methods(methods: Sequence[MethodSummary]) -> TextTable:
         for m in methods
     ]
     return table(("method", "order", "floor", "/eps*cond", "step", "step, read", "start"), rows)
+
+
+def _order(fit: Fit) -> str:
+    """With the digits that its error allows, four at most."""
+    digits = min(4, max(0, -math.floor(math.log10(fit.standard_error)))) if fit.standard_error else 4
+    return f"{fit.order:.{digits}f}({fit.standard_error:.0e})"
 
 
 def _cheapest(answers: Sequence[tuple[float, Point | None]]) -> TextTable:

@@ -87,15 +87,22 @@ def _beyond(report: Report) -> Lines:
         least = min((one.limit for one in ran if one.limit), default=np.inf)
         if h * np.sqrt(np.max(np.abs(system.modes.w2))) < least:
             return []
-    from springcheck.studies.stability.longest import too_long
+    from springcheck.studies.stability.longest import resonating, too_long
 
     out: Lines = []
     for scheme in dict.fromkeys(run.scheme for run in report.runs):
-        limit = too_long(scheme, report.scene)
-        if limit is not None:
-            names = ", ".join(run.method for run in report.runs if run.scheme == scheme)
-            said = f"is beyond the limit of {schemes.title(scheme)} here, {limit:.4g}: {names}"
-            out.append(plain(f"h = {report.scene.step:g} {said}", "bold yellow"))
+        title = schemes.title(scheme)
+        if (limit := too_long(scheme, report.scene)) is not None:
+            said = f"is beyond the limit of {title} here, {limit:.4g}"
+        elif (factor := resonating(scheme, report.scene)) is not None:
+            said = (
+                f"makes {title} grow by a factor of {factor:.4f} a step, and the exact solution stays bounded"
+            )
+            said += "; take a step that is short beside the period of the modulation"
+        else:
+            continue
+        names = ", ".join(run.method for run in report.runs if run.scheme == scheme)
+        out.append(plain(f"h = {report.scene.step:g} {said}: {names}", "bold yellow"))
     return [plain(), *out] if out else []
 
 

@@ -2,12 +2,14 @@
 
 The map is that of the scene linearised where its motion is stiffest, with its friction, and with slow and
 fast springs separate for a scheme that treats them differently.  Uncoupled modes have a 2 x 2 matrix each;
-otherwise all eigenvalues are those of one 2n x 2n matrix.
+otherwise all eigenvalues are those of one 2n x 2n matrix.  A spring of modulated stiffness has no such map,
+and no longest step: a step may resonate with the modulation far below the limit on a spring as stiff, and be
+bounded again beyond it.  Of one step the product of many tells.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -16,7 +18,8 @@ from springcheck import schemes
 from springcheck.errors import SceneError
 from springcheck.physics import exact
 from springcheck.physics.arrays import ROUNDOFF, Extended, Floats, Force, Reals
-from springcheck.physics.driven import ModulatedSpring
+from springcheck.physics.driven import CLOCK, ModulatedSpring
+from springcheck.physics.exact.mathieu import floquet
 from springcheck.physics.scene import Scene
 from springcheck.physics.system import MOST_DENSE, System
 from springcheck.physics.terms import WallSpring
@@ -52,6 +55,10 @@ known to the square root of the rounding only."""
 LEAST_DECAY = 2.0**-80
 """Relative decay below which a mode counts as undamped: the square of 2**12 roundings."""
 
+MODULATED_STEPS = 8192
+"""Steps whose product shows whether a scheme grows on modulated springs: by more than their number squared,
+as at an edge of stability the product grows with their number."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Linear:
@@ -69,6 +76,11 @@ class Linear:
         """Uncoupled modes (g,)."""
         a = np.asarray(w2, np.longdouble)[:, None, None]
         return cls(slow=a, fast=np.zeros_like(a), rate=np.asarray(rate, np.longdouble)[:, None])
+
+
+def is_modulated(scene: Scene) -> bool:
+    """Whether the stiffness of a spring is modulated."""
+    return any(isinstance(x, ModulatedSpring) for x in scene.terms)
 
 
 @lru_cache(maxsize=8)
@@ -138,11 +150,15 @@ def fastest(scene: Scene) -> float:
 def linear(scene: Scene, scheme: Scheme) -> Linear | None:
     """The linearised motion that determines a scheme's stability on a scene.
 
-    None for more coupled particles than are examined, in a magnetic field, which is no stiffness, and where
-    position-dependent friction acts on joined particles.
+    None for more coupled particles than are examined, in a magnetic field, which is no stiffness, where
+    position-dependent friction acts on joined particles, and where a stiffness is modulated.
     """
-    system = _at_its_stiffest(scene).system
-    if "magnetic" in system.acting or (system.brakes_by_place and not system.is_separate):
+    system = scene.system
+    if (
+        "magnetic" in system.acting
+        or is_modulated(scene)
+        or (system.brakes_by_place and not system.is_separate)
+    ):
         return None
     if (scheme.has("mixes") and system.fast) or not (system.is_separate or system.has_one_friction_rate):
         if scene.n > MOST_COUPLED:
@@ -235,6 +251,9 @@ def longest(scheme: Scheme, scene: Scene, limit: float | None = None) -> float:
     For a scheme of multiple time steps that is where its first resonance begins.  `limit` replaces the
     scheme's for an engine that departs from its map.
     """
+    if is_modulated(scene):
+        # two steps that are bounded on every spring may resonate if their springs are not equally stiff
+        return np.nan
     limit = limit_of(scheme) if limit is None else limit
     if not scheme.has("one-step") or np.isinf(limit):
         # a scheme that is bounded on every spring is bounded with friction too
@@ -270,6 +289,37 @@ def too_long(name: str, scene: Scene) -> float | None:
             return None
         limit = longest(scheme, scene)
     return limit if 0 < limit < h[0] else None
+
+
+def resonating(name: str, scene: Scene) -> float | None:
+    """The factor by which a scheme's step multiplies the motion of modulated springs on average, if it grows
+    where the exact solution stays bounded; else, of other scenes, and of a scheme without stable steps None.
+    """
+    scheme, exactly = schemes.known().get(name), floquet(scene.system) if scene.n <= MOST_COUPLED else None
+    if exactly is None or exactly[0] > 1 or scheme is None or scheme.has("random"):
+        return None
+    if not scheme.has("one-step") or not limit_of(scheme):
+        return None
+    (term,), n = scene.terms, scene.n
+    assert isinstance(term, ModulatedSpring)
+    about = scene.derived(terms=(replace(term, at=np.zeros_like(term.at)),))
+    unit = scene.m * fastest(scene)
+    q, p = np.zeros((2, 2, MODULATED_STEPS, n + 1), np.longdouble)
+    q[..., n], p[..., n] = scene.step * np.arange(MODULATED_STEPS), CLOCK
+    q[0, :, :n], p[1, :, :n] = 1, unit
+    with np.errstate(all="ignore"):
+        q, p = schemes.Law(scheme=scheme, scene=about.system.clocked, h=scene.step).step(q, p)
+        maps = np.stack([q[..., :n], p[..., :n] / unit]).transpose(2, 3, 0, 1)
+        for _ in range(3):
+            maps = maps[1::2] @ maps[::2]
+        product, grown, largest = np.eye(2), np.zeros(n), np.zeros(n)
+        for one in maps:
+            product = one @ product
+            size = np.max(np.abs(product), axis=(1, 2))
+            product, grown = product / size[:, None, None], grown + np.log(size)
+            largest = np.maximum(largest, grown)
+    most = float(np.max(largest))
+    return float(np.exp(most / MODULATED_STEPS)) if most > 2 * np.log(MODULATED_STEPS) else None
 
 
 def _first(scheme: Scheme, of: Linear, scale: float) -> float:

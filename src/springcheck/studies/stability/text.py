@@ -8,7 +8,7 @@ import numpy as np
 
 from springcheck.physics.exact import has_true_motion
 from springcheck.physics.exact.mathieu import floquet
-from springcheck.studies.stability.longest import fastest
+from springcheck.studies.stability.longest import fastest, is_modulated
 from springcheck.studies.stability.result import Stability
 from springcheck.studies.text import left_out, resumed
 from springcheck.text.lines import Lines, plain, table
@@ -56,7 +56,7 @@ def _of_scene(study: Stability) -> Lines:
         return [plain("  nothing in this scene oscillates: no step is too long for its stability")]
     if not w and not scene.system.is_damped:
         return [plain("  nothing in this scene oscillates at its start, which says nothing of where it goes")]
-    most = ", its modulated springs at their stiffest" * any(x.key == "modulated-spring" for x in scene.terms)
+    most = ", its modulated springs at their stiffest" * is_modulated(scene)
     there = ", where its motion is stiffest" if has_true_motion(scene) else f", at its start{most}"
     where = "" if scene.system.is_linear else there
     left = {"friction": scene.system.is_damped, "field": any(x.kind == "magnetic" for x in scene.terms)}
@@ -73,7 +73,10 @@ def _of_scene(study: Stability) -> Lines:
         bounded = "stays bounded" if grown == 1 else f"grows by a factor of {grown:.6g}"
         said = f"the exact motion {bounded} (Floquet)"
         out.append(plain(f"  in each period of its modulation, {period:.4g}, {said}"))
+    if is_modulated(scene):
+        said = "no largest step is known: one may resonate with the modulation below its limit on a spring"
+        out.append(plain(f"  {said}", "dim"))
     elif not scene.system.is_linear:
-        said = "limits of small oscillations there; an anharmonic or modulated motion may be lost below them"
+        said = "limits of small oscillations there; an anharmonic motion may be lost below them"
         out.append(plain(f"  {said}", "dim"))
     return out
