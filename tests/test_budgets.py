@@ -18,7 +18,7 @@ BUDGETS = {
     ("engines",): 2763,
     ("driver", "conformance", "doors"): 1239,
     ("checks",): 5230,
-    ("identify",): 9023,
+    ("identify",): 9060,
     ("formats", "store"): 5261,
     ("studies",): 1453,
     ("studies/*",): 9626,

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from springcheck.errors import IdentificationError
 from springcheck.identify.evidence import FIXED, SPARE, Measured
-from springcheck.identify.fit import Map, fit
+from springcheck.identify.fit import LEAST_NOISE, Map, fit
 from springcheck.identify.hypothesis import SURE
 from springcheck.identify.noise import least_squares
 from springcheck.identify.record import AT_REST, Record, of_size, stated_stride
@@ -148,6 +148,10 @@ def _uncoupled(record: Record, maps: dict[int, Map]) -> Record | None:
 SAME_MODE = 1e-5
 """Relative difference of eigenvalues below which any combination of two modes is one."""
 
+UNEVEN = 16.0
+"""Ratio of the sizes of frames from which the forces' part of a map of all, which the small ones hardly show,
+tells slow modes apart less well than each mode's own map."""
+
 
 def _modes(record: Record, chosen: list[int]) -> tuple[Record, float] | None:
     """Positions and velocities of the normal modes of the chosen coordinates as a record, and the root mean
@@ -164,8 +168,11 @@ def _modes(record: Record, chosen: list[int]) -> tuple[Record, float] | None:
         return None
     scaled = z / size
     columns = np.concatenate([scaled[:-1], np.ones((frames - 1, 1), dtype=np.longdouble)], axis=1)
-    x = least_squares(columns, scaled[1:])
-    left = float(np.sqrt(np.mean((scaled[1:] - columns @ x).astype(np.float64) ** 2)))
+    # a motion that grows rounds its last frames far more coarsely than those that show the other modes
+    each = np.max(np.abs(scaled), axis=1, keepdims=True)
+    weight = 1 / np.maximum(np.maximum(each[1:], each[:-1]), LEAST_NOISE * np.max(each))
+    x = least_squares(columns * weight, scaled[1:] * weight)
+    left = float(np.sqrt(np.mean((weight * (scaled[1:] - columns @ x)).astype(np.float64) ** 2)))
     # the force's block: proportional to the springs' matrix for every scheme, to leading order in the step
     block = x[:-1].T[n:, :n]
     values, vectors = np.linalg.eig(block.astype(np.float64))
@@ -179,7 +186,8 @@ def _modes(record: Record, chosen: list[int]) -> tuple[Record, float] | None:
         # eigenvectors of double precision, corrected to first order with what they leave off the diagonal
         inside = _inverse(basis) @ block @ basis
         basis = basis @ (np.eye(n) + np.where(far, inside / np.where(far, gap, 1), 0) * (1 - np.eye(n)))
-    inverse = _inverse(basis)
+    uneven = np.max(weight) > UNEVEN * np.min(weight)
+    inverse = _parted(scaled, x[:-1].T, basis, weight) if uneven else _inverse(basis)
     q = record.q[:, chosen] @ inverse.T
     v = record.v[:, chosen] @ inverse.T
     spreading = np.abs(inverse).astype(np.float64)
@@ -199,6 +207,26 @@ def _modes(record: Record, chosen: list[int]) -> tuple[Record, float] | None:
         ),
         left,
     )
+
+
+def _parted(z: Extended, whole: Extended, basis: Extended, weight: Extended) -> Extended:
+    """Rows (n, n) that take coordinates to modes of one map each, from states z (f, 2n) and the map (2n, 2n)
+    of all: in a row with a share d of another's, a step leaves over d times what the other's map has more."""
+    inverse, n = _inverse(basis), len(basis)
+    blocks = inverse @ whole.reshape(2, n, 2, n).swapaxes(1, 2) @ basis
+    own = np.moveaxis(np.diagonal(blocks, axis1=2, axis2=3), 2, 0)
+    y = np.moveaxis(z.reshape(-1, 2, n) @ inverse.T, 2, 0)
+    shares = np.eye(n, dtype=np.longdouble)
+    for i, one in enumerate(own):
+        other = (weight * y[:, :-1]) @ np.swapaxes(own - one, 1, 2)
+        mine = np.column_stack([y[i, :-1], np.ones(len(weight))]) * weight
+        alone = np.stack([np.column_stack([mine, 0 * mine]), np.column_stack([0 * mine, mine])], axis=1)
+        columns = np.concatenate([np.delete(np.moveaxis(other, 0, 2), i, axis=2), alone], axis=2)
+        flat = columns.reshape(-1, n + 5).astype(np.float64)
+        size = np.max(np.abs(flat), axis=0)
+        left = (weight * (y[i, 1:] - y[i, :-1] @ one.T)).astype(np.float64).ravel()
+        shares[i, np.arange(n) != i] = -(np.linalg.lstsq(flat / size, left)[0] / size)[: n - 1]
+    return np.asarray(shares @ inverse)
 
 
 def _inverse(x: Extended) -> Extended:
