@@ -34,7 +34,8 @@ def test_temperatures_errors_and_limits_lie_on_their_laws() -> None:
     assert np.abs(one.off / one.off_law - 1).max() < 5 / np.sqrt(2 * 100)
     assert one.limit == pytest.approx([2, 2, 2], abs=1e-3)
     assert one.limit_law == pytest.approx([2, 2, 2], abs=1e-3)
-    assert one.force_calls == 2
+    # one a step, as of engines that keep it, and the first
+    assert one.force_calls == pytest.approx(1, abs=0.01)
 
 
 def test_a_friction_of_the_half_step_shortens_the_stable_step() -> None:
