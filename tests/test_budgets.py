@@ -11,7 +11,7 @@ HOME = Path(springcheck.__file__).parent
 
 BUDGETS = {
     ("physics",): 7029,
-    ("schemes",): 1665,
+    ("schemes",): 1671,
     ("thermal",): 3243,
     ("engines/own",): 1633,
     ("engines/openmm", "engines/ase", "engines/sundials"): 1281,
@@ -21,8 +21,8 @@ BUDGETS = {
     ("identify",): 9060,
     ("formats", "store"): 5261,
     ("studies",): 1453,
-    ("studies/*",): 9641,
-    ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 7124,
+    ("studies/*",): 9651,
+    ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 7126,
 }
 """Lines of each room, or of several: of an engine in one file, and of what all studies share, in the first
 folder."""
