@@ -393,6 +393,18 @@ def test_frames_far_apart_are_reached_in_pieces_to_the_same_numbers(
     assert whole.force_calls == pieces.force_calls
 
 
+@pytest.mark.parametrize(("label", "first"), [("own:euler", 0), ("own:velocity-verlet", 1)])
+@pytest.mark.parametrize("every", [1, 5])
+def test_force_calls_of_a_diverged_run_are_those_up_to_its_last_frame(
+    label: str, first: int, every: int
+) -> None:
+    """Its last piece is filled to the end with what is not finite."""
+    scene = replace(scenes.load_scene("spring"), step=1e3, steps=300, every=every)
+    run = springcheck.simulate(scene, label)
+    assert run.outcome.status == "diverged"
+    assert run.force_calls == run.outcome.step + first > 20
+
+
 @pytest.mark.parametrize("rows", [0, 300])
 def test_an_engine_that_fills_nothing_from_some_row_on_is_told_so(rows: int) -> None:
     class Idle:

@@ -751,3 +751,57 @@ def test_a_stepper_that_leaves_by_whatever_exception_is_told_in_a_line(raised: B
 
     with pytest.raises(MethodError, match=f"failed at q=.*{type(raised).__name__}"):
         identify_stepper(step)
+
+
+def of_explicit_euler(m: list[float], k: list[float], rest: list[float], q: list[float], p: list[float],
+                      h: float, frames: int, cubic: float = 0.0) -> Identification:  # fmt: skip
+    """Identify explicit Euler of particles each joined to the next, and by a cubic force to 0."""
+    states = [(np.array(q), np.array(p))]
+    mass = np.array(m)
+    for _ in range(frames):
+        at, moving = states[-1]
+        pulls = np.array(k) * (np.diff(at) - rest)
+        force = np.append(pulls, 0) - np.append(0, pulls) - cubic * at**3
+        states.append((at + h * moving / mass, moving + h * force))
+    return identify(h * np.arange(frames + 1), *np.swapaxes(states, 0, 1), mass=mass)
+
+
+PAIR = {"m": [2.3, 1.1], "k": [3.9], "rest": [1.3], "q": [0.1, 1.6], "p": [0.7, -0.2], "h": 0.11}
+CARBON_MONOXIDE = {
+    "m": [12.011, 15.999], "k": [1.143e6], "rest": [0.1128], "q": [0.0, 0.1188], "p": [1.7, -0.4],
+    "h": 0.0007,
+}  # fmt: skip
+THREE = {
+    "m": [2.3, 0.7, 5.7], "k": [32.1, 11.1], "rest": [0.9, 1.2], "q": [0.3, 1.3, 2.3],
+    "p": [-0.5, 0.25, 0.25], "h": 0.08,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("scene", "frames", "omega"),
+    [(PAIR, 600, 2.28934635199), (PAIR, 1500, 2.28934635199), (CARBON_MONOXIDE, 900, 408.172429968),
+     (THREE, 100, 8.54343629), (THREE, 300, 8.54343629)],
+)  # fmt: skip
+def test_of_a_motion_that_grows_small_modes_have_the_roundings_of_the_large(
+    scene: dict[str, Any], frames: int, omega: float
+) -> None:
+    """One mode grows by up to 1e25, and the coordinates' roundings with it."""
+    found = of_explicit_euler(**scene, frames=frames)
+    assert found.scheme == "explicit-euler"
+    assert found.precision == "double"
+    assert max(found.omega) == pytest.approx(omega, rel=2e-9 if scene is THREE else 2e-12)
+    assert found.explanations == ()
+
+
+@pytest.mark.parametrize("cubic", [1e-6, 1e-13])
+def test_a_small_cubic_force_is_seen_in_a_motion_that_grows(cubic: float) -> None:
+    """Its part grows to 1e-9 of the linear force's, at the least."""
+    found = of_explicit_euler(**PAIR, frames=300, cubic=cubic)
+    assert found.scheme is None
+    assert found.explanations
+
+
+def test_what_is_off_in_a_few_frames_is_measured_by_the_size_of_a_growing_motion_there() -> None:
+    """It grows by 1e75, so that its last frames alone show: no restart among them is told of."""
+    found = of_explicit_euler(**THREE, frames=900)
+    assert "not from frame" not in found.statement

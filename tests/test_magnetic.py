@@ -11,9 +11,11 @@ import pytest
 import lammps_field
 import springcheck
 from springcheck import checks, schemes
+from springcheck.engines.own import vectors
 from springcheck.errors import SceneError
 from springcheck.physics import exact
 from springcheck.physics import scenefile as scenes
+from springcheck.physics.arrays import Force, Reals
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Damping, Magnetic, Spring, WallSpring
 from springcheck.studies.stability import longest
@@ -254,3 +256,29 @@ def test_a_field_is_named_in_files_of_three_axes_beside_what_swings_along_it(axi
     assert found.verdict == "none"
     assert f"The velocity of coordinates {one} and {other} turns by" in found.statement
     assert "strength over mass 0.621621622, stiffness over mass 0.783783784" in found.statement
+
+
+@pytest.mark.parametrize(("method", "calls"), [("boris", 40), ("velocity-verlet", 80)])
+def test_forces_in_a_field_are_counted_as_they_are_evaluated(
+    method: str, calls: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Boris' turn is no force, and its half kicks are at one position; another scheme's force has the field
+    in it, and changes with the momentum."""
+    made: list[int] = []
+    kept = vectors.kept
+
+    def counted(force: Force, damped: bool) -> Force:
+        which = len(made)
+        made.append(0)
+
+        def count(q: Reals, p: Reals) -> Reals:
+            made[which] += 1
+            return force(q, p)
+
+        return kept(count, damped)
+
+    monkeypatch.setattr(vectors, "kept", counted)
+    scene = replace(scenes.load_scene("foucault"), steps=40)
+    run = springcheck.simulate(scene, f"own:{method}")
+    force, slow, fast, _ = made
+    assert run.force_calls == force + slow + fast == calls

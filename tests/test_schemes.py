@@ -234,3 +234,17 @@ def test_the_exact_flow_is_right_to_its_last_digits_however_strong_the_friction(
             for x, y in zip(found.flat, expected, strict=True)
         ]
     assert max(off) < 32 * np.finfo(np.longdouble).eps
+
+
+@pytest.mark.parametrize("name", [x for x, one in schemes.SCHEMES.items() if one.has("one-step")])
+@pytest.mark.parametrize("c", [0.0, 0.4])
+def test_with_friction_kicks_of_its_force_are_of_first_order(name: str, c: float) -> None:
+    """The error of the map of a unit of time, at two steps."""
+    scheme, one = schemes.SCHEMES[name], np.ones(1)
+    exact = mpmath.expm(mpmath.matrix([[0, 1], [-1, -c]]))
+    off = []
+    for steps in (256, 512):
+        step = schemes.matrix(scheme, h=1 / steps, m=one, k=one, c=c * one)[0]
+        whole = mpmath.matrix(np.linalg.matrix_power(step, steps).tolist())
+        off.append(float(mpmath.mnorm(whole - exact)))
+    assert np.log2(off[0] / off[1]) == pytest.approx(scheme.braked_order if c else scheme.order, abs=0.2)

@@ -21,7 +21,7 @@ from springcheck.physics import builders
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.arrays import Extended
 from springcheck.physics.driven import ModulatedSpring
-from springcheck.physics.terms import Damping, Quartic
+from springcheck.physics.terms import Damping, Quartic, Weight
 from springcheck.studies.choose import LeftOut
 from springcheck.studies.run import measure as session
 from springcheck.studies.run import text as run_text
@@ -302,3 +302,29 @@ def test_the_stiffest_state_of_an_anharmonic_motion_is_that_of_its_amplitude() -
     # k/2 A**2 + b/4 A**4 is the energy, and k + 3 b A**2 the curvature there
     square = (np.sqrt(k * k + 4 * b * energy) - k) / b
     assert fastest(scene) == pytest.approx(np.sqrt((k + 3 * b * square) / scene.m[0]), rel=1e-8)
+
+
+def test_a_method_that_needs_a_field_is_told_why_it_has_no_limit() -> None:
+    found = stability.record(scenes.load_scene("magnetic"), None, ["own:boris", "own:euler"])
+    why = "it needs a magnetic field, and limits are measured on springs without one"
+    assert found.left_out == (LeftOut(method="own:boris", reason=why),)
+
+
+@pytest.mark.parametrize("bent", [False, True])
+def test_a_spring_with_a_constant_force_is_not_called_anharmonic(bent: bool) -> None:
+    plain, one = scenes.load_scene("spring"), np.array([0])
+    weight = Weight(i=one, force=np.array([-3.0]), at=np.zeros(1))
+    more = Quartic(i=one, b=np.ones(1), at=np.zeros(1)) if bent else weight
+    study = stability.record(plain.derived(terms=(*plain.terms, more)), None, ["own:euler"])
+    said = "\n".join(str(line) for line in STUDY.lines(study) if isinstance(line, Text))
+    assert ("anharmonic" in said) == bent
+
+
+def test_an_error_that_is_not_known_is_told_why(tmp_path: Path) -> None:
+    plain, one = scenes.load_scene("spring"), np.array([0])
+    weight = Weight(i=one, force=np.array([-3.0]), at=np.zeros(1))
+    for terms, unknown in (((), False), ((weight,), True)):
+        scene = plain.derived(terms=(*plain.terms, *terms))
+        report = session.run(scene, tmp_path / f"{unknown}.h5", methods=["own:euler"])
+        said = as_text(run_text.lines(report))
+        assert ("-: no exact solution of this scene is known here" in said) == unknown

@@ -127,13 +127,17 @@ def play(
     _hand_over(scene, sink, 0, scene.q[None], scene.p[None], first)
     run_seconds = 0.0
     outcome = Outcome(status="complete", step=scene.steps)
-    frame = 1
+    frame, calls = 1, 0
     while frame < scene.frames:
         f = min(ready, scene.frames - frame)
         q[f - 1], p[f - 1] = UNTOUCHED, UNTOUCHED
         ended, seconds = _advance(simulation, scene.every, piece, q[:f], p[:f], progress)
         good = ended.step // scene.every
         run_seconds += seconds
+        before, calls = calls, simulation.force_calls
+        if ended.status == "diverged" and not method.adaptive:
+            # steps to the last frame that is kept: every step costs the same, but for a first force
+            calls = before - (before - calls) * good // f
         ready = min(rows, 4 * ready) if whole and seconds < QUICK else ready
         if good:
             _hand_over(scene, sink, frame, q[:good], p[:good], simulation.last_steps(good))
@@ -154,7 +158,7 @@ def play(
         tolerance=scene.tolerance if method.adaptive else None,
         outcome=outcome,
         timing=Timing(start=start_seconds, run=run_seconds),
-        force_calls=simulation.force_calls,
+        force_calls=calls,
         arithmetic=how,
         rebuilds_velocity=method.rebuilds_velocity,
         off_axis=simulation.off_axis,

@@ -184,7 +184,9 @@ def scheme_lines(scheme: Scheme) -> Iterator[str]:
         if scheme.has("symplectic", "friction"):
             area = "conformally symplectic: a step takes area by exp(-h c/m), without friction it keeps it"
         where = bounded or f"h omega up to {scheme.limit:.6g}"
-        yield f"Order {scheme.order}; {area}; bounded on a spring: {where}"
+        braked = scheme.braked_order
+        lower = f" ({braked} with friction or in a magnetic field)" if braked < scheme.order else ""
+        yield f"Order {scheme.order}{lower}; {area}; bounded on a spring: {where}"
     if scheme.source:
         yield _line(f"Source: {scheme.source}")
 

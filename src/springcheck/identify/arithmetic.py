@@ -252,9 +252,7 @@ def _roundings(record: Record, j: int, found: Map, matches: list[Match]) -> Roun
     size += np.where(flow, turned, 0.0)[:, None, None] * np.max(lengths)
     position = np.abs(z[1:, 0] + float(found.centre[0] / found.size[0]))
     if record.parts is not None:
-        summed = np.stack(
-            [record.parts[0][:, j], record.parts[1][:, j] * abs(float(record.interval))], axis=1
-        )
+        summed = record.summed(j)
         size += 2 * (summed[1:] + summed[:-1]) / found.size.astype(np.float64)
         position = summed[1:, 0] / float(found.size[0])
     difference = np.zeros_like(size)

@@ -252,7 +252,9 @@ def fit(record: Record, j: int, *, kept: NDArray[np.bool_] | None = None, consta
     sigma = record.sigma(j) / size.astype(np.float64)
     row = np.max(sigma, axis=1, keepdims=True)
     sigma = np.maximum(sigma, FLOOR * np.where(row > 0, row, np.median(row)))
-    length = _lengths(z, np.zeros(2))
+    # a mode that is a small difference of large coordinates has their roundings
+    parts = np.zeros((len(z), 2)) if record.parts is None else record.summed(j) / size.astype(np.float64)
+    length = _lengths(z, np.zeros(2), parts)
     # what happens in other pairs than those that are kept is unknown
     unknown = 1.0 if kept is None else np.where(kept, 1.0, UNKNOWN / ROUNDING)
     process = ROUNDING * length * unknown
@@ -262,7 +264,7 @@ def fit(record: Record, j: int, *, kept: NDArray[np.bool_] | None = None, consta
     best, centred, deviations = _constant_part(z, 0 * sigma, pairs, None, record, constant)
     if centred:
         # roundings are relative to the distance from the equilibrium, and to that of the equilibrium from 0
-        length = _lengths(z, best.centre)
+        length = _lengths(z, best.centre, parts)
         process = ROUNDING * length * unknown
         best = _minimum(z, 0 * sigma, process, best, centred, deviations) if record.fine else best
     if not record.fine:
@@ -308,9 +310,9 @@ def _least(freedom: int) -> float:
     return max(LEAST_LEFT, min(1.0, ENOUGH / max(freedom, 1)))
 
 
-def _lengths(z: Extended, centre: Extended | Floats) -> Floats:
-    """Sizes (f - 1,) to which the rounding of each pair is relative."""
-    away = np.sqrt(np.sum((z - centre).astype(np.float64) ** 2, axis=1))
+def _lengths(z: Extended, centre: Extended | Floats, parts: Floats) -> Floats:
+    """Sizes (f - 1,) to which the rounding of each pair is relative, `parts` (f, 2) at least."""
+    away = np.sqrt(np.sum(np.maximum(np.abs((z - centre).astype(np.float64)), parts) ** 2, axis=1))
     if not np.any(away[:-1]):
         raise IdentificationError("a coordinate rests but for the last frame: give the part before")
     # a start of few digits, or 0, is exact, but what follows from it is not

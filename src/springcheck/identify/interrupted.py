@@ -22,7 +22,7 @@ from springcheck.identify.evidence import (
     matched,
 )
 from springcheck.identify.families import FAMILIES, OF_HALF_A_STEP_AGO, VERLET, titles
-from springcheck.identify.fit import Map, fit
+from springcheck.identify.fit import LEAST_NOISE, Map, fit
 from springcheck.identify.hypothesis import FEW, Joint, Match, distinct
 from springcheck.identify.maps import powers, unit
 from springcheck.identify.result import Explanation
@@ -207,7 +207,10 @@ def broken(e: Evidence, *, regular: bool = False) -> Explanation | None:
     z = np.concatenate([record.q[:, moving], record.v[:, moving]], axis=1).astype(np.float64)
     quanta = np.concatenate([record.q_quantum[:, moving], record.v_quantum[:, moving]], axis=1)
     size = np.maximum(np.max(np.abs(z), axis=0), np.finfo(np.float64).tiny)
-    columns, ends = np.column_stack([z[:-1] / size, np.ones(e.pairs)]), z[1:] / size
+    # of a motion that grows each pair is weighted by its own size
+    each = np.max(np.abs(z / size), axis=1)
+    each = np.maximum(np.maximum(each[1:], each[:-1]), LEAST_NOISE * np.max(each))[:, None]
+    columns, ends = np.column_stack([z[:-1] / size, np.ones(e.pairs)]) / each, z[1:] / size / each
     part, room = columns.shape[1] + SPARE, LEFT_BY_ALL + 32 * float(np.max(quanta / size))
     if len(moving) < 2 or e.pairs < 2 * part:
         return None
@@ -235,7 +238,7 @@ def broken(e: Evidence, *, regular: bool = False) -> Explanation | None:
         return None
     at = [f"from frame {x[0]} to {x[-1] + 1}" for x in runs]
     where = at[0] + often if often else few(at, 3)
-    what = _at_once(z[bad + 1], missed[bad] * size) if single else ""
+    what = _at_once(z[bad + 1], missed[bad] * each[bad] * size) if single else ""
     return Explanation(
         f"The coupled motion is that of one map of all coordinates, but not {where}{what}",
         "look at what happens there: a restart, how those frames are written, or what acts at them alone, as "

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from springcheck.errors import IdentificationError
 from springcheck.identify.evidence import FALLS, FIXED, LEFT_BY_ROUNDING, SPARE, Measured
-from springcheck.identify.fit import FLOOR, Map, fit
+from springcheck.identify.fit import FLOOR, LEAST_NOISE, Map, fit
 from springcheck.identify.hypothesis import SURE
 from springcheck.identify.maps import powers
 from springcheck.identify.noise import least_squares
@@ -140,19 +141,40 @@ def _forced(found: Map) -> bool:
 
 def _uncoupled(record: Record, maps: dict[int, Map]) -> Record | None:
     """The record of the normal modes, if the coordinates are coupled and the modes are not."""
-    block = coupled(record, maps, 1e-3 if record.fine else 1 / FALLS)
-    basis = None if block is None else _modes(block)
-    parts = _moving_parts(record, list(maps))
+    chosen = list(maps)
+    whole = coupled(record, maps, 1e-3 if record.fine else 1 / FALLS)
+    basis = None if whole is None else _modes(whole.force)
+    parts = _moving_parts(record, chosen)
     # of two particles that are bound to each other alone the distance is judged
-    if basis is None or (len(parts) > len(basis) and distance(record) is not None):
+    if whole is None or basis is None or (len(parts) > len(basis) and distance(record) is not None):
         return None
-    own = parts @ basis if record.fine else _of_orbit(record, list(maps), parts @ basis)
-    return None if own is None else _along(record, list(maps), own)
+    if not record.fine:
+        own = _of_orbit(record, chosen, parts @ basis)
+        return None if own is None else _along(record, chosen, _inverse(own))
+    uneven = np.max(whole.weight) > UNEVEN * np.min(whole.weight)
+    rows = _parted(whole, basis) @ _inverse(parts) if uneven else _inverse(parts @ basis)
+    return _along(record, chosen, rows)
 
 
-def coupled(record: Record, maps: dict[int, Map], share: float = 1 / FALLS) -> Extended | None:
-    """The force's block (m, m) of the map of all moving parts of the coordinates together, where that leaves
-    a `share` at most of what the maps of single coordinates leave over; None where it leaves more."""
+class Whole(NamedTuple):
+    """The map (2m, 2m) of all moving parts of the coordinates together, from their states (f, 2m), one unit
+    for all positions and one for all velocities, and the weights (f - 1, 1) of the pairs."""
+
+    states: Extended
+    map: Extended
+    weight: Extended
+
+    @property
+    def force(self) -> Extended:
+        """Its block (m, m): proportional to the springs' matrix for every scheme, to leading order in the
+        step."""
+        n = len(self.map) // 2
+        return self.map[n:, :n]
+
+
+def coupled(record: Record, maps: dict[int, Map], share: float = 1 / FALLS) -> Whole | None:
+    """The map of all moving parts of the coordinates together, where that leaves a `share` at most of what
+    the maps of single coordinates leave over; None where it leaves more."""
     single = max(float(np.max(found.residual)) for found in maps.values())
     if len(maps) < 2 or single < max(64 * FIXED, 1e-8):
         return None
@@ -168,25 +190,30 @@ def coupled(record: Record, maps: dict[int, Map], share: float = 1 / FALLS) -> E
         return None
     scaled = z / size
     columns = np.concatenate([scaled[:-1], np.ones((frames - 1, 1), dtype=np.longdouble)], axis=1)
-    ends = scaled[1:]
+    # a motion that grows rounds its last frames far more coarsely than those that show the other modes
+    each, least = np.max(np.abs(scaled), axis=1), LEAST_NOISE
     if not record.fine:
         # frames count by their digits
         unit = [np.max(x[:, list(maps)], axis=1) for x in (record.q_quantum, record.v_quantum * h)]
-        each = np.maximum(unit[0] / size[0], unit[1] / size[-1])
-        each = np.maximum(np.maximum(each[1:], each[:-1]), FLOOR * np.max(each))[:, None]
-        each = each * np.sqrt(np.mean((ends / each) ** 2))
-        columns, ends = columns / each, ends / each
-    x = least_squares(columns, ends)
-    left = float(np.sqrt(np.mean((ends - columns @ x).astype(np.float64) ** 2)))
-    # proportional to the springs' matrix for every scheme, to leading order in the step
-    return np.asarray(x[:-1].T[n:, :n]) if left <= share * single else None
+        each, least = np.maximum(unit[0] / size[0], unit[1] / size[-1]), FLOOR
+    each = np.maximum(np.maximum(each[1:], each[:-1]), least * np.max(each))[:, None]
+    each = each if record.fine else each * np.sqrt(np.mean((scaled[1:] / each) ** 2))
+    weight = 1 / each
+    x = least_squares(columns * weight, scaled[1:] * weight)
+    left = float(np.sqrt(np.mean((weight * (scaled[1:] - columns @ x)).astype(np.float64) ** 2)))
+    return Whole(scaled, x[:-1].T, weight) if left <= share * single else None
 
 
 def _moving_parts(record: Record, chosen: list[int]) -> Extended:
     """Orthogonal combinations (n, m) of coordinates that move, beyond what roundings add up to: all that
     there are, unless one rests, as the centre of mass of a chain without walls."""
     q = record.q[:, chosen].astype(np.float64)
-    _, sizes, ways = np.linalg.svd(q - np.mean(q, axis=0), full_matrices=False)
+    off = q - np.mean(q, axis=0)
+    if record.fine:
+        # of a motion that grows the first frames show what moves beside it
+        so_far = np.maximum.accumulate(np.max(np.abs(q), axis=1, keepdims=True))
+        off = (q - q[0]) / np.where(so_far > 0, so_far, 1)
+    _, sizes, ways = np.linalg.svd(off, full_matrices=False)
     coarse = 0.0 if record.fine else math.sqrt(len(q)) * float(np.max(record.q_quantum[:, chosen]))
     moving = sizes > LEFT_BY_ROUNDING * ROUNDING * len(q) * sizes[0] + coarse
     return (np.eye(len(chosen)) if np.all(moving) else ways[moving].T).astype(np.longdouble)
@@ -194,6 +221,10 @@ def _moving_parts(record: Record, chosen: list[int]) -> Extended:
 
 SAME_MODE = 1e-5
 """Relative difference of eigenvalues below which any combination of two modes is one."""
+
+UNEVEN = 16.0
+"""Ratio of the sizes of frames from which the forces' part of a map of all, which the small ones hardly show,
+tells slow modes apart less well than each mode's own map."""
 
 UNLIKE = 1e6
 """Largest condition number of the modes' basis."""
@@ -216,9 +247,8 @@ def _modes(block: Extended) -> Extended | None:
     return np.asarray(basis)
 
 
-def _along(record: Record, chosen: list[int], basis: Extended) -> Record:
-    """The record of the modes of the chosen coordinates, by their basis (n, m)."""
-    inverse = _inverse(basis)
+def _along(record: Record, chosen: list[int], inverse: Extended) -> Record:
+    """The record of the modes of the chosen coordinates, by the inverse (m, n) of their basis."""
     spreading = np.abs(inverse).astype(np.float64)
     return replace(
         record,
@@ -250,7 +280,7 @@ def _of_orbit(record: Record, chosen: list[int], basis: Extended) -> Extended | 
     rest = np.stack([np.ones(frames), np.zeros(frames)])[:, :, None]
     off = np.inf
     for _ in range(ROUNDS_OF_ORBIT):
-        modes = _along(record, chosen, basis)
+        modes = _along(record, chosen, _inverse(basis))
         straight = [_straight(modes, i) for i in range(basis.shape[1])]
         maps = [np.array([[1, 1], [0, 1]]) if x else fit(modes, i).unscaled for i, x in enumerate(straight)]
         ways = [powers(x.astype(np.float64), frames).transpose(1, 0, 2) for x in maps]
@@ -268,6 +298,27 @@ def _of_orbit(record: Record, chosen: list[int], basis: Extended) -> Extended | 
         if np.linalg.cond(basis.astype(np.float64)) > UNLIKE:
             return None
     return basis if off <= 1 else None
+
+
+def _parted(of: Whole, basis: Extended) -> Extended:
+    """Rows (n, n) that take coordinates to modes of one map each: in a row with a share d of another's, a
+    step leaves over d times what the other's map has more."""
+    z, whole, weight = of
+    inverse, n = _inverse(basis), len(basis)
+    blocks = inverse @ whole.reshape(2, n, 2, n).swapaxes(1, 2) @ basis
+    own = np.moveaxis(np.diagonal(blocks, axis1=2, axis2=3), 2, 0)
+    y = np.moveaxis(z.reshape(-1, 2, n) @ inverse.T, 2, 0)
+    shares = np.eye(n, dtype=np.longdouble)
+    for i, one in enumerate(own):
+        other = (weight * y[:, :-1]) @ np.swapaxes(own - one, 1, 2)
+        mine = np.column_stack([y[i, :-1], np.ones(len(weight))]) * weight
+        alone = np.stack([np.column_stack([mine, 0 * mine]), np.column_stack([0 * mine, mine])], axis=1)
+        columns = np.concatenate([np.delete(np.moveaxis(other, 0, 2), i, axis=2), alone], axis=2)
+        flat = columns.reshape(-1, n + 5).astype(np.float64)
+        size = np.max(np.abs(flat), axis=0)
+        left = (weight * (y[i, 1:] - y[i, :-1] @ one.T)).astype(np.float64).ravel()
+        shares[i, np.arange(n) != i] = -(np.linalg.lstsq(flat / size, left)[0] / size)[: n - 1]
+    return np.asarray(shares @ inverse)
 
 
 def _inverse(x: Extended) -> Extended:

@@ -74,6 +74,12 @@ class Record:
         coarse = [self.q_storage.name != "double", self.v_storage.name != "double"]
         return np.asarray(self.quanta(j) * coarse / np.sqrt(12.0))
 
+    def summed(self, j: int) -> Floats:
+        """Size (f, 2) to which the rounding of each state (q, v T) of coordinate j is relative: its own, or
+        the sum of the absolute values of its terms."""
+        q, v = self.parts or (np.abs(self.q).astype(np.float64), np.abs(self.v).astype(np.float64))
+        return np.stack([q[:, j], v[:, j] * abs(float(self.interval))], axis=1)
+
     @property
     def deep(self) -> bool:
         """Whether the states resolve single precision's roundings: `fine`, or text of enough digits."""

@@ -103,6 +103,12 @@ class Scheme:
         return self.traits.issuperset(traits)
 
     @property
+    def braked_order(self) -> int:
+        """Order where forces depend on the velocity: kicks by them are steps of explicit Euler along p, whose
+        errors of first order no real coefficients cancel."""
+        return 1 if any(kind.evaluates in ("all", "slow") for kind in self.kinds) else self.order
+
+    @property
     def _is_symmetric(self) -> bool:
         """Whether it is its own adjoint."""
         if self.stages:

@@ -91,20 +91,21 @@ class Program:
         x, y = (np.array([getattr(o, name) for o in self.operations], np.float64) for name in "xy")
         return codes, np.array(self.slots, np.int64), x, y
 
-    @property
-    def evaluations(self) -> tuple[int, int]:
-        """Evaluations of the force in the first step, and in each later one: none where the state stayed."""
-        if len(self.a):
-            return self.stages, self.stages
-        stale, counts = [True, True], [0, 0]
-        for cycle in range(2):
-            for o, slot in zip(self.operations, self.slots, strict=True):
-                if o.code not in (FRICTION, DRIFT, SET_CLOCK):
-                    counts[cycle] += stale[slot]
-                    stale[slot] = False
-                moved = o.code not in (FRICTION, KICK, SET_CLOCK)
-                stale = [old or moved or damped for old, damped in zip(stale, self.damped, strict=True)]
-        return counts[0], counts[1]
+
+def evaluations(scheme: Scheme, scene: Scene) -> tuple[int, int]:
+    """Evaluations of forces in the first step, and in each later one: none where nothing has changed that a
+    force depends on.  The turn by a magnetic field is none."""
+    if not scheme.stages:
+        return len(scheme.b), len(scheme.b)
+    fresh: set[str] = set()
+    counts, braked = [0, 0], scene.system.is_damped or any(x.kind == "magnetic" for x in scene.terms)
+    for cycle in range(2):
+        for kind in scheme.kinds:
+            name = POTENTIAL if kind.evaluates == ALL and not braked else kind.evaluates
+            counts[cycle] += name not in (*fresh, "", "magnetic")
+            fresh.add(name)
+            fresh -= fresh if kind.drifts else {ALL, SLOW} if braked else set()
+    return counts[0], counts[1]
 
 
 def program(scheme: Scheme, scene: Scene, h: float) -> Program:

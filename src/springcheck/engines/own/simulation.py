@@ -18,7 +18,7 @@ import springcheck
 from springcheck import schemes
 from springcheck.engines.contract import Label, Method
 from springcheck.engines.own import kernels, layout, solver, tiles, vectors
-from springcheck.engines.own.operations import NoKernelError, Program, program, terms_of
+from springcheck.engines.own.operations import NoKernelError, Program, evaluations, program, terms_of
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import WallSpring
@@ -86,16 +86,16 @@ def prepare(
     threads are used, by default as many as there are processors.
     """
     found = schemes.scheme(scheme) if isinstance(scheme, str) else scheme
+    calls = evaluations(found, scene)
     with np.errstate(all="ignore"):
         try:
             plan = program(found, scene, float(step))
         except NoKernelError:
-            each = len(found.evaluations)
-            return Own(vectors.Vectors(found, scene, step), (each, each), compiled=False)
+            return Own(vectors.Vectors(found, scene, step), calls, compiled=False)
         if _lacks(plan, scene):
-            return Own(vectors.Vectors(found, scene, step), plan.evaluations, compiled=False)
+            return Own(vectors.Vectors(found, scene, step), calls, compiled=False)
         scene = scene.system.clocked
-        job = _one(plan, scene) or _many(plan, scene)
+        job = _one(plan, scene) or _many(plan, scene, max(calls))
     ahead = job.work * scene.steps >= WORTH if compiled is None else compiled
     if ahead:
         try:
@@ -106,7 +106,7 @@ def prepare(
             ahead = False
     tiled = ahead and job.reach > 0
     how = tiles.Tiled(job, threads or tiles.processors()) if tiled else tiles.Whole(job, compiled=ahead)
-    return Own(how, plan.evaluations, compiled=ahead)
+    return Own(how, calls, compiled=ahead)
 
 
 def _lacks(plan: Program, scene: Scene) -> bool:
@@ -133,15 +133,15 @@ def _one(plan: Program, scene: Scene) -> tiles.Job | None:
     return tiles.Job(kernel=kernels.single, head=head, state=state, n=1, work=plan.stages)
 
 
-def _many(plan: Program, scene: Scene) -> tiles.Job:
-    """Any terms: as a row where they allow it, as index lists otherwise."""
+def _many(plan: Program, scene: Scene, calls: int) -> tiles.Job:
+    """Any terms: as a row where they allow it, as index lists otherwise; `calls` forces in a step."""
     n = scene.n
     terms = [terms_of(name, scene) for name in plan.forces]
     slots = layout.slots(terms, scene.m)
     work = float(sum(n + sum(len(part[-1]) for part in layout.lists(some, scene.m)) for some in terms))
     joined = any(len(k) for *_, (k, _, _), _ in slots)
     m, q, p = (np.array(x, dtype=np.float64) for x in (scene.m, scene.q, scene.p))
-    reach = 0 if slots[0][0] else max(plan.evaluations)
+    reach = 0 if slots[0][0] else calls
     solved = solver.NONE
     if plan.implicit_step:
         solved = solver.factors(scene, plan.implicit_step)

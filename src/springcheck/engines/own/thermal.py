@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from springcheck.physics.arrays import Floats
+from springcheck.engines.own.vectors import kept
+from springcheck.physics.arrays import Floats, Force, Reals
 from springcheck.physics.scene import Scene
 from springcheck.thermal import THERMOSTATS, Stepper
 from springcheck.thermal.stepper import forces
@@ -23,14 +24,24 @@ class Random:
         self._q, self._p = scene.q.astype(np.float64), scene.p.astype(np.float64)
         self._scheme = THERMOSTATS[scheme]
         self._step = Stepper.of(self._scheme, scene.derived(step=step), width=np.float64)
-        self._force = forces(self._scheme, scene.system)
-        self._each = sum(act.kind in ("kick", "slow", "fast", "creep") for act in self._scheme.acts)
+        push = forces(self._scheme, scene.system)
+        named = isinstance(push, dict)
+        self._force = {x: self._counted(y) for x, y in push.items()} if named else self._counted(push)
         scripted = hasattr(seed, "standard_normal")
         self._rng = seed if scripted else np.random.Generator(np.random.PCG64(seed))
         # collisions take numbers of their own, far along the same sequence
         self._hits = self._rng if scripted else np.random.Generator(np.random.PCG64(seed).jumped())
         self._ahead = 1 if scripted else max(1, MOST_DRAWS // (scene.n * max(1, self._scheme.draws)))
         self._carried = list(self._drawn(1, self._scheme.carried)[0])
+
+    def _counted(self, force: Force) -> Force:
+        """A force that counts its evaluations, and is kept where the positions stay."""
+
+        def count(q: Reals, p: Reals) -> Reals:
+            self.force_calls += 1
+            return force(q, p)
+
+        return kept(count, damped=False)
 
     def _drawn(self, steps: int, draws: int) -> Floats:
         """(steps, draws, n) numbers of variance 1."""
@@ -56,4 +67,3 @@ class Random:
                     if left % every == 0:
                         q[row], p[row] = self._q, self._p
                         row += 1
-        self.force_calls += every * len(q) * self._each

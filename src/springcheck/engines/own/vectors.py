@@ -26,9 +26,10 @@ class Vectors:
         self._law = Law(scheme=scheme, scene=scene, h=step)
         self._hold, self._rates = system.rods, self._law.rates()
         moving = system.is_damped or bool(self._law.fields)
-        self._force = _kept(system.force, moving)
+        self._force = kept(system.force, moving)
         self._parts = tuple(
-            _kept(system.force_of(part), moving) for part in (system.slow, system.fast, *self._law.fields)
+            kept(system.force_of(part), moving and part is not system.fast)
+            for part in (system.slow, system.fast, *self._law.fields)
         )
 
     def advance(self, every: int, q: Floats, p: Floats) -> None:
@@ -47,12 +48,12 @@ class Vectors:
                 q[row], p[row] = self._q[: self._n], self._p[: self._n]
 
 
-def _kept(force: Force, damped: bool) -> Force:
+def kept(force: Force, damped: bool) -> Force:
     """A force that is evaluated again only when the state that it depends on has changed."""
     last: list[Reals] = []
 
     def again(q: Reals, p: Reals) -> Reals:
-        if not last or last[0] is not q or (damped and last[1] is not p):
+        if not last or last[0] is not q or (damped and not np.array_equal(last[1], p)):
             last[:] = q, p, force(q, p)
         return last[2]
 

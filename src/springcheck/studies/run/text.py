@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from springcheck import checks, schemes
+from springcheck.physics.exact import has_true_motion
 from springcheck.physics.trajectory import Comparison, Verdict
 from springcheck.studies.run.result import MethodRun, Repeat, Repeats, Report, Stored
 from springcheck.studies.text import left_out, of_energy
@@ -50,6 +51,7 @@ def _report(report: Report) -> Lines:
     out += [
         plain(f"error: largest distance from the exact solution, over the {unit}", "dim"),
         *[plain(f"<: {BELOW}", "dim") for run in report.runs[:1] if any(x.error_below for x in report.runs)],
+        *[plain("-: no exact solution of this scene is known here", "dim")] * (not has_true_motion(scene)),
         plain(f"energy: {of_energy(report.scene)}", "dim"),
     ]
     out += [

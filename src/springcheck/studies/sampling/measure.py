@@ -41,7 +41,10 @@ FRICTIONS = np.array([0.03, 0.1, 0.3, 1.0, 3.0, 10.0])
 """Friction over omega at which limits are measured."""
 
 WIDE, WAIT = 1000, 5.0
-"""Springs side by side, and decay times of the motion before frames are used."""
+"""Springs side by side, and decay times of the motion and of its variances before frames are used."""
+
+SLOWEST_DECAY = 0.002
+"""Least rate of decay a step that is waited for, which takes 2,500 steps."""
 
 LARGEST_H_OMEGA = 8.0
 """Largest h omega up to which a limit is looked for."""
@@ -77,7 +80,9 @@ def measured(label: Label) -> Sampled:
         if linear and not max(exact) < HOTTEST_LAW:
             rows.append((nan,) * 6)
             continue
-        slowest_decay = max(-np.log(law.slowest), 0.02) if law and law.slowest > 0 else 1.0
+        # collisions mix maps, so that variances may settle far later than means
+        left = max(law.slowest, float(law.growth[0])) if law else 0.0
+        slowest_decay = max(-np.log(left), SLOWEST_DECAY) if left > 0 else 1.0
         wait = round(WAIT / slowest_decay) if law else 100
         made = driver.run(bathed(springs(WIDE, wait + 500), turn, RATE), label, seed=SEED_OF_ALL)
         found = temperatures(made.q[wait:], made.p[wait:])
@@ -95,9 +100,9 @@ def measured(label: Label) -> Sampled:
         kinetic=columns[3], kinetic_error=columns[4], kinetic_law=columns[5], frames=AVERAGED_STEPS,
         off=np.array([np.sqrt(np.mean((np.mean(q[: int(n)], axis=0) - 1) ** 2)) for n in AVERAGED_STEPS]),
         off_law=np.array([_error_of_average(law, int(n)) for n in AVERAGED_STEPS]), friction=FRICTIONS,
-        limit=np.array([_last_stable(partial(_radius_of_engine, label, x)) for x in FRICTIONS])
+        limit=np.array([_last_stable(partial(_radius_of_engine, label, x), 1e-6) for x in FRICTIONS])
         if linear and not THERMOSTATS[method.scheme].collides else np.full(len(FRICTIONS), nan),
-        limit_law=np.array([_last_stable(partial(_radius, method.scheme, x)) for x in FRICTIONS])
+        limit_law=np.array([_last_stable(partial(_radius, method.scheme, x), 1e-9) for x in FRICTIONS])
         if linear else np.full(len(FRICTIONS), nan),
         force_calls=run.force_calls / steps, seconds=run.timing.run / steps / WIDE,
     )  # fmt: skip
@@ -136,28 +141,36 @@ def _radius_of_engine(label: Label, friction: float, turn: float) -> float:
     return float(np.max(np.abs(np.linalg.eigvals(A)))) ** 2
 
 
-def _last_stable(radius: Callable[[float], float]) -> float:
-    """The largest h omega up to which no map grows, to a part in 1e4; infinity where none up to 8 does.
+RESOLVED = 5e-5
+"""Largest error of a limit: half of the last decimal that is printed."""
+
+
+def _last_stable(radius: Callable[[float], float], to: float) -> float:
+    """The largest h omega up to which no map grows, `to` this part of it; infinity where none up to 8 does,
+    NaN where growth there is too slow to tell from none.
 
     The rounding of a map is 1e-15; where its two eigenvalues coincide it acts by its square root.
     """
-    slack = 1 + 1e-7
+    slack = 1e-7
 
     def grows(turn: float) -> bool:
-        return not radius(turn) <= slack
+        return not radius(turn) <= 1 + slack
+
+    def decays(turn: float) -> bool:
+        return radius(turn) <= 1 - slack
 
     try:
         tried = np.geomspace(0.02, LARGEST_H_OMEGA, 25)
         first = next((i for i, turn in enumerate(tried) if grows(float(turn))), None)
         if first is None:
-            return float("inf")
+            return float("inf") if decays(LARGEST_H_OMEGA) else nan
         low, high = (float(tried[first - 1]), float(tried[first])) if first else (0.0, float(tried[0]))
-        while high - low > 1e-4 * high and high > 1e-3:
+        while high - low > to * high and high > 1e-3:
             middle = (low + high) / 2
             low, high = (low, middle) if grows(middle) else (middle, high)
+        return 0.0 if high <= 1e-3 else low if decays(low - RESOLVED) else nan
     except MethodError:
         return nan
-    return (low + high) / 2 if high > 1e-3 else 0.0
 
 
 def record(path: str | Path | None, methods: Sequence[str] = (), **how: Unpack[How]) -> Sampling:

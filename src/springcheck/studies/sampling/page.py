@@ -96,10 +96,11 @@ def _costs(methods: Sequence[Sampled]) -> str:
 def _limits(methods: Sequence[Sampled]) -> str:
     """The largest step that is stable at every friction, of the best scheme and of the worst."""
     least = {title(x.scheme): float(np.nanmin(x.limit_law)) for x in methods}
-    low, high = min(least, key=lambda name: least[name]), max(least.values())
-    few = sum(x < 0.99 * high for x in least.values())
-    said = f"Steps are stable up to h {W_SIGN} = {high:.3g} at every friction"
-    return f"{said}; {few} of {len(least)} are not, {low} from {least[low]:.3g} on" if few else said
+    low, high = min(least, key=lambda name: least[name]), max(least, key=lambda name: least[name])
+    if least[low] >= 0.99 * least[high]:
+        return f"Steps are stable up to h {W_SIGN} = {least[high]:.3g} at every friction"
+    ends = (f"{least[name]:.3g} by {name}" for name in (low, high))
+    return f"At every friction steps are stable up to h {W_SIGN} = {', and up to '.join(ends)}"
 
 
 def _laws(methods: Sequence[Sampled], of: str) -> list[Curve]:

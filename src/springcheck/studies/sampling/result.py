@@ -44,6 +44,7 @@ class Sampled:
     limit: Floats
     """The largest h omega of stable steps, by the engine's own map, at each friction (g,)."""
     limit_law: Floats
+    """The same of its law: infinite where none is up to 8, NaN where growth is too slow to be resolved."""
     force_calls: float
     """Force evaluations per step."""
     seconds: float

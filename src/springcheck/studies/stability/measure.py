@@ -16,7 +16,7 @@ from typing import Unpack
 import numpy as np
 
 from springcheck import engines
-from springcheck.engines.contract import Label
+from springcheck.engines.contract import Label, Need
 from springcheck.errors import SceneError
 from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
@@ -62,6 +62,8 @@ def _measure(scene: Scene, labels: Sequence[Label], kept: Keeper) -> Stability:
             return "its scheme is not known; --scheme NAME states it, and its limit is then measured"
         if not claimed.has("one-step"):
             return "it has no fixed step and no limit"
+        if Need.FIELD in method.requires:
+            return "it needs a magnetic field, and limits are measured on springs without one"
         return propagators.absence(label) if "wall-spring" in method.terms else "it moves no springs"
 
     usable, left_out = sorted_out(labels, why, "has a limit to measure")

@@ -103,7 +103,9 @@ class Stability(Studied):
         """Results beside the table of limits, in sentences."""
         out = [
             f"{x.method}: stable in {np.count_nonzero(x.stable)} of {x.points} points of the damped plane, "
-            f"{x.wrong} against theory; radii within {x.off:.2f} of what rounding allows"
+            f"{x.wrong} against theory; radii off by up to {x.off:.2f} roundings of the map's entries"
+            + ", not counting those of its substeps, which may be larger"
+            * (x.off > 1)
             for x in self.regions
         ]
         for y in self.resonances:
