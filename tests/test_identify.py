@@ -115,6 +115,17 @@ def test_numbers_of_single_precision_are_told_from_arithmetic_of_single_precisio
     assert (found.precision, found.fits) == ("double, stored in single", True)
 
 
+@pytest.mark.parametrize("written", ["nine digits", "momenta"])
+def test_numbers_of_single_precision_are_seen_behind_nine_digits_and_momenta(written: str) -> None:
+    made = case("velocity-verlet", np.random.default_rng(11), frames=61, lowest=0.3)
+    q, v = single(made.q), single(made.p / made.m)
+    if written == "momenta":
+        found = identify(made.t, q, v * made.m, mass=made.m)
+    else:
+        found = identify(made.t, text(q, "%.9g"), v=text(v, "%.9g"))
+    assert (found.scheme, found.precision) == ("velocity-verlet", "double, stored in single")
+
+
 @pytest.mark.parametrize("name", ["velocity-verlet", "semi-implicit-euler", "position-verlet", "rk2-heun"])
 def test_arithmetic_of_single_precision_is_called_single(name: str) -> None:
     rng = np.random.default_rng(5)
@@ -408,6 +419,19 @@ def test_a_stated_stiffness_or_step_that_is_wrong_is_refused() -> None:
         assert (other.scheme, other.stride, other.fits) == ("velocity-verlet", 2, False)
 
 
+@pytest.mark.parametrize(
+    ("share", "words"),
+    [(0.97, "does not divide the states' interval"), (1 / 3, ", 3 to a frame, no known scheme fits")],
+)
+def test_a_stated_step_that_is_not_that_of_the_states_is_said_with_its_reason(
+    share: float, words: str
+) -> None:
+    made = case("velocity-verlet", np.random.default_rng(15), lowest=0.2)
+    found = identify(made.t, made.q, made.p, mass=made.m, step=share * made.h)
+    assert not found.fits
+    assert [note for note in found.notes if "the stated step" in note and words in note], found.notes
+
+
 def test_wrong_units_of_velocity_are_named() -> None:
     made = case("semi-implicit-euler", np.random.default_rng(16), lowest=0.2)
     found = identify(made.t, made.q, made.p, mass=made.m / 10)
@@ -496,6 +520,7 @@ def test_anharmonic_motion_is_called_so_and_coupled_motion_judged_by_its_modes()
         (lambda c: (0 * c.t, c.q, c.p), "times are equal"),
         (lambda c: (c.t, np.where(c.t[:, None] > c.t[7], np.nan, c.q), c.p), "frame 8"),
         (lambda c: (c.t, c.q[:-1], c.p), "shape"),
+        (lambda c: (c.t, np.hstack([c.q, c.q]), c.p), r"shape \(101, 2\), .* \(101, 1\): they must agree"),
         (
             lambda c: (c.t, 1e-200 * c.q, 1e-200 * c.p),
             "positions are of the size .*e-201: give",
@@ -512,6 +537,12 @@ def test_states_that_cannot_show_a_map_are_refused_with_a_reason(change, words: 
     t, q, p = change(made)
     with pytest.raises(IdentificationError, match=words):
         identify(t, q, p, mass=made.m)
+
+
+def test_momenta_that_point_against_their_velocities_give_no_mass() -> None:
+    made = case("velocity-verlet", np.random.default_rng(20))
+    with pytest.raises(IdentificationError, match="opposite ways: one of them is wrong"):
+        identify(made.t, made.q, made.p, v=-made.p / made.m)
 
 
 @pytest.mark.parametrize(

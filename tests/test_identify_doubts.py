@@ -699,3 +699,46 @@ def test_fixed_decimals_of_a_motion_that_grows_beyond_the_digits_of_double_preci
     assert found.precision == f"text, {decimals} decimals"
     exact = np.array(rows[::every])
     assert storage(exact[:, 0]).name == "double"
+
+
+@pytest.mark.parametrize(
+    ("kept", "words"),
+    [
+        ((0.9, 0.8), "one multiplies areas by a share of 1.00e-01 more than the other"),
+        ((0.9, 1.1), "a friction of changing sign multiplies areas by 1 -1.00e-01 and 1 +1.00e-01"),
+    ],
+)
+def test_frictions_that_alternate_are_of_changing_sign_only_where_one_of_them_drives(
+    kept: tuple[float, float], words: str
+) -> None:
+    q, v, h, states = 1.3, 0.4, 0.3, []
+    for i in range(101):
+        states.append((q, v))
+        v -= h / 2 * K * q / M
+        q += h * v
+        v = (v - h / 2 * K * q / M) * kept[i % 2]
+    qs, vs = np.array(states).T
+    found = identify(h * np.arange(101), qs, v=vs, mass=M)
+    assert found.statement == f"Even and odd steps differ and alternate: {words}"
+
+
+@pytest.mark.parametrize(
+    ("stated", "of_class"),
+    [
+        ({"mass": M}, True), ({"mass": M, "stiffness": K}, True),
+        ({"mass": M, "stiffness": 2 * K}, False), ({}, False),
+    ],
+)  # fmt: skip
+def test_a_method_has_a_stability_function_only_on_the_spring_that_is_stated(
+    stated: dict[str, float], of_class: bool
+) -> None:
+    """Two stages whose weights do not add up to 1, and whose momenta without a mass are of any spring."""
+    step = runge_kutta(((), (0.9,)), (0.5, 0.49))
+    states = [(1.3, 0.4)]
+    for _ in range(100):
+        states.append(step(*states[-1], 0.3, 0.0))
+    q, v = np.array(states).T
+    found = identify(0.3 * np.arange(101), q, M * v, **stated)
+    assert found.scheme is None
+    growth = "amplitudes change by" in found.statement
+    assert ("whose stability function has" in found.statement, growth) == (of_class, not of_class), found

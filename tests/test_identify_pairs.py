@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import pytest
 
 from springcheck.identify import identify
 
@@ -112,3 +113,22 @@ def test_a_pair_whose_line_turns_is_not_named_by_its_distance() -> None:
     found = named(t, q, v, step=H)
     assert found.scheme is None
     assert not any("their distance is judged" in note for note in found.notes)
+
+
+@pytest.mark.parametrize(("columns", "bond"), [((0, 3), True), ((0, 4), False), ((0, 1), False)], ids=str)
+def test_the_stiffness_of_a_bond_is_that_of_two_particles_along_one_axis(
+    columns: tuple[int, int], bond: bool
+) -> None:
+    """Opposite motions along x and y, or of one particle, are of no bond of two particles."""
+    z, rows = np.array([1.1, 0.4]), []
+    for _ in range(N):
+        rows.append(z)
+        half = z[1] - H / 2 * K / M[0] * z[0]
+        q = z[0] + H * half
+        z = np.array([q, half - H / 2 * K / M[0] * q])
+    q, v = (np.zeros((N, 6)) for _ in range(2))
+    for column, sign in zip(columns, (1, -1), strict=True):
+        q[:, column], v[:, column] = sign * np.array(rows).T
+    found = identify(H * np.arange(N), q, v=v, mass=M[0])
+    assert (found.scheme, found.fits) == ("velocity-verlet", True)
+    assert [f"their bond has the stiffness {K / 2:g}" in note for note in found.notes].count(True) == bond

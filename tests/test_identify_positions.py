@@ -76,6 +76,36 @@ def test_without_the_stiffness_all_that_keep_areas_are_left() -> None:
     assert "unknown number of steps" in found.statement
 
 
+ANOTHER_SPRING = "a damped spring of another stiffness may have the same positions"
+
+
+@pytest.mark.parametrize("friction", [None, 0.0], ids=str)
+def test_a_damped_spring_may_have_the_positions_of_an_implicit_scheme_unless_no_friction_is_stated(
+    friction: float | None,
+) -> None:
+    """It was said, and the friction asked for, where a friction of 0 was stated as well."""
+    found = identify(*positions("implicit-euler"), mass=M, friction=friction)
+    assert found.scheme == "implicit-euler"
+    assert (ANOTHER_SPRING in found.notes) == (friction is None)
+    more = "the stiffness, where known, the friction, or velocities"
+    wanted = more if friction is None else "the stiffness, where known, or velocities"
+    assert f"what would tell more: {wanted}" in found.notes
+
+
+def test_a_stiffness_without_the_mass_is_said_to_be_of_no_use() -> None:
+    found = identify(*positions("velocity-verlet"), stiffness=K)
+    assert any(
+        note.startswith("the stiffness says nothing of positions without the mass") for note in found.notes
+    )
+
+
+def test_a_coordinate_that_shows_no_force_is_counted_and_left_out() -> None:
+    t, q = positions("velocity-verlet")
+    found = identify(t, np.column_stack([q, 0.4 + 0.7 * t]), mass=M, stiffness=K)
+    assert {x.scheme for x in found.candidates} == STOERMER
+    assert "1 of 2 coordinates show no force, and are left out" in found.notes
+
+
 def verlet(springs: list[float], every: int) -> tuple[Floats, Floats]:
     """Times and positions of oscillators of unlike stiffness, 150 frames by velocity Verlet."""
     k, q, v = np.array(springs), np.linspace(1.1, 0.7, len(springs)), np.linspace(0.4, -0.3, len(springs))

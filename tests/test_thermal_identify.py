@@ -65,6 +65,16 @@ def test_a_thousand_frames_name_the_scheme_or_list_it_among_those_that_share_its
         assert found.candidates[0].scheme == expected
 
 
+def test_one_oscillator_in_a_bath_is_seen_in_rows_and_in_columns_alike() -> None:
+    """A mass in a list ended in a traceback, and one row beside one column in noise without a name."""
+    t, q, v = run("baoab", 1000)
+    wanted = identify(t, q, v=v, mass=M)
+    assert wanted.statement.startswith("each step takes noise: a thermostat, baoab or ")
+    column = q[:, None]
+    for positions, velocities, mass in ((q, v, [M]), (column, v, M), (q, v[:, None], [M])):
+        assert identify(t, positions, v=velocities, mass=mass).statement == wanted.statement
+
+
 @pytest.mark.parametrize("name", ["baoab", "obabo", "andersen"])
 def test_what_is_stated_of_a_bath_is_held_against_its_states(name: str) -> None:
     t, q, v = run(name, 1000)

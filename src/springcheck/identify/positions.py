@@ -88,7 +88,7 @@ def identify_positions(
         damped = (_joined if known else _first)(found, distinct(damped=True), strides, wanted)
         seen, damped = _stated(seen, damped) if known else (seen, damped)
         kept = [x for x in damped if candidates_of(seen, x)] if friction else kept + damped
-    return _known(seen, found, kept, known) if kept else _none(seen, found, joints)
+    return _known(seen, found, kept, known, friction) if kept else _none(seen, found, joints)
 
 
 def _forced(x: Recurrence) -> bool:
@@ -157,8 +157,10 @@ def _members(joints: list[Joint]) -> list[Joint]:
     return list(out.values())
 
 
-def _known(seen: Measured, found: list[Recurrence], kept: list[Joint], known: bool) -> Identification:
-    """Identification by the hypotheses that fit."""
+def _known(
+    seen: Measured, found: list[Recurrence], kept: list[Joint], known: bool, friction: float | None
+) -> Identification:
+    """Identification by the hypotheses that fit; a stated `friction` of 0 leaves no damped spring open."""
     record, notes, joints = seen.record, list(seen.notes), _members(kept)
     candidates = tuple(x for joint in joints for x in candidates_of(seen, joint))
     names = list(dict.fromkeys(x.scheme for x in candidates))
@@ -186,12 +188,13 @@ def _known(seen: Measured, found: list[Recurrence], kept: list[Joint], known: bo
         statement = f"Positions alone: areas {change}, and they are those of {either(listed)}{frames}"
     if not known:
         told = "mass and stiffness" if record.mass is None else "the stiffness"
-        notes.append(f"what would tell more: {told}, where known, the friction, or velocities")
+        more = ", the friction" if friction is None else ""
+        notes.append(f"what would tell more: {told}, where known{more}, or velocities")
     if any(damped) and seen.friction is None:
         notes.append(
             "with friction every scheme has a spring that fits; a stated friction of 0 leaves it out"
         )
-    elif scheme and float(found[0].beta) > 0 and not known:
+    elif scheme and float(found[0].beta) > 0 and not known and friction != 0:
         notes.append("a damped spring of another stiffness may have the same positions")
     share = 1 / stride if stride else math.nan
     return Identification(

@@ -8,8 +8,6 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
-import numpy as np
-
 from springcheck.thermal.catalogue import family_of
 
 if TYPE_CHECKING:
@@ -279,8 +277,6 @@ def _range(rows: Sequence[tuple[float, ...]]) -> str:
 
 
 def _offset(steps: float) -> str:
-    if np.isnan(steps):
-        return ""
     if steps == 0:
         return "synchronised with the positions"
     return f"{abs(steps):g} of a step {'early' if steps < 0 else 'late'}"

@@ -137,16 +137,15 @@ def of_bath(
 
 def _given(t: Any, q: Any, p: Any, v: Any, mass: Any) -> tuple[Floats, Floats, Floats, Floats] | None:
     """Times (f,), positions and velocities (f, n) and masses (n,) in which a bath may show, or None."""
-    times, positions = np.asarray(t, np.float64), np.asarray(q, np.float64)
-    u = np.asarray(p if v is None else v, np.float64)
-    if times.ndim != 1 or len(times) < FEWEST or positions.shape != u.shape or len(positions) != len(times):
+    times = np.asarray(t, np.float64)
+    positions, u = (
+        np.reshape(np.asarray(x, np.float64), (len(times), -1)) for x in (q, p if v is None else v)
+    )
+    if len(times) < FEWEST or positions.shape[1] > MOST:
         return None
-    m = np.broadcast_to(1.0 if mass is None else np.asarray(mass, np.float64), positions.shape[1:]).ravel()
+    m = np.broadcast_to(1.0 if mass is None else np.ravel(np.asarray(mass, np.float64)), positions.shape[1:])
     steps = np.diff(times)
     if not np.all(np.abs(steps - steps[0]) <= 1e-9 * abs(steps[0])):
-        return None
-    positions, u = (x.reshape(len(x), -1) for x in (positions, u))
-    if positions.shape[1] > MOST or not np.all(m > 0):
         return None
     if v is None:
         u = u / m
