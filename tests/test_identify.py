@@ -605,6 +605,21 @@ def test_a_coordinate_that_shows_no_scheme_is_left_out_and_said_to_be(
     assert [f"oscillator {note}" in one and "is left out" in one for one in found.notes] == [True]
 
 
+def test_a_coordinate_in_a_straight_line_whose_velocities_alternate_does_not_move_freely() -> None:
+    """Their mean is the line's slope to the last bit."""
+    t, x, p = spring("velocity-verlet", frames=60)
+    q, v = 0.3 + 0.4 * t, 0.4 + 0.1 * (-1.0) ** np.arange(60)
+    found = identify(t, np.stack([x, q], axis=1), v=np.stack([p / 3.7, v], axis=1), mass=3.7)
+    assert found.scheme is None
+    assert not any("moves freely" in note for note in found.notes)
+
+
+def test_velocities_that_are_all_0_are_refused_in_a_line() -> None:
+    t, x, _ = spring("velocity-verlet")
+    with pytest.raises(IdentificationError, match="oscillator 0 do not change while its positions do"):
+        identify(t, np.stack([x, x[::-1]], axis=1), v=np.zeros((61, 2)), mass=3.7)
+
+
 def test_momenta_alone_are_said_to_leave_three_numbers_of_a_map() -> None:
     """Of momenta without a mass the scale is free, and with it the difference of these schemes."""
     t, q, p = spring("velocity-verlet", frames=21)
