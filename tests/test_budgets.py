@@ -18,7 +18,7 @@ BUDGETS = {
     ("engines",): 2816,
     ("driver", "conformance", "doors"): 1209,
     ("checks",): 5232,
-    ("identify",): 9118,
+    ("identify",): 9115,
     ("formats", "store"): 5261,
     ("studies",): 1453,
     ("studies/*",): 9628,

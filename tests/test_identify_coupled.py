@@ -134,3 +134,24 @@ def test_a_stiffness_of_single_springs_is_none_of_the_modes() -> None:
     found, stated = pair("position-verlet", 61), pair("position-verlet", 61, stiffness=3.0)
     assert any("normal modes were judged" in note for note in stated.notes)
     assert (stated.statement, stated.notes) == (found.statement, found.notes)
+
+
+def test_a_mode_in_which_the_coordinates_cancel_has_their_roundings() -> None:
+    """Two like masses on like springs, of which one is nearly where the other is."""
+    q, v, states = np.array([0.3, 0.3001]), np.array([0.2, 0.19997]), []
+
+    def kick(q: Floats) -> Floats:
+        bond = 5.3 * (q[1] - q[0])
+        return H / 2 * (np.array([bond, -bond]) - 2.9 * q) / 3.7
+
+    for _ in range(201):
+        states.append((q, v))
+        v = v + kick(q)
+        q = q + H * v
+        v = v + kick(q)
+    q, v = (np.array(x) for x in zip(*states, strict=True))
+    found = identify(H * np.arange(201), q, v=v, mass=3.7)
+    assert (found.scheme, found.precision) == ("velocity-verlet", "double")
+    assert any("2 normal modes were judged" in note for note in found.notes)
+    v[60, 0] += 3000 * 2.0**-52
+    assert not identify(H * np.arange(201), q, v=v, mass=3.7).fits
