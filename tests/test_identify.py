@@ -8,6 +8,7 @@ decide.
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -589,6 +590,75 @@ def test_a_damped_spring_that_has_the_very_same_map_is_said_until_the_stiffness_
     assert [other in note for note in found.notes if note.startswith("the same map is")] == [True]
     stated = identify(h * np.arange(101), x, v=u, mass=m, stiffness=k)
     assert not any(note.startswith("the same map is") for note in stated.notes)
+
+
+def spring(name: str, *, k: float = 2.9, frames: int = 61) -> tuple[Floats, Floats, Floats]:
+    """Times, positions and momenta of a scheme on one spring, of mass 3.7."""
+    states = [(np.array([1.3]), np.array([0.9]))]
+    for _ in range(frames - 1):
+        q, p = step(SCHEMES[name], *states[-1], h=0.31, m=np.array([3.7]), force=lambda q, p: -k * q)
+        states.append((np.asarray(q, np.float64), np.asarray(p, np.float64)))
+    q, p = (np.concatenate(x) for x in zip(*states, strict=True))
+    return 0.31 * np.arange(frames), q, p
+
+
+@pytest.mark.parametrize(
+    ("name", "k", "note"),
+    [
+        ("semi-implicit-euler", 2.9, "leapfrog with velocities half a step early: states alone do not tell"),
+        ("semi-implicit-euler-drift-kick", 2.9, "leapfrog with velocities half a step late: states alone do"),
+        ("velocity-verlet", -0.3, "the spring is inverted: its stiffness is negative"),
+        ("velocity-verlet", 2.9, None),
+    ],
+)
+def test_what_is_peculiar_to_a_scheme_or_a_spring_stands_beside_its_name(
+    name: str, k: float, note: str | None
+) -> None:
+    t, q, p = spring(name, k=k)
+    found = identify(t, q, p, mass=3.7)
+    assert (found.scheme, found.stiffness) == (name, pytest.approx((k,)))
+    assert [note is not None and note in one for one in found.notes] == ([True] if note else [])
+
+
+@pytest.mark.parametrize(
+    ("q", "v", "note"),
+    [
+        (lambda t: 0.3 + 0.4 * t, lambda t: 0.4 + 0 * t, "1 moves freely, in a straight line"),
+        (lambda t: (-1.0) ** np.arange(len(t)), lambda t: 0 * t + 1e-30, "1 shows too little of its motion"),
+    ],
+)
+def test_a_coordinate_that_shows_no_scheme_is_left_out_and_said_to_be(
+    q: Callable[[Floats], Floats], v: Callable[[Floats], Floats], note: str
+) -> None:
+    t, x, p = spring("velocity-verlet")
+    found = identify(t, np.stack([x, q(t)], axis=1), v=np.stack([p / 3.7, v(t)], axis=1), mass=3.7)
+    assert found.scheme == "velocity-verlet"
+    assert [f"oscillator {note}" in one and "is left out" in one for one in found.notes] == [True]
+
+
+def test_a_coordinate_in_a_straight_line_whose_velocities_alternate_does_not_move_freely() -> None:
+    """Their mean is the line's slope to the last bit."""
+    t, x, p = spring("velocity-verlet", frames=60)
+    q, v = 0.3 + 0.4 * t, 0.4 + 0.1 * (-1.0) ** np.arange(60)
+    found = identify(t, np.stack([x, q], axis=1), v=np.stack([p / 3.7, v], axis=1), mass=3.7)
+    assert found.scheme is None
+    assert not any("moves freely" in note for note in found.notes)
+
+
+def test_velocities_that_are_all_0_are_refused_in_a_line() -> None:
+    t, x, _ = spring("velocity-verlet")
+    with pytest.raises(IdentificationError, match="oscillator 0 do not change while its positions do"):
+        identify(t, np.stack([x, x[::-1]], axis=1), v=np.zeros((61, 2)), mass=3.7)
+
+
+def test_momenta_alone_are_said_to_leave_three_numbers_of_a_map() -> None:
+    """Of momenta without a mass the scale is free, and with it the difference of these schemes."""
+    t, q, p = spring("velocity-verlet", frames=21)
+    said = "neither mass nor velocities nor stiffness are known, so only three numbers of each map count"
+    found, stated = identify(t, q, p), identify(t, q, p, stiffness=2.9)
+    assert {"velocity-verlet", "position-verlet", "exact"} <= {x.scheme for x in found.candidates}
+    assert {x.scheme for x in stated.candidates} == {"velocity-verlet", "implicit-midpoint"}
+    assert [any(said in note for note in x.notes) for x in (found, stated)] == [True, False]
 
 
 def test_aliases_are_the_schemes_with_the_same_matrix() -> None:

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from springcheck.identify import Identification, identify
+from springcheck.physics.arrays import Floats
+from springcheck.schemes import SCHEMES, step
 
 H = 0.1
 
@@ -105,3 +107,51 @@ def test_a_boris_run_in_few_digits_is_one_with_the_digits_that_it_shows(form: st
 def test_a_velocity_that_turns_in_few_digits_does_not_grow_by_their_noise(form: str) -> None:
     found = identified(boris(0.7, 0.0), form)
     assert "only turns" in found.statement
+
+
+def pair(name: str, frames: int, stiffness: float | None = None) -> Identification:
+    """What is said of two masses between two walls, in all digits."""
+    m, states = np.array([3.7, 1.9]), [(np.array([0.13, -0.7]), np.array([2.4, 0.2]))]
+
+    def force(q: Floats, p: Floats) -> Floats:
+        return np.array([5.3 * (q[1] - q[0]) - 2.9 * q[0], -5.3 * (q[1] - q[0]) - 0.7 * q[1]])
+
+    for _ in range(frames - 1):
+        q, p = step(SCHEMES[name], *states[-1], h=0.31, m=m, force=force)
+        states.append((np.asarray(q, np.float64), np.asarray(p, np.float64)))
+    q, p = (np.array(x) for x in zip(*states, strict=True))
+    return identify(0.31 * np.arange(frames), q, v=p / m, mass=m, stiffness=stiffness)
+
+
+def test_so_few_frames_that_any_map_of_all_coordinates_takes_each_to_the_next_show_no_modes() -> None:
+    found = pair("velocity-verlet", 6)
+    assert found.scheme is None
+    assert not any("normal modes" in note for note in found.notes)
+
+
+def test_a_stiffness_of_single_springs_is_none_of_the_modes() -> None:
+    """Whatever is stated, the modes' own stiffnesses are open."""
+    found, stated = pair("position-verlet", 61), pair("position-verlet", 61, stiffness=3.0)
+    assert any("normal modes were judged" in note for note in stated.notes)
+    assert (stated.statement, stated.notes) == (found.statement, found.notes)
+
+
+def test_a_mode_in_which_the_coordinates_cancel_has_their_roundings() -> None:
+    """Two like masses on like springs, of which one is nearly where the other is."""
+    q, v, states = np.array([0.3, 0.3001]), np.array([0.2, 0.19997]), []
+
+    def kick(q: Floats) -> Floats:
+        bond = 5.3 * (q[1] - q[0])
+        return H / 2 * (np.array([bond, -bond]) - 2.9 * q) / 3.7
+
+    for _ in range(201):
+        states.append((q, v))
+        v = v + kick(q)
+        q = q + H * v
+        v = v + kick(q)
+    q, v = (np.array(x) for x in zip(*states, strict=True))
+    found = identify(H * np.arange(201), q, v=v, mass=3.7)
+    assert (found.scheme, found.precision) == ("velocity-verlet", "double")
+    assert any("2 normal modes were judged" in note for note in found.notes)
+    v[60, 0] += 3000 * 2.0**-52
+    assert not identify(H * np.arange(201), q, v=v, mass=3.7).fits

@@ -46,6 +46,12 @@ def test_amplitude_frequency_phase_and_scheme_of_a_drive_are_said(name: str, dam
     assert f"the force 0.43 cos(0.87 t + 0.6) by {NAMES[name]}, the phase at the first frame" in why
 
 
+def test_of_a_drive_without_friction_no_scheme_with_a_friction_stage_is_said() -> None:
+    """Each has then the map of the scheme without that stage."""
+    why = said(driven(damped=False), "own:velocity-verlet", mass=3.7, stiffness=2.9)
+    assert why.endswith("the force 0.43 cos(0.87 t + 0.6) by velocity Verlet, the phase at the first frame")
+
+
 def test_an_amplitude_below_zero_is_a_phase_beyond_a_quarter_turn() -> None:
     why = said(
         driven(amplitude=-0.013, frequency=7.1, phase=-1.0), "own:velocity-verlet", mass=3.7, stiffness=2.9

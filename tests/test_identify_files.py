@@ -14,6 +14,7 @@ import pytest
 
 import springcheck
 from springcheck.cli import main
+from springcheck.identify import files
 from springcheck.physics.arrays import Floats
 from springcheck.schemes import SCHEMES, step
 
@@ -150,6 +151,49 @@ def test_velocities_in_other_units_are_turned_into_those_of_position_and_time(
     found = document(capsys)
     assert (found["scheme"], found["stride"], found["precision"]) == ("velocity-verlet", 2, "double")
     assert found["omega"] * time == pytest.approx(np.sqrt(K / M), rel=1e-11)
+
+
+@pytest.mark.parametrize(
+    ("units", "said"),
+    [
+        (("sigma", "tau", "sigma tau-1"), False),
+        (("sigma", "tau", "m s-1"), True),
+        (("nm", "ps", "cells ps-1"), True),
+        (("", "", ""), False),
+    ],
+)
+def test_units_that_are_not_known_are_said_to_be_taken_as_consistent_unless_they_are(
+    units: tuple[str, str, str], said: bool, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["identify", written(*motion(), units=units), "--json"]) == 0
+    found = document(capsys)
+    q, t, v = units
+    note = f"units of position {q!r}, time {t!r} and velocity {v!r} are taken as consistent"
+    assert (found["scheme"], note in found["notes"]) == ("velocity-verlet", said)
+
+
+@pytest.mark.parametrize(
+    ("most", "number", "said"),
+    [
+        ("MOST_FRAMES", 60, "the first 60 frames were looked at"),
+        ("MOST_FRAMES", 101, None),
+        ("MOST_OSCILLATORS", 2, "2 of 3 moving coordinates were looked at"),
+        ("MOST_OSCILLATORS", 3, None),
+    ],
+)
+def test_what_a_file_has_beyond_what_is_looked_at_is_said_to_be_left_out(
+    most: str,
+    number: int,
+    said: str | None,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setattr(files, most, number)
+    t, q, v = motion()
+    assert main(["identify", written(t, q * [1, 2, 3], v * [1, 2, 3]), "--json"]) == 0
+    found = document(capsys)
+    assert found["scheme"] == "velocity-verlet"
+    assert [note for note in found["notes"] if "were looked at" in note] == ([said] if said else [])
 
 
 def test_velocities_that_do_not_belong_to_the_positions_fit_nothing(

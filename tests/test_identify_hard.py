@@ -242,6 +242,24 @@ def test_a_force_held_over_substeps_is_named(n: int) -> None:
     assert_said(found, f"held over {n} substeps")
 
 
+def test_substeps_of_a_held_force_that_kick_first_in_one_oscillator_alone_are_no_scheme() -> None:
+    states = []
+    for kicks_first, k in ((True, K), (False, 0.7)):
+        q, v, rows = 1.3, 0.25, []
+        for _ in range(31):
+            rows.append((q, v))
+            force = -k * q / M
+            for _ in range(4):
+                v += kicks_first * H * force
+                q += H * v
+                v += (not kicks_first) * H * force
+        states.append(rows)
+    q, v = np.array(states).transpose(2, 1, 0)
+    t = 4 * H * np.arange(31)
+    each = [identify(t, q[:, j], v=v[:, j], mass=M).scheme for j in (0, 1)]
+    assert (each, identify(t, q, v=v, mass=M).scheme) == (["held-force"] * 2, None)
+
+
 def test_drag_that_is_linear_and_quadratic_is_told_with_its_coefficients() -> None:
     def step(i: int, q: float, p: float) -> State:
         p = p - H * (K * q + 0.05 * p / M + 0.02 * abs(p / M) * p / M)

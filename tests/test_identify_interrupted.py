@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
@@ -102,6 +103,30 @@ def test_what_acts_in_every_step_of_a_chain_or_at_many_irregular_ones_is_no_inte
     assert not seen(lambda n, q, v: v, drive=0.3).statement.startswith(ONE_MAP)
 
 
+@pytest.mark.parametrize(
+    ("rate", "whose"),
+    [(0.0, ""), (0.03, ""), (None, " of Velocity Verlet")],
+    ids=["of no scheme", "of no scheme, damped", "of a scheme"],
+)
+def test_a_kick_in_a_motion_of_one_map_is_told_with_the_scheme_of_that_map_if_there_is_one(
+    rate: float | None, whose: str
+) -> None:
+    a = 2.9 / 3.7 * 0.31**2
+    b = np.array([[1 - a / 2, 1.0], [-a * (1 - a / 4), 1 - a / 2]])
+    if rate is not None:
+        b = np.array([[0.9, 0.3], [-0.35, 0.93]])
+        b *= np.sqrt((1 - rate) / np.linalg.det(b))
+    states = [np.array([1.3, 0.4])]
+    for n in range(100):
+        states.append(b @ states[-1] + np.array([0.0, 0.01 * (n == 50)]))
+    q, v = np.array(states).T
+    found = identify(0.31 * np.arange(101), q + 7.3, v=v / 0.31, mass=3.7)
+    assert (
+        found.statement
+        == f"The motion is one{whose}, but for one kick of +0.0323 of the velocity at frame 51"
+    )
+
+
 def one(act: Callable[[int, float, float], float], frames: int = 180) -> str:
     """What is said of one mass on a spring, by velocity Verlet, whose velocity `act` changes."""
     q, v = 0.3, 0.7 / 3.7
@@ -120,6 +145,12 @@ def test_velocities_rescaled_at_some_steps_are_no_one_kick_at_all_of_them(frames
     """The last frame of 201 is rescaled, too."""
     said = one(lambda n, q, v: 0.9 * v if n % 50 == 0 else v, frames)
     assert said.endswith("but its velocity is multiplied by 0.9 at frame 50, and so every 50 frames")
+
+
+def test_what_happens_at_the_last_frame_is_no_kick_of_which_nothing_follows() -> None:
+    said = one(lambda n, q, v: 1.01 * v if n == 179 else v)
+    of = "The motion is one of Velocity Verlet, but frame 179, the last, is wrong: its velocity is off by "
+    assert re.fullmatch(rf"{of}0\.00\d+ of the state's size", said)
 
 
 def test_kicks_are_said_to_be_one_where_they_are() -> None:

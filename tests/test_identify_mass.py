@@ -67,6 +67,47 @@ def test_kicks_of_one_number_alone_are_noise_and_no_factor_of_momenta(where: str
     assert found.candidates == ()
 
 
+def test_kicks_that_outlast_a_step_are_no_white_noise() -> None:
+    rng, kick = np.random.default_rng(1), 0.0
+
+    def step(q, p, h, force, mass):
+        nonlocal kick
+        kick = 0.8 * kick + 1e-5 * rng.standard_normal()
+        q, p = verlet(q, p, h, force, mass)
+        return q, p + kick
+
+    statement = told(step).statement
+    assert statement.startswith("No known cause alone explains what one map leaves over, and it is no white")
+    assert statement.endswith("of the state's size in each, in the velocity")
+
+
+@pytest.mark.parametrize(
+    ("what", "much", "remedy"),
+    [
+        (
+            "position",
+            (1e-3, 0.0),
+            "a drift that is not the velocity's, such as a removed centre-of-mass motion",
+        ),
+        (
+            "velocity",
+            (0.0, 1e-3 * M),
+            "a constant force, or a Jacobian by differences, which rounds to one side",
+        ),
+    ],
+)
+def test_a_constant_added_in_every_frame_is_said_with_where_to_look(
+    what: str, much: tuple[float, float], remedy: str
+) -> None:
+    def step(q, p, h, force, mass):
+        q, p = verlet(q, p, h, force, mass)
+        return q + much[0], p + much[1]
+
+    found = told(step)
+    assert found.statement == f"Velocity Verlet with a constant added to the {what} in every frame: 0.001"
+    assert [x.remedy for x in found.explanations] == [f"look for {remedy}"]
+
+
 @pytest.mark.parametrize("factor", [1.001, 1.027027, 0.9, 1.1, 1.66054, 2.0, 0.5, 10.0])
 @pytest.mark.parametrize(
     ("step", "name"),

@@ -207,3 +207,30 @@ def test_a_friction_stated_as_0_hides_no_mark_of_a_wrong_scheme() -> None:
     assert "where 0 is stated" in damped.statement
     assert "unit" not in damped.explanations[0].remedy
     assert "look for a friction" in damped.explanations[0].remedy
+
+
+@pytest.mark.parametrize(
+    ("start", "h", "frames", "room"),
+    [(1e3, 0.13, 301, 1e-14), (1e9, 0.13, 301, 1e-14), (1e9, 0.013, 301, 1e-13), (1e5, 0.13, 9, 1e-11)],
+)
+def test_steps_between_times_that_are_rounded_are_those_of_the_scheme(
+    start: float, h: float, frames: int, room: float
+) -> None:
+    """Each step is the difference of two times, as a solver takes it that is asked for states at times."""
+    t = start + h * np.arange(frames)
+    rows = [(Q, V)]
+    for step in np.diff(t).tolist():
+        rows.append(verlet(*rows[-1], step))
+    q, v = np.array(rows).T
+    found = identify(t, q, v=v, mass=M)
+    assert (found.scheme, found.precision) == ("velocity-verlet", "double")
+    assert found.stiffness == pytest.approx((K,), rel=room)
+
+
+def test_the_step_of_a_clock_that_adds_it_up_is_known_to_the_last_bit() -> None:
+    """A thirtieth is no short decimal, but it is the second time."""
+    h, frames = 0.1 / 3, 1001
+    _, q, v = states(verlet, h, frames).T
+    found = identify(np.cumsum([0.0, *[h] * (frames - 1)]), q, v=v, mass=M)
+    assert (found.scheme, found.step) == ("velocity-verlet", h)
+    assert found.stiffness == pytest.approx((K,), rel=1e-14)

@@ -252,6 +252,8 @@ def test_identify_says_which_mass_it_took(tmp_path: Path, capsys: pytest.Capture
     main(["identify", str(path), "--mass", "3.7"])
     said = " ".join(capsys.readouterr().out.split())
     assert "momenta over velocities are 1, and the mass is stated as 3.7" in said
+    main(["identify", str(path), "--mass", "1"])
+    assert "momenta over velocities" not in " ".join(capsys.readouterr().out.split())
     np.savetxt(path, np.c_[T, Q, P, 1 + 0 * T], fmt="%.17g", delimiter=",", header="t,q,p,m", comments="")
     for mass, told in (("3.7", True), ("1", False)):
         main(["identify", str(path), "--mass", mass])

@@ -126,12 +126,9 @@ class Map:
         """Whether chi-squared agrees with the observation model."""
         return self.chi2 <= self.freedom + ERRORS * math.sqrt(KURTOSIS * self.freedom + 1)
 
-    def residuals(self, other: Map | None = None) -> Floats:
-        """Residuals (f - 1, 2) of the map on the pairs of its own states, or of another fit's."""
-        z = self.z
-        if other is not None:
-            z = (other.z * other.size + other.centre - self.centre) / self.size
-        return np.asarray(z[1:] - z[:-1] @ self.entries.T, np.float64)
+    def residuals(self) -> Floats:
+        """Residuals (f - 1, 2) of the map on all pairs of its states, those that were not kept among them."""
+        return np.asarray(self.z[1:] - self.z[:-1] @ self.entries.T, np.float64)
 
 
 def _sizes(z: Extended) -> Extended:

@@ -109,7 +109,7 @@ def few_bad_frames(e: Evidence) -> Explanation | None:
     kept = np.ones(e.pairs, dtype=bool)
     found = e.found
     for _ in range(8):
-        off = np.max(np.abs(found.residuals(e.found)), axis=1) / e.unit
+        off = np.max(np.abs(found.residuals()), axis=1) / e.unit
         limit = max(8 * float(np.median(off[kept])), 2.0)
         now = off <= limit
         if np.count_nonzero(~now) > max(3, FEW_BAD * e.pairs) or np.array_equal(now, kept):
@@ -123,7 +123,7 @@ def few_bad_frames(e: Evidence) -> Explanation | None:
         # what falls off from frame to frame has no few bad ones
         return None
     before = float(np.max(e.weight[:, None] * np.abs(e.residuals)))
-    rest = (e.weight[:, None] * found.residuals(e.found))[kept]
+    rest = (e.weight[:, None] * found.residuals())[kept]
     after = float(np.sqrt(np.mean(rest**2)))
     if before < FALLS * after:
         return None
@@ -175,7 +175,7 @@ def two_parts(e: Evidence) -> Explanation | None:
     frames = np.arange(e.pairs)
 
     def off(found: Map) -> Floats:
-        return np.asarray(np.max(np.abs(found.residuals(e.found)), axis=1) / (OF_ROUNDING * e.unit))
+        return np.asarray(np.max(np.abs(found.residuals()), axis=1) / (OF_ROUNDING * e.unit))
 
     for half in (frames < e.pairs // 2, frames >= e.pairs // 2):
         one = fit(e.record, e.j, kept=half)

@@ -209,7 +209,7 @@ def memory(e: Evidence) -> Explanation | None:
     found = several or found
     # the first frames alone show the other map, but for which all follow one
     later = fit(e.record, e.j, kept=np.arange(e.pairs) >= e.pairs // 2)
-    start = np.max(np.abs(later.residuals(e.found)), axis=1)
+    start = np.max(np.abs(later.residuals()), axis=1)
     before, weighted = (float(np.max(x[1:])) for x in (start / size, e.weight * start))
     if before < rounding or weighted < FALLS * found.worst:
         return None
