@@ -121,8 +121,10 @@ LISTS: tuple[tuple[str, dict[str, Any]], ...] = (
         for name in ("obabo", "vanden-eijnden-ciccotti", "andersen-leapfrog")
     ),
     # without a spring that shows, positions follow the velocities of these too
-    *((name, {"terms": (), "x": 1.7}) for name in ("andersen", "bussi", "bussi-unsigned", "gj-iii-half")),
-    *((name, {"turn": 1e-5, "x": 0.3}) for name in ("andersen", "bussi-unsigned")),
+    *((name, {"terms": (), "x": 1.7}) for name in ("andersen", "andersen-after", "bussi", "gj-iii-half")),
+    ("bussi-unsigned", {"terms": (), "x": 1.7}),
+    ("andersen-after", {"terms": (), "x": 12.0}),
+    *((name, {"turn": 1e-5, "x": 0.3}) for name in ("andersen", "andersen-after", "bussi-unsigned")),
     # what a collision leaves of a momentum changes its sign beyond h omega = 2**0.5
     *((name, {"turn": 1.9}) for name in ("andersen", "bussi", "bussi-unsigned")),
 )

@@ -49,7 +49,7 @@ def run(name: str, steps: int, seed: int = 3) -> tuple[np.ndarray, np.ndarray, n
         ("gj-vi", "gj-vi"), ("gj-i-half", "gj-i-half"), ("bbk", "bbk"),
         ("lammps-langevin", "lammps-langevin"),
         ("euler-maruyama", "euler-maruyama"), ("brownian", "brownian"), ("andersen", "andersen"),
-        ("andersen-after-kick", "andersen-after-kick"),
+        ("andersen-after-kick", "andersen-after-kick"), ("andersen-after", "andersen-after"),
         ("vanden-eijnden-ciccotti", "vanden-eijnden-ciccotti"),
     ],
 )  # fmt: skip
@@ -202,7 +202,7 @@ def test_gromacs_sd_names_itself_in_single_precision() -> None:
     assert found.friction[0] == pytest.approx(10, rel=0.5)
 
 
-@pytest.mark.parametrize("name", ["andersen", "andersen-leapfrog"])
+@pytest.mark.parametrize("name", ["andersen", "andersen-after", "andersen-leapfrog"])
 def test_frames_without_a_collision_between_them_tell_the_spring_and_the_stride_to_rounding(
     name: str,
 ) -> None:
@@ -295,7 +295,7 @@ def test_forces_that_alternate_are_no_draws(name: str, at: str, frames: int) -> 
 
 
 @pytest.mark.parametrize(
-    "name", ["andersen", "andersen-after-kick", "bussi", "bussi-unsigned", "bussi-after"]
+    "name", ["andersen", "andersen-after-kick", "andersen-after", "bussi", "bussi-unsigned", "bussi-after"]
 )
 @pytest.mark.parametrize("rate", [0.4, 8.0])
 def test_draws_of_collisions_and_of_factors_are_white(name: str, rate: float) -> None:
@@ -350,7 +350,7 @@ def test_draws_that_are_carried_on_are_no_reason_to_be_silent() -> None:
     assert not [x for x in schemes if x in at_once and 1 in schemes[x].strides]
 
 
-@pytest.mark.parametrize("name", ["andersen", "andersen-leapfrog"])
+@pytest.mark.parametrize("name", ["andersen", "andersen-after", "andersen-leapfrog"])
 def test_a_few_collisions_are_no_kicks_without_a_cause(name: str) -> None:
     scene = Scene(
         q=[0.3], p=[0.2], m=[M], step=0.006, steps=2789, bath=Bath(temperature=THERMAL, friction=2.0),
@@ -537,3 +537,39 @@ def test_a_frequency_has_no_more_digits_than_the_file() -> None:
     digits = len(f"{found.omega[0]!r}".replace(".", "").lstrip("0"))
     assert digits <= 7
     assert np.isclose(found.omega[0], OMEGA, rtol=1e-4)
+
+
+def after_verlet(kind: str, axes: int = 1, steps: int = 1000) -> tuple[np.ndarray, np.ndarray]:
+    """Positions and velocities (f, axes) of a loop of one's own: velocity Verlet, then something drawn."""
+    rng, h, w2 = np.random.default_rng(1), 0.35, 0.78
+    q, v, rows = np.full(axes, 0.4), np.full(axes, 0.2), []
+    for i in range(steps):
+        rows.append((q, v))
+        v = v - h / 2 * w2 * q
+        q = q + h * v
+        v = v - h / 2 * w2 * q
+        xi, hit = rng.normal(size=axes), i % 10 == 0 if kind == "in time" else rng.random(axes) < 0.2
+        what = {"shot": v + 0.3 * xi, "half": 0.7 * (v + xi), "size": abs(xi) * np.sign(v)}.get(kind, xi)
+        v = np.where(hit, what, v)
+    return tuple(np.array(rows).transpose(1, 0, 2))  # type: ignore[return-value]
+
+
+@pytest.mark.parametrize("axes", [1, 2, 3])
+def test_collisions_that_end_a_step_have_a_name_at_every_step_and_a_list_in_few(axes: int) -> None:
+    """They had none: no known cause.  Three steps a frame: many frames' last step has the only collision."""
+    q, v = after_verlet("", axes, 4000)
+    found = springcheck.identify(0.35 * np.arange(1000), q[:1000], v=v[:1000], mass=1.0)
+    assert (found.verdict, found.scheme, found.fits) == ("named", "andersen-after", True)
+    assert found.omega == pytest.approx([np.sqrt(0.78)] * axes, rel=1e-9)
+    few = springcheck.identify(1.05 * np.arange(len(q[::3])), q[::3], v=v[::3], mass=1.0)
+    assert (few.verdict, few.fits) == ("not told apart", True)
+    names = [one.scheme for one in few.candidates]
+    assert names == ["andersen", "andersen-after-kick", "andersen-after"]
+
+
+@pytest.mark.parametrize("kind", ["shot", "half", "size", "in time"])
+def test_what_ends_a_step_and_is_not_drawn_anew_at_random_times_is_no_collision(kind: str) -> None:
+    q, v = after_verlet(kind)
+    found = springcheck.identify(0.35 * np.arange(1000), q, v=v, mass=1.0)
+    assert "andersen-after" not in [one.scheme for one in found.candidates], found.statement
+    assert not found.fits

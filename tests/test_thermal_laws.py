@@ -63,6 +63,7 @@ def _table(name: str, a: float, x: float) -> tuple[float, float, float | None]:
         "brownian": (1 / (1 - a / x / 2), None, None),
         "andersen": (1 / (1 - a / 4), 1, 0),
         "andersen-after-kick": ((1 - e / 2) / ((1 - e) * (1 - a / 2)), None, None),
+        "andersen-after": (1 / (1 - a / 4), 1, 0),
         "andersen-leapfrog": ((1 - e / 2) / (1 - a / 2), 1 / (1 - a / 2), None),
     }.get(name, (None, None, None))  # type: ignore[return-value]
 
@@ -252,7 +253,7 @@ def test_the_error_of_a_variance_over_ten_million_frames_takes_no_sum_of_them() 
     assert np.all(np.isnan(law("baoab", 1.0, 1.0, 4 - 1e-15, 1e-15, 1.0).error_of_variances(frames)))
 
 
-@pytest.mark.parametrize("name", ["andersen", "andersen-after-kick", "andersen-leapfrog"])
+@pytest.mark.parametrize("name", ["andersen", "andersen-after-kick", "andersen-after", "andersen-leapfrog"])
 @pytest.mark.parametrize("rate", [0.2, 1.5])
 def test_the_error_of_a_variance_is_that_of_many_runs_with_collisions(name: str, rate: float) -> None:
     """A collision makes squares forget by 1 - p, not by its square, and the motion no Gaussian one.

@@ -19,7 +19,7 @@ import pytest
 import springcheck
 from documented import words_of
 from springcheck import checks, driver, engines
-from springcheck.cli import main
+from springcheck.cli import file, main
 from springcheck.engines import Label
 from springcheck.engines.contract import Need
 from springcheck.engines.own import thermal as own_thermal
@@ -624,3 +624,86 @@ def test_the_methods_of_all_engines_are_as_many_as_are_said(need: Any) -> None:
         need(label)
     assert len({label.split(":")[0] for label in LABELS}) == 4
     assert f"{len(LABELS)} methods of four engines run them" in words_of("validation/README.md")
+
+
+def textbook(
+    scene: Scene, steps: int, *, at: str = "end", size: Any = 1.0, rate: float = 1.0, uniform: bool = False
+) -> np.ndarray:
+    """Rows of t, q, v of a loop of one's own: velocity Verlet, then Andersen's collisions (Frenkel & Smit,
+    algorithm 14); collisions at another place of the step, of another size or rate, of uniform draws."""
+    rng, h, m = np.random.default_rng(8), scene.step, scene.m
+    assert scene.bath is not None
+    chance_of_one, kT = -rate * np.expm1(-scene.bath.friction * h), scene.thermal
+    q, v, rows = scene.q.copy(), scene.p / m, [np.r_[0.0, scene.q, scene.p / m]]
+
+    def collided(v: Any, here: bool) -> Any:
+        xi = np.sqrt(12) * (rng.random(len(m)) - 0.5) if uniform else rng.standard_normal(len(m))
+        hit = (rng.random(len(m)) < chance_of_one) & here
+        return np.where(hit, size * np.sqrt(kT / m) * xi, v)
+
+    none, each = np.zeros((len(m), len(m))), np.eye(len(m))
+    at_0, at_1 = (np.asarray(scene.system.potential_force(x, none), float) for x in (none, each))
+
+    def pull(q: Any) -> Any:
+        return at_0[0] + q @ (at_1 - at_0)
+
+    for i in range(1, steps + 1):
+        v = collided(v, at == "start") + h / 2 * pull(q) / m
+        v = collided(v, at == "middle")
+        q = q + h * v
+        v = collided(v + h / 2 * pull(q) / m, at == "end")
+        rows.append(np.r_[i * h, q, v])
+    return np.array(rows)
+
+
+def failed_of(tmp_path: Path, rows: np.ndarray, scene: Scene) -> set[str]:
+    """Checks that a table of t, q, v fails as `andersen-after`."""
+    n = len(scene.m)
+    names = ["t", *(f"{x}{i}" for x in "qv" for i in range(n))] if n > 1 else ["t", "q", "v"]
+    np.savetxt(tmp_path / "a.csv", rows, fmt="%.17g", delimiter=",", header=",".join(names), comments="")
+    scene = replace(scene, steps=len(rows) - 1, every=1)
+    found = file.judge(tmp_path / "a.csv", scene=scene, scheme="andersen-after").verdicts
+    assert sum(v.passed is True for v in found) >= 6
+    return {v.check for v in found if v.passed is False}
+
+
+def alone(m: list[float], k: list[float], **more: Any) -> Scene:
+    """Springs of their own in a bath."""
+    n = len(m)
+    return Scene(
+        m=np.array(m), q=np.full(n, 0.3), p=np.full(n, 0.2), step=0.2, steps=1, name="alone",
+        terms=(WallSpring(i=np.arange(n), k=np.array(k), at=np.full(n, 0.1)),),
+        bath=Bath(temperature=1.7, friction=0.8), **more,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("of", ["one", "two", "joined", "2 axes", "3 axes"])
+def test_a_textbook_loop_whose_collisions_end_the_step_is_andersen_after(tmp_path: Path, of: str) -> None:
+    """It failed as `andersen` in noise-direction and draws-state, and had no name."""
+    scene = {
+        "one": alone([3.7], [2.9]), "two": alone([3.7, 0.41], [2.9, 1.3]), "joined": pair(),
+        "2 axes": alone([3.7] * 2, [2.9, 1.3], places=[0, 1]),
+        "3 axes": alone([3.7] * 3 + [0.41] * 3, [2.9] * 3 + [1.3] * 3, places=[0, 1, 2, 3, 4, 5]),
+    }[of]  # fmt: skip
+    assert failed_of(tmp_path, textbook(scene, 600), scene) == set()
+    for at in ("start", "middle"):
+        assert "noise-direction" in failed_of(tmp_path, textbook(scene, 600, at=at), scene)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "seen"),
+    [
+        ({}, ""), ({"size": np.sqrt(1.05)}, "draws-variance"), ({"size": np.sqrt(0.95)}, "draws-variance"),
+        ({"size": np.sqrt([3.7, 0.41])}, "draws-variance"), ({"rate": 1.1}, "collisions"),
+        ({"rate": 0.9}, "collisions"), ({"uniform": True}, "draws-shape"),
+    ],
+)  # fmt: skip
+def test_a_long_textbook_loop_of_a_wrong_bath_fails(wrong: dict[str, Any], seen: str) -> None:
+    scene = replace(alone([3.7, 0.41], [2.9, 1.3]), bath=Bath(temperature=1.7, friction=4.0))
+    scene = replace(scene, steps=40_000)
+    rows = textbook(scene, scene.steps, **wrong)
+    run = driver.run(scene, "own:andersen-after", seed=1)
+    run = replace(run, q=rows[:, 1:3], p=rows[:, 3:] * scene.m, energy=None)
+    # a loop of one's own records no energies
+    failed = {v.check for v in springcheck.judge(scene, run) if v.passed is False} - {"grid"}
+    assert (seen in failed) if seen else failed == set()

@@ -87,7 +87,7 @@ def spoiled() -> None:
         *np.array(rows).T,
         "noise|random|kick",
         (*noise, "frames"),
-        schemes=("andersen", "andersen-after-kick"),
+        schemes=("andersen-after",),
     )
     q, v = 0.3, 0.2
     rows = [(q, v)]

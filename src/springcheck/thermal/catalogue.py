@@ -261,6 +261,8 @@ _LAMMPS = (
 )  # fmt: skip
 """The stages up to the one that restores the rods' lengths, and those after it."""
 
+_VERLET = (Act("kick", HALF), Act("drift"), Act("kick", HALF))
+
 _OTHERS = (
     *map(by_groups, (2, 3, 4)),
     Thermostat(
@@ -301,6 +303,10 @@ _OTHERS = (
         acts=(Act("kick", HALF), Act("collide"), Act("drift"), Act("kick", HALF)), source="as ASE runs it",
     ),
     Thermostat(
+        name="andersen-after", title="velocity Verlet, then Andersen's collision",
+        acts=(*_VERLET, Act("collide")), source="Frenkel & Smit 2002, algorithm 14",
+    ),
+    Thermostat(
         name="andersen-leapfrog", title="Andersen on the half-step velocities of leapfrog",
         acts=(Act("collide"), Act("kick"), Act("drift")), synchronised=False,
         source="as OpenMM's VerletIntegrator with AndersenThermostat runs it",
@@ -309,8 +315,6 @@ _OTHERS = (
 
 ENERGY_LEFT = Decay(lambda x: np.exp(-2 * x), lambda x: -np.expm1(-2 * x))
 """What a step of Bussi's thermostat leaves of a kinetic energy, which relaxes at twice a momentum's rate."""
-
-_VERLET = (Act("kick", HALF), Act("drift"), Act("kick", HALF))
 
 _RESCALED = (
     Thermostat(

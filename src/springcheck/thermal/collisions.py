@@ -6,13 +6,14 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from springcheck.physics.arrays import Floats
 from springcheck.thermal import chance
 from springcheck.thermal.catalogue import THERMOSTATS
 from springcheck.thermal.laws import Law
 from springcheck.thermal.likelihood import Candidate
-from springcheck.thermal.residuals import together
+from springcheck.thermal.residuals import regressed, together
 
 TRIPLES = 30000
 """Triples of frames that each give a map: of one that holds for every tenth frame 24 are expected."""
@@ -44,7 +45,9 @@ def between_collisions(q: Floats, v: Floats, h: float) -> list[Candidate] | None
     rows = rng.integers(n, size=(TRIPLES, 3))
     rows = rows[np.abs(np.linalg.det(known[rows])) > 1e-6]
     maps = np.linalg.solve(known[rows], after[rows])
-    best = int(np.argmax(np.sum(np.abs(maps[:, :, 0] @ known[few].T - after[few, 0]) < NO_COLLISION, axis=1)))
+    # a collision that ends a frame has moved nothing yet, and momenta show it
+    missed = (np.abs(maps[:, :, i] @ known[few].T - after[few, i]) for i in (0, 1))
+    best = int(np.argmax(sum(np.sum(x < NO_COLLISION, axis=1) for x in missed)))
     left = known @ maps[best] - after
     still = np.max(np.abs(left), axis=1) < NO_COLLISION
     share = float(np.mean(still))
@@ -52,7 +55,7 @@ def between_collisions(q: Floats, v: Floats, h: float) -> list[Candidate] | None
         return None
     spread = (still - share) / np.sqrt(share * (1 - share))
     drawn, replaced = collide(left[~still], known[~still])
-    if not (chance.neighbours(spread[:, None]).chance > LEAST_CHANCE and drawn):
+    if not (chance.neighbours(spread[:, None]).chance > LEAST_CHANCE and drawn) or _is_in_time(~still):
         return None
     if not replaced:
         return []
@@ -101,6 +104,24 @@ def _fitted(changes: Floats, known: Floats) -> tuple[bool, Floats, Floats]:
         one = min(chance.neighbours(x[:, None]).chance, chance.repeats(x[:, None])[0], together(x))
         drawn = drawn and one > LEAST_CHANCE
     return drawn, np.asarray(entries), rest
+
+
+def changed(changes: Floats, after: Floats, state: Floats, close: float) -> tuple[bool, bool, bool]:
+    """Whether nearly all momenta (f,) change by more than `close`, in units of their size; whether those that
+    do take the place of the one before, as draws at random times; and whether nothing of the state (f, 3)
+    before is left in these."""
+    struck = np.abs(changes) > close
+    often = bool(np.quantile(np.abs(changes), 0.05) > close)
+    if not all(collide(changes[struck, None], state[struck])) or _is_in_time(struck):
+        return often, False, False
+    entries, _, errors = regressed(state[struck], after[struck])
+    return often, True, bool(np.all(np.abs(entries[:2]) < 5 * errors[:2]))
+
+
+def _is_in_time(struck: NDArray[np.bool_]) -> bool:
+    """Whether what takes place in some steps (f,) does so after every so many of them: no collisions do."""
+    gaps = np.diff(np.flatnonzero(struck))
+    return bool(gaps[0] > 1 and np.all(gaps == gaps[0]))
 
 
 def is_a_factor(before: Floats, after: Floats) -> bool:

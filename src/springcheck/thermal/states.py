@@ -16,7 +16,7 @@ import numpy as np
 
 from springcheck.physics.arrays import Floats
 from springcheck.thermal.catalogue import random_scheme
-from springcheck.thermal.collisions import between_collisions, collide, is_a_factor
+from springcheck.thermal.collisions import between_collisions, changed, is_a_factor
 from springcheck.thermal.decays import GJ
 from springcheck.thermal.likelihood import ODDS, Candidate, likely, likely_apart
 from springcheck.thermal.residuals import (
@@ -181,9 +181,12 @@ def _of_one(
     def near(value: float, wanted: float) -> bool:
         return bool(abs(value - wanted) <= close * max(abs(wanted), abs(d), h))
 
-    if abs(d) <= close * h and near(b, h * c) and (counted := between_collisions(q, v, h)):
-        # of several steps no combination is free of noise
-        each = tuple(replace(y, strides=(1,)) for y in counted)
+    after = bool(abs(b) <= close * h and near(d, -h))
+    state = np.stack([(q[:-1] - q[0]) / np.std(q), v[:-1] / np.std(v), np.ones(len(v) - 1)], axis=1)
+    if (after or (abs(d) <= close * h and near(b, h * c))) and (counted := between_collisions(q, v, h)):
+        # of several steps no combination is free of noise, and of a collision that ends a step another one
+        ends = (y for y in counted if after == (random_scheme(y.scheme).acts[-1].kind == "collide"))
+        each = tuple(replace(y, strides=(1,)) for y in ends)
         return Thermal(candidates=each, free=tuple(map(float, free)), misfit=misfit, uniform=False)
     found, added, sparse = list[Candidate](), False, bool(np.median(np.abs(left)) < SPARSE)
     if near(b, d) and near(c, -1):
@@ -202,33 +205,39 @@ def _of_one(
             found += [y for number in GJ if (y := _as_gj(number, decay, slow, error, -b, h, 8 * close))]
     elif near(b, d) and near(b, -h / 2) and -1 < c < 1:
         found = likely(("baoa",), q, v, h, turn=2 * (1 + c))
-    elif near(c, -1) and near(d, -h) and abs(b) <= close * h:
+    elif near(c, -1) and after:
         decay, slow, error = _decay(q, v)
-        # without a spring Bussi's factor leaves the same
-        found = [*likely(("euler-maruyama",), q, v, h), *[Candidate(scheme="bussi-after")] * (slow < error)]
+        found = likely(("euler-maruyama",), q, v, h)
+        if slow < error:
+            # without a spring Bussi's factor leaves the same, and so does a collision in nearly every step
+            often, _, anew = changed(np.diff(v) / np.std(v), v[1:], state, close)
+            found = [*found * (not anew or (often and even)), *[Candidate(scheme="bussi-after")] * often]
+            found, left = ([*found, Candidate(scheme="andersen-after")], left[:0]) if anew else (found, left)
     elif abs(c) > 1 + close and abs(d) <= close * h and near(b, h * c):
         # what a collision has left of the momentum, the rest of the step takes on without noise
         known: dict[str, Any] = {"omega": float(np.sqrt(2 * (1 + 1 / c)) / h), "omega_error": 0.0}
         # some steps have no collision, unless these are many; a factor acts in every step, if little
         drawn = v[1:] + known["omega"] ** 2 * kicks
-        changes = (drawn - v[:-1]) / np.std(v)
-        often = close > COARSE or float(np.quantile(np.abs(changes), 0.05)) > close
-        state = np.stack([(q[:-1] - q[0]) / np.std(q), v[:-1] / np.std(v), np.ones(len(v) - 1)], axis=1)
-        struck = np.abs(changes) > close
-        collides = all(collide(changes[struck, None], state[struck]))
+        often, collides, _ = changed((drawn - v[:-1]) / np.std(v), drawn, state, close)
+        often = often or close > COARSE
         names: tuple[str, ...] = ("andersen", "andersen-after-kick") if collides else ()
         names += ("bussi", "bussi-unsigned") if often and (mixed or is_a_factor(v[:-1], drawn)) else ()
         if not names:
             return None
         found = [Candidate(scheme=name, **known) for name in names]
         left = np.empty(0)
-    elif abs(b) <= close * h and near(d, -h) and -1 < c < 1:
+    elif after and -1 < c < 1:
         # noise that is no factor of the momenta, and no friction of theirs, is added to them
-        added = even and _decay(q, v)[0] >= 1 - UNIT_ROOT / len(q) and is_white(left)
         known = {"omega": float(np.sqrt(2 * (1 + c)) / h), "omega_error": 0.0}
-        found = [] if added else [Candidate(scheme="bussi-after", **known)]
-        if found and not is_a_factor(v[:-1] - known["omega"] ** 2 * kicks, v[1:]):
+        made = v[:-1] - known["omega"] ** 2 * kicks
+        often, collides, anew = changed((v[1:] - made) / np.std(v), v[1:], state, close)
+        names = ("andersen-after",) if collides and (mixed or anew) else ()
+        added = not names and even and _decay(q, v)[0] >= 1 - UNIT_ROOT / len(q) and is_white(left)
+        if not added and (often or close > COARSE) and is_a_factor(made, v[1:]):
+            names += ("bussi-after",)
+        if not names and not added:
             return None
+        found = [Candidate(scheme=name, **known) for name in names]
         left = left if added else np.empty(0)
     elif near(c, -1) and abs(d) <= close * h:
         roots = {n: (lambda x, c2=c2: np.sqrt((1 - c2(x)) / x)) for n, c2 in GJ.items()}
@@ -266,7 +275,7 @@ def _of_one(
         # few steps are off, and all others are not
         return None
     # explicit friction in a loop of one's own leaves what these two leave where digits hide collisions
-    alike = {x.scheme for x in found} - ({"andersen-leapfrog"} if len(found) > 1 else set())
+    alike = {x.scheme for x in found} - ({"andersen-leapfrog", "andersen-after"} if found[1:] else set())
     return Thermal(
         candidates=tuple(found), free=tuple(map(float, free)), misfit=misfit,
         uniform=bool(len(left)) and is_uniform(left), added=added,

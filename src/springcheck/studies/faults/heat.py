@@ -83,7 +83,7 @@ THERMAL_STEPS = each(
     _runs("aboba", "baoab", _DIRECTION), _runs("obabo", "baoab", _DIRECTION), _runs("baoab", "obabo", _LAG),
     _runs("gj-ii", "baoab", _DIRECTION), _runs("gj-i", "baoab", _MAP), _runs("baoab", "gj-ii", _DIRECTION),
     _runs("lammps-langevin", "bbk", _MAP), _runs("bbk", "lammps-langevin", _MAP),
-    _runs("andersen-leapfrog", "andersen", _DIRECTION),
+    _runs("andersen-leapfrog", "andersen", _DIRECTION), _runs("andersen", "andersen-after", _DIRECTION),
     Fault("collision-after-kick", "Andersen's collision after the first half kick, which is lost", _VARIANCE,
           lambda c: played(c, runs="andersen-after-kick"), scheme="andersen", scene="wide bath"),
     Fault("collision-chance", "collisions with the chance gamma h", ("collisions",), lambda c: played(
