@@ -227,6 +227,8 @@ class Roundings:
     """Sums (c, f - 1, 2) of the absolute values of all terms between two frames."""
     difference: Floats
     """Further terms of a velocity that is a difference of positions over the step."""
+    turned: Floats
+    """What the rounding of times turns (c, 1, 1), in units of double precision, whatever that of states is."""
     stride: Floats
     path: Floats
     usual: Floats
@@ -246,21 +248,20 @@ def _roundings(record: Record, j: int, found: Map, matches: list[Match]) -> Roun
     lengths = np.sqrt(np.sum(z**2, axis=1))
     later = np.abs(z[1:]) @ np.swapaxes(step, 1, 2) + (lengths[:-1] + lengths[1:])[:, None]
     size += np.where(stride > 1, 1.0, 0.0)[:, None, None] * later
-    # a solution is evaluated at times, and their rounding turns the phase
-    turned = np.sqrt([abs(match.a) for match in matches]) * record.clock * stride / EPSILON
-    flow = np.array([scheme.flow for scheme in schemes])
-    size += np.where(flow, turned, 0.0)[:, None, None] * np.max(lengths)
     position = np.abs(z[1:, 0] + float(found.centre[0] / found.size[0]))
     if record.parts is not None:
         summed = record.summed(j)
         size += 2 * (summed[1:] + summed[:-1]) / found.size.astype(np.float64)
         position = summed[1:, 0] / float(found.size[0])
+    # a solution is evaluated at times, and their rounding turns the phase
+    turned = np.sqrt([abs(match.a) for match in matches]) * record.clock * stride / EPSILON
+    turned = np.where([scheme.flow for scheme in schemes], turned, 0.0)[:, None, None] * np.max(lengths)
     difference = np.zeros_like(size)
     difference[:, :, 1] = 2 * (float(found.size[0] / found.size[1]) * stride)[:, None] * position
     # substeps of one force round alike
     parts = np.array([_substeps(match) for match in matches])
     return Roundings(
-        size=size, difference=difference, stride=stride, usual=4 + 2 * np.sqrt(stride) * parts,
+        size=size, difference=difference, turned=turned, stride=stride, usual=4 + 2 * np.sqrt(stride) * parts,
         path=stride * parts * [4 if scheme.flow else scheme.path for scheme in schemes],
     )  # fmt: skip
 
@@ -291,7 +292,7 @@ def _defects(
         if plain[i]:
             precision, note = "double", _written(record)
         elif not stored[i] and coarse.is_rebuilt(
-            match, missing[i], half[i], sizes.size[i], sizes.difference[i]
+            match, missing[i], half[i], (sizes.size + sizes.turned)[i], sizes.difference[i]
         ):
             precision, note = "double", REBUILT_NOTE
         elif record.fine:
@@ -320,7 +321,7 @@ def _beyond(record: Record, found: Map, sizes: Roundings, half: Floats) -> bool:
     each = BEYOND * (EPSILON + off * sizes.stride) * (sizes.path + sizes.stride**2)
     if not record.fine:
         each = BEYOND_FILE * (SINGLE + off * sizes.stride) * np.minimum(sizes.path, sizes.usual)
-    most = BEYOND_FILE * half + each[:, None, None] * (sizes.size + sizes.difference)
+    most = BEYOND_FILE * half + each[:, None, None] * (sizes.size + sizes.turned + sizes.difference)
     explained = np.sum((most * found.weight[:, None]) ** 2, axis=(1, 2))
     return bool(np.all(found.freedom / 2 * np.sum(found.residual**2) > explained))
 
@@ -330,7 +331,8 @@ def _in_double(
 ) -> tuple[Floats, Any, Floats]:
     """Largest residuals (c,) in ulps, whether double precision and the rounding of times explain them, and
     the residuals (c, f - 1, 2)."""
-    stride, unit = sizes.stride, EPSILON * sizes.size
+    stride, size = sizes.stride, sizes.size + sizes.turned
+    unit = EPSILON * size
 
     def missed(deviations: Extended | None) -> Floats:
         return _refitted(
@@ -353,7 +355,7 @@ def _in_double(
     most_ulp = np.where(follows, sizes.path, np.minimum(sizes.path, sizes.usual))
     rounded, slack = ulp, np.zeros_like(signed)
     if record.deviations is not None and np.any((stride == 1) & (ulp > most_ulp)):
-        rounded = np.where(stride == 1, ulps(_stepped_to(record, found, matches, signed, sizes.size)), ulp)
+        rounded = np.where(stride == 1, ulps(_stepped_to(record, found, matches, signed, size)), ulp)
     if np.any((stride > 1) & (ulp > sizes.usual)):
         slack = np.where((stride > 1)[:, None, None], _unlike(record, found, matches), 0.0)
         rounded = np.where(stride > 1, ulps(signed, slack), rounded)
@@ -376,7 +378,7 @@ def _in_file(
     most = np.minimum(sizes.path, sizes.usual)[:, None, None]
 
     def explained(rounding: float, size: Floats) -> Any:
-        return _largest(np.abs(signed), half + rounding * size * most) <= 1
+        return _largest(np.abs(signed), half + (rounding * size + EPSILON * sizes.turned) * most) <= 1
 
     # what shows roundings of single precision has none that hide
     single = explained(SINGLE, sizes.size) & (not record.deep)

@@ -15,6 +15,8 @@ from typing import Any
 
 import numpy as np
 
+from springcheck.errors import IdentificationError
+from springcheck.identify.clock import clock_of
 from springcheck.identify.evidence import AGREES
 from springcheck.identify.hypothesis import ERRORS, SURE
 from springcheck.identify.result import Candidate, Explanation, Identification
@@ -144,8 +146,10 @@ def _given(t: Any, q: Any, p: Any, v: Any, mass: Any) -> tuple[Floats, Floats, F
     if len(times) < FEWEST or positions.shape[1] > MOST:
         return None
     m = np.broadcast_to(1.0 if mass is None else np.ravel(np.asarray(mass, np.float64)), positions.shape[1:])
-    steps = np.diff(times)
-    if not np.all(np.abs(steps - steps[0]) <= 1e-9 * abs(steps[0])):
+    try:
+        # of one interval but for the rounding of the times, as of single precision in a .trr
+        times = float(clock_of(times).interval) * np.arange(len(times))
+    except IdentificationError:
         return None
     if v is None:
         u = u / m
