@@ -109,8 +109,7 @@ def judge(
     SpringcheckError where it is unreadable or not of the scene."""
     found = load_scene(scene) if isinstance(scene, str) else scene
     if scheme not in schemes.known():
-        # engines that are not asked for have schemes of their own
-        engines.names()
+        engines.names()  # those that are not asked for have schemes of their own
     known = schemes.scheme(scheme)
     states = states_in(path, columns, step, trajectory)
     judged, run, notes, taken = as_trajectory(path, states, found, known.name)

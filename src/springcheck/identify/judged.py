@@ -151,12 +151,12 @@ def _uncoupled(record: Record, maps: dict[int, Map]) -> Record | None:
     if not record.fine:
         own = _of_orbit(record, chosen, parts @ basis)
         return None if own is None else _along(record, chosen, _inverse(own))
-    uneven = np.max(whole.weight) > UNEVEN * np.min(whole.weight)
+    uneven = np.max(whole.weight) > GROWN * np.min(whole.weight)
     rows = _parted(whole, basis) @ _inverse(parts) if uneven else _inverse(parts @ basis)
     return _along(record, chosen, rows)
 
 
-class Whole(NamedTuple):
+class JointMap(NamedTuple):
     """The map (2m, 2m) of all moving parts of the coordinates together, from their states (f, 2m), one unit
     for all positions and one for all velocities, and the weights (f - 1, 1) of the pairs."""
 
@@ -172,7 +172,7 @@ class Whole(NamedTuple):
         return self.map[n:, :n]
 
 
-def coupled(record: Record, maps: dict[int, Map], share: float = 1 / FALLS) -> Whole | None:
+def coupled(record: Record, maps: dict[int, Map], share: float = 1 / FALLS) -> JointMap | None:
     """The map of all moving parts of the coordinates together, where that leaves a `share` at most of what
     the maps of single coordinates leave over; None where it leaves more."""
     single = max(float(np.max(found.residual)) for found in maps.values())
@@ -201,7 +201,7 @@ def coupled(record: Record, maps: dict[int, Map], share: float = 1 / FALLS) -> W
     weight = 1 / each
     x = least_squares(columns * weight, scaled[1:] * weight)
     left = float(np.sqrt(np.mean((weight * (scaled[1:] - columns @ x)).astype(np.float64) ** 2)))
-    return Whole(scaled, x[:-1].T, weight) if left <= share * single else None
+    return JointMap(scaled, x[:-1].T, weight) if left <= share * single else None
 
 
 def _moving_parts(record: Record, chosen: list[int]) -> Extended:
@@ -222,7 +222,7 @@ def _moving_parts(record: Record, chosen: list[int]) -> Extended:
 SAME_MODE = 1e-5
 """Relative difference of eigenvalues below which any combination of two modes is one."""
 
-UNEVEN = 16.0
+GROWN = 16.0
 """Ratio of the sizes of frames from which the forces' part of a map of all, which the small ones hardly show,
 tells slow modes apart less well than each mode's own map."""
 
@@ -300,7 +300,7 @@ def _of_orbit(record: Record, chosen: list[int], basis: Extended) -> Extended | 
     return basis if off <= 1 else None
 
 
-def _parted(of: Whole, basis: Extended) -> Extended:
+def _parted(of: JointMap, basis: Extended) -> Extended:
     """Rows (n, n) that take coordinates to modes of one map each: in a row with a share d of another's, a
     step leaves over d times what the other's map has more."""
     z, whole, weight = of

@@ -12,7 +12,7 @@ from itertools import combinations
 
 import numpy as np
 
-from springcheck.identify.evidence import FALLS, FIXED, Evidence
+from springcheck.identify.evidence import FALLS, FIXED, LEFT_BY_ROUNDING, Evidence
 from springcheck.identify.fit import fit
 from springcheck.identify.record import Record
 from springcheck.identify.result import Explanation
@@ -38,10 +38,12 @@ def misplaced(e: Evidence) -> Explanation | None:
     before = _left(e.record, e.j)
     if not before:
         return None
+    # of noise, whose largest parts an exchange of some frames takes away, more than rounding is left
+    least = max(FIXED, LEFT_BY_ROUNDING * float(np.median(e.weight * e.unit)))
     for look in (_wrapped, _exchanged):
         for record, cause, remedy in look(e.record, e.j):
             after = _left(record, e.j)
-            if after * FALLS < before:
+            if after * FALLS < before and (look is _wrapped or after <= least):
                 return Explanation(cause, remedy, after / before, local=True)
     return None
 
