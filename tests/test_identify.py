@@ -540,6 +540,14 @@ def test_states_that_cannot_show_a_map_are_refused_with_a_reason(change, words: 
         identify(t, q, p, mass=made.m)
 
 
+def test_momenta_of_few_digits_ask_for_the_mass() -> None:
+    made = case("velocity-verlet", np.random.default_rng(13), lowest=0.2)
+    found = identify(made.t, text(made.q), text(made.p))
+    assert found.verdict == "not told apart"
+    told = [note for note in found.notes if note.startswith("what would tell them apart: ")]
+    assert [note.endswith(" or the mass") for note in told] == [True]
+
+
 def test_momenta_that_point_against_their_velocities_give_no_mass() -> None:
     made = case("velocity-verlet", np.random.default_rng(20))
     with pytest.raises(IdentificationError, match="opposite ways: one of them is wrong"):

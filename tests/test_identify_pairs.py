@@ -115,20 +115,36 @@ def test_a_pair_whose_line_turns_is_not_named_by_its_distance() -> None:
     assert not any("their distance is judged" in note for note in found.notes)
 
 
+def on_a_spring(q: float, v: float) -> np.ndarray:
+    """Positions and velocities (2, N) of the first particle by velocity Verlet."""
+    rows = []
+    for _ in range(N):
+        rows.append((q, v))
+        v -= H / 2 * K / M[0] * q
+        q += H * v
+        v -= H / 2 * K / M[0] * q
+    return np.array(rows).T
+
+
+def test_a_stiffness_of_half_the_springs_is_of_a_bond_only_where_two_particles_move_oppositely() -> None:
+    one, other = on_a_spring(1.1, 0.4), on_a_spring(0.3, 0.9)
+    for second, scheme in ((-one, "velocity-verlet"), (other, None)):
+        q, v = np.stack([one, second], axis=2)
+        found = identify(H * np.arange(N), q, v=v, mass=M[0], stiffness=K / 2)
+        assert (found.scheme, found.fits) == (scheme, scheme is not None)
+        bound = "the two halves of the coordinates are two particles bound to each other, at rest as a whole"
+        assert any(note.startswith(bound) for note in found.notes) == found.fits
+
+
 @pytest.mark.parametrize(("columns", "bond"), [((0, 3), True), ((0, 4), False), ((0, 1), False)], ids=str)
 def test_the_stiffness_of_a_bond_is_that_of_two_particles_along_one_axis(
     columns: tuple[int, int], bond: bool
 ) -> None:
     """Opposite motions along x and y, or of one particle, are of no bond of two particles."""
-    z, rows = np.array([1.1, 0.4]), []
-    for _ in range(N):
-        rows.append(z)
-        half = z[1] - H / 2 * K / M[0] * z[0]
-        q = z[0] + H * half
-        z = np.array([q, half - H / 2 * K / M[0] * q])
+    rows = on_a_spring(1.1, 0.4)
     q, v = (np.zeros((N, 6)) for _ in range(2))
     for column, sign in zip(columns, (1, -1), strict=True):
-        q[:, column], v[:, column] = sign * np.array(rows).T
+        q[:, column], v[:, column] = sign * rows
     found = identify(H * np.arange(N), q, v=v, mass=M[0])
     assert (found.scheme, found.fits) == ("velocity-verlet", True)
     assert [f"their bond has the stiffness {K / 2:g}" in note for note in found.notes].count(True) == bond

@@ -188,3 +188,15 @@ def test_a_step_that_remembers_an_earlier_position_wraps_none_into_a_box() -> No
     found = identify_stepper(stoermer)
     assert (found.scheme, found.fits) == (None, False)
     assert found.statement.startswith("A step depends on an earlier call")
+
+
+def test_leaps_of_unlike_length_are_of_no_box_and_show_no_order() -> None:
+    def step(q: Any, p: Any, h: float, force: Force, m: Any) -> tuple[Any, Any]:
+        p = p + h / 2 * force(q)
+        q = q + h * p / m
+        return q - 1.7 * (q > 1) + 2.3 * (q < -1), p + h / 2 * force(q)
+
+    found = identify_stepper(step)
+    assert (found.scheme, found.fits) == (None, False)
+    assert not found.statement.startswith("The positions are wrapped")
+    assert "its error on a quartic well does not fall as a power of the step: no order is seen" in found.notes

@@ -75,6 +75,23 @@ def test_one_oscillator_in_a_bath_is_seen_in_rows_and_in_columns_alike() -> None
         assert identify(t, positions, v=velocities, mass=mass).statement == wanted.statement
 
 
+def test_what_would_tell_thermostats_apart_is_noted_and_what_is_free_of_noise() -> None:
+    t, q, v = run("baoab", 1000)
+    of_every_step, of_every_third = identify(t, q, v=v, mass=M), identify(t[::3], q[::3], v=v[::3], mass=M)
+    more = "a stated stiffness or more frames may tell them apart"
+    for found, told in ((of_every_step, more), (of_every_third, f"frames of every step, {more}")):
+        assert found.verdict == "not told apart"
+        assert any(note.endswith(f"by a factor of 1e6; {told}") for note in found.notes), found.notes
+    assert any(note.startswith("free of noise at every step: (1, ") for note in of_every_step.notes)
+    turns = "of frames several steps apart whole turns between two of them do not show"
+    assert [turns in found.notes for found in (of_every_step, of_every_third)] == [False, True]
+    # gj-v and gj-vi stretch the step, and with it the frequency
+    stated = identify(t, q, v=v, mass=M, stiffness=K, friction=M * RATE)
+    left = {x.scheme for x in of_every_step.candidates} - {x.scheme for x in stated.candidates}
+    assert left == {"gj-v", "gj-vi"}
+    assert stated.fits
+
+
 @pytest.mark.parametrize("name", ["baoab", "obabo", "andersen"])
 def test_what_is_stated_of_a_bath_is_held_against_its_states(name: str) -> None:
     t, q, v = run(name, 1000)
