@@ -600,3 +600,53 @@ def test_what_ends_a_step_and_is_not_drawn_anew_at_random_times_is_no_collision(
     found = springcheck.identify(0.35 * np.arange(1000), q, v=v, mass=1.0)
     assert "andersen-after" not in [one.scheme for one in found.candidates], found.statement
     assert not found.fits
+
+
+def written(
+    name: str, digits: str, step: float, frames: int = 1500
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Times, positions and velocities of two springs in a bath, as text of so many digits keeps them."""
+    springs = WallSpring(i=np.array([0, 1]), k=np.array([K, 5.3]), at=np.zeros(2))
+    bath = Bath(temperature=THERMAL, friction=RATE)
+    made = driver.run(
+        Scene(m=np.full(2, M), q=np.array([0.3, 0.1]), p=np.array([0.2, -0.4]), terms=(springs,), step=step,
+              steps=frames, bath=bath, name="two"), f"own:{name}", seed=3,
+    )  # fmt: skip
+    t, q, v = (np.array([float(f"{x:{digits}}") for x in y.ravel()]) for y in (made.t, made.q, made.p / M))
+    return t, q.reshape(made.q.shape), v.reshape(made.q.shape)
+
+
+@pytest.mark.parametrize("digits", [".8f", ".6f", ".8g"])
+def test_a_bath_at_rounded_times_is_named_and_is_no_exact_flow(digits: str) -> None:
+    """The phase that rounded times turn was allowed in single precision: every scheme fitted the noise."""
+    t, q, v = written("obabo", digits, 0.0724188843)
+    found = identify(t, q, v=v, mass=M)
+    assert "obabo" in [x.scheme for x in found.candidates]
+    assert "exact" not in [x.scheme for x in found.candidates]
+
+
+def test_a_bath_at_times_of_single_precision_is_named() -> None:
+    t, q, v = (x.astype(np.float32).astype(float) for x in written("baoab", ".17g", 0.35))
+    assert "baoab" in [x.scheme for x in identify(t, q, v=v, mass=M).candidates]
+
+
+def test_noise_of_coordinates_alike_is_no_exchange_of_their_velocities() -> None:
+    rng = np.random.default_rng(907)
+    names, said = ("obabo", "baoab"), []
+    for name in names:
+        t, q, v = written(name, ".8g", 0.0311 * (1 + rng.random()), 900)
+        said.append(identify(t, q, v=v, mass=M).statement)
+    assert not any("changed places" in x for x in said)
+    assert len(said) == len(names)
+
+
+def test_a_friction_that_hardly_shows_is_no_number_and_kt_none_beside_it() -> None:
+    """kT was 22 of its standard errors off, where its product with the friction alone is known."""
+    spring = WallSpring(i=np.array([0]), k=np.array([K]), at=np.zeros(1))
+    weak = Scene(
+        m=np.array([M]), q=np.array([0.3]), p=np.array([0.2]), terms=(spring,), step=0.035, steps=400,
+        bath=Bath(temperature=THERMAL, friction=0.003), name="weak",
+    )  # fmt: skip
+    made = driver.run(weak, "own:baoab", seed=3)
+    said = " ".join(identify(made.t, made.q, v=made.p / M, mass=M).notes)
+    assert "friction c/m too little known to tell kT from it" in said

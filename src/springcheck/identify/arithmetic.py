@@ -228,7 +228,7 @@ class Roundings:
     difference: Floats
     """Further terms of a velocity that is a difference of positions over the step."""
     turned: Floats
-    """What the rounding of times turns (c, 1, 1), in units of double precision, whatever that of states is."""
+    """What the rounding of times turns (c, 1, 1), in units of double precision whatever the states have."""
     stride: Floats
     path: Floats
     usual: Floats

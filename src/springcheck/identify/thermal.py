@@ -320,15 +320,26 @@ def _with_strides(name: str, strides: tuple[int, ...]) -> str:
     return f"{name} ({low}{f' to {high}' if high > low else ''} step{'s' * (high > 1)} a frame)"
 
 
+LEAST_KNOWN = 3.0
+"""Standard errors of a friction up to which it is no number, and kT none beside it."""
+
+
 def _numbers(name: str, one: Any, m: float | None) -> str:
     """The numbers that a candidate implies, each with its standard error."""
     scale = 1.0 if m is None else m
+    # the states show the product of both, of which either may be any part; one has no error at an end of its
+    # range alone, where the other's is not that of digits either
+    at_an_end = math.isnan(one.friction_error) and one.omega_error > 0
+    open_ended = at_an_end or one.friction <= LEAST_KNOWN * one.friction_error
+    if open_ended:
+        one = replace(one, friction=math.nan, thermal=math.nan)
     of = (
         ("omega", one.omega, one.omega_error), ("friction c/m", one.friction, one.friction_error),
         ("kT/m" if m is None else "kT", one.thermal * scale, one.thermal_error * scale),
     )  # fmt: skip
     return f"{_with_strides(name, one.strides[:1])}: " + ", ".join(
-        f"{word} {_measured(x, error)}" for word, x, error in of if math.isfinite(x)
+        [f"{word} {_measured(x, error)}" for word, x, error in of if math.isfinite(x)]
+        + ["friction c/m too little known to tell kT from it"] * open_ended
     )
 
 
