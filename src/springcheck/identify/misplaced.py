@@ -38,14 +38,21 @@ def misplaced(e: Evidence) -> Explanation | None:
     before = _left(e.record, e.j)
     if not before:
         return None
-    # of noise, whose largest parts an exchange of some frames takes away, more than rounding is left
+    # an exchange of some frames takes the largest parts of noise away, and leaves noise in all of them
     least = max(FIXED, LEFT_BY_ROUNDING * float(np.median(e.weight * e.unit)))
     for look in (_wrapped, _exchanged):
         for record, cause, remedy in look(e.record, e.j):
             after = _left(record, e.j)
-            if after * FALLS < before and (look is _wrapped or after <= least):
+            if after * FALLS < before and (look is _wrapped or after <= least or _in_few(record, e.j, after)):
                 return Explanation(cause, remedy, after / before, local=True)
     return None
+
+
+def _in_few(record: Record, j: int, left: float) -> bool:
+    """Whether what a coordinate's map leaves over, `left` in root mean square, stands in few frames."""
+    found = fit(record, j)
+    off = np.max(np.abs(found.residuals()), axis=1) * found.weight
+    return float(np.median(off)) * FALLS < left
 
 
 def _left(record: Record, j: int) -> float:
