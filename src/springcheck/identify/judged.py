@@ -7,8 +7,7 @@ along which each mode moves by itself.
 from __future__ import annotations
 
 import math
-from dataclasses import replace
-from typing import NamedTuple
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -156,7 +155,8 @@ def _uncoupled(record: Record, maps: dict[int, Map]) -> Record | None:
     return _along(record, chosen, rows)
 
 
-class JointMap(NamedTuple):
+@dataclass(frozen=True, slots=True, eq=False)
+class JointMap:
     """The map (2m, 2m) of all moving parts of the coordinates together, from their states (f, 2m), one unit
     for all positions and one for all velocities, and the weights (f - 1, 1) of the pairs."""
 
@@ -303,7 +303,7 @@ def _of_orbit(record: Record, chosen: list[int], basis: Extended) -> Extended | 
 def _parted(of: JointMap, basis: Extended) -> Extended:
     """Rows (n, n) that take coordinates to modes of one map each: in a row with a share d of another's, a
     step leaves over d times what the other's map has more."""
-    z, whole, weight = of
+    z, whole, weight = of.states, of.map, of.weight
     inverse, n = _inverse(basis), len(basis)
     blocks = inverse @ whole.reshape(2, n, 2, n).swapaxes(1, 2) @ basis
     own = np.moveaxis(np.diagonal(blocks, axis1=2, axis2=3), 2, 0)

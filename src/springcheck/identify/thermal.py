@@ -148,7 +148,7 @@ def _given(t: Any, q: Any, p: Any, v: Any, mass: Any) -> tuple[Floats, Floats, F
     m = np.broadcast_to(1.0 if mass is None else np.ravel(np.asarray(mass, np.float64)), positions.shape[1:])
     try:
         # of one interval but for the rounding of the times, as of single precision in a .trr
-        times = float(clock_of(times).interval) * np.arange(len(times))
+        times = np.arange(len(times), dtype=np.float64) * float(clock_of(times).interval)
     except IdentificationError:
         return None
     if v is None:
