@@ -243,7 +243,7 @@ def test_with_friction_kicks_of_its_force_are_of_first_order(name: str, c: float
     scheme, one = schemes.SCHEMES[name], np.ones(1)
     exact = mpmath.expm(mpmath.matrix([[0, 1], [-1, -c]]))
     off = []
-    for steps in (256, 512):
+    for steps in (32, 64):
         step = schemes.matrix(scheme, h=1 / steps, m=one, k=one, c=c * one)[0]
         whole = mpmath.matrix(np.linalg.matrix_power(step, steps).tolist())
         off.append(float(mpmath.mnorm(whole - exact)))
