@@ -292,7 +292,7 @@ def _defects(
         if plain[i]:
             precision, note = "double", _written(record)
         elif not stored[i] and coarse.is_rebuilt(
-            match, missing[i], half[i], (sizes.size + sizes.turned)[i], sizes.difference[i]
+            match, missing[i], half[i], sizes.size[i] + sizes.turned[i], sizes.difference[i]
         ):
             precision, note = "double", REBUILT_NOTE
         elif record.fine:

@@ -20,7 +20,7 @@ from springcheck.identify.hypothesis import ERRORS
 from springcheck.identify.noise import Noise
 from springcheck.identify.record import Record
 from springcheck.identify.storage import ROUNDING
-from springcheck.physics.arrays import Extended, Floats
+from springcheck.physics.arrays import Extended, Floats, Reals
 from springcheck.physics.exact.powers import Rotation
 from springcheck.schemes import rotation
 
@@ -315,6 +315,11 @@ def _lengths(z: Extended, centre: Extended | Floats, parts: Floats) -> Floats:
     # a start of few digits, or 0, is exact, but what follows from it is not
     length = np.maximum(away[1:], away[:-1]) + float(np.sqrt(np.sum(centre.astype(np.float64) ** 2)))
     return np.asarray(np.maximum(length, LEAST_NOISE * np.max(length)))
+
+
+def of_pairs(sizes: Reals, least: float = LEAST_NOISE) -> Reals:
+    """Sizes (f - 1, 1) of pairs of frames: the larger of both, and at least a part of the largest of all."""
+    return np.asarray(np.maximum(np.maximum(sizes[1:], sizes[:-1]), least * np.max(sizes))[:, None])
 
 
 def _constant_part(

@@ -22,7 +22,7 @@ from springcheck.identify.evidence import (
     matched,
 )
 from springcheck.identify.families import FAMILIES, OF_HALF_A_STEP_AGO, VERLET, titles
-from springcheck.identify.fit import LEAST_NOISE, Map, fit
+from springcheck.identify.fit import Map, fit, of_pairs
 from springcheck.identify.hypothesis import FEW, Joint, Match, distinct
 from springcheck.identify.maps import powers, unit
 from springcheck.identify.result import Explanation
@@ -208,8 +208,7 @@ def broken(e: Evidence, *, regular: bool = False) -> Explanation | None:
     quanta = np.concatenate([record.q_quantum[:, moving], record.v_quantum[:, moving]], axis=1)
     size = np.maximum(np.max(np.abs(z), axis=0), np.finfo(np.float64).tiny)
     # of a motion that grows each pair is weighted by its own size
-    each = np.max(np.abs(z / size), axis=1)
-    each = np.maximum(np.maximum(each[1:], each[:-1]), LEAST_NOISE * np.max(each))[:, None]
+    each = of_pairs(np.max(np.abs(z / size), axis=1))
     columns, ends = np.column_stack([z[:-1] / size, np.ones(e.pairs)]) / each, z[1:] / size / each
     part, room = columns.shape[1] + SPARE, LEFT_BY_ALL + 32 * float(np.max(quanta / size))
     if len(moving) < 2 or e.pairs < 2 * part:

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from springcheck.errors import IdentificationError
 from springcheck.identify.evidence import FALLS, FIXED, LEFT_BY_ROUNDING, SPARE, Measured
-from springcheck.identify.fit import FLOOR, LEAST_NOISE, Map, fit
+from springcheck.identify.fit import FLOOR, Map, fit, of_pairs
 from springcheck.identify.hypothesis import SURE
 from springcheck.identify.maps import powers
 from springcheck.identify.noise import least_squares
@@ -22,7 +22,7 @@ from springcheck.identify.record import AT_REST, Record, of_size, stated_stride
 from springcheck.identify.search import terms_of
 from springcheck.identify.storage import ROUNDING
 from springcheck.identify.together import distance
-from springcheck.physics.arrays import Extended
+from springcheck.physics.arrays import Extended, Floats
 
 
 def judged(
@@ -143,23 +143,23 @@ def _uncoupled(record: Record, maps: dict[int, Map]) -> Record | None:
     chosen = list(maps)
     whole = coupled(record, maps, 1e-3 if record.fine else 1 / FALLS)
     basis = None if whole is None else _modes(whole.force)
-    parts = _moving_parts(record, chosen)
     # of two particles that are bound to each other alone the distance is judged
-    if whole is None or basis is None or (len(parts) > len(basis) and distance(record) is not None):
+    if whole is None or basis is None or (len(chosen) > len(basis) and distance(record) is not None):
         return None
     if not record.fine:
-        own = _of_orbit(record, chosen, parts @ basis)
+        own = _of_orbit(record, chosen, whole.parts @ basis)
         return None if own is None else _along(record, chosen, _inverse(own))
     uneven = np.max(whole.weight) > GROWN * np.min(whole.weight)
-    rows = _parted(whole, basis) @ _inverse(parts) if uneven else _inverse(parts @ basis)
+    rows = _parted(whole, basis) @ _inverse(whole.parts) if uneven else _inverse(whole.parts @ basis)
     return _along(record, chosen, rows)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointMap:
-    """The map (2m, 2m) of all moving parts of the coordinates together, from their states (f, 2m), one unit
-    for all positions and one for all velocities, and the weights (f - 1, 1) of the pairs."""
+    """The map (2m, 2m) of all moving parts (n, m) of the coordinates together, from their states (f, 2m), one
+    unit for all positions and one for all velocities, and the weights (f - 1, 1) of the pairs."""
 
+    parts: Extended
     states: Extended
     map: Extended
     weight: Extended
@@ -178,7 +178,7 @@ def coupled(record: Record, maps: dict[int, Map], share: float = 1 / FALLS) -> J
     single = max(float(np.max(found.residual)) for found in maps.values())
     if len(maps) < 2 or single < max(64 * FIXED, 1e-8):
         return None
-    parts, h = _moving_parts(record, list(maps)), abs(float(record.interval))
+    parts = _moving_parts(record, list(maps))
     z = np.concatenate([x[:, list(maps)] @ parts for x in (record.q, record.v * record.interval)], axis=1)
     frames, n = len(z), z.shape[1] // 2
     if frames - 1 < 2 * n + 1 + SPARE:
@@ -191,17 +191,21 @@ def coupled(record: Record, maps: dict[int, Map], share: float = 1 / FALLS) -> J
     scaled = z / size
     columns = np.concatenate([scaled[:-1], np.ones((frames - 1, 1), dtype=np.longdouble)], axis=1)
     # a motion that grows rounds its last frames far more coarsely than those that show the other modes
-    each, least = np.max(np.abs(scaled), axis=1), LEAST_NOISE
+    each = of_pairs(np.max(np.abs(scaled), axis=1))
     if not record.fine:
         # frames count by their digits
-        unit = [np.max(x[:, list(maps)], axis=1) for x in (record.q_quantum, record.v_quantum * h)]
-        each, least = np.maximum(unit[0] / size[0], unit[1] / size[-1]), FLOOR
-    each = np.maximum(np.maximum(each[1:], each[:-1]), least * np.max(each))[:, None]
-    each = each if record.fine else each * np.sqrt(np.mean((scaled[1:] / each) ** 2))
-    weight = 1 / each
+        each = of_pairs(np.max(_digits(record, list(maps)) / size[[0, -1], None], axis=0), FLOOR)
+        each = each * np.sqrt(np.mean((scaled[1:] / each) ** 2))
+    weight = (1 / each).astype(np.longdouble)
     x = least_squares(columns * weight, scaled[1:] * weight)
     left = float(np.sqrt(np.mean((weight * (scaled[1:] - columns @ x)).astype(np.float64) ** 2)))
-    return JointMap(scaled, x[:-1].T, weight) if left <= share * single else None
+    return JointMap(parts, scaled, x[:-1].T, weight) if left <= share * single else None
+
+
+def _digits(record: Record, chosen: list[int]) -> Floats:
+    """Units (2, f) of the last digit of the positions and of the velocities times the interval."""
+    units = record.q_quantum, record.v_quantum * abs(float(record.interval))
+    return np.stack([np.max(x[:, chosen], axis=1) for x in units])
 
 
 def _moving_parts(record: Record, chosen: list[int]) -> Extended:
@@ -273,9 +277,8 @@ def _of_orbit(record: Record, chosen: list[int], basis: Extended) -> Extended | 
     """Basis (n, m) of the modes of a file of few digits, by all frames together: each coordinate is a sum of
     the motions that the modes' own maps give, whose amplitudes are fitted.  None where two modes are one, or
     where the sums are off by more than digits that are cut off are."""
-    h, frames = abs(float(record.interval)), len(record.q)
+    frames, unit = len(record.q), _digits(record, chosen)
     wanted = np.stack([record.q[:, chosen], record.v[:, chosen] * record.interval]).astype(np.float64)
-    unit = np.stack([np.max(x[:, chosen], axis=1) for x in (record.q_quantum, record.v_quantum * h)])
     weight = 1 / np.maximum(unit, FLOOR * np.max(unit, axis=1, keepdims=True))[:, :, None]
     rest = np.stack([np.ones(frames), np.zeros(frames)])[:, :, None]
     off = np.inf

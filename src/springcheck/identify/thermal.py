@@ -327,8 +327,8 @@ LEAST_KNOWN = 3.0
 def _numbers(name: str, one: Any, m: float | None) -> str:
     """The numbers that a candidate implies, each with its standard error."""
     scale = 1.0 if m is None else m
-    # the states show the product of both, of which either may be any part; one has no error at an end of its
-    # range alone, where the other's is not that of digits either
+    # the states show the product of friction and kT better than either; at an end of the range of frictions
+    # no error of it is known, where omega has one
     at_an_end = math.isnan(one.friction_error) and one.omega_error > 0
     open_ended = at_an_end or one.friction <= LEAST_KNOWN * one.friction_error
     if open_ended:
