@@ -50,7 +50,7 @@ posix = pytest.mark.skipif(os.name != "posix", reason="signals are POSIX's")
 def begun(words: Sequence[str], **how: Any) -> Iterator[subprocess.Popen[str]]:
     """A program whose output is caught; it ends with this context: a test of one that does not fails."""
     pipe = subprocess.PIPE
-    with subprocess.Popen(words, stdout=pipe, stderr=pipe, text=True, **how) as process:
+    with subprocess.Popen(words, **{"stdout": pipe, "stderr": pipe, "text": True, **how}) as process:
         try:
             yield process
         finally:
@@ -205,7 +205,7 @@ def test_a_second_signal_prints_nothing_and_spoils_no_tidying_up() -> None:
     body = (
         "interrupts.GRACE = 60\n    try: " + READY + "time.sleep(60)\n    finally:\n        time.sleep(0.3)"
     )
-    body += "; print('tidied up')"
+    body += "; print('tidied up', flush=True)"
     assert signalled(body, *[signal.SIGINT] * 5) == (130, "tidied up\n", "springcheck: interrupted\n")
 
 
@@ -231,7 +231,7 @@ def test_an_interrupt_waits_where_files_must_not_be_left_half_done() -> None:
     body = (
         "interrupts.GRACE = 60\n    with interrupts.held(): "
         + READY
-        + "time.sleep(0.3); print('done')\n    time.sleep(60)"
+        + "time.sleep(0.3); print('done', flush=True)\n    time.sleep(60)"
     )
     assert signalled(body, signal.SIGTERM) == (130, "done\n", "springcheck: interrupted\n")
 
@@ -258,6 +258,63 @@ def test_the_one_line_is_said_where_a_library_s_messages_are_still_caught() -> N
     )
     assert (done.returncode, done.stdout) == (130, "")
     assert done.stderr == "springcheck: interrupted; nothing is kept\n"
+
+
+ANSWERED = """
+import os, signal, sys
+from springcheck import __main__, interrupts
+from springcheck.cli import output
+place, shown, finish = {place!r}, output.show, interrupts.finish
+def signalled(number):
+    os.kill(os.getpid(), number)
+def show(lines):
+    if place == "before":
+        signalled(signal.SIGINT)
+    shown(lines)
+    if place == "shown":
+        signalled(signal.SIGINT)
+def finished():
+    finish()
+    if place == "finished":
+        signalled(signal.SIGTERM)
+output.show, interrupts.finish = show, finished
+sys.argv[1:] = ["list"]
+sys.exit(__main__.main())
+"""
+
+
+@posix
+@pytest.mark.parametrize("place", ["never", "shown", "finished", "before"])
+def test_an_answer_is_printed_whole_or_not_at_all(place: str) -> None:
+    """With its last line a command has ended: exit status 130 beside verdicts would take them back."""
+    words = [sys.executable, "-c", ANSWERED.format(place=place)]
+    done = subprocess.run(words, capture_output=True, text=True, check=False, timeout=60)
+    assert done.stderr == ""
+    assert done.returncode == 0
+    assert done.stdout.count("\n") > 10
+
+
+def test_no_answer_is_printed_once_an_interrupt_was_swallowed(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(interrupts._State, "seen", True)
+    assert cli.main(["list"]) == interrupts.STATUS
+    assert capsys.readouterr().out == ""
+
+
+@posix
+def test_an_interrupt_ends_a_command_whose_reader_takes_no_more() -> None:
+    body = "interrupts.GRACE = 0.3\n    with interrupts.last(): " + READY + "print('x' * 10**7)"
+    out, into = os.pipe()
+    with begun([sys.executable, "-c", SCRIPT.format(body=body)], stdout=into) as process:
+        os.close(into)
+        assert os.read(out, 5) == b"ready"
+        time.sleep(0.3)
+        process.send_signal(signal.SIGINT)
+        assert process.wait(30) == interrupts.STATUS
+        assert process.stderr is not None
+        assert process.stderr.read() == "springcheck: interrupted\n"
+    os.close(out)
 
 
 COMMITTED = """from springcheck import store

@@ -45,6 +45,8 @@ class _State:
     raised = False
     """Its KeyboardInterrupt is on its way; further signals are ignored."""
     held = 0
+    answered = False
+    """All that the command prints is printed."""
     message = "interrupted"
     ends: ClassVar[set[Callable[[], object]]] = set()
     """Called as the process ends, wherever it is: to remove temporary folders and end child processes."""
@@ -237,9 +239,29 @@ def say() -> None:
 
 
 def finish() -> None:
-    """Ignore signals while the interpreter shuts down: nothing is left to interrupt."""
+    """Ignore signals from here on: nothing is left to interrupt."""
     for number in SIGNALS:
-        signal.signal(number, signal.SIG_IGN)
+        # a library's caller keeps its own
+        if signal.getsignal(number) is _raise:
+            signal.signal(number, signal.SIG_IGN)
+
+
+@contextlib.contextmanager
+def last() -> Iterator[None]:
+    """Print the answer of a command in here: it is the command's end, an interrupt that comes now too late.
+
+    One whose reader takes no more ends all the same, interrupted.
+    """
+    if _State.seen:
+        raise KeyboardInterrupt
+    _State.held += 1
+    try:
+        yield
+        sys.stdout.flush()
+        finish()
+        _State.answered, _State.seen = True, False
+    finally:
+        _State.held -= 1
 
 
 def leave() -> None:
@@ -248,7 +270,7 @@ def leave() -> None:
         with contextlib.suppress(Exception):
             end()
     say()
-    _flush()
+    # what standard output holds is no result, and its reader may take no more
     os._exit(ends(STATUS))
 
 
@@ -345,7 +367,8 @@ def _watch(wakeup: int) -> None:
     while os.read(wakeup, 1)[0] not in SIGNALS:
         pass
     time.sleep(GRACE)
-    leave()
+    if not _State.answered:
+        leave()
 
 
 def _uncaught(kind: type[BaseException], error: BaseException, trace: object) -> None:

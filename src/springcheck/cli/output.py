@@ -37,7 +37,7 @@ def show(lines: Lines) -> None:
 
     terminal = sys.stdout.isatty()
     if not terminal and not any(map(os.environ.get, ("FORCE_COLOR", "TTY_COMPATIBLE"))):
-        print("\n".join(str(line).rstrip() for line in shown(lines, PIPE_WIDTH)))
+        print("\n".join(str(line).rstrip() for line in shown(lines, PIPE_WIDTH)), flush=True)
         return
     from rich.console import Console
 
@@ -68,9 +68,12 @@ def answer(
         ci.report(options, data, status)
     if options.json:
         schema = f"springcheck/{name or options.name}/{SCHEMAS.get(name or options.name, 1)}"
-        print(json.dumps({"schema": schema, **data}, allow_nan=False, indent=2))
+        whole = json.dumps({"schema": schema, **data}, allow_nan=False, indent=2)
+        with interrupts.last():
+            print(whole)
     elif not getattr(options, "quiet", False) and (said := lines()):
-        show(said)
+        with interrupts.last():
+            show(said)
     return status
 
 
