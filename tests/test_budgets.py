@@ -10,7 +10,7 @@ import springcheck
 HOME = Path(springcheck.__file__).parent
 
 BUDGETS = {
-    ("physics",): 7034,
+    ("physics",): 7039,
     ("schemes",): 1681,
     ("thermal",): 3277,
     ("engines/own",): 1633,
@@ -21,8 +21,8 @@ BUDGETS = {
     ("identify",): 9206,
     ("formats", "store"): 5261,
     ("studies",): 1453,
-    ("studies/*",): 9763,
-    ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 7157,
+    ("studies/*",): 9760,
+    ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 7183,
 }
 """Lines of each room, or of several: of an engine in one file, and of what all studies share, in the first
 folder."""

@@ -241,7 +241,9 @@ def test_a_pendulum_that_begins_near_its_top_keeps_its_digits() -> None:
         assert abs(wide(p[0, 0]) / mpmath.mpf("-1.348575697690617284844982") - 1) < 100 * exact.EPS
 
 
-@pytest.mark.parametrize("kind", ["spring", "chain", "quartic", "pendulum", "bond", "crowd", "unlike"])
+@pytest.mark.parametrize(
+    "kind", ["spring", "chain", "quartic", "pendulum", "bond", "crowd", "unlike", "weighted"]
+)
 def test_random_scenes_lie_within_the_stated_error(kind: str) -> None:
     """By Taylor series and exponentials in integers: `validation/exact_check.py` takes 10,000 of them."""
     known = 0

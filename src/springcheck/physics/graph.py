@@ -10,7 +10,7 @@ import numpy as np
 from springcheck.errors import SceneError
 from springcheck.physics.arrays import Floats, Integers
 from springcheck.physics.term import Term
-from springcheck.physics.terms import RadialSpring, Spring, WallSpring
+from springcheck.physics.terms import RadialSpring, Spring, WallSpring, Weight
 
 
 def is_uniform_chain(system: Any) -> bool:
@@ -100,7 +100,10 @@ def alike(system: Any) -> tuple[tuple[Integers, Integers], ...]:
     their plane.
     """
     places, parts = system.scene.places, system.terms
-    kept = (x.is_linear or x.kind == "constraint" or isinstance(x, RadialSpring) for x in parts)
+    kept = (
+        (x.is_linear and not isinstance(x, Weight)) or x.kind == "constraint" or isinstance(x, RadialSpring)
+        for x in parts
+    )
     if places is None or not all(kept) or any(x.origin and np.any(getattr(x, x.origin)) for x in parts):
         return ()
     found = []

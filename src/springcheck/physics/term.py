@@ -51,7 +51,7 @@ class Term:
     origin: ClassVar[str] = ""
     """The field that is subtracted from the elongation, and is therefore no argument of the law."""
     is_linear: ClassVar[bool] = False
-    """Whether the force is linear in positions and velocities."""
+    """Whether the force is linear in positions and velocities, up to a constant."""
     kind: ClassVar[Origin] = "potential"
     """Origin of its force: a potential energy, the velocities, the time, or a constrained length."""
     fast: bool = False

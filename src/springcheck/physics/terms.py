@@ -133,6 +133,7 @@ class Weight(OnParticles):
 
     key: ClassVar[str] = "weight"
     formula: ClassVar[str] = "-force (q - at)"
+    is_linear: ClassVar[bool] = True
     columns: ClassVar[tuple[Column, ...]] = (Column("force", "force"), Column("at", "at", 0.0))
     force: Floats
 

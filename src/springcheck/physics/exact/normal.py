@@ -212,7 +212,8 @@ def exact_sums(system: System[Any], of: Callable[[Wide], Wide]) -> tuple[Wide, W
             np.add.at(friction, term.i, exactly(term.c))
             continue
         row = exactly(np.broadcast_to(term.curvature(zero), (len(term),)))
-        term.add_pull(row * -exactly(getattr(term, term.origin)), force)
+        at_rest = exactly(term.slope(np.zeros(len(term)), *term.parameters))
+        term.add_pull(row * -exactly(getattr(term, term.origin)) + at_rest, force)
     for one, other, added in system.elements(zero):
         np.add.at(k, (one, other), exactly(added))
     return of(k), force, friction / exactly(system.m)

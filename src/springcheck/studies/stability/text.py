@@ -14,9 +14,6 @@ from springcheck.studies.text import left_out, resumed
 from springcheck.text.lines import Lines, plain, table
 from springcheck.text.wording import number
 
-STRAIGHT = ("weight", "drive")
-"""Terms that displace the rest position of linear forces, and bend nothing."""
-
 
 def lines(study: Stability, options: Namespace | None = None) -> Lines:
     """The whole report."""
@@ -61,7 +58,7 @@ def _of_scene(study: Stability) -> Lines:
         return [plain("  nothing in this scene oscillates at its start, which says nothing of where it goes")]
     most = ", its modulated springs at their stiffest" * is_modulated(scene)
     there = ", where its motion is stiffest" if has_true_motion(scene) else f", at its start{most}"
-    straight = scene.derived(terms=tuple(x for x in scene.terms if x.key not in STRAIGHT)).system.is_linear
+    straight = scene.system.without("drive").is_linear
     where = "" if straight else there
     left = {"friction": scene.system.is_damped, "field": any(x.kind == "magnetic" for x in scene.terms)}
     where += "".join(f", without its {name}" for name, acts in left.items() if acts)
