@@ -356,17 +356,15 @@ def uniform(rng: np.random.Generator) -> Scene:
 
 
 def weighted(rng: np.random.Generator) -> Scene:
-    """One of the linear scenes, with constant forces on some of its particles; in `spring` maybe no springs."""
-    found = (spring, chain, chain, unlike, large, uniform)[rng.choice(6, p=(0.3, 0.2, 0.2, 0.2, 0.05, 0.05))](
-        rng
-    )
+    """A linear scene with constant forces on some of its particles, of which nothing holds one in ten."""
+    kinds = (spring, chain, chain, unlike, large, uniform)
+    found = kinds[rng.choice(6, p=(0.3, 0.2, 0.2, 0.2, 0.05, 0.05))](rng)
     i = rng.choice(found.n, int(rng.integers(1, found.n + 1)), replace=False)
     springs = [term for term in found.terms if isinstance(term, Spring | WallSpring)]
     size = float(np.median(np.abs(springs[0].k)))
     force = np.array([size * rng.normal() * number(rng, 2) for _ in i])
-    kept = (
-        found.terms if rng.random() < 0.9 else tuple(x for x in found.terms if not isinstance(x, WallSpring))
-    )
+    held = rng.random() < 0.9
+    kept = tuple(x for x in found.terms if held or not isinstance(x, WallSpring))
     weights = Weight(i=i, force=force, at=rng.choice([0.0, 1.0]) * rng.normal(size=len(i)))
     return found.derived(terms=(*kept, weights))
 
