@@ -81,7 +81,7 @@ def absence(label: Label) -> str | None:
         return "it moves no particles on springs"
     if method.adaptive:
         return "it chooses its own steps, and cells are judged step by step"
-    return engines.absence(label.engine) or propagators.absence(label)
+    return propagators.absence(label)
 
 
 def perform(options: Namespace, progress: Progress | None) -> Atlas:
