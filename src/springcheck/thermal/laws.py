@@ -84,9 +84,7 @@ class Law:
     @property
     def A(self) -> Extended:  # noqa: N802 - the letter of the propagator
         """The propagator (n, 2, 2) of the means."""
-        return np.asarray(
-            sum(np.asarray(chance, np.longdouble) * A[:, :2, :2] for chance, A, _ in self._maps)
-        )
+        return np.asarray(sum(chance * A[:, :2, :2] for chance, A, _ in self._maps))
 
     @property
     def G(self) -> Extended:  # noqa: N802 - the letter of the noise
