@@ -124,6 +124,7 @@ class Heat:
             # modes of all terms are not those of the fast ones
             apart = system.is_separate and self._bound == scene.n
             return draws.law_of(scheme, scene.derived(step=piece.step)) if apart else None
+        assert scene.bath is not None
         held = system.modes.w2[system.modes.w2 > 0]
         return Law(
             scheme=scheme, h=piece.step, m=np.ones(len(held)), k=held, rate=scene.bath.friction,
