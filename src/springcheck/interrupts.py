@@ -202,16 +202,12 @@ def over(status: int) -> int:
     """
     if sys.getprofile() is None and sys.gettrace() is None:
         atexit._run_exitfuncs()
-        _flush()
+        for stream in (sys.stdout, sys.stderr):
+            # as far as they are open
+            with contextlib.suppress(OSError, ValueError, AttributeError):
+                stream.flush()
         os._exit(status)
     return status
-
-
-def _flush() -> None:
-    """Write what standard streams hold, as far as they are open."""
-    for stream in (sys.stdout, sys.stderr):
-        with contextlib.suppress(OSError, ValueError, AttributeError):
-            stream.flush()
 
 
 def seen() -> bool:

@@ -71,27 +71,24 @@ def each(
     return [Piece(key=str(label), what=name, measure=measure(label), form=form) for label, name in named]
 
 
+@dataclass(eq=False)
 class Keeper:
     """Access to the pieces that an earlier call has finished, and the place where this call saves its own.
 
     Without a journal nothing is resumed and nothing is saved.
     """
 
-    def __init__(
-        self,
-        journal: store.Journal | None = None,
-        progress: Progress | None = None,
-        team: Team = ALONE,
-        path: Path | None = None,
-    ) -> None:
-        self._journal, self.team = journal, team
-        self.path = path
-        """Path of the store as the caller gave it."""
-        self._finished = journal.tables() if journal else {}
-        self.progress = progress
+    _journal: store.Journal | None = None
+    progress: Progress | None = None
+    team: Team = ALONE
+    path: Path | None = None
+    """Path of the store as the caller gave it."""
+    resumed: int = 0
+    """Number of pieces that were not measured again."""
+
+    def __post_init__(self) -> None:
+        self._finished = self._journal.tables() if self._journal else {}
         self._by: dict[str, list[dict[str, str]]] = {}
-        self.resumed = 0
-        """Number of pieces that were not measured again."""
 
     def finished(self, form: Form[Any], key: str) -> Any:
         """The result that an earlier call has saved under this key, or None."""

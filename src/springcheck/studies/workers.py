@@ -45,13 +45,19 @@ def carried_out(parts: Sequence[Callable[[], T]], workers: int) -> Generator[tup
                 interrupts.takes(process.kill)
                 theirs.close()
                 team[ours] = process
-            _send(ahead.pop(), ours, team)
+            with _reached(process):
+                ours.send(ahead.pop())
         while team:
             ready: list[Any] = wait(list(team))
             for ours in ready:
-                yield _answer(ours, team)
+                with _reached(team[ours]):
+                    i, good, found = ours.recv()
+                if not good:
+                    raise found
+                yield i, found
                 if ahead:
-                    _send(ahead.pop(), ours, team)
+                    with _reached(team[ours]):
+                        ours.send(ahead.pop())
                 else:
                     ours.close()
                     _ended(team.pop(ours))
@@ -73,28 +79,16 @@ def _is_a_file(main: Any) -> None:
         )
 
 
-def _send(numbered: Any, ours: Any, team: dict[Any, Any]) -> None:
+@contextmanager
+def _reached(process: Any) -> Iterator[None]:
+    """Send to a process, or receive from it.  SpringcheckError where it has ended."""
     try:
-        ours.send(numbered)
-    except OSError:
-        raise _died(team[ours]) from None
-
-
-def _answer(ours: Any, team: dict[Any, Any]) -> Any:
-    try:
-        i, good, found = ours.recv()
+        yield
     except (EOFError, OSError):
-        raise _died(team[ours]) from None
-    if not good:
-        raise found
-    return i, found
-
-
-def _died(process: Any) -> SpringcheckError:
-    process.join()
-    return SpringcheckError(
-        f"a worker process has ended by itself (exit status {process.exitcode}): is memory short?"
-    )
+        process.join()
+        raise SpringcheckError(
+            f"a worker process has ended by itself (exit status {process.exitcode}): is memory short?"
+        ) from None
 
 
 def _ended(process: Any) -> None:

@@ -124,11 +124,6 @@ class Thermostat(Scheme):
         return any(act.kind in ("rescale", "scale", "chain") for act in self.acts)
 
 
-def _stretch(c2: Decay) -> Callable[[Any], Any]:
-    """Factor by which a GJ scheme stretches the step of kicks and drifts: q**2 = 2 (1 - c2)/((1 + c2) x)."""
-    return lambda x: np.sqrt(2 * c2.lost(x) / (c2.both(x) * x))
-
-
 def value_of(part: Part, x: Any) -> Any:
     """A fraction of the step, or a function of x = gamma h, in the width of x."""
     if callable(part):
@@ -199,7 +194,7 @@ _GJ_SOURCE = (
 def _gj(number: str) -> Thermostat:
     """BAOAB with c2 in the place of exp(-x), kicks and drifts longer by q."""
     c2 = GJ[number]
-    half = _times(HALF, _stretch(c2))
+    half = _times(HALF, c2.stretch)
     acts = (Act("kick", half), Act("drift", half), Act("exchange", c2), Act("drift", half), Act("kick", half))
     return Thermostat(
         name=f"gj-{number}", title=f"GJ-{number.upper()}, on-site velocity", acts=acts,

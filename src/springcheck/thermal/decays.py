@@ -26,6 +26,10 @@ class Decay:
         """1 + c(x)."""
         return self.added(x) if self.added else 2 - self.lost(x)
 
+    def stretch(self, x: Any) -> Any:
+        """Factor by which a GJ scheme stretches kicks and drifts: q**2 = 2 (1 - c2)/((1 + c2) x)."""
+        return np.sqrt(2 * self.lost(x) / (self.both(x) * x))
+
 
 def decay(share: int) -> Decay:
     """exp(-x/share)."""

@@ -277,10 +277,10 @@ class _Reader:
             return np.stack(self.stepper(*start, self._force, list(those), hit, end[0]))
 
         target, none, linear = np.stack(end), at(found), self.scene.system.is_linear
-        each = np.stack([at(_unit(u, j, found)) - none for j in range(u)])
-        for _ in range(6):
+        units = np.eye(u, dtype=np.longdouble)[:, :, None, None]
+        for iteration in range(6):
             now = at(found)
-            slopes = np.stack([at(found + _unit(u, j, found)) - now for j in range(u)])
+            slopes = np.stack([at(found + unit) - now for unit in units])
             if u == 1:
                 first = 0 if self.of_q else 1
                 change = ((target - now)[first] / slopes[0][first])[None]
@@ -289,7 +289,7 @@ class _Reader:
                 x, y = target - now
                 change = np.stack([d * x - b * y, a * y - c * x]) / (a * d - b * c)
             found = found + change
-            if np.all(np.abs(change) <= 1e-17 * (1 + np.abs(found))) or (linear and _ == 1):
+            if np.all(np.abs(change) <= 1e-17 * (1 + np.abs(found))) or (linear and iteration == 1):
                 break
         of = np.stack(self._allowed(start, np.tensordot(self.directions, found, axes=1)))
         if u == 1:
@@ -306,6 +306,7 @@ class _Reader:
         if np.any(unseen):
             # what no draw explains is then at most the largest one
             of = np.stack(self._allowed(start, np.zeros((self.scheme.draws, *found.shape[1:]))))
+            each = np.stack([at(np.broadcast_to(unit, found.shape)) - none for unit in units])
             noise = LARGEST_DRAW * np.sum(np.abs(each), axis=0) / self.roundings
             across = np.where(unseen, np.max(np.abs(target - none) / (of + noise), axis=0), across)
         return found, across, unit, unseen
@@ -314,12 +315,6 @@ class _Reader:
 def _in_rows(draws: Extended) -> Extended:
     """Draws (2, f-1, n) of two a step as rows one after the other."""
     return draws.transpose(1, 0, 2).reshape(-1, draws.shape[2])
-
-
-def _unit(u: int, j: int, like: Extended) -> Extended:
-    out = np.zeros_like(like)
-    out[j] = 1
-    return out
 
 
 def _directions(scheme: Thermostat, scene: Scene) -> tuple[Extended, bool]:

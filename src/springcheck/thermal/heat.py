@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from springcheck.physics.arrays import Floats, Reals
+from springcheck.physics.rods import Rods
 from springcheck.physics.scene import Scene
 from springcheck.physics.system import MOST_DENSE
 from springcheck.physics.trajectory import Trajectory
@@ -75,14 +76,9 @@ class Heat:
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
         self._law: Law | None = None
-        rods = scene.system.rods
-        self._freedoms = rods.freedoms if rods else scene.n
-        self._bound = scene.n
         self._sums = np.zeros((2, scene.n))
-        self._frames = 0
-        self._from = 0
-        self._every = scene.every
-        self._scheme = ""
+        self._frames = self._from = 0
+        self._scheme, self._every, self._bound = "", scene.every, scene.n
 
     def add(self, piece: Trajectory) -> None:
         """Take a piece into account."""
@@ -106,34 +102,34 @@ class Heat:
         self._frames += len(some)
 
     def _begin(self, piece: Trajectory) -> None:
-        scene, self._scheme, self._every = self._scene, piece.scheme, piece.every
-        assert scene.bath is not None
-        self._bound = bound_freedoms(scene, piece.q)
-        if scene.system.rods:
-            self._from = round(self._settling(scene.p**2 / scene.m) / (scene.bath.friction * piece.step))
-            return
-        linear = scene.system.has_modes and bool(np.all(scene.system.modes.w2 >= 0))
-        if piece.scheme in THERMOSTATS and linear and not THERMOSTATS[piece.scheme].rescales:
-            if not THERMOSTATS[piece.scheme].splits:
-                held = scene.system.modes.w2[scene.system.modes.w2 > 0]
-                if not len(held):
-                    return
-                self._law = Law(
-                    scheme=THERMOSTATS[piece.scheme], h=piece.step, m=np.ones(len(held)), k=held,
-                    rate=scene.bath.friction, thermal=scene.thermal,
-                )  # fmt: skip
-            elif scene.system.is_separate and self._bound == scene.n:
-                # modes of all terms are not those of the fast ones
-                self._law = draws.law_of(THERMOSTATS[piece.scheme], scene.derived(step=piece.step))
-            else:
-                return
-            left, modes = self._law.slowest, scene.system.modes
+        scene, system, bath = self._scene, self._scene.system, self._scene.bath
+        assert bath is not None
+        self._scheme, self._every, self._bound = piece.scheme, piece.every, bound_freedoms(scene, piece.q)
+        if system.rods:
+            self._from = round(self._settling(scene.p**2 / scene.m) / (bath.friction * piece.step))
+        elif law := self._law_of(piece):
+            left, modes = law.slowest, system.modes
             y, v = modes.about_centres(scene.q.astype(np.longdouble), scene.p.astype(np.longdouble))
             lasts = self._settling(modes.w2 * y * y + v * v)
             self._from = round(lasts / -np.log(left)) if 0 < left < 1 else 0
-            if THERMOSTATS[piece.scheme].collides and not scene.system.is_separate:
-                # a collision is one particle's, and mixes modes
-                self._law = None
+            # a collision is one particle's, and mixes modes
+            self._law = None if law.scheme.collides and not system.is_separate else law
+
+    def _law_of(self, piece: Trajectory) -> Law | None:
+        """The law of each mode, or of each particle where slow and fast terms act separately."""
+        scene, system, scheme = self._scene, self._scene.system, THERMOSTATS.get(piece.scheme)
+        if scheme is None or scheme.rescales or not system.has_modes or not np.all(system.modes.w2 >= 0):
+            return None
+        if scheme.splits:
+            # modes of all terms are not those of the fast ones
+            apart = system.is_separate and self._bound == scene.n
+            return draws.law_of(scheme, scene.derived(step=piece.step)) if apart else None
+        assert scene.bath is not None
+        held = system.modes.w2[system.modes.w2 > 0]
+        return Law(
+            scheme=scheme, h=piece.step, m=np.ones(len(held)), k=held, rate=scene.bath.friction,
+            thermal=scene.thermal,
+        ) if len(held) else None  # fmt: skip
 
     def _settling(self, squares: Reals) -> float:
         """Times of decay before frames count: more where the squares of the start (n,) are larger than kT,
@@ -157,24 +153,24 @@ class Heat:
         if bound < len(nan):
             # of motion that nothing holds the law has no stationary state
             law, error[1] = (law[0], nan), np.nan
-        if self._scene.system.rods:
-            law_of_rods, error[1] = self._of_rods()
-            law = nan, np.full(len(nan), law_of_rods)
+        freedoms = len(nan)
+        if rods := self._scene.system.rods:
+            law_of_rods, error[1] = self._of_rods(rods)
+            law, freedoms = (nan, np.full(len(nan), law_of_rods)), rods.freedoms
         return Heated(
             method=method, scheme=self._scheme, configurational=float(np.sum(q)) / bound if bound else np.nan,
             configurational_error=float(error[0]), configurational_law=float(np.mean(law[0])),
-            kinetic=float(np.sum(p)) / self._freedoms, kinetic_error=float(error[1]),
+            kinetic=float(np.sum(p)) / freedoms, kinetic_error=float(error[1]),
             kinetic_law=float(np.mean(law[1])),
         )  # fmt: skip
 
-    def _of_rods(self) -> tuple[float, float]:
+    def _of_rods(self, rods: Rods) -> tuple[float, float]:
         """The kinetic temperature of rods, 1 where they move freely, each by itself, and all that acts on
         momenta acts across them; and the standard error of squares of momenta that forget by
         exp(-friction h) a step."""
-        rods, bath = self._scene.system.rods, self._scene.bath
-        assert rods is not None
+        bath = self._scene.bath
         assert bath is not None
         free = not rods.share and all(term.kind == "constraint" for term in self._scene.terms)
         square = np.exp(-2 * bath.friction * self._scene.step * self._every)
-        error = np.sqrt(2 * (1 + square) / ((1 - square) * max(self._frames, 2) * self._freedoms))
+        error = np.sqrt(2 * (1 + square) / ((1 - square) * max(self._frames, 2) * rods.freedoms))
         return 1.0 if free and THERMOSTATS[self._scheme].kinetic_of_rods else np.nan, float(error)

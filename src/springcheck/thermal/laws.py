@@ -52,11 +52,10 @@ class Law:
     thermal: float
     fast: Reals | float = 0.0
 
-    @cached_property
-    def collision(self) -> Any:
-        """The chance of a collision a step, 1 - exp(-gamma h); (n, 1, 1) of so many rates."""
-        p = -np.expm1(-self.rate * self.h)
-        return np.reshape(p, (-1, 1, 1)) if np.ndim(p) else float(p)
+    @property
+    def collision(self) -> float:
+        """The chance of a collision a step, 1 - exp(-gamma h), of one rate."""
+        return float(-np.expm1(-self.rate * self.h))
 
     @cached_property
     def _maps(self) -> tuple[tuple[Any, Extended, Extended], ...]:
@@ -85,9 +84,7 @@ class Law:
     @property
     def A(self) -> Extended:  # noqa: N802 - the letter of the propagator
         """The propagator (n, 2, 2) of the means."""
-        return np.asarray(
-            sum(np.asarray(chance, np.longdouble) * A[:, :2, :2] for chance, A, _ in self._maps)
-        )
+        return np.asarray(sum(chance * A[:, :2, :2] for chance, A, _ in self._maps))
 
     @property
     def G(self) -> Extended:  # noqa: N802 - the letter of the noise

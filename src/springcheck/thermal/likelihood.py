@@ -157,7 +157,7 @@ def _of_scheme(
     out = []
     for s in strides:
         rows = np.flatnonzero(every == s)
-        if not len(rows) or not np.isfinite(nats[rows]).any():
+        if not np.isfinite(nats[rows]).any():
             continue
         i = rows[np.nanargmin(nats[rows])]
         errors = _errors(of, at[i], s, curved[i], 1 / n if scheme.full_rank or s > 1 else 2 / n)

@@ -43,84 +43,74 @@ def read(
     rebuilt: bool = False,
 ) -> Reading:  # fmt: skip
     """`draws.read` for a scene with rods: draws (f-1, r) are combinations of those of all coordinates."""
-    return _Reader(scheme, scene, how or Arithmetic(), rebuilt).read(q, p)
+    how, stepper, sizer = (
+        how or Arithmetic(),
+        Stepper.of(scheme, scene),
+        Stepper.of(scheme, scene, absolute=True),
+    )
+    force, rods, c = forces(scheme, scene.system), scene.system.rods, scheme.carried
+    wide = q.astype(np.longdouble), p.astype(np.longdouble)
+    n, u = scene.n, scheme.draws
+    start, end = (wide[0][:-1], wide[1][:-1]), wide[0][1:]
+    target = np.concatenate([x[1:] for x in wide], axis=-1)
 
-
-class _Reader:
-    def __init__(self, scheme: Thermostat, scene: Scene, how: Arithmetic, rebuilt: bool) -> None:
-        self._scheme, self._scene, self._how, self._rebuilt = scheme, scene, how, rebuilt
-        self._stepper, self._sizer = Stepper.of(scheme, scene), Stepper.of(scheme, scene, absolute=True)
-        self._force = forces(scheme, scene.system)
-
-    def _at(self, x: Extended, met: list[Met] | None = None) -> Extended:
+    def at(x: Extended, met: list[Met] | None = None) -> Extended:
         """State at the end of the step with draws x (f, u n) -> (f, 2 n)."""
-        split = np.split(x, self._scheme.draws, axis=-1)
-        end = None if met is not None else self._end
-        return np.concatenate(self._stepper(*self._start, self._force, split, None, end, met), axis=-1)
+        there = None if met is not None else end
+        return np.concatenate(stepper(*start, force, np.split(x, u, axis=-1), None, there, met), axis=-1)
 
-    def _allowed(self, x: Extended) -> Extended:
+    def allowed(x: Extended) -> Extended:
         """One rounding of everything that the steps of these draws add up (f, 2 n)."""
         met: list[Met] = []
-        self._at(x, met)
-        sizes = np.split(np.abs(x), self._scheme.draws, axis=-1)
-        of = one_rounding(self._scene, self._sizer, self._start, sizes, None, self._how, self._rebuilt, met)
-        return np.concatenate(of, axis=-1)
+        at(x, met)
+        sizes = np.split(np.abs(x), u, axis=-1)
+        return np.concatenate(one_rounding(scene, sizer, start, sizes, None, how, rebuilt, met), axis=-1)
 
-    def read(self, q: Floats, p: Floats) -> Reading:
-        wide = q.astype(np.longdouble), p.astype(np.longdouble)
-        n, u = self._scene.n, self._scheme.draws
-        self._start, self._end = (wide[0][:-1], wide[1][:-1]), wide[0][1:]
-        target = np.concatenate([x[1:] for x in wide], axis=-1)
-        x = np.zeros((len(target), u * n), np.longdouble)
-        of, now = self._allowed(x), self._at(x)
-        for iteration in range(MOST_GAUSS_NEWTON):
-            # to one side, what bends would show as a combination that does something, where none does
-            sides = ((self._at(x + unit), self._at(x - unit)) for unit in SMALL_DRAW * np.eye(u * n))
-            slopes = [(more - less) / (2 * SMALL_DRAW) for more, less in sides]
-            J = _finite(np.stack(slopes, axis=-1) / of[..., None])
-            inverse = _pseudoinverse(J)
-            change = (inverse @ _finite((target - now) / of)[..., None])[..., 0]
-            last = np.all(np.isfinite(now), axis=-1)
-            for _ in range(MOST_HALVINGS):
-                now = self._at(x + change)
-                if not np.any(beyond := last & ~np.all(np.isfinite(now), axis=-1)):
-                    break
-                change[beyond] /= 2
-            else:
-                now = self._at(x + change)
-            x = x + change
-            if iteration == 1:
-                of = self._allowed(x)
-            elif iteration and np.all(np.abs(change) <= 1e-9 * (1 + np.abs(x))):
-                # the next change would be smaller by the relative error of the slopes: by 1e-8
+    x = np.zeros((len(target), u * n), np.longdouble)
+    of, now = allowed(x), at(x)
+    for iteration in range(MOST_GAUSS_NEWTON):
+        # to one side, what bends would show as a combination that does something, where none does
+        sides = ((at(x + unit), at(x - unit)) for unit in SMALL_DRAW * np.eye(u * n))
+        slopes = [(more - less) / (2 * SMALL_DRAW) for more, less in sides]
+        J = _finite(np.stack(slopes, axis=-1) / of[..., None])
+        inverse = _pseudoinverse(J)
+        change = (inverse @ _finite((target - now) / of)[..., None])[..., 0]
+        last = np.all(np.isfinite(now), axis=-1)
+        for _ in range(MOST_HALVINGS):
+            now = at(x + change)
+            if not np.any(beyond := last & ~np.all(np.isfinite(now), axis=-1)):
                 break
-        of = self._allowed(x)
-        left = np.asarray(((target - now) / of) ** 2, np.float64)
-        # of all draws those that were found leave the least, in the mean over the numbers of a state
-        across = np.sqrt(np.mean(left, axis=-1, keepdims=True))
-        position = J[:, :n]
-        first = _pseudoinverse(position) @ position
-        second = inverse @ J - first
-        V = _carried(first), _carried(second)
-        roundings = roundings_of(self._scheme, self._scene)
-        c = self._scheme.carried
-        if c:
-            # what both steps beside a state say of the draw that acts in them, across the rods there
-            root, rods = np.sqrt(self._scene.m), self._scene.system.rods
-            assert rods is not None
-            one, other = (rods.projected(wide[0][1:-1], root * y) / root for y in (x[1:, :n], x[:-1, n:]))
-            unit = np.sum(np.abs(inverse), axis=-1)
-            sizes = one - other, unit[1:, :n], unit[:-1, n:]
-            off, *units = (np.sqrt(np.sum(y**2, axis=-1)) for y in sizes)
-            across = np.maximum(across[1:], (off / sum(units))[:, None])
-        basis = V[1] if c else np.concatenate(V, axis=-1)
-        turned = np.swapaxes(basis, -1, -2)
-        error = roundings * np.sum(np.abs(turned @ inverse), axis=-1)
-        return Reading(
-            draws=(turned @ np.asarray(x, np.float64)[..., None])[..., 0], error=error,
-            across=np.asarray(across, np.float64) if u == 1 or c else None, roundings=roundings,
-            allowed=(of[:, :n], of[:, n:]),
-        )  # fmt: skip
+            change[beyond] /= 2
+        else:
+            now = at(x + change)
+        x = x + change
+        if iteration == 1:
+            of = allowed(x)
+        elif iteration and np.all(np.abs(change) <= 1e-9 * (1 + np.abs(x))):
+            # the next change would be smaller by the relative error of the slopes: by 1e-8
+            break
+    of = allowed(x)
+    left = np.asarray(((target - now) / of) ** 2, np.float64)
+    # of all draws those that were found leave the least, in the mean over the numbers of a state
+    across = np.sqrt(np.mean(left, axis=-1, keepdims=True))
+    first = _pseudoinverse(J[:, :n]) @ J[:, :n]
+    V = _carried(first), _carried(inverse @ J - first)
+    if c:
+        # what both steps beside a state say of the draw that acts in them, across the rods there
+        assert rods is not None
+        root, unit = np.sqrt(scene.m), np.sum(np.abs(inverse), axis=-1)
+        one, other = (rods.projected(wide[0][1:-1], root * y) / root for y in (x[1:, :n], x[:-1, n:]))
+        sizes = one - other, unit[1:, :n], unit[:-1, n:]
+        off, *units = (np.sqrt(np.sum(y**2, axis=-1)) for y in sizes)
+        across = np.maximum(across[1:], (off / sum(units))[:, None])
+    turned = np.swapaxes(V[1] if c else np.concatenate(V, axis=-1), -1, -2)
+    roundings = roundings_of(scheme, scene)
+    return Reading(
+        draws=(turned @ np.asarray(x, np.float64)[..., None])[..., 0],
+        error=roundings * np.sum(np.abs(turned @ inverse), axis=-1),
+        across=np.asarray(across, np.float64) if u == 1 or c else None, roundings=roundings,
+        allowed=(of[:, :n], of[:, n:]),
+    )  # fmt: skip
 
 
 def _finite(values: Reals) -> Floats:

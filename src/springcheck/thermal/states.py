@@ -56,13 +56,13 @@ SPARSE = 0.1
 class Thermal:
     """What the states of an oscillator in a bath show."""
 
-    candidates: tuple[Candidate, ...]
+    candidates: tuple[Candidate, ...] = ()
     """The best first; none where no known scheme fits."""
-    free: tuple[float, ...]
+    free: tuple[float, ...] = ()
     """The combination of (x', v', x, v) that is free of noise, 1 on x'; () where there is none."""
-    misfit: float
+    misfit: float = nan
     """Root mean square of that combination over that of the noise."""
-    uniform: bool
+    uniform: bool = False
     """Whether the draws are uniform rather than normal."""
     known: bool = True
     """Whether the kind of noise is known: one momentum shows no factor, but any change of it that begins or
@@ -134,7 +134,7 @@ def _identified(q: Floats, v: Floats, h: float, beside: Floats | None, mixed: bo
             size, joint = left_of(z, moved.T)
             # of joined particles, as of one, what takes no noise leaves none that is white
             noisy = np.max(size) > NOISE and all(map(is_white, joint))
-            return Thermal(candidates=(), free=(), misfit=nan, uniform=False) if noisy else None
+            return Thermal() if noisy else None
     if weights[4] < 1e-3 * weights[3]:
         free = turned[4][:4] / np.tile(sizes, 2)
         misfit = weights[4] / weights[3]
@@ -152,7 +152,7 @@ def _identified(q: Floats, v: Floats, h: float, beside: Floats | None, mixed: bo
         return clear(_of_two_halves(q, h, off, beside, mixed))
     collided, white = between_collisions(q, v, h), all(map(is_white, left))
     if collided or (white and collided is not None):
-        return Thermal(candidates=tuple(collided), free=(), misfit=nan, uniform=False)
+        return Thermal(candidates=tuple(collided))
     coloured = not (white and even)
     # draws that are carried on into the next frame are in no other
     if coloured and not (all(is_white(x[i::2]) for x in left for i in (0, 1)) and added(2)):
@@ -163,7 +163,7 @@ def _identified(q: Floats, v: Floats, h: float, beside: Floats | None, mixed: bo
     # a factor of the momenta, of several steps, leaves what collisions do
     a_factor = any(random_scheme(y.scheme).collides and y.strides != (1,) for y in found)
     return Thermal(
-        candidates=found, free=(), misfit=nan, uniform=is_uniform(left[1]),
+        candidates=found, uniform=is_uniform(left[1]),
         known=not (bent or a_factor) and white and not grows(left[1], x[:-1], x[1:]),
     )  # fmt: skip
 
@@ -187,7 +187,7 @@ def _of_one(
         # of several steps no combination is free of noise, and of a collision that ends a step another one
         ends = (y for y in counted if after == (random_scheme(y.scheme).acts[-1].kind == "collide"))
         each = tuple(replace(y, strides=(1,)) for y in ends)
-        return Thermal(candidates=each, free=tuple(map(float, free)), misfit=misfit, uniform=False)
+        return Thermal(candidates=each, free=tuple(map(float, free)), misfit=misfit)
     found, added, sparse = list[Candidate](), False, bool(np.median(np.abs(left)) < SPARSE)
     if near(b, d) and near(c, -1):
         half, (decay, slow, error) = near(b, -h / 2), _decay(q, v)
@@ -314,7 +314,7 @@ def _as_gj(
     leaves an (h w)**2 of 0 known to `least`."""
 
     def stretched(x: Any) -> tuple[Any, Any]:
-        stretch = np.sqrt(2 * GJ[number].lost(x) / (GJ[number].both(x) * x))
+        stretch = GJ[number].stretch(x)
         return stretch, 4 * (1 - stretch * h / (2 * t)) / stretch**2
 
     x = np.geomspace(1e-9, 1e4, 4000)
@@ -395,4 +395,4 @@ def _of_two_halves(q: Floats, h: float, misfit: float, beside: Floats | None, mi
         )  # fmt: skip
     # noise in proportion to the force is none that a scheme adds
     ordered = () if grows(draws, q[1:-1]) else tuple(sorted(found, key=lambda y: y.nats))
-    return Thermal(candidates=ordered, free=(), misfit=misfit, uniform=uniform, known=not bent)
+    return Thermal(candidates=ordered, misfit=misfit, uniform=uniform, known=not bent)

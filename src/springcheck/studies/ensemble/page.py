@@ -48,7 +48,7 @@ class Line:
     """Values over one field, in increasing order; bins of many cells have their median and range."""
 
     x: Floats
-    y: Floats
+    values: Floats
     low: Floats
     high: Floats
     joined: bool
@@ -115,13 +115,14 @@ def _line(x: Floats, y: Floats, fixed: Mapping[str, float], *, joined: bool) -> 
     x, y = x[order], y[order]
     most = MOST_POINTS if joined else len(x) // FEWEST_BINNED
     if len(x) <= max(most, FEW_POINTS):
-        return Line(x=x, y=y, low=y, high=y, joined=joined, fixed=fixed)
+        return Line(x=x, values=y, low=y, high=y, joined=joined, fixed=fixed)
     pieces = [np.array_split(z, min(most, MOST_POINTS)) for z in (x, y)]
     known = [(float(np.median(a)), b[np.isfinite(b)]) for a, b in zip(*pieces, strict=True)]
     low, middle, high = (
         np.array([f(b) if len(b) else np.nan for _, b in known]) for f in (np.min, np.median, np.max)
     )
-    return Line(x=np.array([a for a, _ in known]), y=middle, low=low, high=high, joined=True, fixed=fixed)
+    at = np.array([a for a, _ in known])
+    return Line(x=at, values=middle, low=low, high=high, joined=True, fixed=fixed)
 
 
 def _map(x: Floats, y: Floats, values: Floats, fixed: Mapping[str, float], *, grid: bool) -> Map:
@@ -181,18 +182,14 @@ def banks(found: Ensemble, *, quantity: str | None = None, over: str | None = No
         raise SpringcheckError(f"--quantity {quantity}: {', '.join(TITLES)} can be drawn{close}")
     out, fields = [], fields_over(found, over)
     for name in SIZES if quantity is None else (quantity,):
-        every = (
-            (tally.method, reduced(found.of(tally.method), found, name, fields)) for tally in found.tallies
-        )
+        every = {x.method: reduced(found.of(x.method), found, name, fields) for x in found.tallies}
         # methods without a finite number are left out
-        shown = {x: y for x, y in every if np.isfinite(y.y if isinstance(y, Line) else y.values).any()}
+        shown = {method: one for method, one in every.items() if np.isfinite(one.values).any()}
         if not shown:
             continue
         lines = {method: one for method, one in shown.items() if isinstance(one, Line)}
         maps = {method: one for method, one in shown.items() if isinstance(one, Map)}
-        charts = (
-            [_lines(found.scene, name, fields, lines)] if lines else _maps(found.scene, name, fields, maps)
-        )
+        charts = _lines(found.scene, name, fields, lines) if lines else _maps(found.scene, name, fields, maps)
         of = "" if over is None else "-over-" + "-".join(fields)
         title = "Methods drawn" if lines else f"Colour: {_title(name, found.scene)}"
         out.append(
@@ -207,7 +204,7 @@ def banks(found: Ensemble, *, quantity: str | None = None, over: str | None = No
 
 def _heading(scene: Scene, quantity: str, over: Sequence[str], shown: Mapping[str, Line | Map]) -> str:
     """The quantity, the fields on the axes, and the values of the fields that are not shown."""
-    typical = {x: float(np.nanmedian(y.y if isinstance(y, Line) else y.values)) for x, y in shown.items()}
+    typical = {method: float(np.nanmedian(one.values)) for method, one in shown.items()}
     best = min(typical, key=lambda x: abs(typical[x]))
     fields = " and ".join(named(x, scene) for x in over)
     said = [f"{scene.title}: {_title(quantity, scene).partition(',')[0]} over {fields}"]
@@ -247,16 +244,16 @@ def _limits(scene: Scene, method: str) -> dict[str, float]:
     }
 
 
-def _lines(scene: Scene, quantity: str, fields: Sequence[str], shown: Mapping[str, Line]) -> Chart:
+def _lines(scene: Scene, quantity: str, fields: Sequence[str], shown: Mapping[str, Line]) -> list[Chart]:
     title, (over,) = _title(quantity, scene), fields
-    every = np.concatenate([x for one in shown.values() for x in (one.low, one.y, one.high)])
+    every = np.concatenate([x for one in shown.values() for x in (one.low, one.values, one.high)])
     seen: set[str] = set()
     curves = []
     for method, one in shown.items():
         scheme = scheme_of(method)
         curves.append(
             Curve(
-                name=method, group=scheme, x=one.x, y=one.y, line=one.joined, dots=not one.joined,
+                name=method, group=scheme, x=one.x, y=one.values, line=one.joined, dots=not one.joined,
                 marks=True, over=scheme in seen and one.joined,
                 band=None if scheme in seen or np.array_equal(one.low, one.high, equal_nan=True)
                 else (one.low, one.high),
@@ -265,13 +262,14 @@ def _lines(scene: Scene, quantity: str, fields: Sequence[str], shown: Mapping[st
         seen.add(scheme)
     limits = {at[over]: f"{H_LIMIT} = {at[H_LIMIT]:.3g}" for x in shown if over in (at := _limits(scene, x))}
     low, high = (f([f(one.x) for one in shown.values()]) for f in (np.min, np.max))
-    return Chart(
+    chart = Chart(
         title=f"{title[:1].upper()}{title[1:]}, over {over}.",
         x=Scale(name=named(over, scene), log=all(even_in_logarithm(one.x) for one in shown.values())),
         y=_axis(quantity, scene, every),
         curves=curves,
         rules=[Rule(axis="x", at=at, name=name) for at, name in limits.items() if low < at < high],
     )
+    return [chart]
 
 
 def _axis(quantity: str, scene: Scene, values: Floats) -> Scale:

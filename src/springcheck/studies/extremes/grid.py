@@ -67,21 +67,16 @@ class Spec:
 def specs(*, quick: bool = False) -> list[Spec]:
     """All cells of methods of fixed step that are judged step by step."""
     with np.errstate(over="ignore", under="ignore"):
-        found = [*_forces(), *sizes(), *steps(), *special()]
+        forces = itertools.starmap(force_cell, itertools.product(CELL_TURNS, FORCE_DECADES))
+        found = [*forces, *sizes(), *steps(), *special()]
     if quick:
         # every third cell of the planes, and all steps and special cases
         found = [x for j, x in enumerate(found) if x.block in ("step", "special") or j % 3 == 0]
     return [x for x in found if x.finite]
 
 
-def _forces() -> Iterator[Spec]:
-    """The plane of h w and force."""
-    for turn, decade in itertools.product(CELL_TURNS, FORCE_DECADES):
-        yield force_cell(turn, decade)
-
-
 def force_cell(turn: float, decade: int) -> Spec:
-    """A cell of that plane: mass and step are fixed, amplitude = force / k."""
+    """A cell of the plane of h w and force: mass and step are fixed, amplitude = force / k."""
     k = MASS * (turn / STEP) ** 2
     q = float(np.float64(10.0**decade) / np.float64(k))
     return Spec(block="force", m=MASS, k=k, q=q, p=0.6 * MASS * (turn / STEP) * q, h=STEP)

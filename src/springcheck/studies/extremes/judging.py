@@ -8,7 +8,7 @@ without a reason makes the cell silently wrong.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
@@ -31,6 +31,8 @@ UNSTABLE_GROWTH = 2.0
 
 FORCE_RESOLUTION = 2.0**-24
 """Relative resolution that a fixed-point sum must reach to represent a force: single precision's."""
+
+COARSE = "fixed-point forces: a quantum of {:.1e} leaves too few digits"
 
 RANGES = {
     "double": (2.0**-1022, float(np.finfo(np.float64).max)),
@@ -80,13 +82,9 @@ class Sizes:
     largest: Extended
     smallest: Extended
     force: Extended
-    moved: Floats
-    """Displacement by the engine, whose forces may be cached."""
 
 
-def sizes(
-    label: Label, scene: Scene, start: tuple[Floats, Floats], end: tuple[Extended, Extended], moved: Floats
-) -> Sizes:
+def sizes(label: Label, scene: Scene, start: tuple[Floats, Floats], end: tuple[Extended, Extended]) -> Sizes:
     """Intermediate results of a step from states q, p (f-1, n) to their exact successors.
 
     In whatever order an engine works, it forms positions, momenta, velocities, forces, accelerations and
@@ -105,7 +103,7 @@ def sizes(
         parts += [x * x, y / m * (y / m) * h * h]
     whole = np.stack([np.asarray(part, np.longdouble) for part in parts])
     nonzero = np.where(whole > 0, whole, np.inf)
-    return Sizes(largest=np.max(whole, axis=0), smallest=np.min(nonzero, axis=0), force=force, moved=moved)
+    return Sizes(largest=np.max(whole, axis=0), smallest=np.min(nonzero, axis=0), force=force)
 
 
 def judge(
@@ -124,10 +122,21 @@ def judge(
         ratio = _largest(dq, dp, of_q, of_p)
         strict = _largest(dq, dp, *case.allowance_at(q[:-1], p[:-1], smallest=np.longdouble(0)))
         from_finite = np.isfinite(q[:-1]) & np.isfinite(p[:-1])
-        inside = sizes(label, case.judged, (q[:-1], p[:-1]), case.next_states, np.abs(np.diff(q, axis=0)))
-        growth = growth_of(case, scene)
-    bound = float(case.roundings)
-    low, high = RANGES["single" if how.force >= 2.0**-24 else "double"]
+        inside = sizes(label, case.judged, (q[:-1], p[:-1]), case.next_states)
+        growth, bound = growth_of(case, scene), float(case.roundings)
+        low, high = RANGES["single" if how.force >= 2.0**-24 else "double"]
+        peaks, too_coarse = np.max(inside.force, axis=0, initial=0), COARSE.format(how.quantum)
+        far, k = scene.system.far if how.joints else 0.0, np.array([abs(spec.k) for spec in specs])
+        # the engine's own displacement, as its forces may be cached
+        moved = np.apply_along_axis(least_moved, 0, np.abs(np.diff(q, axis=0)))
+        reasons = {
+            overflows(how): inside.force >= how.overflow,
+            too_coarse: np.broadcast_to(how.quantum > FORCE_RESOLUTION * peaks, moved.shape),
+            keeps(how): moved <= 2 * how.stale,
+            f"a joint of length {far:.3g} is passed": how.joints & (inside.force >= k * far),
+            f"a step forms numbers beyond {high:.1e}": ~(inside.largest <= high),
+            f"a step forms numbers below {low:.1e}": inside.smallest < low,
+        }
     cells = []
     for i, spec in enumerate(specs):
         here = from_finite[:, i]
@@ -142,16 +151,13 @@ def judge(
         if not bad.any() and not stop:
             outcome, reason = "unstable, as theory says" if unstable else "right", ""
             # an unstable force is small at first
-            peak = float(inside.force[0, i] if unstable else np.max(inside.force[:, i], initial=0))
-            coarse = how.quantum > FORCE_RESOLUTION * peak > 0
+            peak = float(inside.force[0, i] if unstable else peaks[i])
             if np.any(here & ~(strict[:, i] <= bound)):
                 outcome, reason = "engine's limit", f"numbers below {low:.1e} lose digits to underflow"
-            elif coarse:
-                outcome = "engine's limit"
-                reason = f"fixed-point forces: a quantum of {how.quantum:.1e} leaves too few digits"
+            elif how.quantum > FORCE_RESOLUTION * peak > 0:
+                outcome, reason = "engine's limit", too_coarse
         elif bad.any():
-            far = scene.system.far if how.joints else 0.0
-            named = _reason(how, spec, inside, i, np.flatnonzero(bad), low, high, far)
+            named = _reason(how, spec, {text: holds[bad, i] for text, holds in reasons.items()})
             if named and unstable and "beyond" in named and j > 0:
                 outcome, reason = "unstable, as theory says", f"grown out of range by step {j + 1}: {named}"
             elif named:
@@ -162,31 +168,17 @@ def judge(
     return cells
 
 
-def _reason(
-    how: Arithmetic, spec: Spec, inside: Sizes, i: int, bad: np.ndarray, low: float, high: float, far: float
-) -> str | None:
-    """A reason that applies to every step that deviates, or None."""
+def _reason(how: Arithmetic, spec: Spec, reasons: Mapping[str, np.ndarray]) -> str | None:
+    """A reason that applies to every step that deviates, of those that hold for each, or None."""
     if how.parameters == "single":
         with np.errstate(over="ignore", under="ignore"):
             kept = abs(np.float32(spec.k))
         if spec.k and not RANGES["single"][0] <= kept <= RANGES["single"][1]:
             return f"the force constant {spec.k:.3g} is beyond single precision, in which it is kept"
-    peak = np.max(inside.force[:, i], initial=0)
-    reasons = {
-        overflows(how): inside.force[bad, i] >= how.overflow,
-        f"fixed-point forces: a quantum of {how.quantum:.1e} leaves too few digits": np.full(
-            len(bad), how.quantum > FORCE_RESOLUTION * peak
-        ),
-        keeps(how): least_moved(inside.moved[:, i])[bad] <= 2 * how.stale,
-        f"a joint of length {far:.3g} is passed": how.joints & (inside.force[bad, i] >= abs(spec.k) * far),
-        f"a step forms numbers beyond {high:.1e}": ~(inside.largest[bad, i] <= high),
-        f"a step forms numbers below {low:.1e}": inside.smallest[bad, i] < low,
-    }
     for text, holds in reasons.items():
         if np.all(holds):
             return text
-    whole = np.any(np.stack(list(reasons.values())), axis=0)
-    if np.all(whole):
+    if np.all(np.any(np.stack(list(reasons.values())), axis=0)):
         return " and ".join(text for text, holds in reasons.items() if np.any(holds))
     return None
 

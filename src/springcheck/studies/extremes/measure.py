@@ -81,7 +81,7 @@ def absence(label: Label) -> str | None:
         return "it moves no particles on springs"
     if method.adaptive:
         return "it chooses its own steps, and cells are judged step by step"
-    return engines.absence(label.engine) or propagators.absence(label)
+    return propagators.absence(label)
 
 
 def perform(options: Namespace, progress: Progress | None) -> Atlas:
@@ -123,16 +123,12 @@ def windows(cells: Sequence[Cell]) -> list[Window]:
     """Decades of force around 1 to 1e6 in which a method's cells within `CALM_TURNS` are all right."""
     found = []
     for method in dict.fromkeys(cell.method for cell in cells):
-        calm: dict[int, list[bool]] = {}
+        calm: dict[int, bool] = {}
         for cell in cells:
-            if (
-                cell.method == method
-                and cell.block == "force"
-                and CALM_TURNS[0] * 0.999 < cell.parameters["h_w"] < CALM_TURNS[1] * 1.001
-            ):
-                calm.setdefault(cell.decade, []).append(cell.outcome in RIGHT)
-        right = {x: all(calm[x]) for x in sorted(calm)}
-        spans = [list(span) for whole, span in groupby(right, right.__getitem__) if whole]
+            within = CALM_TURNS[0] * 0.999 < cell.parameters["h_w"] < CALM_TURNS[1] * 1.001
+            if cell.method == method and cell.block == "force" and within:
+                calm[cell.decade] = calm.get(cell.decade, True) and cell.outcome in RIGHT
+        spans = [list(span) for right, span in groupby(sorted(calm), calm.__getitem__) if right]
         span = next((span for span in spans if any(0 <= x <= 6 for x in span)), None)
         if span is None:
             continue

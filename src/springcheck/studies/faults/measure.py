@@ -120,20 +120,14 @@ def smallest(passed: Passed, check: str, size: float) -> float | None:
     low, high = sorted((size, following))
     for _ in range(DECADE_HALVINGS):
         middle = float(np.sqrt(low * high))
-        if passed(check, middle) is False:
-            high = middle
-        else:
-            low = middle
+        low, high = (low, middle) if passed(check, middle) is False else (middle, high)
     return high
 
 
 RECORDED = {check.name for check in (*checks.CHECKS, *checks.RANDOM)}
 """Names of the checks of recorded states."""
 
-EXPERIMENTS: dict[str, Any] = {
-    **{check.name: check for check in checks.THOROUGH},
-    **{check.name: check for check in SEEDED},
-}
+EXPERIMENTS: dict[str, Any] = {check.name: check for check in (*checks.THOROUGH, *SEEDED)}
 
 
 def examine(fault: Fault, *, limits: bool = True) -> Result:

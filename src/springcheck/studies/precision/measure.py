@@ -21,7 +21,7 @@ from typing import Unpack
 
 import numpy as np
 
-from springcheck import driver
+from springcheck import driver, engines
 from springcheck.engines.contract import Label
 from springcheck.errors import SpringcheckError
 from springcheck.physics import scenefile
@@ -215,13 +215,9 @@ def _errors(sweep: Sweep, known: Truth) -> Point:
     """Measure the errors of the next point."""
     scene = sweep.scene
     assert scene is not None
-    errors = Errors(
-        known,
-        scene.step,
-        scene.every,
-        scheme=scheme(sweep.method.scheme),
-        judged=known.scene.system.in_single if sweep.arithmetic.parameters == "single" else None,
-    )
+    single = engines.arithmetic(sweep.label).parameters == "single"
+    judged = known.scene.system.in_single if single else known.scene
+    errors = Errors(known, scene.step, scene.every, scheme=scheme(sweep.method.scheme), judged=judged)
     record = driver.play(scene, sweep.label, errors, planned=PLANNED)
     outcome = record.outcome
     if outcome.status != "complete":

@@ -12,7 +12,6 @@ import numpy as np
 from springcheck import driver, engines, schemes
 from springcheck.engines.contract import Label, Method, Stopped
 from springcheck.errors import MethodError
-from springcheck.physics.arrays import Arithmetic
 from springcheck.physics.scene import Scene
 from springcheck.studies.precision import fits
 from springcheck.studies.precision.accuracy import MOST_COMPARED_FRAMES, Truth
@@ -38,9 +37,8 @@ class Sweep:
     """Scenes of the finer steps that remain to be run."""
     scene: Scene | None = None
     """Scene of the next point, None at the end."""
-    points: list[Point]
-    arithmetic: Arithmetic
-    condition: fits.Condition | None
+    points: list[Point] = field(default_factory=list)
+    condition: fits.Condition | None = None
     """Growth of rounding in the method."""
     cost: float = 0.0
     """Estimated seconds of one bare run at the next point."""
@@ -85,15 +83,11 @@ def begin(scene: Scene, label: Label, known: Truth) -> Sweep:
     sweep = Sweep(
         label=label,
         scenes=by_tolerance(plain) if method.adaptive else by_step(plain, limit, known),
-        points=[],
-        arithmetic=Arithmetic(),
-        condition=None,
     )
     try:
         if reason := engines.obstacle(scene, label):
             raise MethodError(reason)
-        sweep.arithmetic = engines.arithmetic(label)
-        sweep.condition = fits.condition(method, sweep.arithmetic, known.angle)
+        sweep.condition = fits.condition(method, engines.arithmetic(label), known.angle)
         sweep.scene = next(sweep.scenes, None)
         if sweep.scene is None:
             needed = coarsest(known, limit)

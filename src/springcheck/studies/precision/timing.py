@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from math import ceil
 from time import get_clock_info, perf_counter
@@ -65,30 +67,29 @@ class Clock:
         """Determine how many runs fit into one timing, and how many timings to take."""
         expected = self.sweep.cost
         if warm_ups(expected + self.sweep.start):
-            warm = self._bare()
-            expected = warm.timing.run if warm else 0.0
+            expected = self._bare().timing.run
         most = ceil(MOST_START_SECONDS / max(self.sweep.start, 1e-9))
         self.copies = max(1, min(64, most, ceil(shortest / max(expected, 1e-9))))
         self.count = repeats(expected + self.sweep.start)
 
     def turn(self, number: int) -> None:
         """Measure one repeat."""
-        run = self._bare(copies=self.copies)
-        if run:
-            self.runs.append(run)
+        self.runs.append(self._bare(copies=self.copies))
         reads = READ_TIMINGS if self.sweep.start < MOST_START_SECONDS else 1
         if number < reads and self.sweep.read <= READ_SECONDS:
-            read = self._bare(copies=self.copies, read=True)
-            if read:
-                self.reads.append(read.timing.run)
+            self.reads.append(self._bare(copies=self.copies, read=True).timing.run)
 
-    def _bare(self, *, copies: int = 1, read: bool = False) -> driver.Bare | None:
+    def _bare(self, *, copies: int = 1, read: bool = False) -> driver.Bare:
+        return driver.bare(self.scene, self.sweep.label, copies=copies, read=read, planned=PLANNED)
+
+    @contextmanager
+    def spending(self) -> Iterator[None]:
+        """Add up the seconds of runs, of which one that stops is the last."""
         began = perf_counter()
         try:
-            return driver.bare(self.scene, self.sweep.label, copies=copies, read=read, planned=PLANNED)
+            yield
         except Stopped as stop:
-            self.gave_up = str(stop)
-            return None
+            self.gave_up, self.count = str(stop), 0
         finally:
             self.spent += perf_counter() - began
 
@@ -113,8 +114,10 @@ def take_turns(clocks: list[Clock]) -> None:
     """Warm up, then repeat in turn: A B C A B C."""
     shortest = FEWEST_TICKS * tick()
     for clock in clocks:
-        clock.warm_up(shortest)
+        with clock.spending():
+            clock.warm_up(shortest)
     for number in range(max((clock.count for clock in clocks), default=0)):
         for clock in clocks:
-            if number < clock.count and not clock.gave_up:
-                clock.turn(number)
+            if number < clock.count:
+                with clock.spending():
+                    clock.turn(number)

@@ -75,9 +75,8 @@ def banks(study: Sampling) -> list[Bank]:
 def _temperatures(methods: Sequence[Sampled]) -> str:
     """How many schemes sample right configurations at the step nearest to h omega = 1, and the worst."""
     i = int(np.argmin(np.abs(methods[0].turn - 1)))
-    off = {title(x.scheme): float(x.configurational[i]) - 1 for x in methods}
-    law = {title(x.scheme): float(x.configurational_law[i]) - 1 for x in methods}
-    off = {name: x if np.isnan(law[name]) else law[name] for name, x in off.items()}
+    ends = ((x.scheme, float(x.configurational_law[i]), float(x.configurational[i])) for x in methods)
+    off = {title(name): (measured if np.isnan(law) else law) - 1 for name, law, measured in ends}
     right = sum(abs(x) <= IS_RIGHT for x in off.values())
     name, at = max(off, key=lambda name: abs(off[name])), f"h {W_SIGN} = {methods[0].turn[i]:g}"
     said = f"At {at} positions have their temperature to {share(IS_RIGHT)} by {right} of {len(off)} schemes"
@@ -87,8 +86,8 @@ def _temperatures(methods: Sequence[Sampled]) -> str:
 
 def _costs(methods: Sequence[Sampled]) -> str:
     """Errors of the longest runs, of the best method and of the worst."""
-    ends = {title(x.scheme): (float(x.off_law[-1]), float(x.off[-1])) for x in methods}
-    off = {name: measured if np.isnan(law) else law for name, (law, measured) in ends.items()}
+    ends = ((x.scheme, float(x.off_law[-1]), float(x.off[-1])) for x in methods)
+    off = {title(name): measured if np.isnan(law) else law for name, law, measured in ends}
     after = f"After {methods[0].frames[-1]:.0f} steps of h {W_SIGN} = {methods[0].turn[1]:g}"
     return extremes(off, f"{after} <q\N{SUPERSCRIPT TWO}> is off by {{}}")
 

@@ -9,6 +9,7 @@ Oscillations, 1979, 5.2).
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from math import nan
 
 import numpy as np
 
@@ -35,16 +36,16 @@ class Multiplier:
     method: str
     steps: int
     """Steps in a period of the modulation."""
-    grown: float
+    grown: float = nan
     """Growth factor over a period, measured from two starts."""
-    turned: float
+    turned: float = nan
     """Rotation angle over a period [rad], from 0 to pi, likewise measured; all are NaN where nothing was."""
-    grown_predicted: float
+    grown_predicted: float = nan
     """Growth factor of the scheme's own steps."""
-    turned_predicted: float
-    off: float
+    turned_predicted: float = nan
+    off: float = nan
     """Distance of the two multipliers in the complex plane."""
-    bound: float
+    bound: float = nan
     """Rounding of each step, propagated to the end of the period, times the condition of the eigenvectors.
     States have size 1 + |rest position|, as each is rounded with its distance from 0."""
     why: str = ""
@@ -131,7 +132,4 @@ def _powers(
 
 
 def _unknown(label: Label, steps: int, why: str) -> Multiplier:
-    none = dict.fromkeys(("grown", "turned", "grown_predicted", "turned_predicted", "off", "bound"), np.nan)
-    return Multiplier(
-        method=str(label), steps=steps, why=f"its Floquet multiplier is not measured: {why}", **none
-    )
+    return Multiplier(method=str(label), steps=steps, why=f"its Floquet multiplier is not measured: {why}")
