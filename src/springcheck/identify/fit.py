@@ -340,10 +340,6 @@ def _constant_part(
 
     best = _minimum(z, sigma, process, start, 0, None)
     unknown, wide = 4, None
-    if record.fine and not constant:
-        removed = _removed_at_most(z, process, best, record.deviations)
-        if removed <= CONSTANT_SHOWS * max((best.chi2 - removed) / max(numbers - 6, 1), least):
-            return best, 0, None
     if record.deviations is not None and numbers > FEWEST_UNEVEN:
         wide = _minimum(z, sigma, process, best, 1, None)
         sliding = _minimum(z, sigma, process, wide, 1, record.deviations)
@@ -366,17 +362,6 @@ def _constant_part(
         if clean and gains(best, widest, CONSTANT_SHOWS) and shift > 64 * ROUNDING * np.max(np.abs(z)):
             best, centred = widest, 2
     return best, centred, deviations
-
-
-def _removed_at_most(z: Extended, process: Floats, best: _Solution, deviations: Extended | None) -> float:
-    """Upper bound on the decrease of chi-squared by a constant part and the deviations of the clock: both are
-    linear in the state, 1, and the products of these with the deviations."""
-    state, weight = np.column_stack([z[:-1], np.ones(len(process))]), 1 / process[:, None]
-    every = state if deviations is None else np.column_stack([state, deviations[:, None] * state])
-    size = np.max(np.abs(every), axis=0)
-    columns = (every / np.where(size > 0, size, 1)).astype(np.float64) * weight
-    left = np.asarray(z[1:] - z[:-1] @ best.entries.T, np.float64) * weight
-    return float(np.sum((np.linalg.qr(columns)[0].T @ left) ** 2))
 
 
 def _fed_back(
