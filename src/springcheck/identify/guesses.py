@@ -132,8 +132,6 @@ class Roots:
     log_det: Floats
     step: Floats
     error: float
-    kept: dict[Any, Any]
-    """Cache of comparisons with the curves."""
 
 
 @lru_cache(maxsize=64)
@@ -178,7 +176,7 @@ def roots_of_map(found: Map, strides: tuple[int, ...]) -> Roots:
     # from (q/size, v T/size) to (q, v h)
     step[:, 0, 1] *= s / ratio
     step[:, 1, 0] *= ratio / s
-    return Roots(s, turns, phase, log_det, step, error, {})
+    return Roots(s, turns, phase, log_det, step, error)
 
 
 @dataclass(slots=True, eq=False)
@@ -265,13 +263,9 @@ def _on_curves(
         left, right = (curves.rows[curve, k, cell[r] + i] for i in (0, 1))
         return np.asarray(left + (right - left) * part[r])
 
-    asked = "curves", tuple(names.tolist()), len(roots.s), len(at)
-    if asked not in roots.kept:
-        each, all_ = np.arange(len(curves.low))[:, None], np.arange(len(at))
-        bend = curves.rows[each, 4, cell]
-        losses = between(1, each, all_) - log_det
-        roots.kept[asked] = losses, np.abs(losses) - bend, np.abs(between(2, each, all_) - first) - bend
-    loss, lost, off = roots.kept[asked]
+    each, all_ = np.arange(len(curves.low))[:, None], np.arange(len(at))
+    bend, loss = curves.rows[each, 4, cell], between(1, each, all_) - log_det
+    lost, off = np.abs(loss) - bend, np.abs(between(2, each, all_) - first) - bend
     room = GLANCE + NEAR[1] * roots.error
     beyond = phase - curves.high[:, None]
     close = off <= room + DAMPING * np.abs(loss) if every.damped else (off <= room) & (lost <= 2 * room)
@@ -379,7 +373,7 @@ def roots_of(
         phase = np.where(steps[:, 0, 1] < 0, 2 * np.pi - phase, phase)
         log_det = np.log(np.abs(found.determinant)).astype(np.float64)
         ones = np.ones(len(steps))
-        roots = Roots(ones, 0 * ones, phase, log_det, steps, room / NEAR[1], {})
+        roots = Roots(ones, 0 * ones, phase, log_det, steps, room / NEAR[1])
         x = first(every, roots, growing=False, free_scale=True, far=True)
         x = polished(every, roots, x, free_scale=free_scale)
     return x.which, x.root, x.a, x.g
