@@ -257,18 +257,18 @@ cause; other noise of that size adds up to a ratio of 1.4."""
 REFINED = 16
 """Newton steps for the stiffness, which the residuals bias."""
 
-Force: TypeAlias = Callable[[Floats, Floats], Floats]
+Force: TypeAlias = Callable[[Floats, Reals], Floats]
 """k (c, 1) and q (c, f) -> -k q in an arithmetic; k and the result are in quanta."""
 
 Pull: TypeAlias = Callable[[Floats, Reals], Floats]
 """a (c, 1) and q (c, f) -> h**2 F/m."""
 
 
-def _single(k: Floats, q: Floats) -> Floats:
+def _single(k: Floats, q: Reals) -> Floats:
     return (-k * q).astype(np.float32).astype(np.float64)
 
 
-def _all_single(k: Floats, q: Floats) -> Floats:
+def _all_single(k: Floats, q: Reals) -> Floats:
     return ((-k).astype(np.float32) * q.astype(np.float32)).astype(np.float64)
 
 
