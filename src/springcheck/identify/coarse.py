@@ -323,14 +323,14 @@ def _reproduced(record: Record, j: int, found: Map, match: Match, precision: str
         return np.asarray(-a * x)
 
     start, shift = np.array([[match.a]]), 1e-6 * match.a
-    rows = missed(start, exact).reshape(2, -1)
+    first = missed(start, exact)
+    rows = first.reshape(2, -1)
     size = np.sqrt(np.mean(rows**2, axis=1, keepdims=True)) + 2.0**-52 * np.max(np.abs(q))
     scale = np.broadcast_to(1 / size, rows.shape).ravel()
     slope = (missed(start + shift, exact) - missed(start - shift, exact))[0] / (2 * shift) * scale
     # residuals of another stiffness need no quantum
     inverse = (slope / (slope @ slope))[:, None]
-    plain = start - missed(start, exact) * scale @ inverse
-    without = missed(plain, exact) * scale
+    without = missed(start - first * scale @ inverse, exact) * scale
     before = float(np.sqrt(np.mean(without**2)))
     counted = float(np.sum(without**2) ** 2 / np.sum(without**4)) - 1
     single = float(over_single(mass))
