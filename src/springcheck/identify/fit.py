@@ -261,7 +261,8 @@ def fit(record: Record, j: int, *, kept: NDArray[np.bool_] | None = None, consta
     parts = np.zeros((len(z), 2)) if record.parts is None else record.summed(j) / size.astype(np.float64)
     length = _lengths(z, np.zeros(2), parts)
     # what happens in other pairs than those that are kept is unknown
-    unknown = 1.0 if kept is None else np.where(kept, 1.0, UNKNOWN / ROUNDING)
+    kept = np.ones(len(length), np.bool_) if kept is None else kept
+    unknown = np.where(kept, 1.0, UNKNOWN / ROUNDING)
     process = ROUNDING * length * unknown
     # neighbours alone first: a map that is far off makes nothing of the orbit
     pairs = process if record.fine else np.hypot(process, np.max(sigma[1:], axis=1))
@@ -275,7 +276,7 @@ def fit(record: Record, j: int, *, kept: NDArray[np.bool_] | None = None, consta
     if not record.fine:
         best = _constant_part(z, sigma, process, best, record, constant)
     once: bool | None = None
-    pairs_kept = len(process) if kept is None else int(np.count_nonzero(kept))
+    pairs_kept = int(np.count_nonzero(kept))
     freedom = 2 * pairs_kept - best.unknowns
     if not record.fine:
         other = _fed_back(z, sigma, process, best, freedom)
@@ -297,8 +298,7 @@ def fit(record: Record, j: int, *, kept: NDArray[np.bool_] | None = None, consta
     spread = (state[:-1] - shift).astype(np.float64) * weight[:, None]
     smallest = float(np.linalg.eigvalsh(spread.T @ spread / len(spread))[0])
     left = (state[1:] - state[:-1] @ best.entries.T).astype(np.float64) * weight[:, None]
-    left = left if kept is None else left[kept]
-    residual = np.sqrt(np.mean(left**2, axis=0))
+    residual = np.sqrt(np.mean(left[kept] ** 2, axis=0))
     rounded = float(np.max(np.mean((sigma[1:] ** 2 + sigma[:-1] ** 2) * weight[:, None] ** 2, axis=0)))
     spans = smallest > 100 * rounded and smallest > (64 * ROUNDING) ** 2
     return Map(
