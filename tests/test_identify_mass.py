@@ -41,12 +41,12 @@ def newmark(q, p, h, force, mass, beta=1 / 6):
     return new, p + h / 2 * (force(q) + force(new))
 
 
-def told(step: Any, factor: float = 1.0, **stated: float) -> Identification:
+def told(step: Any, factor: float = 1.0, **stated: float | None) -> Identification:
     rows = [(0.3, 0.7)]
     for _ in range(200):
         rows.append(step(*rows[-1], H, lambda x: -K * x, M * factor))
     q, p = np.array(rows).T
-    return identify(H * np.arange(201), q, p, mass=M, step=H, **stated)
+    return identify(H * np.arange(201), q, p, **{"mass": M, "step": H, **stated})
 
 
 @pytest.mark.parametrize("size", [1e-1, 1e-3, 1e-6])
@@ -126,6 +126,13 @@ def test_a_mass_that_is_not_the_stated_one_is_named(step: Any, name: str, factor
 def test_a_mass_a_ten_trillionth_off_is_not_said_to_be_the_stated_one() -> None:
     """It was 1 times the stated one."""
     assert "in a mass 1.0000000000001 times the stated one" in told(verlet, 1 + 1e-13, stiffness=K).statement
+
+
+def test_the_stated_stiffness_of_momenta_without_a_mass_is_that_of_every_candidate() -> None:
+    found = told(verlet, mass=None, stiffness=K)
+    assert len(found.candidates) > 1
+    for one in found.candidates:
+        assert one.stiffness == pytest.approx((K,), rel=1e-12)
 
 
 def test_without_a_stated_stiffness_mass_and_units_are_both_possible() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -83,16 +82,6 @@ def _derivative(matches: list[Match], found: Map, name: str, *, between: bool = 
     return np.asarray((up - down) / (2 * d)[:, None, None])
 
 
-def _residuals(matches: list[Match], found: Map, deviations: Extended | None) -> Extended:
-    """Residuals (c, f - 1, 2): each frame minus the prediction from the frame before, in the units of
-    `found`. Steps follow the `deviations` of the times."""
-    out = found.z[1:] - found.z[:-1] @ np.swapaxes(_predicted(matches), 1, 2)
-    if deviations is not None:
-        change = _derivative(matches, found, "longer")
-        out = out - deviations[:, None] * (found.z[:-1] @ np.swapaxes(change, 1, 2))
-    return np.asarray(out)
-
-
 FREE = 1e6
 """Prior standard deviation of the equilibrium, in units of the residuals: it is free."""
 
@@ -152,13 +141,6 @@ def _sums(matches: list[Match], found: Map) -> tuple[Floats, Floats]:
     scale = np.ones((len(up), 2, 2))
     scale[:, 0, 1], scale[:, 1, 0] = up, 1 / up
     return step * scale, first * scale
-
-
-def _substeps(match: Match) -> int:
-    """Number of substeps over which the force is held, else 1."""
-    if not FAMILIES[match.family].held:
-        return 1
-    return max(substeps(match.g, match.g_error)[0], default=1)
 
 
 def _unlike(record: Record, found: Map, matches: list[Match]) -> Floats:
@@ -259,7 +241,8 @@ def _roundings(record: Record, j: int, found: Map, matches: list[Match]) -> Roun
     difference = np.zeros_like(size)
     difference[:, :, 1] = 2 * (float(found.size[0] / found.size[1]) * stride)[:, None] * position
     # substeps of one force round alike
-    parts = np.array([_substeps(match) for match in matches])
+    held = [substeps(x.g, x.g_error)[0] if FAMILIES[x.family].held else range(0) for x in matches]
+    parts = np.array([max(numbers, default=1) for numbers in held])
     return Roundings(
         size=size, difference=difference, turned=turned, stride=stride, usual=4 + 2 * np.sqrt(stride) * parts,
         path=stride * parts * [4 if scheme.flow else scheme.path for scheme in schemes],
@@ -269,28 +252,22 @@ def _roundings(record: Record, j: int, found: Map, matches: list[Match]) -> Roun
 def _defects(
     record: Record, j: int, found: Map, matches: list[Match], visible: Callable[[], bool]
 ) -> list[Defect]:
-    sizes, half = _roundings(record, j, found, matches), np.zeros(1)
-    if not record.fine:
-        b = np.abs(_predicted(matches)).astype(np.float64)
-        quanta = record.quanta(j) / found.size.astype(np.float64)
-        half = (quanta[1:] + quanta[:-1] @ np.swapaxes(b, 1, 2)) / 2
-    if _beyond(record, found, sizes, half) and not (record.fine and visible()):
-        return [Defect(ulp=math.inf, precision="", miss=math.inf)] * len(matches)
+    sizes = _roundings(record, j, found, matches)
     ulp, plain, signed = _in_double(record, found, matches, sizes)
-    stored = single = np.zeros(len(matches), dtype=bool)
-    if record.fine:
-        half = np.zeros_like(signed)
-    else:
-        signed, half, stored, single = _in_file(record, found, matches, sizes, signed, half)
+    half, stored, single = np.zeros_like(signed), np.zeros_like(plain), np.zeros_like(plain)
+    if not record.fine:
+        signed, half, stored, single = _in_file(record, j, found, matches, sizes, signed)
     missing = np.abs(signed)
     lengths = np.sqrt(np.sum(found.z[:-1].astype(np.float64) ** 2, axis=1))
     share = _largest(missing, np.repeat(lengths[None, :, None], 2, axis=2))
-    texts = [s.name for s in (record.q_storage, record.v_storage) if s.name.startswith("text")]
+    stored_as = [record.q_storage.name, record.v_storage.name]
+    short, texts = sorted({*stored_as} - {"double"}), [x for x in stored_as if x.startswith("text")]
+    exact = f"the numbers happen to be exact as {' and '.join(short)}" if short else ""
     out = []
     for i, match in enumerate(matches):
         precision, note, certain = "", "", True
         if plain[i]:
-            precision, note = "double", _written(record)
+            precision, note = "double", exact
         elif not stored[i] and coarse.is_rebuilt(
             match, missing[i], half[i], sizes.size[i] + sizes.turned[i], sizes.difference[i]
         ):
@@ -310,22 +287,6 @@ def _defects(
     return out
 
 
-BEYOND, BEYOND_FILE = 1e3, 10.0
-"""Bounds on what double precision, and what a coarser file explains, from which no refitting is tried."""
-
-
-def _beyond(record: Record, found: Map, sizes: Roundings, half: Floats) -> bool:
-    """Whether the residuals exceed so many bounds, `half` that of a file's numbers, under every match: no map
-    leaves a smaller weighted mean square than the fitted one, whatever is refitted of a match."""
-    off = record.clock + np.max(np.abs(0.0 if record.deviations is None else record.deviations))
-    each = BEYOND * (EPSILON + off * sizes.stride) * (sizes.path + sizes.stride**2)
-    if not record.fine:
-        each = BEYOND_FILE * (SINGLE + off * sizes.stride) * np.minimum(sizes.path, sizes.usual)
-    most = BEYOND_FILE * half + each[:, None, None] * (sizes.size + sizes.turned + sizes.difference)
-    explained = np.sum((most * found.weight[:, None]) ** 2, axis=(1, 2))
-    return bool(np.all(found.freedom / 2 * np.sum(found.residual**2) > explained))
-
-
 def _in_double(
     record: Record, found: Map, matches: list[Match], sizes: Roundings
 ) -> tuple[Floats, Any, Floats]:
@@ -335,9 +296,12 @@ def _in_double(
     unit = EPSILON * size
 
     def missed(deviations: Extended | None) -> Floats:
-        return _refitted(
-            record, found, matches, _residuals(matches, found, deviations).astype(np.float64), unit
-        )
+        """Each frame minus the prediction from the frame before, whose steps follow these `deviations`."""
+        out = found.z[1:] - found.z[:-1] @ np.swapaxes(_predicted(matches), 1, 2)
+        if deviations is not None:
+            change = _derivative(matches, found, "longer")
+            out = out - deviations[:, None] * (found.z[:-1] @ np.swapaxes(change, 1, 2))
+        return _refitted(record, found, matches, out.astype(np.float64), unit)
 
     def ulps(x: Floats, slack: Floats | float = 0.0) -> Floats:
         return _largest(np.maximum(np.abs(x) - slack, 0), unit)
@@ -367,10 +331,13 @@ def _in_double(
 
 
 def _in_file(
-    record: Record, found: Map, matches: list[Match], sizes: Roundings, signed: Floats, half: Floats
+    record: Record, j: int, found: Map, matches: list[Match], sizes: Roundings, signed: Floats
 ) -> tuple[Floats, Floats, Any, Any]:
-    """Residuals (c, f - 1, 2), refitted under the errors `half` of the storage format; their bound; and
+    """Residuals (c, f - 1, 2), refitted under the errors of the storage format; the bound of these; and
     whether they explain the residuals (c,) in double, or in single precision arithmetic."""
+    b = np.abs(_predicted(matches)).astype(np.float64)
+    quanta = record.quanta(j) / found.size.astype(np.float64)
+    half = (quanta[1:] + quanta[:-1] @ np.swapaxes(b, 1, 2)) / 2
     signed = _refitted(record, found, matches, signed, half)
     # the map is known from rounded states that move, to a few parts in sqrt(pairs) of their rounding
     moving = np.count_nonzero(np.all(np.diff(found.z.astype(np.float64), axis=0) != 0, axis=1)) + 1
@@ -391,8 +358,3 @@ def _in_file(
 
 def _largest(missing: Floats, unit: Floats) -> Floats:
     return np.asarray(np.max(missing / np.maximum(unit, np.finfo(np.float64).tiny), axis=(1, 2)))
-
-
-def _written(record: Record) -> str:
-    short = {s.name for s in (record.q_storage, record.v_storage)} - {"double"}
-    return f"the numbers happen to be exact as {' and '.join(sorted(short))}" if short else ""

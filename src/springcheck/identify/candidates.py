@@ -52,8 +52,6 @@ def shared(candidates: tuple[Candidate, ...], n: int, *, named: bool = True) -> 
 
 def _alike(rows: list[tuple[float, ...]]) -> tuple[float, ...] | None:
     """Numbers that all candidates share to a relative 1e-9, or None."""
-    if len({len(row) for row in rows}) > 1:
-        return None
     return rows[0] if np.allclose(rows, rows[0], rtol=1e-9, atol=0, equal_nan=True) else None
 
 
@@ -107,26 +105,17 @@ def of_stated_stiffness(seen: Measured, precisions: dict[Joint, str], stated: Fl
     agreeing = [x for x in joints if not seen.disagreements(x)] or [
         x for x in joints if not stated_stiffness(seen, x, precisions[x], stated)[0]
     ]
-    if not agreeing:
-        return nearest_stiffness(seen, joints, stated)
-    _, found, _ = seen.numbers(agreeing[0])
-    if found is None:
-        return agreeing
-    same = stated.copy()
-    same[seen.moving] = found
-    return agreeing + [x for x in joints if x not in agreeing and not seen.disagreements(x, same)]
-
-
-def nearest_stiffness(seen: Measured, joints: list[Joint], stated: Floats) -> list[Joint]:
-    """The hypotheses of the stiffness nearest to the stated one, to within single precision and errors."""
-    off, room = {}, {}
-    for joint in joints:
-        _, stiffness, _ = seen.numbers(joint)
-        known = zip(seen.moving, stiffness or (), strict=False)
-        off[joint] = max((abs(k / float(stated[j]) - 1) for j, k in known if stated[j]), default=0.0)
-        room[joint] = SINGLE_ROOM + max(part.a_room for part in joint.parts)
-    least = min(off.values())
-    return [joint for joint in joints if off[joint] <= 2 * least + room[joint]]
+    found = {x: zip(seen.moving, seen.numbers(x)[1] or (), strict=False) for x in joints}
+    if agreeing:
+        same = stated.copy()
+        for j, k in found[agreeing[0]]:
+            same[j] = k
+        return agreeing + [x for x in joints if x not in agreeing and not seen.disagreements(x, same)]
+    off = {x: max((abs(k / stated[j] - 1) for j, k in each if stated[j]), default=0.0)
+           for x, each in found.items()}  # fmt: skip
+    # to within single precision and errors
+    room = {x: SINGLE_ROOM + max(part.a_room for part in x.parts) for x in joints}
+    return [x for x in joints if off[x] <= 2 * min(off.values()) + room[x]]
 
 
 def _single_constants(record: Record, stated: Floats, stride: int) -> list[tuple[str, Floats, bool]]:
@@ -150,14 +139,11 @@ def other_names(scheme: str, *, damped: bool) -> tuple[str, ...]:
     """Other names of a scheme's map, and schemes that have it on a spring of another stiffness."""
     if scheme not in SCHEMES:
         return ELSEWHERE[scheme].also if scheme in ELSEWHERE else ()
-    leapfrog = [LEAPFROG[scheme]] if scheme in LEAPFROG else []
-    still = [] if damped else [f"{name} without friction" for name in frictionless(scheme)]
-    same = (
-        []
-        if damped
-        else list(dict.fromkeys(f"{FAMILIES[x].scheme} with friction" for x in coincident(scheme)))
-    )
-    return (*aliases(scheme), *leapfrog, *still, *same)
+    names = [*aliases(scheme), *([LEAPFROG[scheme]] if scheme in LEAPFROG else [])]
+    if not damped:
+        names += [f"{name} without friction" for name in frictionless(scheme)]
+        names += dict.fromkeys(f"{FAMILIES[x].scheme} with friction" for x in coincident(scheme))
+    return tuple(names)
 
 
 def held_over(joint: Joint) -> str:
@@ -207,18 +193,11 @@ def candidates_of(seen: Measured, joint: Joint) -> list[Candidate]:
             ]
             if any(abs(x - y) > z for x, y, z in zip(friction, rates, room, strict=True)):
                 continue
-        candidate = Candidate(
-            scheme=joint.scheme,
-            aliases=other_names(joint.scheme, damped=joint.damped),
-            stride=joint.stride,
-            step=float(record.interval) / joint.stride,
-            turns=max(part.turns for part in joint.parts),
-            omega=omega,
-            stiffness=stiffness,
-            friction=friction,
-            law=f"{law} {family.place}".strip(),
-        )
-        out.append(candidate)
+        out.append(Candidate(
+            scheme=joint.scheme, aliases=other_names(joint.scheme, damped=joint.damped), stride=joint.stride,
+            step=float(record.interval) / joint.stride, turns=max(part.turns for part in joint.parts),
+            omega=omega, stiffness=stiffness, friction=friction, law=f"{law} {family.place}".strip(),
+        ))  # fmt: skip
     return out
 
 
@@ -242,12 +221,8 @@ def all_remarks(seen: Measured, joints: list[Joint], candidates: tuple[Candidate
     out += damped
     if not (damped or seen.record.fine):
         most = max(hidden_friction(seen.record, found) for found in seen.maps)
-        with_it = {
-            name: frictionless(name)
-            for name in dict.fromkeys(x.scheme for x in candidates)
-            if name in SCHEMES
-        }
-        same = [f"{name} is {', '.join(names)}" for name, names in with_it.items() if names]
+        names = dict.fromkeys(x.scheme for x in candidates if x.scheme in SCHEMES)
+        same = [f"{name} is {', '.join(frictionless(name))}" for name in names if frictionless(name)]
         if same:
             out.append(f"a friction c/m below {most:.1e} would not show: with it {' and '.join(same)}")
     if scheme and not damped and seen.stiffness is None and scheme in SCHEMES:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -49,9 +49,8 @@ def clock_of(t: Floats) -> Clock:
     # 0.5, 1.0, 1.5 are multiples of a round step, not times that were cut to one decimal, and those of a
     # float32 clock are not text: the finest of the grids that the times lie on explains them
     single = single_of(t) or (written.name == "single" and single_of(t, SHORT_STEP))
-    grids = [even]
-    grids += [float(np.max(Storage(name="single").quantum(t)))] if single else []
-    grids.append(float(np.max(written.quantum(t))))
+    coarser = [Storage(name="single"), written] if single else [written]
+    grids = [even, *(float(np.max(x.quantum(t))) for x in coarser)]
     # an interval is the difference of two rounded times; an accumulated clock rounds once more in every step
     quantum = next((x for x in grids if off[worst] <= 4 * x), None)
     cut = written.name.startswith("text") and quantum == grids[-1]
@@ -74,7 +73,8 @@ def clock_of(t: Floats) -> Clock:
     binary = quantum in grids[: 1 + single]
     mean, line = interval, wide - wide[0] - np.arange(len(t)) * interval
     # a sum of steps, each rounded: its mean is off by as much as they differ
-    step = _added(t, interval, quantum) if binary and not _even(t, interval, quantum) else None
+    width = np.float32 if quantum > even else np.float64
+    step = _added(t, interval, quantum, width) if binary and not _even(t, interval, width) else None
     if step is not None:
         interval = step
         jitter += float(abs(interval / mean - 1)) + (2.0**-24 if quantum != even else 0.0)
@@ -96,22 +96,19 @@ def clock_of(t: Floats) -> Clock:
     )  # fmt: skip
 
 
-def _width(t: Floats, quantum: float) -> type[np.floating[Any]]:
-    """Floating-point type of a clock whose times have this rounding [T]."""
-    return np.float32 if quantum > float(np.max(np.spacing(np.abs(t)))) else np.float64
+Width: TypeAlias = type[np.floating[Any]]
+"""Floating-point type of a clock."""
 
 
-def _even(t: Floats, interval: np.longdouble, quantum: float) -> bool:
+def _even(t: Floats, interval: np.longdouble, width: Width) -> bool:
     """Whether the times are multiples of a step, each rounded once."""
-    width = _width(t, quantum)
     n, times = np.arange(len(t)), t.astype(width)
     steps = (float(interval), float(t[1] - t[0]), float(f"{float(interval):.{SHORT_STEP}g}"))
     return any(np.array_equal((t[0] + n * h).astype(width), times) for h in steps)
 
 
-def _added(t: Floats, interval: np.longdouble, quantum: float) -> np.longdouble | None:
+def _added(t: Floats, interval: np.longdouble, quantum: float, width: Width) -> np.longdouble | None:
     """Interval of a clock t += h that gives t, rounded to `quantum` [T], to the last bit; or None."""
-    width = _width(t, quantum)
     times = t.astype(width)
     for steps, h in _steps(t, float(interval), quantum):
         summed = np.full(steps * (len(t) - 1) + 1, h, width)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import partial
 from itertools import repeat
 from typing import TypeAlias
 
@@ -21,7 +20,7 @@ from springcheck.identify.hypothesis import CHANCE, Match, most
 from springcheck.identify.maps import power, unit
 from springcheck.identify.record import Record
 from springcheck.physics.arrays import Extended, Floats, Reals
-from springcheck.schemes import SCHEMES, Scheme, magnitude_step, number
+from springcheck.schemes import SCHEMES, magnitude_step, step
 from springcheck.schemes.rounding import Met
 
 EPSILON = 2.0**-52
@@ -167,13 +166,9 @@ def _kinematic(record: Record, j: int, found: Map, match: Match) -> tuple[str, s
         ("mixed", single, 1.0, "single-precision numbers"),
         ("mixed", single, float(over_single(mass)), "single-precision numbers, and so is the mass"),
         ("fixed-point force", fixed, 1.0, "whole multiples of 2**-32, a 64-bit fixed-point sum"),
-        (
-            "fixed-point force",
-            fixed,
-            1 + EXCESS,
-            "whole multiples of 1/(2**32 - 1), as OpenMM's CustomIntegrator has them",
-        ),
-    ):
+        ("fixed-point force", fixed, 1 + EXCESS,
+         "whole multiples of 1/(2**32 - 1), as OpenMM's CustomIntegrator has them"),
+    ):  # fmt: skip
         # a fraction of a quantum is uniform, 1/4 on average, unless forces are whole multiples of it
         off = values / (quantum * factor)
         whole = np.rint(off)
@@ -262,18 +257,18 @@ cause; other noise of that size adds up to a ratio of 1.4."""
 REFINED = 16
 """Newton steps for the stiffness, which the residuals bias."""
 
-Force: TypeAlias = Callable[[Floats, Floats], Floats]
+Force: TypeAlias = Callable[[Floats, Reals], Floats]
 """k (c, 1) and q (c, f) -> -k q in an arithmetic; k and the result are in quanta."""
 
-Pull: TypeAlias = Callable[[Floats, Floats], Floats]
-"""a (c, 1) and q (c, f) or (f,) -> h**2 F/m."""
+Pull: TypeAlias = Callable[[Floats, Reals], Floats]
+"""a (c, 1) and q (c, f) -> h**2 F/m."""
 
 
-def _single(k: Floats, q: Floats) -> Floats:
+def _single(k: Floats, q: Reals) -> Floats:
     return (-k * q).astype(np.float32).astype(np.float64)
 
 
-def _all_single(k: Floats, q: Floats) -> Floats:
+def _all_single(k: Floats, q: Reals) -> Floats:
     return ((-k).astype(np.float32) * q.astype(np.float32)).astype(np.float64)
 
 
@@ -302,8 +297,8 @@ def coarse_forces(record: Record, j: int, found: Map, match: Match, signed: Floa
 
 def _reproduced(record: Record, j: int, found: Map, match: Match, precision: str) -> bool:
     """Whether forces of a precision, in an explicit scheme without friction, explain the residuals."""
-    family = FAMILIES[match.family]
-    if record.mass is None:
+    own = SCHEMES[match.scheme]
+    if record.mass is None or not own.has("explicit"):
         return False
     mass, h = float(record.mass[j]), float(record.interval) / match.stride
     # about the equilibrium; velocities as lengths
@@ -314,28 +309,28 @@ def _reproduced(record: Record, j: int, found: Map, match: Match, precision: str
     def missed(a: Floats, pull: Pull, *, leaps: bool = False) -> Floats:
         """Residuals (c, 2 f - 2) of steps with these (h w)**2 (c, 1)."""
         x, y = (np.broadcast_to(z[:-1], (len(a), len(z) - 1)) for z in (q, v))
+        scheme = SCHEMES["semi-implicit-euler"] if leaps else own
         if leaps:
             # stored half a step early, and half a kick of the exact force added where it was read
             y = y + a * x / 2
-        scheme = SCHEMES["semi-implicit-euler" if leaps else family.scheme]
         for _ in range(match.stride):
-            x, y = _stepped(scheme, x, y, partial(pull, a))
+            x, y = step(scheme, x, y, h=1.0, m=np.ones(1), force=lambda at, _: pull(a, at))
         if leaps:
             y = y - a * x / 2
         return np.concatenate([q[1:] - x, v[1:] - y], axis=1)
 
-    def exact(a: Floats, x: Floats) -> Floats:
-        return -a * x
+    def exact(a: Floats, x: Reals) -> Floats:
+        return np.asarray(-a * x)
 
     start, shift = np.array([[match.a]]), 1e-6 * match.a
-    rows = missed(start, exact).reshape(2, -1)
+    first = missed(start, exact)
+    rows = first.reshape(2, -1)
     size = np.sqrt(np.mean(rows**2, axis=1, keepdims=True)) + 2.0**-52 * np.max(np.abs(q))
     scale = np.broadcast_to(1 / size, rows.shape).ravel()
     slope = (missed(start + shift, exact) - missed(start - shift, exact))[0] / (2 * shift) * scale
     # residuals of another stiffness need no quantum
     inverse = (slope / (slope @ slope))[:, None]
-    plain = start - missed(start, exact) * scale @ inverse
-    without = missed(plain, exact) * scale
+    without = missed(start - first * scale @ inverse, exact) * scale
     before = float(np.sqrt(np.mean(without**2)))
     counted = float(np.sum(without**2) ** 2 / np.sum(without**4)) - 1
     single = float(over_single(mass))
@@ -343,13 +338,12 @@ def _reproduced(record: Record, j: int, found: Map, match: Match, precision: str
     quanta = kick * np.array(factors)[:, None]
     forces, n = FORCES[precision], len(factors)
 
-    def cut(a: Floats, x: Floats) -> Floats:
+    def cut(a: Floats, x: Reals) -> Floats:
         # every force with all factors, one below the other
-        x = np.broadcast_to(x, (len(a), x.shape[-1]))
         parts = ((f, a[i : i + n], x[i : i + n]) for f, i in zip(forces, range(0, len(a), n), strict=True))
         return np.concatenate([quanta * f(b / kick, y) for f, b, y in parts])
 
-    for leaps in (False, True) if family.name == "velocity-verlet" else (False,):
+    for leaps in (False, True) if match.family == "velocity-verlet" else (False,):
         values = np.repeat(start, len(forces) * n, axis=0)
         for _ in range(REFINED):
             left = missed(values, cut, leaps=leaps) * scale
@@ -359,17 +353,3 @@ def _reproduced(record: Record, j: int, found: Map, match: Match, precision: str
                 return True
             values = values - left @ inverse
     return False
-
-
-def _stepped(scheme: Scheme, q: Floats, v: Floats, pull: Callable[[Floats], Floats]) -> tuple[Floats, Floats]:
-    """One step on (q, v h), with h**2 F/m from `pull`."""
-    slopes: list[tuple[Floats, Floats]] = []
-    for row in (*scheme.a, scheme.b):
-        x, y = q, v
-        for share, (dx, dy) in zip(row, slopes, strict=False):
-            x, y = x + float(share) * dx, y + float(share) * dy
-        slopes.append((y, pull(x)))
-    for kind, part in scheme.stages:
-        c = float(number(part, np.longdouble))
-        x, y = (x + c * y, y) if kind == "drift" else (x, y + c * pull(x) * (kind != "friction"))
-    return x, y

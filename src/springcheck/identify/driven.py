@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -22,7 +21,7 @@ from springcheck.identify.evidence import AGREES, Evidence
 from springcheck.identify.families import MOST_TITLES
 from springcheck.identify.fit import fit
 from springcheck.identify.hypothesis import FEW, SURE, Match, distinct
-from springcheck.physics.arrays import Extended, Floats
+from springcheck.physics.arrays import Floats, Reals
 from springcheck.physics.driven import CLOCK
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Damping, Drive, WallSpring
@@ -133,14 +132,37 @@ def said(e: Evidence, forced: bool, turn: float) -> str:
 
 
 def _forces(e: Evidence, rows: Floats, turn: float, of: str) -> str:
-    """The drive of this angle per frame by each scheme that has its response; "" where none has."""
-    found: dict[str, str] = {}
+    """The drive of this angle per frame by each scheme of the motion without its steady state that has its
+    response; "" where none has."""
+    record, j, found = e.record, e.j, e.found
     b = rows[3] - 1j * rows[4]
-    for match, unit in _schemes(e, rows, b, turn):
+    turned = np.exp(1j * turn * np.arange(len(found.z)))[:, None]
+    try:
+        steady = np.linalg.solve(np.exp(1j * turn) * np.eye(2) - rows[:2].T, b)
+        centre = np.linalg.solve(np.eye(2) - rows[:2].T, rows[2])
+        left = found.z - (turned * steady).real - centre
+        q, v = record.q.copy(), record.v.copy()
+        q[:, j], v[:, j] = left[:, 0] * found.size[0], left[:, 1] * found.size[1] / record.interval
+        alone = fit(replace(record, q=q, v=v), j)
+    except (np.linalg.LinAlgError, IdentificationError):
+        # it is in resonance, or in its steady state all along
+        return ""
+    # what is left has the roundings of the whole motion, and of what was subtracted
+    size = float(np.max(np.abs(found.z)) / np.max(np.abs(left)))
+    terms = [replace(e.terms, rounding=e.terms.rounding * (1 + size))]
+    several = (compare([alone], terms, distinct(damped=damped), FEW[:4]) for damped in (False, True))
+    drives: dict[str, str] = {}
+    for joint in sorted(itertools.chain(*several), key=lambda x: x.simplicity):
+        match = joint.parts[0]
+        unit = _response(e, match, turn)
+        # other schemes have its map with other springs than the stated one
+        off = 0.0 if e.stated is None else abs(match.a * match.stride**2 - e.stated)
+        if unit is None or match.turns != 0 or not off <= AGREES * abs(e.stated or 0.0):
+            continue
         strength = complex(np.vdot(unit, b) / np.vdot(unit, unit))
         if np.max(np.abs(b - strength * unit)) <= AGREES * np.max(np.abs(b)):
-            found.setdefault(match.scheme, _wave(strength, turn / float(e.record.interval), ".9g", ".9g"))
-    ways = [f"{wave}{of} by {title(name)}" for name, wave in list(found.items())[:MOST_TITLES]]
+            drives.setdefault(match.scheme, _wave(strength, turn / float(record.interval), ".9g", ".9g"))
+    ways = [f"{wave}{of} by {title(name)}" for name, wave in list(drives.items())[:MOST_TITLES]]
     return ", or ".join(ways)
 
 
@@ -150,39 +172,6 @@ def _wave(strength: complex, w: float, first: str, digits: str) -> str:
     phase = math.atan2(strength.imag, strength.real)
     sign = "-" if phase < 0 else "+"
     return f"{abs(strength):{first}} cos({w:{digits}} t {sign} {abs(phase):{first}})"
-
-
-def _schemes(
-    e: Evidence, rows: Floats, b: NDArray[np.complex128], turn: float
-) -> Iterator[tuple[Match, NDArray[np.complex128]]]:
-    """Schemes of the motion without its steady state, each with its response b to a force cos(w t)."""
-    record, j, found = e.record, e.j, e.found
-    n = np.arange(len(found.z))
-    turned = np.exp(1j * turn * n)[:, None]
-    try:
-        steady = np.linalg.solve(np.exp(1j * turn) * np.eye(2) - rows[:2].T, b)
-        centre = np.linalg.solve(np.eye(2) - rows[:2].T, rows[2])
-    except np.linalg.LinAlgError:
-        return
-    left = found.z - (turned * steady).real - centre
-    q, v = record.q.copy(), record.v.copy()
-    q[:, j], v[:, j] = left[:, 0] * found.size[0], left[:, 1] * found.size[1] / record.interval
-    try:
-        alone = fit(replace(record, q=q, v=v), j)
-    except IdentificationError:
-        # it is in its steady state all along
-        return
-    # what is left has the roundings of the whole motion, and of what was subtracted
-    size = float(np.max(np.abs(found.z)) / np.max(np.abs(left)))
-    terms = [replace(e.terms, rounding=e.terms.rounding * (1 + size))]
-    several = (compare([alone], terms, distinct(damped=damped), FEW[:4]) for damped in (False, True))
-    for joint in sorted(itertools.chain(*several), key=lambda x: x.simplicity):
-        match = joint.parts[0]
-        unit = _response(e, match, turn)
-        # other schemes have its map with other springs than the stated one
-        off = 0.0 if e.stated is None else abs(match.a * match.stride**2 - e.stated)
-        if unit is not None and match.turns == 0 and off <= AGREES * abs(e.stated or 0.0):
-            yield match, unit
 
 
 def _response(e: Evidence, match: Match, turn: float) -> NDArray[np.complex128] | None:
@@ -205,12 +194,10 @@ def _response(e: Evidence, match: Match, turn: float) -> NDArray[np.complex128] 
         )
         scene = Scene(m=m * number, q=0 * number, p=0 * number, terms=(*terms, drive), step=h, steps=1)
         whole = Law(scheme=law, scene=scene.system.clocked, h=h)
-        q: Extended
-        p: Extended
-        q, p = np.zeros(2, np.longdouble), np.array([0, CLOCK], np.longdouble)
+        q: Reals = np.zeros(2, np.longdouble)
+        p: Reals = np.array([0, CLOCK], np.longdouble)
         for _ in range(match.stride):
-            a, c = whole.step(q, p)
-            q, p = np.asarray(a, np.longdouble), np.asarray(c, np.longdouble)
+            q, p = whole.step(q, p)
         parts.append([float(q[0]), float(p[0]) / m * float(e.record.interval)])
     # Re(b exp(i phase)) at two phases
     return (np.array(parts[0]) - 1j * np.array(parts[1])) / e.found.size.astype(np.float64)

@@ -101,10 +101,9 @@ class Measured:
         stated, record = self.stiffness if other is None else other, self.record
         _, stiffness, _ = self.numbers(joint)
         assert stated is not None
-        path = FAMILIES[joint.family].path
         out = []
         for j, part, k in zip(self.moving, joint.parts, stiffness or (), strict=False):
-            error = part.a_room + 2 * record.jitter + 4 * path * ROUNDING + room
+            error = part.a_room + 2 * record.jitter + 4 * FAMILIES[joint.family].path * ROUNDING + room
             error += 0.0 if record.fine else SINGLE_ROOM
             # a step or a mass in single precision moves the stiffness that is worked out with the stated one
             error += 0.0 if record.momenta else 3 * abs(part.log_mass)

@@ -51,18 +51,15 @@ def explain(seen: Measured) -> tuple[Explanation, ...]:
     if out := turned(seen.record, seen.moving) or _drift(evidence):
         return (out,)
     if np.max(evidence.excess) <= LINEAR_LEAVES:
-        vague = [_vague(evidence)] if seen.record.vague else []
-        return tuple(vague or wrong_map(evidence)) or (misfit(evidence),)
+        if not seen.record.vague:
+            return tuple(wrong_map(evidence)) or (misfit(evidence),)
+        return (Explanation(
+            f"{ONE_MAP}, but the times are written too coarsely to say whose: they leave the step open by "
+            f"{seen.record.jitter:.1e} of it, and the states have all their digits",
+            "write the times with all their digits as well, or state the step with all of its (--step)",
+        ),)  # fmt: skip
     found = (look(evidence) for look in SEARCHED)
     return (next(filter(None, found), None) or _law(evidence),)
-
-
-def _vague(e: Evidence) -> Explanation:
-    return Explanation(
-        f"{ONE_MAP}, but the times are written too coarsely to say whose: they leave the step open by "
-        f"{e.record.jitter:.1e} of it, and the states have all their digits",
-        "write the times with all their digits as well, or state the step with all of its (--step)",
-    )
 
 
 def _misplaced(e: Evidence) -> Explanation | None:

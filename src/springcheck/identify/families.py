@@ -94,24 +94,16 @@ def stability_function(
 
 def _of(scheme: Scheme, *, damped: bool) -> Family:
     """Family of the scheme itself, or `damped`: with friction by its own stage or in its force."""
-    stages: tuple[Stage, ...] = tuple(("kick" if kind == "pull" else kind, c) for kind, c in scheme.stages)
-    own = any(kind == "friction" for kind, _ in stages)
-    if damped and not own:
-        stages = tuple(("explicit" if kind == "kick" else kind, c) for kind, c in stages)
-    implicit = damped and scheme.has("implicit")
-    law = EXPONENTIAL if own else IMPLICIT if implicit else "" if scheme.has("flow") else EXPLICIT
+    written, flow, own = _is_written_out(scheme), scheme.has("flow"), scheme.has("friction")
+    kick = "explicit" if damped and not own else "kick"
+    law = EXPONENTIAL if own else IMPLICIT if scheme.has("implicit") else "friction" if flow else EXPLICIT
     return Family(
-        name=scheme.name + (", damped" if damped else ""),
-        scheme=scheme.name,
-        stages=stages,
-        stability=stability_function(scheme.a, scheme.b) if scheme.b else ((), ()),
-        damped=damped,
-        laws=((law,) if law else ("friction",)) if damped else (),
-        place="",
-        flow=scheme.has("flow"),
-        path=1 if scheme.has("flow") else roundings(scheme),
-        limit=scheme.limit,
-    )
+        name=scheme.name + (", damped" if damped else ""), scheme=scheme.name,
+        stages=tuple((kick if kind in ("kick", "pull") else kind, c) for kind, c in scheme.stages if written),
+        stability=stability_function(scheme.a, scheme.b) if scheme.b and written else ((), ()),
+        damped=damped, laws=(law,) if damped else (), flow=flow, path=1 if flow else roundings(scheme),
+        limit=scheme.limit, formula="" if written else scheme.name,
+    )  # fmt: skip
 
 
 _ON_A_SPRING = tuple(
@@ -125,13 +117,7 @@ def _is_written_out(scheme: Scheme) -> bool:
     return not solved and all(kind.evaluates or kind.drifts or kind.decay for kind in scheme.kinds)
 
 
-def _stepped(scheme: Scheme) -> Family:
-    return Family(
-        name=scheme.name, scheme=scheme.name, formula=scheme.name, path=roundings(scheme), limit=scheme.limit
-    )
-
-
-UNDAMPED = tuple(_of(s, damped=False) if _is_written_out(s) else _stepped(s) for s in _ON_A_SPRING)
+UNDAMPED = tuple(_of(s, damped=False) for s in _ON_A_SPRING)
 DECAY = (IMPLICIT, EXPONENTIAL)
 SCALED = (EXPONENTIAL, IMPLICIT, "a factor 1 - gamma h")
 
@@ -217,28 +203,6 @@ WRONG_RK4: tuple[tuple[str, tuple[Any, ...], tuple[Any, ...]], ...] = (
 )  # fmt: skip
 """Mistakes in Runge-Kutta methods: what is wrong, stages and weights."""
 
-_FAULTS: tuple[tuple[Any, ...], ...] = (
-    ("old force", "Velocity Verlet whose second half kick uses the old force, "
-     "so that one force is held over the whole step", "compute the force anew after the drift"),
-    ("halves swapped", "Velocity Verlet with its halves swapped: q + h/2 v + h**2 a, not q + h v + h**2/2 a",
-     "move the factor 1/2 from h v to h**2 a"),
-    ("half drift", "Velocity Verlet with a drift of half the step", "drift by the whole step",
-     HALF_KICK, HALF_DRIFT, HALF_KICK),
-    ("double drift", "Velocity Verlet with a drift of two steps", "drift by one step between half kicks",
-     HALF_KICK, DRIFT, DRIFT, HALF_KICK),
-    ("full kicks", "Velocity Verlet with two full kicks instead of two half kicks", "halve both kicks",
-     KICK, DRIFT, KICK),
-    ("no second kick", "Velocity Verlet without its second half kick", "add the half kick after the drift",
-     HALF_KICK, DRIFT),
-    ("no first kick", "Velocity Verlet without its first half kick", "add the half kick before the drift",
-     DRIFT, HALF_KICK),
-    ("implicit velocity", "An implicit velocity, but the position is moved by the old velocity",
-     "move the position by the new velocity: q + h v'"),
-    ("one iteration", "Implicit Euler by one fixed-point iteration, so that its equation is not solved",
-     "iterate until the change is rounding, or solve with the Jacobian"),
-)  # fmt: skip
-
-
 MOST_TITLES = 4
 """Schemes that a sentence names; of more it gives the number."""
 
@@ -265,7 +229,25 @@ def _fault(name: str, cause: str, remedy: str, *stages: Stage) -> Family:
 
 
 FAULTS = (
-    *(_fault(*row) for row in _FAULTS),
+    _fault("old force", "Velocity Verlet whose second half kick uses the old force, "
+           "so that one force is held over the whole step", "compute the force anew after the drift"),
+    _fault("halves swapped",
+           "Velocity Verlet with its halves swapped: q + h/2 v + h**2 a, not q + h v + h**2/2 a",
+           "move the factor 1/2 from h v to h**2 a"),
+    _fault("half drift", "Velocity Verlet with a drift of half the step", "drift by the whole step",
+           HALF_KICK, HALF_DRIFT, HALF_KICK),
+    _fault("double drift", "Velocity Verlet with a drift of two steps",
+           "drift by one step between half kicks", HALF_KICK, DRIFT, DRIFT, HALF_KICK),
+    _fault("full kicks", "Velocity Verlet with two full kicks instead of two half kicks", "halve both kicks",
+           KICK, DRIFT, KICK),
+    _fault("no second kick", "Velocity Verlet without its second half kick",
+           "add the half kick after the drift", HALF_KICK, DRIFT),
+    _fault("no first kick", "Velocity Verlet without its first half kick",
+           "add the half kick before the drift", DRIFT, HALF_KICK),
+    _fault("implicit velocity", "An implicit velocity, but the position is moved by the old velocity",
+           "move the position by the new velocity: q + h v'"),
+    _fault("one iteration", "Implicit Euler by one fixed-point iteration, so that its equation is not solved",
+           "iterate until the change is rounding, or solve with the Jacobian"),
     *(
         Family(
             name=f"fault: {cause}", scheme=cause, cause=cause, path=30, limit=0.0,
@@ -323,22 +305,18 @@ FAMILIES = {
 }
 
 
-def substeps(share: float, error: float) -> tuple[range, bool]:
-    """Numbers of substeps over which a force may be held, empty where no integer fits, and whether each
-    substep kicks before it drifts.  `error` is the standard error of the share from the fit.
+def substeps(share: float, error: float) -> tuple[range, bool, bool]:
+    """Numbers of substeps over which a force may be held, empty where no integer fits; whether each substep
+    kicks before it drifts; and whether infinitely many, a force held over the whole step, have that share.
+    `error` is the standard error of the share from the fit.
 
     The position advances by (n + 1)/2n of h**2 F/m where substeps kick first, by (n - 1)/2n where they drift
     first.
     """
     if math.isnan(share + error):
         # noise left the fit without a share
-        return range(0), False
+        return range(0), False, False
     off, room = abs(2 * share - 1), 12 * (error + G_ROUNDING)
     least = math.ceil(1 / (off + room))
     most = min(1 / (off - room), HELD_SHARES) if off > room else HELD_SHARES
-    return range(max(least, 2), math.floor(most) + 1), share > 0.5
-
-
-def endless(share: float, error: float) -> bool:
-    """Whether the share is that of infinitely many substeps, as of a force held over the whole step."""
-    return abs(2 * share - 1) <= 12 * (error + G_ROUNDING)
+    return range(max(least, 2), math.floor(most) + 1), share > 0.5, off <= room

@@ -124,12 +124,10 @@ def _ours(path: Path, runs: Sequence[store.Run], wanted: str | None) -> Iterator
         if wanted in (None, run.label):
             piece = next(store.windows(path, run.label, MOST_FRAMES))
             kept = len(piece.t)
-            notes = [f"the first {kept} of {run.frames} frames were looked at"] if kept < run.frames else []
-            chosen, remarks = _chosen(piece.q, piece.p, notes)
-            yield FileStates(
-                label=run.label, t=piece.t, q=piece.q[:, chosen], p=piece.p[:, chosen], v=None,
-                mass=scene.m[chosen], notes=remarks, adaptive=_adaptive(run),
-            )  # fmt: skip
+            notes = (f"the first {kept} of {run.frames} frames were looked at",) * (kept < run.frames)
+            states = formats.States(t=piece.t, q=piece.q, p=piece.p, v=None, mass=scene.m, notes=notes)
+            # a scene without rods has none to be seen
+            yield replace(of_arrays(run.label, states), whole=None, adaptive=_adaptive(run))
 
 
 def _adaptive(run: store.Run) -> str:
@@ -158,10 +156,9 @@ def _velocity_factor(units: Mapping[str, str], notes: list[str]) -> float:
 def _chosen(q: Floats, p: Floats, notes: list[str]) -> tuple[Integers, tuple[str, ...]]:
     """Indices of the coordinates that move, `MOST_OSCILLATORS` at most, and notes with what is left out."""
     moving = np.flatnonzero((np.ptp(q, axis=0) > 0) | (np.ptp(p, axis=0) > 0))
-    if len(moving) > MOST_OSCILLATORS:
-        notes = [*notes, f"{MOST_OSCILLATORS} of {len(moving)} moving coordinates were looked at"]
+    more = [f"{MOST_OSCILLATORS} of {len(moving)} moving coordinates were looked at"]
     chosen = moving[:MOST_OSCILLATORS] if len(moving) else np.arange(min(1, q.shape[1]))
-    return np.asarray(chosen), tuple(notes)
+    return np.asarray(chosen), (*notes, *(more if len(moving) > MOST_OSCILLATORS else []))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

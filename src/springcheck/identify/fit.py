@@ -145,13 +145,22 @@ def _sizes(z: Extended) -> Extended:
 
 @dataclass(slots=True, eq=False)
 class _Solution:
-    """A minimum of chi-squared: entries and centre, covariance of all unknowns, chi-squared, noise model."""
+    """A minimum of chi-squared: entries and centre, covariance of all unknowns, chi-squared, noise model, and
+    what else was fitted."""
 
     entries: Extended
     centre: Extended
     inverse: Floats
     chi2: float
     noise: Noise
+    centred: int
+    """Numbers of the constant part: 0 none, 1 an equilibrium at rest, 2 any."""
+    deviations: Extended | None
+    """The clock's deviations, whose effect on a step has 4 further entries; None where it was not fitted."""
+
+    @property
+    def unknowns(self) -> int:
+        return len(self.inverse)
 
     @property
     def cost(self) -> float:
@@ -167,8 +176,7 @@ def _minimum(
     centred: int,
     deviations: Extended | None,
 ) -> _Solution:
-    """Gauss-Newton for the map, its constant part (`centred`: 0 none, 1 an equilibrium at rest, 2 any), and
-    the effect of the clock's deviations on a step (4 further entries)."""
+    """Gauss-Newton for the map, its constant part, and the effect of the clock's deviations."""
     n = 4 + centred
     x = np.zeros(n if deviations is None else n + 4, np.longdouble)
     x[:n] = _first_guess(z, process, start, centred)
@@ -208,7 +216,7 @@ def _minimum(
         inverse = np.linalg.pinv(square / size[:, None] / size, rcond=1e-14, hermitian=True)
         inverse = inverse / size[:, None] / size
         gradient = flat.T @ weighted.reshape(-1)
-        best = _Solution(entries, centre, inverse, chi2, now)
+        best = _Solution(entries, centre, inverse, chi2, now, centred, deviations)
         change = inverse @ gradient
         if gradient @ change <= SETTLED * max(1.0, chi2 / r.size):
             break
@@ -253,24 +261,25 @@ def fit(record: Record, j: int, *, kept: NDArray[np.bool_] | None = None, consta
     parts = np.zeros((len(z), 2)) if record.parts is None else record.summed(j) / size.astype(np.float64)
     length = _lengths(z, np.zeros(2), parts)
     # what happens in other pairs than those that are kept is unknown
-    unknown = 1.0 if kept is None else np.where(kept, 1.0, UNKNOWN / ROUNDING)
+    kept = np.ones(len(length), np.bool_) if kept is None else kept
+    unknown = np.where(kept, 1.0, UNKNOWN / ROUNDING)
     process = ROUNDING * length * unknown
-    deviations = None
     # neighbours alone first: a map that is far off makes nothing of the orbit
     pairs = process if record.fine else np.hypot(process, np.max(sigma[1:], axis=1))
-    best, centred, deviations = _constant_part(z, 0 * sigma, pairs, None, record, constant)
-    if centred:
+    best = _constant_part(z, 0 * sigma, pairs, None, record, constant)
+    if best.centred:
         # roundings are relative to the distance from the equilibrium, and to that of the equilibrium from 0
         length = _lengths(z, best.centre, parts)
         process = ROUNDING * length * unknown
-        best = _minimum(z, 0 * sigma, process, best, centred, deviations) if record.fine else best
+        if record.fine:
+            best = _minimum(z, 0 * sigma, process, best, best.centred, best.deviations)
     if not record.fine:
-        best, centred, _ = _constant_part(z, sigma, process, best, record, constant)
+        best = _constant_part(z, sigma, process, best, record, constant)
     once: bool | None = None
-    pairs_kept = len(process) if kept is None else int(np.count_nonzero(kept))
-    freedom = 2 * pairs_kept - 4 - centred - (4 if deviations is not None else 0)
+    pairs_kept = int(np.count_nonzero(kept))
+    freedom = 2 * pairs_kept - best.unknowns
     if not record.fine:
-        other = _fed_back(z, sigma, process, best, centred, freedom)
+        other = _fed_back(z, sigma, process, best, freedom)
         odds = (other.cost - best.cost) / 2
         expected = freedom + ERRORS * math.sqrt(KURTOSIS * freedom + 1)
         once = True if odds > CERTAIN and best.chi2 <= expected else False if odds < -CERTAIN else None
@@ -283,21 +292,20 @@ def fit(record: Record, j: int, *, kept: NDArray[np.bool_] | None = None, consta
     covariance = best.inverse[:4, :4] * scale * (1.0 if record.fine else repeats(z))
     state = z - best.centre
     share = length.astype(np.longdouble)[:, None] ** -2
-    shift = np.sum(share * state[:-1], axis=0) / np.sum(share) if centred else 0 * best.centre
+    shift = np.sum(share * state[:-1], axis=0) / np.sum(share) if best.centred else 0 * best.centre
     spread = (state[:-1] - shift).astype(np.float64) / length[:, None]
     weight = np.sqrt(2 * len(spread) / np.sum(spread**2)) / length
     spread = (state[:-1] - shift).astype(np.float64) * weight[:, None]
     smallest = float(np.linalg.eigvalsh(spread.T @ spread / len(spread))[0])
     left = (state[1:] - state[:-1] @ best.entries.T).astype(np.float64) * weight[:, None]
-    left = left if kept is None else left[kept]
-    residual = np.sqrt(np.mean(left**2, axis=0))
+    residual = np.sqrt(np.mean(left[kept] ** 2, axis=0))
     rounded = float(np.max(np.mean((sigma[1:] ** 2 + sigma[:-1] ** 2) * weight[:, None] ** 2, axis=0)))
     spans = smallest > 100 * rounded and smallest > (64 * ROUNDING) ** 2
     return Map(
         weight=weight, residual=residual, spans=spans,
         entries=best.entries, covariance=covariance, size=size, centre=best.centre * size, z=state,
-        noise=best.noise, chi2=best.chi2, freedom=freedom, once=once, drifts=centred == 2,
-        deviations=deviations,
+        noise=best.noise, chi2=best.chi2, freedom=freedom, once=once, drifts=best.centred == 2,
+        deviations=best.deviations,
         conditioned=spans and smallest > 100 * float(np.max(residual)) ** 2,
     )  # fmt: skip
 
@@ -324,11 +332,11 @@ def of_pairs(sizes: Reals, least: float = LEAST_NOISE) -> Reals:
 
 def _constant_part(
     z: Extended, sigma: Floats, process: Floats, start: _Solution | None, record: Record, constant: bool
-) -> tuple[_Solution, int, Extended | None]:
-    """Solution with the smallest sufficient constant part (`centred`), and the deviations if fitted."""
+) -> _Solution:
+    """Solution with the smallest sufficient constant part, and with the deviations where they show."""
     from scipy.special import fdtri
 
-    numbers, deviations, centred = 2 * len(process), None, 0
+    numbers, wide = 2 * len(process), None
     least = _least(numbers - 6) if record.fine else 1.0
 
     def gains(old: _Solution, new: _Solution, least_gain: float) -> bool:
@@ -339,55 +347,36 @@ def _constant_part(
         return old.cost - new.cost > least_gain * max(new.chi2 / spare, least)
 
     best = _minimum(z, sigma, process, start, 0, None)
-    unknown, wide = 4, None
-    if record.fine and not constant:
-        removed = _removed_at_most(z, process, best, record.deviations)
-        if removed <= CONSTANT_SHOWS * max((best.chi2 - removed) / max(numbers - 6, 1), least):
-            return best, 0, None
     if record.deviations is not None and numbers > FEWEST_UNEVEN:
         wide = _minimum(z, sigma, process, best, 1, None)
         sliding = _minimum(z, sigma, process, wide, 1, record.deviations)
         if gains(wide, sliding, 2 * CONSTANT_SHOWS):
-            deviations, unknown, wide = record.deviations, 8, None
-            best = _minimum(z, sigma, process, best, 0, deviations)
+            wide, best = None, _minimum(z, sigma, process, best, 0, record.deviations)
+    unknown = best.unknowns
     plain = best.chi2 <= (numbers - unknown) * least
     if numbers <= unknown + 2 or (plain and not constant):
-        return best, centred, deviations
-    wide = wide or _minimum(z, sigma, process, best, 1, deviations)
+        return best
+    wide = wide or _minimum(z, sigma, process, best, 1, best.deviations)
     if constant or gains(best, wide, CONSTANT_SHOWS if record.fine else CONSTANT_LIKELY):
-        best, centred = wide, 1
+        best = wide
     if record.fine and numbers > unknown + 3 and best.chi2 > (numbers - unknown) * least:
-        widest = _minimum(z, sigma, process, best, 2, deviations)
+        widest = _minimum(z, sigma, process, best, 2, best.deviations)
         # at rest the roundings are the same in every step, and add up to a constant of their own
         shift = np.max(np.abs((np.eye(2) - widest.entries) @ (widest.centre - best.centre)))
         # where the clock's deviations are too few to be fitted, a constant may stand for them
         slipping = record.deviations is not None and numbers <= FEWEST_UNEVEN
         clean = not slipping or widest.chi2 <= CLEAN * (numbers - unknown - 3)
         if clean and gains(best, widest, CONSTANT_SHOWS) and shift > 64 * ROUNDING * np.max(np.abs(z)):
-            best, centred = widest, 2
-    return best, centred, deviations
+            best = widest
+    return best
 
 
-def _removed_at_most(z: Extended, process: Floats, best: _Solution, deviations: Extended | None) -> float:
-    """Upper bound on the decrease of chi-squared by a constant part and the deviations of the clock: both are
-    linear in the state, 1, and the products of these with the deviations."""
-    state, weight = np.column_stack([z[:-1], np.ones(len(process))]), 1 / process[:, None]
-    every = state if deviations is None else np.column_stack([state, deviations[:, None] * state])
-    size = np.max(np.abs(every), axis=0)
-    columns = (every / np.where(size > 0, size, 1)).astype(np.float64) * weight
-    left = np.asarray(z[1:] - z[:-1] @ best.entries.T, np.float64) * weight
-    return float(np.sum((np.linalg.qr(columns)[0].T @ left) ** 2))
-
-
-def _fed_back(
-    z: Extended, sigma: Floats, process: Floats, start: _Solution, centred: int, freedom: int
-) -> _Solution:
+def _fed_back(z: Extended, sigma: Floats, process: Floats, found: _Solution, freedom: int) -> _Solution:
     """Solution for states that were rounded in every step as well as when they were written.  The size of the
     rounding in a step is fitted, so that chi-squared equals its degrees of freedom."""
     level = float(np.median(np.max(sigma[1:], axis=1) / process))
-    found = start
     for _ in range(4):
-        found = _minimum(z, sigma / 2, level * process, found, centred, None)
+        found = _minimum(z, sigma / 2, level * process, found, found.centred, None)
         share = found.chi2 / freedom
         if 0.9 < share < 1.1:
             break

@@ -70,26 +70,20 @@ class _Curves:
     """One-step maps of frictionless families over the phase: a curve for each interval of h w on which the
     phase is monotonic.
 
-    Each curve has its family, first and last phase; `rows` (curves, 5, `CELLS` + 1) holds h w, the log of the
+    Each curve has its family and last phase; `rows` (curves, 5, `CELLS` + 1) holds h w, the log of the
     determinant, M11 and M12 over the root of the determinant, and the curvature within a cell.
     """
 
     family: Integers
-    low: Floats
     high: Floats
     rows: Floats
-
-    @property
-    def apart(self) -> float:
-        return LARGEST_PHASE / CELLS
 
 
 @lru_cache(maxsize=64)
 def _curves(families: tuple[str, ...]) -> _Curves:
     each = [_curve(name) for name in families]
-    of = np.repeat(np.arange(len(each)), [len(x.low) for x in each])
-    low, high, rows = (np.concatenate([getattr(x, name) for x in each]) for name in ("low", "high", "rows"))
-    return _Curves(of, low, high, rows)
+    of = np.repeat(np.arange(len(each)), [len(x.high) for x in each])
+    return _Curves(of, *(np.concatenate([getattr(x, name) for x in each]) for name in ("high", "rows")))
 
 
 @cache
@@ -109,17 +103,16 @@ def _curve(name: str) -> _Curves:
     phase, rows = phase[good].astype(np.float64), rows[:, good]
     cuts = np.flatnonzero(np.diff(np.sign(np.diff(phase))) != 0) + 1
     grid = np.linspace(0, LARGEST_PHASE, CELLS + 1)
-    ends, out = [], []
+    high, out = [], []
     for piece in np.split(np.arange(len(phase)), cuts):
         at = piece if phase[piece[-1]] >= phase[piece[0]] else piece[::-1]
         if len(at) > 1:
-            ends.append(phase[at][[0, -1]])
+            high.append(phase[at[-1]])
             curve = np.array([np.interp(grid, phase[at], row[at]) for row in rows])
             bend = np.max(np.abs(np.diff(curve[1:], 2)), axis=0)
             bend = np.concatenate([bend[:1], np.maximum(bend[1:], bend[:-1]), bend[-1:]])
             out.append(np.concatenate([curve, [np.append(bend, bend[-1])]]))
-    low, high = np.array(ends).T
-    return _Curves(np.zeros(len(out), np.int64), low, high, np.array(out))
+    return _Curves(np.zeros(len(out), np.int64), np.array(high), np.array(out))
 
 
 @dataclass(slots=True, eq=False)
@@ -132,8 +125,6 @@ class Roots:
     log_det: Floats
     step: Floats
     error: float
-    kept: dict[Any, Any]
-    """Cache of comparisons with the curves."""
 
 
 @lru_cache(maxsize=64)
@@ -169,16 +160,17 @@ def roots_of_map(found: Map, strides: tuple[int, ...]) -> Roots:
         gap = abs(values[0] - values[1]) / max(abs(values[0]), abs(values[1]), 1e-300)
         if gap < 1e-9 or not np.all(values):
             s = s[s == 1]
-        each = np.sign(values) * np.abs(values) ** (1 / s[:, None])
-        back = np.linalg.inv(vectors) if gap >= 1e-9 else np.eye(2)
-        step = (vectors * each[:, None, :]) @ back if gap >= 1e-9 else np.repeat(b[None], len(s), axis=0)
+            step = np.repeat(b[None], len(s), axis=0)
+        else:
+            each = np.sign(values) * np.abs(values) ** (1 / s[:, None])
+            step = (vectors * each[:, None, :]) @ np.linalg.inv(vectors)
         turns, phase, log_det = np.zeros_like(s), np.full(len(s), np.nan), math.log(abs(det) or 1e-300) / s
         error *= (1 + 1 / max(gap, 1e-6)) / max(gap, 1e-6)
     step = step.copy()
     # from (q/size, v T/size) to (q, v h)
     step[:, 0, 1] *= s / ratio
     step[:, 1, 0] *= ratio / s
-    return Roots(s, turns, phase, log_det, step, error, {})
+    return Roots(s, turns, phase, log_det, step, error)
 
 
 @dataclass(slots=True, eq=False)
@@ -214,7 +206,7 @@ def first(every: MapTable, roots: Roots, *, growing: bool, free_scale: bool, far
             at = turning[roots.s[turning] == 1]
             g = -roots.log_det[at] if family.damped else np.zeros(len(at))
             parts.append((np.full(len(at), i), at, roots.phase[at] ** 2 + g**2 / 4, g))
-        elif family.damped and len((curve := _curve(_base(family))).low) > 1:
+        elif family.damped and len((curve := _curve(_base(family))).high) > 1:
             # the phase turns back at its largest, which friction exceeds
             highest = curve.high[0] + SWAY * np.abs(roots.log_det)
             left = np.flatnonzero(~(roots.phase < FOLDED * curve.high[0]) & ~(roots.phase > highest))
@@ -258,20 +250,17 @@ def _on_curves(
     at = turning[roots.phase[turning] < LARGEST_PHASE]
     phase, log_det = roots.phase[at], roots.log_det[at]
     first, second = (roots.step[at, 0, k] * np.exp(-log_det / 2) for k in (0, 1))
-    cell = np.minimum((phase / curves.apart).astype(np.int64), CELLS - 1)
-    part = phase / curves.apart - cell
+    apart = LARGEST_PHASE / CELLS
+    cell = np.minimum((phase / apart).astype(np.int64), CELLS - 1)
+    part = phase / apart - cell
 
     def between(k: int, curve: Any, r: Any) -> Floats:
         left, right = (curves.rows[curve, k, cell[r] + i] for i in (0, 1))
         return np.asarray(left + (right - left) * part[r])
 
-    asked = "curves", tuple(names.tolist()), len(roots.s), len(at)
-    if asked not in roots.kept:
-        each, all_ = np.arange(len(curves.low))[:, None], np.arange(len(at))
-        bend = curves.rows[each, 4, cell]
-        losses = between(1, each, all_) - log_det
-        roots.kept[asked] = losses, np.abs(losses) - bend, np.abs(between(2, each, all_) - first) - bend
-    loss, lost, off = roots.kept[asked]
+    each, all_ = np.arange(len(curves.high))[:, None], np.arange(len(at))
+    bend, loss = curves.rows[each, 4, cell], between(1, each, all_) - log_det
+    lost, off = np.abs(loss) - bend, np.abs(between(2, each, all_) - first) - bend
     room = GLANCE + NEAR[1] * roots.error
     beyond = phase - curves.high[:, None]
     close = off <= room + DAMPING * np.abs(loss) if every.damped else (off <= room) & (lost <= 2 * room)
@@ -291,7 +280,7 @@ def _on_curves(
     g = loss[curve, r] if every.damped else np.zeros(len(r))
     h_w = between(0, curve, r)
     # a step so small that it is not tabulated
-    h_w = np.where(phase[r] < curves.apart, phase[r], h_w)
+    h_w = np.where(phase[r] < apart, phase[r], h_w)
     # every family of a curve
     order = np.argsort(base, kind="stable")
     counts = np.bincount(base, minlength=len(names))
@@ -379,7 +368,7 @@ def roots_of(
         phase = np.where(steps[:, 0, 1] < 0, 2 * np.pi - phase, phase)
         log_det = np.log(np.abs(found.determinant)).astype(np.float64)
         ones = np.ones(len(steps))
-        roots = Roots(ones, 0 * ones, phase, log_det, steps, room / NEAR[1], {})
+        roots = Roots(ones, 0 * ones, phase, log_det, steps, room / NEAR[1])
         x = first(every, roots, growing=False, free_scale=True, far=True)
         x = polished(every, roots, x, free_scale=free_scale)
     return x.which, x.root, x.a, x.g

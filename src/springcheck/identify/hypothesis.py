@@ -8,7 +8,7 @@ from functools import cache
 
 import numpy as np
 
-from springcheck.identify.families import DAMPED, FAMILIES, UNDAMPED, Family, endless, substeps
+from springcheck.identify.families import DAMPED, FAMILIES, UNDAMPED, Family, substeps
 from springcheck.identify.maps import unit
 from springcheck.identify.storage import ROUNDING
 from springcheck.physics.arrays import Reals
@@ -130,14 +130,14 @@ class Joint:
     def substeps(self) -> tuple[range, bool]:
         """Numbers of substeps over which a force may be held, and whether they kick first."""
         found = [substeps(part.g, part.g_error) for part in self.parts]
-        if len({first for _, first in found}) > 1:
-            return range(0), True
-        return range(max(n.start for n, _ in found), min(n.stop for n, _ in found)), found[0][1]
+        alike = len({first for _, first, _ in found}) == 1
+        both = range(max(n.start for n, *_ in found), min(n.stop for n, *_ in found))
+        return both if alike else range(0), found[0][1]
 
     @property
     def endless(self) -> bool:
         """Whether the force may be held over infinitely many substeps."""
-        return all(endless(part.g, part.g_error) for part in self.parts)
+        return all(substeps(part.g, part.g_error)[2] for part in self.parts)
 
     def __str__(self) -> str:
         return self.scheme + ("" if self.stride == 1 else f", {self.stride} steps a frame")

@@ -351,18 +351,14 @@ def _kicked(
                 f"{'before' if side > 0 else 'after'}, as after a restart from a leapfrog's velocities",
                 "move a leapfrog's velocities by half a kick where they are read, or restart with one scheme",
             )
-    sizes, factor = (
-        kick * float(found.size[1] / e.record.interval),
-        float(kick @ v) / max(float(v @ v), 1e-300),
-    )
+    sizes = kick * float(found.size[1] / e.record.interval)
+    factor = float(kick @ v) / max(float(v @ v), 1e-300)
     if len(kick) == 1 or np.all(np.abs(kick - np.mean(kick)) <= room):
         return f"{but} for one kick of {sizes[0]:+.3g} of the velocity at frame {at}", look
     if np.all(np.abs(kick - factor * v) <= room):
         return f"{but} its velocity is multiplied by {1 + factor:.6g} at frame {at}", look
-    return (
-        f"{but} for kicks of {np.min(sizes):+.3g} to {np.max(sizes):+.3g} of the velocity at frame {at}",
-        look,
-    )
+    least, most = np.min(sizes), np.max(sizes)
+    return f"{but} for kicks of {least:+.3g} to {most:+.3g} of the velocity at frame {at}", look
 
 
 def _amount(off: Floats, state: Extended) -> str:

@@ -258,7 +258,7 @@ def matches(found: Recurrence, families: tuple[Family, ...], strides: range) -> 
     det, trace = np.exp(each), 2 * np.exp(each / 2) * np.cos(phases)
     ones = np.ones_like(s)
     step = np.stack([trace - 1, ones, trace - 1 - det, ones], axis=1).reshape(-1, 2, 2)
-    roots = Roots(s, turns, phases, each, step, 0.0, {})
+    roots = Roots(s, turns, phases, each, step, 0.0)
     with np.errstate(all="ignore"):
         x = first(every, roots, growing=False, free_scale=True, far=True)
         if not every.damped:

@@ -49,14 +49,12 @@ def at_rest(record: Record, found: Identification) -> Identification:
     """Note the stiffness of the bond of two particles in space whose centre of mass rests: that of each
     coordinate is k m/mu, mu the reduced mass."""
     n, moving = record.q.shape[1], np.array(record.moving)
-    one, other = moving[: len(moving) // 2], moving[len(moving) // 2 :]
-    # the coordinates of two points, and not two of one
-    if n % 3 or found.scheme is None or found.stiffness is None or len(one) != len(other) or not len(one):
-        return found
-    if np.any(one % 3 != other % 3) or np.any(one // 3 != one[0] // 3) or np.any(other // 3 == one[0] // 3):
-        return found
     each = of_a_bond(record, record.moving, np.ones(n))
-    if each is None:
+    if n % 3 or found.scheme is None or found.stiffness is None or each is None:
+        return found
+    # the coordinates of two points, and not two of one
+    points, axes = divmod(moving.reshape(2, -1), 3)
+    if np.any(axes[0] != axes[1]) or np.any(points[0] != points[0, 0]) or np.any(points[1] == points[0, 0]):
         return found
     stiffness = float(np.median(np.array(found.stiffness) / each[moving]))
     bond = f"{BOUND}, at rest as a whole: their bond has the stiffness {stiffness:.9g}"
@@ -68,12 +66,11 @@ WANDERS = 1e-3
 walk of roundings of 1e-7 over 1e8 steps."""
 
 BOUND = "two particles bound to each other"
-OF_A_PAIR = f"{BOUND}, which swing along their line: their distance is judged"
 
 
 def of_a_pair(record: Record, found: Identification) -> Identification:
     """Note that the distance of two particles was judged, and their bond's stiffness if masses are known."""
-    note = OF_A_PAIR
+    note = f"{BOUND}, which swing along their line: their distance is judged"
     if record.mass is not None and found.scheme and found.omega:
         reduced = 1 / (1 / record.mass[record.moving[0]] + 1 / record.mass[record.moving[-1]])
         note += f"; their bond has the stiffness {reduced * found.omega[0] ** 2:.9g}"
