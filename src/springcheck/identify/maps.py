@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cache, lru_cache, partial
+from functools import cache, partial
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -24,8 +24,6 @@ KINDS: dict[str, tuple[float, float, float]] = {
     "remembered": (2, -1, 0),
 }
 """Coefficients (e, i, x) of a kick over the share c: v' = exp(-x c g) ((1 - e c g) v - c a q)/(1 + i c g)."""
-
-Selected: TypeAlias = Integers | int
 
 WIDTHS = np.dtype(np.float64), np.dtype(np.longdouble)
 
@@ -90,33 +88,27 @@ class MapTable:
         """One-step matrices (c, 2, 2) for a and g (c,), in their width of float."""
         out = np.zeros((2, 2, len(a)), a.dtype)
         out[0, 0] = out[1, 1] = 1
-        present = np.zeros(len(self.families), dtype=bool)
-        present[which] = True
-        one, kinds, slots = _used(self, present.tobytes())
-        n: Selected = which if one is None else one
-        for kind, members in kinds:
-            if members is None:
-                out[:] = self._special(kind, n, a, g)
-            else:
-                at = np.flatnonzero(members[which])
+        for kind, members in self.kinds:
+            at = np.flatnonzero(members[which])
+            if len(at):
                 out[:, :, at] = self._special(kind, which[at], a[at], g[at])
         q, v = out
         damped = bool(np.any(g))
-        for k, (with_e, with_i, with_x, with_b, with_d) in slots:
-            e, i, x, b, d = self.slots[a.dtype][k]
-            if damped and with_e:
-                v *= 1 - e[n] * g
-            if with_b:
-                v -= b[n] * a * q
-            if damped and with_i:
-                v /= 1 + i[n] * g
-            if damped and with_x:
-                v *= np.exp(-x[n] * g)
-            if with_d:
-                q += d[n] * v
+        present = np.unique(which)
+        for slot in self.slots[a.dtype]:
+            if not slot[:, present].any():
+                continue
+            e, i, x, b, d = slot[:, which]
+            if damped:
+                v *= 1 - e * g
+            v -= b * a * q
+            if damped:
+                v /= 1 + i * g
+                v *= np.exp(-x * g)
+            q += d * v
         return out.transpose(2, 0, 1)
 
-    def _special(self, kind: str, n: Selected, a: Reals, g: Reals) -> Reals:
+    def _special(self, kind: str, n: Integers, a: Reals, g: Reals) -> Reals:
         if kind == "held":
             return _matrices(1 - g * a, np.ones_like(a), -a, np.ones_like(a))
         if kind == "flow":
@@ -124,8 +116,7 @@ class MapTable:
         if kind == "formula":
             out = np.empty((2, 2, len(a)), a.dtype)
             for i in np.unique(n):
-                at = n == i if np.ndim(n) else slice(None)
-                out[:, :, at] = _formula(self.families[i].formula)(a[at], g[at])
+                out[:, :, n == i] = _formula(self.families[i].formula)(a[n == i], g[n == i])
             return out
         over, under, inside = (x[a.dtype][..., n] for x in (self.over, self.under, self.inside))
         return _rational(over, under, a, g * inside)
@@ -162,20 +153,6 @@ class MapTable:
             out = power(out, s)
         up = np.exp(-log_mass) / s.astype(a.dtype) * ratio.astype(a.dtype)
         return np.stack([out[:, 0, 0], out[:, 0, 1] * up, out[:, 1, 0] / up, out[:, 1, 1]])
-
-
-@lru_cache(maxsize=1000)
-def _used(
-    every: MapTable, present: bytes
-) -> tuple[int | None, list[tuple[str, NDArray[np.bool_] | None]], list[tuple[int, list[bool]]]]:
-    """What the families of this mask need: the index of the family if it is alone; kinds of map other than
-    stages with their members, None for all; slots, and which of their coefficients are not 0."""
-    those = np.frombuffer(present, dtype=bool)
-    at = np.flatnonzero(those)
-    kinds = [(kind, None if np.all(of[at]) else of) for kind, of in every.kinds if np.any(of[at])]
-    used = np.any(every.slots[WIDTHS[1]][:, :, at] != 0, axis=2)
-    slots = [(int(k), used[k].tolist()) for k in np.flatnonzero(np.any(used, axis=1))]
-    return int(at[0]) if len(at) == 1 else None, kinds, slots
 
 
 @cache
