@@ -11,7 +11,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from springcheck.identify.families import EULER, FAMILIES, POSITION, PREDICTED, VERLET, Family, Stage
+from springcheck.identify.families import EULER, FAMILIES, POSITION, PREDICTED, VERLET, Family
 from springcheck.physics.arrays import Extended, Floats, Integers, Reals
 from springcheck.schemes import SCHEMES, Scheme, matrix, number, rotation
 
@@ -38,30 +38,20 @@ def _in_both_widths(x: Extended) -> Columns:
 def _slots(families: tuple[Family, ...]) -> Extended:
     """Coefficients (slots, 5, F) of kicks, each with the drift after it: e, i, x of `KINDS` times the share,
     and the shares b of the force and d of the drift."""
-    rows = [_pairs(family.stages) for family in families]
-    most = max((len(row) for row in rows), default=0)
-    out = np.zeros((most, 5, len(families)), np.longdouble)
-    for k, row in enumerate(rows):
-        out[: len(row), :, k] = row if row else 0
-    return out
-
-
-def _pairs(stages: tuple[Stage, ...]) -> list[Extended]:
-    """Stages as pairs of a kick and a drift, numbers as in `_slots`."""
-    out: list[Extended] = []
-    open_ = False
-    for kind, share in stages:
-        c = np.longdouble(number(share, np.longdouble))
-        if kind == "drift":
-            if not open_:
-                out.append(np.zeros(5, np.longdouble))
-            out[-1][4], open_ = c, False
-            continue
-        e, i, x = KINDS[kind]
-        force = 0 if kind == "friction" else 1
-        out.append(np.array([e * c, i * c, x * c, force * c, 0], np.longdouble))
-        open_ = True
-    return out
+    out = np.zeros((max(len(family.stages) for family in families), 5, len(families)), np.longdouble)
+    for family, slots in zip(families, out.transpose(2, 0, 1), strict=True):
+        k, open_ = -1, False
+        for kind, share in family.stages:
+            c = np.longdouble(number(share, np.longdouble))
+            # a drift closes the slot of the kick before it, and has its own after another drift
+            k += not (open_ and kind == "drift")
+            open_ = kind != "drift"
+            if open_:
+                e, i, x = KINDS[kind]
+                slots[k, :4] = e * c, i * c, x * c, (kind != "friction") * c
+            else:
+                slots[k, 4] = c
+    return out[np.any(out, axis=(1, 2))]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -116,7 +106,9 @@ class MapTable:
         if kind == "formula":
             out = np.empty((2, 2, len(a)), a.dtype)
             for i in np.unique(n):
-                out[:, :, n == i] = _formula(self.families[i].formula)(a[n == i], g[n == i])
+                name = self.families[i].formula
+                of = FORMULAS.get(name) or partial(_stepped, SCHEMES[name])
+                out[:, :, n == i] = of(a[n == i], g[n == i])
             return out
         over, under, inside = (x[a.dtype][..., n] for x in (self.over, self.under, self.inside))
         return _rational(over, under, a, g * inside)
@@ -314,11 +306,7 @@ FORMULAS: dict[str, Callable[[Reals, Reals], Reals]] = {
 """Maps (2, 2, c) of faults that are no sequence of stages."""
 
 
-def _formula(name: str) -> Callable[[Reals, Reals], Reals]:
-    """The map of a fault, or of a scheme that is stepped, as a function of a and g."""
-    return FORMULAS.get(name) or partial(_stepped, SCHEMES[name])
-
-
 def _stepped(scheme: Scheme, a: Reals, g: Reals) -> Reals:
+    """The map of a scheme that is no sequence of stages."""
     found = matrix(scheme, h=1.0, m=np.ones(1), k=np.asarray(a, np.longdouble))
     return np.moveaxis(found, 0, -1).astype(a.dtype)
