@@ -18,7 +18,7 @@ from springcheck.identify.fit import FLOOR, Map, fit, of_pairs
 from springcheck.identify.hypothesis import SURE
 from springcheck.identify.maps import powers
 from springcheck.identify.noise import least_squares
-from springcheck.identify.record import AT_REST, Record, of_size, stated_stride
+from springcheck.identify.record import AT_REST, Record, stated
 from springcheck.identify.search import terms_of
 from springcheck.identify.storage import ROUNDING
 from springcheck.identify.together import distance
@@ -29,24 +29,21 @@ def judged(
     record: Record, stiffness: ArrayLike | None, friction: float | None, step: float | None
 ) -> Measured:
     """Select the oscillators that can be judged, and check stated numbers.  Raises IdentificationError."""
-    stated = of_size("stiffness", stiffness, record.q.shape[1], zero=True)
-    of_size("friction", friction, zero=True)
-    remarks: list[str] = []
-    stride = stated_stride(record, step, remarks)
+    stiff, stride, remarks = stated(record, stiffness, friction, step)
     if step is not None and stride is not None and stride > 0 and record.vague:
         record = replace(record, interval=stride * np.longdouble(step))
     of, moving, maps, notes = _oscillators(record)
     if of is not record:
-        stated = None
+        stiff = None
     notes += remarks
-    if of.momenta and stated is None:
+    if of.momenta and stiff is None:
         notes.append(
             "neither mass nor velocities nor stiffness are known, so only three numbers of each map count: "
             "velocity and position Verlet, implicit midpoint and the exact flow look alike; give the mass"
         )
     return Measured(
-        record=of, moving=moving, maps=maps, terms=[terms_of(of, j, stated) for j in moving],
-        stiffness=stated, friction=friction, stride=stride, notes=tuple(notes),
+        record=of, moving=moving, maps=maps, terms=[terms_of(of, j, stiff) for j in moving],
+        stiffness=stiff, friction=friction, stride=stride, notes=tuple(notes),
     )  # fmt: skip
 
 
@@ -142,7 +139,7 @@ def _uncoupled(record: Record, maps: dict[int, Map]) -> Record | None:
     """The record of the normal modes, if the coordinates are coupled and the modes are not."""
     chosen = list(maps)
     whole = coupled(record, maps, 1e-3 if record.fine else 1 / FALLS)
-    basis = None if whole is None else _modes(whole.force)
+    basis = None if whole is None else _modes(whole.map)
     # of two particles that are bound to each other alone the distance is judged
     if whole is None or basis is None or (len(chosen) > len(basis) and distance(record) is not None):
         return None
@@ -163,13 +160,6 @@ class JointMap:
     states: Extended
     map: Extended
     weight: Extended
-
-    @property
-    def force(self) -> Extended:
-        """Its block (m, m): proportional to the springs' matrix for every scheme, to leading order in the
-        step."""
-        n = len(self.map) // 2
-        return self.map[n:, :n]
 
 
 def coupled(record: Record, maps: dict[int, Map], share: float = 1 / FALLS) -> JointMap | None:
@@ -234,8 +224,10 @@ UNLIKE = 1e6
 """Largest condition number of the modes' basis."""
 
 
-def _modes(block: Extended) -> Extended | None:
-    """Basis (m, m) of the eigenvectors of a force's block (m, m); None where they are not real."""
+def _modes(whole: Extended) -> Extended | None:
+    """Basis (m, m) of the eigenvectors of the forces' block of a map (2m, 2m), which for every scheme is
+    proportional to the springs' matrix, to leading order in the step; None where they are not real."""
+    block = whole[len(whole) // 2 :, : len(whole) // 2]
     values, vectors = np.linalg.eig(block.astype(np.float64))
     if np.max(np.abs(np.imag(vectors))) > 1e-6 or np.linalg.cond(np.real(vectors)) > UNLIKE:
         return None
@@ -253,20 +245,13 @@ def _modes(block: Extended) -> Extended | None:
 
 def _along(record: Record, chosen: list[int], inverse: Extended) -> Record:
     """The record of the modes of the chosen coordinates, by the inverse (m, n) of their basis."""
-    spreading = np.abs(inverse).astype(np.float64)
+    q, v, spreading = record.q[:, chosen], record.v[:, chosen], np.abs(inverse.T).astype(np.float64)
     return replace(
-        record,
-        q=record.q[:, chosen] @ inverse.T,
-        v=record.v[:, chosen] @ inverse.T,
-        q_quantum=record.q_quantum[:, chosen] @ spreading.T,
-        v_quantum=record.v_quantum[:, chosen] @ spreading.T,
-        parts=(
-            np.abs(record.q[:, chosen]).astype(np.float64) @ spreading.T,
-            np.abs(record.v[:, chosen]).astype(np.float64) @ spreading.T,
-        ),
-        mass=None,
-        momenta=False,
-    )
+        record, q=q @ inverse.T, v=v @ inverse.T, mass=None, momenta=False,
+        q_quantum=record.q_quantum[:, chosen] @ spreading,
+        v_quantum=record.v_quantum[:, chosen] @ spreading,
+        parts=(np.abs(q).astype(np.float64) @ spreading, np.abs(v).astype(np.float64) @ spreading),
+    )  # fmt: skip
 
 
 ROUNDS_OF_ORBIT = 3

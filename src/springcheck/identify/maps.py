@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cache, lru_cache, partial
+from functools import cache, partial
 from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from springcheck.identify.families import EULER, FAMILIES, POSITION, PREDICTED, VERLET, Family, Stage
+from springcheck.identify.families import EULER, FAMILIES, POSITION, PREDICTED, VERLET, Family
 from springcheck.physics.arrays import Extended, Floats, Integers, Reals
 from springcheck.schemes import SCHEMES, Scheme, matrix, number, rotation
 
@@ -24,8 +24,6 @@ KINDS: dict[str, tuple[float, float, float]] = {
     "remembered": (2, -1, 0),
 }
 """Coefficients (e, i, x) of a kick over the share c: v' = exp(-x c g) ((1 - e c g) v - c a q)/(1 + i c g)."""
-
-Selected: TypeAlias = Integers | int
 
 WIDTHS = np.dtype(np.float64), np.dtype(np.longdouble)
 
@@ -40,30 +38,20 @@ def _in_both_widths(x: Extended) -> Columns:
 def _slots(families: tuple[Family, ...]) -> Extended:
     """Coefficients (slots, 5, F) of kicks, each with the drift after it: e, i, x of `KINDS` times the share,
     and the shares b of the force and d of the drift."""
-    rows = [_pairs(family.stages) for family in families]
-    most = max((len(row) for row in rows), default=0)
-    out = np.zeros((most, 5, len(families)), np.longdouble)
-    for k, row in enumerate(rows):
-        out[: len(row), :, k] = row if row else 0
-    return out
-
-
-def _pairs(stages: tuple[Stage, ...]) -> list[Extended]:
-    """Stages as pairs of a kick and a drift, numbers as in `_slots`."""
-    out: list[Extended] = []
-    open_ = False
-    for kind, share in stages:
-        c = np.longdouble(number(share, np.longdouble))
-        if kind == "drift":
-            if not open_:
-                out.append(np.zeros(5, np.longdouble))
-            out[-1][4], open_ = c, False
-            continue
-        e, i, x = KINDS[kind]
-        force = 0 if kind == "friction" else 1
-        out.append(np.array([e * c, i * c, x * c, force * c, 0], np.longdouble))
-        open_ = True
-    return out
+    out = np.zeros((max(len(family.stages) for family in families), 5, len(families)), np.longdouble)
+    for family, slots in zip(families, out.transpose(2, 0, 1), strict=True):
+        k, open_ = -1, False
+        for kind, share in family.stages:
+            c = np.longdouble(number(share, np.longdouble))
+            # a drift closes the slot of the kick before it, and has its own after another drift
+            k += not (open_ and kind == "drift")
+            open_ = kind != "drift"
+            if open_:
+                e, i, x = KINDS[kind]
+                slots[k, :4] = e * c, i * c, x * c, (kind != "friction") * c
+            else:
+                slots[k, 4] = c
+    return out[np.any(out, axis=(1, 2))]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -90,33 +78,27 @@ class MapTable:
         """One-step matrices (c, 2, 2) for a and g (c,), in their width of float."""
         out = np.zeros((2, 2, len(a)), a.dtype)
         out[0, 0] = out[1, 1] = 1
-        present = np.zeros(len(self.families), dtype=bool)
-        present[which] = True
-        one, kinds, slots = _used(self, present.tobytes())
-        n: Selected = which if one is None else one
-        for kind, members in kinds:
-            if members is None:
-                out[:] = self._special(kind, n, a, g)
-            else:
-                at = np.flatnonzero(members[which])
+        for kind, members in self.kinds:
+            at = np.flatnonzero(members[which])
+            if len(at):
                 out[:, :, at] = self._special(kind, which[at], a[at], g[at])
         q, v = out
         damped = bool(np.any(g))
-        for k, (with_e, with_i, with_x, with_b, with_d) in slots:
-            e, i, x, b, d = self.slots[a.dtype][k]
-            if damped and with_e:
-                v *= 1 - e[n] * g
-            if with_b:
-                v -= b[n] * a * q
-            if damped and with_i:
-                v /= 1 + i[n] * g
-            if damped and with_x:
-                v *= np.exp(-x[n] * g)
-            if with_d:
-                q += d[n] * v
+        present = np.unique(which)
+        for slot in self.slots[a.dtype]:
+            if not slot[:, present].any():
+                continue
+            e, i, x, b, d = slot[:, which]
+            if damped:
+                v *= 1 - e * g
+            v -= b * a * q
+            if damped:
+                v /= 1 + i * g
+                v *= np.exp(-x * g)
+            q += d * v
         return out.transpose(2, 0, 1)
 
-    def _special(self, kind: str, n: Selected, a: Reals, g: Reals) -> Reals:
+    def _special(self, kind: str, n: Integers, a: Reals, g: Reals) -> Reals:
         if kind == "held":
             return _matrices(1 - g * a, np.ones_like(a), -a, np.ones_like(a))
         if kind == "flow":
@@ -124,8 +106,9 @@ class MapTable:
         if kind == "formula":
             out = np.empty((2, 2, len(a)), a.dtype)
             for i in np.unique(n):
-                at = n == i if np.ndim(n) else slice(None)
-                out[:, :, at] = _formula(self.families[i].formula)(a[at], g[at])
+                name = self.families[i].formula
+                of = FORMULAS.get(name) or partial(_stepped, SCHEMES[name])
+                out[:, :, n == i] = of(a[n == i], g[n == i])
             return out
         over, under, inside = (x[a.dtype][..., n] for x in (self.over, self.under, self.inside))
         return _rational(over, under, a, g * inside)
@@ -162,20 +145,6 @@ class MapTable:
             out = power(out, s)
         up = np.exp(-log_mass) / s.astype(a.dtype) * ratio.astype(a.dtype)
         return np.stack([out[:, 0, 0], out[:, 0, 1] * up, out[:, 1, 0] / up, out[:, 1, 1]])
-
-
-@lru_cache(maxsize=1000)
-def _used(
-    every: MapTable, present: bytes
-) -> tuple[int | None, list[tuple[str, NDArray[np.bool_] | None]], list[tuple[int, list[bool]]]]:
-    """What the families of this mask need: the index of the family if it is alone; kinds of map other than
-    stages with their members, None for all; slots, and which of their coefficients are not 0."""
-    those = np.frombuffer(present, dtype=bool)
-    at = np.flatnonzero(those)
-    kinds = [(kind, None if np.all(of[at]) else of) for kind, of in every.kinds if np.any(of[at])]
-    used = np.any(every.slots[WIDTHS[1]][:, :, at] != 0, axis=2)
-    slots = [(int(k), used[k].tolist()) for k in np.flatnonzero(np.any(used, axis=1))]
-    return int(at[0]) if len(at) == 1 else None, kinds, slots
 
 
 @cache
@@ -337,11 +306,7 @@ FORMULAS: dict[str, Callable[[Reals, Reals], Reals]] = {
 """Maps (2, 2, c) of faults that are no sequence of stages."""
 
 
-def _formula(name: str) -> Callable[[Reals, Reals], Reals]:
-    """The map of a fault, or of a scheme that is stepped, as a function of a and g."""
-    return FORMULAS.get(name) or partial(_stepped, SCHEMES[name])
-
-
 def _stepped(scheme: Scheme, a: Reals, g: Reals) -> Reals:
+    """The map of a scheme that is no sequence of stages."""
     found = matrix(scheme, h=1.0, m=np.ones(1), k=np.asarray(a, np.longdouble))
     return np.moveaxis(found, 0, -1).astype(a.dtype)

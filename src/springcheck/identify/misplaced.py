@@ -35,37 +35,23 @@ Repair = tuple[Record, str, str]
 
 def misplaced(e: Evidence) -> Explanation | None:
     """The cause, if one map fits once numbers are moved to another column or row."""
-    before = _left(e.record, e.j)
-    if not before:
-        return None
     # an exchange of some frames takes the largest parts of noise away, and leaves noise in all of them
     least = max(FIXED, LEFT_BY_ROUNDING * float(np.median(e.weight * e.unit)))
     for look in (_wrapped, _exchanged):
         for record, cause, remedy in look(e.record, e.j):
-            after = _left(record, e.j)
-            if after * FALLS < before and (look is _wrapped or after <= least or _in_few(record, e.j, after)):
-                return Explanation(cause, remedy, after / before, local=True)
+            after, usual = _left(record, e.j)
+            if after * FALLS < e.size and (look is _wrapped or after <= least or usual * FALLS < after):
+                return Explanation(cause, remedy, after / e.size, local=True)
     return None
 
 
-def _in_few(record: Record, j: int, left: float) -> bool:
-    """Whether what a coordinate's map leaves over, `left` in root mean square, stands in few frames."""
+def _left(record: Record, j: int) -> tuple[float, float]:
+    """Residual of a coordinate's map, relative to the states: root mean square, and median of all pairs."""
+    if j not in record.moving:
+        return 0.0, 0.0
     found = fit(record, j)
-    off = np.max(np.abs(found.residuals()), axis=1) * found.weight
-    return float(np.median(off)) * FALLS < left
-
-
-def _left(record: Record, j: int) -> float:
-    """Root mean square residual of a coordinate's map, relative to the states."""
-    z = np.stack([record.q[:, j], record.v[:, j] * record.interval], axis=1).astype(np.float64)
-    z = z - np.mean(z, axis=0)
-    if not np.all(np.std(z, axis=0) > 0):
-        return 0.0
-    try:
-        found = fit(record, j)
-    except np.linalg.LinAlgError:
-        return 0.0
-    return float(np.max(found.residual))
+    usual = np.median(np.max(np.abs(found.residuals()), axis=1) * found.weight)
+    return float(np.max(found.residual)), float(usual)
 
 
 def _ways(record: Record, columns: list[int]) -> tuple[Floats, Floats]:
@@ -112,7 +98,9 @@ def unsorted(record: Record) -> Explanation | None:
     put = replace(record, v=record.v.copy())
     put.v[:, each] = record.v[:, of]
     sure = others.size and len(set(of)) == len(of) and others.size == np.count_nonzero(of != each)
-    if not sure or any(_left(put, j) > max(_left(record, j) / FALLS, FIXED) for j in each[others].tolist()):
+    if not sure or any(
+        _left(put, j)[0] > max(_left(record, j)[0] / FALLS, FIXED) for j in each[others].tolist()
+    ):
         return None
     where = ", ".join(f"of coordinate {each[i]} in column {of[i]}" for i in others)
     cause = f"The velocities stand in other columns than the positions, in every frame: those {where}"

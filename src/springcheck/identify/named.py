@@ -20,7 +20,7 @@ from springcheck.identify.candidates import (
 from springcheck.identify.evidence import Measured
 from springcheck.identify.families import FAMILIES, MOST_TITLES, title, titles
 from springcheck.identify.fit import Map
-from springcheck.identify.hypothesis import Joint, Match
+from springcheck.identify.hypothesis import Match
 from springcheck.identify.laws import friction_shows
 from springcheck.identify.misplaced import turned
 from springcheck.identify.notes import (
@@ -65,7 +65,9 @@ def named(seen: Measured, explained: Explained, step: float | None) -> Identific
         joints, stated_fits = of_rate or joints, stated_fits and bool(of_rate)
         seen = seen if of_rate else replace(seen, friction=None)
     found = _known(seen, {x: explained[x] for x in joints}, stated_fits)
-    plainly = friction is not None or seen.record.deep or all(_shows_law(seen, x) for x in joints)
+    # quadratic drag and nonlinear forces have to be excluded as the cause of a friction
+    parts = ((seen.evidence(i), part) for x in joints if x.damped for i, part in enumerate(x.parts))
+    plainly = friction is not None or seen.record.deep or all(friction_shows(*x) for x in parts)
     if seen.stiffness is None:
         of_maps = zip(seen.maps, seen.terms, strict=True)
         plainly = plainly and any(visible(*x, damped=joints[0].damped) for x in of_maps)
@@ -81,12 +83,6 @@ def named(seen: Measured, explained: Explained, step: float | None) -> Identific
     # a scheme on another spring, or a wrong one on the stated spring: the latter is the simpler
     other = [x.cause for x in found.explanations if ": " in x.cause]
     return found.refuted("; or ".join([faults[0].cause, *other]), *faults, *found.explanations)
-
-
-def _shows_law(seen: Measured, joint: Joint) -> bool:
-    """Whether quadratic drag and nonlinear forces are excluded as the cause of its friction."""
-    each = enumerate(joint.parts)
-    return not joint.damped or all(friction_shows(seen.evidence(i), part) for i, part in each)
 
 
 def _known(seen: Measured, explained: Explained, stated_fits: bool) -> Identification:

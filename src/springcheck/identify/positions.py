@@ -18,7 +18,7 @@ from springcheck.identify.candidates import (
 from springcheck.identify.evidence import SINGLE_ROOM, Measured
 from springcheck.identify.families import FAMILIES, HELD, Family, title
 from springcheck.identify.hypothesis import FEW, SURE, Joint, Match, distinct
-from springcheck.identify.record import AT_REST, Record, of_size, stated_stride
+from springcheck.identify.record import AT_REST, Record, stated
 from springcheck.identify.recurrence import FEWEST_FRAMES, Recurrence, classes, matches, recurrence
 from springcheck.identify.result import UNTOLD, Explanation, Identification, nothing, rounded_by
 from springcheck.text.wording import either
@@ -36,12 +36,9 @@ def identify_positions(
     record: Record, stiffness: ArrayLike | None, friction: float | None, step: float | None
 ) -> Identification:
     """The schemes that may have made these positions.  Raises IdentificationError where they show none."""
-    stated = of_size("stiffness", stiffness, record.q.shape[1], zero=True)
-    of_size("friction", friction, zero=True)
-    notes: list[str] = []
-    if stated is not None and record.mass is None:
-        notes.append("the stiffness says nothing of positions without the mass; give the mass as well")
-    stride = stated_stride(record, step, notes)
+    stiff, stride, notes = stated(record, stiffness, friction, step)
+    if stiff is not None and record.mass is None:
+        notes.insert(0, "the stiffness says nothing of positions without the mass; give the mass as well")
     notes.append(ALONE)
     if not (moving := record.moving):
         raise IdentificationError(AT_REST)
@@ -52,7 +49,8 @@ def identify_positions(
     strides = range(stride, stride + 1) if stride is not None and stride > 0 else FEW
     every = {j: recurrence(record, j, strides.stop - 1) for j in moving}
     # of what no single line explains, the size of the force says nothing
-    free = [j for j in moving if every[j].precision and not _forced(every[j])]
+    lines = [j for j, x in every.items() if x.precision]
+    free = [j for j in lines if not abs(every[j].alpha) > SURE * math.sqrt(every[j].covariance[0, 0])]
     moving = [j for j in moving if j not in free]
     if not moving:
         raise IdentificationError(
@@ -66,15 +64,14 @@ def identify_positions(
             "the motion does not turn: without velocities one that dies or grows alone shows no scheme"
         )
     seen = Measured(
-        record=record, moving=moving, maps=[], terms=[], stiffness=stated, friction=friction or None,
+        record=record, moving=moving, maps=[], terms=[], stiffness=stiff, friction=friction or None,
         stride=stride, notes=tuple(notes),
     )  # fmt: skip
     if any(not x.precision for x in found):
         return _none(seen, found, [])
-    known = stated is not None and record.mass is not None
-    wanted = [0.0 for _ in moving]
-    if stated is not None and record.mass is not None:
-        wanted = [float(stated[j] / record.mass[j] * record.interval**2) for j in moving]
+    known, wanted = stiff is not None and record.mass is not None, [0.0 for _ in moving]
+    if stiff is not None and record.mass is not None:
+        wanted = [float(stiff[j] / record.mass[j] * record.interval**2) for j in moving]
     plain = tuple(x[0] for x in classes())
     every_stride = known or not _all_preserve(found)
     joints = (_joined if every_stride else _first)(found, plain, strides, wanted)
@@ -89,10 +86,6 @@ def identify_positions(
         seen, damped = _stated(seen, damped) if known else (seen, damped)
         kept = [x for x in damped if candidates_of(seen, x)] if friction else kept + damped
     return _known(seen, found, kept, known, friction) if kept else _none(seen, found, joints)
-
-
-def _forced(x: Recurrence) -> bool:
-    return abs(float(x.alpha)) > SURE * math.sqrt(x.covariance[0, 0])
 
 
 def _all_preserve(found: list[Recurrence]) -> bool:

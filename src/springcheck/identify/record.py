@@ -170,13 +170,13 @@ def read(
         sizes = {
             "times": abs(float(interval)),
             "positions": float(np.max(np.abs(positions), initial=0.0)),
-            "velocities": float(np.max(np.abs(given[-1]), initial=0.0) * abs(float(interval))),
+            "velocities times the interval": float(np.max(np.abs(given[-1]), initial=0.0))
+            * abs(float(interval)),
         }
     for name, size in sizes.items():
         if size and not SIZES[0] < size < SIZES[1]:
-            way = " times the interval" if name == "velocities" else ""
             raise IdentificationError(
-                f"{name}{way} are of the size {size:.1g}: give them in units in which that is from "
+                f"{name} are of the size {size:.1g}: give them in units in which that is from "
                 f"{SIZES[0]:g} to {SIZES[1]:g}"
             )
     masses = of_size("mass", mass, positions.shape[1])
@@ -221,10 +221,15 @@ def read(
     )
 
 
-def stated_stride(record: Record, step: float | None, notes: list[str]) -> int | None:
-    """Steps between frames by the stated step; -1, and a note, where it does not divide the interval."""
+def stated(
+    record: Record, stiffness: ArrayLike | None, friction: float | None, step: float | None
+) -> tuple[Floats | None, int | None, list[str]]:
+    """Stated stiffness (n,), and steps between frames by the stated step: -1, and a note, where it does not
+    divide the interval.  Raises IdentificationError."""
+    stiff = of_size("stiffness", stiffness, record.q.shape[1], zero=True)
+    of_size("friction", friction, zero=True)
     if step is None:
-        return None
+        return stiff, None, []
     of_size("step", step)
     ratio = float(record.interval / np.longdouble(step))
     stride = round(ratio)
@@ -233,8 +238,9 @@ def stated_stride(record: Record, step: float | None, notes: list[str]) -> int |
             f"--step {step:g}: {ratio:.3g} of them to a frame are more than the times can tell from one more"
         )
     if stride < 1 or abs(ratio - stride) > 4 * stride * (record.jitter + ROUNDING):
-        notes.append(
-            f"the stated step {step:.9g} does not divide the states' interval {float(record.interval):.9g}"
+        return (
+            stiff,
+            -1,
+            [f"the stated step {step:.9g} does not divide the states' interval {float(record.interval):.9g}"],
         )
-        return -1
-    return stride
+    return stiff, stride, []

@@ -222,13 +222,10 @@ def identification(label: str, found: Identification) -> Lines:
         ("same map on a spring", ", ".join(found.aliases)),
         ("friction law", found.candidates[0].law if len(found.candidates) == 1 else ""),
         ("step", f"{found.step:.9g}{recorded}"),
-        ("angular frequency", _numbers(found.omega) if not several else _range([x.omega for x in several])),
-        (
-            "stiffness",
-            _numbers(found.stiffness) if not several else _range([x.stiffness or () for x in several]),
-        ),
+        ("angular frequency", _numbers(found.omega, [x.omega for x in several])),
+        ("stiffness", _numbers(found.stiffness, [x.stiffness or () for x in several])),
         ("velocities", _offset(found.velocity_offset)),
-        ("determinant of a step", _numbers(found.determinant)),
+        ("determinant of a step", _numbers(found.determinant, ())),
         ("symplectic defect", f"{found.symplectic_defect:.1e}"),
         ("defect of a step", f"{found.defect_ulp:.3g} ulp: {found.precision}"),
     ]
@@ -262,18 +259,15 @@ def identification(label: str, found: Identification) -> Lines:
     return out
 
 
-def _numbers(values: tuple[float, ...] | None) -> str:
+def _numbers(values: tuple[float, ...] | None, several: Sequence[tuple[float, ...]]) -> str:
+    """The values of all oscillators, or the range of those (s, n) of several schemes for one oscillator."""
+    if several:
+        each = [f"{x:.9g}" for x in sorted(row[0] for row in several if len(row) == 1)]
+        return " to ".join(dict.fromkeys([*each[:1], *each[-1:]]))
     if not values:
         return ""
     text = ", ".join(f"{x:.12g}" for x in values[:3])
     return text + (f" ... ({len(values)} oscillators)" if len(values) > 3 else "")
-
-
-def _range(rows: Sequence[tuple[float, ...]]) -> str:
-    """Range of the values (s, n) of several schemes for one oscillator, as text."""
-    values = [f"{x:.9g}" for x in sorted(row[0] for row in rows if len(row) == 1)]
-    ends = list(dict.fromkeys([values[0], values[-1]] if values else []))
-    return " to ".join(ends)
 
 
 def _offset(steps: float) -> str:

@@ -96,7 +96,8 @@ def storage(x: Floats) -> Storage:
     listed = sample.tolist()
     with np.errstate(over="ignore", under="ignore", invalid="ignore"):
         single = bool(np.all(np.abs(values) < 3e38)) and single_of(values)
-        short = next((name for name in ("bfloat16", "half") if single and _exact(values, name)), None)
+        exact = (x for x in ("bfloat16", "half") if single and np.all(_rounded(values, x) == values))
+        short = next(exact, None)
 
     def same(text: str, y: float) -> bool:
         return bool(np.float32(text) == np.float32(y)) if single else float(text) == y
@@ -127,7 +128,3 @@ def storage(x: Floats) -> Storage:
         below = sample * (1 - 2.0**-40)
         return max(found, key=lambda s: float(np.mean(np.log10(s.quantum(below)))))
     return binary
-
-
-def _exact(x: Floats, name: str) -> bool:
-    return bool(np.all(_rounded(x, name) == x))

@@ -84,18 +84,14 @@ def explained(
         return found
     with np.errstate(all="ignore"):
         seen = one_factor(float(np.mean(np.diff(times))), positions, u)
-    return _of_a_factor(found, u, *seen) if seen else found
-
-
-def _of_a_factor(
-    found: Identification, v: Floats, place: str, misfit: float, factor: Floats
-) -> Identification:
-    """Identification by one factor a step for all momenta."""
+    if seen is None:
+        return found
+    place, misfit, factor = seen
     low, high = np.quantile(factor, [0.1, 0.9])
     kept = tuple(x for x in found.candidates if random_scheme(x.scheme).rescales)
     which = " or ".join(x.scheme for x in kept) or "a Nose-Hoover chain, or a thermostat that rescales"
     cause = (
-        f"One factor a step multiplies the momenta of all {v.shape[1]} coordinates, {place}: {low:.3g} to "
+        f"One factor a step multiplies the momenta of all {u.shape[1]} coordinates, {place}: {low:.3g} to "
         f"{high:.3g} in most steps, to {misfit:.0e} of how unlike they move: {which}"
     )
     remedy = "judge it by its scheme, which the factor alone does not tell; its bath is in no frame"
@@ -130,11 +126,11 @@ def of_bath(
         if all(one and (None not in found or one.misfit < FREE_OF_NOISE) for one in apart):
             # in a mode of sqrt(m) q the mass is 1
             known = [replace(one, known=one.known and joined[1]) for one in apart if one is not None]
-            return _said(known, h, np.ones(len(m)), stated, with_mass=True, joined=True)
+            return _said(known, h, np.ones(len(m)), stated, joined=True)
     if None in found:
         return None
     known = [one for one in found if one is not None]
-    return _said(known, h, None if mass is None and v is None else m, stated, with_mass=mass is not None)
+    return _said(known, h, None if mass is None else m, stated)
 
 
 def _given(t: Any, q: Any, p: Any, v: Any, mass: Any) -> tuple[Floats, Floats, Floats, Floats] | None:
@@ -179,22 +175,17 @@ def _against(one: Any, first: Thermal, h: float, m: float, stated: Mapping[str, 
 
 
 def _said(
-    found: list[Thermal],
-    h: float,
-    m: Any,
-    stated: Mapping[str, Any],
-    *,
-    with_mass: bool,
-    joined: bool = False,
+    found: list[Thermal], h: float, m: Floats | None, stated: Mapping[str, Any], *, joined: bool = False
 ) -> Identification:
-    """Identification by what each oscillator shows, of masses m (n,), in frames h [T] apart."""
+    """Identification by what each oscillator shows, of masses m (n,) if known, in frames h [T] apart."""
     first = found[0]
     each = [{y.scheme: _of_digits(y, one.misfit, h) for y in one.candidates} for one in found]
     rows = {name: [x[name] for x in each] for name in each[0] if all(name in x for x in each)}
     best = next(iter(rows), None)
     named = best is not None and all(one.named and one.candidates[0].scheme == best for one in found)
     kept = [name for name in rows if all(y.nats < math.inf for y in rows[name])]
-    scales = m if with_mass and not joined else np.zeros(len(found))
+    masses = None if joined else m
+    scales = np.zeros(len(found)) if masses is None else masses
     stiff = np.broadcast_to(np.asarray(stated.get("stiffness"), dtype=object), len(found))
     differ = {
         name: [
@@ -209,31 +200,28 @@ def _said(
     if agreeing and agreeing != kept:
         kept, best = agreeing, agreeing[0]
         named = len(kept) == 1 and all(one.known and rows[best][0].strides == (1,) for one in found)
-    first_stride = {name: rows[name][0].strides[0] for name in kept}
+    unknown = (math.nan,) * len(found)
+
+    def shown(name: str, stride: int, number: str) -> tuple[float, ...]:
+        """A number of each oscillator, by the likeliest number of steps to a frame alone."""
+        of = rows[name] if stride == rows[name][0].strides[0] else []
+        return tuple(_rounded(getattr(y, number), getattr(y, f"{number}_error")) for y in of) or unknown
+
     candidates = tuple(
         Candidate(
             scheme=name, aliases=(), stride=stride, step=h / stride, turns=0,
-            omega=tuple(
-                _rounded(y.omega, y.omega_error) if stride == first_stride[name] else math.nan
-                for y in rows[name]
-            ),
-            stiffness=tuple(
+            omega=shown(name, stride, "omega"), friction=shown(name, stride, "friction"), law="of the bath",
+            stiffness=None if masses is None or stride != rows[name][0].strides[0] else tuple(
                 _rounded(float(k) * y.omega**2, 2 * float(k) * y.omega * y.omega_error)
-                for k, y in zip(m, rows[name], strict=True)
-            ) if with_mass and not joined and stride == first_stride[name] else None,
-            friction=tuple(
-                _rounded(y.friction, y.friction_error) if stride == first_stride[name] else math.nan
-                for y in rows[name]
+                for k, y in zip(masses, rows[name], strict=True)
             ),
-            law="of the bath",
         )
         for name in kept
         for stride in rows[name][0].strides[: None if len(kept) > 1 else 1]
     )  # fmt: skip
     statement = _statement(found, {name: rows[name][0].strides for name in kept}, best, named=named)
-    numbers = [_numbers(name, rows[name][0], m[0] if with_mass else None) for name in kept[:3]]
+    numbers = [_numbers(name, rows[name][0], None if m is None else m[0]) for name in kept[:3]]
     notes = _remarks(found, numbers, stated, named=named, joined=joined)
-    unknown = (math.nan,) * len(found)
     rates = [one.candidates[0] for one in found if best and one.candidates]
     if rates and all(y.friction <= ERRORS * y.friction_error for y in rates):
         statement += "; no friction shows: random kicks without one would do as well in so few frames"
