@@ -16,6 +16,7 @@ import finer_atlas
 import long_cells
 import solver_cells
 from springcheck import engines, store
+from springcheck.cli import main
 from springcheck.engines.contract import Stopped
 from springcheck.figures import render
 from springcheck.physics.arrays import WIDE
@@ -141,6 +142,31 @@ def test_a_nan_in_an_ordinary_cell_is_silently_wrong(monkeypatch: pytest.MonkeyP
     cells = broken(change, monkeypatch)
     ordinary = [cell for cell in cells if 1e-30 < cell.parameters["force"] < 1e30]
     assert {cell.outcome for cell in ordinary if cell.parameters["h_w"] < 3} == {"silently wrong"}
+
+
+def test_an_engine_that_does_not_move_is_not_excused_by_forces_that_it_keeps(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    step = "def frozen(q, p, h, force, mass):\n    return q, p + h * force(q)\n"
+    (tmp_path / "frozen.py").write_text(step)
+    for name, few in {"FORCE_DECADES": (0, 3), "SIZE_DECADES": (0,), "STEP_DECADES": (0,)}.items():
+        monkeypatch.setattr(grid, name, few)
+    monkeypatch.chdir(tmp_path)
+    asked = ["extremes", "--stepper", "frozen.py:frozen", "--method", "stepper:frozen"]
+    assert main([*asked, "--scheme", "frozen=semi-implicit-euler"]) == 1
+    cells = STUDY.stored(Path("extremes.h5")).cells
+    plane = [cell for cell in cells if cell.block == "force"]
+    assert len(plane) == 24
+    assert {cell.outcome for cell in plane} == {"silently wrong"}
+    assert not any("by more than 0" in cell.reason for cell in cells)
+
+
+def test_a_stage_that_overflows_inside_a_step_is_a_reason() -> None:
+    # beyond its limit Yoshida's second stage goes 1.5 times as far as both ends of a step
+    spec = grid.force_cell(1.99, 300)
+    (cell,) = running.cells(engines.parse("own:yoshida4"), [spec])
+    assert cell.outcome == "unstable, as theory says"
+    assert "a step forms numbers beyond 1.8e+308" in cell.reason
 
 
 def test_an_engine_that_gives_up_over_some_cells_takes_no_others_with_it(

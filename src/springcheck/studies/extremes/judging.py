@@ -17,7 +17,7 @@ import numpy as np
 from springcheck import checks, engines, schemes
 from springcheck.checks.case import keeps, least_moved, overflows
 from springcheck.engines.contract import Label, Stopped
-from springcheck.physics.arrays import Arithmetic, Extended, Floats
+from springcheck.physics.arrays import Arithmetic, Extended, Floats, Reals
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory, of_scene
 from springcheck.studies.extremes.grid import Spec
@@ -84,18 +84,20 @@ class Sizes:
     """Displacement by the engine, whose forces may be cached."""
 
 
-def sizes(
-    label: Label, scene: Scene, start: tuple[Floats, Floats], end: tuple[Extended, Extended], moved: Floats
-) -> Sizes:
-    """Intermediate results of a step from states q, p (f-1, n) to their exact successors.
+def sizes(label: Label, case: checks.Case, q: Floats, p: Floats) -> Sizes:
+    """Intermediate results of the scheme's steps from all states q, p (f, n) but the last.
 
     In whatever order an engine works, it forms positions, momenta, velocities, forces, accelerations and
     their increments.  An engine that squares lengths of bonds also forms 1/m and 1/h.
     """
+    scene, places = case.judged, list[Reals]()
     m = scene.m.astype(np.longdouble)
     h = np.abs(np.longdouble(scene.step))
     k = np.abs(scene.system.hessian_diagonal(scene.q))
-    x, y = (np.maximum(np.abs(one), np.abs(other)) for one, other in zip(start, end, strict=True))
+    # a stage may reach farther than both ends of its step
+    case.step(q[:-1].astype(np.longdouble), p[:-1].astype(np.longdouble), met=places)
+    end_q, end_p = case.next_states
+    x, y = np.max(np.abs([q[:-1], end_q, *places]), axis=0), np.maximum(np.abs(p[:-1]), np.abs(end_p))
     force = k * x
     parts = [x, y, y / m, force, force / m, h * force, h * force / m, h * y / m]
     parts += [np.broadcast_to(part, x.shape) for part in (k, k / m, h * h * k / m)]
@@ -104,7 +106,7 @@ def sizes(
         # the length of a bond is the root of a square, and the force is divided by it
         parts += [x * x, y / m * (y / m) * h * h]
     whole = np.stack([np.asarray(part, np.longdouble) for part in parts])
-    nonzero = np.where(whole > 0, whole, np.inf)
+    nonzero, moved = np.where(whole > 0, whole, np.inf), np.abs(np.diff(q, axis=0))
     return Sizes(largest=np.max(whole, axis=0), smallest=np.min(nonzero, axis=0), force=force, moved=moved)
 
 
@@ -124,7 +126,7 @@ def judge(
         ratio = _largest(dq, dp, of_q, of_p)
         strict = _largest(dq, dp, *case.allowance_at(q[:-1], p[:-1], smallest=np.longdouble(0)))
         from_finite = np.isfinite(q[:-1]) & np.isfinite(p[:-1])
-        inside = sizes(label, case.judged, (q[:-1], p[:-1]), case.next_states, np.abs(np.diff(q, axis=0)))
+        inside = sizes(label, case, q, p)
         growth = growth_of(case, scene)
     bound = float(case.roundings)
     low, high = RANGES["single" if how.force >= 2.0**-24 else "double"]
@@ -177,7 +179,7 @@ def _reason(
         f"fixed-point forces: a quantum of {how.quantum:.1e} leaves too few digits": np.full(
             len(bad), how.quantum > FORCE_RESOLUTION * peak
         ),
-        keeps(how): least_moved(inside.moved[:, i])[bad] <= 2 * how.stale,
+        keeps(how): (how.stale > 0) & (least_moved(inside.moved[:, i])[bad] <= 2 * how.stale),
         f"a joint of length {far:.3g} is passed": how.joints & (inside.force[bad, i] >= abs(spec.k) * far),
         f"a step forms numbers beyond {high:.1e}": ~(inside.largest[bad, i] <= high),
         f"a step forms numbers below {low:.1e}": inside.smallest[bad, i] < low,
