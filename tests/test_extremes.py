@@ -15,9 +15,11 @@ import extreme
 import finer_atlas
 import long_cells
 import solver_cells
+import springcheck
 from springcheck import engines, store
 from springcheck.cli import main
 from springcheck.engines.contract import Stopped
+from springcheck.errors import MethodError
 from springcheck.figures import render
 from springcheck.physics.arrays import WIDE
 from springcheck.studies.extremes import STUDY, grid, judging, page, running
@@ -159,6 +161,14 @@ def test_an_engine_that_does_not_move_is_not_excused_by_forces_that_it_keeps(
     assert len(plane) == 24
     assert {cell.outcome for cell in plane} == {"silently wrong"}
     assert not any("by more than 0" in cell.reason for cell in cells)
+
+
+def test_a_function_whose_scheme_is_unknown_is_told_how_to_state_it() -> None:
+    def frozen(q: Any, p: Any, h: Any, force: Any, mass: Any) -> Any:
+        return q, p + h * force(q)
+
+    with pytest.raises(MethodError, match="its scheme is not known; scheme= NAME states it"):
+        springcheck.extremes(frozen, quick=True)
 
 
 def test_a_stage_that_overflows_inside_a_step_is_a_reason() -> None:

@@ -19,6 +19,7 @@ from springcheck import engines
 from springcheck.engines.contract import Label
 from springcheck.errors import SpringcheckError
 from springcheck.physics.arrays import WIDE
+from springcheck.schemes import scheme
 from springcheck.studies import keeper
 from springcheck.studies.arguments import Progress
 from springcheck.studies.choose import sorted_out
@@ -81,6 +82,8 @@ def absence(label: Label) -> str | None:
         return "it moves no particles on springs"
     if method.adaptive:
         return "it chooses its own steps, and cells are judged step by step"
+    if not scheme(method.scheme).has("named"):
+        return "its scheme is not known; --scheme NAME states it, and its steps are then judged"
     return engines.absence(label.engine) or propagators.absence(label)
 
 
