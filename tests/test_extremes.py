@@ -215,6 +215,16 @@ def test_the_document_has_the_promised_fields() -> None:
     assert found["windows"][0]["sentence"].startswith("springcheck (own:implicit-euler): right for forces")
 
 
+def test_a_window_of_forces_says_at_which_steps_it_is_all_that_was_tried() -> None:
+    # at h w = 2.5 the smallest force is at the engine's limit
+    specs = [grid.force_cell(turn, decade) for turn in (0.1, 1.0, 2.5) for decade in (-300, 0, 300)]
+    cells = running.cells(engines.parse("own:implicit-euler"), specs)
+    assert [cell.outcome for cell in cells if cell.outcome != "right"] == ["engine's limit"]
+    (window,) = extremes.windows(cells)
+    assert "forces between 1e-300 and 1e300 at h w from 0.01 to 1.9, in" in window.sentence
+    assert window.sentence.endswith("all that was tried there")
+
+
 def test_an_enormous_step_of_a_free_particle_stays_finite_in_implicit_euler() -> None:
     spec = grid.Spec(block="step", m=3.7, k=0.0, q=0.8, p=0.0, h=3e300)
     (cell,) = running.cells(engines.parse("own:implicit-euler"), [spec])

@@ -140,10 +140,10 @@ def windows(cells: Sequence[Cell]) -> list[Window]:
         if span is None:
             continue
         name = engines.engine(method.partition(":")[0]).title
-        between = f"1e{span[0]} and 1e{span[-1]}"
+        between = f"1e{span[0]} and 1e{span[-1]} at h w from {CALM_TURNS[0]:g} to {CALM_TURNS[1]:g}"
         sentence = f"{name} ({method}): right for forces between {between}, in the scene's unit of force"
         if len(span) == len(calm):
-            sentence += ", all that was tried"
+            sentence += ", all that was tried there"
         found.append(Window(method=method, sentence=sentence, low=10.0 ** span[0], high=10.0 ** span[-1]))
     return found
 
