@@ -352,6 +352,9 @@ def test_a_method_that_cannot_serve_the_scene_is_a_row() -> None:
     (point,) = found.points
     assert point.outcome == "cannot run"
     assert "circuit" in point.message
+    said = str(found)
+    assert "Left out ase:velocity-verlet: ASE moves particles, not circuits" in said
+    assert said.count("ase:velocity-verlet") == 1
 
 
 def test_a_method_whose_first_point_does_not_fit_into_the_budget_is_cut_off_before_it() -> None:
@@ -606,3 +609,4 @@ def test_a_scene_whose_coarsest_run_would_never_end_is_told(tmp_path: Path) -> N
     found = precision.record(scene, labels, tmp_path / "study.h5", budget=0.5)
     assert [point.outcome for point in found.points] == ["cannot run"] * 2
     assert all("its coarsest run takes" in point.message for point in found.points)
+    assert "Left out own:euler, own:implicit-euler: its coarsest run takes" in " ".join(str(found).split())

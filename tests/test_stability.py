@@ -21,7 +21,8 @@ from springcheck.physics import builders
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.arrays import Extended
 from springcheck.physics.driven import ModulatedSpring
-from springcheck.physics.terms import Damping, Quartic, Weight
+from springcheck.physics.scene import Scene
+from springcheck.physics.terms import Damping, Quartic, Spring, Weight
 from springcheck.schemes import lookup
 from springcheck.studies.choose import LeftOut
 from springcheck.studies.run import measure as session
@@ -291,6 +292,20 @@ def test_a_method_that_cannot_serve_the_scene_has_no_largest_step_there(need: Ne
     need("own:respa8")
     study = stability.record(scenes.load_scene("spring"), None, ["own:respa8", "own:velocity-verlet"])
     assert [study.largest(x) for x in study.limits] == pytest.approx([np.nan, 2.0], nan_ok=True)
+
+
+def test_a_method_that_does_not_start_the_scene_is_left_out_with_its_reason(need: Need) -> None:
+    need("openmm:verlet")
+    tied = Spring(a=[0, 1], b=[2, 3], k=[7.1, 1.7], rest=[0.0, 0.0])
+    scene = Scene(
+        m=[3.7, 3.7, 1.3, 1.3], q=[0.3, -0.2, 0.5, 0.9], p=[0.7, 1.1, -0.4, 0.2], places=[0, 1, 3, 4],
+        terms=(tied,), step=0.1, steps=60,
+    )  # fmt: skip
+    study = stability.record(scene, None, ["own:velocity-verlet", "openmm:verlet"])
+    assert [x.method for x in study.limits] == ["own:velocity-verlet"]
+    (left,) = study.left_out
+    assert left.method == "openmm:verlet"
+    assert "a program's spring pulls alike along every axis" in left.reason
 
 
 def test_what_is_left_out_is_named_once() -> None:

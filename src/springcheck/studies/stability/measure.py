@@ -64,7 +64,9 @@ def _measure(scene: Scene, labels: Sequence[Label], kept: Keeper) -> Stability:
             return "it has no fixed step and no limit"
         if Need.FIELD in method.requires:
             return "limits are measured on springs alone, without the magnetic field that it needs"
-        return propagators.absence(label) if "wall-spring" in method.terms else "it moves no springs"
+        if "wall-spring" not in method.terms:
+            return "it moves no springs"
+        return propagators.absence(label) or propagators.unstarted(scene, label)
 
     usable, left_out = sorted_out(labels, why, "has a limit to measure")
     braked = [label for label in usable if "damping" in engines.method(label).terms]
