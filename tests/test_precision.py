@@ -454,6 +454,11 @@ def test_several_short_runs_in_one_timing_count_as_one() -> None:
 def test_a_scene_in_a_bath_is_told_that_the_bath_is_in_the_way() -> None:
     with pytest.raises(SceneError, match=r"none of its errors is.*and no bath"):
         precision.record(scenes.load_scene("bath-spring"), [engines.parse("own:euler")])
+    # and friction on a quartic potential, which without it is known, as are pendulums and Morse bonds
+    scene = scenes.load_scene("anharmonic")
+    braked = scene.derived(terms=(*scene.terms, Damping(i=np.array([0]), c=np.array([0.2]))))
+    with pytest.raises(SceneError, match=r"or an anharmonic potential on each .* without friction"):
+        precision.record(braked, [engines.parse("own:euler")])
 
 
 def test_a_scene_at_rest_has_no_error_to_measure() -> None:
