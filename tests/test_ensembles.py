@@ -257,6 +257,16 @@ def test_a_grid_of_many_cells_is_shown_by_the_medians_of_neighbours() -> None:
     assert np.all((line.low <= line.x * 1.01) & (line.high >= 1.48 * line.x))
 
 
+def test_one_method_that_explodes_does_not_set_the_axis_of_the_others() -> None:
+    calm = np.array([-0.7, 0.4, 0.9])
+    scene, wild = scenefile.load_scene("spring"), np.array([0.4, -80.0, 1e9])
+    assert page._axis("q0", scene, [calm, 0.9 * calm, wild]).shown == pytest.approx((-1.8, 1.8))
+    assert page._axis("q0", scene, [calm, 0.9 * calm]).shown is None
+    # in whatever unit, and numbers of one sign are shown whole
+    assert page._axis("q0", scene, [1e6 * calm]).shown is None
+    assert page._axis("steps", scene, [np.array([3000.0, 5000.0])]).shown is None
+
+
 def test_shades_of_a_map_follow_the_signs_of_its_numbers_and_not_what_explodes() -> None:
     kinds, bounds = page._kinds("q0", [np.array([-3.0, 0.5, np.nan]), np.array([1e6])])
     assert [shade for _, shade in kinds] == list(page.SIGNED_SHADES)

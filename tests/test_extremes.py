@@ -15,8 +15,11 @@ import extreme
 import finer_atlas
 import long_cells
 import solver_cells
+import springcheck
 from springcheck import engines, store
+from springcheck.cli import main
 from springcheck.engines.contract import Stopped
+from springcheck.errors import MethodError
 from springcheck.figures import render
 from springcheck.physics.arrays import WIDE
 from springcheck.studies.extremes import STUDY, grid, judging, page, running
@@ -143,6 +146,39 @@ def test_a_nan_in_an_ordinary_cell_is_silently_wrong(monkeypatch: pytest.MonkeyP
     assert {cell.outcome for cell in ordinary if cell.parameters["h_w"] < 3} == {"silently wrong"}
 
 
+def test_an_engine_that_does_not_move_is_not_excused_by_forces_that_it_keeps(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    step = "def frozen(q, p, h, force, mass):\n    return q, p + h * force(q)\n"
+    (tmp_path / "frozen.py").write_text(step)
+    for name, few in {"FORCE_DECADES": (0, 3), "SIZE_DECADES": (0,), "STEP_DECADES": (0,)}.items():
+        monkeypatch.setattr(grid, name, few)
+    monkeypatch.chdir(tmp_path)
+    asked = ["extremes", "--stepper", "frozen.py:frozen", "--method", "stepper:frozen"]
+    assert main([*asked, "--scheme", "frozen=semi-implicit-euler"]) == 1
+    cells = STUDY.stored(Path("extremes.h5")).cells
+    plane = [cell for cell in cells if cell.block == "force"]
+    assert len(plane) == 24
+    assert {cell.outcome for cell in plane} == {"silently wrong"}
+    assert not any("by more than 0" in cell.reason for cell in cells)
+
+
+def test_a_function_whose_scheme_is_unknown_is_told_how_to_state_it() -> None:
+    def frozen(q: Any, p: Any, h: Any, force: Any, mass: Any) -> Any:
+        return q, p + h * force(q)
+
+    with pytest.raises(MethodError, match="its scheme is not known; scheme= NAME states it"):
+        springcheck.extremes(frozen, quick=True)
+
+
+def test_a_stage_that_overflows_inside_a_step_is_a_reason() -> None:
+    # beyond its limit Yoshida's second stage goes 1.5 times as far as both ends of a step
+    spec = grid.force_cell(1.99, 300)
+    (cell,) = running.cells(engines.parse("own:yoshida4"), [spec])
+    assert cell.outcome == "unstable, as theory says"
+    assert "a step forms numbers beyond 1.8e+308" in cell.reason
+
+
 def test_an_engine_that_gives_up_over_some_cells_takes_no_others_with_it(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -177,6 +213,16 @@ def test_the_document_has_the_promised_fields() -> None:
     fields = {"method", "parameters", "outcome", "reason", "value", "bound"}
     assert all(fields <= set(cell) for cell in found["cells"])
     assert found["windows"][0]["sentence"].startswith("springcheck (own:implicit-euler): right for forces")
+
+
+def test_a_window_of_forces_says_at_which_steps_it_is_all_that_was_tried() -> None:
+    # at h w = 2.5 the smallest force is at the engine's limit
+    specs = [grid.force_cell(turn, decade) for turn in (0.1, 1.0, 2.5) for decade in (-300, 0, 300)]
+    cells = running.cells(engines.parse("own:implicit-euler"), specs)
+    assert [cell.outcome for cell in cells if cell.outcome != "right"] == ["engine's limit"]
+    (window,) = extremes.windows(cells)
+    assert "forces between 1e-300 and 1e300 at h w from 0.01 to 1.9, in" in window.sentence
+    assert window.sentence.endswith("all that was tried there")
 
 
 def test_an_enormous_step_of_a_free_particle_stays_finite_in_implicit_euler() -> None:

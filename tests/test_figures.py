@@ -488,6 +488,13 @@ def test_in_a_bath_every_scheme_has_a_panel_with_the_ring_of_kt_and_its_temperat
     assert measured["own:baoab"] == pytest.approx(
         np.mean(made["own:baoab"].p ** 2) / scene.m[0] / scene.thermal, rel=0.3
     )
+    for axes in render.picture(found["temperature"]).axes:
+        bars = [y.get_xdata() for y in axes.lines if y.get_linestyle() == "-" and len(y.get_xdata()) == 2]
+        low, high = axes.get_xlim()
+        ends = [x for bar in bars for x in bar if x not in (0, 1)]
+        assert len(ends) == 2 * len(made)
+        assert low <= min(ends) <= max(ends) <= high
+        assert "two standard errors" in axes.get_title(loc="left")
 
 
 def test_the_title_of_errors_says_who_is_nearest_and_who_is_farthest() -> None:

@@ -117,6 +117,18 @@ def test_the_page_draws_what_plot_draws(spring: Path, content: page.Content) -> 
         np.testing.assert_allclose(ranges, [one.x.shown, one.y.shown], rtol=1e-6)
 
 
+def test_what_is_said_of_a_mode_stands_under_the_chart_of_that_mode(tmp_path: Path) -> None:
+    scene = scenes.load_scene("chain").derived(steps=60)
+    measure.run(scene, tmp_path / "chain.h5", methods=["own:velocity-verlet"])
+    motion = page.gather(tmp_path / "chain.h5").data["banks"]["motion"]
+    titles = [chart["title"] for chart in motion["charts"] if "Energy of mode" in chart["title"]]
+    said = [title for title in titles if "off by at most" in title]
+    assert len(titles) > 1
+    assert len(said) == 1
+    (mode,) = re.findall(r"the energy of (mode \d+) is off", said[0])
+    assert f"Energy of {mode} of" in said[0]
+
+
 def test_it_asks_for_nothing_and_is_small(content: page.Content) -> None:
     text = page.html(content)
     assert len(text.encode()) < 500_000

@@ -33,7 +33,7 @@ def content(stored: Path) -> page.Content:
 
 def marks(bank: Any) -> dict[str, float]:
     return {
-        f"{chart['short']}: {curve['name']}": curve["x"][0]
+        f"{chart['short'].partition(',')[0]}: {curve['name']}": curve["x"][0]
         for chart in bank["charts"] if "temperature" in chart["short"]
         for curve in chart["curves"] if curve["name"] in METHODS
     }  # fmt: skip

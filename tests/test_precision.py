@@ -352,6 +352,9 @@ def test_a_method_that_cannot_serve_the_scene_is_a_row() -> None:
     (point,) = found.points
     assert point.outcome == "cannot run"
     assert "circuit" in point.message
+    said = str(found)
+    assert "Left out ase:velocity-verlet: ASE moves particles, not circuits" in said
+    assert said.count("ase:velocity-verlet") == 1
 
 
 def test_a_method_whose_first_point_does_not_fit_into_the_budget_is_cut_off_before_it() -> None:
@@ -451,6 +454,11 @@ def test_several_short_runs_in_one_timing_count_as_one() -> None:
 def test_a_scene_in_a_bath_is_told_that_the_bath_is_in_the_way() -> None:
     with pytest.raises(SceneError, match=r"none of its errors is.*and no bath"):
         precision.record(scenes.load_scene("bath-spring"), [engines.parse("own:euler")])
+    # and friction on a quartic potential, which without it is known, as are pendulums and Morse bonds
+    scene = scenes.load_scene("anharmonic")
+    braked = scene.derived(terms=(*scene.terms, Damping(i=np.array([0]), c=np.array([0.2]))))
+    with pytest.raises(SceneError, match=r"or an anharmonic potential on each .* without friction"):
+        precision.record(braked, [engines.parse("own:euler")])
 
 
 def test_a_scene_at_rest_has_no_error_to_measure() -> None:
@@ -606,3 +614,4 @@ def test_a_scene_whose_coarsest_run_would_never_end_is_told(tmp_path: Path) -> N
     found = precision.record(scene, labels, tmp_path / "study.h5", budget=0.5)
     assert [point.outcome for point in found.points] == ["cannot run"] * 2
     assert all("its coarsest run takes" in point.message for point in found.points)
+    assert "Left out own:euler, own:implicit-euler: its coarsest run takes" in " ".join(str(found).split())

@@ -21,7 +21,8 @@ from springcheck.physics import builders
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.arrays import Extended
 from springcheck.physics.driven import ModulatedSpring
-from springcheck.physics.terms import Damping, Quartic, Weight
+from springcheck.physics.scene import Scene
+from springcheck.physics.terms import Damping, Quartic, Spring, Weight
 from springcheck.schemes import lookup
 from springcheck.studies.choose import LeftOut
 from springcheck.studies.run import measure as session
@@ -262,7 +263,16 @@ def test_the_frequency_of_a_scene_in_a_field_is_said_to_be_that_without_it() -> 
     """With it the faster of two circles turns by 1.419."""
     study = stability.record(scenes.load_scene("foucault"), None, ["own:euler"])
     said = next(str(line) for line in STUDY.lines(study) if "fastest angular frequency" in str(line))
-    assert "without its field: w = 1.30609" in said
+    assert "of this scene, without its field: w = 1.30609" in said
+    text = "\n".join(str(line) for line in STUDY.lines(study) if isinstance(line, Text))
+    assert "no largest step is worked out with a magnetic field" in text
+    assert "anharmonic" not in text
+
+
+def test_a_charge_that_circles_is_not_said_to_be_at_rest() -> None:
+    study = stability.record(scenes.load_scene("magnetic"), None, ["own:rk4"])
+    said = "\n".join(str(line) for line in STUDY.lines(study) if isinstance(line, Text))
+    assert "oscillates but by its magnetic field, with which no largest step is worked out" in said
 
 
 def test_the_frequency_of_a_modulated_spring_with_friction_is_said_to_be_its_largest() -> None:
@@ -282,6 +292,20 @@ def test_a_method_that_cannot_serve_the_scene_has_no_largest_step_there(need: Ne
     need("own:respa8")
     study = stability.record(scenes.load_scene("spring"), None, ["own:respa8", "own:velocity-verlet"])
     assert [study.largest(x) for x in study.limits] == pytest.approx([np.nan, 2.0], nan_ok=True)
+
+
+def test_a_method_that_does_not_start_the_scene_is_left_out_with_its_reason(need: Need) -> None:
+    need("openmm:verlet")
+    tied = Spring(a=[0, 1], b=[2, 3], k=[7.1, 1.7], rest=[0.0, 0.0])
+    scene = Scene(
+        m=[3.7, 3.7, 1.3, 1.3], q=[0.3, -0.2, 0.5, 0.9], p=[0.7, 1.1, -0.4, 0.2], places=[0, 1, 3, 4],
+        terms=(tied,), step=0.1, steps=60,
+    )  # fmt: skip
+    study = stability.record(scene, None, ["own:velocity-verlet", "openmm:verlet"])
+    assert [x.method for x in study.limits] == ["own:velocity-verlet"]
+    (left,) = study.left_out
+    assert left.method == "openmm:verlet"
+    assert "a program's spring pulls alike along every axis" in left.reason
 
 
 def test_what_is_left_out_is_named_once() -> None:
@@ -309,7 +333,7 @@ def test_the_stiffest_state_of_an_anharmonic_motion_is_that_of_its_amplitude() -
 
 def test_a_method_that_needs_a_field_is_told_why_it_has_no_limit() -> None:
     found = stability.record(scenes.load_scene("magnetic"), None, ["own:boris", "own:euler"])
-    why = "it needs a magnetic field, and limits are measured on springs without one"
+    why = "limits are measured on springs alone, without the magnetic field that it needs"
     assert found.left_out == (LeftOut(method="own:boris", reason=why),)
 
 

@@ -8,10 +8,11 @@ Command: python validation/extreme.py [FOLDER]       (default: figures; about tw
 
 Printed: 10602 cells, 6427 right, 2025 unstable as theory says, 2145 at an engine's limit, 5 not measured
 (single precision may round as far as a step goes), none silently wrong; 38 inputs that make no sense are
-refused in a line: scene files, and scenes that a method cannot serve.  Right for forces between
-1e-300 and 1e300, all that is tried: the own methods; 1e-11 and 1e300: ASE (its forces are kept while nothing
-moves by more than 1e-15); 1e-150 and 1e150: OpenMM on Reference and CPU (it squares lengths); 1e-2 and 1e8:
-OpenMM on OpenCL in every precision mode; 1e-200 and 1e300: CVODE.
+refused in a line: scene files, and scenes that a method cannot serve.
+Right at h w from 0.01 to 1.9 for forces between 1e-300 and 1e300, all that is tried there: the own
+methods; 1e-11 and 1e300: ASE (its forces are kept while nothing moves by more than 1e-15); 1e-150 and
+1e150: OpenMM on Reference and CPU (it squares lengths); 1e-2 and 1e8: OpenMM on OpenCL in every
+precision mode; 1e-200 and 1e300: CVODE.
 
     ase:velocity-verlet: 462 cells that are right, each alone: off by 8.6e-15 at most, 0 wrong
     own:semi-implicit-euler: 528 cells that are right, each alone: off by 5.1e-15 at most, 0 wrong

@@ -74,6 +74,12 @@ FEW: dict[str, Any] = {"FAULTS": FAULTS[:1], "DECADE_HALVINGS": 0}
 BY_NAME = ("limits", "libraries", "unusable_engines", "broke", "counts")
 """Objects whose keys are names of faults, engines or outcomes, and not of the document."""
 
+MEANS = {
+    "energy_drift": "H - H0 where it is largest, over the energy that the report's table names.  With "
+    "friction or a drive the H of the exact solution, where it is known, takes the place of H0."
+}
+"""What a number is, where its name does not tell."""
+
 
 def inferred(values: list[Any], name: str = "") -> dict[str, Any]:
     """The schema of these values: their types, and what they hold where they are objects or arrays."""
@@ -90,6 +96,8 @@ def inferred(values: list[Any], name: str = "") -> dict[str, Any]:
         # what was never there may be anything
         return {}
     found: dict[str, Any] = {"type": types[0] if len(types) == 1 else types}
+    if name in MEANS:
+        found["description"] = MEANS[name]
     objects = [x for x in values if isinstance(x, dict)]
     if objects and name in BY_NAME:
         found["additionalProperties"] = inferred([y for x in objects for y in x.values()], name)

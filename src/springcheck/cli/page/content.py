@@ -209,11 +209,12 @@ def _motion(run: Stored, most: int) -> dict[str, Any] | None:
     charts = [
         replace(
             chart,
-            title=f"{bank.heading}. {chart.title}" if j == 0 else chart.title,
+            # what is said of modes is of the last, the fastest
+            title=f"{bank.heading}. " * (chart is bank.charts[-(bank.name == "modes")]) + chart.title,
             curves=[replace(curve, x=few(curve.x), y=few(curve.y)) for curve in chart.curves],
         )
         for bank in found
-        for j, chart in enumerate(bank.charts)
+        for chart in bank.charts
     ]
     on = [curve.name for curve in curves if not curve.over] + [chart.title for chart in charts]
     return charts_as_data(

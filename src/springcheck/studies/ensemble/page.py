@@ -246,7 +246,7 @@ def _limits(scene: Scene, method: str) -> dict[str, float]:
 
 def _lines(scene: Scene, quantity: str, fields: Sequence[str], shown: Mapping[str, Line]) -> list[Chart]:
     title, (over,) = _title(quantity, scene), fields
-    every = np.concatenate([x for one in shown.values() for x in (one.low, one.values, one.high)])
+    every = [np.concatenate([one.low, one.values, one.high]) for one in shown.values()]
     seen: set[str] = set()
     curves = []
     for method, one in shown.items():
@@ -272,18 +272,25 @@ def _lines(scene: Scene, quantity: str, fields: Sequence[str], shown: Mapping[st
     return [chart]
 
 
-def _axis(quantity: str, scene: Scene, values: Floats) -> Scale:
-    """The axis of a quantity, truncated where larger values are uninformative."""
-    name, good = _title(quantity, scene).partition(",")[0], values[np.isfinite(values)]
+def _axis(quantity: str, scene: Scene, values: Sequence[Floats]) -> Scale:
+    """The axis of a quantity of each method, truncated where larger values are uninformative."""
+    name, every = _title(quantity, scene).partition(",")[0], np.concatenate(values)
+    good = every[np.isfinite(every)]
     if quantity == "outcome":
         return Scale(name=name, names=OUTCOMES)
     least = good[good > 0]
     low, high = float(np.min(good)), float(np.max(good))
     if low >= 0 and len(least) and high > 100 * (first := float(np.min(least))):
         return Scale(name=name, log=True, shown=(first / 2, min(2 * high, max(MOST_SHOWN_SIZE, 4 * first))))
-    if max(-low, high) > MOST_SHOWN_SIZE:
-        return Scale(name=name, shown=(max(low, -MOST_SHOWN_SIZE), min(high, MOST_SHOWN_SIZE)))
-    return Scale(name=name)
+    most = min(_most(values), MOST_SHOWN_SIZE * float(np.median(np.abs(good))))
+    clipped = low < 0 < most < max(-low, high)
+    return Scale(name=name, shown=(max(low, -most), min(high, most)) if clipped else None)
+
+
+def _most(values: Sequence[Floats]) -> float:
+    """Twice the largest size of the median method: one that diverges would hide the others."""
+    sizes = sorted(float(np.max(np.abs(x[np.isfinite(x)]), initial=0.0)) for x in values)
+    return 2 * sizes[(len(sizes) - 1) // 2]
 
 
 def _maps(scene: Scene, quantity: str, over: Sequence[str], shown: Mapping[str, Map]) -> list[Chart]:
@@ -331,9 +338,7 @@ def _kinds(quantity: str, values: Sequence[Floats]) -> tuple[list[tuple[str, str
     low, high = float(np.min(every)), float(np.max(every))
     shades: Sequence[str] = [f"s{i}" for i in range(SHADES)]
     if low < 0:
-        # scale to twice the median method's largest value: one that diverges would hide the others
-        sizes = sorted(float(np.max(np.abs(x[np.isfinite(x)]), initial=0.0)) for x in values)
-        high = min(max(-low, high), 2 * sizes[(len(sizes) - 1) // 2]) or max(-low, high)
+        high = min(max(-low, high), _most(values)) or max(-low, high)
         low, shades = -high, SIGNED_SHADES
     bounds = np.linspace(low, high if high > low else low + 1, SHADES + 1)
     names = [f"{a:.3g} to {b:.3g}" for a, b in itertools.pairwise(bounds)]

@@ -17,7 +17,7 @@ import numpy as np
 from springcheck import checks, engines, schemes
 from springcheck.checks.case import keeps, least_moved, overflows
 from springcheck.engines.contract import Label, Stopped
-from springcheck.physics.arrays import Arithmetic, Extended, Floats
+from springcheck.physics.arrays import Arithmetic, Extended, Floats, Reals
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory, of_scene
 from springcheck.studies.extremes.grid import Spec
@@ -84,16 +84,20 @@ class Sizes:
     force: Extended
 
 
-def sizes(label: Label, scene: Scene, start: tuple[Floats, Floats], end: tuple[Extended, Extended]) -> Sizes:
-    """Intermediate results of a step from states q, p (f-1, n) to their exact successors.
+def sizes(label: Label, case: checks.Case, q: Floats, p: Floats) -> Sizes:
+    """Intermediate results of the scheme's steps from all states q, p (f, n) but the last.
 
     In whatever order an engine works, it forms positions, momenta, velocities, forces, accelerations and
     their increments.  An engine that squares lengths of bonds also forms 1/m and 1/h.
     """
+    scene, places = case.judged, list[Reals]()
     m = scene.m.astype(np.longdouble)
     h = np.abs(np.longdouble(scene.step))
     k = np.abs(scene.system.hessian_diagonal(scene.q))
-    x, y = (np.maximum(np.abs(one), np.abs(other)) for one, other in zip(start, end, strict=True))
+    # a stage may reach farther than both ends of its step
+    case.step(q[:-1].astype(np.longdouble), p[:-1].astype(np.longdouble), met=places)
+    end_q, end_p = case.next_states
+    x, y = np.max(np.abs([q[:-1], end_q, *places]), axis=0), np.maximum(np.abs(p[:-1]), np.abs(end_p))
     force = k * x
     parts = [x, y, y / m, force, force / m, h * force, h * force / m, h * y / m]
     parts += [np.broadcast_to(part, x.shape) for part in (k, k / m, h * h * k / m)]
@@ -122,7 +126,7 @@ def judge(
         ratio = _largest(dq, dp, of_q, of_p)
         strict = _largest(dq, dp, *case.allowance_at(q[:-1], p[:-1], smallest=np.longdouble(0)))
         from_finite = np.isfinite(q[:-1]) & np.isfinite(p[:-1])
-        inside = sizes(label, case.judged, (q[:-1], p[:-1]), case.next_states)
+        inside = sizes(label, case, q, p)
         growth, bound = growth_of(case, scene), float(case.roundings)
         low, high = RANGES["single" if how.force >= 2.0**-24 else "double"]
         peaks, too_coarse = np.max(inside.force, axis=0, initial=0), COARSE.format(how.quantum)
@@ -132,7 +136,7 @@ def judge(
         reasons = {
             overflows(how): inside.force >= how.overflow,
             too_coarse: np.broadcast_to(how.quantum > FORCE_RESOLUTION * peaks, moved.shape),
-            keeps(how): moved <= 2 * how.stale,
+            keeps(how): (how.stale > 0) & (moved <= 2 * how.stale),
             f"a joint of length {far:.3g} is passed": how.joints & (inside.force >= k * far),
             f"a step forms numbers beyond {high:.1e}": ~(inside.largest <= high),
             f"a step forms numbers below {low:.1e}": inside.smallest < low,

@@ -19,6 +19,7 @@ from springcheck import engines
 from springcheck.engines.contract import Label
 from springcheck.errors import SpringcheckError
 from springcheck.physics.arrays import WIDE
+from springcheck.schemes import scheme
 from springcheck.studies import keeper
 from springcheck.studies.arguments import Progress
 from springcheck.studies.choose import sorted_out
@@ -81,6 +82,8 @@ def absence(label: Label) -> str | None:
         return "it moves no particles on springs"
     if method.adaptive:
         return "it chooses its own steps, and cells are judged step by step"
+    if not scheme(method.scheme).has("named"):
+        return "its scheme is not known; --scheme NAME states it, and its steps are then judged"
     return propagators.absence(label)
 
 
@@ -133,10 +136,10 @@ def windows(cells: Sequence[Cell]) -> list[Window]:
         if span is None:
             continue
         name = engines.engine(method.partition(":")[0]).title
-        between = f"1e{span[0]} and 1e{span[-1]}"
+        between = f"1e{span[0]} and 1e{span[-1]} at h w from {CALM_TURNS[0]:g} to {CALM_TURNS[1]:g}"
         sentence = f"{name} ({method}): right for forces between {between}, in the scene's unit of force"
         if len(span) == len(calm):
-            sentence += ", all that was tried"
+            sentence += ", all that was tried there"
         found.append(Window(method=method, sentence=sentence, low=10.0 ** span[0], high=10.0 ** span[-1]))
     return found
 

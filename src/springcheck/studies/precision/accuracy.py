@@ -85,7 +85,8 @@ def truth(scene: Scene) -> Truth:
     if not exact.has_true_motion(scene):
         raise SceneError(
             f"scene {scene.name}: no closed form of its exact solution is known, so none of its errors is; "
-            "a study of precision needs springs, or quartic potentials without couplings, and no bath"
+            "a study of precision needs springs, or an anharmonic potential on each particle or pair by "
+            "itself without friction, and no bath"
         )
     if not scene.system.norm.of:
         raise SceneError(f"scene {scene.name} rests in equilibrium: give a particle a position or a momentum")

@@ -20,6 +20,9 @@ from springcheck.studies.tables import Rows
 
 Place = tuple[str, int | None, float | None]
 
+CANNOT_RUN = "cannot run"
+"""Outcome of the only point of a method that cannot run the scene."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Point:

@@ -99,7 +99,7 @@ def begin(scene: Scene, label: Label, known: Truth) -> Sweep:
         sweep.start, sweep.cost = first.start, first.run
     except MethodError as error:
         sweep.scene = None
-        sweep.points.append(blank(sweep, "cannot run", str(error)))
+        sweep.points.append(blank(sweep, fits.CANNOT_RUN, str(error)))
     except Stopped:
         # the run for the errors stops likewise and reports it as a row
         pass

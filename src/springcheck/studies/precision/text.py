@@ -6,7 +6,8 @@ import math
 from argparse import Namespace
 from collections.abc import Sequence
 
-from springcheck.studies.precision.fits import Fit, Point
+from springcheck.studies.choose import LeftOut
+from springcheck.studies.precision.fits import CANNOT_RUN, Fit, Point
 from springcheck.studies.precision.result import MethodSummary, PrecisionStudy
 from springcheck.studies.text import left_out, resumed
 from springcheck.text.lines import Lines, Row, TextTable, plain, table
@@ -22,7 +23,7 @@ def lines(study: PrecisionStudy, options: Namespace | None = None) -> Lines:
         plain(f"  {count(done, 'point')} in {study.seconds:.0f} s on {study.machine['processor']}"),
         *resumed(study.resumed, "point"),
         plain(),
-        _methods(study.methods),
+        _methods([x for x in study.methods if {one.outcome for one in x.points} != {CANNOT_RUN}]),
     ]
     for method in study.methods:
         expected = method.expected_floor
@@ -36,7 +37,7 @@ def lines(study: PrecisionStudy, options: Namespace | None = None) -> Lines:
     untimed = sum(point.complete and not point.run_seconds_repeats for point in study.points)
     if untimed:
         out.append(plain(f"  {count(untimed, 'point')} of errors alone: workers measure no times"))
-    rest = [point for point in study.points if not point.complete]
+    rest = [point for point in study.points if not point.complete and point.outcome != CANNOT_RUN]
     if rest:
         out += [plain(), plain("Not measured:")]
         out += [plain(f"  {point.method} at {_where(point)}: {point.said}") for point in rest]
@@ -47,7 +48,8 @@ def lines(study: PrecisionStudy, options: Namespace | None = None) -> Lines:
     ]
     if getattr(options, "points", False):
         out += [plain(), _points(study.points)]
-    out += left_out(study.left_out)
+    unable = [LeftOut(method=x.method, reason=x.message) for x in study.points if x.outcome == CANNOT_RUN]
+    out += left_out([*study.left_out, *unable])
     return out
 
 

@@ -124,6 +124,7 @@ def _of_kind(kind: str, found: Sequence[Heated]) -> Chart:
         if np.isfinite(error):
             ends = [value - 2 * error, value + 2 * error]
             bars.append(Curve(name=TWO_ERRORS, x=ends, y=[float(j)] * 2, **own))
+            every += ends
         if np.isfinite(value):
             marks.append(Curve(name=one.method, x=[value], y=[float(j)], line=False, marks=True, **own))
             every.append(value)
@@ -134,9 +135,9 @@ def _of_kind(kind: str, found: Sequence[Heated]) -> Chart:
     numbers = np.array([*every, *laws[known]])
     middle = numbers[np.abs(numbers - np.median(numbers)) <= 1.0]
     low, high, room = float(np.min(middle)), float(np.max(middle)), 0.1 * float(np.ptp(middle)) + 0.02
-    name = f"{kind} temperature"
+    name, said = f"{kind} temperature", f"{TWO_ERRORS} to either side"
     return Chart(
-        title=f"{name.capitalize()}, two standard errors to either side.", short=name,
+        title=f"{name.capitalize()}, {said}.", short=f"{name}, {said}",
         x=Scale(name=f"{name} / that of the bath", shown=(low - room, high + room)),
         # a row of its own for the name of the rule
         y=Scale(name="method", names=[one.method for one in found], shown=(-0.6, len(found) + 0.1)),

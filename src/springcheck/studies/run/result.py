@@ -41,7 +41,7 @@ class MethodRun:
     """Whether `max_error` is only an upper bound: the uncertainty of the exact solution."""
     energy_drift: float
     """H - H0 over the scene's `energy_scale` where it is largest, > 0 where energy is gained.  With friction
-    the exact solution's H replaces H0, where it is known."""
+    or a drive the exact solution's H replaces H0, where it is known."""
     start_seconds: float
     run_seconds: float
     force_calls: int

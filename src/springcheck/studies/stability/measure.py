@@ -63,8 +63,10 @@ def _measure(scene: Scene, labels: Sequence[Label], kept: Keeper) -> Stability:
         if not claimed.has("one-step"):
             return "it has no fixed step and no limit"
         if Need.FIELD in method.requires:
-            return "it needs a magnetic field, and limits are measured on springs without one"
-        return propagators.absence(label) if "wall-spring" in method.terms else "it moves no springs"
+            return "limits are measured on springs alone, without the magnetic field that it needs"
+        if "wall-spring" not in method.terms:
+            return "it moves no springs"
+        return propagators.absence(label) or propagators.unstarted(scene, label)
 
     usable, left_out = sorted_out(labels, why, "has a limit to measure")
     braked = [label for label in usable if "damping" in engines.method(label).terms]

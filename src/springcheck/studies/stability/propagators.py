@@ -194,3 +194,12 @@ def absence(label: Label) -> str | None:
     except MethodError as error:
         return str(error)
     return None
+
+
+def unstarted(given: Scene, label: Label) -> str | None:
+    """Why an engine does not start a scene that its method serves by what it declares, or None."""
+    try:
+        engines.refusal(given, label) or engines.Started(given, label)
+    except MethodError as error:
+        return str(error)
+    return None
