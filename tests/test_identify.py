@@ -51,12 +51,14 @@ def case(
     stride: int = 1,
     frames: int = 101,
     lowest: float = 0.02,
+    highest: float | None = None,
     coarse: Force | None = None,
     width: type = np.float64,
 ) -> Case:
-    """Springs of uneven m and k, h w log-uniform from `lowest` to 1.5 or 0.95 of the scheme's limit."""
+    """Springs of uneven m and k, h w log-uniform from `lowest` to `highest`, or to 1.5 or 0.95 of the scheme's
+    limit."""
     scheme = SCHEMES[name]
-    highest = min(1.5, 0.95 * scheme.limit) if scheme.limit > 0 else 1.0
+    highest = highest or (min(1.5, 0.95 * scheme.limit) if scheme.limit > 0 else 1.0)
     m, h = 10 ** rng.uniform(-2, 2, n), float(10 ** rng.uniform(-3, 1))
     x = np.exp(rng.uniform(np.log(lowest), np.log(highest), n))
     k = m * (x / h) ** 2
@@ -106,6 +108,19 @@ def test_a_scheme_is_named_with_its_stride_stiffness_and_precision(name: str) ->
         if not name.startswith("langevin"):
             expected = matrix(SCHEMES[name], h=made.h, m=made.m, k=made.k)[0].astype(float)
             assert found.determinant[0] == pytest.approx(float(np.linalg.det(expected)), rel=1e-10)
+
+
+@pytest.mark.parametrize(
+    ("name", "h_w"),
+    [("rk4", 2.6), ("rk4", 2.8), ("rk4", 3.3), ("velocity-verlet", 1.995), ("velocity-verlet", 1.999),
+     ("semi-implicit-euler", 1.9985), ("forest-ruth", 1.57), ("forest-ruth", 1.58), ("forest-ruth", 2.2)],
+)  # fmt: skip
+def test_a_scheme_is_named_at_its_limit_of_stability_and_beyond(name: str, h_w: float) -> None:
+    """RK4 is stable up to 2.83, and turns by more than half a turn there; Forest & Ruth's scheme up to 1.5734."""
+    made = case(name, np.random.default_rng(3), frames=16, lowest=h_w, highest=h_w)
+    found = identify(made.t, made.q, made.p, mass=made.m)
+    assert (found.scheme, found.fits, found.precision) == (name, True, "double"), found
+    assert found.stiffness == pytest.approx(made.k, rel=1e-10)
 
 
 @pytest.mark.parametrize("name", STEPPING)

@@ -58,8 +58,6 @@ class Family:
     """Whether it is the exact solution."""
     path: int = 0
     """Roundings in a step."""
-    limit: float = np.inf
-    """Stability limit of h w."""
     formula: str = ""
     """Key of a map that stages do not give: a fault in `maps.FORMULAS`, or a scheme."""
     cause: str = ""
@@ -110,7 +108,6 @@ def _of(scheme: Scheme, *, damped: bool) -> Family:
         place="",
         flow=scheme.has("flow"),
         path=1 if scheme.has("flow") else roundings(scheme),
-        limit=scheme.limit,
     )
 
 
@@ -126,9 +123,7 @@ def _is_written_out(scheme: Scheme) -> bool:
 
 
 def _stepped(scheme: Scheme) -> Family:
-    return Family(
-        name=scheme.name, scheme=scheme.name, formula=scheme.name, path=roundings(scheme), limit=scheme.limit
-    )
+    return Family(name=scheme.name, scheme=scheme.name, formula=scheme.name, path=roundings(scheme))
 
 
 UNDAMPED = tuple(_of(s, damped=False) if _is_written_out(s) else _stepped(s) for s in _ON_A_SPRING)
@@ -143,7 +138,7 @@ def _placed(
     return Family(
         name=f"{scheme}, friction {place}", scheme=scheme, stages=(*(after.stages if after else ()), *stages),
         stability=after.stability if after else ((), ()), damped=True, laws=laws, place=place,
-        path=roundings(SCHEMES[scheme]) + 3, limit=SCHEMES[scheme].limit,
+        path=roundings(SCHEMES[scheme]) + 3,
     )  # fmt: skip
 
 
@@ -260,7 +255,7 @@ def titles(schemes: Iterable[str]) -> str:
 def _fault(name: str, cause: str, remedy: str, *stages: Stage) -> Family:
     return Family(
         name=f"fault: {name}", scheme=name, formula="" if stages else name, stages=stages, cause=cause,
-        remedy=remedy, path=20, limit=1.0,
+        remedy=remedy, path=20,
     )  # fmt: skip
 
 
@@ -268,7 +263,7 @@ FAULTS = (
     *(_fault(*row) for row in _FAULTS),
     *(
         Family(
-            name=f"fault: {cause}", scheme=cause, cause=cause, path=30, limit=0.0,
+            name=f"fault: {cause}", scheme=cause, cause=cause, path=30,
             remedy="compare stages and weights with the tableau",
             stability=stability_function(_tableau(*rows), _tableau(weights)[0]),
         )
@@ -290,7 +285,7 @@ FAULTS = (
 SUBTRACTED = tuple(
     Family(
         name=f"fault: {name}, friction subtracted", scheme=name, stages=stages, damped=True, laws=(IMPLICIT,),
-        path=roundings(SCHEMES[name]) + 3, limit=SCHEMES[name].limit,
+        path=roundings(SCHEMES[name]) + 3,
         cause=f"{title(name)} with an implicit friction of the wrong sign: it divides by m - h c, "
         "not by m + h c",
         remedy="add h times the derivative of the friction to the mass, do not subtract it",
@@ -300,7 +295,7 @@ SUBTRACTED = tuple(
 """Faults with friction: each has the map of a damped scheme on another spring, so that only a stated
 stiffness tells it."""
 
-HELD = Family(name="held-force", scheme="held-force", damped=True, held=True, path=16, limit=0.0)
+HELD = Family(name="held-force", scheme="held-force", damped=True, held=True, path=16)
 
 KNOWN_ELSEWHERE, DAMPED_ELSEWHERE = (
     tuple(

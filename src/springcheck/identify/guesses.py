@@ -37,8 +37,14 @@ quotients), for d below `FARTHEST`."""
 FLOW_TURNS = 8
 """Largest number of turns between two frames for the exact solution, which has no step that limits them."""
 
-CELLS, LARGEST_PHASE = 2048, 1.15 * math.pi
-"""Cells of the table, and its largest phase of a step: RK4 turns by more than half a turn."""
+CELLS = 4096
+CELL = 2 * math.pi / CELLS
+"""Cells of the table, over a whole turn: RK4 turns by more than half a turn, beyond its limit by almost a
+whole one."""
+
+HALVINGS = 16
+"""Halvings of an interval of h w on which a phase ends: it ends as a square root, by 2**-8 of the interval's
+phase short of half a turn, which is less than a cell."""
 
 GLANCE = 3e-6
 """Distance of the entries of one step from the table, relative to the root of the determinant and beside the
@@ -62,7 +68,7 @@ FOLDS = 0.6, 0.75, 0.9, 1.05, 1.2
 """First guesses of h w in that case, in units of the h w of the largest phase."""
 
 LARGEST = 30.0
-"""Largest h w of schemes that are stable at any."""
+"""Largest h w that is tabulated, of schemes that are unstable there too."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,10 +85,6 @@ class _Curves:
     high: Floats
     rows: Floats
 
-    @property
-    def apart(self) -> float:
-        return LARGEST_PHASE / CELLS
-
 
 @lru_cache(maxsize=64)
 def _curves(families: tuple[str, ...]) -> _Curves:
@@ -94,21 +96,26 @@ def _curves(families: tuple[str, ...]) -> _Curves:
 
 @cache
 def _curve(name: str) -> _Curves:
-    family = FAMILIES[name]
-    highest = family.limit * (1 - 1e-12) if 0 < family.limit < 100 else LARGEST
-    x = np.unique(np.concatenate([np.geomspace(1e-6, 1e-4, 9), np.linspace(1e-4, min(0.1, highest), 200),
-                                  np.linspace(0.1, highest, 2000),
-                                  np.linspace(0.1, min(3.5, highest), 2000)]))  # fmt: skip
-    with np.errstate(all="ignore"):
-        m = np.asarray(unit(family, np.square(x), np.zeros_like(x)), np.float64)
+    def rows_at(x: Floats) -> Floats:
+        m = np.asarray(unit(FAMILIES[name], np.square(x), np.zeros_like(x)), np.float64)
         found = rotation(m.astype(np.longdouble))
         phase = np.where(m[:, 0, 1] < 0, 2 * np.pi - found.angle, found.angle)
         loss = np.log(np.abs(np.asarray(found.determinant, np.float64)))
-        rows = np.array([x, loss, *(m[:, 0].T * np.exp(-loss / 2))])
-    good = found.angle > 0
-    phase, rows = phase[good].astype(np.float64), rows[:, good]
-    cuts = np.flatnonzero(np.diff(np.sign(np.diff(phase))) != 0) + 1
-    grid = np.linspace(0, LARGEST_PHASE, CELLS + 1)
+        turning = np.asarray(found.angle > 0, np.float64)
+        return np.array([turning, phase, x, loss, *(m[:, 0].T * np.exp(-loss / 2))], np.float64)
+
+    with np.errstate(all="ignore"):
+        every = rows_at(np.concatenate([np.geomspace(1e-6, 1e-4, 9), np.linspace(2e-4, 3.5, 1000),
+                                        np.geomspace(3.5, LARGEST, 300)[1:]]))  # fmt: skip
+        for _ in range(HALVINGS):
+            # nodes a cell apart at most: the phase is steep where it ends, as Verlet's at the limit
+            wide = np.flatnonzero(np.abs(np.diff(every[1])) > CELL)
+            more = rows_at((every[2, wide] + every[2, wide + 1]) / 2)
+            every = np.insert(every, wide + 1, more, axis=1)
+    turning = np.flatnonzero(every[0])
+    phase, rows = every[1, turning], every[2:, turning]
+    cuts = np.flatnonzero((np.diff(np.sign(np.diff(phase))) != 0) | (np.diff(turning)[:-1] > 1)) + 1
+    grid = np.linspace(0, 2 * math.pi, CELLS + 1)
     ends, out = [], []
     for piece in np.split(np.arange(len(phase)), cuts):
         at = piece if phase[piece[-1]] >= phase[piece[0]] else piece[::-1]
@@ -231,9 +238,15 @@ def first(every: MapTable, roots: Roots, *, growing: bool, free_scale: bool, far
             g = -np.sum(logs, axis=1) if family.damped else 0 * a
             parts.append((np.full(len(left), i), left, a, g))
             if not (family.damped or family.flow):
-                # beyond its limit a step kicks and drifts all the same
-                kick = 1 - np.trace(roots.step[left], axis1=1, axis2=2) + np.exp(roots.log_det[left])
-                parts.append((np.full(len(left), i), left, kick, 0 * a))
+                # beyond its limit a step has the trace of one of its springs all the same
+                wanted = np.trace(roots.step[left], axis1=1, axis2=2) * np.exp(-roots.log_det[left] / 2)
+                nodes = np.geomspace(1e-8, LARGEST**2, 2000)
+                nodes = np.concatenate([-nodes[::-1], nodes])
+                m = np.asarray(unit(family, nodes, 0 * nodes), np.float64)
+                off = np.trace(m, axis1=1, axis2=2) / np.sqrt(np.abs(np.linalg.det(m))) - wanted[:, None]
+                at, k = np.nonzero(off[:, 1:] * off[:, :-1] <= 0)
+                a = nodes[k] + (nodes[k + 1] - nodes[k]) * off[at, k] / (off[at, k] - off[at, k + 1])
+                parts.append((np.full(len(at), i), left[at], a, 0 * a))
     which, root, a, g = (np.concatenate(x) for x in zip(*parts, strict=True))
     if every.damped and not growing:
         held = every.held[which]
@@ -255,11 +268,11 @@ def _on_curves(
     bases = np.array([_base(every.families[i]) for i in curved.tolist()])
     names, base = np.unique(bases, return_inverse=True)
     curves = _curves(tuple(names.tolist()))
-    at = turning[roots.phase[turning] < LARGEST_PHASE]
+    at = turning[roots.phase[turning] < 2 * math.pi]
     phase, log_det = roots.phase[at], roots.log_det[at]
     first, second = (roots.step[at, 0, k] * np.exp(-log_det / 2) for k in (0, 1))
-    cell = np.minimum((phase / curves.apart).astype(np.int64), CELLS - 1)
-    part = phase / curves.apart - cell
+    cell = np.minimum((phase / CELL).astype(np.int64), CELLS - 1)
+    part = phase / CELL - cell
 
     def between(k: int, curve: Any, r: Any) -> Floats:
         left, right = (curves.rows[curve, k, cell[r] + i] for i in (0, 1))
@@ -291,7 +304,7 @@ def _on_curves(
     g = loss[curve, r] if every.damped else np.zeros(len(r))
     h_w = between(0, curve, r)
     # a step so small that it is not tabulated
-    h_w = np.where(phase[r] < curves.apart, phase[r], h_w)
+    h_w = np.where(phase[r] < CELL, phase[r], h_w)
     # every family of a curve
     order = np.argsort(base, kind="stable")
     counts = np.bincount(base, minlength=len(names))
@@ -326,13 +339,15 @@ def polished(every: MapTable, roots: Roots, x: Guesses, *, free_scale: bool, far
             return x
         r, wanted, size = r[:, keep], wanted[:, keep], size[:, keep]
         moves = [(1e-6 * np.abs(x.a), 0.0)] + ([(0.0, 1e-7)] if every.damped else [])
-        slopes = [(left(x.a + d, x.g + e, wanted, size) - r) / (d + e) for d, e in moves]
-        step = least_squares(np.array(slopes), -r)[0]
+        slopes = np.array([(left(x.a + d, x.g + e, wanted, size) - r) / (d + e) for d, e in moves])
+        step = least_squares(slopes, -r)[0]
         x.a = x.a + np.clip(step[0], -0.5 * np.abs(x.a), 0.5 * np.abs(x.a))
         length = np.abs(step[0] / x.a)
         if every.damped:
             x.g = x.g + step[1]
             length = length + np.abs(step[1]) / np.sqrt(np.abs(x.a))
+        # at the limit an entry is all but 0, and changes by a multiple of itself
+        length = np.maximum(length, np.max(np.abs(np.einsum("imc,ic->mc", slopes, step)), axis=0))
     return x
 
 
