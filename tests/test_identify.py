@@ -55,8 +55,7 @@ def case(
     coarse: Force | None = None,
     width: type = np.float64,
 ) -> Case:
-    """Springs of uneven m and k, h w log-uniform from `lowest` to `highest`, or to 1.5 or 0.95 of the scheme's
-    limit."""
+    """Springs of uneven m and k, h w log-uniform from `lowest` to `highest`: 1.5, or 0.95 of the limit."""
     scheme = SCHEMES[name]
     highest = highest or (min(1.5, 0.95 * scheme.limit) if scheme.limit > 0 else 1.0)
     m, h = 10 ** rng.uniform(-2, 2, n), float(10 ** rng.uniform(-3, 1))
@@ -116,7 +115,7 @@ def test_a_scheme_is_named_with_its_stride_stiffness_and_precision(name: str) ->
      ("semi-implicit-euler", 1.9985), ("forest-ruth", 1.57), ("forest-ruth", 1.58), ("forest-ruth", 2.2)],
 )  # fmt: skip
 def test_a_scheme_is_named_at_its_limit_of_stability_and_beyond(name: str, h_w: float) -> None:
-    """RK4 is stable up to 2.83, and turns by more than half a turn there; Forest & Ruth's scheme up to 1.5734."""
+    """RK4 is stable up to 2.83, where it turns by 1.4 half turns, and Forest & Ruth's scheme up to 1.5734."""
     made = case(name, np.random.default_rng(3), frames=16, lowest=h_w, highest=h_w)
     found = identify(made.t, made.q, made.p, mass=made.m)
     assert (found.scheme, found.fits, found.precision) == (name, True, "double"), found

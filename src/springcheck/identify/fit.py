@@ -41,8 +41,9 @@ ENOUGH = 8
 """Degrees of freedom below which residuals may be small by chance, so that the lower bound on their mean
 square rises to one unit roundoff."""
 
-LEAST_NOISE = 1e-30
-"""Smallest standard deviation of a pair, relative to the largest."""
+LEAST_NOISE = 1e-130
+"""Smallest size of a pair of frames relative to the largest, below which it counts too little: the square of
+its rounding is still a number in double precision."""
 
 CERTAIN = 14.0
 """Log of the likelihood ratio from which one of two noise models is chosen."""
