@@ -696,7 +696,7 @@ def test_velocities_that_follow_from_positions_alone_are_called_that() -> None:
     for v, said in ((0 * q, "do not change"), (0.5 * q, "0.5 times its positions")):
         with pytest.raises(IdentificationError, match=said):
             identify(t, q, v=v)
-    with pytest.raises(IdentificationError, match="one exponential, as of an overdamped motion"):
+    with pytest.raises(IdentificationError, match="one exponential, as of an overdamped or unstable motion"):
         identify(t, np.exp(-0.3 * t), v=-0.3 * np.exp(-0.3 * t))
 
 
@@ -833,6 +833,8 @@ def test_a_motion_about_a_rest_away_from_0_is_named_however_large_it_grows(
     assert 1e38 < np.max(np.abs(q_all)) < 1e44
     assert (found.scheme, found.fits, found.precision) == (name, True, "double"), found
     assert found.stiffness == pytest.approx([k], rel=1e-12)
+    with pytest.raises(IdentificationError, match="of an unstable motion the part before"):
+        identify(h * np.arange(frames + 1), 1e40 * q_all, v=1e40 * v_all, mass=m)
 
 
 @pytest.mark.parametrize("cubic", [1e-6, 1e-13])
