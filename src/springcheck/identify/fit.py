@@ -42,8 +42,7 @@ ENOUGH = 8
 square rises to one unit roundoff."""
 
 LEAST_NOISE = 1e-130
-"""Smallest size of a pair of frames relative to the largest, below which it counts too little: the square of
-its rounding is still a number in double precision."""
+"""Smallest size of a pair relative to the largest: the square of its rounding is a double still."""
 
 CERTAIN = 14.0
 """Log of the likelihood ratio from which one of two noise models is chosen."""
