@@ -43,8 +43,7 @@ CELL = 2 * math.pi / CELLS
 whole one."""
 
 HALVINGS = 16
-"""Halvings of an interval of h w on which a phase ends: it ends as a square root, by 2**-8 of the interval's
-phase short of half a turn, which is less than a cell."""
+"""Halvings of an interval of h w on which a phase ends, as a square root: 2**-8 is left, below a cell."""
 
 GLANCE = 3e-6
 """Distance of the entries of one step from the table, relative to the root of the determinant and beside the
@@ -150,8 +149,7 @@ def roots_of_map(found: Map, strides: tuple[int, ...]) -> Roots:
     b = found.entries.astype(np.float64)
     ratio = float(found.size[1] / found.size[0])
     turn = found.turn
-    det = float(turn.determinant[0])
-    angle = float(turn.angle[0])
+    det, angle = float(turn.determinant[0]), float(turn.angle[0])
     error = float(np.sqrt(np.max(np.diag(found.covariance)))) + ROUNDING
     if angle > 0:
         normal = (b / math.sqrt(det) - math.cos(angle) * np.eye(2)) / math.sin(angle)
@@ -172,11 +170,13 @@ def roots_of_map(found: Map, strides: tuple[int, ...]) -> Roots:
     else:
         values, vectors = np.linalg.eig(b)
         values, vectors = np.real(values), np.real(vectors)
-        s = every if np.all(values > 0) else every[every % 2 == 1]
+        # beyond its limit a step has negative eigenvalues, and an even number of them positive ones
+        s = np.append(every, -every[every % 2 == 0]) if np.all(values > 0) else every[every % 2 == 1]
         gap = abs(values[0] - values[1]) / max(abs(values[0]), abs(values[1]), 1e-300)
         if gap < 1e-9 or not np.all(values):
             s = s[s == 1]
-        each = np.sign(values) * np.abs(values) ** (1 / s[:, None])
+        each = np.sign(s)[:, None] * np.sign(values) * np.abs(values) ** (1 / np.abs(s)[:, None])
+        s = np.abs(s)
         back = np.linalg.inv(vectors) if gap >= 1e-9 else np.eye(2)
         step = (vectors * each[:, None, :]) @ back if gap >= 1e-9 else np.repeat(b[None], len(s), axis=0)
         turns, phase, log_det = np.zeros_like(s), np.full(len(s), np.nan), math.log(abs(det) or 1e-300) / s
