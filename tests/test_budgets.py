@@ -18,7 +18,7 @@ BUDGETS = {
     ("engines",): 2816,
     ("driver", "conformance", "doors"): 1213,
     ("checks",): 5232,
-    ("identify",): 8961,
+    ("identify",): 8978,
     ("formats", "store"): 5261,
     ("studies",): 1444,
     ("studies/*",): 9760,

@@ -51,12 +51,13 @@ def case(
     stride: int = 1,
     frames: int = 101,
     lowest: float = 0.02,
+    highest: float | None = None,
     coarse: Force | None = None,
     width: type = np.float64,
 ) -> Case:
-    """Springs of uneven m and k, h w log-uniform from `lowest` to 1.5 or 0.95 of the scheme's limit."""
+    """Springs of uneven m and k, h w log-uniform from `lowest` to `highest`: 1.5, or 0.95 of the limit."""
     scheme = SCHEMES[name]
-    highest = min(1.5, 0.95 * scheme.limit) if scheme.limit > 0 else 1.0
+    highest = highest or (min(1.5, 0.95 * scheme.limit) if scheme.limit > 0 else 1.0)
     m, h = 10 ** rng.uniform(-2, 2, n), float(10 ** rng.uniform(-3, 1))
     x = np.exp(rng.uniform(np.log(lowest), np.log(highest), n))
     k = m * (x / h) ** 2
@@ -106,6 +107,20 @@ def test_a_scheme_is_named_with_its_stride_stiffness_and_precision(name: str) ->
         if not name.startswith("langevin"):
             expected = matrix(SCHEMES[name], h=made.h, m=made.m, k=made.k)[0].astype(float)
             assert found.determinant[0] == pytest.approx(float(np.linalg.det(expected)), rel=1e-10)
+
+
+@pytest.mark.parametrize(
+    ("name", "h_w", "stride"),
+    [("rk4", 2.6, 1), ("rk4", 2.8, 1), ("rk4", 4.5, 1), ("velocity-verlet", 1.995, 1),
+     ("velocity-verlet", 1.999, 1), ("velocity-verlet", 2.2, 2), ("semi-implicit-euler", 1.9985, 1),
+     ("forest-ruth", 1.57, 1), ("forest-ruth", 1.58, 1), ("forest-ruth", 2.2, 1)],
+)  # fmt: skip
+def test_a_scheme_is_named_at_its_limit_of_stability_and_beyond(name: str, h_w: float, stride: int) -> None:
+    """RK4 is stable up to 2.83, where it turns by 1.4 half turns, and Forest & Ruth's scheme up to 1.5734."""
+    made = case(name, np.random.default_rng(3), stride=stride, frames=16, lowest=h_w, highest=h_w)
+    found = identify(made.t, made.q, made.p, mass=made.m)
+    assert (found.scheme, found.stride, found.precision) == (name, stride, "double"), found
+    assert found.stiffness == pytest.approx(made.k, rel=1e-10)
 
 
 @pytest.mark.parametrize("name", STEPPING)

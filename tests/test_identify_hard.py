@@ -696,7 +696,7 @@ def test_velocities_that_follow_from_positions_alone_are_called_that() -> None:
     for v, said in ((0 * q, "do not change"), (0.5 * q, "0.5 times its positions")):
         with pytest.raises(IdentificationError, match=said):
             identify(t, q, v=v)
-    with pytest.raises(IdentificationError, match="one exponential, as of an overdamped motion"):
+    with pytest.raises(IdentificationError, match="one exponential, as of an overdamped or unstable motion"):
         identify(t, np.exp(-0.3 * t), v=-0.3 * np.exp(-0.3 * t))
 
 
@@ -798,17 +798,43 @@ THREE = {
 @pytest.mark.parametrize(
     ("scene", "frames", "omega"),
     [(PAIR, 600, 2.28934635199), (PAIR, 1500, 2.28934635199), (CARBON_MONOXIDE, 900, 408.172429968),
-     (THREE, 100, 8.54343629), (THREE, 300, 8.54343629)],
+     (THREE, 100, 8.54343629), (THREE, 300, 8.54343629), (THREE, 900, 8.54343629)],
 )  # fmt: skip
 def test_of_a_motion_that_grows_small_modes_have_the_roundings_of_the_large(
     scene: dict[str, Any], frames: int, omega: float
 ) -> None:
-    """One mode grows by up to 1e25, and the coordinates' roundings with it."""
+    """One mode grows by up to 1e75, and the coordinates' roundings with it."""
     found = of_explicit_euler(**scene, frames=frames)
     assert found.scheme == "explicit-euler"
     assert found.precision == "double"
     assert max(found.omega) == pytest.approx(omega, rel=2e-9 if scene is THREE else 2e-12)
     assert found.explanations == ()
+
+
+@pytest.mark.parametrize(
+    ("name", "h", "frames"), [("explicit-euler", 0.6, 270), ("velocity-verlet", 1.3, 90)]
+)
+def test_a_motion_about_a_rest_away_from_0_is_named_however_large_it_grows(
+    name: str, h: float, frames: int
+) -> None:
+    """To 1e40: what the first frames show of the rest is far below the roundings of the last."""
+    m, k, rest = 2.3, 7.1, -1.6
+    states = [(-1.1, 2.3)]
+    for _ in range(frames):
+        q, v = states[-1]
+        before = -k * (q - rest) / m
+        if name == "explicit-euler":
+            states.append((q + h * v, v + h * before))
+        else:
+            q = q + h * v + h * h / 2 * before
+            states.append((q, v + h / 2 * (before - k * (q - rest) / m)))
+    q_all, v_all = np.array(states).T
+    found = identify(h * np.arange(frames + 1), q_all, v=v_all, mass=m)
+    assert 1e38 < np.max(np.abs(q_all)) < 1e44
+    assert (found.scheme, found.fits, found.precision) == (name, True, "double"), found
+    assert found.stiffness == pytest.approx([k], rel=1e-12)
+    with pytest.raises(IdentificationError, match="of an unstable motion the part before"):
+        identify(h * np.arange(frames + 1), 1e40 * q_all, v=1e40 * v_all, mass=m)
 
 
 @pytest.mark.parametrize("cubic", [1e-6, 1e-13])

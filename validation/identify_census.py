@@ -130,7 +130,7 @@ class Draw:
         self.single = "" if flow or self.error else str(rng.choice(["", "", "", "h", "k", "m"]))
         self.form = "double" if self.error else str(rng.choice(["double", "double", "single", "text"]))
         self.stated = bool(rng.random() < 0.5)
-        limit = self.family.limit
+        limit = SCHEMES[self.family.scheme].limit
         highest = min(1.5, 0.95 * limit) if limit > 0 else 1.0
         x = math.exp(rng.uniform(math.log(0.02), math.log(highest)))
         self.m, self.h = float(10 ** rng.uniform(-2, 2)), float(10 ** rng.uniform(-3, 1))

@@ -11,7 +11,7 @@ import numpy as np
 from springcheck.identify import coarse
 from springcheck.identify.coarse import EPSILON
 from springcheck.identify.families import FAMILIES, substeps
-from springcheck.identify.fit import Map
+from springcheck.identify.fit import LEAST_NOISE, Map
 from springcheck.identify.hypothesis import SURE, Match
 from springcheck.identify.maps import MapTable, power, powers, table
 from springcheck.identify.record import Record
@@ -114,7 +114,7 @@ def _refitted(
         columns.append(z @ np.swapaxes(slope, 1, 2))
     if not columns:
         return signed
-    weight = 1 / np.maximum(unit, 1e-30 * np.max(unit))
+    weight = 1 / np.maximum(unit, LEAST_NOISE * np.max(unit))
     rows = np.stack(columns, axis=-1)
     flat = (rows * weight[..., None]).reshape(len(matches), -1, len(columns))
     square = np.swapaxes(flat, 1, 2) @ flat + np.eye(len(columns))
@@ -177,7 +177,7 @@ def _stepped_to(record: Record, found: Map, matches: list[Match], signed: Floats
     """Residuals (c, f - 1, 2), with errors `unit`, minus what `CLOCK_ROUNDINGS` of the times explain."""
     change = _derivative(matches, found, "longer").astype(np.float64)
     way = found.z[:-1].astype(np.float64) @ np.swapaxes(change, 1, 2)
-    weight = way / np.maximum(unit, 1e-30 * np.max(unit)) ** 2
+    weight = way / np.maximum(unit, LEAST_NOISE * np.max(unit)) ** 2
     longer = np.sum(weight * signed, axis=2) / np.maximum(np.sum(weight * way, axis=2), 1e-300)
     room = CLOCK_ROUNDINGS * record.clock
     return np.asarray(signed - np.clip(longer, -room, room)[:, :, None] * way)

@@ -58,8 +58,6 @@ class Family:
     """Whether it is the exact solution."""
     path: int = 0
     """Roundings in a step."""
-    limit: float = np.inf
-    """Stability limit of h w."""
     formula: str = ""
     """Key of a map that stages do not give: a fault in `maps.FORMULAS`, or a scheme."""
     cause: str = ""
@@ -102,7 +100,7 @@ def _of(scheme: Scheme, *, damped: bool) -> Family:
         stages=tuple((kick if kind in ("kick", "pull") else kind, c) for kind, c in scheme.stages if written),
         stability=stability_function(scheme.a, scheme.b) if scheme.b and written else ((), ()),
         damped=damped, laws=(law,) if damped else (), flow=flow, path=1 if flow else roundings(scheme),
-        limit=scheme.limit, formula="" if written else scheme.name,
+        formula="" if written else scheme.name,
     )  # fmt: skip
 
 
@@ -129,7 +127,7 @@ def _placed(
     return Family(
         name=f"{scheme}, friction {place}", scheme=scheme, stages=(*(after.stages if after else ()), *stages),
         stability=after.stability if after else ((), ()), damped=True, laws=laws, place=place,
-        path=roundings(SCHEMES[scheme]) + 3, limit=SCHEMES[scheme].limit,
+        path=roundings(SCHEMES[scheme]) + 3,
     )  # fmt: skip
 
 
@@ -224,7 +222,7 @@ def titles(schemes: Iterable[str]) -> str:
 def _fault(name: str, cause: str, remedy: str, *stages: Stage) -> Family:
     return Family(
         name=f"fault: {name}", scheme=name, formula="" if stages else name, stages=stages, cause=cause,
-        remedy=remedy, path=20, limit=1.0,
+        remedy=remedy, path=20,
     )  # fmt: skip
 
 
@@ -250,7 +248,7 @@ FAULTS = (
            "iterate until the change is rounding, or solve with the Jacobian"),
     *(
         Family(
-            name=f"fault: {cause}", scheme=cause, cause=cause, path=30, limit=0.0,
+            name=f"fault: {cause}", scheme=cause, cause=cause, path=30,
             remedy="compare stages and weights with the tableau",
             stability=stability_function(_tableau(*rows), _tableau(weights)[0]),
         )
@@ -272,7 +270,7 @@ FAULTS = (
 SUBTRACTED = tuple(
     Family(
         name=f"fault: {name}, friction subtracted", scheme=name, stages=stages, damped=True, laws=(IMPLICIT,),
-        path=roundings(SCHEMES[name]) + 3, limit=SCHEMES[name].limit,
+        path=roundings(SCHEMES[name]) + 3,
         cause=f"{title(name)} with an implicit friction of the wrong sign: it divides by m - h c, "
         "not by m + h c",
         remedy="add h times the derivative of the friction to the mass, do not subtract it",
@@ -282,7 +280,7 @@ SUBTRACTED = tuple(
 """Faults with friction: each has the map of a damped scheme on another spring, so that only a stated
 stiffness tells it."""
 
-HELD = Family(name="held-force", scheme="held-force", damped=True, held=True, path=16, limit=0.0)
+HELD = Family(name="held-force", scheme="held-force", damped=True, held=True, path=16)
 
 KNOWN_ELSEWHERE, DAMPED_ELSEWHERE = (
     tuple(

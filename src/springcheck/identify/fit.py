@@ -41,8 +41,8 @@ ENOUGH = 8
 """Degrees of freedom below which residuals may be small by chance, so that the lower bound on their mean
 square rises to one unit roundoff."""
 
-LEAST_NOISE = 1e-30
-"""Smallest standard deviation of a pair, relative to the largest."""
+LEAST_NOISE = 1e-130
+"""Smallest size of a pair relative to the largest: the square of its rounding is a double still."""
 
 CERTAIN = 14.0
 """Log of the likelihood ratio from which one of two noise models is chosen."""

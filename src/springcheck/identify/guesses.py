@@ -37,8 +37,13 @@ quotients), for d below `FARTHEST`."""
 FLOW_TURNS = 8
 """Largest number of turns between two frames for the exact solution, which has no step that limits them."""
 
-CELLS, LARGEST_PHASE = 2048, 1.15 * math.pi
-"""Cells of the table, and its largest phase of a step: RK4 turns by more than half a turn."""
+CELLS = 4096
+CELL = 2 * math.pi / CELLS
+"""Cells of the table, over a whole turn: RK4 turns by more than half a turn, beyond its limit by almost a
+whole one."""
+
+HALVINGS = 16
+"""Halvings of an interval of h w on which a phase ends, as a square root: 2**-8 is left, below a cell."""
 
 GLANCE = 3e-6
 """Distance of the entries of one step from the table, relative to the root of the determinant and beside the
@@ -62,7 +67,7 @@ FOLDS = 0.6, 0.75, 0.9, 1.05, 1.2
 """First guesses of h w in that case, in units of the h w of the largest phase."""
 
 LARGEST = 30.0
-"""Largest h w of schemes that are stable at any."""
+"""Largest h w that is tabulated, of schemes that are unstable there too."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -88,21 +93,26 @@ def _curves(families: tuple[str, ...]) -> _Curves:
 
 @cache
 def _curve(name: str) -> _Curves:
-    family = FAMILIES[name]
-    highest = family.limit * (1 - 1e-12) if 0 < family.limit < 100 else LARGEST
-    x = np.unique(np.concatenate([np.geomspace(1e-6, 1e-4, 9), np.linspace(1e-4, min(0.1, highest), 200),
-                                  np.linspace(0.1, highest, 2000),
-                                  np.linspace(0.1, min(3.5, highest), 2000)]))  # fmt: skip
-    with np.errstate(all="ignore"):
-        m = np.asarray(unit(family, np.square(x), np.zeros_like(x)), np.float64)
+    def rows_at(x: Floats) -> Floats:
+        m = np.asarray(unit(FAMILIES[name], np.square(x), np.zeros_like(x)), np.float64)
         found = rotation(m.astype(np.longdouble))
         phase = np.where(m[:, 0, 1] < 0, 2 * np.pi - found.angle, found.angle)
         loss = np.log(np.abs(np.asarray(found.determinant, np.float64)))
-        rows = np.array([x, loss, *(m[:, 0].T * np.exp(-loss / 2))])
-    good = found.angle > 0
-    phase, rows = phase[good].astype(np.float64), rows[:, good]
-    cuts = np.flatnonzero(np.diff(np.sign(np.diff(phase))) != 0) + 1
-    grid = np.linspace(0, LARGEST_PHASE, CELLS + 1)
+        turning = np.asarray(found.angle > 0, np.float64)
+        return np.array([turning, phase, x, loss, *(m[:, 0].T * np.exp(-loss / 2))], np.float64)
+
+    with np.errstate(all="ignore"):
+        every = rows_at(np.concatenate([np.geomspace(1e-6, 1e-4, 9), np.linspace(2e-4, 3.5, 1000),
+                                        np.geomspace(3.5, LARGEST, 300)[1:]]))  # fmt: skip
+        for _ in range(HALVINGS):
+            # nodes a cell apart at most: the phase is steep where it ends, as Verlet's at the limit
+            wide = np.flatnonzero(np.abs(np.diff(every[1])) > CELL)
+            more = rows_at((every[2, wide] + every[2, wide + 1]) / 2)
+            every = np.insert(every, wide + 1, more, axis=1)
+    turning = np.flatnonzero(every[0])
+    phase, rows = every[1, turning], every[2:, turning]
+    cuts = np.flatnonzero((np.diff(np.sign(np.diff(phase))) != 0) | (np.diff(turning)[:-1] > 1)) + 1
+    grid = np.linspace(0, 2 * math.pi, CELLS + 1)
     high, out = [], []
     for piece in np.split(np.arange(len(phase)), cuts):
         at = piece if phase[piece[-1]] >= phase[piece[0]] else piece[::-1]
@@ -134,8 +144,7 @@ def roots_of_map(found: Map, strides: tuple[int, ...]) -> Roots:
     b = found.entries.astype(np.float64)
     ratio = float(found.size[1] / found.size[0])
     turn = found.turn
-    det = float(turn.determinant[0])
-    angle = float(turn.angle[0])
+    det, angle = float(turn.determinant[0]), float(turn.angle[0])
     error = float(np.sqrt(np.max(np.diag(found.covariance)))) + ROUNDING
     if angle > 0:
         normal = (b / math.sqrt(det) - math.cos(angle) * np.eye(2)) / math.sin(angle)
@@ -156,14 +165,16 @@ def roots_of_map(found: Map, strides: tuple[int, ...]) -> Roots:
     else:
         values, vectors = np.linalg.eig(b)
         values, vectors = np.real(values), np.real(vectors)
-        s = every if np.all(values > 0) else every[every % 2 == 1]
+        # beyond its limit a step has negative eigenvalues, and an even number of them positive ones
+        s = np.append(every, -every[every % 2 == 0]) if np.all(values > 0) else every[every % 2 == 1]
         gap = abs(values[0] - values[1]) / max(abs(values[0]), abs(values[1]), 1e-300)
         if gap < 1e-9 or not np.all(values):
             s = s[s == 1]
             step = np.repeat(b[None], len(s), axis=0)
         else:
-            each = np.sign(values) * np.abs(values) ** (1 / s[:, None])
+            each = np.sign(s)[:, None] * np.sign(values) * np.abs(values) ** (1 / np.abs(s)[:, None])
             step = (vectors * each[:, None, :]) @ np.linalg.inv(vectors)
+        s = np.abs(s)
         turns, phase, log_det = np.zeros_like(s), np.full(len(s), np.nan), math.log(abs(det) or 1e-300) / s
         error *= (1 + 1 / max(gap, 1e-6)) / max(gap, 1e-6)
     step = step.copy()
@@ -223,9 +234,15 @@ def first(every: MapTable, roots: Roots, *, growing: bool, free_scale: bool, far
             g = -np.sum(logs, axis=1) if family.damped else 0 * a
             parts.append((np.full(len(left), i), left, a, g))
             if not (family.damped or family.flow):
-                # beyond its limit a step kicks and drifts all the same
-                kick = 1 - np.trace(roots.step[left], axis1=1, axis2=2) + np.exp(roots.log_det[left])
-                parts.append((np.full(len(left), i), left, kick, 0 * a))
+                # beyond its limit a step has the trace of one of its springs all the same
+                wanted = np.trace(roots.step[left], axis1=1, axis2=2) * np.exp(-roots.log_det[left] / 2)
+                nodes = np.geomspace(1e-8, LARGEST**2, 2000)
+                nodes = np.concatenate([-nodes[::-1], nodes])
+                m = np.asarray(unit(family, nodes, 0 * nodes), np.float64)
+                off = np.trace(m, axis1=1, axis2=2) / np.sqrt(np.abs(np.linalg.det(m))) - wanted[:, None]
+                at, k = np.nonzero(off[:, 1:] * off[:, :-1] <= 0)
+                a = nodes[k] + (nodes[k + 1] - nodes[k]) * off[at, k] / (off[at, k] - off[at, k + 1])
+                parts.append((np.full(len(at), i), left[at], a, 0 * a))
     which, root, a, g = (np.concatenate(x) for x in zip(*parts, strict=True))
     if every.damped and not growing:
         held = every.held[which]
@@ -247,12 +264,11 @@ def _on_curves(
     bases = np.array([_base(every.families[i]) for i in curved.tolist()])
     names, base = np.unique(bases, return_inverse=True)
     curves = _curves(tuple(names.tolist()))
-    at = turning[roots.phase[turning] < LARGEST_PHASE]
+    at = turning[roots.phase[turning] < 2 * math.pi]
     phase, log_det = roots.phase[at], roots.log_det[at]
     first, second = (roots.step[at, 0, k] * np.exp(-log_det / 2) for k in (0, 1))
-    apart = LARGEST_PHASE / CELLS
-    cell = np.minimum((phase / apart).astype(np.int64), CELLS - 1)
-    part = phase / apart - cell
+    cell = np.minimum((phase / CELL).astype(np.int64), CELLS - 1)
+    part = phase / CELL - cell
 
     def between(k: int, curve: Any, r: Any) -> Floats:
         left, right = (curves.rows[curve, k, cell[r] + i] for i in (0, 1))
@@ -280,7 +296,7 @@ def _on_curves(
     g = loss[curve, r] if every.damped else np.zeros(len(r))
     h_w = between(0, curve, r)
     # a step so small that it is not tabulated
-    h_w = np.where(phase[r] < apart, phase[r], h_w)
+    h_w = np.where(phase[r] < CELL, phase[r], h_w)
     # every family of a curve
     order = np.argsort(base, kind="stable")
     counts = np.bincount(base, minlength=len(names))
@@ -315,13 +331,15 @@ def polished(every: MapTable, roots: Roots, x: Guesses, *, free_scale: bool, far
             return x
         r, wanted, size = r[:, keep], wanted[:, keep], size[:, keep]
         moves = [(1e-6 * np.abs(x.a), 0.0)] + ([(0.0, 1e-7)] if every.damped else [])
-        slopes = [(left(x.a + d, x.g + e, wanted, size) - r) / (d + e) for d, e in moves]
-        step = least_squares(np.array(slopes), -r)[0]
+        slopes = np.array([(left(x.a + d, x.g + e, wanted, size) - r) / (d + e) for d, e in moves])
+        step = least_squares(slopes, -r)[0]
         x.a = x.a + np.clip(step[0], -0.5 * np.abs(x.a), 0.5 * np.abs(x.a))
         length = np.abs(step[0] / x.a)
         if every.damped:
             x.g = x.g + step[1]
             length = length + np.abs(step[1]) / np.sqrt(np.abs(x.a))
+        # at the limit an entry is all but 0, and changes by a multiple of itself
+        length = np.maximum(length, np.max(np.abs(np.einsum("imc,ic->mc", slopes, step)), axis=0))
     return x
 
 

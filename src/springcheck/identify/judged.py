@@ -111,8 +111,8 @@ def _proportional(record: Record, j: int) -> str:
     if np.max(np.abs(v - slope * q)) > ALIKE * abs(slope) * size:
         return ""
     return (
-        f"are {slope:.6g} times its positions, but for a constant: one exponential, as of an overdamped "
-        "motion, half periods between frames, or velocities made from positions; they show no scheme"
+        f"are {slope:.6g} times its positions, but for a constant: one exponential, as of an overdamped or "
+        "unstable motion, half periods between frames, or velocities made from positions; they show no scheme"
     )
 
 

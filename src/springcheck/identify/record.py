@@ -177,7 +177,7 @@ def read(
         if size and not SIZES[0] < size < SIZES[1]:
             raise IdentificationError(
                 f"{name} are of the size {size:.1g}: give them in units in which that is from "
-                f"{SIZES[0]:g} to {SIZES[1]:g}"
+                f"{SIZES[0]:g} to {SIZES[1]:g}, or of an unstable motion the part before"
             )
     masses = of_size("mass", mass, positions.shape[1])
     if p is not None and v is not None and masses is None:

@@ -17,6 +17,7 @@ import numpy as np
 from springcheck.identify.coarse import is_white
 from springcheck.identify.compare import Target, solved
 from springcheck.identify.families import Family
+from springcheck.identify.fit import LEAST_NOISE
 from springcheck.identify.guesses import FLOW_TURNS, Guesses, Roots, first
 from springcheck.identify.hypothesis import ERRORS, Match, Terms, distinct
 from springcheck.identify.maps import MapTable, table, unit
@@ -67,9 +68,9 @@ def recurrence(record: Record, j: int, steps: int) -> Recurrence:
     stored = record.q_quantum[:, j] / np.sqrt(12.0)
     size = np.abs(q).astype(np.float64)
     size = size[2:] + 2 * size[1:-1] + size[:-2]
-    size = np.maximum(size, 1e-30 * np.max(size))
+    size = np.maximum(size, LEAST_NOISE * np.max(size))
     noise = np.sqrt((ROUNDING * size) ** 2 + stored[2:] ** 2 + 4 * stored[1:-1] ** 2 + stored[:-2] ** 2)
-    noise = np.maximum(noise, 1e-30 * np.max(noise))
+    noise = np.maximum(noise, LEAST_NOISE * np.max(noise))
     # a frame may lie off by the rounding of its time, on its way of up to a turn more than it shows
     amplitude = _around(np.abs(q - np.mean(q)).astype(np.float64))[1:-1]
     alpha, beta, covariance, left = _neighbours(q, noise, record.deviations)
