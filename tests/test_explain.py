@@ -14,7 +14,7 @@ from springcheck import checks, engines, schemes
 from springcheck.cli import explain, main
 from springcheck.errors import SpringcheckError
 from springcheck.identify.meanings import MEANINGS
-from springcheck.physics import scenefile
+from springcheck.physics import scenefile, terms
 from springcheck.studies.faults.table import FAULTS
 from springcheck.thermal import THERMOSTATS
 
@@ -117,6 +117,20 @@ def test_a_name_of_nothing_is_one_line(name: str, unknown: str, capsys: pytest.C
         list(explain.lines(name))
     assert main(["explain", name]) == 2
     assert capsys.readouterr().err.count("\n") == 1
+
+
+@pytest.mark.parametrize("name", [key for key in terms.known() if key not in explain._CHECKS])
+def test_a_term_of_scene_files_is_explained(name: str) -> None:
+    assert f"{name}, a term: " in "".join(explain.lines(name))
+
+
+@pytest.mark.parametrize("name", ["zzz", "wieght", "velocity"])
+def test_what_is_listed_beside_an_unknown_name_is_whole(name: str) -> None:
+    """It was cut in the middle of its lists: "symplectic-defect, .. ussi-unsigned"."""
+    with pytest.raises(SpringcheckError) as found:
+        list(explain.lines(name))
+    assert " .. " not in str(found.value)
+    assert ("weight" in str(found.value)) is (name != "velocity")
 
 
 def test_a_shown_scene_is_the_scene(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

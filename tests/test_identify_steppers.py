@@ -10,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 
 import springcheck
@@ -200,3 +201,54 @@ def test_leaps_of_unlike_length_are_of_no_box_and_show_no_order() -> None:
     assert (found.scheme, found.fits) == (None, False)
     assert not found.statement.startswith("The positions are wrapped")
     assert "its error on a quartic well does not fall as a power of the step: no order is seen" in found.notes
+
+
+def first_mass(q: Any, p: Any, h: float, force: Force, m: Any) -> tuple[Any, Any]:
+    p = p + h / 2 * force(q)
+    q = q + h * p / (m if isinstance(m, float) else m[0])
+    return q, p + h / 2 * force(q)
+
+
+def one_by_one(q: Any, p: Any, h: float, force: Force, m: Any) -> tuple[Any, Any]:
+    q, p = q.copy(), p.copy()
+    for i in range(len(q)):
+        p[i] += h * force(q)[i]
+        q[i] += h * p[i] / m[i]
+    return q, p
+
+
+@pytest.mark.parametrize(
+    ("stepper", "said"),
+    [(first_mass, "Velocity Verlet of one particle, but of two both move with the mass of the first"),
+     (one_by_one, "but of two that a spring joins a force is worked out when only one of them has moved")],
+)  # fmt: skip
+def test_what_a_stepper_does_wrong_with_two_particles_is_said(stepper: Force, said: str) -> None:
+    """Both were the scheme, with exit status 0: one particle was tried."""
+    found = identify_stepper(stepper)
+    assert not found.fits
+    assert said in str(found).replace("\n  ", " ")
+    # in a scene of several the scheme that it is of one is what it fails
+    assert doors.function.engine([stepper]).methods[stepper.__name__].scheme == found.scheme
+
+
+def test_a_stepper_that_takes_numbers_alone_was_tried_with_one_particle() -> None:
+    def numbers(q: Any, p: Any, h: float, force: Force, m: Any) -> tuple[Any, Any]:
+        p = p + h * force(q)
+        return float(q + h * p / m), float(p)
+
+    found = identify_stepper(numbers)
+    assert (found.scheme, found.fits) == ("semi-implicit-euler", True)
+    assert any(note.startswith("tried with one particle alone: arrays of two end in") for note in found.notes)
+    assert not any("tried with one" in note for note in identify_stepper(heun).notes)
+
+
+def test_other_springs_do_not_repeat_a_remark() -> None:
+    """ "A friction below ... would not show" stood there three times, each with another number."""
+
+    def single(q: Any, p: Any, h: float, force: Force, m: Any) -> tuple[Any, Any]:
+        p = p + h / 2 * force(q)
+        q = q + h * p / m
+        return np.float32(q).astype(float), np.float32(p + h / 2 * force(q)).astype(float)
+
+    notes = identify_stepper(single).notes
+    assert sum("would not show" in note for note in notes) == 1

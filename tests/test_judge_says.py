@@ -193,6 +193,22 @@ def test_times_in_another_unit_are_called_so(tmp_path: Path, capsys: pytest.Capt
     assert "the times look like fs: frames lie" in capsys.readouterr().err
 
 
+def test_times_a_thousand_times_as_far_apart_may_be_in_another_unit(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Without units in the scene they were 1000 steps a frame: the file failed with no word on its times."""
+    scene = replace(scenefile.load_scene("spring-uneven"), steps=12)
+    (tmp_path / "s.toml").write_text(scene.to_toml())
+    run = driver.run(scene, "own:velocity-verlet")
+    for times in (1000, 1):
+        table = np.c_[run.t * times, run.q, run.p]
+        np.savetxt(tmp_path / "a.csv", table, fmt="%.17g", delimiter=",", header="t,q,p", comments="")
+        names = str(tmp_path / "a.csv"), "--scene", str(tmp_path / "s.toml")
+        assert main(["judge", *names, "--scheme", "velocity-verlet"]) == (times != 1)
+        told = " ".join(capsys.readouterr().out.split())
+        assert ("as ms are for s, divide them by 1000" in told) is (times != 1)
+
+
 def far_and_near() -> Scene:
     """A mass at a wall 1e9 away, whose motion is some ulp of its place, beside one at the origin."""
     return clean.scene(

@@ -312,7 +312,7 @@ COMMANDS = (
         argument("-o", "--output", metavar="MY.toml", help="write it there, where nothing is yet"),
     )),
     Command("explain", "a check, scheme, fault or finding in words", _explain, (
-        argument("word", metavar="NAME", help="a check, scheme, engine:method, fault or finding"),
+        argument("word", metavar="NAME", help="a check, scheme, engine:method, fault, finding or term"),
         ENGINE,
     )),
     Command("identify", "which scheme made a trajectory, ours or anyone's", _identify, (

@@ -15,6 +15,7 @@ import numpy as np
 from springcheck import checks, engines, schemes
 from springcheck.checks.seeds import SEEDED
 from springcheck.errors import SpringcheckError
+from springcheck.physics import terms
 from springcheck.schemes import Scheme
 from springcheck.studies.faults.seeded import Fault
 from springcheck.studies.faults.table import FAULTS
@@ -73,6 +74,8 @@ def lines(name: str) -> Iterator[str]:
 
     parts = [_fault(fault) for fault in FAULTS if fault.name == name]
     parts += [meaning_lines(MEANINGS[name])] if name in MEANINGS else []
+    of_terms = terms.known()
+    parts += [iter([_line(f"{name}, a term: {inspect.getdoc(of_terms[name])}")])] if name in of_terms else []
     if parts:
         return chain(parts[0], *(chain([""], part) for part in parts[1:]))
     said = word(name)
@@ -84,12 +87,14 @@ def lines(name: str) -> Iterator[str]:
     # engines that are not asked for have schemes of their own
     if name in schemes.known():
         return scheme_lines(schemes.scheme(name))
-    others = (*_CHECKS, *methods, *(fault.name for fault in FAULTS), *MEANINGS, *WORDS)
+    others = (*_CHECKS, *methods, *(fault.name for fault in FAULTS), *MEANINGS, *of_terms, *WORDS)
     near = schemes.meant(name, others)
+    every = (
+        f"; `springcheck list` names checks and methods, `springcheck faults` faults; terms are "
+        f"{', '.join(of_terms)}; words are {', '.join(WORDS)}"
+    )
     raise SpringcheckError(
-        f"{name!r} is no check, scheme, method, fault, finding or word{near}; `springcheck list` names "
-        f"checks and methods, `springcheck faults` faults; findings are {', '.join(MEANINGS)}; schemes are "
-        f"{', '.join(known)}; words are {', '.join(WORDS)}"
+        f"{name!r} is no check, scheme, method, fault, finding, term or word{near or every}"
     )
 
 

@@ -232,7 +232,7 @@ def as_trajectory(
     StoreError where they are not of the scene: another number of particles, other times, another start.
     """
     start.contradicted(path, states, scene)
-    notes, taken, q, moved = [*states.notes], dict[str, str](), states.q, 0.0
+    notes, taken, q, moved = [*states.notes, *start.clock(states, scene)], dict[str, str](), states.q, 0.0
     other = states.p if states.p is not None else np.asarray(states.v)
     for name, values in (("positions", q), ("momenta" if states.p is not None else "velocities", other)):
         good = np.isfinite(values).all(axis=1)

@@ -48,6 +48,21 @@ def contradicted(path: Path, states: States, scene: Scene) -> None:
     )
 
 
+def clock(states: States, scene: Scene) -> list[str]:
+    """A note where frames lie a power of 1000 times as far apart as in the scene, and are as many: units of
+    time are that far apart."""
+    if not len(states.t) == scene.frames > 1:
+        return []
+    times = abs(float(states.t[1] - states.t[0])) / (scene.step * scene.every)
+    whole = 1000.0 ** round(np.log10(times) / 3) if 0 < times < np.inf else 1.0
+    if whole == 1 or abs(times / whole - 1) > 1e-6:
+        return []
+    return [
+        f"as many frames as in the scene lie {whole:g} times as far apart: if the times are in another unit, "
+        f"as ms are for s, divide them by {whole:g}"
+    ]
+
+
 def differs(scene: Scene, scheme: str, states: States, q: Floats, p: Floats, every: int) -> str:
     """Explain a first frame of q, p (f, n), made from the states of a file, that is not the scene's start,
     with a remedy."""

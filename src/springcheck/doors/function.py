@@ -163,7 +163,8 @@ def _names(specs: Sequence[str]) -> list[str]:
 def _identified(function: Callable[..., Any]) -> str:
     schemes.bring(UNKNOWN)
     try:
-        found = identify_stepper(function)
+        # what it does wrong with several particles fails in the scene, beside this scheme
+        found = identify_stepper(function, single=True)
     except (MethodError, IdentificationError):
         # an error in the function is shown as it is, when it runs
         return UNKNOWN.name

@@ -145,14 +145,15 @@ def _apart(found: Format, path: Path, columns: list[str], step: float | None) ->
     with np.load(BytesIO(said), allow_pickle=False) as arrays:
         known = {name: arrays.get(name) for name in ("p", "v", "mass")}
         decimals = Fixed(*(arrays[part] for part in OF_DECIMALS)) if OF_DECIMALS[0] in arrays else None
-        unit = float(arrays["roundoff"])
-        return States(t=arrays["t"], q=arrays["q"], roundoff=unit, fixed=decimals, **known)
+        known |= {"roundoff": float(arrays["roundoff"]), "notes": tuple(arrays["notes"].tolist())}
+        return States(t=arrays["t"], q=arrays["q"], fixed=decimals, **known)
 
 
 def packed(path: Path, name: str, columns: str, step: str) -> bytes:
     """The states that a format's reader finds, as NPZ."""
     found = BY_NAME[name].read(path, json.loads(columns), float(step) if step else None)
     known: dict[str, Any] = {part: getattr(found, part) for part in ("t", "q", "p", "v", "mass", "roundoff")}
+    known["notes"] = np.array(found.notes, dtype=str)
     known |= dict(zip(OF_DECIMALS, found.fixed or (), strict=False))
     out = BytesIO()
     np.savez(out, **{part: x for part, x in known.items() if x is not None})

@@ -27,6 +27,8 @@ from springcheck.formats.numbers import of_table, shortened, states_of
 from springcheck.formats.tables import SHOWN, fixed, roundoff
 
 MOST_FRAMES = 1 << 20
+VELOCITIES = "velocities", "velocity", "vel", "velo"
+"""Names of the velocities in extended XYZ: it fixes those of ASE's momenta alone."""
 LONGEST_JSON = 1 << 25
 """Bytes of a JSON file: parsed into Python objects it takes some twenty times as much memory."""
 
@@ -61,7 +63,8 @@ def read_ase(path: Path, columns: list[str], step: float | None) -> States:
             raise StoreError(f"{path}: the number of atoms changes")
         v = []
         for i, atoms in enumerate(found):
-            bare = atoms.arrays.get("velocities", atoms.arrays.get("vel"))
+            wide = {k: x for k, x in atoms.arrays.items() if x.shape == atoms.positions.shape}
+            bare = next((x for name, x in wide.items() if name.lower() in VELOCITIES), None)
             if bare is not None or atoms.has("momenta"):
                 v.append(bare if bare is not None else atoms.get_velocities() * units.fs)
             if len(v) not in (0, i + 1):
@@ -71,7 +74,9 @@ def read_ase(path: Path, columns: list[str], step: float | None) -> States:
         told: tuple[Any, ...] = ()
         if kind == "extxyz":
             told = _written(path.read_text().splitlines(), np.repeat(units.fs / m, 3))
-        return of_frames(path, t, q, v or None, m, *told)
+        left = [] if v else [name for name in wide if name[0] in "vV"]
+        notes = tuple(f"the column {name} was not taken: named vel it is velocities" for name in left)
+        return replace(of_frames(path, t, q, v or None, m, *told), notes=notes)
 
 
 def _written(lines: list[str], of_momenta: Floats) -> tuple[float, Fixed | None]:
@@ -88,7 +93,7 @@ def _written(lines: list[str], of_momenta: Floats) -> tuple[float, Fixed | None]
     places, end = dict[str, range](), 0
     for name, width in re.findall(r"(\w+):[A-Z]:(\d+)", lines[1]):
         places[name.lower()] = range(end, end := end + int(width))
-    bare = places.get("velocities", places.get("vel"))
+    bare = next((x for name, x in places.items() if name in VELOCITIES), None)
     v = bare or places.get("momenta", range(0))
     found = fixed(rows, places.get("pos", range(0)), v)
     if found and not bare and v:

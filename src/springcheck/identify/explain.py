@@ -92,12 +92,13 @@ def _solver(e: Evidence) -> Explanation | None:
         least = min((d for _, d in alike), default=math.inf)
         if distances[near] > 30 * residual and (least < 0.1 * distances[near] or residual < FIXED):
             return None
-        size = max(residual, distances[near])
+        size, exact = max(residual, distances[near]), near.parts[0]
     return Explanation(
         f"The states are the exact solution to within {size:.1e} of their size in each frame: an adaptive "
         "solver or one of high order, which has no fixed scheme to find",
         "compare its error with its tolerance; give a smaller tolerance, or none",
         size,
+        hypothesis=exact,
     )
 
 
@@ -114,7 +115,7 @@ def _drift(e: Evidence) -> Explanation | None:
     remedy = "look for a drift that is not the velocity's, such as a removed centre-of-mass motion"
     if what == "velocity":
         remedy = "look for a constant force, or a Jacobian by differences, which rounds to one side"
-    return Explanation(cause, remedy, e.size)
+    return Explanation(cause, remedy, e.size, hypothesis=fitting[0] if fitting else None)
 
 
 def _law(e: Evidence) -> Explanation:

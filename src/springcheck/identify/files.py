@@ -46,7 +46,7 @@ FEWEST_ON_ARC = 8
 """Most frames that a circle in space, of four parameters, fits without significance."""
 
 LENGTHS = {"nm": 1.0, "Angstrom": 0.1, "angstrom": 0.1, "A": 0.1, "Å": 0.1, "pm": 1e-3, "m": 1e9, "um": 1e3}
-TIMES = {"ps": 1.0, "fs": 1e-3, "ns": 1e3, "s": 1e12, "us": 1e6}
+TIMES = {"ps": 1.0, "fs": 1e-3, "ns": 1e3, "s": 1e12, "ms": 1e9, "us": 1e6}
 """Lengths in nm and times in ps, by the names that H5MD files use."""
 
 

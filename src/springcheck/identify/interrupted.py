@@ -165,7 +165,8 @@ def few_bad_frames(e: Evidence) -> Explanation | None:
             f"The motion is one{whose}, but not in frames {bad[0]} to {bad[-1] + 1}, where it is largest: "
             "too few to tell whether the force is anharmonic, or the step or a force changes in time"
         )
-    return Explanation(cause, remedy, after / before, local=True)
+    own = fitting[0] if len(fitting) == 1 and whose else None
+    return Explanation(cause, remedy, after / before, local=True, hypothesis=own)
 
 
 def two_parts(e: Evidence) -> Explanation | None:

@@ -121,8 +121,8 @@ def _of_coordinates(
 
 
 def _unknown(seen: Measured, strides: range) -> Identification:
-    """Identification without a scheme: causes, and the nearest scheme of these strides unless velocities have
-    the wrong sign."""
+    """Identification without a scheme: causes, with the numbers of the one scheme that the first names, and
+    the nearest scheme of these strides unless velocities have the wrong sign."""
     maps = seen.maps
 
     def distance(joint: Joint) -> float:
@@ -138,12 +138,14 @@ def _unknown(seen: Measured, strides: range) -> Identification:
         # many schemes and strides come close by chance; the simplest of the close ones is the better guess
         close = min((x for x in tried if distance(x) <= 10 * least), key=lambda x: x.simplicity)
         near = {"nearest": str(close), "difference": difference(maps[0], close.parts[0])}
-        if not any(part.turns for part in close.parts):
-            # what is near by whole turns that nothing asks for has none of the states' numbers
-            near["omega"], near["stiffness"], _ = seen.numbers(close)
+    causes = explain(seen)
+    if (of := causes[0].hypothesis) and len(maps) == 1:
+        # what is only near has none of the states' numbers
+        own = Joint(family=of.family, stride=of.stride, parts=(of,))
+        near["omega"], near["stiffness"], _ = seen.numbers(own)
     determinant, symplectic = determinants(maps, 1)
     return nothing(
-        explain(seen),
+        causes,
         determinant=determinant,
         symplectic_defect=symplectic,
         defect_ulp=max(float(np.max(found.residual)) for found in maps) / 2.0**-52,

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 from springcheck.thermal.catalogue import family_of
 
 if TYPE_CHECKING:
+    from springcheck.identify.hypothesis import Match
     from springcheck.text.lines import Lines
 
 Verdict: TypeAlias = Literal["named", "not told apart", "none", "adaptive"]
@@ -52,6 +53,8 @@ class Explanation:
     """Whether it leaves no noise to explain: misplaced numbers, or residuals that are only rounding."""
     shown: bool = field(default=True, kw_only=True)
     """Whether the states show it: else it says why they show none."""
+    hypothesis: Match | None = field(default=None, kw_only=True, repr=False)
+    """The fit of the one scheme that it names, whose numbers the states have."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -139,9 +142,10 @@ class Identification:
 
     def refuted(self, statement: str, *because: Explanation) -> Identification:
         """Copy without candidates, since something else made the states."""
+        unknown = (math.nan,) * len(self.omega)
         return replace(
             self, verdict="none", scheme=None, aliases=(), candidates=(), fits=False, statement=statement,
-            explanations=because,
+            explanations=because, omega=unknown, stiffness=None, friction=unknown,
         )  # fmt: skip
 
     def document(self) -> dict[str, Any]:
@@ -180,7 +184,7 @@ SCALARS = ("omega", "stiffness", "friction", "determinant")
 
 def _plain(x: Any, name: str = "") -> Any:
     if isinstance(x, dict):
-        return {key: _plain(value, key) for key, value in x.items()}
+        return {key: _plain(value, key) for key, value in x.items() if key != "hypothesis"}
     if isinstance(x, float):
         return x if math.isfinite(x) else None
     if isinstance(x, tuple | list):

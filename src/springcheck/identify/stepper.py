@@ -11,6 +11,7 @@ import numpy as np
 
 from springcheck.errors import IdentificationError, MethodError, told
 from springcheck.identify.families import title
+from springcheck.identify.pair import Timeless, on_a_pair
 from springcheck.identify.report import identify_arrays
 from springcheck.identify.result import Explanation, Identification
 from springcheck.identify.taken import takers
@@ -49,24 +50,12 @@ WELL = (1.3, 2.1, 1.1, 0.4, 2.0)
 """m, b, q0, p0 and duration on V = b/4 q**4, a quarter of whose time scale passes in a unit of time."""
 
 
-class _Timeless:
-    """A force that may be asked for at a time, of which it knows nothing."""
-
-    t = 0.0
-
-    def __init__(self, law: Callable[..., Any]) -> None:
-        self._law = law
-
-    def __call__(self, q: Any, p: Any = 0.0, t: float = 0.0) -> Any:
-        return self._law(q, p)
-
-
 def _one(
     step: Stepper, q: float, p: float, h: float, force: Callable[..., Any], mass: float
 ) -> tuple[float, float]:
     """One step of the stepper on numbers, or on arrays of one particle where it needs to index them.  Raises
     MethodError."""
-    force = _Timeless(force)
+    force = Timeless(force)
     try:
         try:
             out = step(q, p, h, force, mass)
@@ -128,13 +117,14 @@ def _step(
     return _one(step, 1.3, 0.7 * m, h or long, force or _spring(k), m)
 
 
-def identify_stepper(step: Stepper) -> Identification:
+def identify_stepper(step: Stepper, *, single: bool = False) -> Identification:
     """Which scheme a callable ``step(q, p, h, force, mass) -> (q, p)`` is, and what is wrong with it.
 
     It is run on three springs of uneven mass, stiffness and step, backwards in time, and on a quartic
-    potential: a spring alone can overestimate the order of a scheme.  ``force`` may be called as force(q),
-    force(q, p) or force(q, p, t); ``force.t`` is the time at which the step starts.  The numbers are those of
-    the first spring. Raises MethodError where the callable fails or returns no pair of finite numbers.
+    potential: a spring alone can overestimate the order of a scheme; and with two unlike particles at once,
+    unless `single`.  ``force`` may be called as force(q), force(q, p) or force(q, p, t); ``force.t`` is the
+    time at which the step starts.  The numbers are those of the first spring. Raises MethodError where the
+    callable fails or returns no pair of finite numbers.
     """
     results: list[Identification] = []
     for spring in SPRINGS:
@@ -170,15 +160,23 @@ def identify_stepper(step: Stepper) -> Identification:
             f"On a spring it is {found.scheme}, of order {known.order}, but not on forces that are not linear"
         )
         wrong.append(Explanation(cause, "look for a force that is evaluated at the wrong place"))
+    alone = []
+    if found.scheme and found.fits and not (wrong or single):
+        try:
+            wrong += on_a_pair(step, [found.scheme, *found.aliases])
+        except MethodError as error:
+            alone = [f"tried with one particle alone: {error}"]
     if found.scheme and found.fits and not wrong:
         found = _on_a_well(step, found)
+    # one remark of each kind: other springs have other numbers
+    remarks = [note for x in results if x is results[0] or not x.fits for note in x.notes]
     return replace(
         found,
         fits=found.fits and not wrong,
         statement=wrong[0].cause if wrong else found.statement,
         # what the other springs refute is no explanation any more
         explanations=(*wrong, *found.explanations[1 if wrong and _parametric(found) else 0 :]),
-        notes=tuple(dict.fromkeys([*(note for x in results for note in x.notes), order])),
+        notes=tuple(dict.fromkeys([*remarks, *alone, order])),
         defect_ulp=max(x.defect_ulp for x in results),
     )
 

@@ -20,7 +20,7 @@ from springcheck.identify.families import (
     title,
     titles,
 )
-from springcheck.identify.hypothesis import SURE, Joint, distinct, same_map
+from springcheck.identify.hypothesis import SURE, Joint, Match, distinct, same_map
 from springcheck.identify.result import Explanation
 from springcheck.identify.storage import ROUNDING
 from springcheck.identify.unknown import MAP_OF, ONE_MAP, by_parameter, misfit
@@ -49,10 +49,12 @@ def wrong_map(e: Evidence) -> list[Explanation]:
     for joint in compare([e.found], [e.terms], _faults(), range(1, 5)):
         family = FAMILIES[joint.family]
         steps = "" if joint.stride == 1 else f", {joint.stride} steps to a frame"
-        ranked.append((_rank(e, joint), Explanation(f"{family.cause}{steps}", family.remedy, joint.misfit)))
+        cause = f"{family.cause}{steps}"
+        found = Explanation(cause, family.remedy, joint.misfit, hypothesis=joint.parts[0])
+        ranked.append((_rank(e, joint), found))
     if fitting:
         own = [x for rank, x in ranked if rank == 0 and e.stiffness is not None]
-        return own or [_departing(e, title(fitting[0].scheme))]
+        return own or [_departing(e, fitting)]
     ranked += [(2, x) for x in _negative_friction(e)]
     scaled, certain = _scales(e)
     if certain and (other := by_parameter(e)):
@@ -60,9 +62,8 @@ def wrong_map(e: Evidence) -> list[Explanation]:
         scaled = [replace(x, cause=f"{ONE_MAP}: {MAP_OF}{other}; or {x.cause}") for x in scaled]
     if certain and ranked and min(ranked, key=lambda pair: pair[0])[0] == 0:
         # a drift of half the step, say, is one in twice the mass
-        ranked = [
-            (r, replace(x, cause=f"{x.cause}; or {scaled[0].cause}") if r == 0 else x) for r, x in ranked
-        ]
+        also = f"; or {scaled[0].cause}"
+        ranked = [(r, replace(x, cause=x.cause + also, hypothesis=None) if r == 0 else x) for r, x in ranked]
     # factors that mean nothing, one for each of several schemes, say less than the kind of the map
     ranked += (
         [(1, x) for x in scaled] if certain else [(4, x) for x in (misfit(e), *scaled)] if scaled else []
@@ -70,13 +71,14 @@ def wrong_map(e: Evidence) -> list[Explanation]:
     return [x for _, x in sorted(ranked, key=lambda pair: pair[0])]
 
 
-def _departing(e: Evidence, scheme: str) -> Explanation:
+def _departing(e: Evidence, fitting: list[Match]) -> Explanation:
     size = float(np.max(np.abs(e.residuals)))
     return Explanation(
-        f"The map is {scheme}'s, but single steps depart from it by up to {size:.1e} of the state's "
-        "size, which no arithmetic that is known explains",
+        f"The map is {title(fitting[0].scheme)}'s, but single steps depart from it by up to {size:.1e} of "
+        "the state's size, which no arithmetic that is known explains",
         "look at what is rounded in a step beside positions, velocities and forces",
         size,
+        hypothesis=fitting[0],
     )
 
 
@@ -101,7 +103,7 @@ def _negative_friction(e: Evidence) -> list[Explanation]:
     best = min(joints, key=lambda x: x.simplicity)
     rate = best.parts[0].g * best.stride / float(e.record.interval)
     cause = f"{title(best.scheme)} with a negative friction, c/m = {rate:.4g}, which feeds energy in"
-    return [Explanation(cause, "change the sign of the damping force", best.misfit)]
+    return [Explanation(cause, "change the sign of the damping force", best.misfit, hypothesis=best.parts[0])]
 
 
 def _either_way(factor: float, meaning: str) -> tuple[tuple[float, str], tuple[float, str]]:
