@@ -18,7 +18,7 @@ BUDGETS = {
     ("engines",): 2816,
     ("driver", "conformance", "doors"): 1213,
     ("checks",): 5232,
-    ("identify",): 9206,
+    ("identify",): 9258,
     ("formats", "store"): 5261,
     ("studies",): 1453,
     ("studies/*",): 9760,

@@ -34,7 +34,9 @@ def judged(
     remarks: list[str] = []
     stride = stated_stride(record, step, remarks)
     if step is not None and stride is not None and stride > 0 and record.vague:
-        record = replace(record, interval=stride * np.longdouble(step))
+        # momenta of an unknown mass show no interval that could be another
+        jitter = 0.0 if record.momenta else record.jitter
+        record = replace(record, interval=stride * np.longdouble(step), jitter=jitter)
     of, moving, maps, notes = _oscillators(record)
     if of is not record:
         stated = None

@@ -17,6 +17,7 @@ from springcheck.identify.candidates import (
     stated_stiffness,
     steps_between,
 )
+from springcheck.identify.coarse import over_single
 from springcheck.identify.evidence import Measured
 from springcheck.identify.families import FAMILIES, MOST_TITLES, title, titles
 from springcheck.identify.fit import Map
@@ -57,6 +58,14 @@ def named(seen: Measured, explained: Explained, step: float | None) -> Identific
     stated_fits = stride is None
     if stride is not None and stride > 0:
         agreeing = [x for x in joints if x.stride == stride or x.scheme == "exact"]  # which has no step
+        if seen.vague and step is not None:
+            # the step of a clock in single precision is in that, too
+            exactly, short = (
+                [x for x in agreeing if all(abs(y.log_mass - off) <= y.interval_room for y in x.parts)]
+                for off in (0.0, float(np.log(over_single(step))))
+            )
+            agreeing = exactly or short
+            seen = seen.at_stated_times() if exactly else seen
         joints, stated_fits = agreeing or joints, bool(agreeing)
         if not agreeing:
             seen = seen.noting(f"with the stated step {step:.9g}, {stride} to a frame, no known scheme fits")
