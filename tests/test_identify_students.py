@@ -77,7 +77,7 @@ def test_times_of_few_digits_beside_states_of_all_name_no_wrong_scheme_step_or_s
     found = seen(rows, mass=M)
     right = next(x for x in found.candidates if (x.scheme, x.stride) == (name, 1))
     assert (right.step, *(right.stiffness or ())) == pytest.approx((h, K), rel=1e-12)
-    for stated in ({"stiffness": K}, {"step": h}, {"stiffness": K, "step": h}):
+    for stated in ({"stiffness": K}, {"step": h}, {"step": float(f"{h:.9g}"), "stiffness": K}):
         found = seen(rows, mass=M, **stated)
         assert found.fits
         assert (found.scheme, found.stride) == (name, 1)

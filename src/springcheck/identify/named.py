@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from springcheck.identify.arithmetic import SINGLE
 from springcheck.identify.candidates import (
     all_remarks,
     candidates_of,
@@ -17,7 +18,6 @@ from springcheck.identify.candidates import (
     stated_stiffness,
     steps_between,
 )
-from springcheck.identify.coarse import over_single
 from springcheck.identify.evidence import Measured
 from springcheck.identify.families import FAMILIES, MOST_TITLES, title, titles
 from springcheck.identify.fit import Map
@@ -58,11 +58,11 @@ def named(seen: Measured, explained: Explained, step: float | None) -> Identific
     stated_fits = stride is None
     if stride is not None and stride > 0:
         agreeing = [x for x in joints if x.stride == stride or x.scheme == "exact"]  # which has no step
-        if seen.vague and step is not None:
-            # the step of a clock in single precision is in that, too
+        if seen.vague:
+            # with a clock in single precision the step may be in that, too, and nobody types more digits
             exactly, short = (
-                [x for x in agreeing if all(abs(y.log_mass - off) <= y.interval_room for y in x.parts)]
-                for off in (0.0, float(np.log(over_single(step))))
+                [x for x in agreeing if all(abs(y.log_mass) <= y.interval_room + room for y in x.parts)]
+                for room in (0.0, SINGLE)
             )
             agreeing = exactly or short
             seen = seen.at_stated_times() if exactly else seen
