@@ -18,7 +18,7 @@ BUDGETS = {
     ("engines",): 2816,
     ("driver", "conformance", "doors"): 1214,
     ("checks",): 5232,
-    ("identify",): 9074,
+    ("identify",): 9129,
     ("formats", "store"): 5267,
     ("studies",): 1444,
     ("studies/*",): 9760,

@@ -67,19 +67,96 @@ def test_the_frame_at_which_a_restart_takes_another_step_is_named() -> None:
 
 @pytest.mark.parametrize(("h", "form"), [(1 / 30, ".3f"), (1 / 3, ".1f"), (math.pi / 50, ".4f")])
 @pytest.mark.parametrize("step", [verlet, kick_drift])
-def test_times_of_few_digits_beside_states_of_all_name_no_wrong_cause(
+def test_times_of_few_digits_beside_states_of_all_name_no_wrong_scheme_step_or_stiffness(
     h: float, form: str, step: Step
 ) -> None:
-    rows = states(step, h)
+    """The states show the interval of each scheme, and whose it is where it is stated, or the stiffness."""
+    rows = states(step, h, 31)
     rows[:, 0] = rounded(rows[:, 0], form)
-    for stated in ({}, {"mass": M}, {"mass": M, "stiffness": K}):
-        found = seen(rows, **stated)
-        assert "times are written too coarsely" in found.statement
-        assert "--step" in found.explanations[0].remedy
     name = {verlet: "velocity-verlet", kick_drift: "semi-implicit-euler"}[step]
-    found = seen(rows, mass=M, stiffness=K, step=h)
-    assert found.fits
-    assert found.scheme == name
+    found = seen(rows, mass=M)
+    right = next(x for x in found.candidates if (x.scheme, x.stride) == (name, 1))
+    assert (right.step, *(right.stiffness or ())) == pytest.approx((h, K), rel=1e-12)
+    for stated in ({"stiffness": K}, {"step": h}, {"step": float(f"{h:.9g}"), "stiffness": K}):
+        found = seen(rows, mass=M, **stated)
+        assert found.fits
+        assert (found.scheme, found.stride) == (name, 1)
+        assert (found.step, *(found.stiffness or ())) == pytest.approx((h, K), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    "stated", [{"stiffness": 1.001 * K}, {"step": 0.333}, {"step": 1 / 3, "stiffness": 3.0}]
+)
+def test_what_is_stated_beside_coarse_times_is_held_to_the_digits_of_the_states(
+    stated: dict[str, float],
+) -> None:
+    rows = states(kick_drift, 1 / 3, 31)
+    rows[:, 0] = rounded(rows[:, 0], ".1f")
+    assert not seen(rows, mass=M, **stated).fits
+    # momenta alone show no interval, and no number that follows from it
+    found = identify(rows[:, 0], rows[:, 1], M * rows[:, 2], **stated)
+    assert ("step" in stated) != any("no frequency or stiffness to more" in x for x in found.notes)
+
+
+def test_steps_that_coarse_times_leave_open_are_not_named_by_chance() -> None:
+    """Forest & Ruth's map is velocity Verlet's in any number of steps, at an interval longer by 1e-5."""
+
+    def forest_ruth(q: float, v: float, h: float) -> tuple[float, float]:
+        w = 1 / (2 - 2 ** (1 / 3))
+        for drift, kick in ((w / 2, w), ((1 - w) / 2, 1 - 2 * w), ((1 - w) / 2, w), (w / 2, 0.0)):
+            q += drift * h * v
+            v -= kick * h * K * q / M
+        return q, v
+
+    rows = states(forest_ruth, 0.13007, 16)
+    rows[:, 0] = rounded(rows[:, 0], ".4g")
+    found = seen(rows, mass=M)
+    assert (found.scheme, found.verdict) == (None, "not told apart")
+    assert {("forest-ruth", 1), ("velocity-verlet", 3)} <= {(x.scheme, x.stride) for x in found.candidates}
+    assert "more digits of the times" in found.notes[-1]
+    assert seen(rows, mass=M, stiffness=K).scheme == seen(rows, mass=M, step=0.13007).scheme == "forest-ruth"
+
+
+def test_two_springs_have_one_interval_which_tells_schemes_apart_that_coarse_times_leave_open() -> None:
+    rows, other = (states(lambda q, v, h, k=k: verlet(q, v, h, k), 1 / 30, 31) for k in (K, 4 * K))
+    t, both = rounded(rows[:, 0], ".3f"), np.stack([rows, other], axis=2)
+    found = identify(t, both[:, 1], v=both[:, 2], mass=M)
+    assert (found.scheme, found.stride, found.step) == (
+        "velocity-verlet",
+        1,
+        pytest.approx(1 / 30, rel=1e-12),
+    )
+    assert found.stiffness == pytest.approx((K, 4 * K), rel=1e-12)
+
+
+def test_coarse_times_of_frames_more_than_half_a_turn_apart_turn_no_velocity() -> None:
+    def midpoint(q: float, v: float, h: float) -> tuple[float, float]:
+        return q + h * (v - h / 2 * K * q / M), v - h * K / M * (q + h / 2 * v)
+
+    rows = states(midpoint, 0.4109, 251)[::10]
+    rows[:, 0] = rounded(rows[:, 0], ".3g")
+    found = seen(rows, mass=M)
+    assert (found.scheme, found.stride, found.step) == ("rk2-midpoint", 10, pytest.approx(0.4109, rel=1e-13))
+
+
+def test_a_clock_in_single_precision_makes_no_digits_of_the_stiffness() -> None:
+    rows = states(verlet, 0.031, 41)
+    clock = np.cumsum(np.r_[0, np.full(40, 0.031)].astype(np.float32), dtype=np.float32)
+    found = identify(clock.astype(np.float64), *rows.T[1:2], v=rows[:, 2], mass=M)
+    assert found.scheme == "velocity-verlet"
+    assert (found.step, *(found.stiffness or ())) == pytest.approx((0.031, K), rel=1e-12)
+    assert found.notes[0].startswith("the times show the step to 5e-07 of it")
+    # a clock in single precision may stand for a step in it
+    rows = states(verlet, float(np.float32(0.1)), 41)
+    clock = np.cumsum(np.r_[0, np.full(40, 0.1)].astype(np.float32), dtype=np.float32)
+    for step in (0.1, float(np.float32(0.1))):
+        found = identify(clock.astype(np.float64), rows[:, 1], v=rows[:, 2], mass=M, stiffness=K, step=step)
+        assert (found.fits, found.stiffness) == (True, pytest.approx((K,), rel=1e-12))
+    # the first multiples of some such steps need no rounding, and all the same the step has
+    clock = np.float32(0.19716) * np.arange(13.0)
+    found = seen(np.c_[clock, states(verlet, 0.09858, 25)[::2, 1:]], mass=M)
+    assert (found.scheme, found.stride) == ("velocity-verlet", 2)
+    assert found.step == pytest.approx(0.09858, rel=1e-12)
 
 
 @pytest.mark.parametrize("form", [".17g", ".7g"])

@@ -15,7 +15,7 @@ from springcheck.identify.evidence import SINGLE_ROOM, Measured
 from springcheck.identify.families import FAMILIES, title, titles
 from springcheck.identify.hypothesis import Joint, aliases, frictionless
 from springcheck.identify.notes import LEAPFROG, hidden_friction, same_maps, untold
-from springcheck.identify.record import Record
+from springcheck.identify.record import DEEP, Record
 from springcheck.identify.result import Candidate, Explanation, Identification
 from springcheck.identify.search import coincident
 from springcheck.identify.wrong import stiffness_ratio
@@ -195,7 +195,7 @@ def candidates_of(seen: Measured, joint: Joint) -> list[Candidate]:
                 continue
         out.append(Candidate(
             scheme=joint.scheme, aliases=other_names(joint.scheme, damped=joint.damped), stride=joint.stride,
-            step=float(record.interval) / joint.stride, turns=max(part.turns for part in joint.parts),
+            step=seen.step(joint), turns=max(part.turns for part in joint.parts),
             omega=omega, stiffness=stiffness, friction=friction, law=f"{law} {family.place}".strip(),
         ))  # fmt: skip
     return out
@@ -217,6 +217,10 @@ def all_remarks(seen: Measured, joints: list[Joint], candidates: tuple[Candidate
     scheme = common([x.scheme for x in candidates])
     if scheme in LEAPFROG:
         out.append(f"the same map is {LEAPFROG[scheme]}: states alone do not tell the two apart")
+    jitter = seen.record.jitter if seen.record.vague and seen.stride is None else 0.0
+    if jitter > DEEP and (scheme or not seen.vague):
+        whose = "its digits are the scheme's" if seen.vague else "no frequency or stiffness to more"
+        out.append(f"the times show the step to {jitter:.0e} of it, and {whose}")
     damped = law_assumed(candidates)
     out += damped
     if not (damped or seen.record.fine):

@@ -70,6 +70,9 @@ def clock_of(t: Floats) -> Clock:
             "give a part of the trajectory with one interval"
         )
     jitter = quantum / abs(float(span)) + ROUNDING
+    if single and quantum == even and float(f"{interval:.{SHORT_STEP}g}") != interval:
+        # a step of single precision has even multiples too, and was rounded to it with its times
+        jitter += 2.0**-24
     binary = quantum in grids[: 1 + single]
     mean, line = interval, wide - wide[0] - np.arange(len(t)) * interval
     # a sum of steps, each rounded: its mean is off by as much as they differ

@@ -39,7 +39,7 @@ class Target:
         self.observed = found.entries.reshape(4)
         self.ratio = found.size[1] / found.size[0]
         self.largest = max(1.0, float(np.max(np.abs(self.observed))))
-        shear = terms.jitter * self.observed.astype(np.float64) * [0, 1, -1, 0]
+        shear = (0 if terms.vague else terms.jitter) * self.observed.astype(np.float64) * [0, 1, -1, 0]
         bias = terms.bias * np.repeat(found.residual, 2)
         values, self.axes = np.linalg.eigh(found.covariance + np.outer(shear, shear) + np.diag(bias**2))
         self.variance = np.maximum(values, 1e-15 * values[-1])
@@ -77,11 +77,14 @@ def matches(
             return []
         # the scale of velocities is as uncertain as the interval, and where it is known, that of a number in
         # single precision
-        roots.error += terms.jitter + terms.bias * float(np.max(found.residual))
+        roots.error += terms.bias * float(np.max(found.residual))
         roots.error += terms.rounding * 20 * float(np.max(roots.s))
         roots.error += float(np.max(np.abs(terms.scales), initial=0.0))
         free_scale = terms.mass_unknown
-        x = first(every, roots, growing=terms.growing, free_scale=free_scale, far=far)
+        near = replace(roots, error=roots.error + terms.jitter)
+        x = first(every, near, growing=terms.growing, free_scale=free_scale, far=far)
+        # an interval that each hypothesis sets for itself leaves no error to the entries
+        roots, free_scale = (roots, True) if terms.vague else (near, free_scale)
         if not all(family.flow for family in families):
             # an exact solution has the phase and the determinant of the root from the start
             x = polished(every, roots, x, free_scale=free_scale, far=far)
@@ -97,9 +100,9 @@ def solved(
     all); with `every_turn` for each number of turns and each spring."""
     terms = target.terms
     free = [0, 1] if every.damped else [0]
-    if terms.mass_unknown and terms.log_stiffness is None:
+    if terms.vague or (terms.mass_unknown and terms.log_stiffness is None):
         free.append(2)
-    freedom = len(target.observed) - len(free)
+    freedom = len(target.observed) + terms.vague - len(free)
     s = roots.s[x.root]
     values = np.stack([x.a, x.g, np.zeros_like(x.a)])
     if roots.error < COARSE_ERROR:
@@ -113,7 +116,8 @@ def solved(
     def left(values: Reals) -> tuple[Reals, Floats]:
         entries = target.entries(every, x, s, values)
         off = (target.observed[:, None] - entries).astype(np.float64)
-        return entries, target.axes.T @ off * weight
+        known = [values[2].astype(np.float64) / terms.jitter] if terms.vague else []
+        return entries, np.vstack([target.axes.T @ off * weight, *known])
 
     entries, r = left(values)
     chi2 = np.sum(r**2, axis=0)
@@ -142,7 +146,9 @@ def solved(
             break
     values, entries, chi2 = best
     good = np.isfinite(chi2) & np.all(np.isfinite(entries), axis=0)
-    good &= (chi2 <= most(freedom)) | far
+    # a rounding of times is bounded: by chance an interval is off by its jitter at most
+    timed = np.abs(values[2]) <= terms.jitter if terms.vague else True
+    good &= (chi2 <= most(freedom)) & timed | far
     if every.damped and not terms.growing:
         good &= (values[1] > 0) | every.held[x.which]
     kept: dict[tuple[Any, ...], tuple[float, float, int]] = {}
@@ -152,7 +158,8 @@ def solved(
             # one number of turns, to the left or right and on each branch of a scheme, is several springs
             key += tuple(f"{float(y):.6g}" for y in values[:2, i])
         # a free scale of velocities lets steps of several lengths fit: the shortest is the simplest
-        close = abs(float(values[0, i])) if free[-1] == 2 and freedom <= 2 else float(chi2[i])
+        scaled = free[-1] == 2 and freedom <= 2 and not terms.vague
+        close = abs(float(values[0, i])) if scaled else float(chi2[i])
         turns = float(roots.turns[x.root[i]])
         rank = (0.0 if far else turns), close, i
         kept[key] = min(kept.get(key, rank), rank)

@@ -59,7 +59,8 @@ class Measured:
 
     def compare(self, families: tuple[Family, ...], strides: Iterable[int]) -> list[Joint]:
         """Hypotheses that agree with all oscillators."""
-        return compare(self.maps, self.terms, families, strides)
+        joints = compare(self.maps, self.terms, families, strides)
+        return [x for x in joints if x.of_one_interval] if self.vague else joints
 
     def evidence(self, i: int) -> Evidence:
         """Evidence of one oscillator, by its index in `moving`."""
@@ -70,11 +71,26 @@ class Measured:
             others=tuple(self.maps[:i] + self.maps[i + 1 :]),
         )  # fmt: skip
 
+    @property
+    def vague(self) -> bool:
+        """Whether the maps show the interval more exactly than the times."""
+        return any(x.vague for x in self.terms)
+
+    def at_stated_times(self) -> Measured:
+        """Copy whose interval is known."""
+        known = [replace(x, vague=False, jitter=0.0) for x in self.terms]
+        return replace(self, terms=known, record=replace(self.record, jitter=0.0))
+
+    def step(self, joint: Joint) -> float:
+        """The step [T], by the map where the times are vague."""
+        longer = math.exp(-joint.parts[0].log_mass) if self.vague else 1.0
+        return float(self.record.interval) * longer / joint.stride
+
     def numbers(
         self, chosen: Joint, law: str = ""
     ) -> tuple[tuple[float, ...], tuple[float, ...] | None, tuple[float, ...]]:
         """Frequency [1/T], stiffness [M/T2] and friction rate [1/T] by this law, of each oscillator."""
-        h = float(self.record.interval) / chosen.stride
+        h = self.step(chosen)
         family = FAMILIES[chosen.family]
         law = law or (family.laws[0] if family.laws else "")
         omega = tuple(math.sqrt(m.a) / abs(h) if m.a > 0 else math.nan for m in chosen.parts)
@@ -103,10 +119,11 @@ class Measured:
         assert stated is not None
         out = []
         for j, part, k in zip(self.moving, joint.parts, stiffness or (), strict=False):
-            error = part.a_room + 2 * record.jitter + 4 * FAMILIES[joint.family].path * ROUNDING + room
+            open_ = 2 * part.interval_room if self.vague else 2 * record.jitter
+            error = part.a_room + open_ + 4 * FAMILIES[joint.family].path * ROUNDING + room
             error += 0.0 if record.fine else SINGLE_ROOM
             # a step or a mass in single precision moves the stiffness that is worked out with the stated one
-            error += 0.0 if record.momenta else 3 * abs(part.log_mass)
+            error += 0.0 if record.momenta or self.vague else 3 * abs(part.log_mass)
             if quantum:
                 error += 2 * quantum * (1 + 1 / (abs(k) * float(np.sqrt(np.mean(record.q[:, j] ** 2)))))
             off = k / float(stated[j]) - 1 if stated[j] else math.inf

@@ -25,7 +25,7 @@ from springcheck.identify.interrupted import broken, few_bad_frames, two_parts
 from springcheck.identify.laws import Regression, alone, explained_by, regression
 from springcheck.identify.misplaced import misplaced, turned
 from springcheck.identify.result import Explanation
-from springcheck.identify.unknown import ONE_MAP, lasting, memory, misfit
+from springcheck.identify.unknown import lasting, memory, misfit
 from springcheck.identify.wrong import wrong_map
 from springcheck.text.wording import count
 
@@ -51,13 +51,7 @@ def explain(seen: Measured) -> tuple[Explanation, ...]:
     if out := turned(seen.record, seen.moving) or _drift(evidence):
         return (out,)
     if np.max(evidence.excess) <= LINEAR_LEAVES:
-        if not seen.record.vague:
-            return tuple(wrong_map(evidence)) or (misfit(evidence),)
-        return (Explanation(
-            f"{ONE_MAP}, but the times are written too coarsely to say whose: they leave the step open by "
-            f"{seen.record.jitter:.1e} of it, and the states have all their digits",
-            "write the times with all their digits as well, or state the step with all of its (--step)",
-        ),)  # fmt: skip
+        return tuple(wrong_map(evidence)) or (misfit(evidence),)
     found = (look(evidence) for look in SEARCHED)
     return (next(filter(None, found), None) or _law(evidence),)
 

@@ -43,6 +43,8 @@ class Terms:
     """Whether the scale of the velocities is one more unknown, the log of the mass."""
     jitter: float = 0.0
     """Relative uncertainty of the interval, and of a step or a mass that may be in single precision."""
+    vague: bool = False
+    """Whether the interval, which scales the velocities, is one more unknown with an error of `jitter`."""
     log_stiffness: float | None = None
     """log(k T**2) where the stiffness is known and the mass is not, which then follows from a."""
     rounding: float = ROUNDING
@@ -84,6 +86,11 @@ class Match:
         return SURE * self.a_error / abs(self.a)
 
     @property
+    def interval_room(self) -> float:
+        """Relative error of an interval that the map shows, at `SURE` standard errors, and its roundings."""
+        return SURE * self.mass_error + 4 * FAMILIES[self.family].path * self.stride * ROUNDING
+
+    @property
     def friction(self) -> float:
         """gamma h, and 0 of a held force, whose g is a share."""
         return 0.0 if FAMILIES[self.family].held else self.g
@@ -109,6 +116,12 @@ class Joint:
     def misfit(self) -> float:
         """Distance from the measured maps, in standard errors."""
         return math.sqrt(self.chi2)
+
+    @property
+    def of_one_interval(self) -> bool:
+        """Whether all maps show the same interval, where each is free to show its own."""
+        own = [(x.log_mass, x.interval_room) for x in self.parts]
+        return all(abs(y - own[0][0]) <= room + own[0][1] for y, room in own)
 
     @property
     def damped(self) -> bool:

@@ -31,7 +31,9 @@ def judged(
     """Select the oscillators that can be judged, and check stated numbers.  Raises IdentificationError."""
     stiff, stride, remarks = stated(record, stiffness, friction, step)
     if step is not None and stride is not None and stride > 0 and record.vague:
-        record = replace(record, interval=stride * np.longdouble(step))
+        # momenta of an unknown mass show no interval that could be another
+        jitter = 0.0 if record.momenta else record.jitter
+        record = replace(record, interval=stride * np.longdouble(step), jitter=jitter)
     of, moving, maps, notes = _oscillators(record)
     if of is not record:
         stiff = None

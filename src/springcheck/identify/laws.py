@@ -192,7 +192,7 @@ def _two_maps(e: Evidence, _: Regression) -> str:
     halves = [fit(e.record, e.j, kept=mask) for mask in (~odd, odd)]
     left = max(float(np.max(x.residual)) for x in halves)
     dets = [float(np.linalg.det(x.entries.astype(np.float64))) - 1 for x in halves]
-    loose = replace(e.terms, mass_unknown=True)
+    loose = replace(e.terms, mass_unknown=True, vague=False)
     found = [matched(x, loose) for x in halves]
     one, other = ({m.scheme: m for m in reversed(x)} for x in found)
     both = list(dict.fromkeys(m.scheme for m in found[0] if m.scheme in other))

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from springcheck.identify.arithmetic import SINGLE
 from springcheck.identify.candidates import (
     all_remarks,
     candidates_of,
@@ -57,6 +58,14 @@ def named(seen: Measured, explained: Explained, step: float | None) -> Identific
     stated_fits = stride is None
     if stride is not None and stride > 0:
         agreeing = [x for x in joints if x.stride == stride or x.scheme == "exact"]  # which has no step
+        if seen.vague:
+            # with a clock in single precision the step may be in that, too, and nobody types more digits
+            exactly, short = (
+                [x for x in agreeing if all(abs(y.log_mass) <= y.interval_room + room for y in x.parts)]
+                for room in (0.0, SINGLE)
+            )
+            agreeing = exactly or short
+            seen = seen.at_stated_times() if exactly else seen
         joints, stated_fits = agreeing or joints, bool(agreeing)
         if not agreeing:
             seen = seen.noting(f"with the stated step {step:.9g}, {stride} to a frame, no known scheme fits")

@@ -206,7 +206,10 @@ def same_maps(seen: Measured, joint: Joint) -> list[str]:
 def untold(seen: Measured, joints: list[Joint]) -> list[str]:
     """Why several schemes or numbers of steps remain, and what further data would distinguish them."""
     simplest, record = joints[0], seen.record
-    if simplest.scheme == "exact":
+    if seen.vague:
+        why = f"the times leave the interval open by {record.jitter:.1e} of it, and each scheme has its own"
+        told = ["more digits of the times", "the step with all of its digits"]
+    elif simplest.scheme == "exact":
         why = "no error of a step is visible: fine steps of many schemes come as near to the exact flow"
         told = ["more digits", "a larger step"]
     else:

@@ -91,9 +91,9 @@ class Record:
 
     @property
     def vague(self) -> bool:
-        """Whether the rounding of the times leaves the interval open by more than a linear correction of it
-        takes to the rounding of the states."""
-        return self.fine and self.jitter**2 > ROUNDING
+        """Whether the states show the interval more exactly than the times do: these are no double precision,
+        whose deviations steps may follow, and not even."""
+        return self.fine and self.deviations is None and self.jitter > 2.0**-50
 
     @property
     def text(self) -> bool:

@@ -168,7 +168,7 @@ def _or_elsewhere(seen: Measured, found: Explained) -> Explained:
 def _single_parameters(seen: Measured) -> tuple[list[Joint], str]:
     """Schemes that fit if step, mass or both were rounded to single precision, and a note on which."""
     record, stride = seen.record, seen.stride
-    if record.momenta:
+    if record.momenta or record.vague:
         return [], ""
     masses = [1.0 if record.mass is None else float(record.mass[j]) for j in seen.moving]
     heavier = [_shortened(m) for m in masses]
@@ -236,9 +236,9 @@ def explained(seen: Measured, accepted: list[Joint]) -> Explained:
 
 def _stands_out(seen: Measured, accepted: list[Joint], found: Map, terms: Terms, *, damped: bool) -> bool:
     """Whether all fitting hypotheses have one map, and the truncation error of its scheme is visible."""
-    one = accepted[0]
+    one, free_scale = accepted[0], terms.mass_unknown or terms.vague
     alone = all(
-        (x.scheme, x.stride) == (one.scheme, one.stride) or identical(one, x, free_scale=seen.record.momenta)
+        (x.scheme, x.stride) == (one.scheme, one.stride) or identical(one, x, free_scale=free_scale)
         for x in accepted
     )
     return alone and visible(found, terms, damped=damped)
@@ -317,8 +317,9 @@ def visible(found: Map, terms: Terms, *, damped: bool) -> bool:
 def terms_of(record: Record, j: int, stated: Floats | None) -> Terms:
     """The terms on which the map of oscillator j is compared."""
     log_stiffness = None
-    if record.momenta and stated is not None and stated[j] > 0:
+    if record.momenta and not record.vague and stated is not None and stated[j] > 0:
         log_stiffness = math.log(stated[j] * float(record.interval) ** 2)
     # in a coarse file a step or a mass may be in single precision as well
     jitter = math.hypot(record.jitter, 0.0 if record.deep else SINGLE)
-    return Terms(mass_unknown=record.momenta, jitter=jitter, log_stiffness=log_stiffness)
+    vague = record.vague and not record.momenta
+    return Terms(mass_unknown=record.momenta, jitter=jitter, vague=vague, log_stiffness=log_stiffness)

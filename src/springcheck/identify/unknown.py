@@ -15,6 +15,7 @@ from springcheck.identify.families import title
 from springcheck.identify.fit import Map, fit
 from springcheck.identify.hypothesis import STRIDES, SURE, distinct
 from springcheck.identify.laws import LAWS, Cause, Regression, regression
+from springcheck.identify.record import DEEP
 from springcheck.identify.result import Explanation
 from springcheck.physics.arrays import Floats
 from springcheck.text.wording import either
@@ -87,7 +88,7 @@ def _class(e: Evidence) -> str:
     method's (1 + (1 - theta) z)/(1 - theta z) gives a real theta.  Newmark's method has M12 = 1/(1 + beta a),
     M11 = 1 - a M12/2, M22 = 1 - gamma a M12 on (q, h v), and M21 to test it by.
     """
-    if e.terms.mass_unknown:
+    if e.terms.mass_unknown or (e.terms.vague and e.record.jitter > DEEP):
         return ""
     entries = e.found.unscaled.astype(np.float64)
     (x, y), (z, u) = entries
@@ -301,7 +302,7 @@ def _remembered(e: Evidence, found: Map) -> list[str]:
 
     entries, error = found.unscaled.astype(np.float64).ravel(), np.sqrt(np.diag(found.covariance))
     turn, stated, out = -entries[2] / entries[1] if entries[1] else -1.0, e.stated, []
-    if e.terms.mass_unknown or not e.record.fine or turn <= 0:
+    if e.terms.mass_unknown or not e.record.fine or turn <= 0 or e.record.jitter > DEEP:
         return []
     ratio = float(found.size[1] / found.size[0])
     error = SURE * error * [1, 1 / ratio, ratio, 1] + 1e-14

@@ -88,7 +88,7 @@ def _rank(e: Evidence, joint: Joint) -> int:
     if (stated := e.stated) is None:
         return 0 if joint.stride == 1 else 2
     part = joint.parts[0]
-    room = 1e-7 + part.a_room
+    room = 1e-7 + part.a_room + 2 * e.record.jitter
     return 0 if abs(part.a * joint.stride**2 - stated) <= room * abs(stated) else 3
 
 
@@ -135,7 +135,8 @@ def _scales(e: Evidence) -> tuple[list[Explanation], bool]:
     factor, or agreement with the stated stiffness."""
     if e.terms.mass_unknown:
         return [], False
-    fitting = compare([e.found], [replace(e.terms, mass_unknown=True)], distinct(damped=False), range(1, 4))
+    loose = replace(e.terms, mass_unknown=True, vague=False)
+    fitting = compare([e.found], [loose], distinct(damped=False), range(1, 4))
     fitting = [x for x in fitting if abs(x.parts[0].log_mass) > SURE * x.parts[0].mass_error + 4 * ROUNDING]
     of_stated = [x for x in fitting if e.stated is not None and _rank(e, x) == 0]
     fitting = of_stated or fitting
