@@ -304,3 +304,49 @@ def test_a_passed_verdict_does_not_say_that_draws_are_unlike_all_along() -> None
     for seed in range(1, 7):
         for one in checks.judge(scene, driver.run(scene, "own:baoab", seed=seed)):
             assert not (one.passed and "but not alike" in one.why)
+
+
+def halves(draws: np.ndarray) -> tuple[Scene, Trajectory]:
+    """OBABO of one spring by a loop with these draws (steps, 2), and its scene."""
+    scene = baths.springs(1, steps=len(draws))
+    h, m, force = scene.step, scene.m, scene.system.force
+    c = np.exp(-scene.bath.friction * h / 2)  # type: ignore[union-attr]
+    q, p, size = [scene.q], [scene.p], np.sqrt((1 - c * c) * m * scene.thermal)
+    for a, b in draws:
+        v = c * p[-1] + size * a
+        v = v + h / 2 * force(q[-1], v)
+        q.append(q[-1] + h * v / m)
+        p.append(c * (v + h / 2 * force(q[-1], v)) + size * b)
+    like = driver.run(scene, "own:obabo", seed=1)
+    z = np.array(q), np.array(p)
+    return scene, replace(like, q=z[0], p=z[1], energy=scene.system.energy(*z))
+
+
+def test_draws_that_come_again_within_a_step_or_in_every_step_are_not_said_to_come_later() -> None:
+    """Both were "the random numbers from row 2 on are those from row 0 on, again"."""
+    x = np.random.default_rng(3).standard_normal((1000, 2))
+    assert failed_and_said(*halves(x)) == ([], "")
+    scene, run = halves(x[:, [0, 0]])
+    assert failed_and_said(scene, run)[1].startswith("both random numbers of a step are one number")
+    (largest,) = (one for one in checks.judge(scene, run) if one.check == "draws-largest")
+    assert "two are equal to " in largest.why
+    assert failed_and_said(*halves(0 * x + x[0]))[1] == "every step takes the same random numbers"
+
+
+def test_coordinates_without_noise_are_named_and_share_no_random_numbers() -> None:
+    scene = baths.springs(3, steps=1000)
+    x = np.random.default_rng(3).standard_normal((1000, 3))
+    said = failed_and_said(scene, loop(scene, x, size=np.array([1, 0, 0])))[1]
+    assert said.startswith("no noise acts on coordinate 1, 2,")
+    # nor do momenta that each step sets to 0
+    one = baths.springs(1, steps=1000)
+    still = failed_and_said(one, loop(one, x[:, :1], c=1e3, size=0.0))[1]
+    assert still.startswith("no noise acts on coordinate 0,")
+
+
+def test_rows_of_which_some_come_again_are_not_said_to_do_so_from_one_on() -> None:
+    scene = baths.springs(3, steps=3000)
+    x = np.random.default_rng(3).standard_normal((3000, 3))
+    x[1000:1300] = x[:300]
+    said = failed_and_said(scene, loop(scene, x))[1]
+    assert said == "300 of 2000 rows of random numbers are those 1000 rows before, again"

@@ -95,6 +95,18 @@ def test_what_is_brought_runs_beside_the_default_methods_and_not_beside_all(
     assert "own:rk4" in map(str, choose(load_scene("spring"), ["*"])[0])
 
 
+def test_a_method_that_is_named_is_not_joined_by_others_of_the_engine_that_brings_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "mine.py").write_text(VERLET + "\nsecond = leapfrog\n")
+    brought = ["--stepper", "mine.py:leapfrog", "--stepper", "mine.py:second"]
+    for named, all_run in (("stepper:second", [1]), ("own:rk4", [0, 1]), ("stepper:*", [0, 1])):
+        main(["run", "spring", "--steps", "2", "--json", "--force", *brought, "--method", named])
+        found = [one["method"] for one in json.loads(capsys.readouterr().out)["runs"]]
+        expected = [["stepper:leapfrog", "stepper:second"][i] for i in all_run]
+        assert found == [named] * (named == "own:rk4") + expected
+
+
 @pytest.mark.usefixtures("sketched")
 def test_a_wrong_function_runs_among_the_engines_without_a_name(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]

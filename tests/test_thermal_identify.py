@@ -650,3 +650,54 @@ def test_a_friction_that_hardly_shows_is_no_number_and_kt_none_beside_it() -> No
     made = driver.run(weak, "own:baoab", seed=3)
     said = " ".join(identify(made.t, made.q, v=made.p / M, mass=M).notes)
     assert "friction c/m too little known to tell kT from it" in said
+
+
+def of_letters(word: str, frames: int = 1500, h: float = 0.5) -> tuple[np.ndarray, ...]:
+    """Times, positions and velocities of a loop of one's own: letters of a splitting in another order."""
+    rng, times = np.random.default_rng(3), {x: h / word.count(x) for x in "ABO"}
+    x, v, states = 0.9, 0.4, np.empty((frames, 2))
+    for i in range(frames):
+        for letter in word:
+            if letter == "A":
+                x += times["A"] * v
+            elif letter == "B":
+                v -= times["B"] * K / M * (x - 0.7)
+            else:
+                e = np.exp(-RATE * times["O"])
+                v = e * v + np.sqrt((1 - e * e) * THERMAL / M) * rng.standard_normal()
+        states[i] = x, v
+    return h * np.arange(frames), *states.T
+
+
+@pytest.mark.parametrize(("word", "said"), [
+    ("BAOBA", "by no scheme known here"), ("BABOA", "by no scheme known here"),
+    ("ABO", "euler-maruyama or "), ("AOB", "euler-maruyama or "), ("ABOA", "aboba or aoboa or "),
+    ("AOBA", "aboba or aoboa or "),
+])  # fmt: skip
+def test_letters_in_an_order_that_is_not_known_have_no_name_and_no_stiffness(word: str, said: str) -> None:
+    """BAOBA was BAOA at half the stiffness to 12 digits, and ABO was Euler-Maruyama at twice the friction."""
+    t, q, v = of_letters(word)
+    found = identify(t, q, v=v, mass=M)
+    assert (found.scheme, found.stiffness, found.fits) == (None, None, False)
+    assert said in found.statement
+    assert said.startswith("by no") or found.statement.endswith("or one that is not known here")
+
+
+def test_a_collision_leaves_no_kick_undone() -> None:
+    """OAB has Andersen's null vector of twice its stiffness."""
+    t, q, v = of_letters("OAB")
+    assert identify(t, q, v=v, mass=M).candidates == ()
+
+
+def test_a_drift_before_the_kick_has_its_own_friction_and_temperature_beside_euler_maruyama() -> None:
+    rng, h, x, v, states = np.random.default_rng(5), 0.31, 0.9, 0.4, []
+    for _ in range(2000):
+        x += h * v
+        v += h * (-K / M * x - RATE * v) + np.sqrt(2 * RATE * THERMAL / M * h) * rng.standard_normal()
+        states.append((x, v))
+    q, v = np.array(states).T
+    notes = identify(h * np.arange(2000), q, v=v, mass=M).notes
+    (own,) = (x for x in notes if x.startswith("the same states, if x moves first"))
+    for word, right in (("friction c/m", RATE), ("kT", THERMAL)):
+        value, error = own.partition(f"{word} ")[2].partition(",")[0].split(" +- ")
+        assert abs(float(value) - right) < 4 * float(error) < 0.5 * right

@@ -39,6 +39,9 @@ FIT_ROUNDS = 20
 DIFFERENCE_ROUNDINGS = 4
 """Roundings of a velocity and of the difference in it: of a product, a quotient, a kick, recording."""
 
+NEARLY_ALL = 0.9
+"""Share of the rows from the first that comes again on, from which on all do, but for what rounding hides."""
+
 SAME_DRAWS = 1e-6
 """Relative difference up to which two draws count as one number."""
 
@@ -55,7 +58,7 @@ def found(case: Case, shown: Callable[[int, bool], str] = lambda *_: "") -> str:
     ways: list[Callable[[Case], str]] = []
     if run.every == 1 and run.scheme in THERMOSTATS:
         # of draws that are read by the map of another scheme the size says nothing
-        ways, looks = [_of_bath], [*looks, _of_size]
+        ways, looks = [_of_no_noise, _of_bath], [*looks, _of_size]
     elif run.every == 1 and not missing(case, MAP):
         ways = [_of_differences, driven.found, _of_rods]
     return next(filter(None, (way(case) for way in ways + looks)), few)
@@ -114,6 +117,26 @@ def _of_rods(case: Case) -> str:
     return ""
 
 
+def _of_no_noise(case: Case) -> str:
+    """Coordinates whose draws are a linear map of the state before: no noise acts, or one number does."""
+    seen, run = reading(case), case.trajectory
+    if seen.rescaled is not None or not _told(seen):
+        return ""
+    x = seen.draws.reshape(-1, max(thermostat(case).fresh, 1), seen.draws.shape[1])
+    known = np.column_stack([*(y[-len(x) - 1 : -1] for y in (run.q, run.p)), np.ones(len(x))])
+    if len(x) < FEWEST_DRAWS + known.shape[1]:
+        return ""
+    flat = x.reshape(len(x), -1)
+    rest = (flat - known @ np.linalg.lstsq(known, flat, rcond=None)[0]).reshape(x.shape)
+    least = SAME_DRAWS * np.sqrt(np.mean(x * x))
+    still = np.flatnonzero(np.all(np.abs(rest) <= least, axis=(0, 1)))
+    of = x[:, :, still]
+    if len(still) and np.all(np.ptp(of, axis=0) <= least) and np.all(np.abs(of[0]) > least):
+        return "every step takes the same random numbers"
+    which = ", ".join(map(str, still[:MOST_SIZES])) + ", ..." * (len(still) > MOST_SIZES)
+    return f"no noise acts on coordinate {which}, which follows from the state before alone" if which else ""
+
+
 def _of_bath(case: Case) -> str:
     """Draws that two coordinates share or that come again, or a factor of momenta that is not the bath's."""
     seen = reading(case)
@@ -135,9 +158,13 @@ def _of_bath(case: Case) -> str:
     lags = np.abs(np.diff(order)[np.diff(x[order, 0]) <= SAME_DRAWS * size])
     lag = int(np.argmax(np.bincount(lags, minlength=2)))
     again = np.flatnonzero(np.all(np.abs(x[lag:] - x[:-lag]) <= SAME_DRAWS * size, axis=1)) if lag else lags
-    if len(again) >= FEWEST_DRAWS:
-        return f"the random numbers from row {lag + again[0]} on are those from row {again[0]} on, again"
-    return ""
+    if len(again) < FEWEST_DRAWS:
+        return ""
+    if lag == 1 and thermostat(case).fresh == 2 and not np.any(again % 2):
+        return "both random numbers of a step are one number, where each is one of its own"
+    if len(again) < NEARLY_ALL * (len(x) - lag - again[0]):
+        return f"{len(again)} of {len(x) - lag} rows of random numbers are those {lag} rows before, again"
+    return f"the random numbers from row {lag + again[0]} on are those from row {again[0]} on, again"
 
 
 def _told(seen: Reading) -> bool:

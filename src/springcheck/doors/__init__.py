@@ -92,8 +92,10 @@ def bring(options: Namespace) -> None:
             "--workers: a term that a call brings is known to its own process alone; leave it out"
         )
     if labels and hasattr(options, "method"):
-        # where methods are named, those that are brought here are added to them
-        options.method = list(dict.fromkeys([*(options.method or [engines.UNNAMED]), *labels]))
+        # where methods are named, those that are brought here are added to them, but of engines named there
+        named = options.method or [engines.UNNAMED]
+        others = [x for x in labels if f"{x.partition(':')[0]}:" not in (y[: y.find(":") + 1] for y in named)]
+        options.method = list(dict.fromkeys([*named, *others]))
 
 
 def _labels(found: engines.Engine) -> list[str]:

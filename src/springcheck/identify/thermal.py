@@ -220,7 +220,11 @@ def _said(
         for stride in rows[name][0].strides[: None if len(kept) > 1 else 1]
     )  # fmt: skip
     statement = _statement(found, {name: rows[name][0].strides for name in kept}, best, named=named)
-    numbers = [_numbers(name, rows[name][0], None if m is None else m[0]) for name in kept[:3]]
+    mass = None if m is None else m[0]
+    numbers = [_numbers(name, rows[name][0], mass) for name in kept[:3]]
+    if "euler-maruyama" in kept:
+        words = "the same states, if x moves first and the force is that at the new x"
+        numbers.append(_numbers(words, _moved_first(rows["euler-maruyama"][0], h), mass))
     notes = _remarks(found, numbers, stated, named=named, joined=joined)
     rates = [one.candidates[0] for one in found if best and one.candidates]
     if rates and all(y.friction <= ERRORS * y.friction_error for y in rates):
@@ -253,7 +257,7 @@ def _remarks(
     if first.uniform:
         notes.append("the draws are uniform, not normal")
     apart = any(s > 1 for one in found for y in one.candidates for s in y.strides)
-    if first.candidates and not named:
+    if first.candidates and not named and (apart or first.candidates[1:]):
         more = ["frames of every step"] * apart + ["a stated stiffness"] * (stated.get("stiffness") is None)
         notes.append(
             "one scheme is named where it beats every other, of any number of steps between two frames, by a "
@@ -328,6 +332,18 @@ def _numbers(name: str, one: Any, m: float | None) -> str:
     return f"{_with_strides(name, one.strides[:1])}: " + ", ".join(
         [f"{word} {_measured(x, error)}" for word, x, error in of if math.isfinite(x)]
         + ["friction c/m too little known to tell kT from it"] * open_ended
+    )
+
+
+def _moved_first(y: Any, h: float) -> Any:
+    """Euler-Maruyama's numbers as those of its drift, then its kick: x' = x + h v adds h omega**2 to the
+    friction that v' shows, and the noise is that of the product of friction and kT."""
+    friction = y.friction - h * y.omega**2
+    error = math.hypot(y.friction_error, 2 * h * y.omega * y.omega_error)
+    thermal = y.thermal * y.friction / (friction or math.nan)
+    share = math.hypot(y.thermal_error / y.thermal, error / (friction or math.nan))
+    return replace(
+        y, friction=friction, friction_error=error, thermal=thermal, thermal_error=abs(thermal) * share
     )
 
 

@@ -327,7 +327,7 @@ class Limits:
     """Change of the phase of a drive, in radians."""
     late: float | None = _told("a drive late by {:.1e} of a step")
     """Delay of a drive, in steps."""
-    temperature: float | None = _told("a temperature off by {:.1e}")
+    temperature: float | None = _told("noise of a temperature off by {:.1e}")
     """Relative change of the temperature of a bath's noise, seen in 19 runs of 20."""
 
     def __str__(self) -> str:

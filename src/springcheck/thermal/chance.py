@@ -248,8 +248,9 @@ def largest(x: Floats, error: Floats) -> Statistic:
         smaller = n * math.log1p(-beyond) if beyond < 1 else -math.inf
         # rounding may have made two sizes equal that were not
         apart = log_ndtr(-sizes[0] - errors[0]) - log_ndtr(-sizes[1] + errors[1])
-        tied = -math.expm1(min(float(apart), 0.0))
-        return min(1.0, 3 * min(math.exp(smaller), -math.expm1(smaller), tied)), words
+        tied, inside = -math.expm1(min(float(apart), 0.0)), min(math.exp(smaller), -math.expm1(smaller))
+        words += f", but two are equal to {abs(sizes[0] - sizes[1]):.0e}" * (tied < min(inside, NOT_ALIKE))
+        return min(1.0, 3 * min(inside, tied)), words
 
     def join(one: Sums, other: Sums) -> Sums:
         sizes, errors = (np.concatenate([a, b]) for a, b in zip(one, other, strict=True))

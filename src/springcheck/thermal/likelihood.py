@@ -79,7 +79,7 @@ def likely(
     """
     found = [y for name in names for y in _of_scheme(THERMOSTATS[name], q, v, h, (1,), turn)]
     found += _of_more_substeps(found, q, v, h)
-    return _compared(found, q, v, fits=not THERMOSTATS[names[0]].full_rank)
+    return _compared(found, q, v, rank=2 if THERMOSTATS[names[0]].full_rank else 1)
 
 
 def likely_apart(q: Floats, v: Floats, h: float, *, white: bool = True) -> list[Candidate]:
@@ -103,14 +103,15 @@ def likely_apart(q: Floats, v: Floats, h: float, *, white: bool = True) -> list[
     return [one for one in kept.values() if one.nats < ODDS or one.strides == (1,)]
 
 
-def _compared(found: list[Candidate], q: Floats, v: Floats, *, fits: bool = False) -> list[Candidate]:
-    """Candidates by what their likelihood falls short of the best, if one `fits` as a free map would."""
+def _compared(found: list[Candidate], q: Floats, v: Floats, *, rank: int = 2) -> list[Candidate]:
+    """Candidates by what their likelihood falls short of the best, if one fits as a free map would, of the
+    velocities alone where noise has a `rank` of 1: they carry all that the positions do."""
     best = min((y.nats for y in found), default=inf)
-    if not fits:
-        moments, n = _moments(q, v)
-        free = moments[:2, :2] - _free(moments) @ moments[2:, :2]
-        if not best - n / 2 * (float(np.log(np.linalg.det(free))) + 2) < GAINED_BY_CHANCE:
-            return []
+    moments, n = _moments(q, v)
+    free = (moments[:2, :2] - _free(moments) @ moments[2:, :2])[2 - rank :, 2 - rank :]
+    by_chance = GAINED_BY_CHANCE if rank == 2 else ODDS
+    if not best - n / 2 * (float(np.log(np.linalg.det(free))) + rank) < by_chance:
+        return []
     return sorted((replace(y, nats=y.nats - best) for y in found), key=lambda y: y.nats)
 
 

@@ -220,6 +220,9 @@ def _of_one(
         drawn = v[1:] + known["omega"] ** 2 * kicks
         often, collides, _ = changed((drawn - v[:-1]) / np.std(v), drawn, state, close)
         often = often or close > COARSE
+        # OAB has the null vector of twice its spring: of a collision nothing of a kick is left
+        slopes, _, errors = regressed(state, drawn / np.std(v))
+        collides = collides and bool(abs(slopes[0]) < 5 * errors[0] + close * np.std(q) / h / np.std(v))
         names: tuple[str, ...] = ("andersen", "andersen-after-kick") if collides else ()
         names += ("bussi", "bussi-unsigned") if often and (mixed or is_a_factor(v[:-1], drawn)) else ()
         if not names:
@@ -267,19 +270,20 @@ def _of_one(
             rates = {f"gj-{n}-half": _rate(root, -b / h) for n, root in roots.items()}
             found = [Candidate(scheme=n, friction=x / h, friction_error=0.0) for n, x in rates.items() if x]
             left = np.empty(0)
-    if len(left) and not is_white(left):
-        return None
-    if len(left) and not even and not any(x.scheme == "andersen-leapfrog" for x in found):
+    is_even = even or any(x.scheme == "andersen-leapfrog" for x in found)
+    if len(left) and not (is_white(left) and is_even):
         return None
     if not found and sparse:
         # few steps are off, and all others are not
         return None
     # explicit friction in a loop of one's own leaves what these two leave where digits hide collisions
     alike = {x.scheme for x in found} - ({"andersen-leapfrog", "andersen-after"} if found[1:] else set())
+    # and another order of the same stages does, ABO and ABOA, at other numbers
+    shared = {"bussi-after"}, {"gj-iii-half"}, {"aboba", "aoboa"}
     return Thermal(
         candidates=tuple(found), free=tuple(map(float, free)), misfit=misfit,
         uniform=bool(len(left)) and is_uniform(left), added=added,
-        known=alike not in ({"bussi-after"}, {"gj-iii-half"}) and "bussi" not in alike and close <= COARSE,
+        known=alike not in shared and not alike & {"bussi", "euler-maruyama"} and close <= COARSE,
     )  # fmt: skip
 
 
@@ -317,9 +321,7 @@ def _as_gj(
         stretch = GJ[number].stretch(x)
         return stretch, 4 * (1 - stretch * h / (2 * t)) / stretch**2
 
-    x = np.geomspace(1e-9, 1e4, 4000)
-    if near := _rate(GJ[number], decay):
-        x = np.append(x, near)
+    x = np.append(np.geomspace(1e-9, 1e4, 4000), _rate(GJ[number], decay) or [])
     with np.errstate(all="ignore"):
         stretch, a = stretched(x)
         fits = (a > -least) & (np.abs(a * stretch**2 - slow) <= 4 * error)
@@ -394,5 +396,5 @@ def _of_two_halves(q: Floats, h: float, misfit: float, beside: Floats | None, mi
             )
         )  # fmt: skip
     # noise in proportion to the force is none that a scheme adds
-    ordered = () if grows(draws, q[1:-1]) else tuple(sorted(found, key=lambda y: y.nats))
-    return Thermal(candidates=ordered, misfit=misfit, uniform=uniform, known=not bent)
+    found = [] if grows(draws, q[1:-1]) else sorted(found, key=lambda y: y.nats)
+    return Thermal(candidates=tuple(found), misfit=misfit, uniform=uniform, known=not bent)
