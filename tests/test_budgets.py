@@ -18,7 +18,7 @@ BUDGETS = {
     ("engines",): 2816,
     ("driver", "conformance", "doors"): 1214,
     ("checks",): 5232,
-    ("identify",): 9302,
+    ("identify",): 9303,
     ("formats", "store"): 5267,
     ("studies",): 1453,
     ("studies/*",): 9760,
