@@ -18,7 +18,7 @@ BUDGETS = {
     ("engines",): 2816,
     ("driver", "conformance", "doors"): 1216,
     ("checks",): 5259,
-    ("identify",): 9145,
+    ("identify",): 9146,
     ("formats", "store"): 5267,
     ("studies",): 1444,
     ("studies/*",): 9760,

@@ -70,7 +70,8 @@ def on_a_pair(step: Callable[..., Any], names: Sequence[str]) -> list[Explanatio
     made = _step(step, joined)
 
     def takes(scene: Scene, new: Floats) -> bool:
-        return bool(takers(known, scene, H, *np.stack([[scene.q, scene.p], new], axis=1), ROOM))
+        q, p = np.stack([[scene.q, scene.p], new], axis=1)
+        return bool(takers(known, scene, H, q, p, ROOM))
 
     if takes(joined, made):
         return []
