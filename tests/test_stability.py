@@ -105,6 +105,17 @@ def test_the_damped_plane_is_divided_as_theory_says(name: str, need: Need) -> No
         assert 0.1 < np.mean(found.stable) < 0.9
 
 
+def test_an_engine_that_moves_nothing_faster_than_some_speed_is_measured_below_it(need: Need) -> None:
+    """Box2D stops at two lengths a step: its limit was 0, and all that it did against theory."""
+    need("box2d:force")
+    found = regions.measure(engines.parse("box2d:force"), points=6)
+    assert np.isfinite(found.radius).all()
+    assert found.wrong == 0
+    springs = Springs(label=engines.parse("box2d:force"), turn=np.array([1e-9, 1.9, 2.1, 1e6]))
+    inside = propagators.bounded(propagators.measured(springs), propagators.noise(springs.label))
+    assert inside.tolist() == [True, True, False, False]
+
+
 def test_resonances_of_multiple_time_steps_are_those_of_the_exact_matrix(need: Need) -> None:
     need("openmm:mts")
     wanted = np.array(json.loads(REFERENCE.read_text(encoding="utf-8"))["bands"], dtype=np.float64)

@@ -90,14 +90,14 @@ def sizes(label: Label, case: checks.Case, q: Floats, p: Floats) -> Sizes:
     In whatever order an engine works, it forms positions, momenta, velocities, forces, accelerations and
     their increments.  An engine that squares lengths of bonds also forms 1/m and 1/h.
     """
-    scene, places = case.judged, list[Reals]()
+    scene, (end_q, end_p) = case.judged, case.next_states
+    places: list[Reals] = [q[:-1], end_q]
     m = scene.m.astype(np.longdouble)
     h = np.abs(np.longdouble(scene.step))
     k = np.abs(scene.system.hessian_diagonal(scene.q))
     # a stage may reach farther than both ends of its step
     case.step(q[:-1].astype(np.longdouble), p[:-1].astype(np.longdouble), met=places)
-    end_q, end_p = case.next_states
-    x, y = np.max(np.abs([q[:-1], end_q, *places]), axis=0), np.maximum(np.abs(p[:-1]), np.abs(end_p))
+    x, y = np.max(np.abs(np.stack(places)), axis=0), np.maximum(np.abs(p[:-1]), np.abs(end_p))
     force = k * x
     parts = [x, y, y / m, force, force / m, h * force, h * force / m, h * y / m]
     parts += [np.broadcast_to(part, x.shape) for part in (k, k / m, h * h * k / m)]

@@ -73,18 +73,24 @@ def scene(springs: Springs, q: Floats, p: Floats, *, steps: int = 1) -> Scene:
     )  # fmt: skip
 
 
-def units(springs: Springs) -> tuple[Floats, Floats]:
-    """Units of position and momentum of each spring: A = FORCE/k and m w A."""
-    a = FORCE / springs.k
-    return a, MASS * (np.asarray(springs.true_turn, np.float64) / STEP) * a
+def units(springs: Springs, *, slow: bool = False) -> tuple[Floats, Floats]:
+    """Units of position and momentum of each spring: A = FORCE/k and m w A; `slow`: so small that a kick
+    and a friction of one step leave velocities of about 1."""
+    turn = np.asarray(springs.true_turn, np.float64)
+    a = STEP / (turn * np.maximum(np.maximum(turn, springs.brake), 1)) if slow else FORCE / springs.k
+    return a, MASS * (turn / STEP) * a
 
 
 def measured(springs: Springs) -> Floats:
     """The engine's own one-step matrices (n, 2, 2); NaN where a step does not end finite."""
     n = len(springs.turn)
-    of_q, of_p = units(springs)
-    out = matrices(scene(springs, of_q, of_p), springs.label, of_q[:, None], of_p[:, None])
-    if n > 1 and np.isnan(out).all():
+    # an engine may stop at a speed; the digits of a fixed-point sum need the large forces
+    for slow in (False, True)[: 1 + (engines.arithmetic(springs.label).quantum == 0)]:
+        of_q, of_p = units(springs, slow=slow)
+        out = matrices(scene(springs, of_q, of_p), springs.label, of_q[:, None], of_p[:, None])
+        if not np.isnan(out).all():
+            return out
+    if n > 1:
         # an engine that stops over one spring loses all the others: bisect to find it
         for half in (slice(None, n // 2), slice(n // 2, None)):
             brake = springs.brake if np.ndim(springs.brake) == 0 else np.asarray(springs.brake)[half]
