@@ -16,7 +16,7 @@ from springcheck.engines import Arithmetic
 from springcheck.identify import files
 from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
-from springcheck.physics.trajectory import Trajectory
+from springcheck.physics.trajectory import Trajectory, Verdict
 from springcheck.studies.faults import baths
 from springcheck.studies.faults.table import FAULTS
 from springcheck.thermal import THERMOSTATS, chance
@@ -350,3 +350,18 @@ def test_rows_of_which_some_come_again_are_not_said_to_do_so_from_one_on() -> No
     x[1000:1300] = x[:300]
     said = failed_and_said(scene, loop(scene, x))[1]
     assert said == "300 of 2000 rows of random numbers are those 1000 rows before, again"
+
+
+def test_a_cause_is_with_a_verdict_that_fails_among_all_methods_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It was with the first that failed by itself, passed among many methods, and was shown nowhere."""
+    scene, judge = scenefile.load_scene("bath-spring").derived(steps=400), checks.judge
+
+    def barely(*given: Any, **more: Any) -> list[Verdict]:
+        return [
+            replace(v, value=v.bound + 0.1, passed=False, statistic=None) if v.check == "draws-mean" else v
+            for v in judge(*given, **more)
+        ]
+
+    monkeypatch.setattr(checks, "judge", barely)
+    report = springcheck.run(scene, "own:baoab", faults=["calories"], seed=3)
+    assert "the noise is 2.0" in checks.cause_of([v for v in report.verdicts if v.passed is False])
