@@ -17,11 +17,11 @@ BUDGETS = {
     ("engines/openmm", "engines/ase", "engines/sundials"): 1281,
     ("engines",): 2816,
     ("driver", "conformance", "doors"): 1216,
-    ("checks",): 5259,
+    ("checks",): 5272,
     ("identify",): 9146,
     ("formats", "store"): 5267,
     ("studies",): 1444,
-    ("studies/*",): 9766,
+    ("studies/*",): 9769,
     ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 7200,
 }
 """Lines of each room, or of several: of an engine in one file, and of what all studies share, in the first

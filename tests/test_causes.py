@@ -15,8 +15,9 @@ from springcheck.checks import Case, causes
 from springcheck.engines import Arithmetic
 from springcheck.identify import files
 from springcheck.physics import scenefile
+from springcheck.physics.bath import Bath
 from springcheck.physics.scene import Scene
-from springcheck.physics.trajectory import Trajectory
+from springcheck.physics.trajectory import Trajectory, Verdict
 from springcheck.studies.faults import baths
 from springcheck.studies.faults.table import FAULTS
 from springcheck.thermal import THERMOSTATS, chance
@@ -350,3 +351,40 @@ def test_rows_of_which_some_come_again_are_not_said_to_do_so_from_one_on() -> No
     x[1000:1300] = x[:300]
     said = failed_and_said(scene, loop(scene, x))[1]
     assert said == "300 of 2000 rows of random numbers are those 1000 rows before, again"
+
+
+def test_a_cause_is_with_a_verdict_that_fails_among_all_methods_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It was with the first that failed by itself, passed among many methods, and was shown nowhere."""
+    scene, judge = scenefile.load_scene("bath-spring").derived(steps=400), checks.judge
+
+    def barely(*given: Any, **more: Any) -> list[Verdict]:
+        return [
+            replace(v, value=v.bound + 0.1, passed=False, statistic=None) if v.check == "draws-mean" else v
+            for v in judge(*given, **more)
+        ]
+
+    monkeypatch.setattr(checks, "judge", barely)
+    report = springcheck.run(scene, "own:baoab", faults=["calories"], seed=3)
+    assert "the noise is 2.0" in checks.cause_of([v for v in report.verdicts if v.passed is False])
+
+
+def claims_another_friction(scheme: str, friction: float, steps: int) -> str:
+    """What is said of a run whose friction is twice that of its scene."""
+    scene = baths.springs(3, steps=steps)
+    made, claimed = (Bath(temperature=scene.thermal, friction=x) for x in (friction, friction / 2))
+    run = driver.run(scene.derived(bath=made), f"own:{scheme}", seed=4)
+    return failed_and_said(scene.derived(bath=claimed), run)[1]
+
+
+def test_collisions_twice_as_often_are_said_to_be_so() -> None:
+    said = claims_another_friction("andersen", 0.8, 1500)
+    times, error = (float(x) for x in said.split(" times as often")[0].split("come ")[1].split(" +- "))
+    assert abs(times - 2) < 4 * error < 0.5
+
+
+def test_a_factor_of_another_friction_is_not_said_to_have_its_noise_alone() -> None:
+    """Where little is lost in a step its noise is known better: the loss is within the errors of both."""
+    said = claims_another_friction("bussi", 0.15, 3000)
+    assert "as the friction asks" not in said
+    times, error = (float(x) for x in said.split("or the friction is ")[1].split(" times")[0].split(" +- "))
+    assert abs(times - 2) < 4 * error < 1

@@ -15,7 +15,7 @@ from springcheck.checks import driven, other
 from springcheck.checks.case import Case
 from springcheck.checks.requires import MAP, missing
 from springcheck.checks.steps import seldom_off, step_defect
-from springcheck.checks.thermal import draws_particles, noise_direction, reading, thermostat
+from springcheck.checks.thermal import collisions, draws_particles, noise_direction, reading, thermostat
 from springcheck.physics.arrays import Floats, Reals
 from springcheck.thermal import THERMOSTATS
 from springcheck.thermal.catalogue import ENERGY_LEFT
@@ -58,7 +58,7 @@ def found(case: Case, shown: Callable[[int, bool], str] = lambda *_: "") -> str:
     ways: list[Callable[[Case], str]] = []
     if run.every == 1 and run.scheme in THERMOSTATS:
         # of draws that are read by the map of another scheme the size says nothing
-        ways, looks = [_of_no_noise, _of_bath], [*looks, _of_size]
+        ways, looks = [_of_no_noise, _of_bath, _of_collisions], [*looks, _of_size]
     elif run.every == 1 and not missing(case, MAP):
         ways = [_of_differences, driven.found, _of_rods]
     return next(filter(None, (way(case) for way in ways + looks)), few)
@@ -224,8 +224,21 @@ def _rescaled(case: Case, kinetic: Floats) -> str:
     if abs(c - asked) > STANDARD_ERRORS * of_c:
         return f"{kept} where the friction asks for {asked:.5g}"
     if abs(b - lost) > STANDARD_ERRORS * of_b:
+        # a loss that goes with the noise is of another friction, and near 1 may be that of the bath's as well
+        rate, error = -np.log1p(-b) / (2 * x), of_b / (1 - b) / (2 * x)
+        of_both = abs(c - 1 + b) <= STANDARD_ERRORS * np.hypot(of_c, of_b)
         return (
-            f"{kept}, as the friction asks, and adds {b / lost:.4g} +- {of_b / lost:.1g} times the noise "
-            "that goes with it: the coupling acts on one of both alone"
-        )
+            f"{kept}, where the friction asks for {asked:.5g}, and adds {b / lost:.4g} +- {of_b / lost:.1g} "
+            "times the noise that goes with that: the coupling acts on one of both alone"
+        ) + f", or the friction is {rate:.4g} +- {error:.1g} times the bath's" * bool(of_both)
     return ""
+
+
+def _of_collisions(case: Case) -> str:
+    """How often momenta are drawn anew, where that is not as the friction asks."""
+    hits, bath = reading(case).hits, case.judged.bath
+    if hits is None or bath is None or collisions(case).passed is not False:
+        return ""
+    share, x = float(np.mean(hits)), bath.friction * case.trajectory.step
+    rate, error = -np.log1p(-share) / x, np.sqrt(share / (1 - share) / hits.size) / x
+    return f"collisions come {rate:.4g} +- {error:.1g} times as often as the friction asks"

@@ -238,6 +238,9 @@ def judge(
     if failed:
         from springcheck.identify import files
 
+        # the cause goes with a verdict that fails among those of all methods as well
+        fair = iter(checks.shared([v for mine in worst.values() for v in mine]))
+        worst = {name: [next(fair) for _ in mine] for name, mine in worst.items()}
         for name, piece in failed.items():
             worst[name] = checks.explained(scene, piece, worst[name], files.shown)
     return Report(
