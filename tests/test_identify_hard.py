@@ -837,6 +837,19 @@ def test_a_motion_about_a_rest_away_from_0_is_named_however_large_it_grows(
         identify(h * np.arange(frames + 1), 1e40 * q_all, v=1e40 * v_all, mass=m)
 
 
+def test_one_bad_frame_of_a_motion_that_grows_is_no_dry_friction() -> None:
+    """The velocity reverses in it, and friction has no direction there: rounding is left."""
+    m, k, rest, h = 2.3, 7.1, 0.83, 0.6
+    states = [(1.3, 0.2)]
+    for _ in range(100):
+        q, v = states[-1]
+        states.append((q + h * v, v - h * k * (q - rest) / m))
+    q_all, v_all = np.array(states).T
+    q_all[20] *= 1 + 1e-6
+    found = identify(h * np.arange(101), q_all, v=v_all, mass=m)
+    assert "frame 20 is wrong" in found.statement
+
+
 @pytest.mark.parametrize("cubic", [1e-6, 1e-13])
 def test_a_small_cubic_force_is_seen_in_a_motion_that_grows(cubic: float) -> None:
     """Its part grows to 1e-9 of the linear force's, at the least."""

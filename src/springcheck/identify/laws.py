@@ -107,7 +107,7 @@ def regression(e: Evidence, law: Cause) -> Regression:
     rounding = (LEFT_BY_ROUNDING * e.weight * e.unit)[kept, None]
     if not np.all(kept):
         # residuals are those of a map of the pairs to which the law applies
-        own = every[:, : len(e.linear)]
+        own = (every / size)[:, : len(e.linear)]
         missing = missing - own @ np.linalg.lstsq(own, missing)[0]
     square, above = np.sum(missing**2, axis=1), np.any(np.abs(missing) > FALLS * rounding, axis=1)
     total = float(np.sum(square))
