@@ -42,7 +42,7 @@ CELL = 2 * math.pi / CELLS
 """Cells of the table, over a whole turn: RK4 turns by more than half a turn, beyond its limit by almost a
 whole one."""
 
-HALVINGS = 16
+NODE_HALVINGS = 16
 """Halvings of an interval of h w on which a phase ends, as a square root: 2**-8 is left, below a cell."""
 
 GLANCE = 3e-6
@@ -104,7 +104,7 @@ def _curve(name: str) -> _Curves:
     with np.errstate(all="ignore"):
         every = rows_at(np.concatenate([np.geomspace(1e-6, 1e-4, 9), np.linspace(2e-4, 3.5, 1000),
                                         np.geomspace(3.5, LARGEST, 300)[1:]]))  # fmt: skip
-        for _ in range(HALVINGS):
+        for _ in range(NODE_HALVINGS):
             # nodes a cell apart at most: the phase is steep where it ends, as Verlet's at the limit
             wide = np.flatnonzero(np.abs(np.diff(every[1])) > CELL)
             more = rows_at((every[2, wide] + every[2, wide + 1]) / 2)

@@ -32,7 +32,7 @@ UNSTABLE_GROWTH = 2.0
 FORCE_RESOLUTION = 2.0**-24
 """Relative resolution that a fixed-point sum must reach to represent a force: single precision's."""
 
-COARSE = "fixed-point forces: a quantum of {:.1e} leaves too few digits"
+TOO_COARSE = "fixed-point forces: a quantum of {:.1e} leaves too few digits"
 
 RANGES = {
     "double": (2.0**-1022, float(np.finfo(np.float64).max)),
@@ -129,7 +129,7 @@ def judge(
         inside = sizes(label, case, q, p)
         growth, bound = growth_of(case, scene), float(case.roundings)
         low, high = RANGES["single" if how.force >= 2.0**-24 else "double"]
-        peaks, too_coarse = np.max(inside.force, axis=0, initial=0), COARSE.format(how.quantum)
+        peaks, too_coarse = np.max(inside.force, axis=0, initial=0), TOO_COARSE.format(how.quantum)
         far, k = scene.system.far if how.joints else 0.0, np.array([abs(spec.k) for spec in specs])
         # the engine's own displacement, as its forces may be cached
         moved = np.apply_along_axis(least_moved, 0, np.abs(np.diff(q, axis=0)))
