@@ -20,7 +20,7 @@ BUDGETS = {
     ("checks",): 5272,
     ("identify",): 9146,
     ("formats", "store"): 5267,
-    ("studies",): 1444,
+    ("studies",): 1450,
     ("studies/*",): 9769,
     ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 7200,
 }

@@ -45,19 +45,13 @@ def carried_out(parts: Sequence[Callable[[], T]], workers: int) -> Generator[tup
                 interrupts.takes(process.kill)
                 theirs.close()
                 team[ours] = process
-            with _reached(process):
-                ours.send(ahead.pop())
+            _send(ahead.pop(), ours, team)
         while team:
             ready: list[Any] = wait(list(team))
             for ours in ready:
-                with _reached(team[ours]):
-                    i, good, found = ours.recv()
-                if not good:
-                    raise found
-                yield i, found
+                yield _answer(ours, team)
                 if ahead:
-                    with _reached(team[ours]):
-                        ours.send(ahead.pop())
+                    _send(ahead.pop(), ours, team)
                 else:
                     ours.close()
                     _ended(team.pop(ours))
@@ -79,16 +73,28 @@ def _is_a_file(main: Any) -> None:
         )
 
 
-@contextmanager
-def _reached(process: Any) -> Iterator[None]:
-    """Send to a process, or receive from it.  SpringcheckError where it has ended."""
+def _send(numbered: Any, ours: Any, team: dict[Any, Any]) -> None:
     try:
-        yield
+        ours.send(numbered)
+    except OSError:
+        raise _died(team[ours]) from None
+
+
+def _answer(ours: Any, team: dict[Any, Any]) -> Any:
+    try:
+        i, good, found = ours.recv()
     except (EOFError, OSError):
-        process.join()
-        raise SpringcheckError(
-            f"a worker process has ended by itself (exit status {process.exitcode}): is memory short?"
-        ) from None
+        raise _died(team[ours]) from None
+    if not good:
+        raise found
+    return i, found
+
+
+def _died(process: Any) -> SpringcheckError:
+    process.join()
+    return SpringcheckError(
+        f"a worker process has ended by itself (exit status {process.exitcode}): is memory short?"
+    )
 
 
 def _ended(process: Any) -> None:
