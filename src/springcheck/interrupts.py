@@ -250,14 +250,11 @@ def last() -> Iterator[None]:
     """
     if _State.seen:
         raise KeyboardInterrupt
-    _State.held += 1
-    try:
+    with held():
         yield
         sys.stdout.flush()
         finish()
         _State.answered, _State.seen = True, False
-    finally:
-        _State.held -= 1
 
 
 def leave() -> None:

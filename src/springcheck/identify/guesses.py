@@ -125,6 +125,15 @@ def _curve(name: str) -> _Curves:
     return _Curves(np.zeros(len(out), np.int64), np.array(high), np.array(out))
 
 
+@cache
+def _traces(family: Family) -> tuple[Floats, Floats]:
+    """Values of (h w)**2 of either sign, and the trace of a step over the root of its determinant there."""
+    half = np.geomspace(1e-8, LARGEST**2, 2000)
+    nodes = np.concatenate([-half[::-1], half])
+    m = np.asarray(unit(family, nodes, 0 * nodes), np.float64)
+    return nodes, np.trace(m, axis1=1, axis2=2) / np.sqrt(np.abs(np.linalg.det(m)))
+
+
 @dataclass(slots=True, eq=False)
 class Roots:
     """Matrix roots (r,) of a map, as possible steps on (q, v h), with phase and log of the determinant."""
@@ -236,10 +245,8 @@ def first(every: MapTable, roots: Roots, *, growing: bool, free_scale: bool, far
             if not (family.damped or family.flow):
                 # beyond its limit a step has the trace of one of its springs all the same
                 wanted = np.trace(roots.step[left], axis1=1, axis2=2) * np.exp(-roots.log_det[left] / 2)
-                nodes = np.geomspace(1e-8, LARGEST**2, 2000)
-                nodes = np.concatenate([-nodes[::-1], nodes])
-                m = np.asarray(unit(family, nodes, 0 * nodes), np.float64)
-                off = np.trace(m, axis1=1, axis2=2) / np.sqrt(np.abs(np.linalg.det(m))) - wanted[:, None]
+                nodes, traces = _traces(family)
+                off = traces - wanted[:, None]
                 at, k = np.nonzero(off[:, 1:] * off[:, :-1] <= 0)
                 a = nodes[k] + (nodes[k + 1] - nodes[k]) * off[at, k] / (off[at, k] - off[at, k + 1])
                 parts.append((np.full(len(at), i), left[at], a, 0 * a))

@@ -238,9 +238,7 @@ def stated(
             f"--step {step:g}: {ratio:.3g} of them to a frame are more than the times can tell from one more"
         )
     if stride < 1 or abs(ratio - stride) > 4 * stride * (record.jitter + ROUNDING):
-        return (
-            stiff,
-            -1,
-            [f"the stated step {step:.9g} does not divide the states' interval {float(record.interval):.9g}"],
-        )
+        interval = float(record.interval)
+        note = f"the stated step {step:.9g} does not divide the states' interval {interval:.9g}"
+        return stiff, -1, [note]
     return stiff, stride, []

@@ -43,11 +43,8 @@ def read(
     rebuilt: bool = False,
 ) -> Reading:  # fmt: skip
     """`draws.read` for a scene with rods: draws (f-1, r) are combinations of those of all coordinates."""
-    how, stepper, sizer = (
-        how or Arithmetic(),
-        Stepper.of(scheme, scene),
-        Stepper.of(scheme, scene, absolute=True),
-    )
+    how = how or Arithmetic()
+    stepper, sizer = Stepper.of(scheme, scene), Stepper.of(scheme, scene, absolute=True)
     force, rods, c = forces(scheme, scene.system), scene.system.rods, scheme.carried
     wide = q.astype(np.longdouble), p.astype(np.longdouble)
     n, u = scene.n, scheme.draws

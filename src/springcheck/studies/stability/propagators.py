@@ -205,7 +205,8 @@ def absence(label: Label) -> str | None:
 def unstarted(given: Scene, label: Label) -> str | None:
     """Why an engine does not start a scene that its method serves by what it declares, or None."""
     try:
-        engines.refusal(given, label) or engines.Started(given, label)
+        if engines.refusal(given, label) is None:
+            engines.Started(given, label)
     except MethodError as error:
         return str(error)
     return None
