@@ -701,3 +701,32 @@ def test_a_drift_before_the_kick_has_its_own_friction_and_temperature_beside_eul
     for word, right in (("friction c/m", RATE), ("kT", THERMAL)):
         value, error = own.partition(f"{word} ")[2].partition(",")[0].split(" +- ")
         assert abs(float(value) - right) < 4 * float(error) < 0.5 * right
+
+
+@pytest.mark.parametrize("letters", ["BAOA", "BAOAB", "collisions"])
+@pytest.mark.parametrize("kind", ["normal", "uniform", "signs"])
+def test_draws_that_are_not_normal_are_noted(letters: str, kind: str) -> None:
+    """Draws of +-1 were uniform, and those of collisions were of no shape at all."""
+    rng, h, m, k, c = np.random.default_rng(4), 0.13, 1.7, 2.9, 0.9
+    x, v, rows = 0.3, 0.1, []
+    for _ in range(4000):
+        rows.append((x, v))
+        draw = {"normal": rng.normal(), "uniform": rng.uniform(-3, 3) / np.sqrt(3)}.get(kind, 1.0)
+        draw *= rng.choice([-1, 1])
+        hit = rng.random() < 0.15
+        for one in "BAB" if letters == "collisions" else letters:
+            if one == "A":
+                x += h * v / letters.count("A") if letters != "collisions" else h * v
+            elif one == "B":
+                v -= h * k / m * x / (1 if letters == "BAOA" else 2)
+            else:
+                v = c * v + np.sqrt((1 - c * c) * 0.4) * draw
+        if letters == "collisions" and hit:
+            v = 0.6 * draw
+    q, u = np.array(rows).T
+    found = identify(h * np.arange(4000), q, v=u, mass=m)
+    name = {"collisions": "andersen-after"}.get(letters, letters.lower())
+    assert name in [one.scheme for one in found.candidates]
+    notes = [note for note in found.notes if note.startswith("the draws are")]
+    wanted = {"normal": [], "uniform": ["the draws are uniform, not normal"]}.get(kind)
+    assert notes == wanted if wanted is not None else "not normal: third moment" in "".join(notes)

@@ -254,8 +254,8 @@ def _remarks(
     notes = [x for x in numbers if not x.endswith(": ")]
     if joined:
         notes.append("joined particles: omega is that of each mode, and the numbers are those of the first")
-    if first.uniform:
-        notes.append("the draws are uniform, not normal")
+    if first.draws:
+        notes.append(f"the draws are {first.draws}")
     apart = any(s > 1 for one in found for y in one.candidates for s in y.strides)
     if first.candidates and not named and (apart or first.candidates[1:]):
         more = ["frames of every step"] * apart + ["a stated stiffness"] * (stated.get("stiffness") is None)

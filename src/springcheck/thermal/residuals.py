@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
+from numpy.polynomial.legendre import Legendre
 
 from springcheck.physics.arrays import Floats
 from springcheck.thermal import chance
@@ -18,6 +21,8 @@ WHITE = 1e-9
 
 EVEN = 1e-4
 """Chance below which noise on momenta may be a factor, and no draw is inferred from it."""
+
+UNIFORM = "uniform, not normal"
 
 JOINED_FROM = 6.0
 """Standard deviations of a correlation from which on particles are joined: 2e-9 of those that are not."""
@@ -73,9 +78,15 @@ def is_of_digits(x: Floats) -> bool:
     return is_white(np.sign(x - np.median(x)))
 
 
-def is_uniform(x: Floats) -> bool:
-    """Whether draws (f,) of variance 1 are uniform."""
-    return bool(np.max(np.abs(x)) < 1.9 and chance.shape(x).chance < WHITE)
+def unlike_normal(x: Floats) -> str:
+    """How draws (f,) of one size are not normal, in words; "" where none shows that they are not."""
+    unlike, words = chance.shape(x).found
+    if unlike > WHITE:
+        return ""
+    # the mean of a Legendre polynomial of degree d has the variance 1/(2 d + 1) over the draws
+    u = x / np.max(np.abs(x))
+    even = (float(np.mean(Legendre.basis(d)(u))) * math.sqrt((2 * d + 1) * len(u)) for d in (2, 4))
+    return UNIFORM if all(chance.of_normal(z) > WHITE for z in even) else f"not normal: {words}"
 
 
 def is_correlated(x: Floats) -> bool:

@@ -6,7 +6,7 @@ known to rounding at any temperature.  Where that is not enough, the likelihood 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from math import inf, nan
@@ -15,22 +15,12 @@ from typing import Any
 import numpy as np
 
 from springcheck.physics.arrays import Floats
+from springcheck.thermal import residuals
 from springcheck.thermal.catalogue import random_scheme
-from springcheck.thermal.collisions import between_collisions, changed, is_a_factor
+from springcheck.thermal.collisions import between_collisions, changed, drawn, is_a_factor
 from springcheck.thermal.decays import GJ
 from springcheck.thermal.likelihood import ODDS, Candidate, likely, likely_apart
-from springcheck.thermal.residuals import (
-    FEWEST,
-    follows,
-    grows,
-    is_added,
-    is_correlated,
-    is_of_digits,
-    is_uniform,
-    is_white,
-    left_of,
-    regressed,
-)  # fmt: skip
+from springcheck.thermal.residuals import is_white, regressed, unlike_normal
 
 NOISE = 1e-3
 """Smallest noise of a step, relative to the motion, that is not taken for a file's rounding: that of gamma h
@@ -62,8 +52,8 @@ class Thermal:
     """The combination of (x', v', x, v) that is free of noise, 1 on x'; () where there is none."""
     misfit: float = nan
     """Root mean square of that combination over that of the noise."""
-    uniform: bool = False
-    """Whether the draws are uniform rather than normal."""
+    draws: str = ""
+    """How the draws are not normal, "" where that does not show."""
     known: bool = True
     """Whether the kind of noise is known: one momentum shows no factor, but any change of it that begins or
     ends a step."""
@@ -87,7 +77,7 @@ def identify_thermal(
     coupled to those `beside` it (f, others) no scheme is inferred.  Deterministic motion, coupled or not,
     leaves no residual that is white from frame to frame.
     """
-    if len(t) < FEWEST or not np.isfinite([q, v]).all():
+    if len(t) < residuals.FEWEST or not np.isfinite([q, v]).all():
         return None
     h = float((t[-1] - t[0]) / (len(t) - 1))
     with np.errstate(over="ignore", invalid="ignore"):
@@ -115,23 +105,23 @@ def _identified(q: Floats, v: Floats, h: float, beside: Floats | None, mixed: bo
     if weights[3] < NOISE * weights[0]:
         return None
     z = np.stack([x, u])
-    sizes_left, left = left_of(z, np.empty((0, z.shape[1] - 1)))
+    sizes_left, left = residuals.left_of(z, np.empty((0, z.shape[1] - 1)))
     # a nonlinear force is no scheme's draw
     known = np.stack([x[:-1], u[:-1], np.ones(len(x) - 1)], axis=1)
-    bent = follows(left[1], np.stack([x**2, x**3], axis=1)[:-1], known)
+    bent = residuals.follows(left[1], np.stack([x**2, x**3], axis=1)[:-1], known)
 
     def clear(found: Thermal | None) -> Thermal | None:
         return found and replace(found, known=found.known and not bent)
 
     # the residual of a coordinate without noise is rounding
-    added = partial(is_added, left[sizes_left > NOISE], sizes_left[1] * left[1], u[1:])
+    added = partial(residuals.is_added, left[sizes_left > NOISE], sizes_left[1] * left[1], u[1:])
     even = added(1)
     rest = frames @ turned[4] / max(float(np.std(frames @ turned[4])), 1e-300)
     if beside is not None:
         moved = np.concatenate([beside[:-1], np.diff(beside, axis=0)], axis=1)
-        joined = weights[4] > 1e-9 * weights[3] and follows(rest, moved, known)
-        if joined or follows(left[1], moved, known):
-            size, joint = left_of(z, moved.T)
+        joined = weights[4] > 1e-9 * weights[3] and residuals.follows(rest, moved, known)
+        if joined or residuals.follows(left[1], moved, known):
+            size, joint = residuals.left_of(z, moved.T)
             # of joined particles, as of one, what takes no noise leaves none that is white
             noisy = np.max(size) > NOISE and all(map(is_white, joint))
             return Thermal() if noisy else None
@@ -139,7 +129,7 @@ def _identified(q: Floats, v: Floats, h: float, beside: Floats | None, mixed: bo
         free = turned[4][:4] / np.tile(sizes, 2)
         misfit = weights[4] / weights[3]
         # the residual of digits is white but for neighbours, which share a frame
-        digits = misfit < 1e-9 or is_of_digits(rest[::2])
+        digits = misfit < 1e-9 or residuals.is_of_digits(rest[::2])
         # of one draw the position and the momentum leave the same; a joint to what is beside may not show
         several = mixed or (beside is not None and beside.size > 0)
         if not (free[0] and digits):
@@ -148,7 +138,7 @@ def _identified(q: Floats, v: Floats, h: float, beside: Floats | None, mixed: bo
     jump = (x[2:] - x[:-2]) - 2 * h * sizes[1] / sizes[0] * u[1:-1]
     off = float(np.std(jump))
     # and of what frames two steps apart share none three steps apart do
-    if off < 1e-6 or (off < 1e-3 * sizes_left[0] and is_of_digits(jump[::3])):
+    if off < 1e-6 or (off < 1e-3 * sizes_left[0] and residuals.is_of_digits(jump[::3])):
         return clear(_of_two_halves(q, h, off, beside, mixed))
     collided, white = between_collisions(q, v, h), all(map(is_white, left))
     if collided or (white and collided is not None):
@@ -163,8 +153,8 @@ def _identified(q: Floats, v: Floats, h: float, beside: Floats | None, mixed: bo
     # a factor of the momenta, of several steps, leaves what collisions do
     a_factor = any(random_scheme(y.scheme).collides and y.strides != (1,) for y in found)
     return Thermal(
-        candidates=found, uniform=is_uniform(left[1]),
-        known=not (bent or a_factor) and white and not grows(left[1], x[:-1], x[1:]),
+        candidates=found, draws=_shape(found, left[1], mixed),
+        known=not (bent or a_factor) and white and not residuals.grows(left[1], x[:-1], x[1:]),
     )  # fmt: skip
 
 
@@ -187,7 +177,8 @@ def _of_one(
         # of several steps no combination is free of noise, and of a collision that ends a step another one
         ends = (y for y in counted if after == (random_scheme(y.scheme).acts[-1].kind == "collide"))
         each = tuple(replace(y, strides=(1,)) for y in ends)
-        return Thermal(candidates=each, free=tuple(map(float, free)), misfit=misfit)
+        shape = unlike_normal(drawn(v, each[0].omega ** 2 * kicks, state, close, after)) if each else ""
+        return Thermal(candidates=each, free=tuple(map(float, free)), misfit=misfit, draws=shape)
     found, added, sparse = list[Candidate](), False, bool(np.median(np.abs(left)) < SPARSE)
     if near(b, d) and near(c, -1):
         half, (decay, slow, error) = near(b, -h / 2), _decay(q, v)
@@ -217,14 +208,14 @@ def _of_one(
         # what a collision has left of the momentum, the rest of the step takes on without noise
         known: dict[str, Any] = {"omega": float(np.sqrt(2 * (1 + 1 / c)) / h), "omega_error": 0.0}
         # some steps have no collision, unless these are many; a factor acts in every step, if little
-        drawn = v[1:] + known["omega"] ** 2 * kicks
-        often, collides, _ = changed((drawn - v[:-1]) / np.std(v), drawn, state, close)
+        made = v[1:] + known["omega"] ** 2 * kicks
+        often, collides, _ = changed((made - v[:-1]) / np.std(v), made, state, close)
         often = often or close > COARSE
         # OAB has the null vector of twice its spring: of a collision nothing of a kick is left
-        slopes, _, errors = regressed(state, drawn / np.std(v))
+        slopes, _, errors = regressed(state, made / np.std(v))
         collides = collides and bool(abs(slopes[0]) < 5 * errors[0] + close * np.std(q) / h / np.std(v))
         names: tuple[str, ...] = ("andersen", "andersen-after-kick") if collides else ()
-        names += ("bussi", "bussi-unsigned") if often and (mixed or is_a_factor(v[:-1], drawn)) else ()
+        names += ("bussi", "bussi-unsigned") if often and (mixed or is_a_factor(v[:-1], made)) else ()
         if not names:
             return None
         found = [Candidate(scheme=name, **known) for name in names]
@@ -250,7 +241,7 @@ def _of_one(
             carried, spring = np.abs(entries[:2] / errors[:2]) > 5
             # of several particles' collisions each mode has a part
             names, leapfrog = _of_no_memory(q, v, inf if mixed else close, carried), "andersen-leapfrog"
-            of_two = not is_white(left) and is_correlated(left) and not sparse
+            of_two = not is_white(left) and residuals.is_correlated(left) and not sparse
             if of_two and names != (leapfrog,):
                 found, left = likely(("gj-iii-half",), q, v, h), np.empty(0)
                 if found and close > 1e-6:
@@ -266,7 +257,7 @@ def _of_one(
                 one = "gj-iii-half"
                 found = [Candidate(scheme=name) for name in names if name != one]
                 found += likely((one,), q, v, h) if one in names else []
-        elif -b < h and is_correlated(left):
+        elif -b < h and residuals.is_correlated(left):
             rates = {f"gj-{n}-half": _rate(root, -b / h) for n, root in roots.items()}
             found = [Candidate(scheme=n, friction=x / h, friction_error=0.0) for n, x in rates.items() if x]
             left = np.empty(0)
@@ -282,9 +273,16 @@ def _of_one(
     shared = {"bussi-after"}, {"gj-iii-half"}, {"aboba", "aoboa"}
     return Thermal(
         candidates=tuple(found), free=tuple(map(float, free)), misfit=misfit,
-        uniform=bool(len(left)) and is_uniform(left), added=added,
+        draws=_shape(found, left, mixed), added=added,
         known=alike not in shared and not alike & {"bussi", "euler-maruyama"} and close <= COARSE,
     )  # fmt: skip
+
+
+def _shape(found: Sequence[Candidate], left: Floats, mixed: bool) -> str:
+    """How draws that a map has left are not normal; of collisions and factors it leaves more than draws."""
+    known = [random_scheme(x.scheme) for x in found]
+    mixed = mixed or any(x.collides or x.rescales for x in known)
+    return "" if mixed or not len(left) else unlike_normal(left)
 
 
 def _rate(of: Callable[[Floats], Floats], wanted: float) -> float | None:
@@ -366,13 +364,14 @@ def _of_two_halves(q: Floats, h: float, misfit: float, beside: Floats | None, mi
     if noise == 0 or not is_white(left / noise):
         return None
     # a force that is not linear leaves more than draws
-    bent = follows(left / noise, np.stack([q**2, q**3], axis=1)[1:-1], known)
+    bent = residuals.follows(left / noise, np.stack([q**2, q**3], axis=1)[1:-1], known)
     draws = left / noise
     if beside is not None:
         # a weak joint to what stands beside, which does not show by itself, is no draw
         draws = regressed(np.concatenate([known, beside[1:-1]], axis=1), draws)[1]
         draws /= np.std(draws)
-    uniform, normal = is_uniform(draws), bool(np.max(np.abs(draws)) > 2.2) and not mixed
+    shape = "" if mixed else unlike_normal(draws)
+    uniform, normal = shape == residuals.UNIFORM, bool(np.max(np.abs(draws)) > 2.2) and not mixed
     found = []
     for name, share, slope in (
         ("lammps-langevin", 1 - c, 1.0),
@@ -396,5 +395,5 @@ def _of_two_halves(q: Floats, h: float, misfit: float, beside: Floats | None, mi
             )
         )  # fmt: skip
     # noise in proportion to the force is none that a scheme adds
-    found = [] if grows(draws, q[1:-1]) else sorted(found, key=lambda y: y.nats)
-    return Thermal(candidates=tuple(found), misfit=misfit, uniform=uniform, known=not bent)
+    found = [] if residuals.grows(draws, q[1:-1]) else sorted(found, key=lambda y: y.nats)
+    return Thermal(candidates=tuple(found), misfit=misfit, draws=shape, known=not bent)
