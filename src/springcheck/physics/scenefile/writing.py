@@ -12,7 +12,7 @@ import numpy as np
 from springcheck.physics.arrays import Floats
 from springcheck.physics.fields import SceneFields
 from springcheck.physics.graph import standing
-from springcheck.physics.rods import rods_of
+from springcheck.physics.rods import Rods
 from springcheck.physics.scenefile.tables import BODIES
 from springcheck.physics.system import System
 from springcheck.physics.term import Term
@@ -127,9 +127,7 @@ def _rows(scene: SceneFields, term: Term) -> Iterator[str]:
         for a, b, k, rest in {number: row for *row, number in term.rows()}.values():
             yield _table("[[bond]]", {"ends": _ends(scene, [a, b])[0], "stiffness": k, "rest": rest}.items())
     elif isinstance(term, Rod | WallRod):
-        rods = rods_of(scene.m, scene.places, (term,))
-        assert rods is not None
-        for particles, length, point in rods.joints():
+        for particles, length, point in Rods(scene.m, scene.places, (term,)).joints():
             places = scene.places
             along = [0] if places is None else places[places // 3 == particles[0]] % 3
             wall: dict[str, Any] = {} if point is None else {"wall": point[along].tolist()}
