@@ -27,8 +27,8 @@ def text(system: System[Any]) -> str:
     scene: SceneFields = system.scene
     head = {"title": scene.title, "source": scene.source, "units": scene.units, "kind": scene.kind}
     lines = [_assigned(head)]
-    plain = scene.places is None and scene.kind == "particles"
-    is_chain = plain and system.is_uniform_chain and _rests_at_0(scene)
+    is_chain = scene.places is None and scene.kind == "particles" and system.is_uniform_chain
+    is_chain &= all(_rest_in_0(term) for term in scene.terms if isinstance(term, WallSpring | Spring))
     if is_chain:
         lines += _chain(scene)
     else:
@@ -64,10 +64,9 @@ def _bodies(scene: SceneFields, names: Sequence[str]) -> Iterator[Iterable[tuple
         yield zip((*names, "axes"), (m[0], list(q), list(p), along), strict=True)
 
 
-def _rests_at_0(scene: SceneFields) -> bool:
-    """Whether the springs of a chain have the rest lengths that [chain] implies."""
-    springs = [term for term in scene.terms if isinstance(term, WallSpring | Spring)]
-    return not any(term.fast or np.any(getattr(term, term.origin)) for term in springs)
+def _rest_in_0(term: Term) -> bool:
+    """Whether springs rest in 0 and are not fast, as those of a [chain] and capacitors do."""
+    return not (term.fast or np.any(getattr(term, term.origin)))
 
 
 def _chain(scene: SceneFields) -> Iterator[str]:
@@ -149,7 +148,7 @@ def _are_capacitors(term: WallSpring | Spring) -> bool:
     with np.errstate(divide="ignore", over="ignore"):
         capacitance = 1 / term.k
         exact = (term.k > 0) & (capacitance > 0) & np.isfinite(capacitance) & (1 / capacitance == term.k)
-    return bool(np.all(exact)) and not (term.fast or np.any(getattr(term, term.origin)))
+    return bool(np.all(exact)) and _rest_in_0(term)
 
 
 def _by_columns(scene: SceneFields, term: Term) -> Iterator[str]:
