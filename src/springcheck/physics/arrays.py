@@ -166,3 +166,9 @@ def reals(where: str, **given: Any) -> list[Floats]:
         except (TypeError, ValueError, OverflowError):
             raise SceneError(f"{where}: {name}: real numbers, or an array of them, are needed") from None
     return found
+
+
+def roundoff(*given: Any) -> float:
+    """Unit roundoff of the narrowest of these arrays, that of a double at least."""
+    kinds = [np.asarray(x).dtype for x in given]
+    return float(max([2.0**-53, *(np.finfo(kind).eps / 2 for kind in kinds if kind.kind == "f")]))

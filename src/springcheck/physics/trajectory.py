@@ -13,7 +13,16 @@ import numpy as np
 
 from springcheck.errors import SpringcheckError
 from springcheck.physics.arguments import typed
-from springcheck.physics.arrays import AS_WRITTEN, Arithmetic, Extended, Floats, reals, told, words_of
+from springcheck.physics.arrays import (
+    AS_WRITTEN,
+    Arithmetic,
+    Extended,
+    Floats,
+    reals,
+    roundoff,
+    told,
+    words_of,
+)
 
 if TYPE_CHECKING:
     from springcheck.physics.scene import Scene
@@ -114,7 +123,7 @@ class Trajectory:
         steps = (len(time) - 1) * int(every)
         step = scene.step if scene is not None else float(time[-1] - time[0]) / steps
         more: Any = {"scene": scene, "outcome": Outcome(status="complete", step=steps)}
-        unit = _roundoff(q, *(x for x in (v, mass) if x is not None) if p is None else (p,))
+        unit = roundoff(q, *(x for x in (v, mass) if x is not None) if p is None else (p,))
         if unit > Arithmetic().state:
             more["arithmetic"] = Arithmetic(name=AS_WRITTEN, state=unit)
         made = cls(
@@ -251,12 +260,6 @@ def html_table(title: str, rows: Iterable[Sequence[str]]) -> str:
 
     body = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)
     return f"<p>{escape(title)}</p><table>{body}</table>"
-
-
-def _roundoff(*given: Any) -> float:
-    """Unit roundoff of the narrowest of these arrays, that of a double at least."""
-    kinds = [np.asarray(x).dtype for x in given]
-    return float(max([2.0**-53, *(np.finfo(kind).eps / 2 for kind in kinds if kind.kind == "f")]))
 
 
 def _few(values: Floats) -> str:
