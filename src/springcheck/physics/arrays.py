@@ -59,11 +59,11 @@ def by_identity(kind: type[Class]) -> type[Class]:
 
 
 def told(words: str, default: Any = None) -> Any:
-    """A field of a dataclass, and how `words_of` states a value other than its default."""
+    """A field of a dataclass, and how `worded` states a value other than its default."""
     return field(default=default, metadata={"words": words})
 
 
-def words_of(record: Any) -> str:
+def worded(record: Any) -> str:
     """The fields of a dataclass made by `told` that differ from their defaults, in words."""
     known = ((one, getattr(record, one.name)) for one in fields(record) if "words" in one.metadata)
     return ", ".join(one.metadata["words"].format(x) for one, x in known if x != one.default)
@@ -129,7 +129,7 @@ class Arithmetic:
 
     def __str__(self) -> str:
         """Departures from double precision, in words; "" where there are none."""
-        return words_of(self)
+        return worded(self)
 
 
 MOST_NUMBERS = 1 << 21

@@ -13,16 +13,7 @@ import numpy as np
 
 from springcheck.errors import SpringcheckError
 from springcheck.physics.arguments import typed
-from springcheck.physics.arrays import (
-    AS_WRITTEN,
-    Arithmetic,
-    Extended,
-    Floats,
-    reals,
-    roundoff,
-    told,
-    words_of,
-)
+from springcheck.physics.arrays import AS_WRITTEN, Arithmetic, Extended, Floats, reals, roundoff, told, worded
 
 if TYPE_CHECKING:
     from springcheck.physics.scene import Scene
@@ -336,7 +327,7 @@ class Limits:
 
     def __str__(self) -> str:
         """The limits in words; "" where all are None."""
-        return f"would see {said}" if (said := words_of(self)) else ""
+        return f"would see {said}" if (said := worded(self)) else ""
 
     @classmethod
     def least(cls, several: Iterable[Limits]) -> Limits:
