@@ -69,14 +69,9 @@ class _Bodies:
 
 
 FILE_PATHS = {
-    "step": "time.step",
-    "steps": "time.steps",
-    "every": "record.every",
-    "tolerance": "time.tolerance",
-    "quantities": "record.quantities",
-    "include": "methods.include",
-    "box": "box.lengths",
-}
+    "step": "time.step", "steps": "time.steps", "every": "record.every", "tolerance": "time.tolerance",
+    "quantities": "record.quantities", "include": "methods.include", "box": "box.lengths",
+}  # fmt: skip
 """Path in a scene file of each field of a scene, for messages."""
 
 
