@@ -40,7 +40,7 @@ class RadialSpring(LinearLaw, Term):
     @cached_property
     def _bond(self) -> Integers:
         """Index of the bond of each row."""
-        return np.cumsum(np.diff(self.number, prepend=self.number[:1]) != 0)
+        return np.cumsum(np.append(0, np.diff(self.number) != 0))[: len(self)]
 
     @cached_property
     def _starts(self) -> Integers:
