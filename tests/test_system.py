@@ -6,6 +6,7 @@ import subprocess
 import sys
 import tracemalloc
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -100,12 +101,12 @@ def test_rest_positions_are_the_same_however_springs_are_turned() -> None:
     for a in (np.arange(40), np.array([0, 1, 2, 5, 6, 9, 20, 21])):
         row = Spring(a=a, b=a + 1, k=np.ones(len(a)), rest=rng.normal(size=len(a)))
         turned = Spring(a=row.b, b=row.a, k=row.k, rest=-row.rest)
-        quick, searched = graph.rest_positions(50, [row]), graph.rest_positions(50, [turned])
+        quick, searched = (graph.rest_positions(SimpleNamespace(n=50, terms=[x])) for x in (row, turned))
         assert quick is not None
         assert searched is not None
         assert np.array_equal(quick, searched)
     ring = Spring(a=[0, 1, 2], b=[1, 2, 0], k=1.0, rest=[1.0, 1.0, 1.0])
-    assert graph.rest_positions(3, [ring]) is None
+    assert graph.rest_positions(SimpleNamespace(n=3, terms=[ring])) is None
 
 
 def test_a_sparse_hessian_bounds_what_the_full_one_does(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -18,7 +18,7 @@ numbers for "reduced".
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any, Literal, TypeAlias, TypeVar
 
 import numpy as np
@@ -58,6 +58,17 @@ def by_identity(kind: type[Class]) -> type[Class]:
     return kind
 
 
+def told(words: str, default: Any = None) -> Any:
+    """A field of a dataclass, and how `worded` states a value other than its default."""
+    return field(default=default, metadata={"words": words})
+
+
+def worded(record: Any) -> str:
+    """The fields of a dataclass made by `told` that differ from their defaults, in words."""
+    known = ((one, getattr(record, one.name)) for one in fields(record) if "words" in one.metadata)
+    return ", ".join(one.metadata["words"].format(x) for one, x in known if x != one.default)
+
+
 AS_WRITTEN = "as written"
 """Name of the arithmetic of numbers in a file, whose digits are read from the numbers themselves."""
 
@@ -67,30 +78,30 @@ class Arithmetic:
     """How a platform rounds.  The defaults are IEEE double precision throughout."""
 
     name: str = "double"
-    state: float = 2.0**-53
+    state: float = told("states to {:.2g}", 2.0**-53)
     """Unit roundoff of stored positions and momenta."""
-    force: float = 2.0**-53
+    force: float = told("forces to {:.2g}", 2.0**-53)
     """Unit roundoff of the force."""
-    quantum: float = 0.0
+    quantum: float = told("forces in units of {:.2g}", 0.0)
     """Quantum of fixed-point forces [M L/T2], to which each term's force on a particle is truncated."""
     overflow: float = float("inf")
     """Largest force that the fixed-point sum holds."""
-    parameters: Literal["double", "single"] = "double"
+    parameters: Literal["double", "single"] = told("parameters in {} precision", "double")
     """Precision in which force constants and rest lengths are stored."""
-    excess: float = 0.0
+    excess: float = told("every force {:.2g} too large", 0.0)
     """Relative excess of every force."""
-    stale: float = 0.0
+    stale: float = told("forces kept within {:.2g}", 0.0)
     """Largest displacement since a force was computed for which the engine reuses it [L]."""
-    lengths: float = 0.0
+    lengths: float = told("lengths of rods kept to {:.2g}", 0.0)
     """Relative tolerance of the lengths of rods, where that is coarser than rounding."""
-    cancels: int = 0
+    cancels: int = told("coefficients of the bath from 1 - exp(-friction h) as a difference", 0)
     """Power of 1/x, x = gamma h, or of x above 1, in the relative rounding of a thermostat's coefficients,
     from 1 - c with a rounded c."""
     keeps_displacement: bool = False
     """Whether a velocity rebuilt over the step comes from the stored displacement, not from x' - x."""
-    from_start: bool = False
+    from_start: bool = told("positions kept as displacements from the start", False)
     """Whether positions are stored as displacements from the start, as total Lagrangian elements do."""
-    joints: bool = False
+    joints: bool = told("springs as joints whose lengths are rounded", False)
     """Whether springs are joints of length `System.far`, whose rounding each force has."""
     written: Any = field(default=((), ()), compare=False)
     """Half a unit of the last decimal of recorded positions and momenta (2, n); empty where these are not
@@ -118,20 +129,7 @@ class Arithmetic:
 
     def __str__(self) -> str:
         """Departures from double precision, in words; "" where there are none."""
-        named = {
-            "state": f"states to {self.state:.2g}",
-            "force": f"forces to {self.force:.2g}",
-            "quantum": f"forces in units of {self.quantum:.2g}",
-            "parameters": f"parameters in {self.parameters} precision",
-            "excess": f"every force {self.excess:.2g} too large",
-            "stale": f"forces kept within {self.stale:.2g}",
-            "lengths": f"lengths of rods kept to {self.lengths:.2g}",
-            "from_start": "positions kept as displacements from the start",
-            "joints": "springs as joints whose lengths are rounded",
-            "cancels": "coefficients of the bath from 1 - exp(-friction h) as a difference",
-        }
-        plain = Arithmetic()
-        return ", ".join(said for name, said in named.items() if getattr(self, name) != getattr(plain, name))
+        return worded(self)
 
 
 MOST_NUMBERS = 1 << 21

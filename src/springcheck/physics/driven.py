@@ -45,9 +45,6 @@ class _Driven(Term):
         time = np.abs(size[..., -1:]) if self.clock else 0
         return np.asarray(1 + np.abs(self.frequency) * time + np.abs(self.phase))
 
-    def __getstate__(self) -> dict[str, Any]:
-        return Term.__getstate__(self) | ({"clock": True} if self.clock else {})
-
 
 _TURNS = (Column("frequency", "frequency", single=False), Column("phase", "phase", 0.0, single=False))
 
@@ -93,10 +90,8 @@ class ModulatedSpring(LinearLaw, _Driven):
     depth: Floats
     at: Floats
 
-    @staticmethod
-    def second(u: Reals, k: Floats, depth: Floats, *_: Floats) -> Reals:  # type: ignore[override]
-        """Largest absolute curvature over all times; `curvature` is that at one time."""
-        return np.asarray(np.abs(k) * (1 + np.abs(depth)))
+    # the largest over all times; `curvature` is that at one time
+    second: ClassVar[Any] = staticmethod(lambda u, k, depth, *_: np.abs(k) * (1 + np.abs(depth)))
 
     def pull(self, q: Reals) -> Reals:
         return np.asarray(self.curvature(q) * self.elongation(q))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal, Self, TypeAlias
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from springcheck.physics.arrays import Floats, Integers, Reals
 from springcheck.physics.bath import Bath
-from springcheck.physics.term import Term, refrozen
+from springcheck.physics.term import FrozenArrays, Term
 
 Kind: TypeAlias = Literal["particles", "circuit", "rotor"]
 Units: TypeAlias = Literal["reduced", "md", "si"]
@@ -19,7 +19,7 @@ Quantity: TypeAlias = Literal["q", "p", "energy"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False, init=False)
-class SceneFields:
+class SceneFields(FrozenArrays):
     """The fields of a `Scene`, unchecked: only a `Scene` validates them and derives quantities from them."""
 
     m: Floats
@@ -137,9 +137,3 @@ class SceneFields:
         twin = object.__new__(type(self))
         twin.__dict__.update(self.__getstate__(), **changes)
         return twin
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {field.name: getattr(self, field.name) for field in fields(self)}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        refrozen(self, state)

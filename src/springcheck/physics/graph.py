@@ -63,14 +63,14 @@ def lowest_joined(n: int, terms: Sequence[Term]) -> Integers:
             return lowest
 
 
-def rest_positions(n: int, terms: Sequence[Term]) -> Floats | None:
+def rest_positions(system: Any) -> Floats | None:
     """Positions (n,) [L] at which every spring between particles has its rest length.
 
     The lowest particle of each connected group is at 0.  None where springs in a ring are inconsistent.
     """
-    springs = [term for term in terms if isinstance(term, Spring)]
+    springs = [term for term in system.terms if isinstance(term, Spring)]
     if not any(np.any(term.rest) for term in springs):
-        return np.zeros(n)
+        return np.zeros(system.n)
     neighbours: dict[int, list[tuple[int, float]]] = {}
     for term in springs:
         for a, b, rest in zip(term.a.tolist(), term.b.tolist(), term.rest.tolist(), strict=True):
@@ -88,7 +88,7 @@ def rest_positions(n: int, terms: Sequence[Term]) -> Floats | None:
                     front.append(b)
                 elif placed[b] != placed[a] + rest and placed[a] != placed[b] - rest:
                     return None
-    found = np.zeros(n)
+    found = np.zeros(system.n)
     found[list(placed)] = list(placed.values())
     return found
 

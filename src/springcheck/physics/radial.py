@@ -38,14 +38,14 @@ class RadialSpring(LinearLaw, Term):
     number: Floats
 
     @cached_property
-    def _starts(self) -> Integers:
-        """The first row of each bond."""
-        return np.flatnonzero(np.append(True, np.diff(self.number) != 0)) if len(self) else self.a
-
-    @cached_property
     def _bond(self) -> Integers:
         """Index of the bond of each row."""
-        return np.cumsum(np.append(0, np.diff(self.number) != 0)) if len(self) else self.a
+        return np.cumsum(np.append(0, np.diff(self.number) != 0))[: len(self)]
+
+    @cached_property
+    def _starts(self) -> Integers:
+        """The first row of each bond."""
+        return np.flatnonzero(np.diff(self._bond, prepend=-1))
 
     def _sum(self, values: Reals) -> Reals:
         """Sums over the axes of each bond, for each of its rows (..., s)."""

@@ -103,7 +103,7 @@ class Rods:
         taken = [index for term in self._terms for index in term.particles]
         self.share = len(np.unique(np.concatenate(taken))) < sum(map(len, taken))
         """Whether some particle has two rods."""
-        self._at = [getattr(term, "at", np.zeros(len(term))) for term in self._terms]
+        self._at = np.concatenate([getattr(term, "at", np.zeros(len(term))) for term in self._terms])
 
     def __len__(self) -> int:
         """Number of rods."""
@@ -116,8 +116,7 @@ class Rods:
 
     def joints(self) -> Iterator[tuple[tuple[int, ...], float, Floats | None]]:
         """Each rod for a program: its particles, length [L], and the fixed point (x, y, z) of one end."""
-        at = self.split(np.concatenate(self._at))
-        along = self.split(self._axes)
+        at, along = self.split(self._at), self.split(self._axes)
         for j, (ends, length) in enumerate(zip(self.ends, self.length.tolist(), strict=True)):
             point = np.zeros(3)
             point[along[j]] = at[j]
@@ -288,8 +287,7 @@ class Rods:
 
     def _most(self, size: Reals) -> Reals:
         """Bound on the vectors between positions of these sizes."""
-        at = np.concatenate([np.abs(one) for one in self._at])[self._order]
-        return np.asarray(self._rows("most_stretch", size) + at)
+        return np.asarray(self._rows("most_stretch", size) + np.abs(self._at)[self._order])
 
     def _bound(self, left: Reals, right: Reals, size: Reals) -> Reals:
         """Bound on |k| in `solve`, where the wanted amounts have these sizes."""
@@ -304,7 +302,6 @@ class Rods:
     def strain(self, q: Reals) -> Reals:
         """Strain of each rod, its excess length over its length, at positions q (..., n) -> (..., c)."""
         r, length = self.ways(q), self.length.astype(q.dtype)
-        # the difference of squares by its factors, since a length alone has lost half of its digits
         size = np.sqrt(self.dot(r, r))
         return np.asarray((size - length) / length)
 
@@ -378,8 +375,3 @@ class Rods:
                 f"{abs(rate):.3g} a unit of time at the start; momenta that keep its length are "
                 f"p = {np.asarray(self.projected(q, p)).tolist()}"
             )
-
-
-def rods_of(m: Floats, places: Integers | None, terms: Sequence[Term]) -> Rods | None:
-    """The rods among the terms of a scene, None where there are none."""
-    return Rods(m, places, terms) if any(term.kind == "constraint" for term in terms) else None

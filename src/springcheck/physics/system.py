@@ -19,7 +19,7 @@ from springcheck.physics.arrays import WIDE, Extended, Floats, Force, Integers, 
 from springcheck.physics.driven import Drive, with_clock
 from springcheck.physics.fields import SceneFields
 from springcheck.physics.norm import SMALLEST_ENERGY, Norm, kinetic_energy
-from springcheck.physics.rods import Rods, rods_of
+from springcheck.physics.rods import Rods
 from springcheck.physics.term import Term
 from springcheck.physics.terms import Damping, Magnetic, VanDerPol
 
@@ -31,6 +31,11 @@ cube, 5 s here.  The modes of a uniform chain are known at any length."""
 
 MOST_DENSE = 1024
 """Most joined particles for which second derivatives are stored as n x n numbers."""
+
+
+def _most(term: Term, q: Reals) -> Reals:
+    """The larger absolute curvature of each row, at q (..., n) or at rest -> (..., s) or (s,) [M/T2]."""
+    return np.maximum(np.abs(term.curvature(q)), term.rigidity)
 
 
 class System(Generic[Fields]):
@@ -109,24 +114,26 @@ class System(Generic[Fields]):
 
     def pulls(self, terms: Iterable[Term] | None = None) -> Integers:
         """Number of rows of these terms, or of all, on each particle (n,)."""
-        count = np.zeros(self.n)
+        return self._of_rows(lambda term: 1, np.zeros(self.n), terms).astype(np.int64)
+
+    def _of_rows(
+        self, of: Callable[[Any], Any], out: Reals, terms: Iterable[Term] | None = None
+    ) -> NDArray[Any]:
+        """Sum in out (..., n) of a number for each row of these terms, of(term), on each of its particles."""
         for term in self.terms if terms is None else terms:
-            term.scatter(np.ones(len(term)), count)
-        return count.astype(np.int64)
+            term.scatter(np.broadcast_to(of(term), (*out.shape[:-1], len(term))), out)
+        return out
 
     alike = cached_property(graph.alike)
     free_groups = cached_property(graph.free_groups)
     is_uniform_chain = cached_property(graph.is_uniform_chain)
+    rest_positions = cached_property(graph.rest_positions)
 
     @cached_property
     def rods(self) -> Rods | None:
         """The rods of the scene, None where it has none."""
-        return rods_of(self.m, self.scene.places, self.terms)
-
-    @cached_property
-    def rest_positions(self) -> Floats | None:
-        """Positions (n,) [L] at which every spring between particles has its rest length, or None."""
-        return graph.rest_positions(self.n, self.terms)
+        has_rods = any(term.kind == "constraint" for term in self.terms)
+        return Rods(self.m, self.scene.places, self.terms) if has_rods else None
 
     # forces
 
@@ -196,11 +203,9 @@ class System(Generic[Fields]):
     @cached_property
     def friction_rates(self) -> Extended:
         """Friction rates c/m of the particles (n,) [1/T], extended precision."""
-        out = np.zeros(self.n, dtype=np.longdouble)
-        for term in self.terms:
-            if isinstance(term, Damping):
-                term.scatter(term.c / self.m[term.i].astype(np.longdouble), out)
-        return out
+        brakes = (term for term in self.terms if isinstance(term, Damping))
+        m, none = self.m.astype(np.longdouble), np.zeros(self.n, dtype=np.longdouble)
+        return self._of_rows(lambda term: term.c / m[term.i], none, brakes)
 
     def friction_at(self, q: Reals) -> tuple[Reals, Reals]:
         """Friction rates at q (..., n) [1/T], and their derivatives by each particle's position."""
@@ -228,10 +233,8 @@ class System(Generic[Fields]):
 
     def hessian_diagonal(self, q: Reals) -> Extended:
         """Diagonal of `hessian` (..., n), which is all of it for separate particles."""
-        out, wide = np.zeros(q.shape, dtype=np.longdouble), q.astype(np.longdouble)
-        for term in self.terms:
-            term.scatter(np.broadcast_to(term.curvature(wide), (*q.shape[:-1], len(term))), out)
-        return out
+        wide = q.astype(np.longdouble)
+        return self._of_rows(lambda term: term.curvature(wide), np.zeros(q.shape, dtype=np.longdouble))
 
     def slope(self, q: Reals) -> tuple[Extended, bool]:
         """`hessian_diagonal` for separate particles, otherwise `hessian`; and whether it is the latter."""
@@ -267,19 +270,12 @@ class System(Generic[Fields]):
 
     def gershgorin(self, q: Reals) -> Reals:
         """Bound on the sum of |elements| in each row of the Hessian at q (..., n) -> (..., n) [M/T2]."""
-        out = np.zeros_like(q)
-        for term in self.terms:
-            k = np.maximum(np.abs(term.curvature(q)), term.rigidity)
-            term.scatter(np.broadcast_to(k * term.bodies, (*q.shape[:-1], len(term))), out)
-        return out
+        return self._of_rows(lambda term: _most(term, q) * term.bodies, np.zeros_like(q))
 
     @cached_property
     def rigidity(self) -> Floats:
         """The bound of `gershgorin` from the terms' absolute curvature at rest alone (n,) [M/T2]."""
-        out = np.zeros(self.n)
-        for term in self.terms:
-            term.scatter(term.rigidity * term.bodies, out)
-        return out
+        return self._of_rows(lambda term: term.rigidity * term.bodies, np.zeros(self.n))
 
     # energies and sizes
 
@@ -336,9 +332,7 @@ class System(Generic[Fields]):
         For a free particle the position is what it could reach within the run.
         """
         unit = float(self.norm.unit)
-        k = np.zeros(self.n)
-        for term in self.terms:
-            term.scatter(np.maximum(np.abs(term.curvature(self.q)), term.rigidity), k)
+        k = self._of_rows(lambda term: _most(term, self.q), np.zeros(self.n))
         held = k > 0
         with np.errstate(over="ignore"):
             p = np.sqrt(2.0) * np.sqrt(self.m) * unit

@@ -9,7 +9,7 @@ written once for every width of float, for one state and for a whole trajectory 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any, ClassVar, Literal, NamedTuple, Self, TypeAlias, cast
 
@@ -37,7 +37,21 @@ class Column(NamedTuple):
     """Whether an engine with parameters in single precision stores this one so."""
 
 
-class Term:
+class FrozenArrays:
+    """A frozen dataclass with arrays: in another process the same fields, and arrays that stay read-only."""
+
+    def __getstate__(self) -> dict[str, Any]:
+        given: Any = self
+        return {field.name: getattr(self, field.name) for field in fields(given)}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        for value in state.values():
+            if isinstance(value, np.ndarray):
+                value.setflags(write=False)
+
+
+class Term(FrozenArrays):
     """Rows (s,) of parameters of one law.  Terms derive from `OnParticles` or `OnPairs`."""
 
     key: ClassVar[str]
@@ -247,12 +261,6 @@ class Term:
         rows = other.arrays
         return self._changed(**{name: np.append(values, rows[name]) for name, values in self.arrays.items()})
 
-    def __getstate__(self) -> dict[str, Any]:
-        return self.arrays | ({"fast": True} if self.fast else {})
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        refrozen(self, state)
-
     def _changed(self, **values: Any) -> Self:
         record: Any = self
         return replace(record, **values)  # type: ignore[no-any-return]
@@ -261,36 +269,19 @@ class Term:
 class LinearLaw:
     """The law of a linear spring, with the first parameter as its stiffness."""
 
-    @staticmethod
-    def potential(u: Reals, k: Floats, *_: Floats) -> Reals:
-        return np.asarray(0.5 * (k * u * u))
-
-    @staticmethod
-    def slope(u: Reals, k: Floats, *_: Floats) -> Reals:
-        return np.asarray(k * u)
-
-    @staticmethod
-    def second(u: Reals, k: Floats, *_: Floats) -> Reals:
-        return k
-
-    @staticmethod
-    def rounding(size: Reals, u: Reals, k: Floats, *_: Floats) -> Reals:
-        return np.asarray(k * size)
+    potential: ClassVar[Any] = staticmethod(lambda u, k, *_: 0.5 * (k * u * u))
+    slope: ClassVar[Any] = staticmethod(lambda u, k, *_: k * u)
+    second: ClassVar[Any] = staticmethod(lambda u, k, *_: k)
+    rounding: ClassVar[Any] = staticmethod(lambda size, u, k, *_: k * size)
 
 
 class WithoutPotential(Term):
     """A term without potential energy: friction, a magnetic field, a driving force, a rod."""
 
-    @staticmethod
-    def potential(u: Reals, *_: Floats) -> Reals:
-        return np.zeros_like(u)
-
+    potential: ClassVar[Any] = staticmethod(lambda u, *_: np.zeros_like(u))
     slope: ClassVar[Any] = potential
     rounding: ClassVar[Any] = potential
-
-    @staticmethod
-    def second(u: Reals, strength: Floats, *_: Floats) -> Reals:
-        return np.zeros_like(strength)
+    second: ClassVar[Any] = staticmethod(lambda u, strength, *_: np.zeros_like(strength))
 
     def scaled(self, factor: float | Floats) -> Self:
         """Itself, since it is no part of the potential."""
@@ -338,14 +329,6 @@ def frozen(values: Any, kind: type, rows: int | None, what: str) -> NDArray[Any]
         raise SceneError(f"{what} has the shape {out.shape}: {wanted} is needed")
     out.setflags(write=False)
     return out
-
-
-def refrozen(self: object, state: dict[str, Any]) -> None:
-    """Restore a frozen object from another process, whose arrays arrive writeable."""
-    self.__dict__.update(state)
-    for value in state.values():
-        if isinstance(value, np.ndarray):
-            value.setflags(write=False)
 
 
 def check_sign(values: Floats, sign: str, what: str) -> None:

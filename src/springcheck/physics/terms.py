@@ -63,22 +63,11 @@ class Quartic(OnParticles):
     columns: ClassVar[tuple[Column, ...]] = (Column("coefficient", "b"), Column("at", "at", 0.0))
     b: Floats
 
-    @staticmethod
-    def potential(u: Reals, b: Floats) -> Reals:
-        return 0.25 * (b * (u * u) * (u * u))
-
-    @staticmethod
-    def slope(u: Reals, b: Floats) -> Reals:
-        return b * (u * u * u)
-
-    @staticmethod
-    def second(u: Reals, b: Floats) -> Reals:
-        return 3 * b * u * u
-
-    @staticmethod
-    def rounding(size: Reals, u: Reals, b: Floats) -> Reals:
-        # a relative error of u is amplified threefold in u**3
-        return 3 * np.abs(b) * u * u * size
+    potential: ClassVar[Any] = staticmethod(lambda u, b: 0.25 * (b * (u * u) * (u * u)))
+    slope: ClassVar[Any] = staticmethod(lambda u, b: b * (u * u * u))
+    second: ClassVar[Any] = staticmethod(lambda u, b: 3 * b * u * u)
+    # a relative error of u is amplified threefold in u**3
+    rounding: ClassVar[Any] = staticmethod(lambda size, u, b: 3 * np.abs(b) * u * u * size)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -104,13 +93,8 @@ class Cosine(OnParticles):
         half = np.sin(wave * u / 2)
         return 2 * (depth * half * half)
 
-    @staticmethod
-    def slope(u: Reals, depth: Floats, wave: Floats) -> Reals:
-        return np.asarray((depth * wave) * np.sin(wave * u))
-
-    @staticmethod
-    def second(u: Reals, depth: Floats, wave: Floats) -> Reals:
-        return np.asarray(depth * wave**2 * np.cos(wave * u))
+    slope: ClassVar[Any] = staticmethod(lambda u, depth, wave: (depth * wave) * np.sin(wave * u))
+    second: ClassVar[Any] = staticmethod(lambda u, depth, wave: depth * wave**2 * np.cos(wave * u))
 
     @staticmethod
     def rounding(size: Reals, u: Reals, depth: Floats, wave: Floats) -> Reals:
@@ -137,21 +121,10 @@ class Weight(OnParticles):
     columns: ClassVar[tuple[Column, ...]] = (Column("force", "force"), Column("at", "at", 0.0))
     force: Floats
 
-    @staticmethod
-    def potential(u: Reals, force: Floats) -> Reals:
-        return -force * u
-
-    @staticmethod
-    def slope(u: Reals, force: Floats) -> Reals:
-        return 0 * u - force
-
-    @staticmethod
-    def second(u: Reals, force: Floats) -> Reals:
-        return 0 * u
-
-    @staticmethod
-    def rounding(size: Reals, u: Reals, force: Floats) -> Reals:
-        return 0 * size + np.abs(force)
+    potential: ClassVar[Any] = staticmethod(lambda u, force: -force * u)
+    slope: ClassVar[Any] = staticmethod(lambda u, force: 0 * u - force)
+    second: ClassVar[Any] = staticmethod(lambda u, force: 0 * u)
+    rounding: ClassVar[Any] = staticmethod(lambda size, u, force: 0 * size + np.abs(force))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -309,24 +282,11 @@ class Magnetic(WithoutPotential):
 
 
 _KNOWN: dict[str, type[Term]] = {
-    term.key: term
-    for term in (
-        WallSpring,
-        Spring,
-        Quartic,
-        Cosine,
-        Weight,
-        Morse,
-        RadialSpring,
-        Damping,
-        VanDerPol,
-        Magnetic,
-        Drive,
-        ModulatedSpring,
-        WallRod,
-        Rod,
+    term.key: term for term in (
+        WallSpring, Spring, Quartic, Cosine, Weight, Morse, RadialSpring, Damping, VanDerPol, Magnetic, Drive,
+        ModulatedSpring, WallRod, Rod,
     )
-}
+}  # fmt: skip
 
 T = TypeVar("T", bound=type[Term])
 
@@ -366,12 +326,7 @@ def in_order(terms: Iterable[Term]) -> tuple[Term, ...]:
 
     def place(term: Term) -> tuple[bool, bool, bool, int, str]:
         number = known.index(term.key) if term.key in known else len(known)
-        return (
-            term.kind != "potential",
-            not isinstance(term, WallSpring | Spring),
-            term.fast,
-            number,
-            term.key,
-        )
+        is_spring = isinstance(term, WallSpring | Spring)
+        return term.kind != "potential", not is_spring, term.fast, number, term.key
 
     return tuple(sorted(found.values(), key=place))

@@ -13,7 +13,7 @@ import numpy as np
 
 from springcheck.errors import SpringcheckError
 from springcheck.physics.arguments import typed
-from springcheck.physics.arrays import AS_WRITTEN, Arithmetic, Extended, Floats, reals, roundoff
+from springcheck.physics.arrays import AS_WRITTEN, Arithmetic, Extended, Floats, reals, roundoff, told, worded
 
 if TYPE_CHECKING:
     from springcheck.physics.scene import Scene
@@ -299,42 +299,35 @@ class Comparison:
         return html_table(repr(self), [("", *self.labels), *cells])
 
 
-def _told(words: str) -> Any:
-    """A field of `Limits`, and its phrase."""
-    return field(default=None, metadata={"words": words})
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Limits:
     """The relative change of each quantity from which on a check fails; None where the check is blind."""
 
-    stiffness: float | None = _told("a stiffness off by {:.1e}")
+    stiffness: float | None = told("a stiffness off by {:.1e}")
     """Relative change of the spring, or other potential's row, with the largest such limit."""
-    step: float | None = _told("a step off by {:.1e}")
-    friction: float | None = _told("a friction off by {:.1e}")
+    step: float | None = told("a step off by {:.1e}")
+    friction: float | None = told("a friction off by {:.1e}")
     """Relative change of the friction on one particle."""
-    area: float | None = _told("an area in phase space off by {:.1e} a step")
+    area: float | None = told("an area in phase space off by {:.1e} a step")
     """Relative change of every particle's phase-space area a step: its momentum is multiplied by 1 + x."""
-    reaction: float | None = _told("a force off its reaction by {:.1e}")
+    reaction: float | None = told("a force off its reaction by {:.1e}")
     """Relative excess of the force on one particle over its reactions on the others."""
-    order: float | None = _told("an order or exponent off by {:.1e}")
+    order: float | None = told("an order or exponent off by {:.1e}")
     """Absolute change of an order or an exponent."""
-    amplitude: float | None = _told("a drive's amplitude off by {:.1e}")
+    amplitude: float | None = told("a drive's amplitude off by {:.1e}")
     """Relative change of a drive's amplitude, or of the depth of a modulation: the largest such limit."""
-    frequency: float | None = _told("its frequency off by {:.1e}")
+    frequency: float | None = told("its frequency off by {:.1e}")
     """Relative change of the frequency of a drive."""
-    phase: float | None = _told("its phase off by {:.1e} rad")
+    phase: float | None = told("its phase off by {:.1e} rad")
     """Change of the phase of a drive, in radians."""
-    late: float | None = _told("a drive late by {:.1e} of a step")
+    late: float | None = told("a drive late by {:.1e} of a step")
     """Delay of a drive, in steps."""
-    temperature: float | None = _told("noise of a temperature off by {:.1e}")
+    temperature: float | None = told("noise of a temperature off by {:.1e}")
     """Relative change of the temperature of a bath's noise, seen in 19 runs of 20."""
 
     def __str__(self) -> str:
         """The limits in words; "" where all are None."""
-        known = ((of.metadata["words"], getattr(self, of.name)) for of in fields(self))
-        said = [words.format(x) for words, x in known if x is not None]
-        return f"would see {', '.join(said)}" if said else ""
+        return f"would see {said}" if (said := worded(self)) else ""
 
     @classmethod
     def least(cls, several: Iterable[Limits]) -> Limits:

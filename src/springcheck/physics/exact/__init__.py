@@ -46,10 +46,11 @@ def true_motion(scene: Scene, steps: Integers, h: float) -> tuple[Extended, Exte
         raise ValueError(f"the motion of scene {scene.name!r} has no closed form here")
     # in blocks of times: the intermediate results take ten times the memory of the result
     rows = max(1, MOST_NUMBERS // scene.n)
-    q, p = np.empty((2, len(steps), scene.n), np.longdouble)
-    for begin in range(0, len(steps), rows):
+    t = np.asarray(steps).astype(np.longdouble)[:, None] * np.longdouble(h)
+    q, p = np.empty((2, len(t), scene.n), np.longdouble)
+    for begin in range(0, len(t), rows):
         some = slice(begin, begin + rows)
-        q[some], p[some] = known(steps[some], h)
+        q[some], p[some] = known.at(t[some])
     return q, p
 
 
@@ -65,9 +66,8 @@ def uncertainty(scene: Scene, duration: float) -> float:
     with np.errstate(all="ignore"):
         # the errors of all particles together are smaller than the sum of their bounds; a chain has a joint
         # bound
-        square = (
-            None if not system.has_modes else LinearMotion(system).energy_of_doubt(np.longdouble(duration))
-        )
+        modes = LinearMotion.of(system)
+        square = modes.energy_of_doubt(np.longdouble(duration)) if modes else None
         if square is None:
             dq, dp = system.solution.doubt(duration)
             # the error of a spring's elongation is that of both of its ends

@@ -7,15 +7,7 @@ from typing import Any
 import numpy as np
 
 from springcheck.physics.arrays import Extended
-from springcheck.physics.exact.closedform import (
-    CANCELS,
-    FORM_EPS,
-    ClosedForm,
-    States,
-    by_particle,
-    one_each,
-    wide,
-)
+from springcheck.physics.exact.closedform import CANCELS, FORM_EPS, ClosedForm, States, by_particle, wide
 from springcheck.physics.exact.digits import FEWER_DIGITS, digits, exactly, extended
 from springcheck.physics.system import System
 from springcheck.physics.terms import Morse
@@ -43,7 +35,7 @@ class MorseMotion(ClosedForm):
         super().__init__(system)
         (self.term,) = (term for term in system.terms if isinstance(term, Morse))
         term = self.term
-        self.need(one_each(system) and np.all((term.depth > 0) & (term.steepness != 0)))
+        self.need(self.one_each and np.all((term.depth > 0) & (term.steepness != 0)))
         ends = term.a, term.b
         m, q, p = ([wide(x[end]) for end in ends] for x in (system.m, system.q, system.p))
         total, depth, a = m[0] + m[1], wide(term.depth), wide(term.steepness)
@@ -105,10 +97,7 @@ class MorseMotion(ClosedForm):
         turn, run = np.where(bound, phase, 0), np.where(bound, 0, phase)
         far = np.abs(run) > FAR_PHASE
         endless, run = np.where(far, run, FAR_PHASE), np.where(far, 0, run)
-        half, whole = (
-            np.where(bound, np.sin(turn / 2), np.sinh(run / 2)),
-            np.where(bound, np.sin(turn), np.sinh(run)),
-        )
+        half, whole = (np.where(bound, np.sin(x), np.sinh(y)) for x, y in ((turn / 2, run / 2), (turn, run)))
         size = np.where(edge, 1, np.abs(self.excess))
         z, dz = 2 * root * half * half / size - root / (root + 1), root * self.rate * whole / size
         leaving = np.abs(endless) + np.log(np.where(far, root / (2 * size), 1))
@@ -116,11 +105,9 @@ class MorseMotion(ClosedForm):
         fast = np.where(edge, a * self.p / self.mass, 0)
         slow = np.where(edge, self.w**2 * np.exp(np.where(edge, -a * self.u, 0)), 0)
         grown = fast * t + slow * t * t / 2
-        away = np.where(far, self.rate * np.sign(endless), dz / (1 + z))
-        return (
-            np.where(edge, a * self.u + np.log1p(grown), np.where(far, leaving, np.log1p(z))),
-            np.where(edge, (fast + slow * t) / (1 + grown), away),
-        )
+        u, v = np.where(far, leaving, np.log1p(z)), np.where(far, self.rate * np.sign(endless), dz / (1 + z))
+        edge_u, edge_v = a * self.u + np.log1p(grown), (fast + slow * t) / (1 + grown)
+        return np.where(edge, edge_u, u), np.where(edge, edge_v, v)
 
     def doubt(self, t: np.longdouble) -> States:
         system, term = self.system, self.term

@@ -53,6 +53,11 @@ class ClosedForm:
         except NoClosedFormError:
             return None
 
+    @property
+    def one_each(self) -> bool:
+        """Whether exactly one term acts on each particle."""
+        return bool(np.all(self.system.pulls() == 1))
+
     def at(self, t: Extended) -> States:
         """Exact q and p (f, n) at times t (f, 1) [T]."""
         raise NotImplementedError
@@ -71,13 +76,3 @@ def by_particle(index: Integers, *rows: Any) -> States:
     """Positions and momenta (..., n) of the particles of these numbers (n,), in the order of the scene."""
     q, p = (np.take(x, np.argsort(index), axis=-1) for x in rows)
     return q, p
-
-
-def one_each(system: System[Any]) -> bool:
-    """Whether exactly one term acts on each particle."""
-    return bool(np.all(system.pulls() == 1))
-
-
-def latency(m1: Extended) -> Extended:
-    """Bound on F(phi | m) up to a quarter turn, for any phi that this precision distinguishes from it."""
-    return np.asarray(2 + np.log(16 / np.maximum(np.abs(m1), EPS**4)) / 2)

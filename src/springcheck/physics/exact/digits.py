@@ -7,6 +7,7 @@ for extended precision.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from decimal import Context, Decimal, localcontext
@@ -26,6 +27,9 @@ DIGITS = 420
 
 FEWER_DIGITS = 57
 """Digits where all numbers are within 17 decades of the largest: three words of libmpdec."""
+
+PI_ROUNDS = 4
+"""Rounds that take pi from a double, 1.2e-16 off, to 3e-49, 5e-147, 1e-440, and to rounding."""
 
 
 @contextmanager
@@ -62,21 +66,12 @@ def extended(x: Wide) -> Extended:
 
 @cache
 def pi() -> Decimal:
-    """Machin (1706): pi = 16 atan(1/5) - 4 atan(1/239)."""
+    """The zero of the sine: x + sin x has a sixth of the cube of the error of x."""
+    x = Decimal(math.pi)
     with digits(DIGITS + 10):
-        return 16 * _arctangent(5) - 4 * _arctangent(239)
-
-
-def _arctangent(inverse: int) -> Decimal:
-    """atan(1/inverse) by its series."""
-    power = total = Decimal(1) / inverse
-    k = 1
-    while True:
-        power /= -inverse * inverse
-        k += 2
-        if total + power / k == total:
-            return total
-        total += power / k
+        for _ in range(PI_ROUNDS):
+            x += _series(x, even=False)
+    return x
 
 
 def sine_cosine(x: Decimal) -> tuple[Decimal, Decimal]:

@@ -68,3 +68,8 @@ def argument(sine: Extended, cosine: Extended, m: Extended, m1: Extended) -> Ext
     with np.errstate(divide="ignore", invalid="ignore"):
         endless = np.arcsinh(np.where(edge, sine, 0) / np.where(edge, cosine, 1))
     return np.asarray(np.where(edge, endless, phi / mean))
+
+
+def latency(m1: Extended) -> Extended:
+    """Bound on F(phi | m) up to a quarter turn, for any phi that this precision distinguishes from it."""
+    return np.asarray(2 + np.log(16 / np.maximum(np.abs(m1), EPS**4)) / 2)

@@ -10,7 +10,7 @@ import numpy as np
 
 from springcheck.physics.arrays import EPS, Extended, by_identity
 from springcheck.physics.exact.closedform import ClosedForm, States
-from springcheck.physics.exact.normal import Modes, split
+from springcheck.physics.exact.normal import Modes, discriminant, split
 
 SMALLEST = np.finfo(np.longdouble).tiny
 ROUNDINGS = 32
@@ -34,58 +34,53 @@ class LinearMotion(ClosedForm):
         """A mode is known to a few roundings of its amplitude, of its phase, and of the summands of its
         start.  Errors of the equations themselves, y'' = -A y - r y' + g, act as forces, and a force f moves
         y by at most |t f| min(t, 1/w) (variation of constants)."""
-        system, found = self.system, self.modes
-        if found.waves:
-            y, v, of_y, of_v = self._of_waves(t)
-            return (found.spread(y) + of_y) / found.root_m, (found.spread(v) + of_v) * found.root_m
-        reach, speed, phase, hold = reaches(found, t)
-        joined = found.vectors is not None
-        last, duration = (ROUNDINGS + (system.n if joined else 0)) * EPS, np.abs(t)
-        y, v = last * ((1 + phase) * reach + np.abs(found.centre())), last * (1 + phase) * speed
-        # friction rates that differ by rounding count as one
-        force = found.doubt * reach + (np.ptp(found.rate) * speed if joined else 0)
-        if np.any(found.doubt):
-            zero = np.zeros(system.n, dtype=np.longdouble)
-            force = force + last * system.magnitude()(zero, zero) / found.root_m
-        if not joined:
-            y, v = y + duration * hold * force, v + duration * force
-        else:
-            kick = duration * _length(force)
-            # coupling may concentrate the errors of all modes in one
-            y, v = found.spread(y) + np.max(hold) * kick, found.spread(v) + kick
+        found = self.modes
+        y, v, of_y, of_v = self._of_modes(t)
+        y, v = found.spread(y) + of_y, found.spread(v) + of_v
         return np.asarray(y / found.root_m), np.asarray(v * found.root_m)
 
     def energy_of_doubt(self, t: np.longdouble) -> np.longdouble | None:
         """Bound on the energy of the error at time t [M L2/T2]; None where `doubt` is the tightest bound."""
         if not self.modes.waves:
             return None
-        y, v, of_y, of_v = self._of_waves(t)
+        y, v, of_y, of_v = self._of_modes(t)
         w = np.sqrt(np.max(self.modes.w2))
         of_modes = _length(np.hypot(np.sqrt(self.modes.w2) * y, v))
         known: np.longdouble = (of_modes + np.hypot(w * of_y, of_v)) ** 2 / 2
         return known
 
-    def _of_waves(self, t: np.longdouble) -> tuple[Extended, Extended, Extended, Extended]:
-        """Error bounds (n,) of each wave's position and velocity in a uniform chain, and of the transform.
+    def _of_modes(self, t: np.longdouble) -> tuple[Any, ...]:
+        """Error bounds (n,) of each mode's position and velocity, and those that modes share.
 
-        A wave is known like any mode.  The transform, an orthogonal one, has an error of some log2(n)
-        roundings of the norm of its argument (Higham, Accuracy and Stability of Numerical Algorithms, 24.1),
-        three times that where n + 1 has large factors (Bluestein); the exact motion propagates the error of
-        the start unchanged.
+        In a uniform chain these are of the transform, an orthogonal one: some log2(n) roundings of the norm
+        of its argument (Higham, Accuracy and Stability of Numerical Algorithms, 24.1), three times that where
+        n + 1 has large factors (Bluestein); the exact motion propagates the error of the start unchanged.
         """
         system, found = self.system, self.modes
         reach, speed, phase, hold = reaches(found, t)
-        last, transform = ROUNDINGS * EPS, 24 * np.log2(8 * (system.n + 1)) * EPS
+        joined, duration = found.vectors is not None, np.abs(t)
+        last = (ROUNDINGS + (system.n if joined else 0)) * EPS
         y, v = last * ((1 + phase) * reach + np.abs(found.centre())), last * (1 + phase) * speed
-        # friction rates that differ by rounding count as one
-        v = v + np.abs(t) * np.ptp(found.rate) * speed
+        # of joined particles friction rates that differ by rounding count as one
+        uneven = np.ptp(found.rate)
+        if not found.waves:
+            force = found.doubt * reach + (uneven * speed if joined else 0)
+            if np.any(found.doubt):
+                zero = np.zeros(system.n, dtype=np.longdouble)
+                force = force + last * system.magnitude()(zero, zero) / found.root_m
+            if not joined:
+                return y + duration * hold * force, v + duration * force, 0, 0
+            # coupling may concentrate the errors of all modes in one
+            kick = duration * _length(force)
+            return y, v, np.max(hold) * kick, kick
+        v, transform = v + duration * uneven * speed, 24 * np.log2(8 * (system.n + 1)) * EPS
         whole_y, whole_v = (_length(x) for x in found.into(system.q, system.p))
         w, driven = np.sqrt(np.max(found.w2)), np.exp(np.maximum(-t, 0) * np.max(found.rate))
         of_y = transform * (
             driven * (whole_y + np.max(hold) * whole_v) + _length(found.centre()) + _length(reach)
         )
         of_v = transform * (driven * (whole_v + w * whole_y) + _length(speed))
-        return np.asarray(y), np.asarray(v), of_y, of_v
+        return y, v, of_y, of_v
 
 
 def flow(w2: Extended, rate: Extended, t: np.longdouble) -> Extended:
@@ -150,11 +145,7 @@ def _damped(u: Extended, v: Extended, t: Extended, law: _Law) -> tuple[Extended,
     be 0 times infinity; from st = 1 on the two exponentials are computed separately, with the slow root as
     -w2 / (b + s).  Near critical damping S -> t, and nothing is divided by s.
     """
-    b = law.rate / 2
-    root = np.sqrt(np.abs(law.w2))
-    below = (root - b) * (root + b)
-    square = np.where(law.w2 > 0, below, law.w2 - b * b)
-    s = np.sqrt(np.abs(square))
+    b, square, s = discriminant(law.w2, law.rate)
     angle = s * t
     turning = square > 0
     apart = ~turning & (np.abs(angle) > 1)

@@ -36,9 +36,8 @@ class LumpedMotion(ClosedForm):
         self.need(all(np.all(a != b) for a, b in pairs))
         with digits():
             off = exactly(system.q) - exactly(system.q[first][of])
-            terms, shifts = (
-                zip(*(_moved(term, of, off) for term in others), strict=True) if others else ((), ())
-            )
+            moved = [_moved(term, of, off) for term in others]
+            terms, shifts = zip(*moved, strict=True) if moved else ((), ())
             each = system.m, held.projected(wide(system.q), wide(system.p))
             (m, p), less = _rounded(np.stack([summed(exactly(x), of, len(first)) for x in each]))
             self.off = extended(off)

@@ -13,15 +13,7 @@ import numpy as np
 
 from springcheck.physics.arrays import Extended
 from springcheck.physics.driven import ModulatedSpring
-from springcheck.physics.exact.closedform import (
-    FORM_EPS,
-    PI,
-    ClosedForm,
-    NoClosedFormError,
-    States,
-    one_each,
-    wide,
-)
+from springcheck.physics.exact.closedform import FORM_EPS, PI, ClosedForm, NoClosedFormError, States, wide
 from springcheck.physics.exact.powers import propagate
 from springcheck.physics.system import System
 
@@ -88,7 +80,7 @@ class ModulatedMotion(ClosedForm):
     def __init__(self, system: System[Any]) -> None:
         super().__init__(system)
         term = next(iter(system.terms), None)
-        self.need(isinstance(term, ModulatedSpring) and len(system.terms) == 1 and one_each(system))
+        self.need(isinstance(term, ModulatedSpring) and len(system.terms) == 1 and self.one_each)
         assert isinstance(term, ModulatedSpring)
         found = wide([system.m, system.q, system.p])
         self.modes = [_Mode(found[:, i], row) for i, *row in sorted(term.rows())]
@@ -123,15 +115,10 @@ class ModulatedMotion(ClosedForm):
             M = mode.nodes[-1]
             half = np.trace(M) / 2
             root = np.emath.sqrt((half - 1) * (half + 1)) * np.copysign(1, half)
-            radius, gap = (
-                max(float(np.abs(np.real(half + root))), 1.0),
-                max(2 * float(np.abs(root)), FORM_EPS),
-            )
+            radius = max(float(np.abs(np.real(half + root))), 1.0)
+            gap, periods = max(2 * float(np.abs(root)), FORM_EPS), float(np.abs(t) / mode.period) + 1
             # a time before the start is whole periods back, and a part of one forward
-            turned, periods = (
-                mode.rate * (t if t >= 0 else mode.period - t),
-                float(np.abs(t) / mode.period) + 1,
-            )
+            turned = mode.rate * (t if t >= 0 else mode.period - t)
             sizes = []
             for z in mode.rate * np.geomspace(1, _balance(M) / mode.rate, ERROR_SCALES):
                 scaled = mode.nodes * [[1, z], [1 / z, 1]]

@@ -118,6 +118,13 @@ def split(u: Any, v: Any, w2: Any, rate: Any) -> tuple[Any, Any, Any]:
     return (v - fast * u) / (2 * s), (slow * u - v) / (2 * s), size
 
 
+def discriminant(w2: Extended, rate: Extended) -> tuple[Extended, Extended, Extended]:
+    """b = rate/2, w2 - b**2, which nothing cancels near critical damping, and the root of its size."""
+    b, w = rate / 2, np.sqrt(np.abs(w2))
+    square = np.where(w2 > 0, (w - b) * (w + b), w2 - b * b)
+    return b, square, np.sqrt(np.abs(square))
+
+
 MOST_PRECISE = 32
 """Most particles whose modes are computed to high relative accuracy, in 0.7 s at most."""
 

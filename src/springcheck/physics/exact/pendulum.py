@@ -8,19 +8,9 @@ from typing import Any
 import numpy as np
 
 from springcheck.physics.arrays import Extended
-from springcheck.physics.exact.closedform import (
-    CANCELS,
-    FORM_EPS,
-    PI,
-    ClosedForm,
-    States,
-    by_particle,
-    latency,
-    one_each,
-    wide,
-)
+from springcheck.physics.exact.closedform import CANCELS, FORM_EPS, PI, ClosedForm, States, by_particle, wide
 from springcheck.physics.exact.digits import digits, exactly, extended, pi, sine_cosine
-from springcheck.physics.exact.elliptic import argument, jacobi
+from springcheck.physics.exact.elliptic import argument, jacobi, latency
 from springcheck.physics.system import System
 from springcheck.physics.terms import Cosine, Weight
 
@@ -55,11 +45,8 @@ class _Swing:
         phase = argument(np.where(over, np.sign(r) * s, s), np.where(over, c, r), modulus, other)
         am, sn, cn, dn = jacobi(self.w * t * fast + phase, modulus, other)
         root = np.sqrt(m)
-        swing = np.arctan2(root * sn, dn)
-        return (
-            np.asarray(np.where(over, np.sign(r) * am, swing)),
-            np.asarray(np.where(over, np.sign(r) * root * dn, root * cn)),
-        )
+        half = np.where(over, np.sign(r) * am, np.arctan2(root * sn, dn))
+        return half, np.where(over, np.sign(r) * root * dn, root * cn)
 
     @property
     def latency(self) -> Extended:
@@ -107,7 +94,7 @@ class PendulumMotion(ClosedForm):
     def __init__(self, system: System[Any]) -> None:
         super().__init__(system)
         (self.term,) = (term for term in system.terms if isinstance(term, Cosine))
-        self.need(np.all(self.term.depth != 0) and one_each(system))
+        self.need(np.all(self.term.depth != 0) and self.one_each)
         self.swing = _swing(system, self.term)
 
     def at(self, t: Extended) -> States:

@@ -41,13 +41,8 @@ def rotation(matrices: Extended) -> Rotation:
     growth = np.zeros_like(root)
     if np.any(hyperbolic):
         growth = np.where(hyperbolic, np.arcsinh(root / np.sqrt(np.where(hyperbolic, determinant, 1))), 0)
-    return Rotation(
-        determinant=determinant,
-        angle=angle,
-        growth=growth,
-        sign=np.where(half_trace < 0, np.longdouble(-1), np.longdouble(1)),
-        near=near,
-    )
+    sign = np.where(half_trace < 0, np.longdouble(-1), np.longdouble(1))
+    return Rotation(determinant, angle, growth, sign, near)
 
 
 def propagate(

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from springcheck.physics.arrays import Extended
-from springcheck.physics.exact.closedform import CANCELS, FORM_EPS, ClosedForm, States, latency, wide
+from springcheck.physics.exact.closedform import CANCELS, FORM_EPS, ClosedForm, States, wide
 from springcheck.physics.exact.digits import digits, exactly, extended
-from springcheck.physics.exact.elliptic import argument, jacobi
+from springcheck.physics.exact.elliptic import argument, jacobi, latency
 from springcheck.physics.system import System
 from springcheck.physics.terms import Quartic, WallSpring
 

@@ -128,11 +128,8 @@ def _step(law: _Law, u: Any, v: Any, h: Any, guess: Extended) -> _Nodes | None:
         scale = np.max(np.abs(residual))
         if not np.isfinite(scale):
             return None
-        if scale:
-            change = np.linalg.solve(matrix, (residual / scale).astype(np.float64)) * scale
-            found = found - change
-        else:
-            change = np.zeros(1)
+        change = scale and np.linalg.solve(matrix, (residual / scale).astype(np.float64)) * scale
+        found = found - change
         off, size = float(np.max(np.abs(change))), float(np.max(np.abs(found)))
         if off <= 4 * EPS * size or (off <= 64 * EPS * size and off > last / 4):
             # response of Newton's solution to a change of u and of v at the start

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from springcheck.physics.arrays import EPS, Extended
 from springcheck.physics.exact.closedform import ClosedForm, States
 from springcheck.physics.exact.linear import ROUNDINGS, LinearMotion, reaches
-from springcheck.physics.exact.normal import Modes
+from springcheck.physics.exact.normal import Modes, discriminant
 from springcheck.physics.system import System
 
 _Complex = NDArray[np.complexfloating[Any, Any]]
@@ -78,10 +78,7 @@ def drives(system: System[Any], modes: Modes) -> tuple[_Drive, ...]:
 
 def roots(modes: Modes) -> tuple[_Complex, _Complex]:
     """The two roots of x**2 + r x + w2 of each mode (n,), the smaller first."""
-    b = modes.rate / 2
-    root = np.sqrt(np.abs(modes.w2))
-    square = np.where(modes.w2 > 0, (root - b) * (root + b), modes.w2 - b * b)
-    s = np.sqrt(np.abs(square))
+    b, square, s = discriminant(modes.w2, modes.rate)
     fast = np.where(square > 0, 0, b + s)
     slow = np.where(fast > 0, -modes.w2 / np.where(fast > 0, fast, 1), 0)
     turning = square > 0

@@ -30,12 +30,8 @@ class Solution:
     n: int
     groups: tuple[tuple[Integers, ClosedForm], ...]
 
-    def __call__(self, steps: Integers, h: float) -> tuple[Extended, Extended]:
-        """q and p (f, n) after these numbers of steps of h: see `exact.true_motion`."""
-        return self.at(np.asarray(steps).astype(np.longdouble)[:, None] * np.longdouble(h))
-
     def at(self, t: Extended) -> tuple[Extended, Extended]:
-        """The same at times t (f, 1) [T]."""
+        """q and p (f, n) at times t (f, 1) [T]."""
         q, p = np.empty((2, len(t), self.n), dtype=np.longdouble)
         with np.errstate(all="ignore"):
             for particles, motion in self.groups:

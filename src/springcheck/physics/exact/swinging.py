@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from springcheck.physics.arrays import Extended
-from springcheck.physics.exact.closedform import FORM_EPS, ClosedForm, States, one_each, wide
+from springcheck.physics.exact.closedform import FORM_EPS, ClosedForm, States, wide
 from springcheck.physics.exact.digits import Wide, digits, exactly, extended, summed
 from springcheck.physics.rods import START_TOLERANCE
 from springcheck.physics.system import System
@@ -30,7 +30,7 @@ class SwingingMotion(ClosedForm):
         """No bond may rotate, reach length 0, or share a particle with another."""
         super().__init__(system)
         term: Any = system.terms[0]
-        self.need(one_each(system))
+        self.need(self.one_each)
         a, b = term.a, term.b
         bond = np.unique(term.number, return_inverse=True)[1]
 

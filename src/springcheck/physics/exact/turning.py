@@ -14,7 +14,7 @@ import numpy as np
 
 from springcheck.physics import graph
 from springcheck.physics.arrays import Extended, Integers
-from springcheck.physics.exact.closedform import FORM_EPS, ClosedForm, States, wide
+from springcheck.physics.exact.closedform import FORM_EPS, ClosedForm, NoClosedFormError, States, wide
 from springcheck.physics.exact.digits import Wide, digits, exactly, extended, summed
 from springcheck.physics.rods import START_TOLERANCE, Rods
 from springcheck.physics.system import System
@@ -33,8 +33,6 @@ class TurningRods(ClosedForm):
         rods, places, n = system.rods, system.scene.all_places, system.scene.particles
         assert rods is not None
         of, at = _bodies(system, rods), np.zeros(system.n)
-        self.need(of is not None)
-        assert of is not None
         for term in system.terms:
             if term.origin:
                 at[term.particles[0]] = getattr(term, term.origin)
@@ -90,15 +88,15 @@ class TurningWallRods(TurningRods):
     terms = frozenset({"wall-rod"})
 
 
-def _bodies(system: System[Any], rods: Rods) -> Integers | None:
-    """The body of each particle (particles,), None where some body is flexible, or has redundant rods."""
+def _bodies(system: System[Any], rods: Rods) -> Integers:
+    """The body of each particle (particles,).  NoClosedFormError where some body is flexible, or has
+    redundant rods."""
     places = system.scene.all_places
     of = np.arange(system.scene.particles)
     of[places // 3] = places[graph.lowest_joined(system.n, system.terms)] // 3
     size, joined = Counter(of.tolist()), Counter(int(of[ends[0]]) for ends in rods.ends)
     fixed = Counter(int(of[ends[0]]) for ends in rods.ends if len(ends) == 1)
-    rigid = all(
-        count == (1 if fixed[one] else 2 * size[one] - 3) and (not fixed[one] or size[one] == 1)
-        for one, count in joined.items()
-    )
-    return of if rigid else None
+    for one, count in joined.items():
+        if count != (1 if fixed[one] else 2 * size[one] - 3) or (fixed[one] and size[one] > 1):
+            raise NoClosedFormError
+    return of

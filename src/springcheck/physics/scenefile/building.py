@@ -18,17 +18,8 @@ from springcheck.physics.bath import Bath
 from springcheck.physics.fields import Units
 from springcheck.physics.scene import Scene
 from springcheck.physics.scenefile import tables
-from springcheck.physics.terms import (
-    Column,
-    Damping,
-    Magnetic,
-    RadialSpring,
-    Rod,
-    Spring,
-    Term,
-    WallRod,
-    WallSpring,
-)
+from springcheck.physics.term import Column, Term
+from springcheck.physics.terms import Damping, Magnetic, RadialSpring, Rod, Spring, WallRod, WallSpring
 
 
 class MistakeError(ValueError):
@@ -78,14 +69,9 @@ class _Bodies:
 
 
 FILE_PATHS = {
-    "step": "time.step",
-    "steps": "time.steps",
-    "every": "record.every",
-    "tolerance": "time.tolerance",
-    "quantities": "record.quantities",
-    "include": "methods.include",
-    "box": "box.lengths",
-}
+    "step": "time.step", "steps": "time.steps", "every": "record.every", "tolerance": "time.tolerance",
+    "quantities": "record.quantities", "include": "methods.include", "box": "box.lengths",
+}  # fmt: skip
 """Path in a scene file of each field of a scene, for messages."""
 
 
@@ -106,25 +92,12 @@ def scene(table: Any, *, name: str) -> Scene:
     try:
         bath = table.bath and table.bath.temperature != 0 and Bath(**msgspec.structs.asdict(table.bath))
         found = Scene(
-            name=name,
-            title=table.title,
-            source=table.source,
-            units=units,
-            kind=kind,
-            m=bodies.m,
-            q=bodies.q,
-            p=bodies.p,
-            places=bodies.places,
-            terms=terms,
-            box=table.box and table.box.lengths,
-            bath=bath or None,
-            step=time.step,
-            steps=time.steps,
-            every=table.record.every or time.every or 1,
-            tolerance=time.tolerance,
-            include=table.methods.include,
-            quantities=table.record.quantities,
-        )
+            m=bodies.m, q=bodies.q, p=bodies.p, places=bodies.places, terms=terms, step=time.step,
+            steps=time.steps, every=table.record.every or time.every or 1,
+            box=table.box and table.box.lengths, bath=bath or None, tolerance=time.tolerance, units=units,
+            kind=kind, include=table.methods.include, quantities=table.record.quantities, name=name,
+            title=table.title, source=table.source,
+        )  # fmt: skip
         # temperature 0: friction without noise
         return builders.cold(found, table.bath.friction) if table.bath and not bath else found
     except SceneError as error:
@@ -201,12 +174,11 @@ def _terms(table: Any, bodies: _Bodies) -> Iterator[Term]:
     yield from bodies.terms
     rows = itertools.chain(
         _springs(table.spring, bodies),
-        _capacitors(table, bodies),
         *(_by_columns(x, getattr(table, tables.identifier(x.key)), bodies) for x in tables.of_terms()),
         _rods(table.rod, bodies),
         _bonds(table.bond, bodies),
         _magnetic(table.magnetic, bodies),
-        _resistors(table.resistor, bodies),
+        _circuit(table, bodies),
     )
     found: dict[tuple[type[Term], bool], list[tuple[float, ...]]] = {}
     for term, fast, row in rows:
@@ -304,8 +276,8 @@ def _two_ends(one: int, other: int, field: str) -> None:
         raise MistakeError(f"{field} = [{one}, {other}]: the two ends are the same particle")
 
 
-def _capacitors(table: Any, bodies: _Bodies) -> _Rows:
-    """A capacitor as a spring of stiffness 1/C: of one loop to 0, or between two loops."""
+def _circuit(table: Any, bodies: _Bodies) -> _Rows:
+    """A capacitor as a spring of stiffness 1/C, of one loop to 0, or between two; a resistor as friction."""
     if (table.capacitor or table.resistor) and bodies.name != "inductor":
         raise MistakeError("capacitors and resistors belong to a circuit: give its loops as [[inductor]]")
     for j, capacitor in enumerate(table.capacitor):
@@ -313,10 +285,7 @@ def _capacitors(table: Any, bodies: _Bodies) -> _Rows:
         if len(loops) == 2:
             _two_ends(loops[0], loops[1], f"capacitor[{j}].loops")
         yield WallSpring if len(loops) == 1 else Spring, False, (*loops, 1 / capacitor.capacitance, 0.0)
-
-
-def _resistors(resistors: Sequence[Any], bodies: _Bodies) -> _Rows:
-    for j, resistor in enumerate(resistors):
+    for j, resistor in enumerate(table.resistor):
         yield Damping, False, (bodies.number(resistor.loop, f"resistor[{j}].loop"), resistor.resistance)
 
 

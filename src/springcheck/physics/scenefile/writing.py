@@ -12,7 +12,7 @@ import numpy as np
 from springcheck.physics.arrays import Floats
 from springcheck.physics.fields import SceneFields
 from springcheck.physics.graph import standing
-from springcheck.physics.rods import rods_of
+from springcheck.physics.rods import Rods
 from springcheck.physics.scenefile.tables import BODIES
 from springcheck.physics.system import System
 from springcheck.physics.term import Term
@@ -27,8 +27,8 @@ def text(system: System[Any]) -> str:
     scene: SceneFields = system.scene
     head = {"title": scene.title, "source": scene.source, "units": scene.units, "kind": scene.kind}
     lines = [_assigned(head)]
-    plain = scene.places is None and scene.kind == "particles"
-    is_chain = plain and system.is_uniform_chain and _rests_at_0(scene)
+    is_chain = scene.places is None and scene.kind == "particles" and system.is_uniform_chain
+    is_chain &= all(_rest_in_0(term) for term in scene.terms if isinstance(term, WallSpring | Spring))
     if is_chain:
         lines += _chain(scene)
     else:
@@ -64,10 +64,9 @@ def _bodies(scene: SceneFields, names: Sequence[str]) -> Iterator[Iterable[tuple
         yield zip((*names, "axes"), (m[0], list(q), list(p), along), strict=True)
 
 
-def _rests_at_0(scene: SceneFields) -> bool:
-    """Whether the springs of a chain have the rest lengths that [chain] implies."""
-    springs = [term for term in scene.terms if isinstance(term, WallSpring | Spring)]
-    return not any(term.fast or np.any(getattr(term, term.origin)) for term in springs)
+def _rest_in_0(term: Term) -> bool:
+    """Whether springs rest in 0 and are not fast, as those of a [chain] and capacitors do."""
+    return not (term.fast or np.any(getattr(term, term.origin)))
 
 
 def _chain(scene: SceneFields) -> Iterator[str]:
@@ -127,9 +126,7 @@ def _rows(scene: SceneFields, term: Term) -> Iterator[str]:
         for a, b, k, rest in {number: row for *row, number in term.rows()}.values():
             yield _table("[[bond]]", {"ends": _ends(scene, [a, b])[0], "stiffness": k, "rest": rest}.items())
     elif isinstance(term, Rod | WallRod):
-        rods = rods_of(scene.m, scene.places, (term,))
-        assert rods is not None
-        for particles, length, point in rods.joints():
+        for particles, length, point in Rods(scene.m, scene.places, (term,)).joints():
             places = scene.places
             along = [0] if places is None else places[places // 3 == particles[0]] % 3
             wall: dict[str, Any] = {} if point is None else {"wall": point[along].tolist()}
@@ -151,7 +148,7 @@ def _are_capacitors(term: WallSpring | Spring) -> bool:
     with np.errstate(divide="ignore", over="ignore"):
         capacitance = 1 / term.k
         exact = (term.k > 0) & (capacitance > 0) & np.isfinite(capacitance) & (1 / capacitance == term.k)
-    return bool(np.all(exact)) and not (term.fast or np.any(getattr(term, term.origin)))
+    return bool(np.all(exact)) and _rest_in_0(term)
 
 
 def _by_columns(scene: SceneFields, term: Term) -> Iterator[str]:
