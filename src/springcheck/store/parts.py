@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 from urllib.parse import unquote
@@ -62,26 +62,26 @@ def claim(parts: Path) -> JournalClaim | None:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Parts:
-    """The files that make up a store: the collection, or the parts of a run that are not yet in one.
+    """The files that make up a store: the collection, or the parts of a run that are not yet in one."""
 
-    Each part holds a trajectory (`runs`), or a table or rows of one (`tables`).
-    """
-
-    collection: Path | None
     runs: list[Path]
-    tables: list[Path]
+    """Parts of one trajectory each, or the collection alone."""
+    tables: list[Path] = field(default_factory=list)
+    """Parts of a table, or of rows of one."""
+    complete: bool = False
+    """Whether there is a collection."""
 
     @property
     def everything(self) -> list[Path]:
-        """Every file of the journal: the collection, or its runs and tables."""
-        return [*self.runs, *self.tables] if self.collection is None else [self.collection]
+        """All of these files."""
+        return [*self.runs, *self.tables]
 
     @classmethod
     def of(cls, path: Path, run: str | None) -> Parts:
         """`run` is the writer's, whose parts they are; None for a reader, who takes the collection if there
         is one."""
         if run is None and path.is_file():
-            return cls(collection=path, runs=[], tables=[])
+            return cls(runs=[path], complete=True)
         folder, known = parts_folder(path), run
         if known is None:
             with contextlib.suppress(StoreError):
@@ -91,7 +91,7 @@ class Parts:
         parts = sorted(part for part in there if part.is_file() and not part.is_symlink())
         parts = [part for part in parts if (found := seal.find(part)) is None or found.run == known]
         runs = [part for part in parts if part.name.startswith("run-")]
-        return cls(collection=None, runs=runs, tables=[part for part in parts if part not in runs])
+        return cls(runs=runs, tables=[part for part in parts if part not in runs])
 
 
 def run_of(path: Path) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+from collections import UserDict
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,7 +15,7 @@ import numpy as np
 from springcheck.errors import StoreError, nearest
 from springcheck.physics.arrays import Floats
 from springcheck.physics.trajectory import Comparison, Outcome, Trajectory, Verdict
-from springcheck.store import access, digests, files, layout, parts, pieces, records, tables
+from springcheck.store import access, digests, files, layout, parts, pieces, records, seal, tables
 from springcheck.store.access import Scalar
 from springcheck.store.parts import Parts, claim, opened, parts_folder
 from springcheck.store.records import RunRecord
@@ -33,14 +34,10 @@ def sources(path: Path, run: str | None = None) -> dict[str, Path]:
         with files.told(path, "read"), path.open("rb"):
             pass
     listed: list[tuple[int, str, Path]] = []
-    if found.collection is not None:
-        with opened(found.collection) as file:
-            labels = access.children(file, "parameters")
-            listed += [(_sequence(file, label), label, found.collection) for label in labels]
     for part in found.runs:
-        label = parts.name_of(part)
         with opened(part) as file:
-            listed.append((_sequence(file, label), label, part))
+            labels = access.children(file, "parameters") if found.complete else [parts.name_of(part)]
+            listed += [(_sequence(file, label), label, part) for label in labels]
     return {label: source for _, label, source in sorted(listed)}
 
 
@@ -109,9 +106,9 @@ def read_one(path: str | Path, label: str) -> Trajectory:
 
 def digest(path: str | Path, label: str) -> str:
     """The digest of the numbers of a trajectory as they are now (see `digests.combined`)."""
-    with _held(path, label) as (_, _, datasets):
-        columns = {name: layout.Column(path=name, shape=x.shape) for name, x in datasets.items()}
-        return digests.combined({name: digests.of_array(x) for name, x in datasets.items()}, columns)
+    with _held(path, label) as (_, _, arrays), open(arrays["time"].file.filename, "rb") as raw:
+        places = {name: (x.id.get_offset(), x.size * x.dtype.itemsize) for name, x in arrays.items()}
+        return digests.combined({name: seal.digest(raw, place) for name, place in places.items()}, arrays)
 
 
 def windows(path: str | Path, label: str, rows: int = PIECE, stride: int = 1) -> Iterator[Trajectory]:
@@ -203,7 +200,7 @@ def summary(path: str | Path) -> Summary:
             root = access.attributes(file)
             documents = tuple(access.children(file, "documents"))
     found = Parts.of(path, None)
-    names = _tables(path) if found.collection else map(parts.table_of, found.tables)
+    names = _tables(path) if found.complete else map(parts.table_of, found.tables)
     return Summary(
         path=path,
         size=sum(part.stat().st_size for part in found.everything),
@@ -227,9 +224,9 @@ def _is_claimed(path: Path, run: object) -> bool:
 def _tables(path: Path, run: str | None = None, *, rows: bool = False) -> dict[str, Path]:
     """The tables of a collection, and the parts that hold a table or rows of one."""
     found = Parts.of(path, run)
-    if found.collection is not None:
-        with opened(found.collection) as file:
-            return dict.fromkeys(tables.names(file), found.collection)
+    if found.complete:
+        with opened(path) as file:
+            return dict.fromkeys(tables.names(file), path)
     whole = [part for part in found.tables if rows or not part.name.startswith(parts.ROWS)]
     return {parts.name_of(part): part for part in whole}
 
@@ -241,21 +238,14 @@ def _table(path: str | Path, name: str) -> Table | None:
         return None if group is None else tables.read(group, name)
 
 
-class _Tables(Mapping[str, Table]):
-    def __init__(self, sources: Mapping[str, Path]) -> None:
-        self._sources = sources
+class _Tables(UserDict[str, Any]):
+    """Files by the names of the tables that they hold; an item is the table, read from its file."""
 
     def __getitem__(self, name: str) -> Table:
-        found = _table(self._sources[name], name)
+        found = _table(self.data[name], name)
         if found is None:
-            raise StoreError(f"{self._sources[name]} holds no {name}")
+            raise StoreError(f"{self.data[name]} holds no {name}")
         return found
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._sources)
-
-    def __len__(self) -> int:
-        return len(self._sources)
 
 
 def tables_of(path: str | Path, run: str | None = None, *, rows: bool = False) -> Mapping[str, Table]:
