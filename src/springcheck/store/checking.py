@@ -146,7 +146,7 @@ def _before(file: Any, kept: dict[str, str], now: dict[str, str]) -> Iterator[Da
     """Damage that is known without a list of arrays: of a store of an earlier format, or of a part."""
     for label in access.children(file, "parameters"):
         try:
-            reading.arrays_of(file, label, reading.known_of(file, label)[0])
+            reading.run_and_arrays(file, label)
         except StoreError as error:
             yield Damage(f"/observables/{label}", str(error))
     if kept:

@@ -16,7 +16,6 @@ from collections.abc import Mapping
 from typing import Any
 
 import h5py
-import numpy as np
 
 from springcheck.store import access, tables
 from springcheck.store.layout import QUANTITIES
