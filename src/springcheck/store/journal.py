@@ -64,8 +64,6 @@ def open_new(path: str | Path, command: str, *, force: bool = False) -> Journal:
             raise StoreError(
                 f"{path} is no store of springcheck, and is not replaced; -o writes another file"
             )
-        if path.exists() and not force and not parts.is_dir():
-            raise StoreError(f"{path} exists: --force writes it anew, -o writes another file")
     with files.told(folder, "write into"):
         parts.mkdir(exist_ok=True)
         lock = files.Lock(parts / "lock")
@@ -73,7 +71,7 @@ def open_new(path: str | Path, command: str, *, force: bool = False) -> Journal:
         with files.told(parts, "write"):
             run = _claim(path, parts, command, force=force)
     except BaseException:
-        _leave(parts)
+        _leave(parts, "lock")
         lock.release()
         raise
     return Journal(path, run, lock)
@@ -164,12 +162,20 @@ def _remove(parts: Path, which: Callable[[str], bool]) -> None:
             entry.unlink(missing_ok=True)
 
 
-def _leave(parts: Path) -> None:
-    """Remove a journal that holds nothing but its lock."""
+def _end(parts: Path) -> None:
+    """Remove a journal: its claim first, so that a kill leaves an empty folder at worst."""
+    (parts / "command").unlink(missing_ok=True)
+    _remove(parts, lambda _: True)
     with contextlib.suppress(OSError):
-        if {entry.name for entry in parts.iterdir()} == {"lock"}:
-            (parts / "lock").unlink()
+        # files that a user has put into it stay
         parts.rmdir()
+
+
+def _leave(parts: Path, *empty: str) -> None:
+    """Remove a journal that holds no more than these files."""
+    with interrupts.held(), contextlib.suppress(OSError):
+        if {entry.name for entry in parts.iterdir()} <= {*empty}:
+            _end(parts)
 
 
 def _give_up(temporary: Path, run: str) -> None:
@@ -275,17 +281,9 @@ class Journal:
                 adopt.settled(self.folder)
                 for part in found.everything:
                     part.unlink(missing_ok=True)
-                self._end()
+                _end(self.folder)
                 # the store is complete: the same command would refuse to overwrite it
                 interrupts.announce(plain(f"interrupted; {self.path} is complete"))
-
-    def _end(self) -> None:
-        """Remove the journal: its claim first, so that a kill leaves an empty folder at worst."""
-        (self.folder / "command").unlink()
-        _remove(self.folder, lambda _: True)
-        with contextlib.suppress(OSError):
-            # files that a user has put into it stay
-            self.folder.rmdir()
 
     def _part(self, kind: str, name: str) -> Path:
         return self.folder / f"{kind}-{quote(name, safe='@-._')}.h5"
@@ -299,10 +297,7 @@ class Journal:
 
     def close(self) -> None:
         """Release the lock; what is finished stays for the next writer."""
-        if self.folder.is_dir():
-            with interrupts.held(), contextlib.suppress(OSError):
-                if {entry.name for entry in self.folder.iterdir()} <= {"lock", "command"}:
-                    self._end()
+        _leave(self.folder, "lock", "command")
         self._lock.release()
 
     def __enter__(self) -> Journal:

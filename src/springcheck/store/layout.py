@@ -173,7 +173,7 @@ def fresh(path: Path, size: int) -> Iterator[Any]:
     never the one to find the disk full.
     """
     files.need_space(path, size)
-    with files.created(path) as raw:
+    with path.open("xb") as raw:
         raw.write(_empty())
     with reopened(path, size) as file:
         yield file

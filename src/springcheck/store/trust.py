@@ -24,8 +24,6 @@ def trust(path: Path, module: str) -> None:
     A file without a seal is read on trial by the function `tried` of a module.
     """
     with files.told(path, "read"):
-        with path.open("rb"):
-            pass
         said = _against(path.absolute(), module, _state(path))
     if said:
         raise StoreError(f"cannot read {path}: {said}")
