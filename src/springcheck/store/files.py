@@ -174,6 +174,11 @@ def own(path: Path, *, create: bool = False) -> BinaryIO:
     return os.fdopen(handle, "rb+" if create else "rb")
 
 
+def is_plain(path: Path) -> bool:
+    """Whether a path is a file, and no link to one."""
+    return path.is_file() and not path.is_symlink()
+
+
 def sync_folder(folder: Path) -> None:
     """Make names in a folder survive a loss of power."""
     if sys.platform == "win32":

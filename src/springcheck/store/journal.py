@@ -28,7 +28,7 @@ from springcheck.physics.trajectory import Comparison, Trajectory, Verdict
 from springcheck.store import adopt, files, layout, merge, pieces, reading, records, seal, tables
 from springcheck.store.access import Scalar
 from springcheck.store.draft import Draft
-from springcheck.store.parts import JournalClaim, Parts, claim, name_of, opened, parts_folder, run_of
+from springcheck.store.parts import JournalClaim, Parts, claim, name_of, opened, parts_folder, parts_in, run_of
 from springcheck.store.tables import Table
 
 COLLECTION = "collection.new"
@@ -96,13 +96,9 @@ def _is_free(parts: Path) -> bool:
     return all(
         name == "lock"
         or files.TEMPORARY.fullmatch(name)
-        or (_NAMES.fullmatch(name) and _is_plain(parts / name) and _is_ours(parts / name))
+        or (_NAMES.fullmatch(name) and files.is_plain(parts / name) and _is_ours(parts / name))
         for name in known
     )
-
-
-def _is_plain(path: Path) -> bool:
-    return path.is_file() and not path.is_symlink()
 
 
 def _is_ours(path: Path) -> bool:
@@ -142,7 +138,7 @@ def _claim(path: Path, parts: Path, command: str, *, force: bool) -> str:
 
 def _look_at_parts(parts: Path, run: str) -> None:
     """Remove the damaged parts of a run, with a warning: they alone are measured again."""
-    for part in sorted(filter(_is_plain, parts.glob("*-*.h5"))):
+    for part in parts_in(parts):
         name = name_of(part)
         known = seal.find(part)
         if known is not None and known.run != run:

@@ -28,6 +28,11 @@ def table_of(part: Path) -> str:
     return name_of(part).rpartition("/")[0] if part.name.startswith(ROWS) else name_of(part)
 
 
+def parts_in(folder: Path) -> list[Path]:
+    """The parts in a journal; a pipe or a link in that place is not ours."""
+    return sorted(filter(files.is_plain, folder.glob("*-*.h5")))
+
+
 def parts_folder(path: Path) -> Path:
     """The journal of a store."""
     return path.with_name(path.name + files.JOURNAL)
@@ -86,10 +91,8 @@ class Parts:
         if known is None:
             with contextlib.suppress(StoreError):
                 known = getattr(claim(folder), "run", None)
-        # a pipe or a link in that place is not ours
-        there = folder.glob("*-*.h5") if known is not None else ()
-        parts = sorted(part for part in there if part.is_file() and not part.is_symlink())
-        parts = [part for part in parts if (found := seal.find(part)) is None or found.run == known]
+        there = parts_in(folder) if known is not None else []
+        parts = [part for part in there if (found := seal.find(part)) is None or found.run == known]
         runs = [part for part in parts if part.name.startswith("run-")]
         return cls(runs=runs, tables=[part for part in parts if part not in runs])
 
