@@ -68,14 +68,11 @@ UnitsOf: TypeAlias = Mapping[str, str]
 Axis: TypeAlias = Mapping[str, Any]
 """The datasets `time` and `step`, which all elements of a trajectory share."""
 UNITS: Mapping[tuple[str, str], UnitsOf] = {
-    ("particles", "md"): _MD,
-    ("particles", "reduced"): _MD,
+    **dict.fromkeys([("particles", "md"), ("particles", "reduced")], _MD),
+    **dict.fromkeys([("rotor", "md"), ("rotor", "reduced")], _MD_ROTOR),
+    **dict.fromkeys([("circuit", "md"), ("circuit", "reduced")], _BARE),
     ("particles", "si"): _SI,
-    ("rotor", "md"): _MD_ROTOR,
-    ("rotor", "reduced"): _MD_ROTOR,
     ("rotor", "si"): _SI_ROTOR,
-    ("circuit", "md"): _BARE,
-    ("circuit", "reduced"): _BARE,
     ("circuit", "si"): _SI_CIRCUIT,
 }
 REDUCED = "reduced: the numbers carry no unit; nm, ps, u and kJ/mol stand for 1"
