@@ -136,6 +136,18 @@ def test_a_scene_without_fast_springs_or_with_more_than_springs_has_no_resonance
     assert found.limits[0].agrees
 
 
+def test_a_scene_that_resonates_nowhere_is_stored_and_says_so(tmp_path: Path) -> None:
+    """Its slow spring is too weak: a study without bands could not be stored."""
+    text = scenes.text_of("multiple-time-steps").replace("stiffness = 1.7", "stiffness = 1.7e-12")
+    soft = scenes.parse(text, name="soft", where="here")
+    found = stability.record(soft, tmp_path / "s.h5", ["own:respa8"])
+    (none,) = stability.stored(tmp_path / "s.h5").resonances
+    assert none.bands == none.bands_predicted == ()
+    assert none.radius.tobytes() == found.resonances[0].radius.tobytes()
+    assert "own:respa8: grows at no h w_fast from 1 to 7; the exact map agrees to 0.0e+00" in found.sentences
+    assert found.failures == []
+
+
 def test_bdf_leaves_the_stiff_mode_behind_where_adams_cannot(need: Need) -> None:
     need("sundials:bdf")
     (bdf,) = stiffness_costs.measure(engines.parse("sundials:bdf"), "two-scales", [1e10])

@@ -292,6 +292,20 @@ def test_a_store_of_studies_alone_needs_no_trajectory(tmp_path: Path) -> None:
     assert store.check(tmp_path / "s.h5") == []
 
 
+def test_tables_and_pieces_without_rows_are_stored(tmp_path: Path) -> None:
+    """Pairs and vectors of a result that has none are columns of shape (0, 2)."""
+    path = tmp_path / "s.h5"
+    columns = {"number": np.empty(0), "pair": np.empty((0, 2))}
+    with store.open_new(path, "nothing") as journal:
+        journal.add(store.Table(name="of/none", columns=columns))
+        for piece in ("joined/1", "joined/2"):
+            journal.add(store.Table(name=piece, columns=columns), rows=True)
+        journal.commit()
+    assert store.check(path) == []
+    for table in store.tables_of(path).values():
+        assert {name: np.shape(x) for name, x in table.columns.items()} == {"number": (0,), "pair": (0, 2)}
+
+
 def test_a_recording_that_would_not_fit_is_told_before_it_starts(tmp_path: Path) -> None:
     s = scene(steps=10**13, every=1)
     with pytest.raises(StoreError, match=r"960 TB are needed, and .* are free in"):

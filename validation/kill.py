@@ -134,7 +134,7 @@ def digest(path: Path, label: str) -> str:
     """The digest that a trajectory carries, its numbers read and checked against theirs."""
     store.read_one(path, label)
     with parts.opened(path) as file:
-        return reading.known_of(file, label)[0].sha256
+        return reading.run_and_arrays(file, label)[0].sha256
 
 
 def child(work: Callable[[Callable[[str], None]], None]) -> tuple[int, int]:

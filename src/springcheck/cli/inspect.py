@@ -74,7 +74,7 @@ def _runs(summary: store.Summary) -> TextTable:
             if key.startswith("origin.") and key[7:] not in ("engine", "method", "velocity")
         )
         outcome, digest = str(known.get("outcome", "")), str(known.get("sha256", ""))[:12]
-        rows.append((run.label, str(run.frames), str(run.n), outcome, versions, digest))
+        rows.append((run.label, str(run.frames), str(run.particles), outcome, versions, digest))
     titles = ("trajectory", "frames", "n", "outcome", "versions", "sha256")
     return table(titles, rows, left=("trajectory", "outcome", "sha256"), prose="versions")
 
@@ -122,8 +122,8 @@ def document(summary: store.Summary, options: Namespace) -> dict[str, Any]:
             {
                 "label": run.label,
                 "frames": run.frames,
-                "particles": run.n,
-                "quantities": run.quantities,
+                "particles": run.particles,
+                "quantities": run.kept,
                 "parameters": run.parameters,
             }
             for run in summary.runs

@@ -218,6 +218,9 @@ def listed(names: Iterable[str]) -> str:
 
 def named(path: Path, values: Floats, names: Sequence[str]) -> Columns:
     """The columns of a table (f, c) under names; StoreError where the numbers of the two differ."""
+    if not names:
+        how = f"give all {values.shape[1]}, as --columns t,q,v"
+        raise StoreError(f"{path}: its columns have no names; {how}")
     if len(names) != values.shape[1]:
         raise StoreError(f"{path}: columns: {values.shape[1]}, names: {len(names)}: {listed(names)}")
     out: dict[str, Floats] = {}

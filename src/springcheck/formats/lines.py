@@ -6,7 +6,6 @@ import gzip
 import re
 from collections.abc import Iterator
 from pathlib import Path
-from types import TracebackType
 
 from springcheck.errors import StoreError
 
@@ -60,9 +59,7 @@ class Lines:
     def __enter__(self) -> Lines:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._file.close()
 
 

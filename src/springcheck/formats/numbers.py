@@ -135,6 +135,4 @@ def read_npy(path: Path, columns: list[str], step: float | None) -> States:
 
 def of_table(path: Path, found: Any, names: Sequence[str]) -> States:
     """The states in the unnamed columns (f, c) of an array, named by `names`."""
-    if not names:
-        raise StoreError(f"{path}: its columns have no names; give all {found.shape[1]}, as --columns t,q,v")
     return split(path, named(path, np.asarray(found, np.float64), names), roundoff(found))

@@ -81,8 +81,6 @@ def of_rows(
     if not names and len(header) == width - 1 and _are_counted(values[:, 0]):
         header = ["", *header]
     chosen = names or header
-    if not chosen:
-        raise StoreError(f"{path}: its columns have no names; give all {width}, as --columns t,q,v")
     counted = [i for i, name in enumerate(chosen[:width]) if re.fullmatch(r"(?i)\s*(time)?steps?\s*", name)]
     if counted and "t" not in kinds(chosen).values():
         i, values, chosen = counted[0], values.copy(), [*chosen]

@@ -12,7 +12,6 @@ from springcheck.store.files import need_space
 from springcheck.store.journal import Journal, open_new
 from springcheck.store.layout import machine, size
 from springcheck.store.reading import (
-    Run,
     Summary,
     comparison,
     decoded,
@@ -30,7 +29,7 @@ from springcheck.store.reading import (
     verdicts,
     windows,
 )
-from springcheck.store.records import attributes
+from springcheck.store.records import Run, attributes
 from springcheck.store.tables import Table
 
 __all__ = [

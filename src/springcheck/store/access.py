@@ -317,13 +317,13 @@ def columns(group: Any) -> dict[str, Any]:
     return found
 
 
-def column(dataset: Any, rows: Any = ()) -> np.ndarray:
-    """Values of a table's column: numbers, booleans or strings; `rows` selects among numbers."""
+def column(dataset: Any) -> np.ndarray:
+    """Values of a table's column: numbers, booleans or strings."""
     if is_text(dataset):
         return texts(dataset)
     if dataset.dtype.kind not in "fiub":
         raise refuse(dataset, f"is of type {dataset.dtype}, no column of ours")
-    return np.asarray(dataset[rows])
+    return np.asarray(dataset[()])
 
 
 def attributes(node: Any) -> dict[str, Any]:

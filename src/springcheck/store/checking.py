@@ -78,15 +78,12 @@ def check_file(path: Path, most: int | None = None) -> list[Damage]:
             found.append(
                 Damage("/", "bytes of groups, attributes or tables have changed since it was written")
             )
-    try:
-        said = [Damage(place, what) for place, what in json.loads(trust.guarded(path, trust.OURS))]
-        # where the file is no store, no other finding matters
-        found = said if said and NO_STORE in said[0].what else found + said
-    except StoreError as error:
-        found.append(Damage("/", str(error).removeprefix(f"cannot read {files.shown(path)}: ")))
-    except ValueError:
-        found.append(Damage("/", "it is damaged, reading it crashes the HDF5 library"))
-    return found
+    said, harmless = trust.tried(path, trust.OURS)
+    if not harmless:
+        return [*found, Damage("/", said)]
+    there = [Damage(place, what) for place, what in json.loads(said)]
+    # where the file is no store, no other finding matters
+    return there if there and NO_STORE in there[0].what else found + there
 
 
 def structure(path: Path, *, arrays: bool = True) -> list[Damage]:
@@ -146,7 +143,7 @@ def _before(file: Any, kept: dict[str, str], now: dict[str, str]) -> Iterator[Da
     """Damage that is known without a list of arrays: of a store of an earlier format, or of a part."""
     for label in access.children(file, "parameters"):
         try:
-            reading.arrays_of(file, label, reading.known_of(file, label)[0])
+            reading.run_and_arrays(file, label)
         except StoreError as error:
             yield Damage(f"/observables/{label}", str(error))
     if kept:

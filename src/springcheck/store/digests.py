@@ -12,18 +12,14 @@ one.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import h5py
-import numpy as np
 
 from springcheck.store import access, tables
-from springcheck.store.layout import QUANTITIES, Column
+from springcheck.store.layout import QUANTITIES
 from springcheck.store.seal import Extent
-
-PIECE = 1 << 20
-"""Numbers that are read at a time."""
 
 KEY = "digests"
 """The attribute of the root that keeps the digests."""
@@ -36,23 +32,15 @@ DEEPEST = 4
 trajectories."""
 
 
-def combined(digests: Mapping[str, str], columns: Mapping[str, Column]) -> str:
+def combined(digests: Mapping[str, str], arrays: Mapping[str, Any]) -> str:
     """Digest of a trajectory: sha256 over the sha256 of its times and quantities, with their shapes.
 
     Little-endian float64, without clock or machine: equal exactly when two runs agree bit for bit.
     """
     lines = [
-        f"{name} {columns[name].shape} {digests[name]}" for name in ("time", *QUANTITIES) if name in digests
+        f"{name} {arrays[name].shape} {digests[name]}" for name in ("time", *QUANTITIES) if name in digests
     ]
     return hashlib.sha256("\n".join(lines).encode()).hexdigest()
-
-
-def of_array(dataset: Any) -> str:
-    """sha256 of a recorded array, in bounded memory."""
-    total = hashlib.sha256()
-    for values in blocks(dataset):
-        total.update(np.ascontiguousarray(values).data)
-    return total.hexdigest()
 
 
 def of_table(group: Any) -> str:
@@ -62,22 +50,12 @@ def of_table(group: Any) -> str:
         text = access.is_text(dataset)
         kind = "|O" if text else dataset.dtype.str
         total.update(f"{name} {dataset.shape} {kind}\n".encode() + _attributes(dataset))
+        values = access.column(dataset)
         if text:
-            total.update("\0".join(map(str, access.column(dataset).ravel())).encode("utf-8", "surrogatepass"))
-            continue
-        for values in blocks(dataset):
-            total.update(np.ascontiguousarray(values).tobytes())
+            total.update("\0".join(map(str, values.ravel())).encode("utf-8", "surrogatepass"))
+        else:
+            total.update(values.tobytes())
     return total.hexdigest()
-
-
-def blocks(dataset: Any) -> Iterator[np.ndarray]:
-    """A column piece by piece, in bounded memory where it holds numbers."""
-    rows = max(1, PIECE // max(1, int(np.prod(dataset.shape[1:]))))
-    if access.is_text(dataset) or dataset.ndim == 0 or len(dataset) <= rows:
-        yield access.column(dataset)
-        return
-    for start in range(0, len(dataset), rows):
-        yield access.column(dataset, slice(start, start + rows))
 
 
 def of_run(file: Any, label: str) -> str:

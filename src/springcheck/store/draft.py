@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import os
 from collections.abc import Mapping
+from contextlib import ExitStack
 from datetime import UTC, datetime
 from io import FileIO
 from pathlib import Path
@@ -24,7 +25,6 @@ from springcheck.store.access import Scalar
 
 if TYPE_CHECKING:
     from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import ExitStack
 
 BUFFER = 1 << 22
 """Bytes that are buffered for one array before they are written."""
@@ -45,7 +45,6 @@ class Draft:
         self.path, self.label, self.scene, self.sequence, self.run = path, label, scene, sequence, run
         self.rows = 0
         self._temporary = files.temporary(path)
-        self._lay_out(steps=False)
         self._held = 0
         self._offsets: dict[str, int] = {}
         self._files: dict[str, FileIO] = {}
@@ -73,8 +72,8 @@ class Draft:
 
         Quantities that the scene does not record are ignored.  Raises StoreError when the disk is full.
         """
-        if last_step is not None and not self.rows:
-            self._lay_out(steps=True)
+        if not self.rows:
+            self._lay_out(steps=last_step is not None)
         f = len(t)
         given: dict[str, Floats] = {}
         for name, values in zip(("time", *layout.QUANTITIES), (t, q, p, energy, last_step), strict=True):

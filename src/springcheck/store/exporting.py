@@ -41,14 +41,13 @@ def export(path: str | Path, label: str, out: str | Path) -> list[Damage]:
         if place.split("/")[1:3] in (["observables", label], ["parameters", label]):
             raise StoreError(f"{path} is not what was written: {place} {finding.what}; nothing is exported")
     with parts.opened(source) as file:
-        known, attributes = reading.known_of(file, label)
+        known, arrays = reading.run_and_arrays(file, label)
         if known.kind != "particles":
             raise StoreError(f"{label} of {path} has no positions to export: its scene has no particles")
         base, group = f"observables/{label}", f"particles/{label}"
         if access.group_at(file, group) is None:
             raise StoreError(f"{path} is an exported trajectory already: copy it")
         places = layout.places_of(known.axes, known.particles)
-        arrays = reading.arrays_of(file, label, known)
         if "velocity" in access.children(file, base):
             arrays["velocity"] = access.array(file, f"{base}/velocity/value", arrays["p"].shape)
         arrays["step"] = access.array(file, f"{base}/q/step", (known.frames,), "i")
@@ -57,14 +56,14 @@ def export(path: str | Path, label: str, out: str | Path) -> list[Damage]:
         edges = access.array(file, f"{group}/box/edges", (3,))[()].tolist() if boxed else None
         # positions and velocities are written twice, the second time in three dimensions
         size = 8 * sum(x.size * (1 + (x.ndim == 2)) for x in arrays.values()) + 24 * known.frames
-        text = 16 * sum(len(str(value)) for value in attributes.values())
+        text = 16 * sum(len(str(value)) for value in known.parameters.values())
         run = os.urandom(16).hex()
         root = {"run": run, "complete": True, "scene": known.scene, "scene_name": known.scene_name}
         with files.told(out, "write"), files.unfinished(files.temporary(out)) as made:
             with layout.fresh(made, size + text) as target:
                 layout.begin(target)
                 layout.write_attributes(target, {**root, "units": known.units})
-                layout.write_attributes(target.create_group(f"parameters/{label}"), attributes)
+                layout.write_attributes(target.create_group(f"parameters/{label}"), known.parameters)
                 axis = _observables(file[base], target.create_group(base), arrays)
                 particles = target.create_group("particles/trajectory")
                 layout.write_particles(

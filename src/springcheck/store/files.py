@@ -158,12 +158,6 @@ def _function(name: str) -> Callable[..., int]:
     )
 
 
-def created(path: Path) -> BinaryIO:
-    """Create a file for reading and writing; FileExistsError where anything has its name, a link too."""
-    how = os.O_RDWR | os.O_CREAT | os.O_EXCL | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0)
-    return os.fdopen(os.open(path, how, 0o666), "rb+")
-
-
 def own(path: Path, *, create: bool = False) -> BinaryIO:
     """Open a file of a journal for reading, with `create` for writing as well.  ValueError where it is not a
     plain file with one name: a link would lead to a file of the user's."""
@@ -178,6 +172,11 @@ def own(path: Path, *, create: bool = False) -> BinaryIO:
         os.close(handle)
         raise ValueError(f"{path} is no file of its own")
     return os.fdopen(handle, "rb+" if create else "rb")
+
+
+def is_plain(path: Path) -> bool:
+    """Whether a path is a file, and no link to one."""
+    return path.is_file() and not path.is_symlink()
 
 
 def sync_folder(folder: Path) -> None:
@@ -234,7 +233,7 @@ def move(complete: Path, path: Path) -> None:
 def put_bytes(content: bytes, path: Path) -> None:
     """Write a small file whole or not at all."""
     with unfinished(temporary(path)) as made:
-        with created(made) as file:
+        with made.open("xb") as file:
             file.write(content)
         put(made, path)
 
@@ -317,16 +316,13 @@ def _is_torn(content: bytes) -> bool:
 
 def _alive(who: dict[str, Any]) -> bool:
     """Whether the holder of a lock still runs, as far as this machine can tell."""
-    if not who:
-        return False
-    if who["host"] != platform.node():
-        return True
-    try:
-        os.kill(who["pid"], 0)
-    except (ProcessLookupError, OverflowError):
-        return False
-    except OSError:
-        return True
+    if not who or who["host"] != platform.node():
+        return bool(who)
+    with contextlib.suppress(OSError):
+        try:
+            os.kill(who["pid"], 0)
+        except (ProcessLookupError, OverflowError):
+            return False
     return True
 
 

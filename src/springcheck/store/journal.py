@@ -25,10 +25,10 @@ from springcheck import interrupts
 from springcheck.errors import StoreError, StoreWarning, plain
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Comparison, Trajectory, Verdict
-from springcheck.store import adopt, files, layout, merge, pieces, reading, records, seal, tables
+from springcheck.store import access, adopt, files, layout, merge, pieces, reading, records, seal, tables
 from springcheck.store.access import Scalar
 from springcheck.store.draft import Draft
-from springcheck.store.parts import JournalClaim, Parts, claim, name_of, opened, parts_folder, run_of
+from springcheck.store.parts import JournalClaim, Parts, claim, name_of, opened, parts_folder, parts_in
 from springcheck.store.tables import Table
 
 COLLECTION = "collection.new"
@@ -64,8 +64,6 @@ def open_new(path: str | Path, command: str, *, force: bool = False) -> Journal:
             raise StoreError(
                 f"{path} is no store of springcheck, and is not replaced; -o writes another file"
             )
-        if path.exists() and not force and not parts.is_dir():
-            raise StoreError(f"{path} exists: --force writes it anew, -o writes another file")
     with files.told(folder, "write into"):
         parts.mkdir(exist_ok=True)
         lock = files.Lock(parts / "lock")
@@ -73,7 +71,7 @@ def open_new(path: str | Path, command: str, *, force: bool = False) -> Journal:
         with files.told(parts, "write"):
             run = _claim(path, parts, command, force=force)
     except BaseException:
-        _leave(parts)
+        _leave(parts, "lock")
         lock.release()
         raise
     return Journal(path, run, lock)
@@ -98,13 +96,9 @@ def _is_free(parts: Path) -> bool:
     return all(
         name == "lock"
         or files.TEMPORARY.fullmatch(name)
-        or (_NAMES.fullmatch(name) and _is_plain(parts / name) and _is_ours(parts / name))
+        or (_NAMES.fullmatch(name) and files.is_plain(parts / name) and _is_ours(parts / name))
         for name in known
     )
-
-
-def _is_plain(path: Path) -> bool:
-    return path.is_file() and not path.is_symlink()
 
 
 def _is_ours(path: Path) -> bool:
@@ -118,7 +112,7 @@ def _is_ours(path: Path) -> bool:
 def _claim(path: Path, parts: Path, command: str, *, force: bool) -> str:
     """The run id of the journal, resumed or new."""
     known = claim(parts)
-    if known is not None and path.is_file() and run_of(path) == known.run:
+    if known is not None and path.is_file() and _run_of(path) == known.run:
         # killed as it tidied up: the store is complete
         _remove(parts, lambda name: name != "lock")
         known = None
@@ -142,9 +136,19 @@ def _claim(path: Path, parts: Path, command: str, *, force: bool) -> str:
     return run
 
 
+def _run_of(path: Path) -> str:
+    """The run that wrote a store; "" where it does not say."""
+    found = seal.find(path)
+    if found is not None:
+        return found.run
+    with contextlib.suppress(StoreError), opened(path) as file:
+        return str(access.attribute(file, "run"))
+    return ""
+
+
 def _look_at_parts(parts: Path, run: str) -> None:
     """Remove the damaged parts of a run, with a warning: they alone are measured again."""
-    for part in sorted(filter(_is_plain, parts.glob("*-*.h5"))):
+    for part in parts_in(parts):
         name = name_of(part)
         known = seal.find(part)
         if known is not None and known.run != run:
@@ -164,12 +168,20 @@ def _remove(parts: Path, which: Callable[[str], bool]) -> None:
             entry.unlink(missing_ok=True)
 
 
-def _leave(parts: Path) -> None:
-    """Remove a journal that holds nothing but its lock."""
+def _end(parts: Path) -> None:
+    """Remove a journal: its claim first, so that a kill leaves an empty folder at worst."""
+    (parts / "command").unlink(missing_ok=True)
+    _remove(parts, lambda _: True)
     with contextlib.suppress(OSError):
-        if {entry.name for entry in parts.iterdir()} == {"lock"}:
-            (parts / "lock").unlink()
+        # files that a user has put into it stay
         parts.rmdir()
+
+
+def _leave(parts: Path, *empty: str) -> None:
+    """Remove a journal that holds no more than these files."""
+    with interrupts.held(), contextlib.suppress(OSError):
+        if {entry.name for entry in parts.iterdir()} <= {*empty}:
+            _end(parts)
 
 
 def _give_up(temporary: Path, run: str) -> None:
@@ -275,17 +287,9 @@ class Journal:
                 adopt.settled(self.folder)
                 for part in found.everything:
                     part.unlink(missing_ok=True)
-                self._end()
+                _end(self.folder)
                 # the store is complete: the same command would refuse to overwrite it
                 interrupts.announce(plain(f"interrupted; {self.path} is complete"))
-
-    def _end(self) -> None:
-        """Remove the journal: its claim first, so that a kill leaves an empty folder at worst."""
-        (self.folder / "command").unlink()
-        _remove(self.folder, lambda _: True)
-        with contextlib.suppress(OSError):
-            # files that a user has put into it stay
-            self.folder.rmdir()
 
     def _part(self, kind: str, name: str) -> Path:
         return self.folder / f"{kind}-{quote(name, safe='@-._')}.h5"
@@ -299,10 +303,7 @@ class Journal:
 
     def close(self) -> None:
         """Release the lock; what is finished stays for the next writer."""
-        if self.folder.is_dir():
-            with interrupts.held(), contextlib.suppress(OSError):
-                if {entry.name for entry in self.folder.iterdir()} <= {"lock", "command"}:
-                    self._end()
+        _leave(self.folder, "lock", "command")
         self._lock.release()
 
     def __enter__(self) -> Journal:

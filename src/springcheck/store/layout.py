@@ -68,14 +68,11 @@ UnitsOf: TypeAlias = Mapping[str, str]
 Axis: TypeAlias = Mapping[str, Any]
 """The datasets `time` and `step`, which all elements of a trajectory share."""
 UNITS: Mapping[tuple[str, str], UnitsOf] = {
-    ("particles", "md"): _MD,
-    ("particles", "reduced"): _MD,
+    **dict.fromkeys([("particles", "md"), ("particles", "reduced")], _MD),
+    **dict.fromkeys([("rotor", "md"), ("rotor", "reduced")], _MD_ROTOR),
+    **dict.fromkeys([("circuit", "md"), ("circuit", "reduced")], _BARE),
     ("particles", "si"): _SI,
-    ("rotor", "md"): _MD_ROTOR,
-    ("rotor", "reduced"): _MD_ROTOR,
     ("rotor", "si"): _SI_ROTOR,
-    ("circuit", "md"): _BARE,
-    ("circuit", "reduced"): _BARE,
     ("circuit", "si"): _SI_CIRCUIT,
 }
 REDUCED = "reduced: the numbers carry no unit; nm, ps, u and kJ/mol stand for 1"
@@ -173,7 +170,7 @@ def fresh(path: Path, size: int) -> Iterator[Any]:
     never the one to find the disk full.
     """
     files.need_space(path, size)
-    with files.created(path) as raw:
+    with path.open("xb") as raw:
         raw.write(_empty())
     with reopened(path, size) as file:
         yield file
@@ -354,11 +351,8 @@ def _system() -> str:
 
 
 def _processor() -> str:
-    try:
-        with open("/proc/cpuinfo", encoding="utf-8", errors="replace") as lines:
-            for line in lines:
-                if line.startswith("model name"):
-                    return line.split(":", 1)[1].strip()
-    except OSError:
-        pass
+    with contextlib.suppress(OSError), open("/proc/cpuinfo", encoding="utf-8", errors="replace") as lines:
+        for line in lines:
+            if line.startswith("model name"):
+                return line.split(":", 1)[1].strip()
     return platform.processor() or "unknown"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 from urllib.parse import unquote
@@ -26,6 +26,11 @@ def name_of(part: Path) -> str:
 def table_of(part: Path) -> str:
     """The table of the collection that a part goes into: pieces of one are named <table>/<piece>."""
     return name_of(part).rpartition("/")[0] if part.name.startswith(ROWS) else name_of(part)
+
+
+def parts_in(folder: Path) -> list[Path]:
+    """The parts in a journal; a pipe or a link in that place is not ours."""
+    return sorted(filter(files.is_plain, folder.glob("*-*.h5")))
 
 
 def parts_folder(path: Path) -> Path:
@@ -60,48 +65,40 @@ def claim(parts: Path) -> JournalClaim | None:
         ) from error
 
 
+def claimed_by(path: Path) -> str | None:
+    """The run whose journal stands beside a store; None where there is none that can be read."""
+    with contextlib.suppress(StoreError):
+        return getattr(claim(parts_folder(path)), "run", None)
+    return None
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Parts:
-    """The files that make up a store: the collection, or the parts of a run that are not yet in one.
+    """The files that make up a store: the collection, or the parts of a run that are not yet in one."""
 
-    Each part holds a trajectory (`runs`), or a table or rows of one (`tables`).
-    """
-
-    collection: Path | None
     runs: list[Path]
-    tables: list[Path]
+    """Parts of one trajectory each, or the collection alone."""
+    tables: list[Path] = field(default_factory=list)
+    """Parts of a table, or of rows of one."""
+    complete: bool = False
+    """Whether there is a collection."""
 
     @property
     def everything(self) -> list[Path]:
-        """Every file of the journal: the collection, or its runs and tables."""
-        return [*self.runs, *self.tables] if self.collection is None else [self.collection]
+        """All of these files."""
+        return [*self.runs, *self.tables]
 
     @classmethod
     def of(cls, path: Path, run: str | None) -> Parts:
         """`run` is the writer's, whose parts they are; None for a reader, who takes the collection if there
         is one."""
         if run is None and path.is_file():
-            return cls(collection=path, runs=[], tables=[])
-        folder, known = parts_folder(path), run
-        if known is None:
-            with contextlib.suppress(StoreError):
-                known = getattr(claim(folder), "run", None)
-        # a pipe or a link in that place is not ours
-        there = folder.glob("*-*.h5") if known is not None else ()
-        parts = sorted(part for part in there if part.is_file() and not part.is_symlink())
-        parts = [part for part in parts if (found := seal.find(part)) is None or found.run == known]
+            return cls(runs=[path], complete=True)
+        known = claimed_by(path) if run is None else run
+        there = parts_in(parts_folder(path)) if known is not None else []
+        parts = [part for part in there if (found := seal.find(part)) is None or found.run == known]
         runs = [part for part in parts if part.name.startswith("run-")]
-        return cls(collection=None, runs=runs, tables=[part for part in parts if part not in runs])
-
-
-def run_of(path: Path) -> str:
-    """The run that wrote a store; "" where it does not say."""
-    found = seal.find(path)
-    if found is not None:
-        return found.run
-    with contextlib.suppress(StoreError), opened(path) as file:
-        return str(access.attribute(file, "run"))
-    return ""
+        return cls(runs=runs, tables=[part for part in parts if part not in runs])
 
 
 @contextlib.contextmanager

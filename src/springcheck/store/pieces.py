@@ -9,7 +9,6 @@ for each piece.
 from __future__ import annotations
 
 import json
-from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import groupby
@@ -89,30 +88,26 @@ def joined(parts: Sequence[Path], by: list[tuple[str, Worker]]) -> Iterator[Tabl
 
 
 def _joined(name: str, parts: Sequence[Path], by: list[tuple[str, Worker]]) -> Table:
-    lengths: Counter[str] = Counter()
-    for part in reversed(parts):
+    first: Any = None
+    columns: dict[str, list[np.ndarray]] = {}
+    for part in parts:
         known = seal.find(part)
         if known is None or not seal.is_whole(part, known):
             raise StoreError(f"{part.name} is damaged: give the same command again, and it is measured again")
         with access.opened(part) as source:
-            rows = source[name_of(part)]
             by += [(name_of(part), worker) for worker in by_of(source)]
-            if part == parts[0]:
-                first = tables.read(rows, name)
-            if len(parts) == 1:
-                return first
-            lengths.update({column: len(rows[column]) for column in rows})
-    like = {column: np.asarray(x) for column, x in first.columns.items()}
-    whole = {column: np.empty((lengths[column], *x.shape[1:]), x.dtype) for column, x in like.items()}
-    at: Counter[str] = Counter()
-    for part in parts:
-        with access.opened(part) as source:
-            found = {column: access.column(x) for column, x in source[name_of(part)].items()}
-        if {column: (x.dtype, x.shape[1:]) for column, x in found.items()} != {
-            column: (x.dtype, x.shape[1:]) for column, x in like.items()
-        }:
+            table = tables.read(source[name_of(part)], name)
+        if len(parts) == 1:
+            return table
+        first = first or table
+        if _kinds(table) != _kinds(first):
             raise StoreError(f"{part.name} has other columns than the rows of {name} before it")
-        for column, x in found.items():
-            whole[column][at[column] : at[column] + len(x)] = x
-            at[column] += len(x)
-    return replace(first, columns=whole)
+        for column, x in table.columns.items():
+            columns.setdefault(column, []).append(np.asarray(x))
+    joined: Table = replace(first, columns={name: np.concatenate(x) for name, x in columns.items()})
+    return joined
+
+
+def _kinds(table: Table) -> dict[str, tuple[Any, ...]]:
+    columns = {column: np.asarray(x) for column, x in table.columns.items()}
+    return {column: (x.dtype, x.shape[1:]) for column, x in columns.items()}

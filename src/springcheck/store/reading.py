@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+from collections import UserDict
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,10 +15,10 @@ import numpy as np
 from springcheck.errors import StoreError, nearest
 from springcheck.physics.arrays import Floats
 from springcheck.physics.trajectory import Comparison, Outcome, Trajectory, Verdict
-from springcheck.store import access, digests, files, layout, parts, pieces, records, tables
+from springcheck.store import access, digests, files, layout, parts, pieces, records, seal, tables
 from springcheck.store.access import Scalar
-from springcheck.store.parts import Parts, claim, opened, parts_folder
-from springcheck.store.records import RunRecord
+from springcheck.store.parts import Parts, opened
+from springcheck.store.records import Run
 from springcheck.store.tables import Table
 
 MAPPED = 1 << 26
@@ -33,14 +34,10 @@ def sources(path: Path, run: str | None = None) -> dict[str, Path]:
         with files.told(path, "read"), path.open("rb"):
             pass
     listed: list[tuple[int, str, Path]] = []
-    if found.collection is not None:
-        with opened(found.collection) as file:
-            labels = access.children(file, "parameters")
-            listed += [(_sequence(file, label), label, found.collection) for label in labels]
     for part in found.runs:
-        label = parts.name_of(part)
         with opened(part) as file:
-            listed.append((_sequence(file, label), label, part))
+            labels = access.children(file, "parameters") if found.complete else [parts.name_of(part)]
+            listed += [(_sequence(file, label), label, part) for label in labels]
     return {label: source for _, label, source in sorted(listed)}
 
 
@@ -51,31 +48,25 @@ def _sequence(file: Any, label: str) -> int:
     return found if isinstance(found, int) else 0
 
 
-def known_of(file: Any, label: str) -> tuple[RunRecord, dict[str, Any]]:
-    """Metadata of a trajectory: as a typed record, and as stored."""
+def run_and_arrays(file: Any, label: str) -> tuple[Run, dict[str, Any]]:
+    """A trajectory's metadata and its arrays, validated: time, and those quantities that are recorded."""
     group = access.group_at(file, f"parameters/{label}")
     if group is None:
         raise StoreError(f"{file.filename} holds no trajectory {label!r}")
-    known = access.attributes(group)
-    return records.record(f"cannot read {file.filename}, {label}", known), known
-
-
-def arrays_of(file: Any, label: str, known: RunRecord) -> dict[str, Any]:
-    """The arrays of a trajectory, validated: time, and those quantities that are recorded."""
+    run = records.record(f"cannot read {file.filename}, {label}", label, access.attributes(group))
     base = f"observables/{label}"
-    found = {"time": access.array(file, f"{base}/q/time", (known.frames,))}
-    for name in known.kept:
-        shape = layout.shape(name, known.frames, known.particles)
+    found = {"time": access.array(file, f"{base}/q/time", (run.frames,))}
+    for name in run.kept:
+        shape = layout.shape(name, run.frames, run.particles)
         found[name] = access.array(file, f"{base}/{name}/value", shape)
-    return found
+    return run, found
 
 
 @contextlib.contextmanager
-def _held(path: str | Path, label: str) -> Iterator[tuple[RunRecord, dict[str, Any], dict[str, Any]]]:
-    """Metadata of a trajectory of a store (see `known_of`), and its arrays (see `arrays_of`)."""
+def _held(path: str | Path, label: str) -> Iterator[tuple[Run, dict[str, Any]]]:
+    """Metadata of a trajectory of a store, and its arrays (see `run_and_arrays`)."""
     with opened(source_of(Path(path), label)) as file:
-        known, rest = known_of(file, label)
-        yield known, rest, arrays_of(file, label, known)
+        yield run_and_arrays(file, label)
 
 
 def _whole(path: Path, dataset: Any) -> Floats:
@@ -102,16 +93,15 @@ def read_one(path: str | Path, label: str) -> Trajectory:
     """One trajectory of one file."""
     path = Path(path)
     with opened(path) as file:
-        known, rest = known_of(file, label)
-        datasets = arrays_of(file, label, known)
-        return records.trajectory(label, known, rest, {x: _whole(path, y) for x, y in datasets.items()})
+        run, arrays = run_and_arrays(file, label)
+        return records.trajectory(run, {name: _whole(path, x) for name, x in arrays.items()})
 
 
 def digest(path: str | Path, label: str) -> str:
     """The digest of the numbers of a trajectory as they are now (see `digests.combined`)."""
-    with _held(path, label) as (_, _, datasets):
-        columns = {name: layout.Column(path=name, shape=x.shape) for name, x in datasets.items()}
-        return digests.combined({name: digests.of_array(x) for name, x in datasets.items()}, columns)
+    with _held(path, label) as (_, arrays), open(arrays["time"].file.filename, "rb") as raw:
+        places = {name: (x.id.get_offset(), x.size * x.dtype.itemsize) for name, x in arrays.items()}
+        return digests.combined({name: seal.digest(raw, place) for name, place in places.items()}, arrays)
 
 
 def windows(path: str | Path, label: str, rows: int = PIECE, stride: int = 1) -> Iterator[Trajectory]:
@@ -119,36 +109,32 @@ def windows(path: str | Path, label: str, rows: int = PIECE, stride: int = 1) ->
 
     With a stride only every stride-th piece is read, and the last one.
     """
-    with _held(path, label) as (known, rest, datasets):
-        starts = range(0, max(1, known.frames - 1), rows)
+    with _held(path, label) as (run, arrays):
+        starts = range(0, max(1, run.frames - 1), rows)
         for start in sorted({*starts[::stride], starts[-1]}):
-            piece = records.trajectory(label, known, rest, _rows(datasets, slice(start, start + rows + 1)))
+            piece = records.trajectory(run, _rows(arrays, slice(start, start + rows + 1)))
             end = start + len(piece.t) - 1
             # a piece ends where it ends; only the last one with what became of the run
-            if end < known.frames - 1:
+            if end < run.frames - 1:
                 piece = replace(piece, outcome=Outcome(status="continued", step=end * piece.every))
             yield piece
 
 
 def strided(path: str | Path, label: str, max_frames: int) -> tuple[Trajectory, int]:
     """Every stride-th frame, at most `max_frames` of them, and the stride."""
-    with _held(path, label) as (known, rest, datasets):
-        stride = max(1, -(-known.frames // max_frames))
-        kept = _rows(datasets, slice(None, None, stride))
-        return records.trajectory(label, known, rest, kept, stride), stride
+    with _held(path, label) as (run, arrays):
+        stride = max(1, -(-run.frames // max_frames))
+        return records.trajectory(run, _rows(arrays, slice(None, None, stride)), stride), stride
 
 
 def end(path: str | Path, label: str, rows: int) -> Trajectory:
     """The last `rows` frames of a trajectory."""
-    with _held(path, label) as (known, rest, datasets):
-        return records.trajectory(label, known, rest, _rows(datasets, slice(-rows, None)))
+    with _held(path, label) as (run, arrays):
+        return records.trajectory(run, _rows(arrays, slice(-rows, None)))
 
 
-def _rows(datasets: Mapping[str, Any], rows: slice) -> dict[str, Floats]:
-    return {
-        name: dataset[slice(*rows.indices(len(dataset)))].astype(np.float64, copy=False)
-        for name, dataset in datasets.items()
-    }
+def _rows(arrays: Mapping[str, Any], rows: slice) -> dict[str, Floats]:
+    return {name: np.asarray(x[slice(*rows.indices(len(x)))], np.float64) for name, x in arrays.items()}
 
 
 def source_of(path: Path, label: str) -> Path:
@@ -163,19 +149,8 @@ def source_of(path: Path, label: str) -> Path:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Run:
-    """A trajectory without its numbers."""
-
-    label: str
-    frames: int
-    n: int
-    quantities: tuple[str, ...]
-    parameters: Mapping[str, Scalar]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Summary:
-    """What is in a store.  `complete` is False while a journal stands beside it; size [B]."""
+    """What is in a store.  `complete` is False while a journal of another run stands beside it; size [B]."""
 
     path: Path
     size: int
@@ -192,10 +167,7 @@ def summary(path: str | Path) -> Summary:
     runs = []
     for label, source in sources(path).items():
         with opened(source) as file:
-            known, rest = known_of(file, label)
-            arrays_of(file, label, known)
-        run = Run(label=label, frames=known.frames, n=known.particles, quantities=known.kept, parameters=rest)
-        runs.append(run)
+            runs.append(run_and_arrays(file, label)[0])
     root: dict[str, Scalar] = {}
     documents: tuple[str, ...] = ()
     if path.is_file():
@@ -203,11 +175,11 @@ def summary(path: str | Path) -> Summary:
             root = access.attributes(file)
             documents = tuple(access.children(file, "documents"))
     found = Parts.of(path, None)
-    names = _tables(path) if found.collection else map(parts.table_of, found.tables)
+    names = _tables(path) if found.complete else map(parts.table_of, found.tables)
     return Summary(
         path=path,
         size=sum(part.stat().st_size for part in found.everything),
-        complete=path.is_file() and root.get("complete") is True and not _is_claimed(path, root.get("run")),
+        complete=root.get("complete") is True and parts.claimed_by(path) in (None, root.get("run")),
         root=root,
         runs=tuple(runs),
         tables=tuple(dict.fromkeys(names)),
@@ -215,21 +187,12 @@ def summary(path: str | Path) -> Summary:
     )
 
 
-def _is_claimed(path: Path, run: object) -> bool:
-    """Whether the journal beside a store belongs to another run than the store: a kill may leave that."""
-    try:
-        found = claim(parts_folder(path))
-        return found is not None and found.run != run
-    except StoreError:
-        return False
-
-
 def _tables(path: Path, run: str | None = None, *, rows: bool = False) -> dict[str, Path]:
     """The tables of a collection, and the parts that hold a table or rows of one."""
     found = Parts.of(path, run)
-    if found.collection is not None:
-        with opened(found.collection) as file:
-            return dict.fromkeys(tables.names(file), found.collection)
+    if found.complete:
+        with opened(path) as file:
+            return dict.fromkeys(tables.names(file), path)
     whole = [part for part in found.tables if rows or not part.name.startswith(parts.ROWS)]
     return {parts.name_of(part): part for part in whole}
 
@@ -241,21 +204,14 @@ def _table(path: str | Path, name: str) -> Table | None:
         return None if group is None else tables.read(group, name)
 
 
-class _Tables(Mapping[str, Table]):
-    def __init__(self, sources: Mapping[str, Path]) -> None:
-        self._sources = sources
+class _Tables(UserDict[str, Any]):
+    """Files by the names of the tables that they hold; an item is the table, read from its file."""
 
     def __getitem__(self, name: str) -> Table:
-        found = _table(self._sources[name], name)
+        found = _table(self.data[name], name)
         if found is None:
-            raise StoreError(f"{self._sources[name]} holds no {name}")
+            raise StoreError(f"{self.data[name]} holds no {name}")
         return found
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._sources)
-
-    def __len__(self) -> int:
-        return len(self._sources)
 
 
 def tables_of(path: str | Path, run: str | None = None, *, rows: bool = False) -> Mapping[str, Table]:
@@ -309,5 +265,5 @@ def scene_text(path: str | Path) -> str:
         if "scene" in known:
             return str(known["scene"])
         for label in access.children(file, "parameters"):
-            return known_of(file, label)[0].scene
+            return run_and_arrays(file, label)[0].scene
     raise StoreError(f"{path} holds no scene")

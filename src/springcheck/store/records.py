@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from operator import attrgetter
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_type_hints
 
 import msgspec
 
@@ -21,40 +22,18 @@ Size = Annotated[int, msgspec.Meta(ge=1, lt=2**48)]
 Name = Annotated[str, msgspec.Meta(max_length=200)]
 Message = Annotated[str, msgspec.Meta(max_length=1 << 20)]
 _DOUBLE = Arithmetic()
-KEPT = {
-    "scheme": "scheme",
-    "step": "step",
-    "every": "every",
-    "outcome": "outcome.status",
-    "outcome_step": "outcome.step",
-    "outcome_message": "outcome.message",
-    "outcome_fastest": "outcome.fastest",
-    "start_seconds": "timing.start",
-    "run_seconds": "timing.run",
-    "force_calls": "force_calls",
-    "tolerance": "tolerance",
-    "arithmetic": "arithmetic.name",
-    "state_roundoff": "arithmetic.state",
-    "force_roundoff": "arithmetic.force",
-    "force_quantum": "arithmetic.quantum",
-    "force_overflow": "arithmetic.overflow",
-    "parameter_precision": "arithmetic.parameters",
-    "force_excess": "arithmetic.excess",
-    "forces_kept_within": "arithmetic.stale",
-    "rod_tolerance": "arithmetic.lengths",
-    "bath_cancels": "arithmetic.cancels",
-    "keeps_displacement": "arithmetic.keeps_displacement",
-    "counts_from_start": "arithmetic.from_start",
-    "springs_are_joints": "arithmetic.joints",
-    "rebuilds_velocity": "rebuilds_velocity",
-    "off_axis": "off_axis",
-}
-"""Attributes, and the fields of a trajectory that they store."""
 
 
-class RunRecord(msgspec.Struct, frozen=True, kw_only=True):
-    """The attributes of /parameters/<label>, without those that only people read."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Run:
+    """A trajectory without its numbers: the attributes of /parameters/<label>.
 
+    A text beside a type is the field of a `Trajectory` that the attribute stores.
+    """
+
+    label: str
+    parameters: Mapping[str, Any]
+    """All attributes as stored."""
     scene: str
     scene_name: Name = ""
     units: Units
@@ -67,32 +46,32 @@ class RunRecord(msgspec.Struct, frozen=True, kw_only=True):
     quantities: Name
     sequence: Count = 0
     sha256: Name
-    scheme: Name = ""
-    step: float = math.nan
-    every: Size = 1
-    outcome: Literal["complete", "diverged", "stopped"] = "complete"
-    outcome_step: Count = 0
-    outcome_message: Message = ""
-    outcome_fastest: float = math.inf
-    start_seconds: float = math.nan
-    run_seconds: float = math.nan
-    force_calls: Count = 0
-    tolerance: float | None = None
-    arithmetic: Name = _DOUBLE.name
-    state_roundoff: float = _DOUBLE.state
-    force_roundoff: float = _DOUBLE.force
-    force_quantum: float = _DOUBLE.quantum
-    force_overflow: float = _DOUBLE.overflow
-    parameter_precision: Literal["double", "single"] = _DOUBLE.parameters
-    force_excess: float = _DOUBLE.excess
-    forces_kept_within: float = _DOUBLE.stale
-    rod_tolerance: float = 0.0
-    bath_cancels: int = 0
-    keeps_displacement: bool = False
-    counts_from_start: bool = False
-    springs_are_joints: bool = False
-    rebuilds_velocity: bool = False
-    off_axis: float | None = None
+    scheme: Annotated[Name, "scheme"] = ""
+    step: Annotated[float, "step"] = math.nan
+    every: Annotated[Size, "every"] = 1
+    outcome: Annotated[Literal["complete", "diverged", "stopped"], "outcome.status"] = "complete"
+    outcome_step: Annotated[Count, "outcome.step"] = 0
+    outcome_message: Annotated[Message, "outcome.message"] = ""
+    outcome_fastest: Annotated[float, "outcome.fastest"] = math.inf
+    start_seconds: Annotated[float, "timing.start"] = math.nan
+    run_seconds: Annotated[float, "timing.run"] = math.nan
+    force_calls: Annotated[Count, "force_calls"] = 0
+    tolerance: Annotated[float | None, "tolerance"] = None
+    arithmetic: Annotated[Name, "arithmetic.name"] = _DOUBLE.name
+    state_roundoff: Annotated[float, "arithmetic.state"] = _DOUBLE.state
+    force_roundoff: Annotated[float, "arithmetic.force"] = _DOUBLE.force
+    force_quantum: Annotated[float, "arithmetic.quantum"] = _DOUBLE.quantum
+    force_overflow: Annotated[float, "arithmetic.overflow"] = _DOUBLE.overflow
+    parameter_precision: Annotated[Literal["double", "single"], "arithmetic.parameters"] = _DOUBLE.parameters
+    force_excess: Annotated[float, "arithmetic.excess"] = _DOUBLE.excess
+    forces_kept_within: Annotated[float, "arithmetic.stale"] = _DOUBLE.stale
+    rod_tolerance: Annotated[float, "arithmetic.lengths"] = 0.0
+    bath_cancels: Annotated[int, "arithmetic.cancels"] = 0
+    keeps_displacement: Annotated[bool, "arithmetic.keeps_displacement"] = False
+    counts_from_start: Annotated[bool, "arithmetic.from_start"] = False
+    springs_are_joints: Annotated[bool, "arithmetic.joints"] = False
+    rebuilds_velocity: Annotated[bool, "rebuilds_velocity"] = False
+    off_axis: Annotated[float | None, "off_axis"] = None
 
     @property
     def kept(self) -> tuple[str, ...]:
@@ -100,10 +79,19 @@ class RunRecord(msgspec.Struct, frozen=True, kw_only=True):
         return tuple(name for name in QUANTITIES if name in self.quantities.split())
 
 
-def record(place: str, known: Mapping[str, Any]) -> RunRecord:
+KEPT: dict[str, str] = {
+    name: text
+    for name, hint in get_type_hints(Run, include_extras=True).items()
+    for text in getattr(hint, "__metadata__", ())
+    if isinstance(text, str)
+}
+"""Attributes, and the fields of a trajectory that they store."""
+
+
+def record(place: str, label: str, known: Mapping[str, Any]) -> Run:
     """Attributes as a typed record; StoreError that names one that is missing or has another type."""
     try:
-        found = msgspec.convert(known, RunRecord)
+        found = msgspec.convert({**known, "label": label, "parameters": known}, Run)
     except msgspec.ValidationError as error:
         raise StoreError(f"{place}: {error}") from error
     if not {"q", "p"} <= set(found.kept):
@@ -117,17 +105,15 @@ def attributes(trajectory: Trajectory) -> dict[str, Scalar | None]:
     return {"method": trajectory.label, **kept, **{f"origin.{x}": y for x, y in trajectory.origin.items()}}
 
 
-def trajectory(
-    label: str, x: RunRecord, known: Mapping[str, Any], arrays: Mapping[str, Floats], stride: int = 1
-) -> Trajectory:
+def trajectory(run: Run, arrays: Mapping[str, Floats], stride: int = 1) -> Trajectory:
     """A trajectory, or every stride-th frame of it, from its record and its arrays."""
     parts: dict[str, dict[str, Any]] = {"": {}, "outcome": {}, "timing": {}, "arithmetic": {}}
     for name, field in KEPT.items():
         part, _, own = field.rpartition(".")
-        parts[part][own] = getattr(x, name)
+        parts[part][own] = getattr(run, name)
     parts[""]["every"] *= stride
     return Trajectory(
-        label=label,
+        label=run.label,
         t=arrays["time"],
         q=arrays["q"],
         p=arrays["p"],
@@ -136,6 +122,6 @@ def trajectory(
         outcome=Outcome(**parts["outcome"]),
         timing=Timing(**parts["timing"]),
         arithmetic=Arithmetic(**parts["arithmetic"]),
-        origin={key[7:]: str(value) for key, value in known.items() if key.startswith("origin.")},
+        origin={key[7:]: str(value) for key, value in run.parameters.items() if key.startswith("origin.")},
         **parts[""],
     )

@@ -24,8 +24,6 @@ def trust(path: Path, module: str) -> None:
     A file without a seal is read on trial by the function `tried` of a module.
     """
     with files.told(path, "read"):
-        with path.open("rb"):
-            pass
         said = _against(path.absolute(), module, _state(path))
     if said:
         raise StoreError(f"cannot read {path}: {said}")
@@ -50,17 +48,14 @@ def _state(path: Path) -> tuple[int, ...]:
     return state.st_dev, state.st_ino, state.st_mtime_ns, state.st_size
 
 
-def guarded(path: Path, module: str) -> str:
-    """Read a file in a child process -> its answer; StoreError where that crashes or runs out of time."""
-    said, harmless = _tried(path.absolute(), module, _state(path))
-    if not harmless:
-        raise StoreError(f"cannot read {path}: {said}")
-    return said
+def tried(path: Path, module: str) -> tuple[str, bool]:
+    """The answer of a child process that reads a file, and whether it ended normally; if not, how it
+    ended."""
+    return _tried(path.absolute(), module, _state(path))
 
 
 @lru_cache(maxsize=4096)
 def _tried(path: Path, module: str, state: tuple[int, ...]) -> tuple[str, bool]:
-    """The answer of the child process, and whether it ended normally."""
     try:
         return apart.read(module, "tried", path).decode(), True
     except StoreError as error:

@@ -318,12 +318,12 @@ def repeat(path: Path, *, methods: Sequence[str] = (), progress: Progress | None
             for name in chosen:
                 before = known[name].parameters
                 label = engines.parse(name)
-                quantities = ("q", "p", "energy") if "energy" in known[name].quantities else ("q", "p")
+                quantities = ("q", "p", "energy") if "energy" in known[name].kept else ("q", "p")
                 mine = replace(scene, quantities=quantities)
                 with journal.draft(name, mine) as draft:
                     told = bar.of(label, scene.steps)
                     # fields that an older version did not store are no difference
-                    kept = 5 if "last_step" in known[name].quantities else 4
+                    kept = 5 if "last_step" in known[name].kept else 4
                     sink = lambda *frames, add=draft.append, kept=kept: add(*frames[:kept])  # noqa: E731
                     seed = _seed(path, name, before.get("origin.seed")) if scene.bath else None
                     record = driver.play(mine, label, sink, progress=told, seed=seed)

@@ -106,9 +106,9 @@ def _region(x: Region) -> Chart:
 
 def _resonance(x: Resonance) -> Chart:
     group = scheme_of(x.method)
-    bands = ", ".join(f"{a:.6f} to {b:.6f}" for a, b in x.bands)
+    said = x.grows("h \N{GREEK SMALL LETTER OMEGA}")
     return Chart(
-        title=f"{x.scene}: {x.method} resonates, it grows at h \N{GREEK SMALL LETTER OMEGA} from {bands}.",
+        title=f"{x.scene}: {x.method} {'resonates, it ' if x.bands else ''}{said}.",
         x=Scale(name="outer step times fast frequency"),
         y=Scale(name="growth of one step"),
         curves=[
@@ -116,5 +116,5 @@ def _resonance(x: Resonance) -> Chart:
             Curve(name=x.method, group=group, x=x.h_w, y=x.radius - 1, line=False, marks=True),
         ],
         rules=[Rule(axis="x", at=float(np.pi), name="\N{GREEK SMALL LETTER PI}")],
-        short=f"{x.method} grows from {bands}",
+        short=f"{x.method} {said}",
     )

@@ -42,6 +42,12 @@ class Resonance:
     bands: tuple[tuple[float, float], ...]
     bands_predicted: tuple[tuple[float, float], ...]
 
+    def grows(self, name: str) -> str:
+        """Where its steps grow along h w, which is called `name`, in words."""
+        bands = ", ".join(f"{a:.6f} to {b:.6f}" for a, b in self.bands)
+        ends = f"{self.h_w[0]:g} to {self.h_w[-1]:g}"
+        return f"grows at {name} from {bands}" if bands else f"grows at no {name} from {ends}"
+
 
 def fast_frequency(scene: Scene) -> float:
     """Angular frequency of the scene's fastest mode with its fast springs alone [1/T]."""

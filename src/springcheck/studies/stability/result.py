@@ -108,11 +108,11 @@ class Stability(Studied):
             * (x.off > 1)
             for x in self.regions
         ]
-        for y in self.resonances:
-            bands = ", ".join(f"{a:.6f} to {b:.6f}" for a, b in y.bands)
-            out.append(f"{y.method}: grows at h w_fast from {bands}; the exact map agrees to {_apart(y):.1e}")
-        out += self.failures
-        return out
+        out += [
+            f"{y.method}: {y.grows('h w_fast')}; the exact map agrees to {_apart(y):.1e}"
+            for y in self.resonances
+        ]
+        return out + self.failures
 
     def document(self) -> dict[str, Any]:
         """Plain data for JSON (a limit of None: there is none)."""
@@ -161,7 +161,7 @@ def growth_allowed(limit: Limit) -> float:
 
 def _apart(x: Resonance) -> float:
     a, b = np.array(x.bands), np.array(x.bands_predicted)
-    return float(np.max(np.abs(a - b))) if a.shape == b.shape and a.size else float("nan")
+    return float(np.max(np.abs(a - b), initial=0.0)) if a.shape == b.shape else float("nan")
 
 
 LIMITS: RecordForm[Limit] = RecordForm(
