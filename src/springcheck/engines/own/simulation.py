@@ -91,8 +91,8 @@ def prepare(
         try:
             plan = program(found, scene, float(step))
         except NoKernelError:
-            return Own(vectors.Vectors(found, scene, step), calls, compiled=False)
-        if _lacks(plan, scene):
+            plan = None
+        if plan is None or _lacks(plan, scene):
             return Own(vectors.Vectors(found, scene, step), calls, compiled=False)
         scene = scene.system.clocked
         job = _one(plan, scene) or _many(plan, scene, max(calls))
@@ -129,7 +129,7 @@ def _one(plan: Program, scene: Scene) -> tiles.Job | None:
     divisor = float(solver.factors(scene, plan.implicit_step)[0][0])
     code, _, x, y = plan.arrays
     v, f = np.zeros((2, plan.a.shape[1]))
-    head = code, x, y, plan.a, v, f, divisor, m, k
+    head = (code, x, y, plan.a, v, f), (divisor, m, k)
     return tiles.Job(kernel=kernels.single, head=head, state=state, n=1, work=plan.stages)
 
 
@@ -152,7 +152,7 @@ def _many(plan: Program, scene: Scene, calls: int) -> tiles.Job:
     decays = np.array([np.exp(-x * rates) for x in plan.decays] or np.empty((0, n)))
     return tiles.Job(
         kernel=kernels.many,
-        head=(*plan.arrays, damped, decays, plan.a, *(slots * 2)[:2], solved),
+        head=((*plan.arrays, damped, decays, plan.a), *(slots * 2)[:2], solved),
         m=m,
         state=(q, p),
         stages=plan.a.shape[1],
