@@ -70,6 +70,8 @@ class Scheme:
     thermostat: ClassVar[bool] = False
     """Whether it has noise, and a step that `springcheck.thermal` carries out."""
     source: str = ""
+    unnamed: bool = False
+    """It stands for a step, fixed or not, whose scheme nobody has named."""
 
     @cached_property
     def kinds(self) -> tuple[StageKind, ...]:
@@ -152,9 +154,6 @@ class Scheme:
             for i, (kind, (_, c)) in enumerate(zip(self.kinds, self.stages, strict=True))
             if kind.evaluates
         ]
-
-    unnamed: bool = False
-    """It stands for a step, fixed or not, whose scheme nobody has named."""
 
 
 def _mirrored(*half: Stage) -> tuple[Stage, ...]:
@@ -322,11 +321,7 @@ that is set once and held over substeps, friction that is taken implicitly where
 that is solved for in every substep; and Boris' rotation, which is position Verlet without a field."""
 
 
+@lru_cache(maxsize=4096)
 def number(c: Coefficient, width: Any) -> Any:
     """A coefficient rounded once to a float of this width (np.float64, np.longdouble)."""
-    return _rounded(c, width)
-
-
-@lru_cache(maxsize=4096)
-def _rounded(c: Coefficient, width: Any) -> Any:
     return width(c.numerator) / width(c.denominator) if isinstance(c, Fraction) else width(c)
