@@ -111,7 +111,7 @@ class Tiled:
         mapped(given, lambda x: rows.append(x) if is_row(x) and len(x) >= job.n - 1 else None)
         apart = dict(zip(map(id, rows), staggered(rows), strict=True))
         self._head, self._m, (self._q, self._p) = mapped(given, lambda x: apart.get(id(x), x))
-        self._cuts: dict[int, list[tuple[int, int, int, tuple[Any, ...]]]] = {}
+        self._width, self._tiles = 0, list[tuple[int, int, int, tuple[Any, ...]]]()
 
     def advance(self, every: int, q: Floats, p: Floats) -> None:
         """Fill q and p (f, n)."""
@@ -165,8 +165,12 @@ class Tiled:
         self._job.kernel(every, *arguments, q[:, lo:hi], p[:, lo:hi])
 
     def _cut(self, width: int, margin: int) -> list[tuple[int, int, int, tuple[Any, ...]]]:
-        """Tiles: the particles lo to hi that are kept, how many stand before them, and the arguments."""
-        if width not in self._cuts:
+        """Tiles: the particles lo to hi that are kept, how many stand before them, and the arguments.
+
+        The last cut alone is kept: its tiles hold the forces of their last step, which are those of the state
+        only as long as no other cut moves it.
+        """
+        if width != self._width:
             n = self._job.n
             count = -(-n // width)
             edge = -(-n // (count * LANES)) * LANES if count > 1 else n
@@ -179,8 +183,8 @@ class Tiled:
                 if not margin:
                     inner = self._job.arguments(head, m, self._q[lo:hi], self._p[lo:hi], 0)
                 found.append((lo, lo - begin, hi, inner))
-            self._cuts[width] = found
-        return self._cuts[width]
+            self._width, self._tiles = width, found
+        return self._tiles
 
 
 def cut(head: tuple[Any, ...], lo: int, hi: int) -> tuple[Any, ...]:
