@@ -321,7 +321,11 @@ that is set once and held over substeps, friction that is taken implicitly where
 that is solved for in every substep; and Boris' rotation, which is position Verlet without a field."""
 
 
-@lru_cache(maxsize=4096)
 def number(c: Coefficient, width: Any) -> Any:
     """A coefficient rounded once to a float of this width (np.float64, np.longdouble)."""
+    return _rounded(c, width)
+
+
+@lru_cache(maxsize=4096)
+def _rounded(c: Coefficient, width: Any) -> Any:
     return width(c.numerator) / width(c.denominator) if isinstance(c, Fraction) else width(c)

@@ -67,20 +67,16 @@ class Program:
         return tuple(o.x for o in self.operations if o.code == kernels.FRICTION)
 
     @property
-    def slots(self) -> tuple[int, ...]:
-        """For each operation, the index of its force or of its row of decays."""
+    def arrays(self) -> tuple[Integers, Integers, Floats, Floats]:
+        """Code, slot (the index of its force, or of its row of decays), x and y of each operation."""
         frictions = iter(range(len(self.operations)))
-        return tuple(
+        slots = [
             next(frictions) if o.code == kernels.FRICTION else self.forces.index(o.force) if o.force else 0
             for o in self.operations
-        )
-
-    @property
-    def arrays(self) -> tuple[Integers, Integers, Floats, Floats]:
-        """Code, slot, x and y of each operation."""
+        ]
         codes = np.array([o.code for o in self.operations], np.int64)
         x, y = (np.array([getattr(o, name) for o in self.operations], np.float64) for name in "xy")
-        return codes, np.array(self.slots, np.int64), x, y
+        return codes, np.array(slots, np.int64), x, y
 
 
 def evaluations(scheme: Scheme, scene: Scene) -> tuple[int, int]:

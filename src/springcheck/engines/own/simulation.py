@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import platform
 import sys
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 
@@ -29,16 +29,14 @@ WORTH = 1_000_000
 takes 0.15 s, loading cached code 5 ms, compiling it the first time 1 to 4 s."""
 
 
-Carrier: TypeAlias = tiles.Whole | tiles.Tiled | vectors.Vectors
-"""What fills rows."""
-
-
 class Own:
-    """A started run of an own method; `compiled` says whether by a compiled kernel."""
+    """A started run of an own method: `how` fills rows, `compiled` says whether by a compiled kernel."""
 
-    def __init__(self, how: Carrier, evaluations: tuple[int, int], *, compiled: bool) -> None:
+    def __init__(
+        self, how: tiles.Whole | tiles.Tiled | vectors.Vectors, calls: tuple[int, int], *, compiled: bool
+    ) -> None:
         self.compiled = compiled
-        self._first, self._each = evaluations
+        self._first, self._each = calls
         self._steps = 0
         self._how = how
 

@@ -58,15 +58,11 @@ class Job:
     joined: bool = False
     """Whether neighbours are joined."""
 
-    def room(self, n: int) -> tuple[Any, ...]:
-        """Work arrays of the kernel for n particles."""
-        s = self.stages
-        v, f, stage = np.zeros((s, n)), np.zeros((max(s, 2), n)), np.zeros((2, n if s else 0))
-        return v, f, stage, np.zeros(n + 1), np.ones(2, bool)
-
     def arguments(self, head: tuple[Any, ...], m: Floats, q: Floats, p: Floats, skip: int) -> tuple[Any, ...]:
-        """All of the kernel's arguments but `every` and the rows to fill."""
-        return *head, m, self.room(len(m)), q, p, skip
+        """All of the kernel's arguments but `every` and the rows to fill, with work arrays of their own."""
+        s, n = self.stages, len(m)
+        v, f, stage = np.zeros((s, n)), np.zeros((max(s, 2), n)), np.zeros((2, n if s else 0))
+        return *head, m, (v, f, stage, np.zeros(n + 1), np.ones(2, bool)), q, p, skip
 
     @property
     def whole(self) -> tuple[Any, ...]:
