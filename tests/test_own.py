@@ -349,7 +349,7 @@ def test_neither_tiles_nor_threads_change_a_number(
 def test_calls_of_few_and_of_many_steps_by_turns_change_no_number(
     scheme: str, make: Callable[[int], Scene], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """They are cut into unlike tiles, and the force that one cut has kept is not that of where another leads."""
+    """They are cut into unlike tiles, and the force kept by one is not that of where another leads."""
     what = make(2 * 96 + 77)
     plain_q, plain_p = run(what, scheme, compiled=False, frames=60)
     for name, value in {"WIDTH": 96, "NARROW": 64, "MARGIN": 17, "MANY_STEPS": 7}.items():
