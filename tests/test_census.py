@@ -88,7 +88,9 @@ def test_an_engine_that_is_not_what_it_is_declared_as_is_found_out(
 
 
 BROKEN = """
-from springcheck.engines import Engine, Method, Stopped, named
+from springcheck.engines import Engine, Method, Need, Stopped, named
+
+RIGID = {"terms": frozenset({"wall-spring", "rod"}), "requires": frozenset({Need.RODS})}
 
 class Run:
     force_calls = 0
@@ -101,7 +103,11 @@ class Run:
 
 ENGINE = Engine(
     name="broken", title="Broken", start=Run, version=lambda: {},
-    methods=named(*(Method(name=x, scheme="velocity-verlet", about="") for x in ("stops", "escapes"))),
+    any_axis=True,
+    methods=named(
+        Method(name="stops-rods", scheme="velocity-verlet", about="", **RIGID),
+        *(Method(name=x, scheme="velocity-verlet", about="") for x in ("stops", "escapes")),
+    ),
     thermostats=named(
         *(Method(name=f"{x}-bath", scheme="baoab", about="", generator="none") for x in ("stops", "escapes"))
     ),
@@ -116,8 +122,10 @@ def test_an_engine_whose_first_step_fails_has_no_numbers_of_a_motion(
     arguments = ["--thermostats", "--engine", "broken.py", "--method", "broken:*"]
     assert main(["census", *arguments, "--json"]) == 1
     rows = {x["method"].partition(":")[2]: x for x in json.loads(capsys.readouterr().out)["entries"]}
-    assert set(rows) == {"stops", "escapes", "stops-bath", "escapes-bath"}
+    assert set(rows) == {"stops-rods", "stops", "escapes", "stops-bath", "escapes-bath"}
+    assert rows["stops-rods"]["constraint"] == "rod: takes no step, length to rounding"
     assert {x[key] for x in rows.values() for key in ("amplitude", "area", "trace", "kinetic")} == {None}
+    assert rows["stops-rods"]["along"] == rows["stops"]["along"] == "none"
     limits = [(rows[x]["limit"], rows[x]["bounded"]) for x in ("stops", "escapes")]
     assert limits == [(None, False), (0.0, False)]
     assert "1000 springs: stopped after step 0" in rows["stops-bath"]["note"]
