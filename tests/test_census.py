@@ -87,6 +87,50 @@ def test_an_engine_that_is_not_what_it_is_declared_as_is_found_out(
     assert "pefrl:pefrl is declared as velocity Verlet" in " ".join(capsys.readouterr().out.split())
 
 
+BROKEN = """
+from springcheck.engines import Engine, Method, Need, Stopped, named
+
+RIGID = {"terms": frozenset({"wall-spring", "rod"}), "requires": frozenset({Need.RODS})}
+
+class Run:
+    force_calls = 0
+    def __init__(self, scene, method, label, step, seed=None):
+        self.stops = method.name.startswith("stops")
+    def advance(self, every, q, p):
+        if self.stops:
+            raise Stopped(0, "out of order")
+        q[:] = p[:] = float("inf")
+
+ENGINE = Engine(
+    name="broken", title="Broken", start=Run, version=lambda: {},
+    any_axis=True,
+    methods=named(
+        Method(name="stops-rods", scheme="velocity-verlet", about="", **RIGID),
+        *(Method(name=x, scheme="velocity-verlet", about="") for x in ("stops", "escapes")),
+    ),
+    thermostats=named(
+        *(Method(name=f"{x}-bath", scheme="baoab", about="", generator="none") for x in ("stops", "escapes"))
+    ),
+)
+"""
+
+
+def test_an_engine_whose_first_step_fails_has_no_numbers_of_a_motion(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "broken.py").write_text(BROKEN)
+    arguments = ["--thermostats", "--engine", "broken.py", "--method", "broken:*"]
+    assert main(["census", *arguments, "--json"]) == 1
+    rows = {x["method"].partition(":")[2]: x for x in json.loads(capsys.readouterr().out)["entries"]}
+    assert set(rows) == {"stops-rods", "stops", "escapes", "stops-bath", "escapes-bath"}
+    assert rows["stops-rods"]["constraint"] == "rod: takes no step, length to rounding"
+    assert {x[key] for x in rows.values() for key in ("amplitude", "area", "trace", "kinetic")} == {None}
+    assert rows["stops-rods"]["along"] == rows["stops"]["along"] == "none"
+    limits = [(rows[x]["limit"], rows[x]["bounded"]) for x in ("stops", "escapes")]
+    assert limits == [(None, False), (0.0, False)]
+    assert "1000 springs: stopped after step 0" in rows["stops-bath"]["note"]
+
+
 def test_what_was_measured_by_hand_is_compared() -> None:
     """A census that names another scheme, amplitude, partner or growth than a loop by hand is told."""
     one = census.entry(engines.parse("own:euler"))

@@ -344,6 +344,26 @@ def test_neither_tiles_nor_threads_change_a_number(
             assert np.array_equal(p, plain_p[every - 1 :: every])
 
 
+@pytest.mark.parametrize("scheme", ["velocity-verlet", "yoshida4", "rk4", "trapezoidal"])
+@pytest.mark.parametrize("make", [springs, chain])
+def test_calls_of_few_and_of_many_steps_by_turns_change_no_number(
+    scheme: str, make: Callable[[int], Scene], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """They are cut into unlike tiles, and the force kept by one is not that of where another leads."""
+    what = make(2 * 96 + 77)
+    plain_q, plain_p = run(what, scheme, compiled=False, frames=60)
+    for name, value in {"WIDTH": 96, "NARROW": 64, "MARGIN": 17, "MANY_STEPS": 7}.items():
+        monkeypatch.setattr(tiles, name, value)
+    started = simulation.prepare(what, scheme, what.step, compiled=True, threads=1)
+    done = 0
+    for steps in (1, 9, 1, 20, 3, 8, 2, 16):
+        q, p = np.empty((2, 1, what.n))
+        started.advance(steps, q, p)
+        done += steps
+        assert np.array_equal(q[0], plain_q[done - 1])
+        assert np.array_equal(p[0], plain_p[done - 1])
+
+
 def test_a_tile_without_its_margin_would_be_wrong(monkeypatch: pytest.MonkeyPatch) -> None:
     what = chain(300)
     monkeypatch.setattr(tiles, "WIDTH", 96)

@@ -30,7 +30,7 @@ from springcheck.identify.files import rod_of
 from springcheck.physics import exact, scenefile
 from springcheck.physics.rods import Rods
 from springcheck.physics.scene import Scene
-from springcheck.physics.terms import Cosine, Rod, Spring, WallRod, WallSpring
+from springcheck.physics.terms import Cosine, Rod, Spring, WallRod, WallSpring, Weight
 from springcheck.studies.faults import measure
 from springcheck.studies.faults.rigid import Rattle
 from springcheck.studies.faults.seeded import Fault
@@ -588,6 +588,18 @@ def test_iterations_that_find_no_length_stop_a_run(need: Need) -> None:
     scene = replace(scenefile.load_scene("rod-on-a-line"), step=10.0, steps=8)
     run = driver.run(scene, "ase:rattle")
     assert (run.outcome.status, run.outcome.message) == ("stopped", "Did not converge")
+
+
+@pytest.mark.parametrize("units", ["reduced", "md"])
+def test_frames_before_a_stop_are_in_the_units_of_the_scene(units: str, need: Need) -> None:
+    """A dumbbell that forces turn faster and faster, until no push along its rod keeps the length."""
+    need("ase:rattle")
+    turned = Weight(i=[1, 3], force=[-30.0, 30.0], at=[0.0, 0.0])  # type: ignore[arg-type]
+    scene = replace(dumbbell(), units=units, terms=(*dumbbell().terms, turned), steps=20)
+    run = driver.run(scene, "ase:rattle")
+    assert run.outcome.status == "stopped"
+    assert len(run.t) > 2
+    assert not [v for v in checks.judge(scene, run) if v.passed is False]
 
 
 def test_passes_that_come_near_lengths_too_slowly_are_a_stop_with_its_words_and_no_failure(

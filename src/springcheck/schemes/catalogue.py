@@ -70,6 +70,8 @@ class Scheme:
     thermostat: ClassVar[bool] = False
     """Whether it has noise, and a step that `springcheck.thermal` carries out."""
     source: str = ""
+    unnamed: bool = False
+    """It stands for a step, fixed or not, whose scheme nobody has named."""
 
     @cached_property
     def kinds(self) -> tuple[StageKind, ...]:
@@ -152,9 +154,6 @@ class Scheme:
             for i, (kind, (_, c)) in enumerate(zip(self.kinds, self.stages, strict=True))
             if kind.evaluates
         ]
-
-    unnamed: bool = False
-    """It stands for a step, fixed or not, whose scheme nobody has named."""
 
 
 def _mirrored(*half: Stage) -> tuple[Stage, ...]:

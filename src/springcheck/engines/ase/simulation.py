@@ -156,11 +156,8 @@ class _Dynamics:
                 except RuntimeError as error:
                     # lengths of constraints that its iteration does not reach
                     raise Stopped(row, str(error)) from error
-                q[row] = atoms.arrays["positions"].reshape(-1)[self._where]
-                p[row] = atoms.arrays["momenta"].reshape(-1)[self._where]
-            if self._length != 1.0:
-                q /= self._length
-                p /= self._momentum
+                q[row] = atoms.arrays["positions"].reshape(-1)[self._where] / self._length
+                p[row] = atoms.arrays["momenta"].reshape(-1)[self._where] / self._momentum
         if self._on_a_line:
             self.off_axis = max(self.off_axis, off_axis(atoms.positions, self._elsewhere))
 

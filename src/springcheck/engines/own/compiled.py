@@ -25,8 +25,6 @@ HELP: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
 would contract and reorder.  Nothing is allocated, so arrays need not be counted, which would take longer
 than a step of a few hundred particles."""
 
-FLAGS: dict[str, Any] = {**HELP, "nogil": True}
-
 HELPERS: tuple[Callable[..., Any], ...] = tuple(
     thing
     for thing in vars(loops).values()
@@ -82,7 +80,7 @@ def _jit(kernel: Callable[..., Any], types: tuple[Any, ...], *, saved: bool) -> 
     import numba
 
     _registered()
-    found: Any = numba.njit(cache=saved, **FLAGS)(kernel)
+    found: Any = numba.njit(cache=saved, nogil=True, **HELP)(kernel)
     written = saved and not _unbroken(Path(found.stats.cache_path), kernel)
     found.compile(types)
     if written:

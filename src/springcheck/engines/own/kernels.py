@@ -35,6 +35,9 @@ from springcheck.engines.own.loops import (
 Rows: TypeAlias = Any
 """A list of lists, or a two-dimensional array; qs and ps are always arrays (f, n)."""
 
+Steps: TypeAlias = Any
+"""Code, slot, x, y of each operation, whether slots are damped, decays, and the tableau: see `many`."""
+
 KICK, DRIFT, KICK_DRIFT, EULER, FRICTION, IMPLICIT, MIDPOINT, SET_CLOCK = range(8)
 """Operations on (q, p), with coefficients x and y in units of time:
 
@@ -47,22 +50,12 @@ FRICTION    p *= decay            SET_CLOCK   the last coordinate is the time: s
 
 def many(
     every: int,
-    code: Numbers,
-    slot: Numbers,
-    x: Numbers,
-    y: Numbers,
-    damped: Numbers,
-    decay: Rows,
-    a: Rows,
+    steps: Steps,
     one: Slot,
     two: Slot,
     solver: Solver,
     m: Numbers,
-    v: Rows,
-    f: Rows,
-    stage: Rows,
-    t: Numbers,
-    stale: Numbers,
+    room: Rows,
     q: Numbers,
     p: Numbers,
     skip: int,
@@ -79,8 +72,9 @@ def many(
 
     Rows of the result leave out the first `skip` particles.
     """
-    n = len(m)
-    stages, f_one, f_two = len(v), f[0], f[1]
+    code, slot, x, y, damped, decay, a = steps
+    v, f, stage, t, stale = room
+    n, stages, f_one, f_two = len(m), len(v), f[0], f[1]
     # for a simple row the loops are called from here: passing a whole force on costs as much as 100 particles
     indices, _, (k_held, at_held), (k, rest, ends), (c, _) = one
     divisors, factors, _ = solver
@@ -162,22 +156,11 @@ def many(
 
 
 def single(
-    every: int,
-    code: Numbers,
-    x: Numbers,
-    y: Numbers,
-    a: Rows,
-    v: Numbers,
-    f: Numbers,
-    divisor: float,
-    m: float,
-    k: float,
-    state_q: Numbers,
-    state_p: Numbers,
-    qs: Rows,
-    ps: Rows,
+    every: int, steps: Steps, spring: Numbers, state_q: Numbers, state_p: Numbers, qs: Rows, ps: Rows
 ) -> None:
-    """`many` of one particle on one spring."""
+    """`many` of one particle on one spring; its stages v and f are numbers."""
+    code, x, y, a, v, f = steps
+    divisor, m, k = spring
     stages, q, p = len(v), state_q[0], state_p[0]
     for row in range(len(qs)):
         for _ in range(every):

@@ -17,16 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from springcheck.engines.own.kernels import (
-    DRIFT,
-    EULER,
-    FRICTION,
-    IMPLICIT,
-    KICK,
-    KICK_DRIFT,
-    MIDPOINT,
-    SET_CLOCK,
-)
+from springcheck.engines.own import kernels
 from springcheck.errors import MethodError
 from springcheck.physics.arrays import Floats, Integers
 from springcheck.physics.scene import Scene
@@ -68,28 +59,24 @@ class Program:
     @property
     def implicit_step(self) -> float:
         """x of the implicit operations, 0 where there is none."""
-        return next((o.x for o in self.operations if o.code in (IMPLICIT, MIDPOINT)), 0.0)
+        return next((o.x for o in self.operations if o.code in (kernels.IMPLICIT, kernels.MIDPOINT)), 0.0)
 
     @property
     def decays(self) -> tuple[float, ...]:
         """x of the frictions, in the order of their rows."""
-        return tuple(o.x for o in self.operations if o.code == FRICTION)
-
-    @property
-    def slots(self) -> tuple[int, ...]:
-        """For each operation, the index of its force or of its row of decays."""
-        frictions = iter(range(len(self.operations)))
-        return tuple(
-            next(frictions) if o.code == FRICTION else self.forces.index(o.force) if o.force else 0
-            for o in self.operations
-        )
+        return tuple(o.x for o in self.operations if o.code == kernels.FRICTION)
 
     @property
     def arrays(self) -> tuple[Integers, Integers, Floats, Floats]:
-        """Code, slot, x and y of each operation."""
+        """Code, slot (the index of its force, or of its row of decays), x and y of each operation."""
+        frictions = iter(range(len(self.operations)))
+        slots = [
+            next(frictions) if o.code == kernels.FRICTION else self.forces.index(o.force) if o.force else 0
+            for o in self.operations
+        ]
         codes = np.array([o.code for o in self.operations], np.int64)
         x, y = (np.array([getattr(o, name) for o in self.operations], np.float64) for name in "xy")
-        return codes, np.array(self.slots, np.int64), x, y
+        return codes, np.array(slots, np.int64), x, y
 
 
 def evaluations(scheme: Scheme, scene: Scene) -> tuple[int, int]:
@@ -117,13 +104,13 @@ def program(scheme: Scheme, scene: Scene, h: float) -> Program:
     """
     if scheme.has("random") or not scheme.has("one-step"):
         raise MethodError(f"own: the scheme {scheme.name} has no fixed step that can be repeated")
-    clock = (Operation(code=SET_CLOCK, x=h),) if scene.system.is_driven else ()
+    clock = (Operation(code=kernels.SET_CLOCK, x=h),) if scene.system.is_driven else ()
     if scheme.stages:
         found = _splitting(scheme, h)
     elif scheme.has("implicit"):
         found = _implicit(scheme, h)
     elif len(scheme.b) == 1:
-        found = (Operation(code=EULER, x=h, y=h, force=ALL),)
+        found = (Operation(code=kernels.EULER, x=h, y=h, force=ALL),)
     else:
         s = len(scheme.b)
         a = np.zeros((s + 1, s))
@@ -132,8 +119,8 @@ def program(scheme: Scheme, scene: Scene, h: float) -> Program:
         return Program(operations=clock, a=a)
     damped = scene.system.is_damped
     if not damped:
-        whole = {ALL: POTENTIAL}
-        found = tuple(o._replace(force=whole.get(o.force, o.force)) for o in found if o.code != FRICTION)
+        without = (o for o in found if o.code != kernels.FRICTION)
+        found = tuple(o._replace(force=POTENTIAL) if o.force == ALL else o for o in without)
     forces = tuple(dict.fromkeys(o.force for o in found if o.force))
     if len(forces) > 2:
         raise NoKernelError(f"{len(forces)} forces apart, where two are served")
@@ -146,15 +133,15 @@ def _splitting(scheme: Scheme, h: float) -> tuple[Operation, ...]:
     for kind, (_, c) in zip(scheme.kinds, scheme.stages, strict=True):
         x = float(number(c, np.float64) * h)
         if kind.decay:
-            found.append(Operation(code=FRICTION, x=x))
+            found.append(Operation(code=kernels.FRICTION, x=x))
         elif kind.evaluates and kind.kicks:
-            found.append(Operation(code=KICK, x=x, force=kind.evaluates))
+            found.append(Operation(code=kernels.KICK, x=x, force=kind.evaluates))
         elif not kind.drifts:
             raise NoKernelError(f"a stage that is not served: {kind.name}")
-        elif found and found[-1].code == KICK:
-            found[-1] = found[-1]._replace(code=KICK_DRIFT, y=x)
+        elif found and found[-1].code == kernels.KICK:
+            found[-1] = found[-1]._replace(code=kernels.KICK_DRIFT, y=x)
         else:
-            found.append(Operation(code=DRIFT, y=x))
+            found.append(Operation(code=kernels.DRIFT, y=x))
     return tuple(found)
 
 
@@ -165,10 +152,10 @@ def _implicit(scheme: Scheme, h: float) -> tuple[Operation, ...]:
     explicit = all(not c for row in a[:-1] for c in row)
     if explicit and s <= 2 and tuple(a[-1]) == tuple(b):
         first = float(number(a[-1][0], np.float64) * h)
-        before = (Operation(code=EULER, x=first, y=first, force=ALL),) if s == 2 else ()
-        return (*before, Operation(code=IMPLICIT, x=x, y=x, force=POTENTIAL))
+        before = (Operation(code=kernels.EULER, x=first, y=first, force=ALL),) if s == 2 else ()
+        return (*before, Operation(code=kernels.IMPLICIT, x=x, y=x, force=POTENTIAL))
     if s == 1 and b[0] == 1 and a[0][0] * 2 == 1:
-        return (Operation(code=MIDPOINT, x=x, y=h, force=POTENTIAL),)
+        return (Operation(code=kernels.MIDPOINT, x=x, y=h, force=POTENTIAL),)
     raise NoKernelError("implicit stages that are not solved by factors")
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import platform
 import sys
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 
@@ -29,16 +29,14 @@ WORTH = 1_000_000
 takes 0.15 s, loading cached code 5 ms, compiling it the first time 1 to 4 s."""
 
 
-Carrier: TypeAlias = tiles.Whole | tiles.Tiled | vectors.Vectors
-"""What fills rows."""
-
-
 class Own:
-    """A started run of an own method; `compiled` says whether by a compiled kernel."""
+    """A started run of an own method: `how` fills rows, `compiled` says whether by a compiled kernel."""
 
-    def __init__(self, how: Carrier, evaluations: tuple[int, int], *, compiled: bool) -> None:
+    def __init__(
+        self, how: tiles.Whole | tiles.Tiled | vectors.Vectors, calls: tuple[int, int], *, compiled: bool
+    ) -> None:
         self.compiled = compiled
-        self._first, self._each = evaluations
+        self._first, self._each = calls
         self._steps = 0
         self._how = how
 
@@ -91,8 +89,8 @@ def prepare(
         try:
             plan = program(found, scene, float(step))
         except NoKernelError:
-            return Own(vectors.Vectors(found, scene, step), calls, compiled=False)
-        if _lacks(plan, scene):
+            plan = None
+        if plan is None or _lacks(plan, scene):
             return Own(vectors.Vectors(found, scene, step), calls, compiled=False)
         scene = scene.system.clocked
         job = _one(plan, scene) or _many(plan, scene, max(calls))
@@ -129,7 +127,7 @@ def _one(plan: Program, scene: Scene) -> tiles.Job | None:
     divisor = float(solver.factors(scene, plan.implicit_step)[0][0])
     code, _, x, y = plan.arrays
     v, f = np.zeros((2, plan.a.shape[1]))
-    head = code, x, y, plan.a, v, f, divisor, m, k
+    head = (code, x, y, plan.a, v, f), (divisor, m, k)
     return tiles.Job(kernel=kernels.single, head=head, state=state, n=1, work=plan.stages)
 
 
@@ -152,7 +150,7 @@ def _many(plan: Program, scene: Scene, calls: int) -> tiles.Job:
     decays = np.array([np.exp(-x * rates) for x in plan.decays] or np.empty((0, n)))
     return tiles.Job(
         kernel=kernels.many,
-        head=(*plan.arrays, damped, decays, plan.a, *(slots * 2)[:2], solved),
+        head=((*plan.arrays, damped, decays, plan.a), *(slots * 2)[:2], solved),
         m=m,
         state=(q, p),
         stages=plan.a.shape[1],

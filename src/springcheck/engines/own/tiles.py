@@ -58,15 +58,11 @@ class Job:
     joined: bool = False
     """Whether neighbours are joined."""
 
-    def room(self, n: int) -> tuple[Any, ...]:
-        """Work arrays of the kernel for n particles."""
-        s = self.stages
-        v, f, stage = np.zeros((s, n)), np.zeros((max(s, 2), n)), np.zeros((2, n if s else 0))
-        return v, f, stage, np.zeros(n + 1), np.ones(2, bool)
-
     def arguments(self, head: tuple[Any, ...], m: Floats, q: Floats, p: Floats, skip: int) -> tuple[Any, ...]:
-        """All of the kernel's arguments but `every` and the rows to fill."""
-        return *head, m, *self.room(len(m)), q, p, skip
+        """All of the kernel's arguments but `every` and the rows to fill, with work arrays of their own."""
+        s, n = self.stages, len(m)
+        v, f, stage = np.zeros((s, n)), np.zeros((max(s, 2), n)), np.zeros((2, n if s else 0))
+        return *head, m, (v, f, stage, np.zeros(n + 1), np.ones(2, bool)), q, p, skip
 
     @property
     def whole(self) -> tuple[Any, ...]:
@@ -107,13 +103,11 @@ class Tiled:
     def __init__(self, job: Job, threads: int) -> None:
         assert job.m is not None
         self._job, self._threads = job, threads
-        rows = [*_numbers(job.head), job.m, *job.state]
-        apart = iter(staggered([row for row in rows if len(row) >= job.n - 1]))
-        found = {id(row): next(apart) for row in rows if len(row) >= job.n - 1}
-        self._head = _exchanged(job.head, found)
-        self._m = found[id(job.m)]
-        self._q, self._p = (found[id(x)] for x in job.state)
-        self._cuts: dict[int, list[tuple[int, int, int, tuple[Any, ...]]]] = {}
+        given, rows = (job.head, job.m, job.state), list[Floats]()
+        mapped(given, lambda x: rows.append(x) if is_row(x) and len(x) >= job.n - 1 else None)
+        apart = dict(zip(map(id, rows), staggered(rows), strict=True))
+        self._head, self._m, (self._q, self._p) = mapped(given, lambda x: apart.get(id(x), x))
+        self._width, self._tiles = 0, list[tuple[int, int, int, tuple[Any, ...]]]()
 
     def advance(self, every: int, q: Floats, p: Floats) -> None:
         """Fill q and p (f, n)."""
@@ -150,8 +144,7 @@ class Tiled:
             from concurrent.futures import ThreadPoolExecutor
 
             with ThreadPoolExecutor(min(self._threads, len(tiles))) as pool:
-                for future in [pool.submit(go, tile, every, q, p) for tile in tiles]:
-                    future.result()
+                list(pool.map(lambda tile: go(tile, every, q, p), tiles))
         else:
             for tile in tiles:
                 go(tile, every, q, p)
@@ -168,8 +161,12 @@ class Tiled:
         self._job.kernel(every, *arguments, q[:, lo:hi], p[:, lo:hi])
 
     def _cut(self, width: int, margin: int) -> list[tuple[int, int, int, tuple[Any, ...]]]:
-        """Tiles: the particles lo to hi that are kept, how many stand before them, and the arguments."""
-        if width not in self._cuts:
+        """Tiles: the particles lo to hi that are kept, how many stand before them, and the arguments.
+
+        The last cut alone is kept: its tiles hold the forces of their last step, which are those of the state
+        only as long as no other cut moves it.
+        """
+        if width != self._width:
             n = self._job.n
             count = -(-n // width)
             edge = -(-n // (count * LANES)) * LANES if count > 1 else n
@@ -182,15 +179,15 @@ class Tiled:
                 if not margin:
                     inner = self._job.arguments(head, m, self._q[lo:hi], self._p[lo:hi], 0)
                 found.append((lo, lo - begin, hi, inner))
-            self._cuts[width] = found
-        return self._cuts[width]
+            self._width, self._tiles = width, found
+        return self._tiles
 
 
 def cut(head: tuple[Any, ...], lo: int, hi: int) -> tuple[Any, ...]:
     """The part of a kernel's constants that belongs to the particles lo to hi."""
-    *step, decays, a, one, two, (divisors, *rest) = head
+    (*steps, decays, a), one, two, (divisors, *rest) = head
     slots = layout.cut(one, lo, hi), layout.cut(two, lo, hi)
-    return *step, np.ascontiguousarray(decays[:, lo:hi]), a, *slots, (divisors[lo:hi], *rest)
+    return (*steps, np.ascontiguousarray(decays[:, lo:hi]), a), *slots, (divisors[lo:hi], *rest)
 
 
 def staggered(rows: Any) -> list[Floats]:
@@ -211,21 +208,16 @@ def staggered(rows: Any) -> list[Floats]:
     return out
 
 
+def mapped(value: Any, change: Callable[[Any], Any]) -> Any:
+    """Tuples within tuples, each part that is none of them changed."""
+    return tuple(mapped(x, change) for x in value) if isinstance(value, tuple) else change(value)
+
+
 def as_lists(value: Any) -> Any:
     """Arrays within tuples as lists."""
-    if isinstance(value, tuple):
-        return tuple(as_lists(x) for x in value)
-    return value.tolist() if isinstance(value, np.ndarray) else value
+    return mapped(value, lambda x: x.tolist() if isinstance(x, np.ndarray) else x)
 
 
-def _numbers(value: Any) -> list[Floats]:
-    """The one-dimensional arrays of floats within tuples."""
-    if isinstance(value, tuple):
-        return [row for part in value for row in _numbers(part)]
-    return [value] if isinstance(value, np.ndarray) and value.ndim == 1 and value.dtype == np.float64 else []
-
-
-def _exchanged(value: Any, by: dict[int, Floats]) -> Any:
-    if isinstance(value, tuple):
-        return tuple(_exchanged(part, by) for part in value)
-    return by.get(id(value), value)
+def is_row(value: Any) -> bool:
+    """Whether it is a one-dimensional array of floats."""
+    return isinstance(value, np.ndarray) and value.ndim == 1 and value.dtype == np.float64

@@ -117,6 +117,7 @@ def entry(label: Label) -> Entry:
     whole = hot.outcome.status == "complete"
     both = temperatures(*(x[UNCOUNTED:] for x in read(hot))) if whole else ((nan, nan), (nan, nan))
     configurational, kinetic = both
+    steps = [max(x.outcome.step, 1) for x in (run, hot)]
     ends = "" if whole else f"{SIDE_BY_SIDE} springs: {hot.outcome.status} after step {hot.outcome.step}"
     return Entry(
         method=str(label), about=method.about, note="; ".join(filter(None, (method.note, ends))),
@@ -128,7 +129,7 @@ def entry(label: Label) -> Entry:
         along="x, y and z" if joined else "x",
         constraint=f"rod: length {rigid.to(np.max(np.abs(joined.strain(run.q))))}" if joined else "",
         configurational=configurational[0], configurational_error=configurational[1],
-        kinetic=kinetic[0], kinetic_error=kinetic[1], force_calls=run.force_calls / run.outcome.step,
-        seconds=hot.timing.run / hot.outcome.step,
+        kinetic=kinetic[0], kinetic_error=kinetic[1], force_calls=run.force_calls / steps[0],
+        seconds=hot.timing.run / steps[1],
         digest=hashlib.sha256(np.concatenate([run.q, run.p]).tobytes()).hexdigest()[:16],
     )  # fmt: skip

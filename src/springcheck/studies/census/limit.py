@@ -43,15 +43,18 @@ def first_limit(scene: Scene, label: Label) -> float:
     """Smallest h omega whose one-step map grows, to a part in 1e5; 0 where all grow, infinity where none up
     to 4.
 
-    One mass on one spring.  NaN where the engine refuses a step, or where its rounding hides a growth that
-    may begin below the first that is detected.
+    One mass on one spring.  NaN where the engine refuses a step, or stops within the first three, or where
+    its rounding hides a growth that may begin below the first that is detected.
     """
     run = replace(scene, steps=STEPS_OF_A_RUN, every=1, quantities=("q", "p"))
     small = replace(run, q=scene.q * START_FACTOR, p=scene.p * START_FACTOR)
     omega = float(np.sqrt(scene.system.hessian_diagonal(scene.q)[0] / scene.m[0]))
 
     def growth(h_omega: float) -> tuple[float, float]:
-        return _growth(rigid.run(replace(small, step=h_omega / omega), label))
+        found = rigid.run(replace(small, step=h_omega / omega), label)
+        if found.outcome.step < LEAST_STEPS and found.outcome.status == "stopped":
+            raise MethodError(found.outcome.message)
+        return _growth(found)
 
     try:
         low, hidden = 0.0, 0.0
@@ -78,6 +81,8 @@ def first_limit(scene: Scene, label: Label) -> float:
 def _growth(run: Trajectory) -> tuple[float, float]:
     """Spectral radius minus 1 of the map (2, 2) that fits the states best, and its error.  Where the whole
     run follows no linear map, its first steps are used: a rest length is passed later."""
+    if run.outcome.step < LEAST_STEPS:
+        return float("inf"), 0.0
     z = np.stack([run.q[:, 0], run.p[:, 0]])
     found = [_of_states(z[:, : steps + 1]) for steps in (STEPS_OF_A_RUN, STEPS_OF_A_RUN // 2, LEAST_STEPS)]
     return next((x for x in found if x[1] < LOST_GROWTH), found[0])

@@ -24,7 +24,7 @@ from springcheck.schemes.elsewhere import ELSEWHERE
 from springcheck.studies import keeper
 from springcheck.studies.arguments import Progress
 from springcheck.studies.census import baths, rigid, table
-from springcheck.studies.census.limit import first_limit
+from springcheck.studies.census.limit import LEAST_STEPS, first_limit
 from springcheck.studies.census.result import ENTRIES, Census, Entry
 from springcheck.studies.choose import LeftOut, sorted_out
 from springcheck.studies.keeper import How, Keeper, each
@@ -119,8 +119,10 @@ def entry(label: Label) -> Entry:
     held = rigid.is_rigid(label)
     found = None if method.adaptive or held else _identified(uneven, run)
     limit = np.nan if method.adaptive else first_limit(uneven, label)
+    ended = orbit.outcome.status == "complete"
     name = "adaptive" if method.adaptive else rigid.name(uneven, run) if held else _name(uneven, found)
-    one_step = np.full((2, 2), np.nan) if method.adaptive else rigid.fitted(run.q[:, 0], run.p[:, 0])
+    unmapped = method.adaptive or run.outcome.step < LEAST_STEPS
+    one_step = None if unmapped else rigid.fitted(run.q[:, 0], run.p[:, 0])
     steps = max(run.outcome.step, 1)
     states = np.concatenate([orbit.q[:, 0], orbit.p[:, 0]])
     return Entry(
@@ -133,15 +135,15 @@ def entry(label: Label) -> Entry:
         agrees=agrees(uneven, method.scheme, name),
         substeps=0 if found is None or found.stride is None else found.stride,
         velocity_offset=np.nan if found is None else float(found.velocity_offset),
-        area=float(np.linalg.det(one_step)) - 1,
-        trace=float(np.trace(one_step)),
+        area=np.nan if one_step is None else float(np.linalg.det(one_step)) - 1,
+        trace=np.nan if one_step is None else float(np.trace(one_step)),
         friction=float(found.friction[0]) if found is not None and found.fits and found.friction else np.nan,
         precision=found.precision if found is not None and found.fits else run.arithmetic.name,
         limit=limit,
         bounded=bool(np.isinf(limit)),
         along=rigid.axes(label),
         constraint=rigid.constraint(label),
-        amplitude=float(np.hypot(orbit.q[-1, 0], orbit.p[-1, 0])),
+        amplitude=float(np.hypot(orbit.q[-1, 0], orbit.p[-1, 0])) if ended else np.nan,
         force_calls=run.force_calls / steps,
         digest=hashlib.sha256(states.tobytes()).hexdigest()[:16],
         q=orbit.q[:, 0].copy(),

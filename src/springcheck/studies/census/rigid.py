@@ -99,6 +99,8 @@ def fitted(q: Floats, p: Floats) -> Floats:
 def name(scene: Scene, found: Trajectory) -> str:
     """Schemes whose map of this spring fits the states as well as any linear map.  The residuals are the
     solver's own, of an arithmetic that `identify` does not know."""
+    if found.outcome.step == 0:
+        return NO_SCHEME
     z = np.stack([found.q[:, 0], found.p[:, 0]])
     z = z / np.max(np.abs(z), axis=1, keepdims=True)
     scale = np.max(np.abs(found.q)) / np.max(np.abs(found.p))
@@ -129,6 +131,8 @@ def axes(label: Label) -> str:
     if engines.refusal(scene, label):
         return "x"
     found = driver.run(scene, label)
+    if found.outcome.step == 0:
+        return "none"
     said = "x, y and z"
     if not is_rigid(label):
         maps = np.stack([fitted(found.q[:, axis], found.p[:, axis]) for axis in range(3)])
@@ -165,6 +169,8 @@ def _turn(found: Trajectory, rods: Rods, scene: Scene) -> str:
 
 def _named(each: Reals, h_w: Floats) -> str:
     """The mean turn per step, as a law of h w (1,) [rad]."""
+    if not len(each):
+        return "takes no step"
     off = {name: float(np.abs(np.mean(each) / turn(h_w) - 1)[0]) for name, turn in ROD_TURNS.items()}
     name = min(off, key=lambda one: off[one])
     if not off[name] < UNLIKE_TURN:

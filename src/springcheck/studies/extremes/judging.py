@@ -75,17 +75,9 @@ def cell(
     )  # fmt: skip
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Sizes:
-    """Magnitudes of a step's intermediate results over the pair of frames (f-1, n), extended precision."""
-
-    largest: Extended
-    smallest: Extended
-    force: Extended
-
-
-def sizes(label: Label, case: checks.Case, q: Floats, p: Floats) -> Sizes:
-    """Intermediate results of the scheme's steps from all states q, p (f, n) but the last.
+def sizes(label: Label, case: checks.Case, q: Floats, p: Floats) -> tuple[Extended, Extended, Extended]:
+    """The largest and the smallest magnitude of intermediate results, and the force, (f-1, n) each, of the
+    scheme's steps from all states q, p (f, n) but the last.
 
     In whatever order an engine works, it forms positions, momenta, velocities, forces, accelerations and
     their increments.  An engine that squares lengths of bonds also forms 1/m and 1/h.
@@ -107,7 +99,7 @@ def sizes(label: Label, case: checks.Case, q: Floats, p: Floats) -> Sizes:
         parts += [x * x, y / m * (y / m) * h * h]
     whole = np.stack([np.asarray(part, np.longdouble) for part in parts])
     nonzero = np.where(whole > 0, whole, np.inf)
-    return Sizes(largest=np.max(whole, axis=0), smallest=np.min(nonzero, axis=0), force=force)
+    return np.max(whole, axis=0), np.min(nonzero, axis=0), force
 
 
 def judge(
@@ -126,20 +118,20 @@ def judge(
         ratio = _largest(dq, dp, of_q, of_p)
         strict = _largest(dq, dp, *case.allowance_at(q[:-1], p[:-1], smallest=np.longdouble(0)))
         from_finite = np.isfinite(q[:-1]) & np.isfinite(p[:-1])
-        inside = sizes(label, case, q, p)
+        largest, smallest, force = sizes(label, case, q, p)
         growth, bound = growth_of(case, scene), float(case.roundings)
         low, high = RANGES["single" if how.force >= 2.0**-24 else "double"]
-        peaks, too_coarse = np.max(inside.force, axis=0, initial=0), TOO_COARSE.format(how.quantum)
+        peaks, too_coarse = np.max(force, axis=0, initial=0), TOO_COARSE.format(how.quantum)
         far, k = scene.system.far if how.joints else 0.0, np.array([abs(spec.k) for spec in specs])
         # the engine's own displacement, as its forces may be cached
         moved = np.apply_along_axis(least_moved, 0, np.abs(np.diff(q, axis=0)))
         reasons = {
-            overflows(how): inside.force >= how.overflow,
+            overflows(how): force >= how.overflow,
             too_coarse: np.broadcast_to(how.quantum > FORCE_RESOLUTION * peaks, moved.shape),
             keeps(how): (how.stale > 0) & (moved <= 2 * how.stale),
-            f"a joint of length {far:.3g} is passed": how.joints & (inside.force >= k * far),
-            f"a step forms numbers beyond {high:.1e}": ~(inside.largest <= high),
-            f"a step forms numbers below {low:.1e}": inside.smallest < low,
+            f"a joint of length {far:.3g} is passed": how.joints & (force >= k * far),
+            f"a step forms numbers beyond {high:.1e}": ~(largest <= high),
+            f"a step forms numbers below {low:.1e}": smallest < low,
         }
     cells = []
     for i, spec in enumerate(specs):
@@ -155,7 +147,7 @@ def judge(
         if not bad.any() and not stop:
             outcome, reason = "unstable, as theory says" if unstable else "right", ""
             # an unstable force is small at first
-            peak = float(inside.force[0, i] if unstable else peaks[i])
+            peak = float(force[0, i] if unstable else peaks[i])
             if np.any(here & ~(strict[:, i] <= bound)):
                 outcome, reason = "engine's limit", f"numbers below {low:.1e} lose digits to underflow"
             elif how.quantum > FORCE_RESOLUTION * peak > 0:
