@@ -25,10 +25,10 @@ from springcheck import interrupts
 from springcheck.errors import StoreError, StoreWarning, plain
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Comparison, Trajectory, Verdict
-from springcheck.store import adopt, files, layout, merge, pieces, reading, records, seal, tables
+from springcheck.store import access, adopt, files, layout, merge, pieces, reading, records, seal, tables
 from springcheck.store.access import Scalar
 from springcheck.store.draft import Draft
-from springcheck.store.parts import JournalClaim, Parts, claim, name_of, opened, parts_folder, parts_in, run_of
+from springcheck.store.parts import JournalClaim, Parts, claim, name_of, opened, parts_folder, parts_in
 from springcheck.store.tables import Table
 
 COLLECTION = "collection.new"
@@ -112,7 +112,7 @@ def _is_ours(path: Path) -> bool:
 def _claim(path: Path, parts: Path, command: str, *, force: bool) -> str:
     """The run id of the journal, resumed or new."""
     known = claim(parts)
-    if known is not None and path.is_file() and run_of(path) == known.run:
+    if known is not None and path.is_file() and _run_of(path) == known.run:
         # killed as it tidied up: the store is complete
         _remove(parts, lambda name: name != "lock")
         known = None
@@ -134,6 +134,16 @@ def _claim(path: Path, parts: Path, command: str, *, force: bool) -> str:
     JournalClaim(run=run, command=command, forced=force).write(parts)
     files.sync_folder(path.absolute().parent)
     return run
+
+
+def _run_of(path: Path) -> str:
+    """The run that wrote a store; "" where it does not say."""
+    found = seal.find(path)
+    if found is not None:
+        return found.run
+    with contextlib.suppress(StoreError), opened(path) as file:
+        return str(access.attribute(file, "run"))
+    return ""
 
 
 def _look_at_parts(parts: Path, run: str) -> None:

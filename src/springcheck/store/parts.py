@@ -65,6 +65,13 @@ def claim(parts: Path) -> JournalClaim | None:
         ) from error
 
 
+def claimed_by(path: Path) -> str | None:
+    """The run whose journal stands beside a store; None where there is none that can be read."""
+    with contextlib.suppress(StoreError):
+        return getattr(claim(parts_folder(path)), "run", None)
+    return None
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Parts:
     """The files that make up a store: the collection, or the parts of a run that are not yet in one."""
@@ -87,24 +94,11 @@ class Parts:
         is one."""
         if run is None and path.is_file():
             return cls(runs=[path], complete=True)
-        folder, known = parts_folder(path), run
-        if known is None:
-            with contextlib.suppress(StoreError):
-                known = getattr(claim(folder), "run", None)
-        there = parts_in(folder) if known is not None else []
+        known = claimed_by(path) if run is None else run
+        there = parts_in(parts_folder(path)) if known is not None else []
         parts = [part for part in there if (found := seal.find(part)) is None or found.run == known]
         runs = [part for part in parts if part.name.startswith("run-")]
         return cls(runs=runs, tables=[part for part in parts if part not in runs])
-
-
-def run_of(path: Path) -> str:
-    """The run that wrote a store; "" where it does not say."""
-    found = seal.find(path)
-    if found is not None:
-        return found.run
-    with contextlib.suppress(StoreError), opened(path) as file:
-        return str(access.attribute(file, "run"))
-    return ""
 
 
 @contextlib.contextmanager

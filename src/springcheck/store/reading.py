@@ -17,7 +17,7 @@ from springcheck.physics.arrays import Floats
 from springcheck.physics.trajectory import Comparison, Outcome, Trajectory, Verdict
 from springcheck.store import access, digests, files, layout, parts, pieces, records, seal, tables
 from springcheck.store.access import Scalar
-from springcheck.store.parts import Parts, claim, opened, parts_folder
+from springcheck.store.parts import Parts, opened
 from springcheck.store.records import Run
 from springcheck.store.tables import Table
 
@@ -150,7 +150,7 @@ def source_of(path: Path, label: str) -> Path:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Summary:
-    """What is in a store.  `complete` is False while a journal stands beside it; size [B]."""
+    """What is in a store.  `complete` is False while a journal of another run stands beside it; size [B]."""
 
     path: Path
     size: int
@@ -179,21 +179,12 @@ def summary(path: str | Path) -> Summary:
     return Summary(
         path=path,
         size=sum(part.stat().st_size for part in found.everything),
-        complete=path.is_file() and root.get("complete") is True and not _is_claimed(path, root.get("run")),
+        complete=root.get("complete") is True and parts.claimed_by(path) in (None, root.get("run")),
         root=root,
         runs=tuple(runs),
         tables=tuple(dict.fromkeys(names)),
         documents=documents,
     )
-
-
-def _is_claimed(path: Path, run: object) -> bool:
-    """Whether the journal beside a store belongs to another run than the store: a kill may leave that."""
-    try:
-        found = claim(parts_folder(path))
-        return found is not None and found.run != run
-    except StoreError:
-        return False
 
 
 def _tables(path: Path, run: str | None = None, *, rows: bool = False) -> dict[str, Path]:

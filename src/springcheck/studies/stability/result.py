@@ -108,10 +108,11 @@ class Stability(Studied):
             * (x.off > 1)
             for x in self.regions
         ]
-        for y in self.resonances:
-            out.append(f"{y.method}: {y.grows('h w_fast')}; the exact map agrees to {_apart(y):.1e}")
-        out += self.failures
-        return out
+        out += [
+            f"{y.method}: {y.grows('h w_fast')}; the exact map agrees to {_apart(y):.1e}"
+            for y in self.resonances
+        ]
+        return out + self.failures
 
     def document(self) -> dict[str, Any]:
         """Plain data for JSON (a limit of None: there is none)."""
