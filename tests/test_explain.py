@@ -119,7 +119,7 @@ def test_a_name_of_nothing_is_one_line(name: str, unknown: str, capsys: pytest.C
     assert capsys.readouterr().err.count("\n") == 1
 
 
-@pytest.mark.parametrize("name", [key for key in terms.known() if key not in explain._CHECKS])
+@pytest.mark.parametrize("name", terms.known())
 def test_a_term_of_scene_files_is_explained(name: str) -> None:
     assert f"{name}, a term: " in "".join(explain.lines(name))
 

@@ -144,7 +144,7 @@ def test_axes_are_in_units_in_which_numbers_are_read_easily(
 
 @pytest.mark.parametrize(
     ("given", "angle", "momentum", "time"),
-    [("si", "rad", "N m s", "s"), ("md", "rad", "u nm\u00b2/ps", "ps"), ("reduced", "", "", "")],
+    [("si", "rad", "N m s", "s"), ("md", "rad", "u nm\u00b2/ps", "ps"), ("reduced", "rad", "", "")],
 )
 def test_the_angle_of_a_rotor_is_no_length(given: Any, angle: str, momentum: str, time: str) -> None:
     (view,) = views(scene := replace(scenefile.load_scene("torsion-pendulum"), units=given))

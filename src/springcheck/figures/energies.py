@@ -16,6 +16,7 @@ from springcheck.figures.overlay import Runs, exact_curve
 from springcheck.figures.portraits import extremes
 from springcheck.physics.arrays import Floats, Reals
 from springcheck.physics.norm import energy_scale
+from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory
 
 MOST_DRAWN = 1e3
@@ -67,20 +68,16 @@ def energy(runs: Runs, exact: Exact) -> Bank:
     unit, of = start if of == "initial energy" else float(scale), of or "unit"
     changes = not scene.system.keeps_energy and exact.known
 
-    def energies(q: Reals, p: Reals) -> Floats:
-        with np.errstate(over="ignore", invalid="ignore"):
-            return np.asarray(scene.system.energy(q, p), np.float64)
-
     def off(run: Trajectory) -> Floats:
-        right = energies(*exact.at(run)) if changes else start
+        right = _energies(scene, *exact.at(run)) if changes else start
         with np.errstate(over="ignore", invalid="ignore"):
-            return np.asarray(np.abs(energies(run.q, run.p) - right) / unit)
+            return np.asarray(np.abs(_energies(scene, run.q, run.p) - right) / unit)
 
-    found = {run.label: energies(run.q, run.p) / unit for run in runs.every}
+    found = {run.label: _energies(scene, run.q, run.p) / unit for run in runs.every}
     lines = []
     true: Floats | None = None
     if changes and (truth := true_motion(scene, runs.every)) is not None:
-        true = energies(*truth[1:]) / unit
+        true = _energies(scene, *truth[1:]) / unit
         lines.append(exact_curve(truth[0], true))
     elif scene.system.keeps_energy:
         true = np.full(2, start / unit)
@@ -97,6 +94,12 @@ def energy(runs: Runs, exact: Exact) -> Bank:
     flat = lower and scene.system.keeps_energy and max(map(np.max, differences.values())) < FLAT * ys.half
     charts = lower if flat else [upper, *lower]
     return runs.bank("energy", charts, said or "energy", (7.2, 4.2 if flat and len(lower) == 1 else 2.7))
+
+
+def _energies(scene: Scene, q: Reals, p: Reals) -> Floats:
+    """Energy of each frame (f,); not finite where a run has diverged."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        return np.asarray(scene.system.energy(q, p), np.float64)
 
 
 def _said(runs: Runs, found: Mapping[str, Floats], differences: Mapping[str, Floats]) -> str:
@@ -150,8 +153,7 @@ def orbits(runs: Runs, parts: Runs, exact: Exact) -> str:
         if exact.known:
             off[group.title] = max(float(np.max(exact.error(run))), parts.errors.get(run.label, 0.0))
         if scene.system.keeps_energy:
-            with np.errstate(over="ignore", invalid="ignore"):
-                e = np.asarray(scene.system.energy(run.q, run.p), np.float64)
+            e = _energies(scene, run.q, run.p)
             first, last = e[: len(e) // 4 + 1], e[-(len(e) // 4) - 1 :]
             unit = CHANGED * float(scene.system.norm.unit) ** 2
             # a motion that diverged did not oscillate
@@ -274,8 +276,7 @@ def means(runs: Runs, thermal: float) -> Bank:
     found = {}
     scene = runs.scene
     for run in runs.every:
-        with np.errstate(over="ignore", invalid="ignore"):
-            e = np.asarray(scene.system.energy(run.q, run.p), np.float64) / thermal
+        e = _energies(scene, run.q, run.p) / thermal
         found[run.label] = np.cumsum(e) / np.arange(1, len(e) + 1)
     ends = {group.title: float(found[group.members[0].label][-1]) for group in runs.groups}
     usual = float(np.median(list(ends.values())))

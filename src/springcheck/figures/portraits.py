@@ -213,7 +213,7 @@ def positions(runs: Runs, shown: Sequence[View], truth: Motion | None, whole: Ru
     spans = _spans(runs, shown, truth)
     charts = [_position(runs, view, truth, span, alone=len(shown) == 1) for view in shown for span in spans]
     parts = "" if len(spans) == 1 else f"; the first and the last {PERIODS_SHOWN} periods"
-    few = "; a few periods" if spans[-1][1] < _last(runs) else ""
+    few = "; a few periods" if spans[-1][1] < runs.last else ""
     bath = f"one random motion of each method{few}"
     off = _off(whole, shown[0]) if runs.scene.bath is None else bath
     said = _heading(f"{shown[0].what}{_of(runs, shown)}{runs.part}", off) + parts
@@ -252,7 +252,7 @@ def extremes(found: Mapping[str, float], text: str, *, beyond: float = 10.0) -> 
 
 def _spans(runs: Runs, shown: Sequence[View], truth: Motion | None) -> list[tuple[float, float]]:
     """The times that are shown: all, or the first and the last periods of many."""
-    first, last = (float(f([f(np.abs(run.t)) for run in runs.every])) for f in (np.min, np.max))
+    first, last = min(float(np.min(np.abs(run.t))) for run in runs.every), runs.last
     motion = truth[1:] if truth is not None else (runs.longest.q, runs.longest.p)
     count = max(periods(view.pick(*motion)[0]) for view in shown)
     if count <= MANY_PERIODS:
@@ -314,10 +314,6 @@ def _position(
         curves=[*lines, *curves],
         note=runs.leaving(lambda run: ys.leaves(picked[run.label])) if span[0] == 0 else "",
     )
-    if (alone or span[0] == 0) and span[1] == _last(runs):
+    if (alone or span[0] == 0) and span[1] == runs.last:
         return naming.at_ends(chart, height=naming.NAME_HIGH * (1 if alone else 2))
     return chart
-
-
-def _last(runs: Runs) -> float:
-    return max(float(np.max(np.abs(run.t))) for run in runs.every)
