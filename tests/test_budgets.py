@@ -21,8 +21,8 @@ BUDGETS = {
     ("identify",): 9154,
     ("formats", "store"): 5267,
     ("studies",): 1456,
-    ("studies/*",): 9779,
-    ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 7198,
+    ("studies/*",): 9771,
+    ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 7183,
 }
 """Lines of each room, or of several: of an engine in one file, and of what all studies share, in the first
 folder."""

@@ -71,8 +71,9 @@ def lines(name: str) -> Iterator[str]:
     from springcheck.identify.meanings import MEANINGS
 
     of_terms = terms.known()
-    parts = [chain(check_lines(_CHECKS[name]), _seen(_CHECKS[name]))] if name in _CHECKS else []
-    parts += [_fault(fault) for fault in FAULTS if fault.name == name]
+    parts = [_fault(fault) for fault in FAULTS if fault.name == name]
+    if name in _CHECKS:
+        parts.insert(0, chain(check_lines(_CHECKS[name]), _seen(_CHECKS[name])))
     parts += [meaning_lines(MEANINGS[name])] if name in MEANINGS else []
     parts += [iter([_line(f"{name}, a term: {inspect.getdoc(of_terms[name])}")])] if name in of_terms else []
     if parts:

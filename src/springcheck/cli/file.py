@@ -51,7 +51,6 @@ class Judgement:
 
     @property
     def status(self) -> int:
-        """Exit status of these verdicts."""
         return checks.status(self.verdicts)
 
     @property
@@ -60,14 +59,12 @@ class Judgement:
         return bool(checks.not_judged(self.verdicts))
 
     def document(self) -> dict[str, Any]:
-        """Plain data for JSON."""
         names = ("check", "value", "bound", "unit", "passed", "why", "sees")
         own = {x: getattr(self, x) for x in ("scene", "scheme", "frames", "notes", "not_judged")}
         verdicts = [{name: getattr(v, name) for name in names} for v in self.verdicts]
         return keeper.document(file=self.path, **own, verdicts=verdicts)
 
     def lines(self) -> Lines:
-        """The report as text."""
         told = {True: plain("passed"), False: plain("FAILED", "bold red")}
         titles = ("check", "verdict", "value", "why")
         rows = [
@@ -211,7 +208,6 @@ class Recorded(States):
 
 
 def _recorded(path: Path) -> dict[str, States]:
-    """The trajectories of one of our stores."""
     found: dict[str, States] = {}
     for run in store.summary(path).runs:
         # as a single piece, however long the run
@@ -299,8 +295,8 @@ def as_trajectory(
         taken["start"] = f"the start was taken as it is written in the file, {size:.2g} of the amplitude off"
         notes += [taken["start"]] if size > 0 else []
     if fixed:
-        both = (("positions", fixed.q), (rates, fixed.v))
-        sizes = {name: f"{np.max(x):.1g}" for name, x in both if np.any(x)}
+        halves_of = {"positions": fixed.q, rates: fixed.v}
+        sizes = {name: f"{np.max(x):.1g}" for name, x in halves_of.items() if np.any(x)}
         of, each = (" and ".join(words) for words in (sizes, sizes.values()))
         notes += [f"{of} are rounded to decimals, by up to {each}, and judged to that"] * bool(sizes)
     if (unit := fixed.beside if fixed else states.roundoff) > 2.0**-53:

@@ -65,7 +65,6 @@ class Runs:
 
     @property
     def longest(self) -> Trajectory:
-        """The one with the most frames."""
         return max(self.every, key=lambda run: len(run.t))
 
     @property

@@ -72,7 +72,6 @@ def _of(runs: Runs, shown: Sequence[View]) -> str:
 
 
 def _portrait(runs: Runs, view: View, truth: Motion | None, *, alone: bool) -> Chart:
-    """One panel."""
     true = None if truth is None else view.pick(truth[1], truth[2])
     picked = {run.label: view.pick(run.q, run.p) for run in runs.every}
     xs, ys = _frames(list(picked.values()), true, view)
@@ -272,7 +271,6 @@ def _settles(t: Floats, x: Floats) -> float:
 def _position(
     runs: Runs, view: View, truth: Motion | None, span: tuple[float, float], *, alone: bool
 ) -> Chart:
-    """One panel."""
     true = None if truth is None else view.pick(truth[1], truth[2])
     picked = {run.label: view.pick(run.q, run.p)[0] for run in runs.every}
     first = runs.every[0]
