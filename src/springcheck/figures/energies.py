@@ -73,11 +73,11 @@ def energy(runs: Runs, exact: Exact) -> Bank:
         with np.errstate(over="ignore", invalid="ignore"):
             return np.asarray(np.abs(_energies(scene, run.q, run.p) - right) / unit)
 
-    found = {run.label: _energies(scene, run.q, run.p) / unit for run in runs.every}
+    found = {run.label: _energies(scene, run.q, run.p, unit) for run in runs.every}
     lines = []
     true: Floats | None = None
     if changes and (truth := true_motion(scene, runs.every)) is not None:
-        true = _energies(scene, *truth[1:]) / unit
+        true = _energies(scene, *truth[1:], unit)
         lines.append(exact_curve(truth[0], true))
     elif scene.system.keeps_energy:
         true = np.full(2, start / unit)
@@ -96,10 +96,10 @@ def energy(runs: Runs, exact: Exact) -> Bank:
     return runs.bank("energy", charts, said or "energy", (7.2, 4.2 if flat and len(lower) == 1 else 2.7))
 
 
-def _energies(scene: Scene, q: Reals, p: Reals) -> Floats:
-    """Energy of each frame (f,); not finite where a run has diverged."""
+def _energies(scene: Scene, q: Reals, p: Reals, unit: float = 1.0) -> Floats:
+    """Energy of each frame (f,) in this unit; not finite where a run has diverged."""
     with np.errstate(over="ignore", invalid="ignore"):
-        return np.asarray(scene.system.energy(q, p), np.float64)
+        return np.asarray(scene.system.energy(q, p), np.float64) / unit
 
 
 def _said(runs: Runs, found: Mapping[str, Floats], differences: Mapping[str, Floats]) -> str:
@@ -113,9 +113,8 @@ def _said(runs: Runs, found: Mapping[str, Floats], differences: Mapping[str, Flo
         for group in runs.groups:
             each = steady(found[group.members[0].label], group.members[0].every)
             if each and not group.failed:
-                said.append(
-                    f"{group.title} {'gains' if each > 0 else 'loses'} {100 * abs(each):.2g} % a step"
-                )
+                percent = float(f"{100 * abs(each):.2g}")
+                said.append(f"{group.title} {'gains' if each > 0 else 'loses'} {percent:g} % a step")
                 del largest[group.title]
         said = said[:FINDINGS_SAID]
     if largest:
@@ -276,7 +275,7 @@ def means(runs: Runs, thermal: float) -> Bank:
     found = {}
     scene = runs.scene
     for run in runs.every:
-        e = _energies(scene, run.q, run.p) / thermal
+        e = _energies(scene, run.q, run.p, thermal)
         found[run.label] = np.cumsum(e) / np.arange(1, len(e) + 1)
     ends = {group.title: float(found[group.members[0].label][-1]) for group in runs.groups}
     usual = float(np.median(list(ends.values())))
@@ -293,4 +292,5 @@ def means(runs: Runs, thermal: float) -> Bank:
         rule = Rule(axis="y", at=float(scene.n), look="here")
         chart = replace(chart, rules=[rule], note=f"dotted: equipartition, {scene.n} kT")
     said = f"mean energies from {some[low]:.3g} kT ({low}) to {some[high]:.3g} kT ({high})"
+    said = f"mean energy {some[low]:.3g} kT ({low})" if low == high else said
     return runs.bank("energy", [chart], said, (7.2, 4.2))
