@@ -144,7 +144,7 @@ def test_axes_are_in_units_in_which_numbers_are_read_easily(
 
 @pytest.mark.parametrize(
     ("given", "angle", "momentum", "time"),
-    [("si", "rad", "N m s", "s"), ("md", "rad", "u nm\u00b2/ps", "ps"), ("reduced", "", "", "")],
+    [("si", "rad", "N m s", "s"), ("md", "rad", "u nm\u00b2/ps", "ps"), ("reduced", "rad", "", "")],
 )
 def test_the_angle_of_a_rotor_is_no_length(given: Any, angle: str, momentum: str, time: str) -> None:
     (view,) = views(scene := replace(scenefile.load_scene("torsion-pendulum"), units=given))
@@ -599,3 +599,39 @@ def test_a_logarithmic_axis_can_be_read_however_short_it_is(high: float, labels:
     axes.figure.draw_without_rendering()
     (low, top), ticks = axes.get_ylim(), (*axes.yaxis.get_major_ticks(), *axes.yaxis.get_minor_ticks())
     assert len([x for x in ticks if low <= x.get_loc() <= top and x.label1.get_text()]) >= labels
+
+
+@pytest.mark.parametrize(
+    ("numbers", "said"),
+    [
+        ({"a": 1e-3, "b": 0.5}, "off by 0.1 % (a) to 50 % (b)"),
+        ({"a": 1e-3, "b": np.nan}, "off by 0.1 % (a); b leaves it"),
+        ({"a": 1e-3, "b": 11.0, "c": np.inf}, "off by 0.1 % (a); 2 of 3 leave it"),
+        # "3 of 3 leave it" was all that was said, of nothing
+        ({"a": 11.0, "b": np.inf}, "2 of 2 leave the chart"),
+        ({"a": 11.0}, "a leaves the chart"),
+        ({}, ""),
+    ],
+)
+def test_a_heading_says_who_left_what(numbers: dict[str, float], said: str) -> None:
+    assert portraits.extremes(numbers, "off by {}") == said
+
+
+def test_headings_of_one_thermostat_and_of_a_large_gain_can_be_read() -> None:
+    """They said "by 1 thermostats", "from 0.858 kT (BAOAB) to 0.858 kT (BAOAB)", "gains 3.6e+02 % a step"."""
+    scene = replace(scenefile.load_scene("bath-spring"), steps=200)
+    run = {"own:baoab": driver.run(scene, "own:baoab", seed=1)}
+    said = {bank.name: bank.heading for bank in of_runs(scene, run, run)}
+    assert "states by 1 thermostat;" in said["phase-portrait"]
+    assert re.search(r"mean energy \d\.\d+ kT \(BAOAB\)$", said["energy"])
+    scene = scenefile.load_scene("stiff-spring")
+    stiff = runs(scene, "own:euler", "own:velocity-verlet")
+    (energy,) = (bank for bank in of_runs(scene, stiff, stiff) if bank.name == "energy")
+    assert "explicit Euler gains 360 % a step" in energy.heading
+
+
+def test_energies_beyond_double_precision_are_drawn_without_a_warning() -> None:
+    """Over the start's energy, which is below 1, the last finite one overflows."""
+    scene = scenefile.load_scene("multiple-time-steps")
+    found = runs(scene, "own:velocity-verlet")
+    assert of_runs(scene, found, found)

@@ -605,6 +605,13 @@ def test_a_velocity_that_is_a_multiple_of_the_position_is_told() -> None:
     assert "The velocity follows the position: from frame 1 on it is 0.8 times" in found.statement
 
 
+def test_a_velocity_that_is_a_rounding_is_said_to_be_zero() -> None:
+    """It was said to be 1.9e-18 times the distance from rest."""
+    t = 0.1 * np.arange(100)
+    found = identify(t, np.exp(-0.3 * t), p=np.r_[1.0, np.full(99, 1e-18)], mass=M)
+    assert found.statement == "The velocity is 0 from frame 1 on"
+
+
 def test_noise_that_leaves_no_fit_is_no_number_of_substeps() -> None:
     assert list(substeps(0.75, 1e-9)[0]) == [2]
     assert list(substeps(np.nan, 1e-9)[0]) == list(substeps(0.75, np.nan)[0]) == []

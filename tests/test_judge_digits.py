@@ -171,3 +171,20 @@ def test_what_single_steps_do_not_see_is_one_spring_and_its_step(
     assert step.passed is not seen
     assert "any part" not in step.why
     assert seen or "1 spring and the step could be off by 3% and not be seen in a step" in step.why
+
+
+@pytest.mark.parametrize(
+    ("forms", "said"),
+    [
+        (("%.6f", "%.17g"), "positions are rounded to decimals, by up to 5e-07, and judged to that"),
+        (("%.17g", "%.5f"), "velocities are rounded to decimals, by up to 5e-06, and judged to that"),
+        (("%.6f", "%.5f"), "positions and velocities are rounded to decimals, by up to 5e-07 and 5e-06, and"),
+    ],
+)
+def test_a_note_names_the_columns_that_are_rounded(tmp_path: Path, forms: tuple[str, str], said: str) -> None:
+    """It said "positions and velocities are rounded to decimals, by up to 5e-07 and 0"."""
+    scene = spring()
+    rows = np.c_[scene.step * np.arange(251), states(scene)]
+    np.savetxt(tmp_path / "a.csv", rows, ["%.8g", *forms], delimiter=",", header="t,x,v", comments="")
+    notes = file.judge(tmp_path / "a.csv", scene=scene, scheme="velocity-verlet").notes
+    assert any(note.startswith(said) for note in notes), notes

@@ -315,6 +315,8 @@ def test_a_method_that_cannot_serve_the_scene_has_no_largest_step_there(need: Ne
     need("own:respa8")
     study = stability.record(scenes.load_scene("spring"), None, ["own:respa8", "own:velocity-verlet"])
     assert [study.largest(x) for x in study.limits] == pytest.approx([np.nan, 2.0], nan_ok=True)
+    # "-" in the table has its reason below it
+    assert "No largest step here by own:respa8: it is for scenes with springs marked fast" in str(study)
 
 
 def test_a_method_that_does_not_start_the_scene_is_left_out_with_its_reason(need: Need) -> None:
@@ -329,6 +331,15 @@ def test_a_method_that_does_not_start_the_scene_is_left_out_with_its_reason(need
     (left,) = study.left_out
     assert left.method == "openmm:verlet"
     assert "a program's spring pulls alike along every axis" in left.reason
+
+
+def test_a_method_that_refuses_springs_of_the_scan_is_left_out_with_its_reason(need: Need) -> None:
+    """One of them ended the study of `--method 'box2d:*'`."""
+    need("box2d:distance-joint")
+    scene = scenes.load_scene("spring")
+    study = stability.record(scene, None, ["own:velocity-verlet", "box2d:distance-joint"])
+    assert [x.method for x in study.limits] == ["own:velocity-verlet"]
+    assert "a joint's length of" in study.left_out[0].reason
 
 
 def test_what_is_left_out_is_named_once() -> None:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from springcheck import interrupts, store
+from springcheck import store
 from springcheck.cli import inspect
 from springcheck.errors import SpringcheckError
 from springcheck.figures import folder
@@ -57,14 +57,13 @@ def draw(path: Path, into: Path, **chosen: Any) -> tuple[list[Path], list[str]]:
         held = " and ".join(study.name for study, _ in studies)
         raise SpringcheckError(f"{path}: {what} {whose}, and it holds {held}")
     notes: list[str] = []
-    with interrupts.folder() as made:
-        written: list[Path] = []
-        for study, found in drawn:
-            written += study.draw(found, made, partial(folder.check, folder=into, path=path), **chosen)
-            notes += getattr(found, "notes", ())
-        if not written:
-            raise SpringcheckError(f"{path}: nothing was measured in its study that can be drawn")
-        return folder.put(written, into, path), notes
+    files: dict[str, bytes] = {}
+    for study, found in drawn:
+        files |= study.drawn(found, partial(folder.check, folder=into, path=path), **chosen)
+        notes += getattr(found, "notes", ())
+    if not files:
+        raise SpringcheckError(f"{path}: nothing was measured in its study that can be drawn")
+    return folder.put(files, into, path), notes
 
 
 def draw_foreign(
@@ -81,7 +80,7 @@ def draw_foreign(
     from springcheck.figures import looks, render
     from springcheck.figures.charts import Bank, Chart, Curve, Scale
     from springcheck.figures.motion import periods
-    from springcheck.figures.style import files_of, save, style
+    from springcheck.figures.style import drawn, files_of, style
 
     found = states_in(path, columns, step, trajectory)
     other, name = (found.p, "p") if found.p is not None else (np.asarray(found.v), "v")
@@ -121,8 +120,8 @@ def draw_foreign(
     heading = f"{path.name}{which}: {_found(found.q[:, chosen[0]], len(found.t))}"
     bank = Bank(name="states", title="Coordinates", charts=charts, heading=heading, size=(4.4, 3.8))
     folder.check(files_of(bank.name), into, path)
-    with style(), interrupts.folder() as made:
-        return folder.put(save(render.picture(bank), made, bank.name), into, path), notes
+    with style():
+        return folder.put(drawn(render.picture(bank), bank.name), into, path), notes
 
 
 def _found(q: Any, frames: int) -> str:

@@ -60,8 +60,6 @@ def _bare(name: str) -> str:
 
 def lines(name: str) -> Iterator[str]:
     """All explanations of a name.  SpringcheckError where it is unknown."""
-    if name in _CHECKS:
-        return chain(check_lines(_CHECKS[name]), _seen(_CHECKS[name]))
     known = schemes.known()
     # a scheme is found by its title too, which tables print
     for scheme in known.values():
@@ -72,9 +70,11 @@ def lines(name: str) -> Iterator[str]:
     # heavier to import, and rarely needed
     from springcheck.identify.meanings import MEANINGS
 
-    parts = [_fault(fault) for fault in FAULTS if fault.name == name]
-    parts += [meaning_lines(MEANINGS[name])] if name in MEANINGS else []
     of_terms = terms.known()
+    parts = [_fault(fault) for fault in FAULTS if fault.name == name]
+    if name in _CHECKS:
+        parts.insert(0, chain(check_lines(_CHECKS[name]), _seen(_CHECKS[name])))
+    parts += [meaning_lines(MEANINGS[name])] if name in MEANINGS else []
     parts += [iter([_line(f"{name}, a term: {inspect.getdoc(of_terms[name])}")])] if name in of_terms else []
     if parts:
         return chain(parts[0], *(chain([""], part) for part in parts[1:]))

@@ -51,7 +51,6 @@ class Judgement:
 
     @property
     def status(self) -> int:
-        """Exit status of these verdicts."""
         return checks.status(self.verdicts)
 
     @property
@@ -60,17 +59,12 @@ class Judgement:
         return bool(checks.not_judged(self.verdicts))
 
     def document(self) -> dict[str, Any]:
-        """Plain data for JSON."""
         names = ("check", "value", "bound", "unit", "passed", "why", "sees")
         own = {x: getattr(self, x) for x in ("scene", "scheme", "frames", "notes", "not_judged")}
-        return keeper.document(
-            file=self.path,
-            **own,
-            verdicts=[{name: getattr(v, name) for name in names} for v in self.verdicts],
-        )
+        verdicts = [{name: getattr(v, name) for name in names} for v in self.verdicts]
+        return keeper.document(file=self.path, **own, verdicts=verdicts)
 
     def lines(self) -> Lines:
-        """The report as text."""
         told = {True: plain("passed"), False: plain("FAILED", "bold red")}
         titles = ("check", "verdict", "value", "why")
         rows = [
@@ -214,7 +208,6 @@ class Recorded(States):
 
 
 def _recorded(path: Path) -> dict[str, States]:
-    """The trajectories of one of our stores."""
     found: dict[str, States] = {}
     for run in store.summary(path).runs:
         # as a single piece, however long the run
@@ -233,8 +226,8 @@ def as_trajectory(
     """
     start.contradicted(path, states, scene)
     notes, taken, q, moved = [*states.notes, *start.clock(states, scene)], dict[str, str](), states.q, 0.0
-    other = states.p if states.p is not None else np.asarray(states.v)
-    for name, values in (("positions", q), ("momenta" if states.p is not None else "velocities", other)):
+    other, rates = (states.p, "momenta") if states.p is not None else (np.asarray(states.v), "velocities")
+    for name, values in (("positions", q), (rates, other)):
         good = np.isfinite(values).all(axis=1)
         if not good.all():
             raise StoreError(
@@ -268,8 +261,8 @@ def as_trajectory(
         raise StoreError(f"{path}: holds {len(q)} frame; two are needed")
     if not np.isfinite(states.t).all():
         raise StoreError(f"{path}: row {int(np.argmin(np.isfinite(states.t))) + 1} of t is not finite")
-    every = round(float(states.t[1] - states.t[0]) / scene.step)
     apart, own = float(states.t[1] - states.t[0]), units(scene).t
+    every = round(apart / scene.step)
     for name, one in files.TIMES.items() if own in files.TIMES else ():
         factor = files.TIMES[own] / one
         if factor != 1 and abs(apart - factor * scene.step * scene.every) <= 1e-6 * apart:
@@ -302,9 +295,10 @@ def as_trajectory(
         taken["start"] = f"the start was taken as it is written in the file, {size:.2g} of the amplitude off"
         notes += [taken["start"]] if size > 0 else []
     if fixed:
-        each = " and ".join(f"{np.max(x):.1g}" for x in (fixed.q, fixed.v))
-        of = "positions and " + ("velocities" if states.p is None else "momenta")
-        notes.append(f"{of} are rounded to decimals, by up to {each}, and judged to that")
+        halves_of = {"positions": fixed.q, rates: fixed.v}
+        sizes = {name: f"{np.max(x):.1g}" for name, x in halves_of.items() if np.any(x)}
+        of, each = (" and ".join(words) for words in (sizes, sizes.values()))
+        notes += [f"{of} are rounded to decimals, by up to {each}, and judged to that"] * bool(sizes)
     if (unit := fixed.beside if fixed else states.roundoff) > 2.0**-53:
         notes.append(f"numbers are written to {unit:.1g}, and judged to that")
     steps = (len(q) - 1) * every

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import suppress
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -34,10 +37,8 @@ def contradicted(path: Path, states: States, scene: Scene) -> None:
         return
     p, v = states.p[:, m > 0], states.v[:, m > 0]
     m = m[m > 0]
-    off, size = (
-        np.max(np.abs(p - m * v), axis=0),
-        np.maximum(np.max(np.abs(p), axis=0), np.max(np.abs(m * v), axis=0)),
-    )
+    off, *sizes = (np.max(np.abs(x), axis=0) for x in (p - m * v, p, m * v))
+    size = np.maximum(*sizes)
     if not np.any(bad := off > max(1e-9, 10 * states.roundoff) * size):
         return
     i = int(np.argmax(bad))
@@ -81,9 +82,8 @@ def _is_at(scene: Scene, q: Floats, p: Floats, there_q: Reals, there_p: Reals) -
 
 def _single(scene: Scene, q: Floats, p: Floats) -> str:
     for state in ((scene.q, scene.p), (scene.q, np.float64(np.float32(scene.p / scene.m)) * scene.m)):
-        if np.array_equal(np.float32(state[0]), q) and np.allclose(
-            np.float32(state[1]), p, rtol=1e-15, atol=0
-        ):
+        single_q, single_p = (np.float32(x) for x in state)
+        if np.array_equal(single_q, q) and np.allclose(single_p, p, rtol=1e-15, atol=0):
             return "it is the start in single precision; store the numbers as float32, or to nine digits"
     return ""
 
@@ -152,32 +152,30 @@ def _kicked(scene: Scene, scheme: str, q: Floats, p: Floats, every: int, roundof
 def _follows(scene: Scene, scheme: str, q: Floats, p: Floats, every: int, roundoff: float) -> bool:
     """Whether each of the first frames leads to the next by a scheme, as far as their digits can tell it from
     half a kick."""
-    law = schemes.Law(scheme=schemes.scheme(scheme), scene=scene, h=scene.step)
     q, p = (x[: MOST_STEPS + 1] for x in (q, p))
-    at: tuple[Reals, Reals] = q[:-1].astype(np.longdouble), p[:-1].astype(np.longdouble)
     half, norm = scene.step / 2 * np.asarray(scene.system.force(q, p)), scene.system.norm
     rounded = norm.most(*(ROUNDINGS * roundoff * np.max(np.abs(x), axis=0) for x in (q, p)))
     close = max(CLOSE_STATE, float(rounded / norm.unit))
-    try:
-        for _ in range(every):
-            at = law.step(*at)
-    except (SpringcheckError, ArithmeticError, ValueError):
-        return False
-    right = np.all(norm(at[0] - q[1:], at[1] - p[1:]) <= close)
+    at = next(islice(_steps(scene, scheme, q[:-1], p[:-1]), every - 1, None), None)
+    right = at is not None and np.all(norm(at[0] - q[1:], at[1] - p[1:]) <= close)
     return bool(right and 2 * close <= np.max(norm(np.zeros_like(q), half)))
+
+
+def _steps(scene: Scene, scheme: str, q: Floats, p: Floats) -> Iterator[tuple[Reals, Reals]]:
+    """States after each step of a scheme from q, p (..., n), up to one that the forces do not determine."""
+    law = schemes.Law(scheme=schemes.scheme(scheme), scene=scene, h=scene.step)
+    at: tuple[Reals, Reals] = q.astype(np.longdouble), p.astype(np.longdouble)
+    with suppress(SpringcheckError, ArithmeticError, ValueError):
+        while True:
+            at = law.step(*at)
+            yield at
 
 
 def _later(scene: Scene, scheme: str, q: Floats, p: Floats) -> str:
     if scene.n > MOST_PARTICLES or scene.bath:
         return ""
-    law = schemes.Law(scheme=schemes.scheme(scheme), scene=scene, h=scene.step)
-    at: tuple[Reals, Reals] = scene.q.astype(np.longdouble), scene.p.astype(np.longdouble)
-    for done in range(1, min(scene.steps, MOST_STEPS) + 1):
-        try:
-            at = law.step(*at)
-        except (SpringcheckError, ArithmeticError, ValueError):
-            # not every scheme has a step that the forces determine
-            return ""
+    steps = islice(_steps(scene, scheme, scene.q, scene.p), min(scene.steps, MOST_STEPS))
+    for done, at in enumerate(steps, 1):
         if _is_at(scene, q, p, *at):
             return (
                 f"it is the scene's state after {count(done, 'step')} of {schemes.title(scheme)}; write the "

@@ -16,6 +16,7 @@ from springcheck.figures.overlay import Runs, exact_curve
 from springcheck.figures.portraits import extremes
 from springcheck.physics.arrays import Floats, Reals
 from springcheck.physics.norm import energy_scale
+from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory
 
 MOST_DRAWN = 1e3
@@ -67,20 +68,16 @@ def energy(runs: Runs, exact: Exact) -> Bank:
     unit, of = start if of == "initial energy" else float(scale), of or "unit"
     changes = not scene.system.keeps_energy and exact.known
 
-    def energies(q: Reals, p: Reals) -> Floats:
-        with np.errstate(over="ignore", invalid="ignore"):
-            return np.asarray(scene.system.energy(q, p), np.float64)
-
     def off(run: Trajectory) -> Floats:
-        right = energies(*exact.at(run)) if changes else start
+        right = _energies(scene, *exact.at(run)) if changes else start
         with np.errstate(over="ignore", invalid="ignore"):
-            return np.asarray(np.abs(energies(run.q, run.p) - right) / unit)
+            return np.asarray(np.abs(_energies(scene, run.q, run.p) - right) / unit)
 
-    found = {run.label: energies(run.q, run.p) / unit for run in runs.every}
+    found = {run.label: _energies(scene, run.q, run.p, unit) for run in runs.every}
     lines = []
     true: Floats | None = None
     if changes and (truth := true_motion(scene, runs.every)) is not None:
-        true = energies(*truth[1:]) / unit
+        true = _energies(scene, *truth[1:], unit)
         lines.append(exact_curve(truth[0], true))
     elif scene.system.keeps_energy:
         true = np.full(2, start / unit)
@@ -99,6 +96,12 @@ def energy(runs: Runs, exact: Exact) -> Bank:
     return runs.bank("energy", charts, said or "energy", (7.2, 4.2 if flat and len(lower) == 1 else 2.7))
 
 
+def _energies(scene: Scene, q: Reals, p: Reals, unit: float = 1.0) -> Floats:
+    """Energy of each frame (f,) in this unit; not finite where a run has diverged."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        return np.asarray(scene.system.energy(q, p), np.float64) / unit
+
+
 def _said(runs: Runs, found: Mapping[str, Floats], differences: Mapping[str, Floats]) -> str:
     """Who gains or loses energy in every step alike, and how far the others are off."""
     largest = _largest(runs, differences)
@@ -110,9 +113,8 @@ def _said(runs: Runs, found: Mapping[str, Floats], differences: Mapping[str, Flo
         for group in runs.groups:
             each = steady(found[group.members[0].label], group.members[0].every)
             if each and not group.failed:
-                said.append(
-                    f"{group.title} {'gains' if each > 0 else 'loses'} {100 * abs(each):.2g} % a step"
-                )
+                percent = float(f"{100 * abs(each):.2g}")
+                said.append(f"{group.title} {'gains' if each > 0 else 'loses'} {percent:g} % a step")
                 del largest[group.title]
         said = said[:FINDINGS_SAID]
     if largest:
@@ -150,8 +152,7 @@ def orbits(runs: Runs, parts: Runs, exact: Exact) -> str:
         if exact.known:
             off[group.title] = max(float(np.max(exact.error(run))), parts.errors.get(run.label, 0.0))
         if scene.system.keeps_energy:
-            with np.errstate(over="ignore", invalid="ignore"):
-                e = np.asarray(scene.system.energy(run.q, run.p), np.float64)
+            e = _energies(scene, run.q, run.p)
             first, last = e[: len(e) // 4 + 1], e[-(len(e) // 4) - 1 :]
             unit = CHANGED * float(scene.system.norm.unit) ** 2
             # a motion that diverged did not oscillate
@@ -274,8 +275,7 @@ def means(runs: Runs, thermal: float) -> Bank:
     found = {}
     scene = runs.scene
     for run in runs.every:
-        with np.errstate(over="ignore", invalid="ignore"):
-            e = np.asarray(scene.system.energy(run.q, run.p), np.float64) / thermal
+        e = _energies(scene, run.q, run.p, thermal)
         found[run.label] = np.cumsum(e) / np.arange(1, len(e) + 1)
     ends = {group.title: float(found[group.members[0].label][-1]) for group in runs.groups}
     usual = float(np.median(list(ends.values())))
@@ -292,4 +292,5 @@ def means(runs: Runs, thermal: float) -> Bank:
         rule = Rule(axis="y", at=float(scene.n), look="here")
         chart = replace(chart, rules=[rule], note=f"dotted: equipartition, {scene.n} kT")
     said = f"mean energies from {some[low]:.3g} kT ({low}) to {some[high]:.3g} kT ({high})"
+    said = f"mean energy {some[low]:.3g} kT ({low})" if low == high else said
     return runs.bank("energy", [chart], said, (7.2, 4.2))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from springcheck.errors import StoreError
@@ -29,21 +29,28 @@ def check(names: Iterable[str], folder: Path, path: Path) -> None:
             raise StoreError(f"{target} shows {whose}: name another folder with -o")
 
 
-def put(drawn: list[Path], folder: Path, path: Path) -> list[Path]:
-    """Put figures of a store into a folder; StoreError where that would replace any other file."""
-    content = {one.name: one.read_bytes() for one in drawn}
-    check(content, folder, path)
+def put(drawn: Mapping[str, bytes], folder: Path, path: Path) -> list[Path]:
+    """Put figures of a store, by the names of their files, into a folder -> their paths.
+
+    StoreError where that would replace any other file, or the folder cannot be written.
+    """
+    check(drawn, folder, path)
     mine, known = str(path.absolute()), _known(folder)
-    for name, figure in content.items():
+    for name, figure in drawn.items():
         _, *old = known.get(name, [mine])
         # the last one too: whoever is killed in between may find it in its place
         known[name] = [mine, *old[-1:], _sha256(figure)]
-    files.need_space(folder / FIGURES, sum(map(len, content.values())))
+    files.need_space(folder / FIGURES, sum(map(len, drawn.values())))
+    _, *written = write({FIGURES: json.dumps(known, indent=1).encode(), **drawn}, folder)
+    return written
+
+
+def write(content: Mapping[str, bytes], folder: Path) -> list[Path]:
+    """Write files by their names into a folder, each whole or not at all -> their paths."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        files.put_bytes(json.dumps(known, indent=1).encode(), folder / FIGURES)
-        for name, figure in content.items():
-            files.put_bytes(figure, folder / name)
+        for name, data in content.items():
+            files.put_bytes(data, folder / name)
     except OSError as error:
         why = files.cause(error, writing=True)
         raise StoreError(f"{folder}: figures cannot be written: {why}") from error

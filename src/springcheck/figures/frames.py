@@ -39,17 +39,14 @@ class Frame:
 
     @property
     def centre(self) -> float:
-        """Its middle."""
         return self.low / 2 + self.high / 2
 
     @property
     def half(self) -> float:
-        """Half-width."""
         return self.high / 2 - self.low / 2
 
     @property
     def ends(self) -> tuple[float, float]:
-        """Lower and upper end."""
         return self.low, self.high
 
     def axis(self, name: str, unit: str) -> Scale:

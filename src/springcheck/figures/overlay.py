@@ -65,14 +65,17 @@ class Runs:
 
     @property
     def longest(self) -> Trajectory:
-        """The one with the most frames."""
         return max(self.every, key=lambda run: len(run.t))
+
+    @property
+    def last(self) -> float:
+        """The longest time from the start [T]."""
+        return max(abs(float(run.t[-1])) for run in self.every)
 
     @property
     def time_unit(self) -> tuple[float, str]:
         """Factor and unit of a readable axis of time."""
-        last = max(abs(float(run.t[-1])) for run in self.every)
-        return looks.prefixed(last, units(self.scene).t)
+        return looks.prefixed(self.last, units(self.scene).t)
 
     def time(self, span: tuple[float, float] | None = None) -> Scale:
         """An axis of time in a readable unit, from one time to another; left out: of all of it."""

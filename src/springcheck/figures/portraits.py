@@ -15,6 +15,7 @@ from springcheck.figures.overlay import Runs, exact_curve, share
 from springcheck.figures.views import State, View, with_unit
 from springcheck.physics.arrays import Floats
 from springcheck.physics.trajectory import Trajectory
+from springcheck.text.wording import count
 
 ALIKE = 2.5
 """Ratio of two ranges up to which equal scales on both axes are useful."""
@@ -72,7 +73,6 @@ def _of(runs: Runs, shown: Sequence[View]) -> str:
 
 
 def _portrait(runs: Runs, view: View, truth: Motion | None, *, alone: bool) -> Chart:
-    """One panel."""
     true = None if truth is None else view.pick(truth[1], truth[2])
     picked = {run.label: view.pick(run.q, run.p) for run in runs.every}
     xs, ys = _frames(list(picked.values()), true, view)
@@ -137,7 +137,9 @@ def clouds(runs: Runs, view: View, thermal: float) -> Bank:
         )
     left = len(runs.groups) - len(groups)
     more = f"; {left} more are not drawn" if left else ""
-    said = f"states by {len(runs.groups)} thermostats" + ("; on the ring H = kT" if ring else "") + more
+    said = (
+        f"states by {count(len(runs.groups), 'thermostat')}" + ("; on the ring H = kT" if ring else "") + more
+    )
     said = _heading(f"phase portrait{_of(runs, [view])}", said)
     return runs.bank("phase-portrait", charts, said, (2.6, 2.4), columns=min(4, len(charts)))
 
@@ -213,7 +215,7 @@ def positions(runs: Runs, shown: Sequence[View], truth: Motion | None, whole: Ru
     spans = _spans(runs, shown, truth)
     charts = [_position(runs, view, truth, span, alone=len(shown) == 1) for view in shown for span in spans]
     parts = "" if len(spans) == 1 else f"; the first and the last {PERIODS_SHOWN} periods"
-    few = "; a few periods" if spans[-1][1] < _last(runs) else ""
+    few = "; a few periods" if spans[-1][1] < runs.last else ""
     bath = f"one random motion of each method{few}"
     off = _off(whole, shown[0]) if runs.scene.bath is None else bath
     said = _heading(f"{shown[0].what}{_of(runs, shown)}{runs.part}", off) + parts
@@ -238,26 +240,24 @@ def _off(runs: Runs, view: View) -> str:
 def extremes(found: Mapping[str, float], text: str, *, beyond: float = 10.0) -> str:
     """A text with the smallest and the largest number, and whose they are; what is beyond has left."""
     stay = {name: x for name, x in found.items() if x <= beyond}
-    left = len(found) - len(stay)
-    gone = f"{left} of {len(found)} leave it" if left > 1 else next(
-        (f"{name} leaves it" for name in found if name not in stay), ""
-    )  # fmt: skip
+    left = [name for name in found if name not in stay]
+    gone = f"{left[0]} leaves" if len(left) == 1 else f"{len(left)} of {len(found)} leave"
     if not stay:
-        return gone
+        return f"{gone} the chart" if left else ""
     small, large = min(stay, key=lambda x: stay[x]), max(stay, key=lambda x: stay[x])
     numbers = f"{share(stay[small])} ({small})"
     numbers += f" to {share(stay[large])} ({large})" if share(stay[large]) != share(stay[small]) else ""
-    return "; ".join(filter(None, [text.format(numbers), gone]))
+    return text.format(numbers) + (f"; {gone} it" if left else "")
 
 
 def _spans(runs: Runs, shown: Sequence[View], truth: Motion | None) -> list[tuple[float, float]]:
     """The times that are shown: all, or the first and the last periods of many."""
-    first, last = (float(f([f(np.abs(run.t)) for run in runs.every])) for f in (np.min, np.max))
+    first, last = min(float(np.min(np.abs(run.t))) for run in runs.every), runs.last
     motion = truth[1:] if truth is not None else (runs.longest.q, runs.longest.p)
-    count = max(periods(view.pick(*motion)[0]) for view in shown)
-    if count <= MANY_PERIODS:
+    turns = max(periods(view.pick(*motion)[0]) for view in shown)
+    if turns <= MANY_PERIODS:
         return [(first, last)]
-    length = PERIODS_SHOWN * (last - first) / count
+    length = PERIODS_SHOWN * (last - first) / turns
     # in a bath all parts are alike
     return [(first, first + length), (last - length, last)][: 1 if runs.scene.bath else 2]
 
@@ -272,7 +272,6 @@ def _settles(t: Floats, x: Floats) -> float:
 def _position(
     runs: Runs, view: View, truth: Motion | None, span: tuple[float, float], *, alone: bool
 ) -> Chart:
-    """One panel."""
     true = None if truth is None else view.pick(truth[1], truth[2])
     picked = {run.label: view.pick(run.q, run.p)[0] for run in runs.every}
     first = runs.every[0]
@@ -314,10 +313,6 @@ def _position(
         curves=[*lines, *curves],
         note=runs.leaving(lambda run: ys.leaves(picked[run.label])) if span[0] == 0 else "",
     )
-    if (alone or span[0] == 0) and span[1] == _last(runs):
+    if (alone or span[0] == 0) and span[1] == runs.last:
         return naming.at_ends(chart, height=naming.NAME_HIGH * (1 if alone else 2))
     return chart
-
-
-def _last(runs: Runs) -> float:
-    return max(float(np.max(np.abs(run.t))) for run in runs.every)

@@ -118,7 +118,6 @@ def _shared(grid: Sequence[Axes], charts: Sequence[Chart], columns: int) -> None
 
 
 def _heading(figure: Figure, text: str, width: int) -> None:
-    """A title over all axes of a figure."""
     # a number keeps its unit, and a name its hyphen
     kept = textwrap.fill(text.replace(" %", "\0%"), width, break_on_hyphens=False).replace("\0", " ")
     figure.suptitle(kept, x=0.02, ha="left", fontsize=10)
@@ -194,7 +193,6 @@ def _chart(axes: Axes, chart: Chart, letters: int) -> None:
 
 
 def _label(axes: Axes, label: Naming) -> None:
-    """The label of a curve."""
     color = OTHER_LINES[label.group]["color"] if label.group in OTHER_LINES else looks.look(label.group).color
     beside, left = label.x >= 1, label.x > 0.6
     axes.annotate(

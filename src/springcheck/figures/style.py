@@ -19,8 +19,8 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from springcheck.errors import StoreError, plain
-from springcheck.store import files
+from springcheck.errors import plain
+from springcheck.figures.folder import write
 
 LONGEST_LINE = 120
 """Characters of a line of text, and of a file's name."""
@@ -61,8 +61,8 @@ def files_of(name: str) -> list[str]:
     return [f"{safe}.png", f"{safe}.svg"]
 
 
-def save(figure: Figure, folder: Path, name: str) -> list[Path]:
-    """Write a figure as PNG and SVG; StoreError where the folder cannot be written.
+def drawn(figure: Figure, name: str) -> dict[str, bytes]:
+    """The files of a figure, PNG and SVG, by their names.
 
     Its texts may come from any file: control characters are escaped, and what is not valid mathtext stays
     text.
@@ -70,23 +70,19 @@ def save(figure: Figure, folder: Path, name: str) -> list[Path]:
     texts = figure.findobj(Text)
     for text in texts:
         text.set_text("\n".join(plain(line, LONGEST_LINE) for line in text.get_text().split("\n")))
-    written = []
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        try:
-            drawn = _drawn(figure)
-        except ValueError:
-            # a title with dollar signs that is not mathtext
-            for text in texts:
-                text.set_parse_math(False)
-            drawn = _drawn(figure)
-        for file, content in zip(files_of(name), drawn, strict=True):
-            written.append(folder / file)
-            files.put_bytes(content, written[-1])
-    except OSError as error:
-        why = files.cause(error, writing=True)
-        raise StoreError(f"{folder}: figures cannot be written: {why}") from error
-    return written
+        found = _drawn(figure)
+    except ValueError:
+        # a title with dollar signs that is not mathtext
+        for text in texts:
+            text.set_parse_math(False)
+        found = _drawn(figure)
+    return dict(zip(files_of(name), found, strict=True))
+
+
+def save(figure: Figure, folder: Path, name: str) -> list[Path]:
+    """Write a figure as PNG and SVG; StoreError where the folder cannot be written."""
+    return write(drawn(figure, name), folder)
 
 
 def _drawn(figure: Figure) -> tuple[bytes, bytes]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,8 +19,7 @@ MOST_PANELS = 4
 State = tuple[Floats, Floats]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Units:
+class Units(NamedTuple):
     """Units of a scene's numbers, "" for reduced ones."""
 
     q: str = ""
@@ -28,11 +28,12 @@ class Units:
 
 
 _UNITS = {
-    ("particles", "md"): Units(q="nm", p="u nm/ps", t="ps"),
-    ("particles", "si"): Units(q="m", p="kg m/s", t="s"),
-    ("circuit", "si"): Units(q="C", p="Wb", t="s"),
-    ("rotor", "md"): Units(q="rad", p="u nm\u00b2/ps", t="ps"),
-    ("rotor", "si"): Units(q="rad", p="N m s", t="s"),
+    ("particles", "md"): Units("nm", "u nm/ps", "ps"),
+    ("particles", "si"): Units("m", "kg m/s", "s"),
+    ("circuit", "si"): Units("C", "Wb", "s"),
+    ("rotor", "reduced"): Units("rad"),
+    ("rotor", "md"): Units("rad", "u nm\u00b2/ps", "ps"),
+    ("rotor", "si"): Units("rad", "N m s", "s"),
 }
 
 

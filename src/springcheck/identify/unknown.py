@@ -52,8 +52,11 @@ def misfit(e: Evidence) -> Explanation:
     slope = float(q @ v / (q @ q)) if np.any(q) else 0.0
     if slope and np.all(np.abs(v - slope * q) <= 8 * e.unit):
         times = slope * float(e.found.size[1] / e.found.size[0] / e.record.interval)
+        still = np.all(np.abs(v) <= 8 * e.unit)
         return Explanation(
-            f"The velocity follows the position: from frame 1 on it is {times:.6g} times its distance "
+            "The velocity is 0 from frame 1 on"
+            if still
+            else f"The velocity follows the position: from frame 1 on it is {times:.6g} times its distance "
             "from rest",
             "look for a buffer that both share, or a velocity that is made from the position",
             float(np.max(np.abs(v - slope * q))),

@@ -146,19 +146,25 @@ class Study:
         found: StudyResult = self._part("measure").stored(path)
         return found
 
-    def draw(
-        self, found: StudyResult, folder: Path, check: Callable[[list[str]], object] = list, **chosen: Any
-    ) -> list[Path]:
-        """Draw a stored or a fresh result into a folder, with the options `chosen`; returns the files.
+    def drawn(
+        self, found: StudyResult, check: Callable[[list[str]], object] = list, **chosen: Any
+    ) -> dict[str, bytes]:
+        """The figures of a stored or a fresh result, with the options `chosen`, by the names of their files.
 
-        `check` is called with their names before the first is drawn.
+        `check` is called with these names before the first is drawn.
         """
-        from springcheck.figures.style import files_of, save, style
+        from springcheck.figures.style import drawn, files_of, style
 
         with style():
             pictures = self.pictures(found, **chosen)
             check([file for name in pictures for file in files_of(name)])
-            return [path for name, draw in pictures.items() for path in save(draw(), folder, name)]
+            return {file: x for name, draw in pictures.items() for file, x in drawn(draw(), name).items()}
+
+    def draw(self, found: StudyResult, folder: Path) -> list[Path]:
+        """Write its figures into a folder; returns the files."""
+        from springcheck.figures.folder import write
+
+        return write(self.drawn(found), folder)
 
     def pictures(self, found: StudyResult, **chosen: Any) -> dict[str, Callable[[], Any]]:
         """Functions that draw its figures by matplotlib, by name."""

@@ -37,7 +37,6 @@ class Text:
 
     @property
     def style(self) -> str:
-        """The style of its first part."""
         return self.parts[0][1]
 
 

@@ -141,7 +141,6 @@ class Content:
 
     @property
     def failed(self) -> tuple[Passed, ...]:
-        """Methods with a failed verdict."""
         return tuple(one for one in self.methods if one.count(False))
 
     @property

@@ -11,7 +11,7 @@ from springcheck.figures.looks import title
 from springcheck.studies.census.result import Census, Entry
 from springcheck.studies.census.table import amount
 from springcheck.studies.text import left_out, resumed
-from springcheck.text.lines import Lines, Row, hanging, plain, table
+from springcheck.text.lines import Cell, Lines, Row, hanging, plain, table
 from springcheck.text.wording import few, number, seconds
 
 TITLES = (
@@ -31,7 +31,7 @@ def lines(census: Census, options: Namespace | None = None) -> Lines:
         plain(),
     ]
     partners = census.partners
-    cold = _under(census, False, lambda x: _row(x, partners[x.method]))
+    cold = _under(census, False, lambda x: [*_cold(x), few(partners[x.method], 2)])
     hot = _under(census, True, _heated)
     if cold:
         out.append(table(TITLES, cold, left=("method", "arithmetic"), prose=TITLES[-1]))
@@ -72,28 +72,21 @@ def _under(census: Census, thermostats: bool, row: Callable[[Entry], Row]) -> li
     return rows
 
 
-def _heated(x: Entry) -> Row:
-    return [
-        plain("  " + x.method, "" if x.agrees else "bold red"),
-        f"{x.configurational:.4f} +- {x.configurational_error:.1g}",
-        f"{x.kinetic:.4f} +- {x.kinetic_error:.1g}",
-        "-" if np.isnan(x.velocity_offset) else f"{x.velocity_offset:+.1f} h",
-        x.precision,
-        f"{x.force_calls:.3g}",
-        seconds(x.seconds),
-    ]
+def _heated(x: Entry) -> list[Cell]:
+    temperatures = (x.configurational, x.configurational_error), (x.kinetic, x.kinetic_error)
+    return _row(x, *(f"{value:.4f} +- {error:.1g}" for value, error in temperatures), _velocity(x))
 
 
-def _row(x: Entry, partners: tuple[str, ...]) -> Row:
-    return [
-        plain("  " + x.method, "" if x.agrees else "bold red"),
-        number(x.amplitude, ".4f"),
-        amount(x.area, 1e-13, "+.2e"),
-        "-" if np.isnan(x.velocity_offset) else f"{x.velocity_offset:+.1f} h",
-        amount(x.friction, 1e-9, "+.2e"),
-        number(x.limit, ".3f", "none"),
-        x.precision,
-        f"{x.force_calls:.3g}",
-        seconds(x.seconds),
-        few(partners, 2),
-    ]
+def _cold(x: Entry) -> list[Cell]:
+    amplitude, area = number(x.amplitude, ".4f"), amount(x.area, 1e-13, "+.2e")
+    friction, limit = amount(x.friction, 1e-9, "+.2e"), number(x.limit, ".3f", "none")
+    return _row(x, amplitude, area, _velocity(x), friction, limit)
+
+
+def _velocity(x: Entry) -> str:
+    return "-" if np.isnan(x.velocity_offset) else f"{x.velocity_offset:+.1f} h"
+
+
+def _row(x: Entry, *measured: str) -> list[Cell]:
+    method = plain("  " + x.method, "" if x.agrees else "bold red")
+    return [method, *measured, x.precision, f"{x.force_calls:.3g}", seconds(x.seconds)]

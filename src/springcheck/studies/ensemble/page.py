@@ -53,8 +53,6 @@ class Line:
     high: Floats
     joined: bool
     """Whether neighbours differ in this field alone; otherwise no line joins them."""
-    fixed: Mapping[str, float]
-    """Values of the other fields of a grid."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -64,8 +62,6 @@ class Map:
     x: Floats
     y: Floats
     values: Floats
-    fixed: Mapping[str, float]
-    """Values of the other fields of a grid."""
 
 
 def _title(quantity: str, scene: Scene) -> str:
@@ -83,21 +79,23 @@ def fields_over(found: Ensemble, over: str | None = None) -> tuple[str, ...]:
     return fields
 
 
+def fixed(cells: Columns, found: Ensemble, over: Sequence[str]) -> dict[str, float]:
+    """The other fields of a grid, each at its middle value."""
+    others = {name: np.unique(cells[name]) for name in found.fields if found.grid and name not in over}
+    return {name: float(known[len(known) // 2]) for name, known in others.items()}
+
+
 def reduced(cells: Columns, found: Ensemble, quantity: str, over: Sequence[str]) -> Line | Map:
     """The cells of one method to draw, with the other fields of a grid at their middle value."""
     keep = np.ones(len(cells[quantity]), dtype=bool)
-    fixed = {}
-    for name in found.fields:
-        if found.grid and name not in over:
-            known = np.unique(cells[name])
-            fixed[name] = float(known[len(known) // 2])
-            keep &= cells[name] == fixed[name]
+    for name, value in fixed(cells, found, over).items():
+        keep &= cells[name] == value
     values = np.asarray(cells[quantity][keep], np.float64)
     values = np.abs(values) if quantity in SIZES else values
     along = [cells[name][keep] for name in over]
     if len(along) == 1:
-        return _line(along[0], values, fixed, joined=found.grid or len(found.fields) == 1)
-    return _map(along[0], along[1], values, fixed, grid=found.grid)
+        return _line(along[0], values, joined=found.grid or len(found.fields) == 1)
+    return _map(along[0], along[1], values, grid=found.grid)
 
 
 def even_in_logarithm(values: Floats) -> bool:
@@ -110,22 +108,22 @@ def even_in_logarithm(values: Floats) -> bool:
     return bool(abs(middle - np.log(low * high) / 2) < abs(middle - np.log((low + high) / 2)))
 
 
-def _line(x: Floats, y: Floats, fixed: Mapping[str, float], *, joined: bool) -> Line:
+def _line(x: Floats, y: Floats, *, joined: bool) -> Line:
     order = np.argsort(x, kind="stable")
     x, y = x[order], y[order]
     most = MOST_POINTS if joined else len(x) // FEWEST_BINNED
     if len(x) <= max(most, FEW_POINTS):
-        return Line(x=x, values=y, low=y, high=y, joined=joined, fixed=fixed)
+        return Line(x=x, values=y, low=y, high=y, joined=joined)
     pieces = [np.array_split(z, min(most, MOST_POINTS)) for z in (x, y)]
     known = [(float(np.median(a)), b[np.isfinite(b)]) for a, b in zip(*pieces, strict=True)]
     low, middle, high = (
         np.array([f(b) if len(b) else np.nan for _, b in known]) for f in (np.min, np.median, np.max)
     )
     at = np.array([a for a, _ in known])
-    return Line(x=at, values=middle, low=low, high=high, joined=True, fixed=fixed)
+    return Line(x=at, values=middle, low=low, high=high, joined=True)
 
 
-def _map(x: Floats, y: Floats, values: Floats, fixed: Mapping[str, float], *, grid: bool) -> Map:
+def _map(x: Floats, y: Floats, values: Floats, *, grid: bool) -> Map:
     most = MOST_TILES if grid else int(np.clip(np.sqrt(len(values) / FEWEST_BINNED), 2, MOST_TILES))
     (us, i), (vs, j) = (_tiles(z, most, grid=grid) for z in (x, y))
     found = np.full(len(us) * len(vs), np.nan)
@@ -135,7 +133,7 @@ def _map(x: Floats, y: Floats, values: Floats, fixed: Mapping[str, float], *, gr
     held, first = np.unique(tile[order], return_index=True)
     for which, mine in zip(held, np.split(values[order], first[1:]), strict=True):
         found[which] = np.median(mine)
-    return Map(x=us, y=vs, values=found.reshape(len(vs), len(us)), fixed=fixed)
+    return Map(x=us, y=vs, values=found.reshape(len(vs), len(us)))
 
 
 def _tiles(x: Floats, most: int, *, grid: bool) -> tuple[Floats, np.ndarray]:
@@ -190,19 +188,23 @@ def banks(found: Ensemble, *, quantity: str | None = None, over: str | None = No
         lines = {method: one for method, one in shown.items() if isinstance(one, Line)}
         maps = {method: one for method, one in shown.items() if isinstance(one, Map)}
         charts = _lines(found.scene, name, fields, lines) if lines else _maps(found.scene, name, fields, maps)
+        others = fixed(found.of(next(iter(shown))), found, fields)
         of = "" if over is None else "-over-" + "-".join(fields)
         title = "Methods drawn" if lines else f"Colour: {_title(name, found.scene)}"
         out.append(
             Bank(
                 name=f"ensemble-{name}{of}", title=title, charts=charts,
-                heading=_heading(found.scene, name, fields, shown),
+                heading=_heading(found.scene, name, fields, shown, others),
                 columns=1 if lines else min(3, len(charts)), size=(6.8, 4.2) if lines else None,
             )
         )  # fmt: skip
     return out
 
 
-def _heading(scene: Scene, quantity: str, over: Sequence[str], shown: Mapping[str, Line | Map]) -> str:
+def _heading(
+    scene: Scene, quantity: str, over: Sequence[str], shown: Mapping[str, Line | Map],
+    others: Mapping[str, float],
+) -> str:  # fmt: skip
     """The quantity, the fields on the axes, and the values of the fields that are not shown."""
     typical = {method: float(np.nanmedian(one.values)) for method, one in shown.items()}
     best = min(typical, key=lambda x: abs(typical[x]))
@@ -214,9 +216,8 @@ def _heading(scene: Scene, quantity: str, over: Sequence[str], shown: Mapping[st
         ]
         with_it = f" and {len(same)} like it" if same else ""
         said.append(f"smallest by {best}{with_it}, {typical[best]:.1g} in the middle")
-    one = next(iter(shown.values()))
-    if one.fixed:
-        said.append("at " + ", ".join(f"{named(name, scene)} = {x:.4g}" for name, x in one.fixed.items()))
+    if others:
+        said.append("at " + ", ".join(f"{named(name, scene)} = {x:.4g}" for name, x in others.items()))
     if any(isinstance(x, Line) and np.any(x.low < x.high) for x in shown.values()):
         said.append("bands: all cells; lines: their median")
     return "; ".join(said)

@@ -84,7 +84,7 @@ def absence(label: Label) -> str | None:
         return "it chooses its own steps, and cells are judged step by step"
     if not scheme(method.scheme).has("named"):
         return "its scheme is not known; --scheme NAME states it, and its steps are then judged"
-    return propagators.absence(label)
+    return propagators.absence(label, 0.5)
 
 
 def perform(options: Namespace, progress: Progress | None) -> Atlas:

@@ -124,8 +124,8 @@ def smallest(passed: Passed, check: str, size: float) -> float | None:
     return high
 
 
-RECORDED = {check.name for check in (*checks.CHECKS, *checks.RANDOM)}
-"""Names of the checks of recorded states."""
+RECORDED = dict.fromkeys(check.name for check in (*checks.CHECKS, *checks.RANDOM))
+"""Names of the checks of recorded states, in their order."""
 
 EXPERIMENTS: dict[str, Any] = {check.name: check for check in (*checks.THOROUGH, *SEEDED)}
 

@@ -41,7 +41,6 @@ BELOW = "the exact solution is known no better than this, and the run is no furt
 
 
 def _report(report: Report) -> Lines:
-    """The whole report of `springcheck run`."""
     scene = report.scene
     size = "" if scene.n == 1 else f", {scene.size}"
     head = f"{scene.title}: {count(scene.steps, 'step')} of {scene.step:g}{size}"
@@ -320,7 +319,6 @@ def verdicts_table(verdicts: Iterable[Verdict]) -> TextTable:
 
 
 def _repeat(one: Repeat) -> Text:
-    """One line for a repeated trajectory."""
     if one.equal:
         return plain(f"{one.method}: equal bit for bit")
     why = f"; {', '.join(one.changed)}" if one.changed else ""

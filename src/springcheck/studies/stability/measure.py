@@ -66,7 +66,8 @@ def _measure(scene: Scene, labels: Sequence[Label], kept: Keeper) -> Stability:
             return "limits are measured on springs alone, without the magnetic field that it needs"
         if "wall-spring" not in method.terms:
             return "it moves no springs"
-        return propagators.absence(label) or propagators.unstarted(scene, label)
+        scan = limits.FIRST_H_W, limits.LAST_H_W
+        return propagators.absence(label, *scan) or propagators.unstarted(scene, label)
 
     usable, left_out = sorted_out(labels, why, "has a limit to measure")
     braked = [label for label in usable if "damping" in engines.method(label).terms]

@@ -188,15 +188,16 @@ def first(
     return float((low + high) / 2)
 
 
-def absence(label: Label) -> str | None:
-    """Why a label cannot be measured here: its library or its platform is missing."""
+def absence(label: Label, *turns: float) -> str | None:
+    """Why a label cannot be measured here at these h w: its library or its platform is missing, or it refuses
+    such springs."""
     reason = engines.absence(label.engine)
     if reason:
         return reason
     try:
-        springs = Springs(label=label, turn=np.array([0.5]))
+        springs = Springs(label=label, turn=np.array(turns))
         a, _ = units(springs)
-        driver.run(scene(springs, a, np.zeros(1)), label)
+        driver.run(scene(springs, a, np.zeros(len(turns))), label)
     except MethodError as error:
         return str(error)
     return None

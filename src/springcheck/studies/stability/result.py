@@ -81,15 +81,19 @@ class Stability(Studied):
         out += [f"{z.method}: {said.format(z.off, z.bound)}" for z in strayed]
         return out
 
+    def refusal(self, found: Limit) -> str:
+        """Why a method cannot serve this scene; "" where it can."""
+        try:
+            return engines.refusal(self.scene, engines.parse(found.method)) or ""
+        except MethodError as error:
+            return str(error)
+
     def largest(self, found: Limit) -> float:
         """The largest step of a method on this scene [T]: see `longest`.  NaN where it cannot serve it."""
-        try:
-            label = engines.parse(found.method)
-            scheme = schemes.scheme(engines.method(label).scheme)
-        except MethodError:
+        if self.refusal(found):
             return np.nan
-        if engines.refusal(self.scene, label):
-            return np.nan
+        label = engines.parse(found.method)
+        scheme = schemes.scheme(engines.method(label).scheme)
         if found.agrees:
             return longest(scheme, self.scene)
         # an engine that departs from its scheme's map: its measured limit scales the scheme's step

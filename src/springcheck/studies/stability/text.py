@@ -8,6 +8,7 @@ import numpy as np
 
 from springcheck.physics.exact import has_true_motion
 from springcheck.physics.exact.mathieu import floquet
+from springcheck.studies.choose import LeftOut
 from springcheck.studies.stability.longest import fastest, is_modulated
 from springcheck.studies.stability.result import Stability
 from springcheck.studies.text import left_out, resumed
@@ -45,6 +46,8 @@ def lines(study: Stability, options: Namespace | None = None) -> Lines:
         found += [(x.method, f"{x.grown:.9f}", f"{x.turned:.9f}", f"{x.off:.0e}") for x in study.multipliers]
         out += [table(("method", "grows by", "turns by", "off its scheme's"), found), plain()]
     out += [plain(line) for line in study.sentences]
+    refused = [LeftOut(method=x.method, reason=why) for x in study.limits if (why := study.refusal(x))]
+    out += left_out(refused, "No largest step here by")
     out += left_out(study.left_out)
     return out
 
