@@ -17,7 +17,7 @@ BUDGETS = {
     ("engines/openmm", "engines/ase", "engines/sundials"): 1281,
     ("engines",): 2816,
     ("driver", "conformance", "doors"): 1216,
-    ("checks",): 5272,
+    ("checks",): 5380,
     ("identify",): 9151,
     ("formats", "store"): 5267,
     ("studies",): 1450,
