@@ -301,6 +301,17 @@ def hot(m: list[float], k: list[float], step: float = 0.2, steps: int = 3000) ->
     return replace(scene, bath=Bath(temperature=2.2, friction=0.7))
 
 
+def test_momenta_that_change_in_every_step_are_no_collisions() -> None:
+    """It was a ZeroDivisionError: all of them had collided."""
+    scene = baths.springs(3, steps=120)
+    run = driver.run(scene, "own:andersen", seed=4)
+    failed, said = failed_and_said(
+        scene, replace(run, p=run.p * (1 + 1e-9 * np.sin(np.arange(121)))[:, None])
+    )
+    assert "collisions" in failed
+    assert "times as often" not in said
+
+
 LATE = "the force is that at the end of the step where the scheme takes that at its start"
 DRAG = "the drag is not the one that the friction asks for"
 

@@ -91,54 +91,58 @@ def found(case: Case, shown: Callable[[int, bool], str] = lambda *_: "") -> str:
 
 
 def _off(case: Case, p: Floats | None = None) -> NDArray[np.bool_]:
-    """Which coordinates are not where the scheme takes them from each frame but the last (f-1, n), or from
-    its positions and other momenta p (f, n); none where draws explain any momentum."""
-    run, slack = case.trajectory, 1.0 if p is None else driven.SLACK
+    """Which frames but the first (f-1,) are not where the scheme leads from the one before, or from its
+    positions and other momenta p (f, n); none where draws explain any momentum."""
+    run, found = case.trajectory, np.zeros(len(case.steps) - 1, np.bool_)
+    slack = 1.0 if p is None else driven.SLACK
     starts = run.q, run.p if p is None else p
     if run.scheme not in THERMOSTATS:
         if case.scene.system.is_driven:
-            return np.zeros((len(run.q) - 1, case.scene.n), np.bool_)
+            return found
         ends = case.step(*(x[:-1].astype(np.longdouble) for x in starts))
-        off = np.abs(np.stack(ends) - np.stack([run.q[1:], run.p[1:]]))
-        return np.any(~(off <= slack * case.roundings * np.stack(case.allowance)), axis=0)
-    # each end beside its start, so that every other step is one of these
+        ratio = np.abs(np.stack(ends) - np.stack([run.q[1:], run.p[1:]])) / np.stack(case.allowance)
+        return np.asarray(np.any(~(ratio <= slack * case.roundings), axis=(0, 2)))
     bath, seen, every = thermostat(case), reading(case), 1
     if p is not None and not (bath.carried or bath.chain):
+        # each end beside its start, so that every other step is one of these
         both = zip(starts, (run.q, run.p), strict=True)
         pairs = (np.stack([x[:-1], y[1:]], axis=1).reshape(-1, case.scene.n) for x, y in both)
         seen, every = read_frames(case, *pairs), 2
-    none = np.zeros((len(run.q) - 1, case.scene.n), np.bool_)
-    return none if seen.across is None else ~(seen.across[::every] <= slack * seen.roundings)
+    if seen.across is not None:
+        off = np.any(~(seen.across[::every] <= slack * seen.roundings), axis=1)
+        # a first draw that acts in two steps is not read
+        found[len(found) - len(off) :] = off
+    return found
 
 
 def _of_removal(case: Case) -> str:
     """A total momentum that is taken away after steps or before them, at every one or at every so many."""
     run, bath = case.trajectory, THERMOSTATS.get(case.trajectory.scheme)
-    off = np.any(_off(case), axis=1)
+    off = _off(case)
     if case.scene.particles < 2 or not np.any(off):
         return ""
     m, axis = case.judged.m, np.equal.outer(np.unique(case.scene.all_places % 3), case.scene.all_places % 3)
     total, size = run.p @ axis.T, np.abs(run.p) @ axis.T
     left = run.p - m * (total / (axis @ m) @ axis)
-    where = ""
     # a total that the scheme keeps at 0 is no sign
-    ends = case.next_states[1] @ axis.T if bath is None else total[1:] + size[1:] * (bath.fresh > 0)
+    drawn = bath is not None and bath.fresh > 0 and not bath.rescales
+    ends = case.next_states[1] @ axis.T if bath is None else size[1:] * drawn
     room = REMOVED_ROUNDINGS * case.scene.n * run.arithmetic.state * np.max(size, axis=0)
     if np.all((np.abs(total[1:]) <= room)[off]) and np.any((np.abs(ends) > room)[off]):
         where = "after"
     elif not np.any(_off(case, left)[off]):
         where = "before"
-    if not where:
+    else:
         return ""
-    steps = case.steps[1:][off].tolist()
-    often = "every step" if np.all(off) else f"step {steps[0]}{regularly(steps, 'step')}"
+    at = case.steps[1:][off].tolist()
+    often = "every step" if np.all(off) else f"step {at[0]}{regularly(at, 'step')}"
     return f"the total momentum is taken away {where} {often}: the motion of the centre of mass is removed"
 
 
 def _of_reach(case: Case) -> str:
     """A force that is another from a distance on: no step that comes so far is the scheme's, all others
     are."""
-    off, q = np.any(_off(case), axis=1), case.trajectory.q
+    off, q = _off(case), case.trajectory.q
     if comb(len(off), int(np.count_nonzero(off))) < FEWEST_ORDERS:
         return ""
     for term in case.scene.terms:
@@ -344,7 +348,8 @@ def _rescaled(case: Case, kinetic: Floats) -> str:
 def _of_collisions(case: Case) -> str:
     """How often momenta are drawn anew, where that is not as the friction asks."""
     hits, bath = reading(case).hits, case.judged.bath
-    if hits is None or bath is None or collisions(case).passed is not False:
+    # where nothing is left of any step, its map is another
+    if hits is None or bath is None or np.all(hits) or collisions(case).passed is not False:
         return ""
     share, x = float(np.mean(hits)), bath.friction * case.trajectory.step
     rate, error = -np.log1p(-share) / x, np.sqrt(share / (1 - share) / hits.size) / x

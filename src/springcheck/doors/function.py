@@ -36,7 +36,6 @@ UNKNOWN = Scheme(
     source="none: only what needs no scheme is judged",
 )
 
-
 Spec = str | Callable[..., Any]
 """A function, or the text that says where one is."""
 
