@@ -346,6 +346,13 @@ def test_a_force_that_is_cut_off_in_a_bath_is_no_other_thermostat() -> None:
     assert said.endswith("the force is another there, as where it is cut off")
 
 
+def test_an_error_that_grows_with_the_distance_is_no_cut_off() -> None:
+    scene = hot([3.1], [2.7], steps=1500)
+    x = np.random.default_rng(7).standard_normal((scene.steps, 1))
+    _, said = failed_and_said(scene, loop(scene, x, force=lambda q: -2.7 * q * (1 + 1e-19 * q**24)))
+    assert said == ""
+
+
 @pytest.mark.parametrize(("every", "after"), [(1, True), (1, False), (10, True), (10, False)])
 @pytest.mark.parametrize("scheme", ["velocity-verlet", "baoab"])
 def test_a_centre_of_mass_that_is_held_is_said_to_be_so(scheme: str, every: int, *, after: bool) -> None:

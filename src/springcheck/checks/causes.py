@@ -11,12 +11,11 @@ from dataclasses import replace
 from math import comb
 
 import numpy as np
-from numpy.typing import NDArray
 
 from springcheck.checks import driven, other
 from springcheck.checks.case import Case
 from springcheck.checks.requires import MAP, missing
-from springcheck.checks.steps import seldom_off, step_defect
+from springcheck.checks.steps import STANDS_APART, seldom_off, step_defect
 from springcheck.checks.thermal import (
     collisions,
     draws_particles,
@@ -84,24 +83,26 @@ def found(case: Case, shown: Callable[[int, bool], str] = lambda *_: "") -> str:
         looks = [*looks, _of_reach]
     vague = ""
     for way in ways + looks:
-        if (said := way(case)) and not said.endswith(OR_UNKNOWN):
+        said = way(case)
+        # where all but the momenta is right, what their draws hold is surer than a scheme that may be another
+        if said.endswith(OR_UNKNOWN) and noise_direction(case).passed:
+            vague = said
+        elif said:
             return said
-        vague = vague or said
     return vague or few
 
 
-def _off(case: Case, p: Floats | None = None) -> NDArray[np.bool_]:
-    """Which frames but the first (f-1,) are not where the scheme leads from the one before, or from its
-    positions and other momenta p (f, n); none where draws explain any momentum."""
-    run, found = case.trajectory, np.zeros(len(case.steps) - 1, np.bool_)
-    slack = 1.0 if p is None else driven.SLACK
+def _off(case: Case, p: Floats | None = None) -> Floats:
+    """Distance of each frame but the first (f-1,) from where the scheme leads from the one before, or from
+    its positions and other momenta p (f, n), over its bound; 0 where draws explain any momentum."""
+    run, found = case.trajectory, np.zeros(len(case.steps) - 1)
     starts = run.q, run.p if p is None else p
     if run.scheme not in THERMOSTATS:
         if case.scene.system.is_driven:
             return found
         ends = case.step(*(x[:-1].astype(np.longdouble) for x in starts))
-        ratio = np.abs(np.stack(ends) - np.stack([run.q[1:], run.p[1:]])) / np.stack(case.allowance)
-        return np.asarray(np.any(~(ratio <= slack * case.roundings), axis=(0, 2)))
+        off = np.abs(np.stack(ends) - np.stack([run.q[1:], run.p[1:]])) / np.stack(case.allowance)
+        return np.asarray(np.max(off, axis=(0, 2)) / case.roundings, np.float64)
     bath, seen, every = thermostat(case), reading(case), 1
     if p is not None and not (bath.carried or bath.chain):
         # each end beside its start, so that every other step is one of these
@@ -109,7 +110,7 @@ def _off(case: Case, p: Floats | None = None) -> NDArray[np.bool_]:
         pairs = (np.stack([x[:-1], y[1:]], axis=1).reshape(-1, case.scene.n) for x, y in both)
         seen, every = read_frames(case, *pairs), 2
     if seen.across is not None:
-        off = np.any(~(seen.across[::every] <= slack * seen.roundings), axis=1)
+        off = np.max(seen.across[::every], axis=1) / seen.roundings
         # a first draw that acts in two steps is not read
         found[len(found) - len(off) :] = off
     return found
@@ -118,7 +119,7 @@ def _off(case: Case, p: Floats | None = None) -> NDArray[np.bool_]:
 def _of_removal(case: Case) -> str:
     """A total momentum that is taken away after steps or before them, at every one or at every so many."""
     run, bath = case.trajectory, THERMOSTATS.get(case.trajectory.scheme)
-    off = _off(case)
+    off = ~(_off(case) <= 1)
     if case.scene.particles < 2 or not np.any(off):
         return ""
     m, axis = case.judged.m, np.equal.outer(np.unique(case.scene.all_places % 3), case.scene.all_places % 3)
@@ -130,7 +131,7 @@ def _of_removal(case: Case) -> str:
     room = REMOVED_ROUNDINGS * case.scene.n * run.arithmetic.state * np.max(size, axis=0)
     if np.all((np.abs(total[1:]) <= room)[off]) and np.any((np.abs(ends) > room)[off]):
         where = "after"
-    elif not np.any(_off(case, left)[off]):
+    elif np.all(_off(case, left)[off] <= driven.SLACK):
         where = "before"
     else:
         return ""
@@ -142,8 +143,10 @@ def _of_removal(case: Case) -> str:
 def _of_reach(case: Case) -> str:
     """A force that is another from a distance on: no step that comes so far is the scheme's, all others
     are."""
-    off, q = _off(case), case.trajectory.q
-    if comb(len(off), int(np.count_nonzero(off))) < FEWEST_ORDERS:
+    by, q = _off(case), case.trajectory.q
+    off = ~(by <= 1)
+    # an error that grows with the distance leaves none so far off at once
+    if np.any(by[off] <= STANDS_APART) or comb(len(off), int(np.count_nonzero(off))) < FEWEST_ORDERS:
         return ""
     for term in case.scene.terms:
         if term.kind == "potential":
