@@ -17,7 +17,7 @@ BUDGETS = {
     ("engines/openmm", "engines/ase", "engines/sundials"): 1281,
     ("engines",): 2816,
     ("driver", "conformance", "doors"): 1200,
-    ("checks",): 5378,
+    ("checks",): 5381,
     ("identify",): 9169,
     ("formats", "store"): 5267,
     ("studies",): 1450,
