@@ -16,8 +16,9 @@ from springcheck.engines import Arithmetic
 from springcheck.identify import files
 from springcheck.physics import scenefile
 from springcheck.physics.bath import Bath
+from springcheck.physics.builders import spring
 from springcheck.physics.scene import Scene
-from springcheck.physics.trajectory import Trajectory, Verdict
+from springcheck.physics.trajectory import Trajectory, Verdict, of_scene
 from springcheck.studies.faults import baths
 from springcheck.studies.faults.table import FAULTS
 from springcheck.thermal import THERMOSTATS, chance
@@ -204,19 +205,23 @@ def test_a_run_in_a_bath_says_what_its_draws_show_as_the_judge_of_a_file_does() 
     assert "the noise is 2.0" in checks.cause_of(report.verdicts)
 
 
-def loop(scene: Scene, draws: np.ndarray, c: float = 1.0, size: object = 1.0) -> Trajectory:
-    """BAOAB by a loop of these draws (steps, n), of `size`, with `c` times the friction."""
-    h, m, force = scene.step, scene.m, scene.system.force
-    left = np.exp(-c * scene.bath.friction * h)  # type: ignore[union-attr]
+def loop(
+    scene: Scene, draws: np.ndarray, c: float = 1.0, size: object = 1.0, *, force: Any = None,
+    starts: Any = lambda _, p: p, ends: Any = lambda _, p: p,
+) -> Trajectory:  # fmt: skip
+    """BAOAB by a loop of these draws (steps, n), of `size`, with `c` times the friction, another force, and
+    momenta that are changed at the start and at the end of a step by its number."""
+    h, m, force = scene.step, scene.m, force or (lambda q: scene.system.potential_force(q, 0 * q))
+    left = np.exp(-c * scene.bath.friction * h) if scene.bath else 1.0
     q, p = [scene.q], [scene.p]
-    for x in draws:
-        v = p[-1] + h / 2 * force(q[-1], p[-1])
+    for i, x in enumerate(draws):
+        v = starts(i, p[-1])
+        v = v + h / 2 * force(q[-1])
         y = q[-1] + h / 2 * v / m
         v = left * v + size * np.sqrt((1 - left * left) * m * scene.thermal) * x
         q.append(y + h / 2 * v / m)
-        p.append(v + h / 2 * force(q[-1], v))
-    like = driver.run(scene, "own:baoab", seed=1)
-    return replace(like, q=np.array(q), p=np.array(p), energy=scene.system.energy(np.array(q), np.array(p)))
+        p.append(ends(i + 1, v + h / 2 * force(q[-1])))
+    return of_scene(scene, np.array(q), np.array(p), label="a loop", scheme="baoab").of_scene(scene)
 
 
 def failed_and_said(scene: Scene, run: Trajectory) -> tuple[list[str], str]:
@@ -277,6 +282,96 @@ def test_a_friction_that_is_halved_with_its_noise_is_said_to_be_one() -> None:
     assert "draws-variance" in failed
     assert "go with the momentum before them" in said
     assert "the noise is" not in said
+
+
+def maruyama(scene: Scene, force: Any, *, late: bool = False, c: float = 1.0) -> Trajectory:
+    """A loop of another force, taken after the drift if `late`, or with `c` times the drag."""
+    h, m, rng, q, p = scene.step, scene.m, np.random.default_rng(3), [scene.q], [scene.p]
+    x = h * scene.bath.friction  # type: ignore[union-attr]
+    for _ in range(scene.steps):
+        q.append(q[-1] + h * p[-1] / m)
+        noise = np.sqrt(2 * x * m * scene.thermal) * rng.standard_normal(scene.n)
+        p.append(p[-1] + h * force(q[-1 if late else -2]) - c * x * p[-1] + noise)
+    return of_scene(scene, np.array(q), np.array(p), label="a loop", scheme="euler-maruyama").of_scene(scene)
+
+
+def hot(m: list[float], k: list[float], step: float = 0.2, steps: int = 3000) -> Scene:
+    start = {"q": np.full(len(m), 0.3), "p": np.full(len(m), 0.2)}
+    scene = spring(m=np.array(m), k=np.array(k), step=step, steps=steps, **start)
+    return replace(scene, bath=Bath(temperature=2.2, friction=0.7))
+
+
+def test_momenta_that_change_in_every_step_are_no_collisions() -> None:
+    """It was a ZeroDivisionError: all of them had collided."""
+    scene = baths.springs(3, steps=120)
+    run = driver.run(scene, "own:andersen", seed=4)
+    failed, said = failed_and_said(
+        scene, replace(run, p=run.p * (1 + 1e-9 * np.sin(np.arange(121)))[:, None])
+    )
+    assert "collisions" in failed
+    assert "times as often" not in said
+
+
+LATE = "the force is that at the end of the step where the scheme takes that at its start"
+DRAG = "the drag is not the one that the friction asks for"
+
+
+@pytest.mark.parametrize(("m", "k"), [([0.6], [1.9]), ([0.6, 3.1], [1.9, 2.7])])
+def test_a_force_after_the_drift_is_no_wrong_drag(m: list[float], k: list[float]) -> None:
+    """`judge --scheme euler-maruyama` of such a loop ended in: the drag is not the one that the friction asks
+    for.  On one spring a drag does the same; on unlike ones it does not."""
+    scene = hot(m, k)
+    run = maruyama(scene, lambda q: -np.array(k) * q, late=True)
+    failed, said = failed_and_said(scene, run)
+    assert "draws-state" in failed
+    assert said.endswith(f": {LATE}, or {DRAG}" if len(m) == 1 else f": {LATE}")
+    _, said = failed_and_said(scene, maruyama(scene, lambda q: -np.array(k) * q, c=1.6))
+    assert said.endswith(DRAG)
+
+
+def test_a_force_that_is_cut_off_in_a_bath_is_no_other_thermostat() -> None:
+    """It was: a thermostat, bussi-after or one that is not known here; or nothing, of BAOAB."""
+    k, far = np.array([1.9, 2.7]), 1.4
+
+    def force(q: np.ndarray) -> np.ndarray:
+        return np.where(np.abs(q) < far, -k * q, 0.0)
+
+    scene = hot([0.6, 3.1], [1.9, 2.7], steps=1500)
+    _, said = failed_and_said(scene, maruyama(scene, force))
+    assert said.endswith("the force is not that of the scene")
+    x = np.random.default_rng(7).standard_normal((scene.steps, 2))
+    _, said = failed_and_said(scene, loop(scene, x, force=force))
+    within, beyond = (float(part.split()[0]) for part in said.partition("within ")[2].split("beyond "))
+    assert within < far < beyond
+    assert said.endswith("the force is another there, as where it is cut off")
+
+
+def test_an_error_that_grows_with_the_distance_is_no_cut_off() -> None:
+    scene = hot([3.1], [2.7], steps=1500)
+    x = np.random.default_rng(7).standard_normal((scene.steps, 1))
+    _, said = failed_and_said(scene, loop(scene, x, force=lambda q: -2.7 * q * (1 + 1e-19 * q**24)))
+    assert said == ""
+
+
+@pytest.mark.parametrize(("every", "after"), [(1, True), (1, False), (10, True), (10, False)])
+@pytest.mark.parametrize("scheme", ["velocity-verlet", "baoab"])
+def test_a_centre_of_mass_that_is_held_is_said_to_be_so(scheme: str, every: int, *, after: bool) -> None:
+    """It was "a scheme with memory", "one map of all coordinates, but not from frame 0 to 1", or nothing."""
+    scene = hot([1.7, 0.6, 2.9], [2.3, 1.9, 0.8], step=0.11, steps=300)
+    x = np.random.default_rng(8).standard_normal((scene.steps, 3))
+    if scheme != "baoab":
+        scene, x = replace(scene, bath=None), np.zeros_like(x)
+
+    def removed(step: int, p: np.ndarray) -> np.ndarray:
+        return p - scene.m * np.sum(p) / np.sum(scene.m) if step % every == 0 else p
+
+    run = loop(scene, x, **{"ends" if after else "starts": removed})
+    where, first = ("after", 10) if after else ("before", 1)
+    often = "every step" if every == 1 else f"step {first}, and so every 10 steps"
+    expected = (
+        f"the total momentum is taken away {where} {often}: the motion of the centre of mass is removed"
+    )
+    assert said(scene, replace(run, scheme=scheme)) == expected
 
 
 @pytest.mark.parametrize(

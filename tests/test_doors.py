@@ -201,11 +201,14 @@ BAD_FUNCTIONS = [
         "    return q.real_part, p",
         "AttributeError: 'float' object has no attribute 'real_part' (mine.py, line 3)",
     ),
-    ("    return q, p, h", "returned tuple of 3; a step returns (q, p)"),
+    ("    return q, p, h", "returned tuple of 3; a step returns (q, p) (mine.py, line 2)"),
+    ("    return q", "f: returned float; a step returns (q, p) (mine.py, line 2)"),
     ("    return None", "returned NoneType"),
     ("    return q, undefined", "NameError: name 'undefined' is not defined (mine.py, line 3)"),
     ("    raise ValueError('no\\nidea')", "ValueError: no idea (mine.py, line 3)"),
-    ("    return 'a', p", "ValueError"),
+    ("    return 'a', p", "returned no numbers; a step returns (q, p) (mine.py, line 2)"),
+    ("    return q, [q, [p]]", "returned no numbers"),
+    ("    return q + 1j, p", "returned complex numbers"),
     ("    return [1, 2, 3], p", "returned shapes (3,)"),
 ]
 

@@ -6,6 +6,7 @@ fourth; a step on another force tells them.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -16,6 +17,7 @@ import pytest
 import springcheck
 from springcheck import checks, doors, driver
 from springcheck.doors.function import UNKNOWN
+from springcheck.errors import MethodError
 from springcheck.identify import identify_stepper
 from springcheck.identify.files import shown
 from springcheck.identify.taken import seen_to_take
@@ -252,3 +254,20 @@ def test_other_springs_do_not_repeat_a_remark() -> None:
 
     notes = identify_stepper(single).notes
     assert sum("would not show" in note for note in notes) == 1
+
+
+@pytest.mark.parametrize(
+    ("out", "what"),
+    [(1.0, "float"), (None, "NoneType"), ((1, 2, 3), "tuple of 3"), (("a", 1.0), "no numbers"),
+     (([1.0, [2.0]], 1.0), "no numbers"), (([], []), "no numbers"), ((1j, 1.0), "complex numbers")],
+)  # fmt: skip
+def test_what_is_no_pair_of_numbers_is_put_down_to_the_function(out: Any, what: str) -> None:
+    """It was: TypeError: cannot unpack non-iterable float object (stepper.py, line 67)."""
+
+    def step(q: Any, p: Any, h: float, force: Force, m: Any) -> Any:
+        return out
+
+    line = step.__code__.co_firstlineno
+    said = f"step: returned {what}; a step returns (q, p) (test_identify_steppers.py, line {line})"
+    with pytest.raises(MethodError, match=re.escape(said)):
+        identify_stepper(step)

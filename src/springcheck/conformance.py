@@ -68,19 +68,13 @@ def checks_of(engine: Engine) -> list[Check]:
     """Every check of every method of an engine."""
     if engine.name not in engines.names() or engines.engine(engine.name) is not engine:
         engines.bring(engine, "the tests of its own")
-    labels, random = (
-        [Label(engine=engine.name, method=name) for name in some]
-        for some in (engine.methods, engine.thermostats)
-    )
-    found = [Check("declaring imports no library", [*labels, *random][0], _imports_nothing)]
+    labels = [Label(engine=engine.name, method=name) for name in (*engine.methods, *engine.thermostats)]
+    found = [Check("declaring imports no library", labels[0], _imports_nothing)]
     for label in labels:
         scenes = _some(label)
         found += [Check(f"right on {scene.name}", label, partial(_right, scene=scene)) for scene in scenes]
-        found += [Check(name, label, test) for name, test in TESTS.items()]
-    for label in random:
-        scenes = _some(label)
-        found += [Check(f"right on {scene.name}", label, partial(_right, scene=scene)) for scene in scenes]
-        found += [Check("seeds", label, _seeds)] * bool(scenes)
+        tests = TESTS if label.method in engine.methods else {"seeds": _seeds} if scenes else {}
+        found += [Check(name, label, test) for name, test in tests.items()]
     return found
 
 
@@ -258,8 +252,8 @@ def _chunks(label: Label) -> None:
     """Rows asked for at once or one by one are the same."""
     scene = replace(_served(label)[0], every=1)
     same = _advanced(scene, label, 1, 24) == _advanced(scene, label, 1, 1, 6, 17)
-    assert np.all(same[0]), "rows asked for in parts are not those asked for at once: keep the state"
-    assert np.all(same[1]), "momenta asked for in parts are not those asked for at once: keep the state"
+    for of, what in zip(same, ("rows", "momenta"), strict=True):
+        assert np.all(of), f"{what} asked for in parts are not those asked for at once: keep the state"
 
 
 def _strides(label: Label) -> None:
@@ -267,8 +261,8 @@ def _strides(label: Label) -> None:
     scene = replace(_served(label)[0], every=1)
     if not engines.method(label).adaptive:
         same = _advanced(scene, label, 1, 30)[:, 9::10] == _advanced(scene, label, 10, 3)
-        assert np.all(same[0]), "advance(10, ...) does not give every tenth state of advance(1, ...)"
-        assert np.all(same[1]), "advance(10, ...) does not give every tenth momentum of advance(1, ...)"
+        for of, what in zip(same, ("state", "momentum"), strict=True):
+            assert np.all(of), f"advance(10, ...) does not give every tenth {what} of advance(1, ...)"
 
 
 def _untouched(label: Label) -> None:

@@ -37,10 +37,8 @@ the speed of the machine."""
 UNHEARD = 0.25
 """Longest call of an engine that cannot be interrupted, where its numbers are discarded [s]."""
 
-
 UNTOUCHED = np.array(0x7FF8_0000_5C5C_5C5C).view(np.float64)
 """Fill value of rows before an engine writes them: a NaN that no arithmetic produces."""
-
 
 Sink: TypeAlias = Callable[[Floats, Floats, Floats, Floats | None, Floats | None], None]
 """Receives recorded frames: t (f,), q and p (f, n), energy and last steps (f,) or None.  The arrays are
@@ -49,17 +47,14 @@ reused."""
 Progress = Callable[[int], None]
 """Called with the number of steps done since the last call."""
 
-
 TINY = float(np.finfo(np.float64).smallest_normal)
 SUBNORMAL = (
     f"it has decayed below {TINY:.1e}: numbers are subnormal there, with fewer and fewer digits, and a "
     "step takes up to fifty times as long"
 )
 
-
 MOST_SEED = 900_000_000
 """Seeds are 1 to this, which every library accepts: LAMMPS has no larger one, and 0 makes OpenMM draw one."""
-
 
 GIVEN_DRAWS = "none: drawn by a generator that the caller gave"
 """Stored in place of a seed where a generator was given."""

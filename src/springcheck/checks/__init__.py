@@ -43,7 +43,7 @@ from springcheck.checks.steps import BLIND, arithmetic, border, bridges, step_de
 from springcheck.errors import MethodError
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Limits, Trajectory, Verdict
-from springcheck.text.wording import STATES_SHOW
+from springcheck.text.wording import STATES_SHOW, count, few
 
 __all__ = [
     "ALL", "BLIND", "CHECKS", "CONTRACTED", "RANDOM", "SPECIAL", "STATES_SHOW", "TELLING", "THOROUGH",
@@ -69,7 +69,6 @@ ALL: tuple[Check, ...] = (*CHECKS, *THOROUGH)
 
 RANDOM: tuple[Check, ...] = (start, times, grid, energies, *thermal.DRAWN, rod_length, rod_velocity)
 """Checks of a thermostat's trajectory, to which no law of deterministic motion applies."""
-
 
 TELLING = frozenset(["identified", *(one.name for one in (*ALL, *thermal.DRAWN) if one.telling)])
 """Checks that distinguish the scheme that a method claims from others; `identified` is of a file's states."""
@@ -101,12 +100,11 @@ def summary(verdicts: Sequence[Verdict]) -> str:
     rest = len(verdicts) - judged
     beside = f", {rest} not applicable" if rest else ""
     if not failed:
-        return f"{judged} verdict{'' if judged == 1 else 's'} passed, 0 failed{beside}"
+        return f"{count(judged, 'verdict')} passed, 0 failed{beside}"
     methods = list(dict.fromkeys(verdict.method for verdict in failed))
     whose = {verdict.method for verdict in verdicts}
     names = methods if len(whose) > 1 else list(dict.fromkeys(verdict.check for verdict in failed))
-    more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
-    return f"{len(failed)} of {judged} failed: {', '.join(names[:MOST_NAMED])}{more}{beside}"
+    return f"{len(failed)} of {judged} failed: {few(names, MOST_NAMED)}{beside}"
 
 
 def explained(

@@ -8,18 +8,27 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from math import comb
 
 import numpy as np
 
 from springcheck.checks import driven, other
 from springcheck.checks.case import Case
 from springcheck.checks.requires import MAP, missing
-from springcheck.checks.steps import seldom_off, step_defect
-from springcheck.checks.thermal import collisions, draws_particles, noise_direction, reading, thermostat
+from springcheck.checks.steps import STANDS_APART, seldom_off, step_defect
+from springcheck.checks.thermal import (
+    collisions,
+    draws_particles,
+    noise_direction,
+    read_frames,
+    reading,
+    thermostat,
+)
 from springcheck.physics.arrays import Floats, Reals
+from springcheck.text.wording import regularly
 from springcheck.thermal import THERMOSTATS
 from springcheck.thermal.catalogue import ENERGY_LEFT
-from springcheck.thermal.draws import Reading
+from springcheck.thermal.draws import Reading, law_of
 
 PUSH_ROUNDINGS = 64
 """Roundings of the positions whose difference is an impulse: of a free step, and of the frame as recorded."""
@@ -45,6 +54,15 @@ NEARLY_ALL = 0.9
 SAME_DRAWS = 1e-6
 """Relative difference up to which two draws count as one number."""
 
+REMOVED_ROUNDINGS = 16
+"""Roundings of each particle's momentum up to which a total momentum is 0."""
+
+FEWEST_ORDERS = 1e9
+"""Ways to choose the steps that are off, of which one has the farthest by chance."""
+
+OR_UNKNOWN = "or one that is not known here"
+"""End of an identification that does not exclude other schemes: another cause goes before it."""
+
 
 @np.errstate(all="ignore")
 def found(case: Case, shown: Callable[[int, bool], str] = lambda *_: "") -> str:
@@ -58,10 +76,88 @@ def found(case: Case, shown: Callable[[int, bool], str] = lambda *_: "") -> str:
     ways: list[Callable[[Case], str]] = []
     if run.every == 1 and run.scheme in THERMOSTATS:
         # of draws that are read by the map of another scheme the size says nothing
-        ways, looks = [_of_no_noise, _of_bath, _of_collisions], [*looks, _of_size]
+        ways = [_of_no_noise, _of_bath, _of_collisions, _of_removal]
+        looks = [*looks, _of_reach, _of_state, _of_size]
     elif run.every == 1 and not missing(case, MAP):
-        ways = [_of_differences, driven.found, _of_rods]
-    return next(filter(None, (way(case) for way in ways + looks)), few)
+        ways = [_of_differences, driven.found, _of_rods, _of_removal]
+        looks = [*looks, _of_reach]
+    vague = ""
+    for way in ways + looks:
+        said = way(case)
+        # where all but the momenta is right, what their draws hold is surer than a scheme that may be another
+        if said.endswith(OR_UNKNOWN) and noise_direction(case).passed:
+            vague = said
+        elif said:
+            return said
+    return vague or few
+
+
+def _off(case: Case, p: Floats | None = None) -> Floats:
+    """Distance of each frame but the first (f-1,) from where the scheme leads from the one before, or from
+    its positions and other momenta p (f, n), over its bound; 0 where draws explain any momentum."""
+    run, found = case.trajectory, np.zeros(len(case.steps) - 1)
+    starts = run.q, run.p if p is None else p
+    if run.scheme not in THERMOSTATS:
+        if case.scene.system.is_driven:
+            return found
+        ends = case.step(*(x[:-1].astype(np.longdouble) for x in starts))
+        off = np.abs(np.stack(ends) - np.stack([run.q[1:], run.p[1:]])) / np.stack(case.allowance)
+        return np.asarray(np.max(off, axis=(0, 2)) / case.roundings, np.float64)
+    bath, seen, every = thermostat(case), reading(case), 1
+    if p is not None and not (bath.carried or bath.chain):
+        # each end beside its start, so that every other step is one of these
+        both = zip(starts, (run.q, run.p), strict=True)
+        pairs = (np.stack([x[:-1], y[1:]], axis=1).reshape(-1, case.scene.n) for x, y in both)
+        seen, every = read_frames(case, *pairs), 2
+    if seen.across is not None:
+        off = np.max(seen.across[::every], axis=1) / seen.roundings
+        # a first draw that acts in two steps is not read
+        found[len(found) - len(off) :] = off
+    return found
+
+
+def _of_removal(case: Case) -> str:
+    """A total momentum that is taken away after steps or before them, at every one or at every so many."""
+    run, bath = case.trajectory, THERMOSTATS.get(case.trajectory.scheme)
+    off = ~(_off(case) <= 1)
+    if case.scene.particles < 2 or not np.any(off):
+        return ""
+    m, axis = case.judged.m, np.equal.outer(np.unique(case.scene.all_places % 3), case.scene.all_places % 3)
+    total, size = run.p @ axis.T, np.abs(run.p) @ axis.T
+    left = run.p - m * (total / (axis @ m) @ axis)
+    # a total that the scheme keeps at 0 is no sign
+    drawn = bath is not None and bath.fresh > 0 and not bath.rescales
+    ends = case.next_states[1] @ axis.T if bath is None else size[1:] * drawn
+    room = REMOVED_ROUNDINGS * case.scene.n * run.arithmetic.state * np.max(size, axis=0)
+    if np.all((np.abs(total[1:]) <= room)[off]) and np.any((np.abs(ends) > room)[off]):
+        where = "after"
+    elif np.all(_off(case, left)[off] <= driven.SLACK):
+        where = "before"
+    else:
+        return ""
+    at = case.steps[1:][off].tolist()
+    often = "every step" if np.all(off) else f"step {at[0]}{regularly(at, 'step')}"
+    return f"the total momentum is taken away {where} {often}: the motion of the centre of mass is removed"
+
+
+def _of_reach(case: Case) -> str:
+    """A force that is another from a distance on: no step that comes so far is the scheme's, all others
+    are."""
+    by, q = _off(case), case.trajectory.q
+    off = ~(by <= 1)
+    # an error that grows with the distance leaves none so far off at once
+    if np.any(by[off] <= STANDS_APART) or comb(len(off), int(np.count_nonzero(off))) < FEWEST_ORDERS:
+        return ""
+    for term in case.scene.terms:
+        if term.kind == "potential":
+            far = np.max(np.abs(term.elongation(q)), axis=1)
+            reach = np.maximum(far[:-1], far[1:])
+            if (least := np.min(reach[off])) > (most := np.max(reach[~off])):
+                return (
+                    f"steps that end within {most:.6g} of the rest of each {term.key} are the scheme's, and "
+                    f"none beyond {least:.6g} is: the force is another there, as where it is cut off"
+                )
+    return ""
 
 
 def _of_differences(case: Case) -> str:
@@ -120,7 +216,7 @@ def _of_rods(case: Case) -> str:
 def _of_no_noise(case: Case) -> str:
     """Coordinates whose draws are a linear map of the state before: no noise acts, or one number does."""
     seen, run = reading(case), case.trajectory
-    if seen.rescaled is not None or not _told(seen):
+    if not _told(seen):
         return ""
     x = seen.draws.reshape(-1, max(thermostat(case).fresh, 1), seen.draws.shape[1])
     known = np.column_stack([*(y[-len(x) - 1 : -1] for y in (run.q, run.p)), np.ones(len(x))])
@@ -168,29 +264,47 @@ def _of_bath(case: Case) -> str:
 
 
 def _told(seen: Reading) -> bool:
-    return seen.known and seen.draws.size >= FEWEST_DRAWS and bool(np.all(np.isfinite(seen.draws)))
+    many = seen.rescaled is None and seen.known and seen.draws.size >= FEWEST_DRAWS
+    return many and bool(np.all(np.isfinite(seen.draws)))
+
+
+def _of_state(case: Case) -> str:
+    """Draws that hold a part of the momentum or of the force before them."""
+    seen, run, system = reading(case), case.trajectory, case.judged.system
+    if not _told(seen) or noise_direction(case).passed is False or system.rods:
+        return ""
+    rows, x = max(thermostat(case).fresh, 1), seen.draws
+    q, p = (np.repeat(y[-(len(x) // rows) - 1 :], rows, axis=0) for y in (run.q, run.p))
+    force = system.potential_force(q, 0 * p)
+    both = np.stack([p[:-rows], force[:-rows]])
+    held = np.array([[np.corrcoef(*z)[0, 1] for z in zip(x.T, y.T, strict=True)] for y in both])
+    which, i = np.unravel_index(int(np.argmax(np.abs(np.nan_to_num(held)))), held.shape)
+    if not abs(held[which, i]) * np.sqrt(len(x)) > STANDARD_ERRORS:
+        return ""
+    # what the force at a step's end in place of that at its start adds to draws, and what another drag does
+    made = np.max(np.abs(law_of(thermostat(case), case.judged).G[:, 1]), axis=1)
+    change, drag = (np.asarray(y / made, float) for y in (run.step * (force[rows:] - force[:-rows]), both[0]))
+    size, of_drag = np.linalg.norm(change), np.linalg.norm(drag)
+    fitted = np.sum(x * change) / size
+    better = fitted**2 - (np.sum(x * drag) / of_drag) ** 2
+    why = ("the drag is not the one that the friction asks for", "the force is not that of the scene")[which]
+    if abs(fitted - size) <= STANDARD_ERRORS and better > -(STANDARD_ERRORS**2):
+        late = "the force is that at the end of the step where the scheme takes that at its start"
+        why = late if better > STANDARD_ERRORS**2 else f"{late}, or {why}"
+    return (
+        f"the draws of coordinate {i} go with the {('momentum', 'force')[which]} before them, with a "
+        f"correlation of {held[which, i]:+.2g}: {why}"
+    )
 
 
 def _of_size(case: Case) -> str:
-    """Draws that hold a part of the momentum before them; else noise whose size is not the bath's, of each
-    coordinate where these are unlike, and of none where coordinates share draws."""
-    seen, rods = reading(case), case.scene.system.rods
-    if seen.rescaled is not None or not _told(seen) or noise_direction(case).passed is False:
+    """Noise whose size is not the bath's, of each coordinate where these are unlike, and of none where
+    coordinates share draws."""
+    seen = reading(case)
+    if not _told(seen) or any(one(case).passed is False for one in (noise_direction, draws_particles)):
         return ""
     of = seen.draws**2
     mean, error = np.mean(of, axis=0), np.std(of, axis=0) / np.sqrt(len(of))
-    if not rods:
-        rows = max(thermostat(case).fresh, 1)
-        before = np.repeat(case.trajectory.p[-(len(of) // rows) - 1 : -1], rows, axis=0)
-        held = [float(np.corrcoef(x, y)[0, 1]) for x, y in zip(seen.draws.T, before.T, strict=True)]
-        i = int(np.argmax(np.abs(held)))
-        if abs(held[i]) * np.sqrt(len(of)) > STANDARD_ERRORS:
-            return (
-                f"the draws of coordinate {i} go with the momentum before them, with a correlation of "
-                f"{held[i]:+.2g}: the drag is not the one that the friction asks for"
-            )
-    if draws_particles(case).passed is False:
-        return ""
     asked = "as large as the temperature, the masses and the friction ask"
     sizes = [(np.mean(of), np.std(of) / np.sqrt(of.size)), *zip(mean, error, strict=True)]
     told = [f"{np.sqrt(y):.4g} +- {e / (2 * np.sqrt(y)):.1g} times" for y, e in sizes]
@@ -237,7 +351,8 @@ def _rescaled(case: Case, kinetic: Floats) -> str:
 def _of_collisions(case: Case) -> str:
     """How often momenta are drawn anew, where that is not as the friction asks."""
     hits, bath = reading(case).hits, case.judged.bath
-    if hits is None or bath is None or collisions(case).passed is not False:
+    # where nothing is left of any step, its map is another
+    if hits is None or bath is None or np.all(hits) or collisions(case).passed is not False:
         return ""
     share, x = float(np.mean(hits)), bath.friction * case.trajectory.step
     rate, error = -np.log1p(-share) / x, np.sqrt(share / (1 - share) / hits.size) / x

@@ -33,15 +33,19 @@ class Same:
     """Origin of the allowed difference: rounding alone, or the tolerance of some adaptive solver."""
 
 
+def solution(scene: Scene, pieces: Collection[Trajectory]) -> tuple[Extended, Extended]:
+    """The exact solution q, p (f, n) at the frames of the longest of these pieces, where it is known."""
+    longest = max(pieces, key=lambda piece: len(piece.t))
+    return exact.true_motion(scene, Case(trajectory=longest, scene=scene).steps, longest.step)
+
+
 def compare(scene: Scene, pieces: Mapping[str, Trajectory]) -> Comparison:
     """Compare trajectories, or pieces of them over the same frames, with each other and the exact one."""
     norm = scene.system.norm
     states: dict[str, tuple[Extended | Floats, Extended | Floats]] = {}
-    longest = max(pieces.values(), key=lambda piece: len(piece.t), default=None)
-    if longest is not None and exact.has_true_motion(scene):
-        steps = Case(trajectory=longest, scene=scene).steps
-        states[EXACT] = exact.true_motion(scene, steps, longest.step)
-    frames = len(longest.t) if longest is not None else 0
+    if pieces and exact.has_true_motion(scene):
+        states[EXACT] = solution(scene, pieces.values())
+    frames = max((len(piece.t) for piece in pieces.values()), default=0)
     states.update((label, (piece.q, piece.p)) for label, piece in pieces.items())
     labels = tuple(states)
     out = np.zeros((len(labels), len(labels)))
@@ -115,7 +119,7 @@ def _motion(scene: Scene, run: Trajectory) -> _Motion:
 
 def _exact(scene: Scene, like: Trajectory, ends: Collection[float]) -> _Motion:
     """The exact solution at the frames of another trajectory, with its largest error up to these times."""
-    q, p = exact.true_motion(scene, Case(trajectory=like, scene=scene).steps, like.step)
+    q, p = solution(scene, [like])
     states = {"q": np.asarray(q, np.float64), "p": np.asarray(p, np.float64)}
     plain = {"arithmetic": Arithmetic(), "rebuilds_velocity": False, "energy": None}
     run = replace(like, label=EXACT, scheme=EXACT, **states, **plain)  # type: ignore[arg-type]

@@ -18,7 +18,6 @@ SMALLEST = np.longdouble(5e-324 if WIDE else 1e-323)
 """Loss of an operation to underflow: one unit of a subnormal double, and as much again where the reference
 step is no wider than double."""
 
-
 OF_LENGTH = 6
 """Roundings of a joint's length: the places of both ends, their difference, its square, the root of that, and
 what is left beyond the rest length."""

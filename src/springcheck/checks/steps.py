@@ -17,7 +17,7 @@ from springcheck.checks.stretch import Stretch, known
 from springcheck.physics import exact
 from springcheck.physics.arrays import Arithmetic, Floats, Integers, Reals
 from springcheck.physics.trajectory import Limits
-from springcheck.text.wording import count, regularly
+from springcheck.text.wording import count, few, regularly
 
 
 def bridges(case: Case) -> bool:
@@ -120,7 +120,6 @@ def _allowed(case: Case) -> tuple[Floats, NDArray[np.bool_]]:
 
 BLIND = "cannot be judged by single steps here: rounding may be as large as they are"
 
-
 NO_BETTER = "cannot be judged to better than that here: rounding is as large"
 
 
@@ -167,8 +166,7 @@ def _list(case: Case, which: NDArray[np.bool_], said: str, size: Reals | None = 
         f"{'qp'[i]}{along[j]} of particle {of[j]}" + ("" if size is None else f" ({float(size[i, j]):.1e})")
         for i, j in np.argwhere(which)
     ]
-    more = f" and {len(names) - MOST_LISTED} more" if len(names) > MOST_LISTED else ""
-    return f"; {', '.join(names[:MOST_LISTED])}{more} {said}" if names else ""
+    return f"; {few(names, MOST_LISTED)} {said}" if names else ""
 
 
 MOST_LISTED = 4
@@ -299,19 +297,14 @@ def _without_length(case: Case, off: NDArray[np.bool_]) -> str:
     )
 
 
-def rates_met(case: Case, *states: Reals) -> Floats:
-    """Gershgorin's bound of the frequencies and rates met up to each of the states (f, n) -> (f,) [1/T]."""
-    rows = [case.system.gershgorin(q.astype(np.longdouble)) / case.judged.m for q in states]
-    steepest = np.maximum.accumulate(np.max(np.concatenate(rows, axis=-1), axis=-1))
+def fastest(case: Case) -> float:
+    """Gershgorin's bound of the frequencies and rates met on the whole trajectory [1/T]."""
+    q = case.trajectory.q
+    steepest = np.max(case.system.gershgorin(q.astype(np.longdouble)) / case.judged.m)
     turns = 0.0 if case.law.turns is None else np.max(case.law.turns)
     if case.system.brakes_by_place:
-        turns = turns + max(float(np.max(np.abs(case.system.friction_at(q)[0]))) for q in states)
-    return np.asarray(np.sqrt(steepest) + np.max(case.system.friction_rates) + turns, np.float64)
-
-
-def fastest(case: Case) -> float:
-    """The largest of `rates_met` on the whole trajectory [1/T]."""
-    return float(rates_met(case, case.trajectory.q)[-1])
+        turns = turns + float(np.max(np.abs(case.system.friction_at(q)[0])))
+    return float(np.sqrt(steepest) + np.max(case.system.friction_rates) + turns)
 
 
 @check("arith", family="motion", requires=MAP | {"resolved"})
@@ -345,7 +338,6 @@ def arithmetic(case: Case) -> Finding | str:
 
 FLOOR = 2.0**-8
 """A random rounding stays below this fraction of its unit once in 2**8 times."""
-
 
 ENOUGH = 9
 """Frames of which all stay below `FLOOR` by chance once in 2**64 times: 8 steps, or fewer particles."""

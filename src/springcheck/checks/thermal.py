@@ -42,10 +42,11 @@ def thermostat(case: Case) -> Thermostat:
 
 
 def _reading(case: Case) -> Reading:
-    return _read(case, *(x[_unread(case) :] for x in (case.trajectory.q, case.trajectory.p)))
+    return read_frames(case, *(x[_unread(case) :] for x in (case.trajectory.q, case.trajectory.p)))
 
 
-def _read(case: Case, q: Floats, p: Floats) -> Reading:
+def read_frames(case: Case, q: Floats, p: Floats) -> Reading:
+    """The draws behind other frames q, p (f, n) of the case's scene and scheme."""
     run, scheme = case.trajectory, thermostat(case)
     by = thermal.rigid.read if case.judged.system.rods else thermal.draws.read
     return by(scheme, case.judged, q, p, how=run.arithmetic, rebuilt=run.rebuilds_velocity)
@@ -81,7 +82,7 @@ def noise_direction(case: Case) -> Finding | str:
     if not len(off):
         run = case.trajectory
         liveliest = int(np.argmax(np.sum(np.square(run.p.astype(np.longdouble)) / case.judged.m, axis=1)))
-        still = _read(case, *(np.repeat(x[liveliest][None], 4, axis=0) for x in (run.q, run.p))).across
+        still = read_frames(case, *(np.repeat(x[liveliest][None], 4, axis=0) for x in (run.q, run.p))).across
         # without draws a particle at rest stays there
         least = -1.0 if thermostat(case).draws else 0.0
         if still is not None and least < np.max(still) <= found.roundings:

@@ -20,6 +20,7 @@ from springcheck import engines, schemes
 from springcheck.engines import BRAKES, DRIVEN, EVERY_FORCE, Engine, Label, Method, Simulation, Stopped
 from springcheck.errors import IdentificationError, MethodError, told
 from springcheck.identify import identify_stepper
+from springcheck.identify.pair import returned
 from springcheck.physics.arrays import Floats
 from springcheck.physics.driven import timed
 from springcheck.physics.scene import Scene
@@ -34,7 +35,6 @@ UNKNOWN = Scheme(
     unnamed=True,
     source="none: only what needs no scheme is judged",
 )
-
 
 Spec = str | Callable[..., Any]
 """A function, or the text that says where one is."""
@@ -218,12 +218,7 @@ class _Steps:
         else:
             given = (float(self._q[0]), float(self._p[0]), float(self._m[0]))
         out = self._function(given[0], given[1], self._h, self._force, given[2])
-        if not isinstance(out, tuple | list | np.ndarray) or len(out) != 2:
-            what = type(out).__name__ + (f" of {len(out)}" if isinstance(out, tuple | list) else "")
-            raise MethodError(f"{self._name}: returned {what}; a step returns (q, p)")
-        if np.iscomplexobj(out[0]) or np.iscomplexobj(out[1]):
-            raise MethodError(f"{self._name}: returned complex numbers, and no real numbers")
-        q, p = (np.atleast_1d(np.asarray(x, np.float64)) for x in out)
+        q, p = map(np.atleast_1d, returned(self._function, out))
         if q.shape != (self._n,) or p.shape != (self._n,):
             raise MethodError(f"{self._name}: returned shapes {q.shape} and {p.shape}, not ({self._n},)")
         return q, p

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -37,6 +39,26 @@ class Timeless:
         return self._law(q, p)
 
 
+def returned(step: Callable[..., Any], out: Any) -> tuple[Floats, Floats]:
+    """The position and the momentum that a step returned, as doubles.  MethodError, with the place of the
+    function, for anything but two real numbers or arrays."""
+    what = f"{type(out).__name__}{f' of {len(out)}' if isinstance(out, tuple | list) else ''}"
+    try:
+        q, p = out
+        what = "no numbers"
+        if not (np.iscomplexobj(q) or np.iscomplexobj(p)):
+            both = np.asarray(q, np.float64), np.asarray(p, np.float64)
+            if all(x.size for x in both):
+                return both
+        else:
+            what = "complex numbers"
+    except (TypeError, ValueError):
+        pass
+    name, code = getattr(step, "__name__", "the function"), getattr(inspect.unwrap(step), "__code__", None)
+    where = f" ({Path(code.co_filename).name}, line {code.co_firstlineno})" if code else ""
+    raise MethodError(f"{name}: returned {what}; a step returns (q, p){where}")
+
+
 def _pair(bond: float) -> Scene:
     both, m, k, q, p = np.arange(2), *map(np.array, (M, K, Q, P))
     walls = WallSpring(i=both, k=k, at=np.zeros(2))
@@ -49,15 +71,15 @@ def _step(step: Callable[..., Any], scene: Scene) -> Floats:
     force = Timeless(lambda q, p: scene.system.force(*(np.array(x, np.float64) for x in (q, p + 0 * q))))
     try:
         out = step(scene.q.copy(), scene.p.copy(), H, force, scene.m.copy())
-        new = np.array([*out], dtype=np.float64)
     except KeyboardInterrupt:
         raise
     except BaseException as error:
         file = getattr(getattr(step, "__code__", None), "co_filename", "")
         raise MethodError(f"arrays of two end in {told(error, file)}") from error
-    if new.shape != (2, 2) or not np.all(np.isfinite(new)):
-        raise MethodError(f"of arrays of two it returns {new.tolist()}")
-    return new
+    new = returned(step, out)
+    if any(x.shape != (2,) or not np.all(np.isfinite(x)) for x in new):
+        raise MethodError(f"of arrays of two it returns {[x.tolist() for x in new]}")
+    return np.stack(new)
 
 
 def on_a_pair(step: Callable[..., Any], names: Sequence[str]) -> list[Explanation]:

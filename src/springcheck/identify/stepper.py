@@ -11,7 +11,7 @@ import numpy as np
 
 from springcheck.errors import IdentificationError, MethodError, told
 from springcheck.identify.families import title
-from springcheck.identify.pair import Timeless, on_a_pair
+from springcheck.identify.pair import Timeless, on_a_pair, returned
 from springcheck.identify.report import identify_arrays
 from springcheck.identify.result import Explanation, Identification
 from springcheck.identify.taken import takers
@@ -64,12 +64,8 @@ def _one(
                 out = step(np.array([q]), np.array([p]), h, force, np.array([mass]))
             except Exception:
                 raise first from None
-        new_q, new_p = out
-        q, p = (
-            float(np.asarray(x, dtype=np.float64).reshape(())) if np.ndim(x) == 0 else float(np.ravel(x)[0])
-            for x in (new_q, new_p)
-        )
-    except KeyboardInterrupt:
+        q, p = (float(x.flat[0]) for x in returned(step, out))
+    except (KeyboardInterrupt, MethodError):
         raise
     except BaseException as error:
         file = getattr(getattr(step, "__code__", None), "co_filename", "")

@@ -25,7 +25,7 @@ from springcheck.studies.arguments import Progress
 from springcheck.studies.choose import LeftOut, choose
 from springcheck.studies.run.changes import changed
 from springcheck.studies.run.result import FAULT, Repeat, Repeats, Report, Stored
-from springcheck.studies.run.tally import Tally, line, solution
+from springcheck.studies.run.tally import Tally, line
 
 if TYPE_CHECKING:
     from springcheck.studies.ensemble.result import Ensemble
@@ -217,7 +217,7 @@ def judge(
         # over the same frames; runs that have ended are left out
         pieces = {name: one for name, one in zip(sources, windows, strict=True) if one is not None}
         judged_frames += max(len(piece.t) for piece in pieces.values())
-        known = solution(scene, pieces.values()) if exact.has_true_motion(scene) else None
+        known = compare.solution(scene, pieces.values()) if exact.has_true_motion(scene) else None
         for name, piece in pieces.items():
             verdicts[name].append(checks.judge(scene, piece, piece=True))
             if any(v.passed is False and v.check in checks.TELLING for v in verdicts[name][-1]):

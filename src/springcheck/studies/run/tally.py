@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from springcheck import checks
+from springcheck.checks.compare import solution
 from springcheck.physics import exact
 from springcheck.physics.arrays import Extended, Reals
 from springcheck.physics.norm import energy_scale
@@ -20,12 +20,6 @@ if TYPE_CHECKING:
 
 FAINTEST_ENERGY = np.finfo(np.float64).tiny / np.finfo(np.float64).eps
 """Scale of energies below which they are subnormal in double precision and lose digits."""
-
-
-def solution(scene: Scene, pieces: Collection[Trajectory]) -> tuple[Extended, Extended]:
-    """The exact solution q, p (f, n) at the frames of the longest of these pieces, where it is known."""
-    longest = max(pieces, key=lambda piece: len(piece.t))
-    return exact.true_motion(scene, checks.Case(trajectory=longest, scene=scene).steps, longest.step)
 
 
 class Tally:
