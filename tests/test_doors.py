@@ -208,7 +208,7 @@ BAD_FUNCTIONS = [
     ("    raise ValueError('no\\nidea')", "ValueError: no idea (mine.py, line 3)"),
     ("    return 'a', p", "returned no numbers; a step returns (q, p) (mine.py, line 2)"),
     ("    return q, [q, [p]]", "returned no numbers"),
-    ("    return q + 1j, p", "returned complex numbers"),
+    ("    return q + 1j, p", "returned complex numbers, and no real numbers"),
     ("    return [1, 2, 3], p", "returned shapes (3,)"),
 ]
 

@@ -259,7 +259,8 @@ def test_other_springs_do_not_repeat_a_remark() -> None:
 @pytest.mark.parametrize(
     ("out", "what"),
     [(1.0, "float"), (None, "NoneType"), ((1, 2, 3), "tuple of 3"), (("a", 1.0), "no numbers"),
-     (([1.0, [2.0]], 1.0), "no numbers"), (([], []), "no numbers"), ((1j, 1.0), "complex numbers")],
+     (([1.0, [2.0]], 1.0), "no numbers"), (([], []), "no numbers"),
+     ((1j, 1.0), "complex numbers, and no real numbers")],
 )  # fmt: skip
 def test_what_is_no_pair_of_numbers_is_put_down_to_the_function(out: Any, what: str) -> None:
     """It was: TypeError: cannot unpack non-iterable float object (stepper.py, line 67)."""

@@ -51,7 +51,7 @@ def returned(step: Callable[..., Any], out: Any) -> tuple[Floats, Floats]:
             if all(x.size for x in both):
                 return both
         else:
-            what = "complex numbers"
+            what = "complex numbers, and no real numbers"
     except (TypeError, ValueError):
         pass
     name, code = getattr(step, "__name__", "the function"), getattr(inspect.unwrap(step), "__code__", None)
