@@ -18,7 +18,7 @@ BUDGETS = {
     ("engines",): 2816,
     ("driver", "conformance", "doors"): 1216,
     ("checks",): 5272,
-    ("identify",): 9151,
+    ("identify",): 9149,
     ("formats", "store"): 5267,
     ("studies",): 1450,
     ("studies/*",): 9770,
