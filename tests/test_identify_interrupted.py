@@ -181,8 +181,8 @@ def test_a_restart_from_few_digits_is_told_with_their_number() -> None:
     before = verlet(0.7, 0.3, 60)
     q, v = np.concatenate([before, verlet(*np.round(before[-1], 4), 61)[1:]]).T
     assert identify(0.31 * np.arange(120), q, v=v).statement == (
-        "The motion of Velocity Verlet jumps by 6.8e-05 of its size between frames 59 and 60, as after a restart "
-        "from numbers of 4 digits"
+        "The motion of Velocity Verlet jumps by 6.8e-05 of its size between frames 59 and 60, as after a "
+        "restart from numbers of 4 digits"
     )
 
 
