@@ -18,7 +18,7 @@ BUDGETS = {
     ("engines",): 2816,
     ("driver", "conformance", "doors"): 1200,
     ("checks",): 5381,
-    ("identify",): 9172,
+    ("identify",): 9170,
     ("formats", "store"): 5151,
     ("studies",): 1456,
     ("studies/*",): 9777,

@@ -21,7 +21,7 @@ from springcheck.identify import Identification, identify, identify_stepper
 from springcheck.identify.hypothesis import aliases
 from springcheck.identify.result import UNTOLD, rounded_by
 from springcheck.physics.arrays import Floats, Force
-from springcheck.schemes import SCHEMES, matrix, step
+from springcheck.schemes import SCHEMES, matrix, number, step
 
 STEPPING = [s.name for s in SCHEMES.values() if s.has("one-step") and not s.has("mixes")]
 SPRINGS = 4
@@ -202,6 +202,21 @@ def test_what_rounding_hides_is_said_and_not_guessed() -> None:
 
 
 @pytest.mark.campaign
+def test_friction_in_the_force_takes_a_step_of_long_substeps_beyond_its_largest_phase() -> None:
+    """Without friction Forest & Ruth's phase turns back there: no guess of h w lies on its curve."""
+    h, w2, rate, (q, v) = 0.11, (1.33 / 0.11) ** 2, 1.1, (0.7, 2.3)
+    states = []
+    for _ in range(101):
+        states.append((q, v))
+        for kind, share in SCHEMES["forest-ruth"].stages:
+            c = h * float(number(share, np.longdouble))
+            q, v = (q + c * v, v) if kind == "drift" else (q, v - c * (w2 * q + rate * v))
+    q_, v_ = np.array(states).T
+    found = identify(h * np.arange(101), q_, v=v_)
+    assert (found.scheme, found.stride, found.fits) == ("forest-ruth", 1, True)
+    assert (found.omega[0], found.friction[0]) == pytest.approx((w2**0.5, rate))
+
+
 @pytest.mark.parametrize("form", ["single", "text"])
 @pytest.mark.parametrize("name", ["rk4", "ruth3", "forest-ruth", "yoshida4"])
 def test_a_scheme_of_high_order_in_coarse_numbers_is_named_or_listed_and_never_called_another(
@@ -575,6 +590,7 @@ def test_momenta_that_point_against_their_velocities_give_no_mass() -> None:
         ({"stiffness": np.nan}, "stiffness nan"),
         ({"friction": np.inf}, "friction inf"),
         ({"step": 0.0}, "step 0"),
+        ({"step": 1e-19}, "step 1e-19: .* of them to a frame are more than the times can tell"),
         ({"mass": 1e-90}, "mass 1e-90"),
         ({"stiffness": [1.0, 2.0]}, "stiffness of shape"),
     ],

@@ -166,6 +166,35 @@ def test_kicks_are_said_to_be_one_where_they_are() -> None:
     assert "and 2 more, not all like it, at frames 100, 150" in said
 
 
+def verlet(q: float, v: float, frames: int) -> Floats:
+    """States (frames, 2) on a spring of w**2 = 1.3."""
+    out = [(q, v)]
+    for _ in range(frames - 1):
+        v -= 0.155 * 1.3 * q
+        q += 0.31 * v
+        v -= 0.155 * 1.3 * q
+        out.append((q, v))
+    return np.array(out)
+
+
+def test_a_restart_from_few_digits_is_told_with_their_number() -> None:
+    before = verlet(0.7, 0.3, 60)
+    q, v = np.concatenate([before, verlet(*np.round(before[-1], 4), 61)[1:]]).T
+    assert identify(0.31 * np.arange(120), q, v=v).statement == (
+        "The motion of Velocity Verlet jumps by 6.8e-05 of its size between frames 59 and 60, as after a "
+        "restart from numbers of 4 digits"
+    )
+
+
+@pytest.mark.parametrize(
+    ("lost", "said"), [(1, "frame 40 is missing"), (3, "3 frames are missing from frame 40 on")]
+)
+def test_frames_that_are_missing_are_counted(lost: int, said: str) -> None:
+    q, v = np.delete(verlet(0.7, 0.3, 120), range(40, 40 + lost), axis=0).T
+    found = identify(0.31 * np.arange(len(q)), q, v=v)
+    assert found.statement == f"The motion is one of Velocity Verlet, but {said}"
+
+
 def test_interruptions_of_unlike_kinds_are_not_said_to_be_alike() -> None:
     def act(n: int, q: float, v: float) -> float:
         return v * (0.9 if n in (60, 90) else 1)

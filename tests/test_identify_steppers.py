@@ -272,3 +272,32 @@ def test_what_is_no_pair_of_numbers_is_put_down_to_the_function(out: Any, what: 
     said = f"step: returned {what}; a step returns (q, p) (test_identify_steppers.py, line {line})"
     with pytest.raises(MethodError, match=re.escape(said)):
         identify_stepper(step)
+
+
+def kick_drift(q: Any, p: Any, h: float, force: Force, m: Any) -> tuple[Any, Any]:
+    p = p + h * force(q)
+    return q + h * p / m, p
+
+
+def drift_kick(q: Any, p: Any, h: float, force: Force, m: Any) -> tuple[Any, Any]:
+    q = q + h * p / m
+    return q, p + h * force(q)
+
+
+def test_a_step_that_is_another_scheme_at_another_mass_is_told_with_both() -> None:
+    found = identify_stepper(
+        lambda q, p, h, force, m: (kick_drift if m > 1 else drift_kick)(q, p, h, force, m)
+    )
+    assert found.statement.startswith("The stepper looks like different schemes on different springs: ")
+    assert "semi-implicit-euler at m=3.7" in found.statement
+    assert "semi-implicit-euler-drift-kick at m=0.6" in found.statement
+
+
+def test_a_step_that_is_another_scheme_backwards_is_told_with_both() -> None:
+    found = identify_stepper(
+        lambda q, p, h, force, m: (kick_drift if h > 0 else drift_kick)(q, p, h, force, m)
+    )
+    assert (
+        found.statement
+        == "A negative step is not semi-implicit-euler backwards but semi-implicit-euler-drift-kick"
+    )

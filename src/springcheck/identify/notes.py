@@ -154,7 +154,7 @@ def of_unasked_friction(found: Identification) -> Identification:
 def _fault(found: Identification, *, stated: bool = False) -> Explanation | None:
     """A friction c/m = h k/(n m), n an integer: the mark of a faulty or implicit scheme; None for another.
     `stated` is whether a friction of 0 is."""
-    if not found.friction or not found.step or not all(x.law for x in found.candidates):
+    if not all(x.law for x in found.candidates):
         return None
     for one in found.candidates:
         for w, rate, det in zip(one.omega, one.friction, found.determinant, strict=True):

@@ -17,7 +17,7 @@ import numpy as np
 from springcheck.identify.coarse import is_white
 from springcheck.identify.compare import Target, solved
 from springcheck.identify.families import Family
-from springcheck.identify.fit import LEAST_NOISE
+from springcheck.identify.fit import KURTOSIS, LEAST_NOISE
 from springcheck.identify.guesses import FLOW_TURNS, Guesses, Roots, first
 from springcheck.identify.hypothesis import ERRORS, Match, Terms, distinct
 from springcheck.identify.maps import MapTable, table, unit
@@ -186,7 +186,7 @@ def _orbit(
     else:
         return None
     # a uniform error has a fourth moment of 9/5 of its variance squared, and ends at sqrt(3) of them
-    most = frames + ERRORS * math.sqrt(0.8 * frames) + 1
+    most = frames + ERRORS * math.sqrt(KURTOSIS * frames) + 1
     if left @ left > most or np.max(np.abs(left)) > math.sqrt(3) + 0.5:
         return None
     inverse = np.linalg.inv(triangle)

@@ -317,8 +317,6 @@ def _remembered(e: Evidence, found: Map) -> list[str]:
             return np.nan_to_num(off, nan=NO_METHOD, posinf=NO_METHOD, neginf=-NO_METHOD)
 
         for start in [[1.0, y] for y in PARAMETERS] if "{" in name else [[1.0]]:
-            if np.max(np.abs(left(np.array(start)))) >= NO_METHOD:
-                continue
             best = least_squares(left, start, x_scale="jac", xtol=1e-15, ftol=1e-15, gtol=1e-15)
             other = stated is not None and abs(best.x[0] * turn - stated) > AGREES * abs(stated)
             if np.max(np.abs(best.fun)) > 1 or other:
