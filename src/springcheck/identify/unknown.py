@@ -215,7 +215,8 @@ def memory(e: Evidence) -> Explanation | None:
     last = int(np.max(np.flatnonzero(start > 8 * e.unit), initial=-1)) + 1
     # a force that is not linear fades where the motion does, down to no map at all
     lasts = several is None and last > e.pairs // 2
-    if lasts or before < rounding or weighted < FALLS * found.worst:
+    forced = abs(float(later.entries[1, 0])) >= SURE * math.sqrt(later.covariance[2, 2])
+    if lasts or not forced or before < rounding or weighted < FALLS * found.worst:
         return None
     goes_on = later.z[last] - np.linalg.matrix_power(later.entries, last) @ later.z[0]
     if np.max(np.abs(goes_on)) < AS_BEFORE * np.max(start):
