@@ -97,8 +97,8 @@ def _of_rods(case: Case) -> str:
     across = replace(case, trajectory=replace(run, p=held))
     if rod_velocity(case).passed is False and not seldom_off(case)[1] and step_defect(across).passed:
         return (
-            "momenta keep their part along rods, which RATTLE takes off at the end of a step; without it each "
-            "step is the scheme's own"
+            "momenta keep their part along rods, which RATTLE takes off at the end of a step; without it "
+            "each step is the scheme's own"
         )
     drifts = [kind for kind in case.scheme.kinds if kind.drifts]
     if len(drifts) != 1:
@@ -123,8 +123,8 @@ def _of_rods(case: Case) -> str:
         off = float(np.max(np.abs(rods.strain(run.q[1:].astype(np.longdouble)))))
         return other.found(case) or (
             "SHAKE pushes along rods in their direction, and not as much as keeps lengths, off by up to "
-            f"{off:.2g} of themselves: a wide tolerance, an iteration that stops early, other masses in it, or "
-            "a spring in its place"
+            f"{off:.2g} of themselves: a wide tolerance, an iteration that stops early, other masses in it, "
+            "or a spring in its place"
         ) * (rod_length(case).passed is False)
     if along(rods.ways(loose)):
         return (
