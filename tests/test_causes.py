@@ -418,3 +418,21 @@ def test_a_factor_of_another_friction_is_not_said_to_have_its_noise_alone() -> N
     assert "as the friction asks" not in said
     times, error = (float(x) for x in said.split("or the friction is ")[1].split(" times")[0].split(" +- "))
     assert abs(times - 2) < 4 * error < 1
+
+
+@pytest.mark.parametrize("method", ["own:velocity-verlet", "own:rk4"])
+def test_two_numbers_that_are_exchanged_are_named(method: str) -> None:
+    scene = scenefile.load_scene("chain").derived(steps=60)
+    words = "each step is the scheme's own with the "
+    for i, j in ((0, 1), (0, 2), (1, 2)):
+        order = np.arange(3)
+        order[[i, j]] = j, i
+        run = driver.run(scene.derived(m=scene.m[order]), method)
+        assert f"{words}masses of particles {i} and {j} exchanged" in said(scene, run)
+        # velocities of a program, of which a reader makes momenta by the scene's masses
+        kept = replace(run, p=run.p / scene.m[order] * scene.m)
+        begun = scene.derived(p=kept.p[0])
+        assert f"{words}masses of particles {i} and {j} exchanged" in said(begun, kept)
+    walls, springs = scene.terms
+    turned = scene.derived(terms=(walls, replace(springs, k=springs.k[::-1])))  # type: ignore[call-arg, attr-defined]
+    assert f"{words}numbers (stiffness) of springs 0 and 1 exchanged" in said(scene, driver.run(turned, method))

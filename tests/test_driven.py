@@ -599,8 +599,11 @@ def test_an_axis_that_is_none_is_answered_with_those_that_are(table: str) -> Non
 @pytest.mark.parametrize("name", ["driven-spring", "mathieu-stable"])
 @pytest.mark.parametrize(
     ("late", "said"),
-    [(-37.0, "from step 37 on the time of the drive is 0 again"), (0.3, "37 on the drive is taken 0.3 steps later")],
-)  # fmt: skip
+    [
+        (-37.0, "from step 37 on the time of the drive is 0 again"),
+        (0.3, "from step 37 on the drive is taken 0.3 steps later"),
+    ],
+)
 def test_a_drive_that_another_time_moves_from_some_step_on_is_told(name: str, late: float, said: str) -> None:
     """As a program that is restarted from a frame, and counts its steps from there."""
     scene = replace(scenes.load_scene(name), steps=80)
