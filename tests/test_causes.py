@@ -435,4 +435,6 @@ def test_two_numbers_that_are_exchanged_are_named(method: str) -> None:
         assert f"{words}masses of particles {i} and {j} exchanged" in said(begun, kept)
     walls, springs = scene.terms
     turned = scene.derived(terms=(walls, replace(springs, k=springs.k[::-1])))  # type: ignore[call-arg, attr-defined]
-    assert f"{words}numbers (stiffness) of springs 0 and 1 exchanged" in said(scene, driver.run(turned, method))
+    assert f"{words}numbers (stiffness) of springs 0 and 1 exchanged" in said(
+        scene, driver.run(turned, method)
+    )
