@@ -125,15 +125,15 @@ def _exchanged(case: Case) -> Iterator[tuple[str, Case]]:
         for column in term.columns:
             if (numbers := term.arrays[column.field]).dtype.kind == "f":
                 words = f"numbers ({column.name}) of {term.key.removeprefix('wall-')}s"
-                other = partial(_with, case, number, column.field)
-                kinds.append((words, numbers, other, np.arange(len(numbers))))
+                changed = partial(_with, case, number, column.field)
+                kinds.append((words, numbers, changed, np.arange(len(numbers))))
     for words, numbers, other, rows in kinds:
         for i, j in combinations(range(int(np.max(rows, initial=-1)) + 1), 2):
             mine, its = numbers[rows == i], numbers[rows == j]
             if len(mine) == len(its) and np.any(mine != its) and len(numbers) <= MOST_ALONE:
-                changed = numbers.copy()
-                changed[rows == i], changed[rows == j] = its, mine
-                yield f"the {words} {i} and {j} exchanged", other(changed)
+                swapped = numbers.copy()
+                swapped[rows == i], swapped[rows == j] = its, mine
+                yield f"the {words} {i} and {j} exchanged", other(swapped)
 
 
 def _numbers(case: Case) -> Iterator[Number]:
