@@ -594,3 +594,24 @@ def test_an_axis_that_is_none_is_answered_with_those_that_are(table: str) -> Non
     given = f"{table}\naxis = 'w'\n[[particle]]\nmass = 1.3\nposition = [0.3, 0.1]\nmomentum = [0.1, 0.2]\n"
     with pytest.raises(SceneError, match=r"\.axis = 'w': one of x, y, z is needed"):
         scenes.parse(f"title = 'a'\n{given}[time]\nstep = 0.1\nsteps = 20\n", name="a")
+
+
+@pytest.mark.parametrize("name", ["driven-spring", "mathieu-stable"])
+@pytest.mark.parametrize(
+    ("late", "said"),
+    [
+        (-37.0, "from step 37 on the time of the drive is 0 again"),
+        (0.3, "from step 37 on the drive is taken 0.3 steps later"),
+    ],
+)
+def test_a_drive_that_another_time_moves_from_some_step_on_is_told(name: str, late: float, said: str) -> None:
+    """As a program that is restarted from a frame, and counts its steps from there."""
+    scene = replace(scenes.load_scene(name), steps=80)
+    right = springcheck.simulate(scene, "own:velocity-verlet")
+    drive = next(x for x in scene.terms if x.kind == "drive")
+    phase = drive.phase + drive.frequency * scene.step * (37 + late)  # type: ignore[attr-defined]
+    terms = tuple(replace(x, phase=phase) if x is drive else x for x in scene.terms)  # type: ignore[call-arg]
+    again = scene.derived(q=right.q[37], p=right.p[37], steps=43, terms=terms)
+    rest = springcheck.simulate(again, "own:velocity-verlet")
+    q, p = (np.concatenate([getattr(right, x)[:37], getattr(rest, x)]) for x in "qp")
+    assert said in sentence(scene, replace(right, q=q, p=p))

@@ -663,6 +663,7 @@ def test_what_is_peculiar_to_a_scheme_or_a_spring_stands_beside_its_name(
     ("q", "v", "note"),
     [
         (lambda t: 0.3 + 0.4 * t, lambda t: 0.4 + 0 * t, "1 moves freely, in a straight line"),
+        (lambda t: 0.3 + 0.4 * t - 0.6 * t * t, lambda t: 0.4 - 1.2 * t, "1 moves by a constant force alone"),
         (lambda t: (-1.0) ** np.arange(len(t)), lambda t: 0 * t + 1e-30, "1 shows too little of its motion"),
     ],
 )
@@ -673,6 +674,13 @@ def test_a_coordinate_that_shows_no_scheme_is_left_out_and_said_to_be(
     found = identify(t, np.stack([x, q(t)], axis=1), v=np.stack([p / 3.7, v(t)], axis=1), mass=3.7)
     assert found.scheme == "velocity-verlet"
     assert [f"oscillator {note}" in one and "is left out" in one for one in found.notes] == [True]
+
+
+def test_a_fall_alone_is_refused_and_has_no_spring() -> None:
+    """It was an inverted spring of a stiffness of 1e-12, by one of all schemes."""
+    t = 0.0279 * np.arange(120)
+    with pytest.raises(IdentificationError, match="no force acts on oscillator 0 but a constant one"):
+        identify(t, 1.0 + 0.3 * t + 0.2 * t * t, v=0.3 + 0.4 * t)
 
 
 def test_a_coordinate_in_a_straight_line_whose_velocities_alternate_does_not_move_freely() -> None:

@@ -194,3 +194,42 @@ def test_few_digits_do_not_tell_a_small_quadratic_drag_from_friction_and_say_so(
     found = identify(t, q, v=v, mass=1.0, stiffness=1.7, step=every_h)
     assert found.fits
     assert ("not known here" in found.statement) == bool(drag)
+
+
+@pytest.mark.parametrize("step", [verlet, heun])
+@pytest.mark.parametrize(
+    ("depth", "steepness", "m", "q", "v", "h"),
+    [
+        (1.46, 0.98, (0.237, 1.698), (9.82, 12.7), (2.16, 0.04), 0.0472),
+        (0.46, 0.98, (0.559, 0.214), (0.96, -0.5), (-0.11, 1.05), 0.0567),
+    ],
+    ids=["long swings", "into free flight"],
+)
+def test_a_bond_that_softens_has_no_memory_and_no_bath(
+    step: Any, depth: float, steepness: float, m: Any, q: Any, v: Any, h: float,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    """What fades with the distance was a start-up, and a factor below 0 in most steps a thermostat's."""
+    monkeypatch.setitem(globals(), "H", h)
+    m, q, v = map(np.array, (m, q, v))
+
+    def force(q: Any, v: Any, t: float) -> Any:
+        near = np.exp(-steepness * (q[1] - q[0] - 0.25))
+        return 2 * depth * steepness * (1 - near) * near * np.array([1, -1]) / m
+
+    t, q, v = march(step, q, v, force, 251)
+    found = identify(t, q, v=v)
+    assert not found.fits
+    assert not any(word in found.statement for word in ("memory", "thermostat", "several"))
+
+
+def test_a_relaxation_oscillation_has_no_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(globals(), "H", 0.013)
+
+    def force(q: Any, v: Any, t: float) -> Any:
+        return (-1.29 * q + 0.249 * (1 - (q / 0.256) ** 2) * v) / 0.397
+
+    t, q, v = march(verlet, 1.2, -3.5, force, 251)
+    found = identify(t, q, v=v)
+    assert not found.fits
+    assert "memory" not in found.statement

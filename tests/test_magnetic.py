@@ -282,3 +282,19 @@ def test_forces_in_a_field_are_counted_as_they_are_evaluated(
     run = springcheck.simulate(scene, f"own:{method}")
     force, slow, fast, _ = made
     assert run.force_calls == force + slow + fast == calls
+
+
+@pytest.mark.parametrize(("step", "grows"), [(1.53, False), (1.55, True), (-2.0, True), (6.1, True)])
+def test_a_run_in_a_field_is_warned_of_a_step_with_which_boris_grows(step: float, grows: bool) -> None:
+    """The trace of its step is 1 + R times 1 - (h w)**2/2, R the rotation in the field."""
+    scene = replace(scenes.load_scene("foucault"), step=step, steps=30)
+    turn, w2 = np.arctan(0.37 / 1.7 * step / 2), 2.9 / 1.7
+    trace = abs(np.cos(turn) * (1 - w2 * step**2 / 2))
+    factor = trace + np.sqrt(max(trace**2 - 1, 0))
+    assert (factor > 1) == grows
+    found = longest.resonating("boris", scene)
+    assert found == (pytest.approx(factor, rel=1e-9) if grows else None)
+    said = " ".join(str(springcheck.run(scene, methods=["own:boris"])).split())
+    assert (f"grow by a factor of {factor:.4f} a step, and the exact" in said) == grows
+    # of kicks by the field's force no step is bounded, and no shorter one helps
+    assert longest.resonating("velocity-verlet", scene) is None

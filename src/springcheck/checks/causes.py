@@ -15,6 +15,7 @@ import numpy as np
 from springcheck.checks import driven, other
 from springcheck.checks.case import Case
 from springcheck.checks.requires import MAP, missing
+from springcheck.checks.rods import rod_length, rod_velocity
 from springcheck.checks.steps import STANDS_APART, seldom_off, step_defect
 from springcheck.checks.thermal import (
     collisions,
@@ -182,27 +183,45 @@ def _of_differences(case: Case) -> str:
 
 
 def _of_rods(case: Case) -> str:
-    """The direction of the impulses along rods, where it is not that of the rods before the drift."""
+    """Momenta that are not projected, impulses along other directions than that of the rods before the drift,
+    or of another size than keeps their lengths."""
     rods, run = case.system.rods, case.trajectory
-    drifts = [kind for kind in case.scheme.kinds if kind.drifts]
-    if rods is None or rods.share or len(run.t) < 3 or len(drifts) != 1:
+    if rods is None or len(run.t) < 3:
         return ""
-    scene = case.judged
+    q, p = (x.astype(np.longdouble) for x in (run.q, run.p))
+    held = np.concatenate([run.p[:1], rods.projected(q[1:], p[1:]).astype(np.float64)])
+    across = replace(case, trajectory=replace(run, p=held))
+    if rod_velocity(case).passed is False and not seldom_off(case)[1] and step_defect(across).passed:
+        return (
+            "momenta keep their part along rods, which RATTLE takes off at the end of a step; without it "
+            "each step is the scheme's own"
+        )
+    drifts = [kind for kind in case.scheme.kinds if kind.drifts]
+    if len(drifts) != 1:
+        return ""
+    scene, q, p = case.judged, q[:-1], p[:-1]
     free = scene.derived(terms=tuple(x for x in scene.terms if x.kind != "constraint"))
-    q, p = (x[:-1].astype(np.longdouble) for x in (run.q, run.p))
     loose = Case(trajectory=run, scene=free).step(q, p)[0]
     push, noise = run.q[1:] - loose, 2.0**-53 * (np.abs(run.q[1:]) + np.abs(loose))
     moved = rods.apart(push)
     allowed = PUSH_ROUNDINGS * rods.spans(noise)
 
     def along(way: Reals) -> bool:
-        part = rods.each(rods.dot(moved, way) / rods.dot(way, way)) * way
+        size = rods.solve(way, way, rods.dot(moved, way))
+        part = rods.apart(rods.spread(rods.each(size) * way) / scene.m)
         off = np.sqrt(rods.dot(moved - part, moved - part))
         return bool(np.all(off[1:] <= allowed[1:]))
 
     ways = rods.ways(q)
-    if np.all(np.sqrt(rods.dot(moved, moved)) <= allowed) or along(ways):
+    if np.all(np.sqrt(rods.dot(moved, moved)) <= allowed):
         return ""
+    if along(ways):
+        off = float(np.max(np.abs(rods.strain(run.q[1:].astype(np.longdouble)))))
+        return other.found(case) or (
+            "SHAKE pushes along rods in their direction, and not as much as keeps lengths, off by up to "
+            f"{off:.2g} of themselves: a wide tolerance, an iteration that stops early, other masses in it, "
+            "or a spring in its place"
+        ) * (rod_length(case).passed is False)
     if along(rods.ways(loose)):
         return (
             "SHAKE pushes the ends of a rod along it as it lies after the drift, where "

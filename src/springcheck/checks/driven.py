@@ -55,6 +55,14 @@ def found(case: Case) -> str:
     if abs(later) > _delay(case)[1] and _fits(case, later):
         way = f"{'of a step' if abs(later) <= 1 else 'steps'} {'later' if later > 0 else 'earlier'}"
         return f"the drive is taken {abs(later):.6g} {way} than {title} takes it"
+    allowed = np.stack(case.allowance)[..., :-1] * case.roundings * SLACK
+    first = int(np.argmax(np.any(np.abs(_off(case, 0.0)) > allowed, axis=(0, 2))))
+    rest = replace(case, trajectory=case.trajectory.at(slice(first, None)))
+    if first and _fits(rest, -float(case.steps[first])):
+        return f"from step {first} on the time of the drive is 0 again, as after a restart"
+    if first and _fits(rest, later := _later(rest)):
+        way = "later" if later > 0 else "earlier"
+        return f"from step {first} on the drive is taken {abs(later):.6g} steps {way} than before"
     return ""
 
 

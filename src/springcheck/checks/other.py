@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
+from itertools import combinations
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -44,7 +45,11 @@ def found(case: Case) -> str:
     with np.errstate(all="ignore"):
         values = ((name, own, _value(case, own, size, of)) for name, own, size, of in _numbers(case))
         shown = dict.fromkeys(_said(name, own, x) for name, own, x in values if x is not None)
-        return f"{SAME} with another number, {either([*shown])}" if shown else _frame(case)
+        if shown:
+            return f"{SAME} with another number, {either([*shown])}"
+        return next(
+            (f"{SAME} with {words}" for words, of in _exchanged(case) if _fits(case, of)), _frame(case)
+        )
 
 
 def _said(name: str, own: float, value: float) -> str:
@@ -77,8 +82,7 @@ def _value(case: Case, own: float, size: float, of: Callable[[float], Case]) -> 
         left, x = np.sum(here * here), x - float(np.sum(here * slope) / np.sum(slope * slope))
     if not (np.max(np.abs(here)) <= VALUE_SLACK and abs(x - own) > error):
         return None
-    fits = np.max(np.abs(_off(of(x), unit, every))) <= VALUE_SLACK
-    return (x if abs(x) > error else 0.0) if fits else None
+    return (x if abs(x) > error else 0.0) if _fits(case, of(x)) else None
 
 
 def _with(case: Case, number: int, field: str, values: Floats) -> Case:
@@ -86,6 +90,50 @@ def _with(case: Case, number: int, field: str, values: Floats) -> Case:
     terms: list[Any] = list(case.judged.terms)
     terms[number] = replace(terms[number], **{field: values})
     return sight.of_scene(case, case.judged.derived(terms=tuple(terms)))
+
+
+def _heavier(case: Case, m: Floats) -> Case:
+    """The case with other masses of its coordinates (n,), a clock's apart; none is below 0."""
+    scene = case.judged
+    return sight.of_scene(case, scene.derived(m=np.append(np.where(m > 0, m, np.nan), scene.m[len(m) :])))
+
+
+def _quicker(case: Case, m: Floats) -> Case:
+    """The same, of a program that keeps velocities, from which momenta were made by the scene's masses."""
+    there = _heavier(case, m)
+    p = case.trajectory.p * (there.scene.m / case.judged.m)
+    return replace(there, trajectory=replace(there.trajectory, p=p))
+
+
+def _fits(case: Case, other: Case) -> bool:
+    """Whether all steps are the scheme's own in another case."""
+    assert case.ahead is not None
+    unit, every = case.roundings * case.ahead.allowance, np.arange(len(case.trajectory.t) - 1)
+    # some of them tell nearly all others
+    parts = sight.rows(case, len(every)), every
+    return all(np.max(np.abs(_off(other, unit, at))) <= VALUE_SLACK for at in parts)
+
+
+def _exchanged(case: Case) -> Iterator[tuple[str, Case]]:
+    """Cases in which two particles have exchanged their masses, or two rows of a term a number."""
+    scene = case.judged
+    n, of = scene.n - scene.system.is_driven, scene.all_places[: scene.n - scene.system.is_driven] // 3
+    kinds: list[tuple[str, Floats, Callable[[Floats], Case], Integers]] = [
+        ("masses of particles", scene.m[:n], partial(way, case), of) for way in (_heavier, _quicker)
+    ]
+    for number, term in enumerate(scene.terms):
+        for column in term.columns:
+            if (numbers := term.arrays[column.field]).dtype.kind == "f":
+                words = f"numbers ({column.name}) of {term.key.removeprefix('wall-')}s"
+                changed = partial(_with, case, number, column.field)
+                kinds.append((words, numbers, changed, np.arange(len(numbers))))
+    for words, numbers, other, rows in kinds:
+        for i, j in combinations(range(int(np.max(rows, initial=-1)) + 1), 2):
+            mine, its = numbers[rows == i], numbers[rows == j]
+            if len(mine) == len(its) and np.any(mine != its) and len(numbers) <= MOST_ALONE:
+                swapped = numbers.copy()
+                swapped[rows == i], swapped[rows == j] = its, mine
+                yield f"the {words} {i} and {j} exchanged", other(swapped)
 
 
 def _numbers(case: Case) -> Iterator[Number]:
@@ -107,18 +155,9 @@ def _numbers(case: Case) -> Iterator[Number]:
     if sum(term.kind == "potential" for term in scene.terms) > 1:
         yield "a factor to every force", 1.0, 0.0, lambda x: sight.of_scene(case, scene.system.scaled(x))
 
-    def heavier(m: Floats) -> Case:
-        # no mass is below 0
-        return sight.of_scene(case, scene.derived(m=np.append(np.where(m > 0, m, np.nan), scene.m[n:])))
-
-    def quicker(m: Floats) -> Case:
-        # of a program that keeps velocities, from which momenta were made by the scene's masses
-        there = heavier(m)
-        return replace(there, trajectory=replace(there.trajectory, p=run.p * (there.scene.m / scene.m)))
-
     where = [f"particle {one}" for one in of[:n]]
-    yield from _each("mass", " of ", scene.m[:n], heavier, where)
-    yield from _each("mass", " that divides the force on ", scene.m[:n], quicker, where)
+    yield from _each("mass", " of ", scene.m[:n], partial(_heavier, case), where)
+    yield from _each("mass", " that divides the force on ", scene.m[:n], partial(_quicker, case), where)
     yield "the step", run.step, 0.0, lambda x: sight.changed(case, "step", x / run.step - 1)
 
 

@@ -57,7 +57,8 @@ def _oscillators(record: Record) -> tuple[Record, list[int], list[Map], list[str
     n = record.q.shape[1]
     notes = [f"{n - len(moving)} of {n} oscillators are at rest and left out"] if len(moving) < n else []
     free = [j for j in moving if _straight(record, j)]
-    maps = {j: fit(record, j) for j in moving if j not in free}
+    falls = [j for j in moving if j not in free and _falls(record, j)]
+    maps = {j: fit(record, j) for j in moving if j not in (*free, *falls)}
     if len(maps) > 1 and (modes := _uncoupled(record, maps)) is not None:
         kept = {i: fit(modes, i) for i in range(modes.q.shape[1]) if not _straight(modes, i)}
         good = [i for i, found in kept.items() if found.conditioned and _forced(found)]
@@ -76,10 +77,14 @@ def _oscillators(record: Record) -> tuple[Record, list[int], list[Map], list[str
         return record, every, [maps[j] for j in every], notes
     if not good:
         if (lost and maps[lost[0]].conditioned) or not lost:
+            if lost:
+                why = f"velocities of oscillator {lost[0]} do not depend on its positions beyond their digits"
+                raise IdentificationError(f"the {why}")
+            if falls:
+                why = f"oscillator {falls[0]} but a constant one, by which few schemes can be told apart"
+                raise IdentificationError(f"no force acts on {why}: record a motion on a spring")
             raise IdentificationError(
-                f"the velocities of oscillator {lost[0]} do not depend on its positions beyond their digits"
-                if lost
-                else f"no force acts on oscillator {free[0]}: every scheme moves it in a straight line"
+                f"no force acts on oscillator {free[0]}: every scheme moves it in a straight line"
             )
         if proportion := _proportional(record, lost[0]):
             raise IdentificationError(f"the velocities of oscillator {lost[0]} {proportion}")
@@ -89,6 +94,8 @@ def _oscillators(record: Record) -> tuple[Record, list[int], list[Map], list[str
         )
     if free:
         notes.append(f"{_names(free)} moves freely, in a straight line as by every scheme, and is left out")
+    if falls:
+        notes.append(f"{_names(falls)} moves by a constant force alone, and is left out")
     if lost:
         notes.append(f"{_names(lost)} shows too little of its motion to be judged, and is left out")
     return record, good, [maps[j] for j in good], notes
@@ -96,6 +103,10 @@ def _oscillators(record: Record) -> tuple[Record, list[int], list[Map], list[str
 
 ALIKE = 1e-9
 """Relative difference up to which velocities are a multiple of the positions."""
+
+
+FEWEST_OF_A_FALL = 8
+"""Frames that a constant acceleration explains by more than its own three numbers."""
 
 
 def _proportional(record: Record, j: int) -> str:
@@ -131,6 +142,17 @@ def _straight(record: Record, j: int) -> bool:
     way = np.arange(len(q)) * record.interval * np.mean(v)
     unit = 2 * np.max(record.q_quantum[:, j]) + ROUNDING * 64 * np.sqrt(len(q)) * np.max(np.abs(q))
     return bool(np.max(np.abs(q - q[0] - way)) <= unit + np.abs(way[-1]) * (record.jitter + 64 * ROUNDING))
+
+
+def _falls(record: Record, j: int) -> bool:
+    """Whether a coordinate moves at constant acceleration, to the rounding of its numbers and times."""
+    n = np.arange(len(record.q), dtype=np.longdouble) / len(record.q)
+    rounding = 64 * ROUNDING * np.sqrt(len(n)) + record.jitter
+    for x, quantum, powers_ in ((record.q[:, j], record.q_quantum, 3), (record.v[:, j], record.v_quantum, 2)):
+        left = x - np.vander(n, powers_) @ least_squares(np.vander(n, powers_), x[:, None])[:, 0]
+        if np.max(np.abs(left)) > rounding * np.max(np.abs(x)) + 2 * np.max(quantum[:, j]):
+            return False
+    return len(n) > FEWEST_OF_A_FALL
 
 
 def _forced(found: Map) -> bool:

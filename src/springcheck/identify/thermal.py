@@ -66,7 +66,9 @@ def one_factor(h: float, q: Floats, v: Floats) -> tuple[str, float, Floats] | No
         # of velocities that are linear in the positions any c would do: there the factor makes none of them
         off = np.linalg.norm(made - factor[:, None] * of, axis=0) / np.linalg.norm(made, axis=0)
         high, low = np.quantile(factor, [0.9, 0.1])
-        if max(misfit, *off) < SHARP_FACTOR * (high - low) / max(abs(high), abs(low)):
+        # a factor of either sign, which Bussi's thermostat draws, comes near more motions
+        sharp = SHARP_FACTOR if low > 0 else SHARP_FACTOR**2
+        if max(misfit, *off) < sharp * (high - low) / max(abs(high), abs(low)):
             return PLACES_OF_FACTOR[i], misfit, np.asarray(factor)
     return None
 

@@ -215,9 +215,12 @@ def memory(e: Evidence) -> Explanation | None:
     later = fit(e.record, e.j, kept=np.arange(e.pairs) >= e.pairs // 2)
     start = np.max(np.abs(later.residuals()), axis=1)
     before, weighted = (float(np.max(x[1:])) for x in (start / size, e.weight * start))
-    if before < rounding or weighted < FALLS * found.worst:
+    last = int(np.max(np.flatnonzero(start > 8 * e.unit), initial=-1)) + 1
+    # a force that is not linear fades where the motion does, down to no map at all
+    lasts = several is None and last > e.pairs // 2
+    forced = abs(float(later.entries[1, 0])) >= SURE * math.sqrt(later.covariance[2, 2])
+    if lasts or not forced or before < rounding or weighted < FALLS * found.worst:
         return None
-    last = int(np.flatnonzero(start > 8 * e.unit)[-1]) + 1
     goes_on = later.z[last] - np.linalg.matrix_power(later.entries, last) @ later.z[0]
     if np.max(np.abs(goes_on)) < AS_BEFORE * np.max(start):
         # frames between are written wrongly: what is remembered would have moved those that follow

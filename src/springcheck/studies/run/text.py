@@ -99,7 +99,8 @@ def _beyond(report: Report) -> Lines:
             said = (
                 f"makes {title} grow by a factor of {factor:.4f} a step, and the exact solution stays bounded"
             )
-            said += "; take a step that is short beside the period of the modulation"
+            of = "period of the modulation" if system.is_driven else "periods of the field and the springs"
+            said += f"; take a step that is short beside the {of}"
         else:
             continue
         names = ", ".join(run.method for run in report.runs if run.scheme == scheme)

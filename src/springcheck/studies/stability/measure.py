@@ -43,9 +43,10 @@ def record(
     """
     if rods := scene.system.rods:
         rate = float(np.max(rods.rates(scene.q, scene.p)))
+        here = f", here h < {1 / rate:.6g} at the rate of the start" if rate else ""
         raise SceneError(
             f"scene {scene.name} has rods, and stability is a study of springs: a rod that turns freely has "
-            f"a step below h w = 1, here h < {1 / rate if rate else np.inf:.6g}, and none beyond"
+            f"a step below h w = 1{here}, and none beyond"
         )
     fastest(scene)
     labels = engines.match(methods or ("*",), every=bool(methods))
