@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import clean
-from springcheck import driver, engines
+from springcheck import driver, engines, schemes
 from springcheck.cli import file
+from springcheck.errors import StoreError
 from springcheck.identify.taken import has_a_start, springs_of
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Damping, WallSpring
 from springcheck.physics.trajectory import Verdict
-from springcheck.schemes import SCHEMES
+from springcheck.schemes import SCHEMES, matrix
 
 
 def spring(k: float = 4.9, c: float = 0.0, step: float = 0.02, every: int = 1) -> Scene:
@@ -171,3 +173,62 @@ def test_what_single_steps_do_not_see_is_one_spring_and_its_step(
     assert step.passed is not seen
     assert "any part" not in step.why
     assert seen or "1 spring and the step could be off by 3% and not be seen in a step" in step.why
+
+
+@pytest.mark.parametrize(
+    ("scheme", "other"),
+    [
+        ("langevin-middle", "position-verlet"),
+        ("langevin-middle-early", "semi-implicit-euler-drift-kick"),
+        ("respa8", "position-verlet"),
+        ("boris", "velocity-verlet"),
+        ("force-held-4", "semi-implicit-euler"),
+        ("semi-implicit-euler-implicit-friction", "semi-implicit-euler-drift-kick"),
+        ("exact", "velocity-verlet"),
+    ],
+)
+def test_a_scheme_is_known_by_its_steps_and_not_by_its_name_alone(
+    tmp_path: Path, scheme: str, other: str
+) -> None:
+    """On one spring many of them are another scheme, by whose name the states are known."""
+    scene = spring(step=0.05, every=2)
+
+    def rows(name: str) -> Floats:
+        one_step = matrix(
+            schemes.scheme(name if name != "respa8" else "velocity-verlet"),
+            h=scene.step, m=scene.m, k=np.array([4.9]),
+        )[0]  # fmt: skip
+        out = [np.array([0.08, 0.0], np.longdouble)]
+        for _ in range(scene.steps):
+            out.append(one_step @ out[-1])
+        return (np.array(out[:: scene.every]) / [1, 0.25]).astype(np.float64)
+
+    assert identified(tmp_path, scene, rows(scheme), "%.7g", scheme).passed is not False
+    assert identified(tmp_path, scene, rows(other), "%.7g", scheme).passed is False
+
+
+def test_times_of_fixed_decimals_are_not_off_by_their_last_digit(tmp_path: Path) -> None:
+    """A period of 40 steps has no short step, and 4 decimals keep four digits of it."""
+    scene = spring(step=0.03548)
+    scene = replace(scene, step=2 * np.pi / 40 * np.sqrt(0.25 / 4.9))
+    rows, t = states(scene), scene.step * np.arange(scene.frames)
+    np.savetxt(
+        tmp_path / "a.csv", np.c_[t, rows], fmt=["%.4f", "%.17g", "%.17g"], header="t x v", comments=""
+    )
+    found = file.judge(tmp_path / "a.csv", scene=scene, scheme="velocity-verlet")
+    assert found.status == 0
+    late = t + 2e-3 * (t > 1)
+    np.savetxt(
+        tmp_path / "a.csv", np.c_[late, rows], fmt=["%.4f", "%.17g", "%.17g"], header="t x v", comments=""
+    )
+    with pytest.raises(StoreError, match="is due"):
+        file.judge(tmp_path / "a.csv", scene=scene, scheme="velocity-verlet")
+
+
+def test_the_exact_flow_is_judged_by_all_digits_too(tmp_path: Path) -> None:
+    scene = spring()
+    w = np.sqrt(4.9 / 0.25)
+    t = scene.step * np.arange(scene.frames)
+    x = np.c_[0.08 * np.cos(w * t), -0.08 * w * np.sin(w * t)]
+    assert identified(tmp_path, scene, x, "%.17g", "exact").passed
+    assert identified(tmp_path, scene, states(scene), "%.17g", "exact").passed is False

@@ -43,6 +43,20 @@ def takers(
     return tuple(found)
 
 
+def is_step_of(scheme: Scheme, names: Iterable[str], scene: Scene, run: Trajectory) -> bool:
+    """Whether the scheme's steps from the first frames are those of one of `names` on this scene, to
+    rounding, as of Boris' rotation and position Verlet where no field turns velocities."""
+    start = [x[:STEPS].astype(np.longdouble) for x in (run.q, run.p)]
+    one_step = [x for name in names if (x := SCHEMES.get(name)) and x.has("one-step")]
+    if not scheme.has("one-step"):
+        return False
+    own, *others = (Law(scheme=x, scene=scene, h=run.step).step(*start) for x in (scheme, *one_step))
+    return any(
+        all(np.all(np.abs(x - y) <= 2.0**-49 * np.max(np.abs(x))) for x, y in zip(own, other, strict=True))
+        for other in others
+    )
+
+
 def springs_of(scene: Scene) -> Floats:
     """Mass, stiffness and friction (3, n) [M, M/T2, M/T] of each coordinate, the last two NaN where other
     forces act, or some join two coordinates."""
