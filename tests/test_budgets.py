@@ -18,11 +18,11 @@ BUDGETS = {
     ("engines",): 2816,
     ("driver", "conformance", "doors"): 1216,
     ("checks",): 5272,
-    ("identify",): 9171,
+    ("identify",): 9189,
     ("formats", "store"): 5267,
     ("studies",): 1450,
     ("studies/*",): 9770,
-    ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 7223,
+    ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 7224,
 }
 """Lines of each room, or of several: of an engine in one file, and of what all studies share, in the first
 folder."""

@@ -620,7 +620,7 @@ def test_times_of_six_digits_beyond_1000_are_even() -> None:
     found = clock_of(written)
     assert abs(float(found.interval) / 0.405 - 1) <= found.jitter
     assert found.jitter < 1e-4
-    with pytest.raises(IdentificationError, match="2601 and 2602 are 0.82"):
+    with pytest.raises(IdentificationError, match=r"2601 and 2602 are 0\.82"):
         clock_of(np.delete(written, 2602))
 
 

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 import clean
-from springcheck import driver, engines, schemes
+import springcheck
+from springcheck import checks, driver, engines, schemes
 from springcheck.cli import file
 from springcheck.errors import StoreError
 from springcheck.identify.taken import has_a_start, springs_of
@@ -232,3 +233,49 @@ def test_the_exact_flow_is_judged_by_all_digits_too(tmp_path: Path) -> None:
     x = np.c_[0.08 * np.cos(w * t), -0.08 * w * np.sin(w * t)]
     assert identified(tmp_path, scene, x, "%.17g", "exact").passed
     assert identified(tmp_path, scene, states(scene), "%.17g", "exact").passed is False
+
+
+def grown(gain: float, frames: int = 200, k: float = 4.9, far: float = 0.0, bend: float = 0.0) -> Floats:
+    """q, v (f, 2) of kick-drift Euler whose velocity grows in each step, on a hardening spring."""
+    x, v, out = far + 0.08, 0.0, [(far + 0.08, 0.0)]
+    for _ in range(frames):
+        u = x - far
+        v = (v - 0.02 * k / 0.25 * u * (1 + bend * u * u)) * (1 + gain)
+        x += 0.02 * v
+        out.append((x, v))
+    return np.array(out)
+
+
+def test_nine_digits_show_a_growth_that_single_precision_would_hide(tmp_path: Path) -> None:
+    """Their rounding is far below that of single precision, which is in every step of what has it."""
+    scene, scheme = spring(), "semi-implicit-euler"
+    assert identified(tmp_path, scene, grown(0.0), "%.9g", scheme).passed
+    assert identified(tmp_path, scene, grown(3e-8), "%.9g", scheme).passed is False
+    # of seven digits they leave room for it
+    assert identified(tmp_path, scene, grown(3e-8), "%.7g", scheme).passed
+
+
+def test_a_restart_from_six_digits_is_no_rounding_to_nine() -> None:
+    """One jump of 2e-6 among 25 steps, which roundings of single precision in seven stages would allow."""
+    scene = replace(spring(step=0.07, every=2), steps=26)
+    first = driver.run(scene, "own:forest-ruth")
+    p = np.array([float(f"{first.p[-1, 0]:.6g}")])
+    later = driver.run(replace(scene, q=first.q[-1], p=p), "own:forest-ruth")
+    q, v = (np.r_[x[:-1, 0], y[:, 0]] for x, y in ((first.q, later.q), (first.p / 0.25, later.p / 0.25)))
+    q, v = (np.array([float(f"{x:.9g}") for x in y]) for y in (q, v))
+    found = springcheck.identify(0.14 * np.arange(len(q)), q, v=v, mass=0.25, stiffness=4.9, step=0.07)
+    assert not found.fits, found.statement
+
+
+def test_a_wrong_force_far_from_the_origin_is_no_matter_of_differences(tmp_path: Path) -> None:
+    """Positions of nine digits at 300 give velocities to 1e-3; the recorded ones have finer digits."""
+    one = np.array([0])
+    terms = (WallSpring(i=one, k=np.array([4.9]), at=np.array([300.0])),)
+    scene = clean.scene(np.array([0.25]), terms, np.array([300.08]), np.zeros(1), step=0.02, steps=200)
+    rows = grown(0.0, far=300.0, bend=3.0)
+    np.savetxt(
+        tmp_path / "a.csv", np.c_[0.02 * np.arange(201), rows], fmt="%.9g", header="t x v", comments=""
+    )
+    found = file.judge(tmp_path / "a.csv", scene=scene, scheme="semi-implicit-euler")
+    assert found.status == 1
+    assert "differences" not in checks.cause_of(found.verdicts)

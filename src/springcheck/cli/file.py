@@ -227,6 +227,7 @@ def as_trajectory(
         raise StoreError(
             f"{path}: row {row + 1} is at t = {states.t[row]:.12g}, and {states.t[0] + t[row]:.12g} is due: "
             f"frames lie whole steps of {scene.step:g} apart in scene {scene.name}, as the first two do"
+            + "".join(f"; {x}" for x in start.clock(states, scene))
         )
     if np.any(states.t != t):
         notes.append(TIMES)

@@ -104,13 +104,14 @@ def has_a_start(
 
 
 def _unit(x: Floats, steps: Integers, roundoff: float) -> Floats:
-    """The last digit of numbers (f,), and one rounding of each of so many steps, in single precision or in
-    the shorter format that they are stored in."""
+    """The last digit of numbers (f,), and one rounding of each of so many steps: in single precision where
+    digits do not exclude it, or in the shorter format that they are stored in."""
     form = storage(x)
     unit = 2 * roundoff * np.max(np.abs(x)) if form.name == "double" else form.quantum(x)
     # a 0 is written with no digit, and is that of a start mostly
     unit = np.where(unit > 0, unit, np.min(unit, where=unit > 0, initial=np.max(unit)))
-    own = 2.0 ** -BINARY.get(form.name, BINARY["single"])
+    coarse = form.name in BINARY or np.max(unit) >= 2.0**-24 * np.max(np.abs(x))
+    own = 2.0 ** -BINARY.get(form.name, BINARY["single"]) if coarse else 2.0**-53
     return np.asarray(unit + own * steps * np.maximum.accumulate(np.abs(x)))
 
 
