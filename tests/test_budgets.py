@@ -19,7 +19,7 @@ BUDGETS = {
     ("driver", "conformance", "doors"): 1216,
     ("checks",): 5272,
     ("identify",): 9189,
-    ("formats", "store"): 5267,
+    ("formats", "store"): 5281,
     ("studies",): 1450,
     ("studies/*",): 9770,
     ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 7224,

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 
@@ -279,3 +281,23 @@ def test_a_wrong_force_far_from_the_origin_is_no_matter_of_differences(tmp_path:
     found = file.judge(tmp_path / "a.csv", scene=scene, scheme="semi-implicit-euler")
     assert found.status == 1
     assert "differences" not in checks.cause_of(found.verdicts)
+
+
+@pytest.mark.parametrize("name", ["a.csv", "a.npz", "a.h5", "a.json"])
+def test_rounded_numbers_are_judged_to_their_digits_in_any_format(tmp_path: Path, name: str) -> None:
+    scene = spring()
+    rows, path = np.round(states(scene), 8), tmp_path / name
+    for wrong in (False, True):
+        rows[100, 0] += 1e-4 * wrong
+        arrays = {"t": scene.step * np.arange(len(rows)), "q": rows[:, 0], "v": rows[:, 1]}
+        if name.endswith("npz"):
+            np.savez(path, **arrays)
+        elif name.endswith("h5"):
+            with h5py.File(path, "w") as store:
+                for key, values in arrays.items():
+                    store[key] = values
+        elif name.endswith("json"):
+            path.write_text(json.dumps({key: x.tolist() for key, x in arrays.items()}))
+        else:
+            np.savetxt(path, np.c_[*arrays.values()], fmt="%.8f", header="t x v", comments="")
+        assert file.judge(path, scene=scene, scheme="velocity-verlet").status == wrong
