@@ -64,7 +64,7 @@ def other_scheme(scene: Scene, run: Trajectory, states: States) -> Verdict:
     else:
         unread, said = "no one scheme is read from these states", f"all states together: {found.statement}"
         if found.fits and found.verdict in ("named", "not told apart"):
-            names = {found.scheme, *found.aliases}
+            names = {str(found.scheme), *found.aliases}
             for one in found.candidates:
                 names |= {one.scheme, *one.aliases}
             alike = run.scheme in names or is_step_of(scheme, names, scene, run)

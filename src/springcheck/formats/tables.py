@@ -158,7 +158,7 @@ def roundoff(rows: Sequence[Sequence[str]], columns: Iterable[int]) -> float:
 
 
 def as_written(states: States) -> States:
-    """States with the digits that their numbers show, as of doubles that were rounded before they were stored;
+    """States with the digits that their numbers show, as of doubles that were rounded before they are stored;
     those of a format that states its own keep them."""
     if states.roundoff > 2.0**-53 or states.fixed:
         return states
