@@ -352,8 +352,8 @@ def _in_file(
     def explained(rounding: float, size: Floats) -> Any:
         return _largest(np.abs(signed), half + (rounding * size + EPSILON * sizes.turned) * most) <= 1
 
-    # what shows roundings of single precision has none that hide, and they are in every step: in text a few that
-    # are far larger than the others have another cause
+    # what shows roundings of single precision has none that hide, and they are in every step: in text a few
+    # that are far larger than the others have another cause
     each = np.abs(signed) / (half + SINGLE * sizes.size * most)
     even = np.max(each, axis=(1, 2)) <= SPREAD * np.max(np.median(each, axis=1), axis=1)
     even |= not record.text
