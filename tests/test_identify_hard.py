@@ -17,6 +17,7 @@ import pytest
 
 from springcheck.errors import IdentificationError, MethodError
 from springcheck.identify import Identification, identify, identify_stepper
+from springcheck.identify.clock import clock_of
 
 M, K, H = 3.7, 2.9, 0.1
 STATED = {"mass": M, "stiffness": K}
@@ -611,6 +612,16 @@ def test_a_clock_that_adds_up_and_is_written_as_text_keeps_its_step(digits: int,
     assert found.scheme == "velocity-verlet"
     # of 16 digits times are doubles, whose sum is no longer known to the bit
     assert abs(found.step / h - 1) < (1e-12 if digits == 16 else 1e-16)
+
+
+def test_times_of_six_digits_beyond_1000_are_even() -> None:
+    """Up to 1000 they have three decimals and show the whole step, from there on two, as C++ prints them."""
+    written = np.array([float(f"{0.405 * i:.6g}") for i in range(2700)])
+    found = clock_of(written)
+    assert abs(float(found.interval) / 0.405 - 1) <= found.jitter
+    assert found.jitter < 1e-4
+    with pytest.raises(IdentificationError, match=r"2601 and 2602 are 0\.82"):
+        clock_of(np.delete(written, 2602))
 
 
 @pytest.mark.parametrize("recorded", ["its own clock", "i h"])

@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+import json
+from dataclasses import replace
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 
 import clean
-from springcheck import driver, engines
+import springcheck
+from springcheck import checks, driver, engines, schemes
 from springcheck.cli import file
+from springcheck.errors import StoreError
 from springcheck.identify.taken import has_a_start, springs_of
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Damping, WallSpring
 from springcheck.physics.trajectory import Verdict
-from springcheck.schemes import SCHEMES
+from springcheck.schemes import SCHEMES, matrix
 
 
 def spring(k: float = 4.9, c: float = 0.0, step: float = 0.02, every: int = 1) -> Scene:
@@ -188,3 +193,128 @@ def test_a_note_names_the_columns_that_are_rounded(tmp_path: Path, forms: tuple[
     np.savetxt(tmp_path / "a.csv", rows, ["%.8g", *forms], delimiter=",", header="t,x,v", comments="")
     notes = file.judge(tmp_path / "a.csv", scene=scene, scheme="velocity-verlet").notes
     assert any(note.startswith(said) for note in notes), notes
+
+
+@pytest.mark.parametrize(
+    ("scheme", "other"),
+    [
+        ("langevin-middle", "position-verlet"),
+        ("langevin-middle-early", "semi-implicit-euler-drift-kick"),
+        ("respa8", "position-verlet"),
+        ("boris", "velocity-verlet"),
+        ("force-held-4", "semi-implicit-euler"),
+        ("semi-implicit-euler-implicit-friction", "semi-implicit-euler-drift-kick"),
+        ("exact", "velocity-verlet"),
+    ],
+)
+def test_a_scheme_is_known_by_its_steps_and_not_by_its_name_alone(
+    tmp_path: Path, scheme: str, other: str
+) -> None:
+    """On one spring many of them are another scheme, by whose name the states are known."""
+    scene = spring(step=0.05, every=2)
+
+    def rows(name: str) -> Floats:
+        one_step = matrix(
+            schemes.scheme(name if name != "respa8" else "velocity-verlet"),
+            h=scene.step, m=scene.m, k=np.array([4.9]),
+        )[0]  # fmt: skip
+        out = [np.array([0.08, 0.0], np.longdouble)]
+        for _ in range(scene.steps):
+            out.append(one_step @ out[-1])
+        return (np.array(out[:: scene.every]) / [1, 0.25]).astype(np.float64)
+
+    assert identified(tmp_path, scene, rows(scheme), "%.7g", scheme).passed is not False
+    assert identified(tmp_path, scene, rows(other), "%.7g", scheme).passed is False
+
+
+def test_times_of_fixed_decimals_are_not_off_by_their_last_digit(tmp_path: Path) -> None:
+    """A period of 40 steps has no short step, and 4 decimals keep four digits of it."""
+    scene = spring(step=0.03548)
+    scene = replace(scene, step=2 * np.pi / 40 * np.sqrt(0.25 / 4.9))
+    rows, t = states(scene), scene.step * np.arange(scene.frames)
+    np.savetxt(
+        tmp_path / "a.csv", np.c_[t, rows], fmt=["%.4f", "%.17g", "%.17g"], header="t x v", comments=""
+    )
+    found = file.judge(tmp_path / "a.csv", scene=scene, scheme="velocity-verlet")
+    assert found.status == 0
+    late = t + 2e-3 * (t > 1)
+    np.savetxt(
+        tmp_path / "a.csv", np.c_[late, rows], fmt=["%.4f", "%.17g", "%.17g"], header="t x v", comments=""
+    )
+    with pytest.raises(StoreError, match="is due"):
+        file.judge(tmp_path / "a.csv", scene=scene, scheme="velocity-verlet")
+
+
+def test_the_exact_flow_is_judged_by_all_digits_too(tmp_path: Path) -> None:
+    scene = spring()
+    w = np.sqrt(4.9 / 0.25)
+    t = scene.step * np.arange(scene.frames)
+    x = np.c_[0.08 * np.cos(w * t), -0.08 * w * np.sin(w * t)]
+    assert identified(tmp_path, scene, x, "%.17g", "exact").passed
+    assert identified(tmp_path, scene, states(scene), "%.17g", "exact").passed is False
+
+
+def grown(gain: float, frames: int = 200, k: float = 4.9, far: float = 0.0, bend: float = 0.0) -> Floats:
+    """q, v (f, 2) of kick-drift Euler whose velocity grows in each step, on a hardening spring."""
+    x, v, out = far + 0.08, 0.0, [(far + 0.08, 0.0)]
+    for _ in range(frames):
+        u = x - far
+        v = (v - 0.02 * k / 0.25 * u * (1 + bend * u * u)) * (1 + gain)
+        x += 0.02 * v
+        out.append((x, v))
+    return np.array(out)
+
+
+def test_nine_digits_show_a_growth_that_single_precision_would_hide(tmp_path: Path) -> None:
+    """Their rounding is far below that of single precision, which is in every step of what has it."""
+    scene, scheme = spring(), "semi-implicit-euler"
+    assert identified(tmp_path, scene, grown(0.0), "%.9g", scheme).passed
+    assert identified(tmp_path, scene, grown(3e-8), "%.9g", scheme).passed is False
+    # of seven digits they leave room for it
+    assert identified(tmp_path, scene, grown(3e-8), "%.7g", scheme).passed
+
+
+def test_a_restart_from_six_digits_is_no_rounding_to_nine() -> None:
+    """One jump of 2e-6 among 25 steps, which roundings of single precision in seven stages would allow."""
+    scene = replace(spring(step=0.07, every=2), steps=26)
+    first = driver.run(scene, "own:forest-ruth")
+    p = np.array([float(f"{first.p[-1, 0]:.6g}")])
+    later = driver.run(replace(scene, q=first.q[-1], p=p), "own:forest-ruth")
+    q, v = (np.r_[x[:-1, 0], y[:, 0]] for x, y in ((first.q, later.q), (first.p / 0.25, later.p / 0.25)))
+    q, v = (np.array([float(f"{x:.9g}") for x in y]) for y in (q, v))
+    found = springcheck.identify(0.14 * np.arange(len(q)), q, v=v, mass=0.25, stiffness=4.9, step=0.07)
+    assert not found.fits, found.statement
+
+
+def test_a_wrong_force_far_from_the_origin_is_no_matter_of_differences(tmp_path: Path) -> None:
+    """Positions of nine digits at 300 give velocities to 1e-3; the recorded ones have finer digits."""
+    one = np.array([0])
+    terms = (WallSpring(i=one, k=np.array([4.9]), at=np.array([300.0])),)
+    scene = clean.scene(np.array([0.25]), terms, np.array([300.08]), np.zeros(1), step=0.02, steps=200)
+    rows = grown(0.0, far=300.0, bend=3.0)
+    np.savetxt(
+        tmp_path / "a.csv", np.c_[0.02 * np.arange(201), rows], fmt="%.9g", header="t x v", comments=""
+    )
+    found = file.judge(tmp_path / "a.csv", scene=scene, scheme="semi-implicit-euler")
+    assert found.status == 1
+    assert "differences" not in checks.cause_of(found.verdicts)
+
+
+@pytest.mark.parametrize("name", ["a.csv", "a.npz", "a.h5", "a.json"])
+def test_rounded_numbers_are_judged_to_their_digits_in_any_format(tmp_path: Path, name: str) -> None:
+    scene = spring()
+    rows, path = np.round(states(scene), 8), tmp_path / name
+    for wrong in (False, True):
+        rows[100, 0] += 1e-4 * wrong
+        arrays = {"t": scene.step * np.arange(len(rows)), "q": rows[:, 0], "v": rows[:, 1]}
+        if name.endswith("npz"):
+            np.savez(path, **arrays)
+        elif name.endswith("h5"):
+            with h5py.File(path, "w") as store:
+                for key, values in arrays.items():
+                    store[key] = values
+        elif name.endswith("json"):
+            path.write_text(json.dumps({key: x.tolist() for key, x in arrays.items()}))
+        else:
+            np.savetxt(path, np.c_[*arrays.values()], fmt="%.8f", header="t x v", comments="")
+        assert file.judge(path, scene=scene, scheme="velocity-verlet").status == wrong

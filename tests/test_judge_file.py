@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import clean
+import springcheck
 from springcheck import driver, schemes
 from springcheck.cli import file, main
 from springcheck.errors import StoreError
@@ -402,3 +403,29 @@ def test_positions_that_are_wrapped_into_the_box_are_said_to_be(tmp_path: Path) 
     np.savetxt(tmp_path / "a.csv", rows, fmt="%.17g", delimiter=",", header=header, comments="")
     with pytest.raises(StoreError, match="unwrap its positions across the borders of the box"):
         file.judge(tmp_path / "a.csv", scene=scene, scheme="velocity-verlet")
+
+
+def test_times_of_a_smaller_unit_are_refused_with_what_they_may_be(tmp_path: Path) -> None:
+    scene = scenefile.load_scene("spring-uneven")
+    run = driver.run(scene, "own:velocity-verlet")
+    np.savetxt(
+        tmp_path / "a.csv", np.c_[run.t / 1000, run.q, run.p], header="t,q,p", delimiter=",", comments=""
+    )
+    with pytest.raises(StoreError, match=r"0\.1 is due.*lie 0\.001 times as far apart.*another unit"):
+        file.judge(tmp_path / "a.csv", scene=scene, scheme="velocity-verlet")
+
+
+@pytest.mark.parametrize(
+    ("stated", "said"),
+    [
+        ({"stiffness": 7.7}, "stiffness could not be compared: give the mass"),
+        ({"friction": 5.0}, "friction could not be compared: give the mass"),
+        ({"stiffness": 7.7, "friction": 5.0}, "stiffness and friction could not be compared"),
+        ({"stiffness": 2.9, "mass": 3.7}, ""),
+        ({"friction": 0.0}, ""),
+    ],
+)
+def test_a_stated_number_that_cannot_be_compared_is_named(stated: dict[str, float], said: str) -> None:
+    run = driver.run(scenefile.load_scene("spring-uneven"), "own:velocity-verlet")
+    found = springcheck.identify(run.t, run.q, v=run.p / 3.7, **stated)
+    assert [said in note for note in found.notes if "compared" in note] == [True] * bool(said)

@@ -170,8 +170,8 @@ def _of_differences(case: Case) -> str:
         right, size = made + kick * run.step * case.system.force(q, p), np.abs(p) + np.abs(made)
         if rods := case.system.rods:
             right, size = rods.projected(q, right), np.max(size, axis=1, keepdims=True)
-        # and those of decimals, of the positions that are subtracted too
-        half = run.arithmetic.recorded(m, n * run.step, True)[1]
+        # and those of their own decimals: what has finer ones than the positions was not made of them
+        half = run.arithmetic.recorded(m, n * run.step, False)[1]
         off = (np.abs(p - right) - half) / (DIFFERENCE_ROUNDINGS * run.arithmetic.state)
         are = not run.rebuilds_velocity and np.all(off <= size)
         if are and step_defect(replace(case, trajectory=replace(run, rebuilds_velocity=True))).passed:

@@ -11,14 +11,12 @@ from typing import Any
 import numpy as np
 
 from springcheck import checks, engines, schemes, store
-from springcheck.cli import start
-from springcheck.errors import IdentificationError, StoreError
+from springcheck.cli import shown, start
+from springcheck.errors import StoreError
 from springcheck.figures.views import units
 from springcheck.formats import States, is_store, moving, read
 from springcheck.identify import files
-from springcheck.identify.families import FAMILIES
-from springcheck.identify.files import identify_states, of_arrays
-from springcheck.identify.taken import has_a_start, springs_of
+from springcheck.identify.storage import storage
 from springcheck.physics.arrays import AS_WRITTEN, Arithmetic, Floats
 from springcheck.physics.rods import START_TOLERANCE
 from springcheck.physics.scene import Scene
@@ -31,10 +29,6 @@ from springcheck.text.wording import count
 
 TIMES = "times were taken as whole numbers of steps from the first frame on"
 NOT_DOUBLE = "(single|mixed|fixed-point force) arithmetic explains every step"
-NO_START = (
-    "no start leads to all of these states by {} with the scene's masses, springs and friction, to the "
-    "digits that they have: look for another stiffness, mass, friction or step, or another scheme"
-)
 NOT_JUDGED = "not judged: nothing that applies to these states could tell the scheme from another"
 
 
@@ -119,68 +113,14 @@ def judge(
         replace(v, passed=None, value=np.nan, bound=np.nan, why=taken[v.check]) if v.check in taken else v
         for v in checks.explained(judged, run, checks.judge(judged, run), files.shown)
     ]
-    if states.roundoff > 2.0**-53:
-        verdicts.append(_shown(judged, run, states))
+    if states.roundoff > 2.0**-53 or known.flow:
+        verdicts.append(shown.other_scheme(judged, run, states))
     if arithmetic is None and re.search(NOT_DOUBLE, checks.cause_of(verdicts)):
         notes += ("of a program that computes so: --arithmetic, as --arithmetic openmm:verlet@CUDA-mixed",)
     return Judgement(
         path=path, scene=found.name, scheme=known.name, frames=len(run.t), notes=notes,
         verdicts=tuple(verdicts),
     )  # fmt: skip
-
-
-def _shown(scene: Scene, run: Trajectory, states: States) -> Verdict:
-    """Whether the states as a whole show another scheme.
-
-    With few digits many schemes fit every single step, which the other checks examine; the map that fits all
-    steps together is known far better.
-    """
-
-    def verdict(passed: bool | None, why: str) -> Verdict:
-        value, bound = (np.nan, np.nan) if passed is None else (float(not passed), 0.0)
-        return Verdict(
-            method=run.label, check="identified", value=value, bound=bound, unit="other schemes",
-            passed=passed, why=why,
-        )  # fmt: skip
-
-    # digits are counted as written: projections onto a line would not show their decimals
-    n, width, other = scene.n, states.q.shape[1], np.asarray(states.v if states.p is None else states.p)
-    # of points in space the scene's own axes or, where they move along one line, all three
-    own = scene.places is not None and width == 3 * scene.particles
-    columns = np.arange(width)[scene.where] if own else np.arange(width)
-    moving = (np.ptp(states.q, axis=0) + np.ptp(other, axis=0))[columns] > 0
-    columns, of = (
-        x[moving][: files.MOST_OSCILLATORS] for x in (columns, np.arange(n).repeat(len(columns) // n))
-    )
-    m, k, c = springs_of(scene)[:, of]
-    parts = {name: x[:, columns] for name in ("q", "p", "v") if (x := getattr(states, name)) is not None}
-    # then the springs and frictions of the scene are all of its forces
-    known = run.scheme in FAMILIES and len(of) > 0 and not np.isnan(k).any()
-    stated: dict[str, Any] = {"stiffness": k} if known else {}
-    stated |= {"friction": c[0]} if known and np.ptp(c) == 0 else {}
-    try:
-        record = of_arrays(run.label, replace(states, mass=m, **parts))
-        found = identify_states(record, step=scene.step, **stated)
-    except (IdentificationError, ArithmeticError, ValueError) as error:
-        unread, said = f"no scheme can be read from these states: {error}", ""
-    else:
-        unread, said = "no one scheme is read from these states", f"all states together: {found.statement}"
-        if found.fits and found.verdict in ("named", "not told apart"):
-            names = {found.scheme, *found.aliases}
-            for one in found.candidates:
-                names |= {one.scheme, *one.aliases}
-            return verdict(run.scheme in names, said)
-        # of the few digits of a motion that dies down or grows a cause may be read that is none
-        said = "" if found.undecided or not any(x.shown for x in found.explanations[:1]) else said
-    springs = (m, k, c) if states.p is not None else (np.ones_like(m), k / m, c / m)
-    steps, scheme = np.arange(len(run.t)) * run.every, schemes.scheme(run.scheme)
-    numbers = parts["q"], other[:, columns]
-    if (
-        known and not run.rebuilds_velocity
-        and not has_a_start(scheme, run.step, springs, steps, *numbers, states.roundoff)
-    ):  # fmt: skip
-        return verdict(False, said or NO_START.format(scheme.title))
-    return verdict(None, unread)
 
 
 def states_in(
@@ -272,12 +212,15 @@ def as_trajectory(
             )
     t = np.arange(len(q), dtype=np.float64) * max(every, 1) * scene.step
     off = np.abs(states.t - states.t[0] - t)
+    # of times with fixed decimals the last digit does not grow with them
     allowed = 1e-9 * np.abs(t + scene.step) + 2 * states.roundoff * np.abs(states.t)
+    allowed += storage(states.t).quantum(states.t)
     if every < 1 or np.any(off > allowed):
         row = int(np.argmax(off > allowed))
         raise StoreError(
             f"{path}: row {row + 1} is at t = {states.t[row]:.12g}, and {states.t[0] + t[row]:.12g} is due: "
             f"frames lie whole steps of {scene.step:g} apart in scene {scene.name}, as the first two do"
+            + "".join(f"; {x}" for x in start.clock(states, scene))
         )
     if np.any(states.t != t):
         notes.append(TIMES)

@@ -112,7 +112,7 @@ def read(
     alone.  Raises StoreError, in one line, where the file cannot be read, or lacks times or positions.
     """
     found = read_hdf5(path, columns, most) if is_hdf5(path) else {path.name: _read(path, list(columns), step)}
-    return {name: fitting(path, states) for name, states in found.items()}
+    return {name: fitting(path, tables.as_written(states)) for name, states in found.items()}
 
 
 def _read(path: Path, columns: list[str], step: float | None) -> States:

@@ -24,7 +24,7 @@ from springcheck.formats.columns import Fixed, Floats, States
 from springcheck.formats.lines import MOST_NUMBERS
 from springcheck.formats.molecular import clock, of_frames
 from springcheck.formats.numbers import of_table, shortened, states_of
-from springcheck.formats.tables import SHOWN, fixed, roundoff
+from springcheck.formats.tables import fixed, roundoff
 
 MOST_FRAMES = 1 << 20
 VELOCITIES = "velocities", "velocity", "vel", "velo"
@@ -201,8 +201,4 @@ def read_pandas(call: str, path: Path, columns: list[str], step: float | None) -
         if table.size > MOST_NUMBERS:
             raise StoreError(f"{path}: more than {MOST_NUMBERS:,} numbers: choose among the columns")
         found: Mapping[str, Any] = {str(name): table[name].to_numpy() for name in table.columns}
-    states = states_of(path, found, columns)
-    # a spreadsheet keeps text of 16 digits, or of fewer
-    numbers = np.hstack([x[:SHOWN] for x in (states.q, states.p, states.v) if x is not None])
-    rows = [[*map(repr, row)] for row in numbers.tolist()]
-    return replace(states, roundoff=max(states.roundoff, roundoff(rows, range(numbers.shape[1]))))
+    return states_of(path, found, columns)

@@ -155,6 +155,24 @@ def roundoff(rows: Sequence[Sequence[str]], columns: Iterable[int]) -> float:
     return found
 
 
+def as_written(states: States) -> States:
+    """States with the digits that their numbers show, as of doubles that were rounded before they are stored;
+    those of a format that states its own keep them."""
+    if states.roundoff > 2.0**-53 or states.fixed:
+        return states
+    numbers = np.hstack([x[:SHOWN] for x in (states.q, states.p, states.v) if x is not None])
+    width, of_q = numbers.shape[1], states.q.shape[1]
+
+    def shortest(x: Floats) -> list[list[str]]:
+        return [[np.format_float_positional(y, trim="0") for y in row] for row in x]
+
+    if len(numbers) < FEWEST_CELLS or roundoff(shortest(numbers[:FEWEST_CELLS]), range(width)) == 2.0**-53:
+        return states
+    rows = shortest(numbers)
+    known = roundoff(rows, range(width)), fixed(rows, range(of_q), range(of_q, width))
+    return replace(states, roundoff=known[0], fixed=known[1]) if known[0] > 2.0**-53 else states
+
+
 def fixed(rows: Sequence[Sequence[str]], q: Iterable[int], v: Iterable[int]) -> Fixed | None:
     """How columns of positions and of momenta or velocities are rounded to decimals; None where none is.
 

@@ -9,7 +9,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from springcheck.errors import IdentificationError
-from springcheck.identify.storage import ROUNDING, Storage, single_of, storage
+from springcheck.identify.storage import ROUNDING, Storage, single_of, storages
 from springcheck.physics.arrays import Extended, Floats
 
 FEWEST_STATES = 5
@@ -45,18 +45,19 @@ def clock_of(t: Floats) -> Clock:
     off = np.abs(np.diff(wide) - interval)
     worst = int(np.argmax(off))
     even = float(np.max(np.spacing(np.abs(t))))
-    written = storage(t)
+    forms = storages(t)
     # 0.5, 1.0, 1.5 are multiples of a round step, not times that were cut to one decimal, and those of a
     # float32 clock are not text: the finest of the grids that the times lie on explains them
-    single = single_of(t) or (written.name == "single" and single_of(t, SHORT_STEP))
-    coarser = [Storage(name="single"), written] if single else [written]
+    single = single_of(t) or (forms[0].name == "single" and single_of(t, SHORT_STEP))
+    coarser = [Storage(name="single"), *forms] if single else forms
     grids = [even, *(float(np.max(x.quantum(t))) for x in coarser)]
-    # an interval is the difference of two rounded times; an accumulated clock rounds once more in every step
-    quantum = next((x for x in grids if off[worst] <= 4 * x), None)
-    cut = written.name.startswith("text") and quantum == grids[-1]
-    if cut and (off[worst] > 1.5 * grids[-1] or abs(interval / grids[-1] - 1) < 0.1):
-        # a cut is by the last digit at most, and times one digit apart are not cut: a frame is there twice
-        quantum = None
+    texts = grids[-len(forms) :] if forms[0].name.startswith("text") else []
+    # an interval is the difference of two rounded times; an accumulated clock rounds once more in every step.
+    # A cut is by the last digit at most, and times one digit apart are not cut: a frame is there twice
+    quantum = next((
+        x for x in grids
+        if off[worst] <= (1.5 if x in texts else 4) * x and (x not in texts or abs(interval / x - 1) >= 0.1)
+    ), None)  # fmt: skip
     if quantum is None:
         quantum = next((x for x in grids[: 1 + single] if off[worst] <= (4 + MOST_ADDED / 2) * x), None)
     if quantum is None:

@@ -43,6 +43,10 @@ def judged(
             "neither mass nor velocities nor stiffness are known, so only three numbers of each map count: "
             "velocity and position Verlet, implicit midpoint and the exact flow look alike; give the mass"
         )
+    if record.mass is None:
+        asked = {"stiffness": stiffness is not None and not of.momenta, "friction": bool(friction)}
+        names = " and ".join(name for name, is_so in asked.items() if is_so)
+        notes += [f"the stated {names} could not be compared: give the mass as well"] if names else []
     return Measured(
         record=of, moving=moving, maps=maps, terms=[terms_of(of, j, stiff) for j in moving],
         stiffness=stiff, friction=friction, stride=stride, notes=tuple(notes),

@@ -34,6 +34,10 @@ POOR = 8.0
 ONE_MORE = 4.0
 """Decrease of chi-squared by one more unknown that is exceeded with a probability of 5 %."""
 
+LEAST_OF_SINGLE = 2.0**-27
+"""Least residual, relative to the state, of states that are computed in single precision: one rounding has a
+root mean square of 2**-24.8 to 2**-25.8 of a number, and most numbers are below the size of the state."""
+
 PLAIN = 30.0
 """Distance of the exact solution's map, in residuals, from which a scheme's truncation error is visible."""
 
@@ -265,7 +269,7 @@ def _plan(seen: Measured) -> list[list[Trial]]:
         for rounding in (ROUNDING, SINGLE)
         for damped in (False, True)
     )
-    coarse = residual > 2.0**-40 and not record.deep
+    coarse = residual > LEAST_OF_SINGLE and not record.deep
     out: list[list[Trial]] = []
     if whole or not coarse:
         out += [[double], [double_damped, single] if record.text and coarse else [double_damped]]

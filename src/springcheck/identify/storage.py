@@ -87,10 +87,15 @@ def single_of(x: Floats, digits: int = 0) -> bool:
 
 def storage(x: Floats) -> Storage:
     """Detect the storage format of x from the numbers themselves."""
+    return storages(x)[0]
+
+
+def storages(x: Floats) -> list[Storage]:
+    """The formats that can hold x, the likeliest first: significant digits or fixed decimals for text."""
     values = np.ravel(x)
     values = values[values != 0]
     if len(np.unique(np.abs(values))) < FEWEST_VALUES:
-        return Storage()
+        return [Storage()]
     at = np.linspace(0, len(values) - 1, min(len(values), SAMPLE)).astype(int)
     sample = values[at]
     listed = sample.tolist()
@@ -107,7 +112,7 @@ def storage(x: Floats) -> Storage:
     decimals = next((d for d in range(most) if all(same(f"{y:.{d}f}", y) for y in listed)), None)
     if not single and digits > DIGITS_OF_SINGLE and single_of(values, digits):
         # nine digits hold a number of single precision
-        return Storage(name="single")
+        return [Storage(name="single")]
     found = [Storage(name=f"text, {digits} digits", digits=digits)] if digits else []
     if decimals is not None:
         found.append(Storage(name=f"text, {decimals} decimals", decimals=decimals))
@@ -126,5 +131,5 @@ def storage(x: Floats) -> Storage:
         # both can hold the numbers; the coarser of the two leaves less to chance.  A power of ten has its
         # neighbours below it ten times as close as those above
         below = sample * (1 - 2.0**-40)
-        return max(found, key=lambda s: float(np.mean(np.log10(s.quantum(below)))))
-    return binary
+        found.sort(key=lambda s: -float(np.mean(np.log10(s.quantum(below)))))
+    return found or [binary]

@@ -43,6 +43,20 @@ def takers(
     return tuple(found)
 
 
+def is_step_of(scheme: Scheme, names: Iterable[str], scene: Scene, run: Trajectory) -> bool:
+    """Whether the scheme's steps from the first frames are those of one of `names` on this scene, to
+    rounding, as of Boris' rotation and position Verlet where no field turns velocities."""
+    start = [x[:STEPS].astype(np.longdouble) for x in (run.q, run.p)]
+    one_step = [x for name in names if (x := SCHEMES.get(name)) and x.has("one-step")]
+    if not scheme.has("one-step"):
+        return False
+    own, *others = (Law(scheme=x, scene=scene, h=run.step).step(*start) for x in (scheme, *one_step))
+    return any(
+        all(np.all(np.abs(x - y) <= 2.0**-49 * np.max(np.abs(x))) for x, y in zip(own, other, strict=True))
+        for other in others
+    )
+
+
 def springs_of(scene: Scene) -> Floats:
     """Mass, stiffness and friction (3, n) [M, M/T2, M/T] of each coordinate, the last two NaN where other
     forces act, or some join two coordinates."""
@@ -90,13 +104,14 @@ def has_a_start(
 
 
 def _unit(x: Floats, steps: Integers, roundoff: float) -> Floats:
-    """The last digit of numbers (f,), and one rounding of each of so many steps, in single precision or in
-    the shorter format that they are stored in."""
+    """The last digit of numbers (f,), and one rounding of each of so many steps: in single precision where
+    digits do not exclude it, or in the shorter format that they are stored in."""
     form = storage(x)
     unit = 2 * roundoff * np.max(np.abs(x)) if form.name == "double" else form.quantum(x)
     # a 0 is written with no digit, and is that of a start mostly
     unit = np.where(unit > 0, unit, np.min(unit, where=unit > 0, initial=np.max(unit)))
-    own = 2.0 ** -BINARY.get(form.name, BINARY["single"])
+    coarse = form.name in BINARY or np.max(unit) >= 2.0**-24 * np.max(np.abs(x))
+    own = 2.0 ** -BINARY.get(form.name, BINARY["single"]) if coarse else 2.0**-53
     return np.asarray(unit + own * steps * np.maximum.accumulate(np.abs(x)))
 
 
