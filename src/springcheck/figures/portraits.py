@@ -15,7 +15,6 @@ from springcheck.figures.overlay import Runs, exact_curve, share
 from springcheck.figures.views import State, View, with_unit
 from springcheck.physics.arrays import Floats
 from springcheck.physics.trajectory import Trajectory
-from springcheck.text.wording import count
 
 ALIKE = 2.5
 """Ratio of two ranges up to which equal scales on both axes are useful."""
@@ -138,7 +137,7 @@ def clouds(runs: Runs, view: View, thermal: float) -> Bank:
     left = len(runs.groups) - len(groups)
     more = f"; {left} more are not drawn" if left else ""
     said = (
-        f"states by {count(len(runs.groups), 'thermostat')}" + ("; on the ring H = kT" if ring else "") + more
+        f"states by {len(runs.groups)} thermostat{'s' * (len(runs.groups) > 1)}" + ("; on the ring H = kT" if ring else "") + more
     )
     said = _heading(f"phase portrait{_of(runs, [view])}", said)
     return runs.bank("phase-portrait", charts, said, (2.6, 2.4), columns=min(4, len(charts)))
