@@ -136,9 +136,8 @@ def clouds(runs: Runs, view: View, thermal: float) -> Bank:
         )
     left = len(runs.groups) - len(groups)
     more = f"; {left} more are not drawn" if left else ""
-    said = (
-        f"states by {len(runs.groups)} thermostat{'s' * (len(runs.groups) > 1)}" + ("; on the ring H = kT" if ring else "") + more
-    )
+    said = f"states by {len(runs.groups)} thermostat{'s' * (len(runs.groups) > 1)}"
+    said += ("; on the ring H = kT" if ring else "") + more
     said = _heading(f"phase portrait{_of(runs, [view])}", said)
     return runs.bank("phase-portrait", charts, said, (2.6, 2.4), columns=min(4, len(charts)))
 
