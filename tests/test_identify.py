@@ -201,7 +201,6 @@ def test_what_rounding_hides_is_said_and_not_guessed() -> None:
     assert any("more digits" in note for note in found.notes)
 
 
-@pytest.mark.campaign
 def test_friction_in_the_force_takes_a_step_of_long_substeps_beyond_its_largest_phase() -> None:
     """Without friction Forest & Ruth's phase turns back there: no guess of h w lies on its curve."""
     h, w2, rate, (q, v) = 0.11, (1.33 / 0.11) ** 2, 1.1, (0.7, 2.3)
@@ -217,6 +216,7 @@ def test_friction_in_the_force_takes_a_step_of_long_substeps_beyond_its_largest_
     assert (found.omega[0], found.friction[0]) == pytest.approx((w2**0.5, rate))
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize("form", ["single", "text"])
 @pytest.mark.parametrize("name", ["rk4", "ruth3", "forest-ruth", "yoshida4"])
 def test_a_scheme_of_high_order_in_coarse_numbers_is_named_or_listed_and_never_called_another(

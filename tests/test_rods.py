@@ -478,7 +478,10 @@ def test_studies_of_springs_refuse_rods_in_a_line(tmp_path: Path, capsys: pytest
     assert main(["run", "dumbbell", "--method", "own:velocity-verlet", "--steps", "50", "-o", path]) == 0
     capsys.readouterr()
     assert main(["stability", "dumbbell", "-o", str(tmp_path / "b.h5")]) == 2
-    assert "a step below h w = 1, here h < 0.666667, and none beyond" in capsys.readouterr().err
+    assert (
+        "a step below h w = 1, here h < 0.666667 at the rate of the start, and none beyond"
+        in capsys.readouterr().err
+    )
     assert main(["identify", path]) == 2
     said = capsys.readouterr().err
     assert "its scene has rods, and schemes are told by springs; judge it instead" in said

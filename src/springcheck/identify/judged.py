@@ -149,12 +149,15 @@ def _straight(record: Record, j: int) -> bool:
 
 
 def _falls(record: Record, j: int) -> bool:
-    """Whether a coordinate moves at constant acceleration, to the rounding of its numbers and times."""
+    """Whether a coordinate moves at constant acceleration, which its positions show, to the rounding of its
+    numbers and times."""
     n = np.arange(len(record.q), dtype=np.longdouble) / len(record.q)
     rounding = 64 * ROUNDING * np.sqrt(len(n)) + record.jitter
-    for x, quantum, powers_ in ((record.q[:, j], record.q_quantum, 3), (record.v[:, j], record.v_quantum, 2)):
-        left = x - np.vander(n, powers_) @ least_squares(np.vander(n, powers_), x[:, None])[:, 0]
-        if np.max(np.abs(left)) > rounding * np.max(np.abs(x)) + 2 * np.max(quantum[:, j]):
+    for x, quantum, degree in ((record.q[:, j], record.q_quantum, 2), (record.v[:, j], record.v_quantum, 1)):
+        powers = np.vander(n, degree + 1)
+        numbers = least_squares(powers, x[:, None])[:, 0]
+        room = rounding * np.max(np.abs(x)) + 2 * np.max(quantum[:, j])
+        if np.max(np.abs(x - powers @ numbers)) > room or not np.abs(numbers[0]) > room:
             return False
     return len(n) > FEWEST_OF_A_FALL
 
