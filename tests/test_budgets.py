@@ -17,11 +17,11 @@ BUDGETS = {
     ("engines/openmm", "engines/ase", "engines/sundials"): 1278,
     ("engines",): 2816,
     ("driver", "conformance", "doors"): 1200,
-    ("checks",): 5381,
+    ("checks",): 5389,
     ("identify",): 9172,
     ("formats", "store"): 5151,
     ("studies",): 1456,
-    ("studies/*",): 9777,
+    ("studies/*",): 9781,
     ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 7184,
 }
 """Lines of each room, or of several: of an engine in one file, and of what all studies share, in the first
