@@ -17,11 +17,11 @@ BUDGETS = {
     ("engines/openmm", "engines/ase", "engines/sundials"): 1278,
     ("engines",): 2816,
     ("driver", "conformance", "doors"): 1200,
-    ("checks",): 5447,
+    ("checks",): 5455,
     ("identify",): 9238,
     ("formats", "store"): 5165,
     ("studies",): 1456,
-    ("studies/*",): 9804,
+    ("studies/*",): 9813,
     ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 7212,
 }
 """Lines of each room, or of several: of an engine in one file, and of what all studies share, in the first

@@ -56,7 +56,7 @@ def test_pieces_of_trajectories_are_compared_as_wholes() -> None:
         {label: replace(run, t=run.t[a:b], q=run.q[a:b], p=run.p[a:b]) for label, run in runs.items()}
         for a, b in ((0, 90), (89, 201))
     ]
-    merged = compare.merge([compare.compare(scene, piece) for piece in pieces])
+    merged = compare.merge([compare.compare(scene, piece) for piece in pieces], runs)
     assert merged.labels == whole.labels
     assert (merged.max_difference == whole.max_difference).all()
 

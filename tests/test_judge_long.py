@@ -14,6 +14,7 @@ from springcheck import checks, schemes
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Quartic
+from springcheck.physics.trajectory import Outcome
 from springcheck.studies import keeper
 from springcheck.studies.faults import steppers
 from springcheck.studies.run import measure, text
@@ -98,6 +99,29 @@ def test_pieces_alone_pass_nothing_where_no_closed_form_joins_them(
     assert report.not_judged == ("own:plain",)
     (why,) = {v.why for v in report.verdicts if v.check == "step-defect"}
     assert "no closed form tells what happened between them" in why
+
+
+@pytest.mark.usefixtures("small")
+@pytest.mark.parametrize("steps", [187, 188, 396])
+def test_a_run_that_ends_early_takes_nothing_from_the_errors_of_others(tmp_path: Path, steps: int) -> None:
+    # its last piece begins between those of the other, and may be as long
+    scene, runs = springs(400), {}
+    for name, end in (("semi-implicit-euler", steps), ("velocity-verlet", 400)):
+        scheme = schemes.SCHEMES[name]
+        run = steppers.record(scene, scheme, steppers.textbook(scene, scheme), label=f"own:{name}")
+        how = "stopped" if end < 400 else "complete"
+        runs[run.label] = replace(run.at(slice(end + 1)), outcome=Outcome(status=how, step=end))
+    with keeper.open_new(tmp_path / "a.h5", "test") as journal:
+        for run in runs.values():
+            journal.save(run, scene)
+        sources = journal.sources()
+        both = measure.judge(scene, tmp_path / "a.h5", sources, [])
+        alone = [measure.judge(scene, tmp_path / "a.h5", {name: sources[name]}, []) for name in runs]
+    assert [run.max_error for run in both.runs] == [one.runs[0].max_error for one in alone]
+    assert both.comparison.labels == ("exact", *runs)
+    differences = both.comparison.max_difference
+    assert differences[0, 2] == alone[1].comparison.max_difference[0, 1]
+    assert np.isnan(differences[1, [0, 2]]).all()
 
 
 def test_a_closed_form_that_forgets_does_not_join_pieces() -> None:

@@ -57,10 +57,18 @@ def compare(scene: Scene, pieces: Mapping[str, Trajectory]) -> Comparison:
     return Comparison(labels=labels, max_difference=out)
 
 
-def merge(comparisons: Sequence[Comparison]) -> Comparison:
-    """The comparison of whole trajectories from those of their pieces."""
-    worst = np.max([comparison.max_difference for comparison in comparisons], axis=0)
-    return Comparison(labels=comparisons[0].labels, max_difference=np.asarray(worst))
+def merge(comparisons: Sequence[Comparison], last: Mapping[str, Trajectory]) -> Comparison:
+    """The comparison of whole trajectories from those of their pieces, of which `last` has the last ones.
+    What ended before another is not compared: NaN."""
+    labels, end = comparisons[0].labels, max(run.outcome.step for run in last.values())
+    out = np.zeros((len(labels), len(labels)))
+    for part in comparisons:
+        at = np.ix_(*[[labels.index(label) for label in part.labels]] * 2)
+        out[at] = np.maximum(out[at], part.max_difference)
+    early = [label in last and last[label].outcome.step < end for label in labels]
+    out[early] = out[:, early] = np.nan
+    np.fill_diagonal(out, 0)
+    return Comparison(labels=labels, max_difference=out)
 
 
 @np.errstate(all="ignore")

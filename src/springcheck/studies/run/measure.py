@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import heapq
 import os
 from argparse import Namespace
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from fnmatch import fnmatchcase
-from itertools import zip_longest
+from itertools import groupby, zip_longest
+from operator import itemgetter
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -207,34 +209,30 @@ def judge(
 ) -> Report:
     """The report on stored trajectories, read in pieces of bounded size."""
     rows, stride = _pieces(scene, sources)
-    judged_frames = 0
+    judged_frames = dict.fromkeys(sources, 0)
     verdicts: dict[str, list[list[Verdict]]] = {name: [] for name in sources}
     tallies = {name: Tally(scene) for name in sources}
     parts: list[Comparison] = []
     last, failed = dict[str, Trajectory](), dict[str, Trajectory]()
-    streams = (keeper.windows(source, name, rows, stride) for name, source in sources.items())
-    for windows in zip_longest(*streams):
-        # over the same frames; runs that have ended are left out
-        pieces = {name: one for name, one in zip(sources, windows, strict=True) if one is not None}
-        judged_frames += max(len(piece.t) for piece in pieces.values())
+    first = itemgetter(0)
+    streams = (_begun(scene, keeper.windows(path, name, rows, stride)) for name, path in sources.items())
+    # over the same frames: the last piece of a run that ends early may begin where no other does
+    for _, same in groupby(heapq.merge(*streams, key=first), first):
+        pieces = {piece.label: piece for _, piece in same}
         known = compare.solution(scene, pieces.values()) if exact.has_true_motion(scene) else None
         for name, piece in pieces.items():
+            judged_frames[name] += len(piece.t)
             verdicts[name].append(checks.judge(scene, piece, piece=True))
             if any(v.passed is False and v.check in checks.TELLING for v in verdicts[name][-1]):
                 failed.setdefault(name, piece)
             tallies[name].add(piece, known)
             last[name] = piece
-        if len(pieces) == len(sources):
-            parts.append(compare.compare(scene, pieces))
-        else:
-            # where some run has ended early, pairs cannot be compared any further
-            nothing = np.full_like(parts[-1].max_difference, np.nan)
-            parts.append(replace(parts[-1], max_difference=nothing))
-    comparison = compare.merge(parts)
+        parts.append(compare.compare(scene, pieces))
+    comparison, frames = compare.merge(parts, last), max(judged_frames.values())
     runs = tuple(line(last[name], tallies[name]) for name in sources)
     worst = {name: checks.worst(verdicts[name]) for name in sources}
     if stride > 1:
-        worst = {name: _bridged(mine, verdicts[name], judged_frames) for name, mine in worst.items()}
+        worst = {name: _bridged(mine, verdicts[name], frames) for name, mine in worst.items()}
     if failed:
         from springcheck.identify import files
 
@@ -252,9 +250,15 @@ def judge(
         comparison=comparison,
         same=() if scene.bath else tuple(compare.same_motions(scene, last, comparison)),
         temperatures=tuple(tally.heat.line(name) for name, tally in tallies.items() if tally.heat),
-        judged_frames=min(judged_frames, scene.frames) if stride > 1 else scene.frames,
+        judged_frames=min(frames, scene.frames) if stride > 1 else scene.frames,
         resumed=tuple(name for name in resumed if name in sources),
     )
+
+
+def _begun(scene: Scene, pieces: Iterable[Trajectory]) -> Iterator[tuple[int, Trajectory]]:
+    """Pieces of a run, each with the steps before its first frame."""
+    for piece in pieces:
+        yield int(checks.Case(trajectory=piece, scene=scene).steps[0]), piece
 
 
 def _pieces(scene: Scene, sources: Mapping[str, Path]) -> tuple[int, int]:
