@@ -50,7 +50,8 @@ function mapOf({ t, q, x }) {
   // the roundings of a step: of the numbers in the file, of the products and of their sum
   const rounds = ([A, B], i) => Math.abs(A * (Q[i] + q0)) + Math.abs(B * (V[i] + v0));
   const miss = (k, i) => Math.abs(left(k, i)) / (Math.abs(z[k][i + 1] + [q0, v0][k]) + rounds(rows[k], i));
-  const exact = t.every((_, i) => i === n || Math.max(miss(0, i), miss(1, i)) < DIGITS * ULP), under = (1 - A) * (1 - D) - B * C;
+  const exact = t.every((_, i) => i === n || Math.max(miss(0, i), miss(1, i)) < DIGITS * ULP);
+  const under = (1 - A) * (1 - D) - B * C;
   if (!exact) return "A step is not linear in the state to rounding: few digits, noise, or another force";
   const rests = Math.abs(v0 * under + C * e + (1 - A) * f) < error * (1 + away);
   return rests ? { entries: [A, B, C, D], ratio: (vs * T) / qs, error } : "No place is at rest";
