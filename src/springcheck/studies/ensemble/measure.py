@@ -126,9 +126,7 @@ def measure(scene: Scene, cells: Plan, chunk: int, label: Label) -> Columns:
     for number in range(int(group.max()) + 1):
         mine = np.flatnonzero(group.ravel() == number)
         first = together(scene, changes, mine[:1])
-        # all joints of a run are as long as the largest motion needs them
-        alone = engines.method(label).adaptive or engines.arithmetic(label).joints
-        size = 1 if alone else max(1, NUMBERS_PER_ARRAY // (first.frames * first.n))
+        size = 1 if engines.method(label).adaptive else max(1, NUMBERS_PER_ARRAY // (first.frames * first.n))
         for start in range(0, len(mine), size):
             _run(scene, changes, mine[start : start + size], label, found)
     return {**values, **found}
@@ -138,9 +136,6 @@ def _run(scene: Scene, changes: Any, chosen: np.ndarray, label: Label, found: di
     """Run these cells side by side; where the engine stops, bisect to find the cells that stop it."""
     many = together(scene, changes, chosen)
     try:
-        # copies side by side may have what the engine takes once for all of them, as its rate of friction
-        if reason := engines.refusal(many, label):
-            raise MethodError(reason)
         q, p, stop = raw(many, label)
         stopped = stop is not None
     except MethodError:
