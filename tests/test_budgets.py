@@ -10,7 +10,7 @@ import springcheck
 HOME = Path(springcheck.__file__).parent
 
 BUDGETS = {
-    ("physics",): 6845,
+    ("physics",): 6850,
     ("schemes",): 1680,
     ("thermal",): 3273,
     ("engines/own",): 1591,
@@ -21,8 +21,8 @@ BUDGETS = {
     ("identify",): 9238,
     ("formats", "store"): 5165,
     ("studies",): 1456,
-    ("studies/*",): 9813,
-    ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 7212,
+    ("studies/*",): 9816,
+    ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 7215,
 }
 """Lines of each room, or of several: of an engine in one file, and of what all studies share, in the first
 folder."""
@@ -64,5 +64,5 @@ def test_no_module_is_longer_than_400_lines() -> None:
 
 def test_the_scripts_of_the_page_are_few_lines_that_can_be_read() -> None:
     lines = [line for path in (HOME / "cli/page").glob("*.js") for line in path.read_text().splitlines()]
-    assert len(lines) <= 810
+    assert len(lines) <= 832
     assert max(map(len, lines)) <= 110

@@ -585,6 +585,8 @@ def test_an_axis_along_which_all_rests_is_not_exercised() -> None:
     still = replace(scene, q=[0.3, 0.0, 0.8], p=[0.7, 0.0, -0.4])
     assert "axis y" in checks.not_exercised(still)
     assert "ax" not in checks.not_exercised(scene)
+    # a bath moves what rests
+    assert "axes y and z" in checks.not_exercised(scenes.load_scene("bath-uneven"))
 
 
 @pytest.mark.parametrize(

@@ -223,6 +223,10 @@ def test_a_window_of_forces_says_at_which_steps_it_is_all_that_was_tried() -> No
     (window,) = extremes.windows(cells)
     assert "forces between 1e-300 and 1e300 at h w from 0.01 to 1.9, in" in window.sentence
     assert window.sentence.endswith("all that was tried there")
+    # explicit Euler is nowhere right at h w = 1.9
+    specs = [grid.force_cell(turn, decade) for turn in (0.1, 1.9) for decade in (0, 3)]
+    (window,) = extremes.windows(running.cells(engines.parse("own:euler"), specs))
+    assert "at h w from 0.01 to 1.9, or unstable as theory says, in" in window.sentence
 
 
 def test_an_enormous_step_of_a_free_particle_stays_finite_in_implicit_euler() -> None:

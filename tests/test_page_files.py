@@ -130,3 +130,23 @@ def test_what_is_not_plain_is_left_to_the_command(tmp_path: Path) -> None:
     assert names.pop("spaced, with units and another column") == "velocity-verlet"
     assert set(names.values()) == {None}
     assert all(one.get("scheme") or one["why"] for one in found.values())
+
+
+def test_a_frame_that_is_off_is_seen_however_large_others_are(tmp_path: Path) -> None:
+    """Explicit Euler at h omega = 1 grows 2**20 times in 40 steps; an arc is short beside its velocity."""
+    texts = []
+    for h, steps, tableau in ((1.0, 40, [0.0]), (0.025, 13, [0.0, 0.5])):
+        state, rows = np.array([0.3, 0.7]), []
+        for i in range(steps):
+            rows.append((i * h, *state))
+            k = np.zeros(2)
+            for part in tableau:
+                x = state + part * h * k
+                k = np.array([x[1], -x[0]])
+            state = state + h * k
+        t, q, v = np.array(rows).T
+        off = q.copy()
+        off[steps // 2] *= 1 + 1e-13
+        texts += [text(t=t, q=q, v=v), text(t=t, q=off, v=v)]
+    names = [one.get("scheme") for one in said(texts, tmp_path)]
+    assert names == ["explicit-euler", None, "rk2-midpoint", None]

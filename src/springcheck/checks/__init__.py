@@ -190,9 +190,9 @@ def not_exercised(scene: Scene) -> str:
     if scene.kind != "particles":
         return ""
     system = scene.system
-    pulled = np.abs(scene.p) + np.abs(system.force_of(scene.terms)(scene.q, scene.p)) > 0
+    pulled = np.abs(scene.p) + np.abs(system.force_of(scene.terms)(scene.q, scene.p)) + scene.thermal > 0
     for term in scene.terms:
-        # a particle at rest without a force at the start may be driven later
+        # a particle at rest without a force at the start may be driven later, as by the heat of a bath
         if term.kind == "drive":
             pulled[np.concatenate(term.particles)] = True
     moved = np.bincount(scene.all_places[pulled] % 3, minlength=3)

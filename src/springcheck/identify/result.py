@@ -252,7 +252,7 @@ def identification(label: str, found: Identification) -> Lines:
         out += hanging("  what to do: ", one.remedy)
     for one in found.explanations[1:3]:
         out += hanging("  or: ", f"{one.cause}; {one.remedy}")
-    if several:
+    if several and found.choice != [found.scheme]:
         out += hanging("  one of: ", "; ".join(found.choice))
     for name, text in rows:
         if text and "nan" not in text:

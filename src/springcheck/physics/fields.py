@@ -73,6 +73,12 @@ class SceneFields(FrozenArrays):
         return particles if self.places is None else f"{particles} along {along}"
 
     @property
+    def stepping(self) -> str:
+        """Number and length of the steps, with the unit of time, in words."""
+        unit = {"reduced": "", "md": " ps", "si": " s"}[self.units]
+        return f"{self.steps} step{'s' if self.steps != 1 else ''} of {self.step:g}{unit}"
+
+    @property
     def axes(self) -> tuple[str, ...]:
         """The axes, of x, y and z, along which something moves."""
         return ("x",) if self.places is None else tuple("xyz"[i] for i in np.unique(self.places % 3))

@@ -45,8 +45,7 @@ class Scene(SceneFields):
 
     def __repr__(self) -> str:
         terms = ", ".join(f"{len(term)} {term.key}" for term in self.terms) or "free"
-        steps = f"{self.steps} step{'s' if self.steps != 1 else ''} of {self.step:g}"
-        return f"Scene({self.name!r}, {self.size}, {terms}, {steps})"
+        return f"Scene({self.name!r}, {self.size}, {terms}, {self.stepping})"
 
     @cached_property
     def system(self) -> SolvedSystem[Scene]:

@@ -62,11 +62,12 @@ class Chart {
 
   draw(view = this.view) {
     const { spec } = this, R = 12, T = 12, W = Math.max(280, this.box.clientWidth || 440);
-    // names are written in full: at the left, and upwards below
-    const beyond = ({ named, values }, n) => Math.max(0, ...values.map((v) => (named ? v.length - n : 0)));
-    const L = 62 + 6.8 * beyond(spec.y, 5), B = 46 + 7.4 * beyond(spec.x, 2);
+    // names and numbers are written in full: at the left, and names upwards below
+    const all = this.whole(), beyond = (texts, n) => Math.max(0, ...texts.map((text) => text.length - n));
+    const L = 62 + 7 * beyond(ticks(spec.y, ...(view || all).slice(2)).map(([, text]) => text), 4);
+    const B = 46 + 7.4 * beyond(spec.x.named ? spec.x.values : [], 2);
     const usual = Math.min(420, Math.max(260, Math.round(W * 0.72)));
-    const all = this.whole(), H = spec.y.named ? (all[3] - all[2]) * 14 + T + B : usual;
+    const H = spec.y.named ? (all[3] - all[2]) * 14 + T + B : usual;
     const across = W - L - R, up = H - T - B;
     let [x0, x1, y0, y1] = view || all, [sx, sy] = [across / (x1 - x0), up / (y1 - y0)];
     if (spec.equal) {
@@ -92,14 +93,17 @@ class Chart {
     }
     root.append(element("clipPath", { id: clip }, element("rect", box)));
     if (spec.tiles) this.tiles(inside, x, y);
-    let [beneath, above] = [T + 11, -99];
+    let [beneath, above, texts] = [T + 11, -99, []];
     for (const { axis, at, name, look } of spec.rules) {
       const v = this.ways["xy".indexOf(axis)](at), [left, more] = look === "one" ? [L + 5] : [W - R - 5, END];
-      const place = axis === "x" ? { x: x(v) + 5, y: beneath } : { x: left, y: y(v) - 5, ...more };
+      const high = y(v) + (y(v) < T + 16 ? 14 : -5);
+      const place = axis === "x" ? { x: x(v) + 5, y: beneath } : { x: left, y: high, ...more };
       if (axis === "x") beneath = T + 11 + ((beneath - T - 11 + LINE) % (4 * LINE));
-      inside.append(line(axis, v, look || "limit"), element("text", place, name));
+      inside.append(line(axis, v, look || "limit"));
+      texts.push(element("text", place, name));
     }
     for (const curve of this.seen()) this.curve(inside, curve, x, y);
+    inside.append(...texts);
     const fills = new Map(this.seen().map(({ group, look }) => [group, colourOf(look)])), [a, b, c, d] = all;
     for (const one of spec.labels.filter(({ group }) => fills.has(group)).sort((p, q) => q.y - p.y)) {
       const style = { fill: fills.get(one.group) }, [off, more] = one.x > 0.6 ? [-4, END] : [4, {}];
@@ -111,11 +115,16 @@ class Chart {
     this.ring = element("circle", { class: "ring", r: 6, cx: -99, cy: -99 });
     this.frame = element("rect", { class: "drag", width: 0, height: 0 });
     inside.append(this.ring, this.frame);
-    // a long name stays inside
-    const below = { x: Math.min((L + W - R) / 2, W - 3.6 * spec.x.name.length), y: H - 8, ...MIDDLE };
+    const below = { x: (L + W - R) / 2, y: H - 8, ...MIDDLE };
     root.append(inside, element("rect", { class: "frame", ...box }), element("text", below, spec.x.name),
       element("text", { transform: `translate(14 ${(T + H - B) / 2}) rotate(-90)`, ...MIDDLE }, spec.y.name));
     this.box.replaceChildren(root);
+    // what is written stays inside, that of a line at the edge too
+    for (const text of root.querySelectorAll("text:not([transform])")) {
+      const at = text.getBBox(), [low, high] = inside.contains(text) ? [L, W - R] : [0, W];
+      const off = Math.max(0, low - at.x) + Math.min(0, high - at.x - at.width);
+      if (at.x < high + 6 && at.x + at.width > low) made(text, { x: Number(text.getAttribute("x")) + off });
+    }
     const names = spec.tiles ? "all tiles" : this.seen().map((curve) => curve.name).join(", ") || "nothing";
     this.box.setAttribute("aria-label", `${spec.title} ${spec.y.name} over ${spec.x.name}. Shown: ${names}. `
       + "Arrow keys read it, plus and minus zoom, 0 shows all.");

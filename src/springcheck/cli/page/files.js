@@ -2,6 +2,7 @@
 // linear force, no friction.  Of anything else the command is to be asked: what is named here, it names.
 
 const ULP = 2 ** -53;
+const DIGITS = 46; // units roundoff in half a unit of the 15th digit
 
 // The columns t, q and x (p or v) of a table of one particle; why not, in words, where they are not that.
 function columns(text) {
@@ -25,11 +26,13 @@ function mapOf({ t, q, x }) {
   const even = T > 0 && t.every((v, i) => !i || Math.abs(v - t[i - 1] - T) <= 4 * ULP * most);
   if (!even) return "The frames are not at even times";
   const mean = (v) => v.reduce((a, b) => a + b, 0) / v.length;
+  // only what stays far from 0 is centred: of a motion that grows the small states keep their digits
   const [[q0, qs, Q], [v0, vs, V]] = [q, x].map((v) => {
-    const at = mean(v), size = Math.sqrt(mean(v.map((u) => (u - at) ** 2)));
+    const far = mean(v), spread = (at) => Math.sqrt(mean(v.map((u) => (u - at) ** 2)));
+    const at = Math.abs(far) > spread(far) ? far : 0, size = spread(at);
     return [at / size, size, v.map((u) => (u - at) / size)];
   });
-  const away = Math.hypot(q0, v0), length = Q.map((u, i) => Math.hypot(u, V[i]) + away);
+  const away = Math.hypot(q0, v0), length = Q.map((u, i) => Math.hypot(u + q0, V[i] + v0));
   // least squares, each pair relative to its size
   const sum = (f) => length.reduce((s, u, i) => (i < n ? s + f(i) / Math.max(u, length[i + 1]) ** 2 : s), 0);
   const all = sum(() => 1), a = sum((i) => Q[i]) / all, b = sum((i) => V[i]) / all;
@@ -44,8 +47,11 @@ function mapOf({ t, q, x }) {
     rows[k] = [rows[k][0] + c, rows[k][1] + d, rows[k][2] + r / all - c * a - d * b];
   }
   const [[A, B, e], [C, D, f]] = rows, error = ((64 + n) * ULP * (1 + away)) / Math.sqrt(det / aa / bb);
-  const miss = (i) => Math.hypot(left(0, i), left(1, i)) / (length[i] + length[i + 1]);
-  const exact = t.every((_, i) => i === n || miss(i) < 16 * ULP), under = (1 - A) * (1 - D) - B * C;
+  // the roundings of a step: of the numbers in the file, of the products and of their sum
+  const rounds = ([A, B], i) => Math.abs(A * (Q[i] + q0)) + Math.abs(B * (V[i] + v0));
+  const miss = (k, i) => Math.abs(left(k, i)) / (Math.abs(z[k][i + 1] + [q0, v0][k]) + rounds(rows[k], i));
+  const exact = t.every((_, i) => i === n || Math.max(miss(0, i), miss(1, i)) < DIGITS * ULP);
+  const under = (1 - A) * (1 - D) - B * C;
   if (!exact) return "A step is not linear in the state to rounding: few digits, noise, or another force";
   const rests = Math.abs(v0 * under + C * e + (1 - A) * f) < error * (1 + away);
   return rests ? { entries: [A, B, C, D], ratio: (vs * T) / qs, error } : "No place is at rest";

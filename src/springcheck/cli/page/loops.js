@@ -34,9 +34,15 @@ function exactMotion(s, times) {
   const g = (s.c || 0) / (2 * s.m), w2 = s.k / s.m - g * g, w = Math.sqrt(Math.abs(w2));
   const x0 = s.q - s.at, v0 = s.p / s.m, [cos, sin] = w2 > 0 ? [Math.cos, Math.sin] : [Math.cosh, Math.sinh];
   return times.map((t) => {
-    const even = cos(w * t), odd = w === 0 ? t : sin(w * t) / w, decay = Math.exp(-g * t);
-    const x = decay * (x0 * even + (v0 + g * x0) * odd);
-    return [s.at + x, s.m * decay * (v0 * even - (g * v0 + (s.k / s.m) * x0) * odd)];
+    const decay = Math.exp(-g * t);
+    let [even, odd] = [decay * cos(w * t), decay * (w === 0 ? t : sin(w * t) / w)];
+    if (w2 < 0 && Math.abs(w * t) > 1) {
+      // two exponentials, the slow one without cancellation: cosh leaves the range of doubles
+      const [slow, fast] = [Math.exp((-(s.k / s.m) / (g + w)) * t), Math.exp(-(g + w) * t)];
+      [even, odd] = [(slow + fast) / 2, (slow - fast) / (2 * w)];
+    }
+    const x = x0 * even + (v0 + g * x0) * odd;
+    return [s.at + x, s.m * (v0 * even - (g * v0 + (s.k / s.m) * x0) * odd)];
   });
 }
 

@@ -40,6 +40,7 @@ function selfCheck() {
   const { equal, near, wrong } = said, list = lines.filter(Boolean).map((text) => html("li", {}, text));
   const bad = ["differs", "bad", "Your browser and this file differ:"];
   const [result, look, head] = lines[0] || wrong.length ? bad
+    : !DATA.linear ? ["none", "", place.textContent]
     : !equal.length && !near.length ? ["none", "", "None of these methods is computed again here."]
       : ["equal", "good", `Your browser = this file: ${equal.length} of ${runs.length} methods to the last `
         + `bit, ${near.length} to rounding or tolerance.`];

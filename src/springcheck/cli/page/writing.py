@@ -19,7 +19,7 @@ from springcheck.figures import looks
 from springcheck.figures.charts import BEGIN, EXACTLY, GUIDE, REJECTED, SEPARATRIX
 from springcheck.physics.trajectory import Verdict
 from springcheck.store import files
-from springcheck.text.wording import ordinal
+from springcheck.text.wording import count, ordinal
 
 HERE = Path(__file__).parent
 MARK = '<meta name="generator" content="springcheck report">'
@@ -67,6 +67,7 @@ def html(content: Content) -> str:
         "short": "{:.3g}".format,
         "fraction": fraction,
         "ordinal": ordinal,
+        "count": count,
         "words": lambda text: str(text).strip(),
     }
     names = (*SCRIPTS, "bath.js") if content.data.get("bath") else SCRIPTS

@@ -127,17 +127,20 @@ def windows(cells: Sequence[Cell]) -> list[Window]:
     found = []
     for method in dict.fromkeys(cell.method for cell in cells):
         calm: dict[int, bool] = {}
+        unstable = ""
         for cell in cells:
             within = CALM_TURNS[0] * 0.999 < cell.parameters["h_w"] < CALM_TURNS[1] * 1.001
             if cell.method == method and cell.block == "force" and within:
                 calm[cell.decade] = calm.get(cell.decade, True) and cell.outcome in RIGHT
+                unstable = ", or unstable as theory says" if cell.outcome == RIGHT[1] else unstable
         spans = [list(span) for right, span in groupby(sorted(calm), calm.__getitem__) if right]
         span = next((span for span in spans if any(0 <= x <= 6 for x in span)), None)
         if span is None:
             continue
         name = engines.engine(method.partition(":")[0]).title
         between = f"1e{span[0]} and 1e{span[-1]} at h w from {CALM_TURNS[0]:g} to {CALM_TURNS[1]:g}"
-        sentence = f"{name} ({method}): right for forces between {between}, in the scene's unit of force"
+        right = f"right for forces between {between}{unstable}"
+        sentence = f"{name} ({method}): {right}, in the scene's unit of force"
         if len(span) == len(calm):
             sentence += ", all that was tried there"
         found.append(Window(method=method, sentence=sentence, low=10.0 ** span[0], high=10.0 ** span[-1]))

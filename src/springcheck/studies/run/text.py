@@ -43,7 +43,7 @@ BELOW = "the exact solution is known no better than this, and the run is no furt
 def _report(report: Report) -> Lines:
     scene = report.scene
     size = "" if scene.n == 1 else f", {scene.size}"
-    head = f"{scene.title}: {count(scene.steps, 'step')} of {scene.step:g}{size}"
+    head = f"{scene.title}: {scene.stepping}{size}"
     out: Lines = [plain(head, "bold"), plain(), _runs(report.runs)]
     unit = f"root of the {scene.system.norm.of or 'unit'}, as the start has no energy"
     unit = "initial energy norm" if "initial" in unit else unit
