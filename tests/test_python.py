@@ -8,13 +8,15 @@ import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from threading import Event, Thread
 from typing import Any
 
 import numpy as np
 import pytest
 
 import springcheck
-from springcheck import api, engines
+from springcheck import api, driver, engines
+from springcheck.api.taking import labels_of
 from springcheck.cli import file
 from springcheck.errors import MethodError, SceneError, SpringcheckError, StoreError
 from springcheck.text.wording import STATES_SHOW
@@ -77,6 +79,31 @@ def test_a_function_of_ones_own_is_a_method_for_its_call_alone() -> None:
     assert not unknown.passed, "of no scheme nothing is judged"
     with pytest.raises(MethodError, match="cannot be called as a step"):
         springcheck.simulate(scene, lambda q, p: (q, p))
+
+
+def test_a_function_of_another_thread_is_not_run_in_the_place_of_this_one() -> None:
+    def euler(q: Any, p: Any, h: Any, force: Callable[..., Any], mass: Any) -> tuple[Any, Any]:
+        return q + h * p / mass, p + h * force(q)
+
+    euler.__name__ = leapfrog.__name__
+    scene, entered, over = springcheck.load_scene("spring-uneven"), Event(), Event()
+
+    def elsewhere() -> None:
+        with labels_of(euler):
+            entered.set()
+            over.wait(60)
+
+    alone = springcheck.simulate(scene, leapfrog)
+    other = Thread(target=elsewhere)
+    with labels_of(leapfrog) as (label,):
+        other.start()
+        entered.wait(60)
+        found = driver.run(scene, label)
+        over.set()
+        other.join()
+        again = driver.run(scene, label)
+    np.testing.assert_array_equal(found.q, alone.q)
+    np.testing.assert_array_equal(again.q, alone.q)
 
 
 def test_run_leaves_nothing_on_disk_unless_it_is_asked_to() -> None:
