@@ -7,6 +7,7 @@ import os
 import sys
 from collections.abc import Callable
 from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 from threading import Event, Thread
 from typing import Any
@@ -150,7 +151,7 @@ def shown(result: Any, name: str) -> Any:
 
 def test_every_study_has_a_function_whose_result_shows_itself() -> None:
     two = ["own:euler", "own:velocity-verlet"]
-    frame = shown(springcheck.precision("spring", two, budget=np.float32(0.2)), "PrecisionStudy")
+    frame = shown(springcheck.precision("spring", two, budget=Fraction(1, 5)), "PrecisionStudy")
     assert set(frame["method"]) <= set(two)
     assert {"max_error", "run_seconds"} <= set(frame.columns)
     limits = springcheck.stability("spring", two)
@@ -322,6 +323,15 @@ def test_wrong_arguments_are_answered_in_words() -> None:
             for x in (5, [1], "")
             for f in (springcheck.read, springcheck.report)
         ),
+        (lambda: springcheck.report("", "x.html"), "path of a file is needed"),
+        *((lambda f=f: f(Path()), "it is a folder") for f in (springcheck.read, springcheck.report)),
+        (lambda: made(t, np.ma.array(t, mask=t == 2), t), "q: real numbers"),
+        (lambda: springcheck.spring(k=np.ma.array([3.0], mask=[True])), "k: real numbers"),
+        (lambda: scene.replace(m=np.ma.array([3.0], mask=[True])), "m: real numbers"),
+        (lambda: springcheck.plot.phase([run, run]), "phase: runs = .*: a Trajectory is needed"),
+        (lambda: springcheck.plot.energy(5), "a Trajectory is needed"),
+        (lambda: springcheck.plot.phase(run, particle=1), "particle = 1: 0 to 0 are here"),
+        (lambda: springcheck.plot.position(run, run, particle="a"), "particle = 'a': a whole number"),
         (lambda: springcheck.precision(scene, "own:rk4", path=5), "path = 5: a text or a path"),
         (lambda: springcheck.run(scene, "own:rk4", path=5), "path = 5: a text or a path"),
         (lambda: springcheck.report("x.h5", 5), "output = 5: a text or a path"),

@@ -168,6 +168,12 @@ class Trajectory:
             raise SpringcheckError(f"{self.label}: its times are no whole steps of {self.step:g}")
         return exact.true_motion(scene, steps.astype(np.int64), self.step)
 
+    def of_particle(self, particle: int) -> tuple[Floats, Floats]:
+        """Its positions and momenta, (f,) each.  SpringcheckError where none has this number."""
+        if particle not in range(-(n := self.q.shape[1]), n):
+            raise SpringcheckError(f"{self.label}: particle = {particle}: 0 to {n - 1} are here")
+        return self.q[:, particle], self.p[:, particle]
+
     def at(self, rows: slice) -> Trajectory:
         """These frames alone."""
         more = {x: y[rows] for x in ("energy", "last_step") if (y := getattr(self, x)) is not None}
@@ -202,13 +208,12 @@ class Trajectory:
 
         `ax`: matplotlib axes of your own.  `springcheck.plot` draws several trajectories, and over time.
         """
-        if particle not in range(-(n := self.q.shape[1]), n):
-            raise SpringcheckError(f"{self.label}: particle = {particle}: 0 to {n - 1} are here")
+        states = self.of_particle(particle)
         axes = library("matplotlib.pyplot").figure(layout="constrained").add_subplot() if ax is None else ax
         if self.scene is not None and self.scene.system.solution is not None:
             q, p = self._exact(self.scene)
             axes.plot(q[:, particle], p[:, particle], color="#b3b3b3", linewidth=4, label="exact")
-        axes.plot(self.q[:, particle], self.p[:, particle], label=self.label)
+        axes.plot(*states, label=self.label)
         axes.set(xlabel="q", ylabel="p", title=f"{self.label}: phase portrait of {len(self.t)} frames")
         axes.legend()
         return axes
