@@ -58,7 +58,7 @@ class _Found(NamedTuple):
 _brought: dict[str, _Found] = {}
 
 # known within a context alone, so that another thread's engine of the same name is not run in its place
-_here: ContextVar[Mapping[str, _Found]] = ContextVar("_here", default={})  # noqa: B039
+_here: ContextVar[dict[str, _Found]] = ContextVar("_here", default={})  # noqa: B039
 
 
 @cache
