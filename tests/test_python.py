@@ -3,6 +3,7 @@ disk unless it is asked for, and results that show themselves."""
 
 from __future__ import annotations
 
+import errno
 import os
 import sys
 from collections.abc import Callable
@@ -516,3 +517,23 @@ def test_judge_without_a_scheme_says_in_a_line_how_to_find_it() -> None:
 def test_an_argument_that_a_function_has_not_is_answered_with_its_name() -> None:
     with pytest.raises(TypeError, match=r"^run\(\) got an unexpected keyword argument 'workers'"):
         springcheck.run("spring", "own:euler", workers=2)  # type: ignore[call-arg]
+
+
+@pytest.mark.parametrize(("name", "writer"), [("a.csv", "savetxt"), ("a.npz", "savez")])
+def test_a_file_that_cannot_be_written_whole_leaves_what_was_there(
+    name: str, writer: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = springcheck.simulate("spring", "own:euler")
+    before = run.save(name).read_bytes()
+
+    def broken(file: Any, *given: Any, **named: Any) -> None:
+        (file.write if hasattr(file, "write") else Path(file).write_bytes)(before[:100])
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(np, writer, broken)
+    with pytest.raises(SpringcheckError, match=f"{name}: cannot be written: No space left"):
+        run.save(name)
+    assert Path(name).read_bytes() == before
+    assert [path.name for path in Path().iterdir()] == [name]
+    with pytest.raises(SpringcheckError, match="cannot be written: embedded null"):
+        run.save("\0" + name)
