@@ -10,19 +10,19 @@ import springcheck
 HOME = Path(springcheck.__file__).parent
 
 BUDGETS = {
-    ("physics",): 6850,
+    ("physics",): 6872,
     ("schemes",): 1680,
     ("thermal",): 3273,
     ("engines/own",): 1591,
     ("engines/openmm", "engines/ase", "engines/sundials"): 1278,
-    ("engines",): 2816,
+    ("engines",): 2821,
     ("driver", "conformance", "doors"): 1200,
     ("checks",): 5455,
     ("identify",): 9238,
     ("formats", "store"): 5165,
     ("studies",): 1456,
     ("studies/*",): 9816,
-    ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 7215,
+    ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 7220,
 }
 """Lines of each room, or of several: of an engine in one file, and of what all studies share, in the first
 folder."""

@@ -3,18 +3,22 @@ disk unless it is asked for, and results that show themselves."""
 
 from __future__ import annotations
 
+import errno
 import os
 import sys
 from collections.abc import Callable
 from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
+from threading import Event, Thread
 from typing import Any
 
 import numpy as np
 import pytest
 
 import springcheck
-from springcheck import api, engines
+from springcheck import api, driver, engines
+from springcheck.api.taking import labels_of
 from springcheck.cli import file
 from springcheck.errors import MethodError, SceneError, SpringcheckError, StoreError
 from springcheck.text.wording import STATES_SHOW
@@ -79,6 +83,31 @@ def test_a_function_of_ones_own_is_a_method_for_its_call_alone() -> None:
         springcheck.simulate(scene, lambda q, p: (q, p))
 
 
+def test_a_function_of_another_thread_is_not_run_in_the_place_of_this_one() -> None:
+    def euler(q: Any, p: Any, h: Any, force: Callable[..., Any], mass: Any) -> tuple[Any, Any]:
+        return q + h * p / mass, p + h * force(q)
+
+    euler.__name__ = leapfrog.__name__
+    scene, entered, over = springcheck.load_scene("spring-uneven"), Event(), Event()
+
+    def elsewhere() -> None:
+        with labels_of(euler):
+            entered.set()
+            over.wait(60)
+
+    alone = springcheck.simulate(scene, leapfrog)
+    other = Thread(target=elsewhere)
+    with labels_of(leapfrog) as (label,):
+        other.start()
+        entered.wait(60)
+        found = driver.run(scene, label)
+        over.set()
+        other.join()
+        again = driver.run(scene, label)
+    np.testing.assert_array_equal(found.q, alone.q)
+    np.testing.assert_array_equal(again.q, alone.q)
+
+
 def test_run_leaves_nothing_on_disk_unless_it_is_asked_to() -> None:
     report = springcheck.run("spring", ["own:euler", "own:velocity-verlet"])
     assert list(Path().iterdir()) == []
@@ -123,7 +152,7 @@ def shown(result: Any, name: str) -> Any:
 
 def test_every_study_has_a_function_whose_result_shows_itself() -> None:
     two = ["own:euler", "own:velocity-verlet"]
-    frame = shown(springcheck.precision("spring", two, budget=np.float32(0.2)), "PrecisionStudy")
+    frame = shown(springcheck.precision("spring", two, budget=Fraction(1, 5)), "PrecisionStudy")
     assert set(frame["method"]) <= set(two)
     assert {"max_error", "run_seconds"} <= set(frame.columns)
     limits = springcheck.stability("spring", two)
@@ -295,6 +324,15 @@ def test_wrong_arguments_are_answered_in_words() -> None:
             for x in (5, [1], "")
             for f in (springcheck.read, springcheck.report)
         ),
+        (lambda: springcheck.report("", "x.html"), "path of a file is needed"),
+        *((lambda f=f: f(Path()), "it is a folder") for f in (springcheck.read, springcheck.report)),
+        (lambda: made(t, np.ma.array(t, mask=t == 2), t), "q: real numbers"),
+        (lambda: springcheck.spring(k=np.ma.array([3.0], mask=[True])), "k: real numbers"),
+        (lambda: scene.replace(m=np.ma.array([3.0], mask=[True])), "m: real numbers"),
+        (lambda: springcheck.plot.phase([run, run]), "phase: runs = .*: a Trajectory is needed"),
+        (lambda: springcheck.plot.energy(5), "a Trajectory is needed"),
+        (lambda: springcheck.plot.phase(run, particle=1), "particle = 1: 0 to 0 are here"),
+        (lambda: springcheck.plot.position(run, run, particle="a"), "particle = 'a': a whole number"),
         (lambda: springcheck.precision(scene, "own:rk4", path=5), "path = 5: a text or a path"),
         (lambda: springcheck.run(scene, "own:rk4", path=5), "path = 5: a text or a path"),
         (lambda: springcheck.report("x.h5", 5), "output = 5: a text or a path"),
@@ -479,3 +517,23 @@ def test_judge_without_a_scheme_says_in_a_line_how_to_find_it() -> None:
 def test_an_argument_that_a_function_has_not_is_answered_with_its_name() -> None:
     with pytest.raises(TypeError, match=r"^run\(\) got an unexpected keyword argument 'workers'"):
         springcheck.run("spring", "own:euler", workers=2)  # type: ignore[call-arg]
+
+
+@pytest.mark.parametrize(("name", "writer"), [("a.csv", "savetxt"), ("a.npz", "savez")])
+def test_a_file_that_cannot_be_written_whole_leaves_what_was_there(
+    name: str, writer: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = springcheck.simulate("spring", "own:euler")
+    before = run.save(name).read_bytes()
+
+    def broken(file: Any, *given: Any, **named: Any) -> None:
+        (file.write if hasattr(file, "write") else Path(file).write_bytes)(before[:100])
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(np, writer, broken)
+    with pytest.raises(SpringcheckError, match=f"{name}: cannot be written: No space left"):
+        run.save(name)
+    assert Path(name).read_bytes() == before
+    assert [path.name for path in Path().iterdir()] == [name]
+    with pytest.raises(SpringcheckError, match="cannot be written: embedded null"):
+        run.save("\0" + name)

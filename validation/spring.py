@@ -14,7 +14,7 @@ Expected:
     openmm:leapfrog  to own:semi-implicit-euler   below 1e-13   (here 6e-15)
     openmm:euler     to own:euler                 below 1e-12   (here 0)
     openmm:verlet    to ase:velocity-verlet       below 1e-13   (here 6e-15)
-    sundials:adams   to the true motion           below 1e-9    (here 1e-10)
+    sundials:adams   to the exact solution        below 1e-9    (here 1e-10)
     every verdict passed
 """
 

@@ -5,28 +5,32 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from springcheck.errors import SpringcheckError
+from springcheck.physics.arguments import typed
 from springcheck.physics.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
+@typed
 def phase(*runs: Trajectory, particle: int = 0, ax: Axes | None = None) -> Axes:
     """Phase portraits, p over q, of one particle of each trajectory; returns the axes."""
     axes = _axes(ax)
     for run in runs:
-        axes.plot(run.q[:, particle], run.p[:, particle], label=run.label)
+        axes.plot(*run.of_particle(particle), label=run.label)
     return _finished(axes, "q", "p")
 
 
+@typed
 def position(*runs: Trajectory, particle: int = 0, ax: Axes | None = None) -> Axes:
     """Positions over time of one particle of each trajectory; returns the axes."""
     axes = _axes(ax)
     for run in runs:
-        axes.plot(run.t, run.q[:, particle], label=run.label)
+        axes.plot(run.t, run.of_particle(particle)[0], label=run.label)
     return _finished(axes, "t", "q")
 
 
+@typed
 def energy(*runs: Trajectory, ax: Axes | None = None) -> Axes:
     """Change of the total energy over time, relative to the kinetic plus the absolute potential energy of
     the start, or where that is 0 to what the scene may gain; without a scene to |H0|.  Returns the axes.

@@ -38,7 +38,7 @@ def precision(
 
     found = scene_of(scene)
     with taken(methods, force, workers, path) as (named, how):
-        if not 0 < budget < math.inf:
+        if not 0 < (budget := float(budget)) < math.inf:
             raise SpringcheckError(f"budget={budget}: a number of seconds above 0 is needed")
         from springcheck.studies.choose import choose
 
@@ -167,7 +167,8 @@ def report(path: str | Path, output: str | Path | None = None) -> Path:
     """
     from springcheck.cli import page
 
-    into = path_of(f"{path_of(path).stem}.html" if output is None else output)
+    place = path_of(path)
+    into = path_of(f"{place.stem}.html" if output is None else output)
     with spoken():
-        page.write(page.gather(Path(path)), into)
+        page.write(page.gather(place), into)
     return into

@@ -7,6 +7,7 @@ import importlib.util
 import os
 from collections.abc import Callable, Iterator, Mapping, Set
 from contextlib import contextmanager
+from contextvars import ContextVar
 from fnmatch import fnmatchcase
 from functools import cache, partial
 from hashlib import sha256
@@ -56,6 +57,9 @@ class _Found(NamedTuple):
 # process
 _brought: dict[str, _Found] = {}
 
+# known within a context alone, so that another thread's engine of the same name is not run in its place
+_here: ContextVar[dict[str, _Found]] = ContextVar("_here", default={})  # noqa: B039
+
 
 @cache
 def _ours() -> dict[str, _Found]:
@@ -88,7 +92,7 @@ def _points() -> dict[str, _Found]:
 
 
 def _known() -> dict[str, _Found]:
-    return _points() | _brought
+    return _points() | _brought | _here.get()
 
 
 def _look(name: str) -> _Found | None:
@@ -223,30 +227,31 @@ def module_name(name: str) -> str:
 
 def bring(found: Engine, where: str, version: str = "") -> Engine:
     """Register an engine for the rest of this process.  MethodError where it does not keep the contract."""
-    found = _checked(found)
-    taken = _look(found.name)
-    if taken is not None and found.name not in _brought:
-        raise MethodError(f"{where}: the name {found.name!r} is taken by the engine of {taken.origin}")
-    _brought[found.name] = _Found(origin=Origin(package=where, version=version), engine=found)
+    _brought.update(_named(found, where, version))
     return found
 
 
 @contextmanager
 def while_here(found: Engine, where: str, version: str) -> Iterator[None]:
-    """Register an engine within this context, and restore what had its name after it."""
-    before = _brought.get(found.name)
-    bring(found, where, version)
+    """Register an engine within this context, of this thread alone, before any other of its name."""
+    before = _here.set({**_here.get(), **_named(found, where, version)})
     try:
         yield
     finally:
-        del _brought[found.name]
-        if before is not None:
-            _brought[found.name] = before
+        _here.reset(before)
+
+
+def _named(found: Engine, where: str, version: str) -> dict[str, _Found]:
+    """The engine by its name.  MethodError where it does not keep the contract, or a package has that."""
+    found = _checked(found)
+    if (taken := _look(found.name)) is not None and not is_brought(found.name):
+        raise MethodError(f"{where}: the name {found.name!r} is taken by the engine of {taken.origin}")
+    return {found.name: _Found(origin=Origin(package=where, version=version), engine=found)}
 
 
 def is_brought(name: str) -> bool:
     """Whether a call has brought it, rather than a package."""
-    return name in _brought
+    return name in _brought or name in _here.get()
 
 
 def from_file(path: Path) -> Engine | None:

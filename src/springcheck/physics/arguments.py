@@ -60,8 +60,9 @@ def typed(function: Callable[P, R]) -> Callable[P, R]:
             # Python's own message names the function
             return function(*given, **named)
         for name, value in bound.arguments.items():
-            if ANNOTATED.keys() >= set(wanted[name]):
-                of_kind(f"{function.__name__}: {name}", value, *wanted[name])
+            is_several = signature.parameters[name].kind is inspect.Parameter.VAR_POSITIONAL
+            for one in (value if is_several else (value,)) if ANNOTATED.keys() >= set(wanted[name]) else ():
+                of_kind(f"{function.__name__}: {name}", one, *wanted[name])
         return function(*given, **named)
 
     return call

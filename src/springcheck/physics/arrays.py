@@ -158,14 +158,19 @@ def in_pieces(law: Callable[..., Reals], rows: int, *more: Reals) -> Callable[[R
 
 
 def reals(where: str, **given: Any) -> list[Floats]:
-    """Copies of the arguments as doubles.  SceneError for anything but real numbers."""
+    """Copies of the arguments as doubles.  SceneError for anything but real numbers, none of them masked."""
     found = []
     for name, x in given.items():
         try:
-            found.append(np.array(float("no") if np.iscomplexobj(x) else x, np.float64))
+            found.append(np.array(float("no") if np.iscomplexobj(x) or is_masked(x) else x, np.float64))
         except (TypeError, ValueError, OverflowError):
             raise SceneError(f"{where}: {name}: real numbers, or an array of them, are needed") from None
     return found
+
+
+def is_masked(given: Any) -> bool:
+    """Whether values of a masked array are masked, which have no number."""
+    return bool(np.any(getattr(given, "_mask", False)))
 
 
 def roundoff(*given: Any) -> float:

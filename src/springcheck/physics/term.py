@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from springcheck.errors import SceneError
 from springcheck.physics.arguments import of_kind
-from springcheck.physics.arrays import Floats, Integers, Reals
+from springcheck.physics.arrays import Floats, Integers, Reals, is_masked
 
 Where: TypeAlias = "slice | Integers"
 Origin: TypeAlias = Literal["potential", "friction", "magnetic", "drive", "constraint"]
@@ -316,7 +316,8 @@ def frozen(values: Any, kind: type, rows: int | None, what: str) -> NDArray[Any]
         return cast(NDArray[Any], values)
     try:
         found = np.asarray(values)
-        if found.size and found.dtype.kind not in ("iu" if kind is np.int64 else "iuf"):
+        known = "iu" if kind is np.int64 else "iuf"
+        if is_masked(values) or (found.size and found.dtype.kind not in known):
             raise ValueError(found.dtype)
         out: NDArray[Any] = np.array(
             np.broadcast_to(found, (rows,)) if found.ndim == 0 and rows else found, dtype=kind

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, fields, replace
 from functools import partial
 from importlib import import_module
@@ -168,6 +170,12 @@ class Trajectory:
             raise SpringcheckError(f"{self.label}: its times are no whole steps of {self.step:g}")
         return exact.true_motion(scene, steps.astype(np.int64), self.step)
 
+    def of_particle(self, particle: int) -> tuple[Floats, Floats]:
+        """Its positions and momenta, (f,) each.  SpringcheckError where none has this number."""
+        if particle not in range(-(n := self.q.shape[1]), n):
+            raise SpringcheckError(f"{self.label}: particle = {particle}: 0 to {n - 1} are here")
+        return self.q[:, particle], self.p[:, particle]
+
     def at(self, rows: slice) -> Trajectory:
         """These frames alone."""
         more = {x: y[rows] for x in ("energy", "last_step") if (y := getattr(self, x)) is not None}
@@ -178,22 +186,30 @@ class Trajectory:
         """Write t, q, p (and m, energy) as .csv or .npz, every double so that it reads back exactly.
 
         A .csv has columns t, q0, p0, q1 ..., energy, m0, m1 ...; `springcheck.identify` and the command read
-        both.  A file of this name is replaced.  SpringcheckError where it cannot be written.
+        both.  A file of this name is replaced, once the new one is whole.  SpringcheckError where it cannot
+        be written.
         """
         place, masses = Path(path), {} if self.scene is None else {"m": self.scene.m}
+        if place.suffix not in (".csv", ".npz"):
+            raise SpringcheckError(f"{place}: a name that ends in .csv or .npz is needed")
+        draft = place.parent / f"{place.name}.{os.urandom(8).hex()}"
         try:
-            if place.suffix == ".npz":
-                more = masses if self.energy is None else {"energy": self.energy, **masses}
-                np.savez(place, allow_pickle=False, t=self.t, q=self.q, p=self.p, **more)
-            elif place.suffix == ".csv":
-                alike = {f"m{i}": np.full(len(self.t), m) for i, m in enumerate(masses.get("m", ()))}
-                columns = {"t": self.t, **self._columns, **alike}
-                rows = np.column_stack([*columns.values()])
-                np.savetxt(place, rows, "%.17g", ",", header=",".join(columns), comments="")
-            else:
-                raise SpringcheckError(f"{place}: a name that ends in .csv or .npz is needed")
-        except OSError as error:
-            raise SpringcheckError(f"{place}: cannot be written: {error.strerror}") from error
+            with draft.open("wb") as file:
+                if place.suffix == ".npz":
+                    more = masses if self.energy is None else {"energy": self.energy, **masses}
+                    np.savez(file, allow_pickle=False, t=self.t, q=self.q, p=self.p, **more)
+                else:
+                    alike = {f"m{i}": np.full(len(self.t), m) for i, m in enumerate(masses.get("m", ()))}
+                    columns = {"t": self.t, **self._columns, **alike}
+                    rows = np.column_stack([*columns.values()])
+                    np.savetxt(file, rows, "%.17g", ",", header=",".join(columns), comments="")
+            draft.replace(place)
+        except (OSError, ValueError) as error:
+            why = getattr(error, "strerror", None) or error
+            raise SpringcheckError(f"{place}: cannot be written: {why}") from error
+        finally:
+            with suppress(OSError, ValueError):
+                draft.unlink(missing_ok=True)
         return place
 
     @typed
@@ -202,13 +218,12 @@ class Trajectory:
 
         `ax`: matplotlib axes of your own.  `springcheck.plot` draws several trajectories, and over time.
         """
-        if particle not in range(-(n := self.q.shape[1]), n):
-            raise SpringcheckError(f"{self.label}: particle = {particle}: 0 to {n - 1} are here")
+        states = self.of_particle(particle)
         axes = library("matplotlib.pyplot").figure(layout="constrained").add_subplot() if ax is None else ax
         if self.scene is not None and self.scene.system.solution is not None:
             q, p = self._exact(self.scene)
             axes.plot(q[:, particle], p[:, particle], color="#b3b3b3", linewidth=4, label="exact")
-        axes.plot(self.q[:, particle], self.p[:, particle], label=self.label)
+        axes.plot(*states, label=self.label)
         axes.set(xlabel="q", ylabel="p", title=f"{self.label}: phase portrait of {len(self.t)} frames")
         axes.legend()
         return axes

@@ -35,7 +35,7 @@ def parts_in(folder: Path) -> list[Path]:
 
 def parts_folder(path: Path) -> Path:
     """The journal of a store."""
-    return path.with_name(path.name + files.JOURNAL)
+    return path.parent / (path.name + files.JOURNAL)
 
 
 class JournalClaim(msgspec.Struct, frozen=True, kw_only=True):
