@@ -10,7 +10,7 @@ import springcheck
 HOME = Path(springcheck.__file__).parent
 
 BUDGETS = {
-    ("physics",): 6872,
+    ("physics",): 6884,
     ("schemes",): 1680,
     ("thermal",): 3273,
     ("engines/own",): 1591,
@@ -22,7 +22,7 @@ BUDGETS = {
     ("formats", "store"): 5165,
     ("studies",): 1456,
     ("studies/*",): 9816,
-    ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 7220,
+    ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 7217,
 }
 """Lines of each room, or of several: of an engine in one file, and of what all studies share, in the first
 folder."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from springcheck.errors import SpringcheckError
 from springcheck.physics.arguments import typed
+from springcheck.physics.norm import energy_changes
 from springcheck.physics.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -39,10 +39,7 @@ def energy(*runs: Trajectory, ax: Axes | None = None) -> Axes:
     """
     axes = _axes(ax)
     for run in runs:
-        if run.energy is None:
-            raise SpringcheckError(f"{run.label}: its scene keeps no energies (record.quantities)")
-        scale = run.scene.system.norm.unit**2 if run.scene else abs(run.energy[0]) or 1.0
-        axes.plot(run.t, (run.energy - run.energy[0]) / float(scale), label=run.label)
+        axes.plot(run.t, energy_changes(run), label=run.label)
     return _finished(axes, "t", "(H - H0) / (initial T + |V|)")
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from springcheck.errors import SpringcheckError
 from springcheck.physics.arrays import Extended, Floats, Integers, Reals, in_pieces
 from springcheck.physics.term import Term
 
@@ -97,3 +98,14 @@ def energy_scale(system: Any) -> tuple[np.longdouble, str]:
     start, unit = system.energy(*(x.astype(np.longdouble) for x in (system.q, system.p))), system.norm.unit**2
     whole = abs(start - unit) <= WHOLE * unit
     return (np.longdouble(start), "initial energy") if whole else (unit, system.norm.of)
+
+
+def energy_changes(run: Any) -> Floats:
+    """Change of a trajectory's energy (f,), relative to the unit of its scene's norm, or else to |H0|.
+
+    SpringcheckError where it was recorded without energies.
+    """
+    if run.energy is None:
+        raise SpringcheckError(f"{run.label}: its scene keeps no energies (record.quantities)")
+    scale = run.scene.system.norm.unit**2 if run.scene else abs(run.energy[0]) or 1.0
+    return np.asarray((run.energy - run.energy[0]) / float(scale))
