@@ -430,3 +430,20 @@ def test_velocities_of_extended_xyz_are_taken_or_said_to_be_left(
     said = " ".join(capsys.readouterr().out.split())
     assert said.startswith("x.xyz: velocity-verlet ") is (name != "v")
     assert ("the column v was not taken: named vel it is velocities" in said) is (name == "v")
+
+
+def test_frictions_of_one_scheme_are_no_choice_of_schemes(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    q, v, rows = 0.3, 0.7, ["t,q,v"]
+    for i in range(60):
+        rows.append(f"{0.1 * i!r},{q!r},{v!r}")
+        v -= 0.05 * 2.9 * q
+        q += 0.1 * v
+        v = (v - 0.05 * 2.9 * q) * (1 - 1e-3)
+    (tmp_path / "a.csv").write_text("\n".join(rows))
+    main(["identify", str(tmp_path / "a.csv")])
+    said = capsys.readouterr().out
+    assert said.startswith("a.csv: velocity-verlet\n")
+    assert "the law is an assumption" in said
+    assert "one of:" not in said
