@@ -18,7 +18,7 @@ BUDGETS = {
     ("engines",): 2821,
     ("driver", "conformance", "doors"): 1200,
     ("checks",): 5455,
-    ("identify",): 9238,
+    ("identify",): 9245,
     ("formats", "store"): 5165,
     ("studies",): 1456,
     ("studies/*",): 9816,

@@ -16,7 +16,7 @@ import springcheck
 from springcheck import checks, driver, engines, schemes
 from springcheck.checks import experiments
 from springcheck.checks.steps import NO_BETTER
-from springcheck.cli import main
+from springcheck.cli import file, main
 from springcheck.physics import scenefile
 from springcheck.physics.arrays import WIDE
 from springcheck.physics.scene import Scene
@@ -311,3 +311,20 @@ def test_what_would_be_seen_is_of_the_spring_that_shows_least() -> None:
     assert both.sees.stiffness is not None
     assert lonely.sees.stiffness is not None
     assert 300 < both.sees.stiffness / lonely.sees.stiffness < 3e4
+
+
+def test_a_friction_that_the_scene_does_not_have_is_the_cause(tmp_path: Path) -> None:
+    """Its verdicts failed without one, as the scheme is the one that was asked for."""
+    scene = scenefile.load_scene("spring-uneven")
+    m, k, h, q, p = 3.7, 2.9, scene.step, 0.3, 0.7
+    rows = []
+    for i in range(scene.steps + 1):
+        rows.append((i * h, q, p))
+        p -= h / 2 * k * q
+        q += h * p / m
+        p = (p - h / 2 * k * q) * (1 - 2e-4)
+    np.savetxt(tmp_path / "a.csv", rows, fmt="%.17g", delimiter=",", header="t,q,p", comments="")
+    found = file.judge(tmp_path / "a.csv", scene=scene, scheme="velocity-verlet").verdicts
+    said = checks.cause_of(found)
+    assert said.startswith("Velocity Verlet with friction")
+    assert said.endswith("its c/m is 0.002, and the scene has none")

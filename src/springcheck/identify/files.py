@@ -235,11 +235,13 @@ def _turns_back(arm: Floats) -> bool:
 
 
 def sentence(
-    run: Trajectory, mass: Floats, stiffness: Floats | None = None, *, about: int = 0, few: bool = False
-) -> str:
+    run: Trajectory, mass: Floats, stiffness: Floats | None = None, *, about: int = 0, few: bool = False,
+    damped: bool = True,
+) -> str:  # fmt: skip
     """One sentence that identifies a trajectory around a frame, for a failed verdict; "" where the states
     show nothing.  `stiffness` (n,) where each particle has a spring of its own; `few` if the steps are the
-    scheme's own but for a few, which no cause explains that acts in every step."""
+    scheme's own but for a few, which no cause explains that acts in every step; `damped` if there may be
+    friction."""
     chosen, _ = _chosen(run.q, run.p, [])
     most = MOST_RANDOM if run.scheme in THERMOSTATS else MOST_FAILED
     first = max(0, min(about - most // 2, len(run.t) - most))
@@ -267,6 +269,11 @@ def sentence(
     # the exact flow of a frame is that of its steps
     if found.stride not in (None, run.every) and not schemes.scheme(run.scheme).flow:
         return f"{found.statement}, of {found.step:.9g} and not of {run.step:.9g}"
+    rates = [x for one in found.candidates if one.law and one.scheme == found.scheme for x in one.friction]
+    if rates and not damped:
+        low, high = f"{min(rates):.3g}", f"{max(rates):.3g}"
+        size = low if low == high else f"{low} to {high}"
+        return f"{found.statement}; its c/m is {size}, and the scene has none"
     return "" if plain else found.statement
 
 
@@ -276,7 +283,7 @@ def shown(scene: Scene, run: Trajectory, about: int, few: bool = False) -> str:
         return seen_to_take(scene, run, about)
     alone = scene.system.is_separate
     k = scene.system.hessian_diagonal(scene.q).astype(np.float64) if alone else None
-    said = sentence(run, scene.m, k, about=about, few=few)
+    said = sentence(run, scene.m, k, about=about, few=few, damped=scene.system.is_damped)
     # springs couple the particles of a scene that has them
     return said if alone or not said.startswith(str(COUPLED.cause).partition(":")[0]) else ""
 
