@@ -75,18 +75,19 @@ def found(case: Case, shown: Callable[[int, bool], str] = lambda *_: "") -> str:
         # of one particle by itself states show more than which number is another
         looks.reverse()
     ways: list[Callable[[Case], str]] = []
-    if run.every == 1 and run.scheme in THERMOSTATS:
+    random = run.scheme in THERMOSTATS
+    if run.every == 1 and random:
         # of draws that are read by the map of another scheme the size says nothing
         ways = [_of_no_noise, _of_bath, _of_collisions, _of_removal]
         looks = [*looks, _of_reach, _of_state, _of_size]
     elif run.every == 1 and not missing(case, MAP):
-        ways = [_of_differences, driven.found, _of_rods, _of_removal]
+        ways = [_of_differences, driven.found, _of_rods, _of_removal, _of_factor]
         looks = [*looks, _of_reach]
     vague = ""
     for way in ways + looks:
         said = way(case)
         # where all but the momenta is right, what their draws hold is surer than a scheme that may be another
-        if said.endswith(OR_UNKNOWN) and noise_direction(case).passed:
+        if random and said.endswith(OR_UNKNOWN) and noise_direction(case).passed:
             vague = said
         elif said:
             return said
@@ -139,6 +140,27 @@ def _of_removal(case: Case) -> str:
     at = case.steps[1:][off].tolist()
     often = "every step" if np.all(off) else f"step {at[0]}{regularly(at, 'step')}"
     return f"the total momentum is taken away {where} {often}: the motion of the centre of mass is removed"
+
+
+def _of_factor(case: Case) -> str:
+    """One factor by which all numbers of a state, or all its momenta, are multiplied after each step, another
+    one from step to step."""
+    run = case.trajectory
+    unit, ends = (np.concatenate(x, axis=1) for x in (case.allowance, case.next_states))
+    made, n = np.concatenate([run.q[1:], run.p[1:]], axis=1), case.scene.n
+    off = np.abs(made - ends) / (case.roundings * unit)
+    for what, kept, of in (("momenta", slice(n), slice(n, None)), ("positions and momenta", [], slice(None))):
+        x, y = ends[:, of] / unit[:, of], made[:, of] / unit[:, of]
+        factor = np.sum(x * y, axis=1) / np.sum(x * x, axis=1)
+        left = [np.max(np.abs(y - one * x)) for one in (factor[:, None], np.mean(factor))]
+        room = driven.SLACK * case.roundings
+        if x.shape[1] > 1 and np.all(off[:, kept] <= driven.SLACK) and left[0] <= room < left[1]:
+            size = " to ".join(f"{float(one):.6g}" for one in (np.min(factor), np.max(factor)))
+            return (
+                f"each step is the scheme's own, and all {what} are multiplied by one factor after it, from "
+                f"{size}: a rescaling, as to one energy or temperature"
+            )
+    return ""
 
 
 def _of_reach(case: Case) -> str:
