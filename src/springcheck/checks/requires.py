@@ -116,7 +116,7 @@ _ALL = (
     Requirement("named", "a scheme that is named", _trait(
         "named", "its scheme is not known; --scheme NAME states it")),
     Requirement("one-step", "a fixed step", _trait(
-        "one-step", "{title} has no step of stages; an adaptive solver is judged by its tolerance")),
+        "one-step", "it has no step of stages; an adaptive solver is judged by its tolerance")),
     Requirement("tolerance", "a tolerance", _unless(
         lambda x: not x.law.has("one-step") and x.trajectory.tolerance is not None,
         "a method of fixed step has no tolerance")),

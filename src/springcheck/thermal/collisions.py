@@ -123,7 +123,8 @@ def drawn(v: Floats, kicks: Floats, state: Floats, close: float, after: bool) ->
     beside what follows of the state (f - 1, 3) before the step."""
     made, before = (v[1:], v[:-1] - kicks) if after else (v[1:] + kicks, v[:-1])
     struck = np.abs(made - before) > close * np.std(v)
-    return regressed(state[struck], made[struck])[1]
+    known = state[struck]
+    return np.asarray(made[struck] - known @ np.linalg.lstsq(known, made[struck], rcond=None)[0])
 
 
 def _is_in_time(struck: NDArray[np.bool_]) -> bool:

@@ -165,7 +165,7 @@ def _of_one(
     _, b, c, d = free
     close = max(1e-9, 100 * misfit)
     # that combination is 0 of a centre at rest, and both half kicks are -h w**2/2 (q + q') about it
-    centre = float(np.mean(q[1:] + b * v[1:] + c * q[:-1] + d * v[:-1])) / (1 + c or nan)
+    centre = float(np.mean(q[1:] + b * v[1:] + c * q[:-1] + d * v[:-1])) / (1 + c or inf)
     kicks = h / 2 * (q[1:] + q[:-1] - 2 * centre)
 
     def near(value: float, wanted: float) -> bool:
