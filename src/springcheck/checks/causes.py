@@ -143,18 +143,18 @@ def _of_removal(case: Case) -> str:
 
 
 def _of_factor(case: Case) -> str:
-    """One factor by which all numbers of a state, or all its momenta, are multiplied after each step, another
-    one from step to step."""
+    """One factor that multiplies a state, or its momenta, after most steps, and not the same after each."""
     run = case.trajectory
     unit, ends = (np.concatenate(x, axis=1) for x in (case.allowance, case.next_states))
     made, n = np.concatenate([run.q[1:], run.p[1:]], axis=1), case.scene.n
     off = np.abs(made - ends) / (case.roundings * unit)
+    most = np.median(np.max(off, axis=1)) > 1
     for what, kept, of in (("momenta", slice(n), slice(n, None)), ("positions and momenta", [], slice(None))):
         x, y = ends[:, of] / unit[:, of], made[:, of] / unit[:, of]
         factor = np.sum(x * y, axis=1) / np.sum(x * x, axis=1)
         left = [np.max(np.abs(y - one * x)) for one in (factor[:, None], np.mean(factor))]
         room = driven.SLACK * case.roundings
-        if x.shape[1] > 1 and np.all(off[:, kept] <= driven.SLACK) and left[0] <= room < left[1]:
+        if most and x.shape[1] > 1 and np.all(off[:, kept] <= driven.SLACK) and left[0] <= room < left[1]:
             size = " to ".join(f"{float(one):.6g}" for one in (np.min(factor), np.max(factor)))
             return (
                 f"each step is the scheme's own, and all {what} are multiplied by one factor after it, from "
