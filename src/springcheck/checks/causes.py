@@ -102,7 +102,7 @@ def _off(case: Case, p: Floats | None = None) -> Floats:
     if run.scheme not in THERMOSTATS:
         if case.scene.system.is_driven:
             return found
-        ends = case.step(*(x[:-1].astype(np.longdouble) for x in starts))
+        ends = case.next_states if p is None else case.step(*(x[:-1].astype(np.longdouble) for x in starts))
         off = np.abs(np.stack(ends) - np.stack([run.q[1:], run.p[1:]])) / np.stack(case.allowance)
         return np.asarray(np.max(off, axis=(0, 2)) / case.roundings, np.float64)
     bath, seen, every = thermostat(case), reading(case), 1
@@ -144,17 +144,17 @@ def _of_removal(case: Case) -> str:
 
 def _of_factor(case: Case) -> str:
     """One factor that multiplies a state, or its momenta, after most steps, and not the same after each."""
-    run = case.trajectory
+    if not np.median(_off(case)) > 1:
+        return ""
+    run, n, room = case.trajectory, case.scene.n, driven.SLACK * case.roundings
     unit, ends = (np.concatenate(x, axis=1) for x in (case.allowance, case.next_states))
-    made, n = np.concatenate([run.q[1:], run.p[1:]], axis=1), case.scene.n
-    off = np.abs(made - ends) / (case.roundings * unit)
-    most = np.median(np.max(off, axis=1)) > 1
+    made = np.concatenate([run.q[1:], run.p[1:]], axis=1)
+    off = np.abs(made - ends) / unit
     for what, kept, of in (("momenta", slice(n), slice(n, None)), ("positions and momenta", [], slice(None))):
         x, y = ends[:, of] / unit[:, of], made[:, of] / unit[:, of]
         factor = np.sum(x * y, axis=1) / np.sum(x * x, axis=1)
         left = [np.max(np.abs(y - one * x)) for one in (factor[:, None], np.mean(factor))]
-        room = driven.SLACK * case.roundings
-        if most and x.shape[1] > 1 and np.all(off[:, kept] <= driven.SLACK) and left[0] <= room < left[1]:
+        if x.shape[1] > 1 and np.all(off[:, kept] <= room) and left[0] <= room < left[1]:
             size = " to ".join(f"{float(one):.6g}" for one in (np.min(factor), np.max(factor)))
             return (
                 f"each step is the scheme's own, and all {what} are multiplied by one factor after it, from "

@@ -39,12 +39,15 @@ def solution(scene: Scene, pieces: Collection[Trajectory]) -> tuple[Extended, Ex
     return exact.true_motion(scene, Case(trajectory=longest, scene=scene).steps, longest.step)
 
 
-def compare(scene: Scene, pieces: Mapping[str, Trajectory]) -> Comparison:
-    """Compare trajectories, or pieces of them over the same frames, with each other and the exact one."""
+def compare(
+    scene: Scene, pieces: Mapping[str, Trajectory], known: tuple[Extended, Extended] | None = None
+) -> Comparison:
+    """Compare trajectories, or pieces of them over the same frames, with each other and the exact one, which
+    is worked out unless it is `known` (`solution`)."""
     norm = scene.system.norm
     states: dict[str, tuple[Extended | Floats, Extended | Floats]] = {}
     if pieces and exact.has_true_motion(scene):
-        states[EXACT] = solution(scene, pieces.values())
+        states[EXACT] = known or solution(scene, pieces.values())
     frames = max((len(piece.t) for piece in pieces.values()), default=0)
     states.update((label, (piece.q, piece.p)) for label, piece in pieces.items())
     labels = tuple(states)

@@ -116,8 +116,8 @@ def _fits(case: Case, other: Case) -> bool:
 
 def _exchanged(case: Case) -> Iterator[tuple[str, Case]]:
     """Cases in which two particles have exchanged their masses, or two rows of a term a number."""
-    scene = case.judged
-    n, of = scene.n - scene.system.is_driven, scene.all_places[: scene.n - scene.system.is_driven] // 3
+    scene, n = case.judged, case.judged.n - case.judged.system.is_driven
+    of = scene.all_places[:n] // 3
     kinds: list[tuple[str, Floats, Callable[[Floats], Case], Integers]] = [
         ("masses of particles", scene.m[:n], partial(way, case), of) for way in (_heavier, _quicker)
     ]

@@ -227,7 +227,7 @@ def judge(
                 failed.setdefault(name, piece)
             tallies[name].add(piece, known)
             last[name] = piece
-        parts.append(compare.compare(scene, pieces))
+        parts.append(compare.compare(scene, pieces, known))
     comparison, frames = compare.merge(parts, last), max(judged_frames.values())
     runs = tuple(line(last[name], tallies[name]) for name in sources)
     worst = {name: checks.worst(verdicts[name]) for name in sources}
