@@ -10,6 +10,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -141,7 +142,7 @@ class S:
         {advance}
 def start({started}):
     {start}
-M = Method(name="m", scheme={scheme}, about="", terms={terms})
+M = Method(name={method}, scheme={scheme}, about="", terms={terms})
 ENGINE = Engine(name={name}, title="bad", methods={by_name}(M),
                 start=start, version=lambda: {version}, arithmetic={arithmetic})
 """
@@ -149,10 +150,10 @@ ENGINE = Engine(name={name}, title="bad", methods={by_name}(M),
 
 def bad(path: Path, **parts: str) -> Path:
     plain = {
-        "advance": "pass", "start": "return S()", "name": "'bad'", "scheme": "'explicit-euler'",
-        "version": "{}", "arithmetic": "lambda label: Arithmetic()", "by_name": "named",
-        "terms": "{'wall-spring'}", "started": "scene, method, label, step", "advanced": "every, q, p",
-        "calls": "0", "more": "pass",
+        "advance": "pass", "start": "return S()", "name": "'bad'", "method": "'m'",
+        "scheme": "'explicit-euler'", "version": "{}", "arithmetic": "lambda label: Arithmetic()",
+        "by_name": "named", "terms": "{'wall-spring'}", "started": "scene, method, label, step",
+        "advanced": "every, q, p", "calls": "0", "more": "pass",
     }  # fmt: skip
     path.write_text(MINIMAL.format(**plain | parts))
     return path
@@ -162,7 +163,8 @@ def bad(path: Path, **parts: str) -> Path:
     ("parts", "said"),
     [
         ({"name": "'own'"}, "is taken by the engine of springcheck"),
-        ({"name": "'a b'"}, "must be of letters"),
+        ({"name": "'a b'"}, "its name 'a b' must be of letters"),
+        ({"method": "'m@x'"}, "the name of its method 'm@x' must be of letters"),
         ({"scheme": "'velocity-verlett'"}, "did you mean velocity-verlet?"),
         (
             {"by_name": "{}, thermostats=named", "scheme": "'baoab'"},
@@ -306,30 +308,18 @@ def test_a_missing_file_is_answered_in_one_line(capsys: pytest.CaptureFixture[st
     assert capsys.readouterr().err == "springcheck: nowhere.py: there is no such file\n"
 
 
-class Point:
-    """An entry point of a package that is not there."""
-
-    def __init__(self, name: str, found: object) -> None:
-        self.name, self.value, self._found = name, f"somewhere:{name}", found
-        self.group = engines.registry.GROUP
-        self.dist = importlib.metadata.Distribution.from_name("numpy")
-
-    def load(self) -> object:
-        if isinstance(self._found, BaseException):
-            raise self._found
-        return self._found
-
-
 def test_a_broken_plug_in_is_named_and_takes_no_other_down(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     real = importlib.metadata.entry_points(group=engines.registry.GROUP)
+    texts = {"raises": "raise RuntimeError('no licence\\nfound')", "leaves": "raise SystemExit(3)"}
+    for name in ("raises", "leaves", "number", "own"):
+        (tmp_path / f"broken_{name}.py").write_text(texts.get(name, "ENGINE = 7"))
+    monkeypatch.syspath_prepend(tmp_path)
+    dist = importlib.metadata.Distribution.from_name("numpy")
     broken = [
-        Point("gone", ModuleNotFoundError("No module named 'gone'")),
-        Point("raises", RuntimeError("no licence\nfound")),
-        Point("leaves", SystemExit(3)),
-        Point("number", 7),
-        Point("own", 8),
+        SimpleNamespace(name=name, module=f"broken_{name}", attr="ENGINE", dist=dist)
+        for name in ("gone", "raises", "leaves", "number", "own")
     ]
     monkeypatch.setattr(importlib.metadata, "entry_points", lambda group: [*broken, *real])
     engines.registry._points.cache_clear()

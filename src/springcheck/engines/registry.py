@@ -5,13 +5,15 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import os
-from collections.abc import Callable, Iterator, Mapping, Set
+from collections.abc import Iterator, Mapping, Set
 from contextlib import contextmanager
 from contextvars import ContextVar
 from fnmatch import fnmatchcase
-from functools import cache, partial
+from functools import cache
 from hashlib import sha256
+from operator import attrgetter
 from pathlib import Path
+from re import fullmatch
 from types import ModuleType
 from typing import NamedTuple
 
@@ -44,11 +46,10 @@ class Origin(NamedTuple):
 
 
 class _Found(NamedTuple):
-    """An engine that is known by name: `load` imports it from `place`; unusable where `reason` is."""
+    """An engine that is known by name: it, its `place` as module:attribute, or the reason why it is none."""
 
     origin: Origin
     place: str = ""
-    load: Callable[[], object] | None = None
     engine: Engine | None = None
     reason: str = ""
 
@@ -64,13 +65,7 @@ _here: ContextVar[dict[str, _Found]] = ContextVar("_here", default={})  # noqa: 
 @cache
 def _ours() -> dict[str, _Found]:
     origin = Origin(package=OURS, version=springcheck.__version__)
-    return {
-        name: _Found(origin=origin, place=f"{GROUP}.{name}", load=partial(_ours_of, name)) for name in MODULES
-    }
-
-
-def _ours_of(name: str) -> object:
-    return importlib.import_module(f"{GROUP}.{name}").ENGINE
+    return {name: _Found(origin=origin, place=f"{GROUP}.{name}:ENGINE") for name in MODULES}
 
 
 @cache
@@ -84,7 +79,7 @@ def _points() -> dict[str, _Found]:
         about = point.dist.metadata if point.dist else {"Name": "?", "Version": ""}
         origin = Origin(package=about["Name"], version=about["Version"])
         if point.name not in found:
-            found[point.name] = _Found(origin=origin, place=point.value, load=point.load)
+            found[point.name] = _Found(origin=origin, place=f"{point.module}:{point.attr}")
         elif found[point.name].origin.package != origin.package:
             reason = f"its name is taken by the engine of {found[point.name].origin}"
             found[f"{point.name} ({origin.package})"] = _Found(origin=origin, reason=reason)
@@ -100,11 +95,12 @@ def _look(name: str) -> _Found | None:
 
 
 @cache
-def _loaded(name: str, place: str, load: Callable[[], object]) -> Engine | str:
-    """The engine that `load` imports, or why there is none, whatever its code raises."""
+def _loaded(name: str, place: str) -> Engine | str:
+    """The engine at a place, or why there is none, whatever its code raises."""
+    module, _, attribute = place.partition(":")
     try:
         with foreign(place, f"{place} cannot be loaded"):
-            return _checked(load(), name)
+            return _checked(attrgetter(attribute)(importlib.import_module(module)), name)
     except SpringcheckError as error:
         return str(error)
 
@@ -134,13 +130,18 @@ def foreign(name: str, what: str, file: str = "") -> Iterator[None]:
         interrupts.calling("")
 
 
+def _plain(what: str, name: object) -> None:
+    """MethodError for a name that a label cannot hold."""
+    if not isinstance(name, str) or not fullmatch(r"[\w-]+", name):
+        raise MethodError(f"{what} {name!r} must be of letters, digits, - and _")
+
+
 def _checked(found: object, name: str = "") -> Engine:
     """The object, if it is an engine that keeps the contract; its schemes are registered.  MethodError, with
     what the contract asks, where it does not."""
     if not isinstance(found, Engine):
         raise MethodError(f"it is of type {type(found).__name__}, not a springcheck.engines.Engine")
-    if not isinstance(found.name, str) or not found.name.replace("-", "").replace("_", "").isalnum():
-        raise MethodError(f"its name {found.name!r} must be of letters, digits, - and _")
+    _plain("its name", found.name)
     if name and found.name != name:
         raise MethodError(f"it calls itself {found.name!r}, and its entry point {name!r}")
     for what in ("start", "version", "arithmetic", "convention"):
@@ -159,6 +160,7 @@ def _checked(found: object, name: str = "") -> Engine:
     for key, one in (*found.methods.items(), *found.thermostats.items()):
         if not isinstance(one, Method) or one.name != key:
             raise MethodError(f"its method {key!r} must be a springcheck.engines.Method of this name")
+        _plain("the name of its method", key)
         if not isinstance(one.terms, Set):
             raise MethodError(f"the terms of its method {key!r} are a {type(one.terms).__name__}, not a set")
         for term in one.terms:
@@ -198,7 +200,7 @@ def _find(name: str) -> Engine | str | None:
     found = _look(name)
     if found is None:
         return None
-    return _loaded(name, found.place, found.load) if found.load else found.engine or found.reason
+    return found.engine or found.reason or _loaded(name, found.place)
 
 
 def engine(name: str) -> Engine:
