@@ -34,6 +34,8 @@ CHEAP = 10_000
 """Calls of a case that always stays: about 10 ms."""
 PROCESS = 1_000_000
 """Calls that a process counts for: about a second."""
+STARTS = ("_posixsubprocess.fork_exec", "posix.posix_spawn")
+"""What starts a process; since Python 3.14 also the second."""
 APART = ("studies/faults/table.py", "studies/faults/steppers.py")
 """What breaks engines on purpose: every fault has lines of its own there, and checks tell them apart."""
 
@@ -75,7 +77,8 @@ class Cases:
 
 def calls(profile: Any) -> int:
     """How many calls were made, a process that was started among them as `PROCESS`."""
-    return sum(x.callcount * (PROCESS if "fork_exec" in str(x.code) else 1) for x in profile.getstats())
+    made = [(str(x.code), x.callcount) for x in profile.getstats()]
+    return sum(n * (PROCESS if any(name in code for name in STARTS) else 1) for code, n in made)
 
 
 def values(item: Any) -> Iterator[tuple[Any, ...]]:
