@@ -266,9 +266,9 @@ class Magnetic(WithoutPotential):
             where: Any = (..., index)
             np.add.at(out, where, push)
 
-    def by_velocity(self, m: Floats) -> Floats:
-        """Derivatives of the force by the momenta (n, n) [1/T]."""
-        out = np.zeros((len(m), len(m)))
+    def by_velocity(self, m: Reals) -> Reals:
+        """Derivatives of the force by the momenta (n, n) [1/T], as wide as the masses."""
+        out = np.zeros((len(m), len(m)), m.dtype)
         np.add.at(out, (self.a, self.b), self.strength / m[self.b])
         np.subtract.at(out, (self.b, self.a), self.strength / m[self.a])
         return out
