@@ -17,7 +17,7 @@ from springcheck.physics import exact
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.arrays import Force, Reals
 from springcheck.physics.scene import Scene
-from springcheck.physics.terms import Damping, Magnetic, Spring, WallSpring, Weight
+from springcheck.physics.terms import Damping, Drive, Magnetic, Spring, WallSpring, Weight
 from springcheck.studies.stability import longest
 
 SCENES = ("magnetic", "foucault")
@@ -185,6 +185,35 @@ def test_the_exact_motion_has_friction_and_a_resting_place_too(unlike: float) ->
     assert np.max(np.abs(run.p[-1] - p)) < 1e-11
 
 
+def test_boris_turns_about_a_field_that_lies_along_no_axis(need: Any) -> None:
+    """v- = v + v x t, v+ = v + 2/(1 + t.t) v- x t: what of v is along the field stays.  The second particle
+    has a field in one plane, a drive pulls at the first."""
+    field, m, h = np.array([[0.7, -1.1, 0.4], [0.0, 0.8, 0.0]]), np.array([[1.7], [2.9]]), 0.1
+    start = np.array([[0.3, -0.2, 0.5], [1.1, 0.4, -0.6]]), np.array([[0.7, 0.4, -0.3], [0.2, -0.5, 0.9]])
+    k, axes = np.array([[2.9, 1.3, 0.8], [1.1, 2.2, 3.1]]), np.arange(3)
+    scene = Scene(
+        m=np.repeat(m, 3), q=start[0].ravel(), p=start[1].ravel(), places=range(6), step=h, steps=60,
+        terms=(WallSpring(i=range(6), k=k.ravel(), at=np.zeros(6)),
+               Magnetic(a=np.ravel([(axes + 1) % 3 + 3 * i for i in (0, 1)]), strength=field.ravel(),
+                        b=np.ravel([(axes + 2) % 3 + 3 * i for i in (0, 1)]))),
+    )  # fmt: skip
+    (x, v), turn = (start[0], start[1] / m), field / m * h / 2
+    for _ in range(scene.steps):
+        x = x + h / 2 * v
+        v = v - h / 2 * k * x / m
+        v = v + np.cross(v + np.cross(v, turn), 2 * turn / (1 + np.sum(turn**2, axis=1, keepdims=True)))
+        v = v - h / 2 * k * x / m
+        x = x + h / 2 * v
+    run = springcheck.simulate(scene, "own:boris")
+    assert np.allclose(run.q[-1], x.ravel(), rtol=0, atol=1e-13)
+    assert np.allclose(run.p[-1], (m * v).ravel(), rtol=0, atol=1e-13)
+    assert springcheck.judge(scene, run).passed
+    driven = replace(scene, terms=(*scene.terms, Drive(i=[1], amplitude=[0.3], frequency=[1.1], phase=[0.2])))
+    assert springcheck.judge(driven, springcheck.simulate(driven, "own:boris")).passed
+    need("openmm:boris")
+    assert springcheck.judge(scene, springcheck.simulate(scene, "openmm:boris")).passed
+
+
 def test_a_charge_in_crossed_fields_drifts_across_both() -> None:
     """E along x and B along z: v = u + R(W t) (v0 - u) with u = (0, -E/B), beside a fall along z."""
     m, force, field, fall = 1.7, 0.9, 2.3, -0.4
@@ -199,7 +228,8 @@ def test_a_charge_in_crossed_fields_drifts_across_both() -> None:
     z, v = 30.3 - 0.2j + u * t + v0 * (np.exp(w * t) - 1) / w, u + v0 * np.exp(w * t)
     q = [z.real, z.imag, 0.1 - 0.3 / m * t + fall / m * t * t / 2]
     p = [m * v.real, m * v.imag, -0.3 + fall * t]
-    assert np.allclose(found.q[-1], q, rtol=1e-13, atol=0) and np.allclose(found.p[-1], p, rtol=1e-13, atol=0)
+    assert np.allclose(found.q[-1], q, rtol=1e-13, atol=0)
+    assert np.allclose(found.p[-1], p, rtol=1e-13, atol=0)
     assert springcheck.judge(scene, springcheck.simulate(scene, "own:boris")).passed
 
 

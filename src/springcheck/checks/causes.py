@@ -56,7 +56,7 @@ REMOVED_ROUNDINGS = 16
 FEWEST_ORDERS = 1e9
 """Ways to choose the steps that are off, of which one has the farthest by chance."""
 
-DECLARED = "judge it with --differences (in Python: rebuilds_velocity=True)"
+DECLARE_DIFFERENCES = "judge it with --differences (in Python: rebuilds_velocity=True)"
 """What to do where velocities are right to what differences of positions keep."""
 
 OR_UNKNOWN = "or one that is not known here"
@@ -203,7 +203,7 @@ def _of_differences(case: Case) -> str:
         if are and step_defect(declared).passed:
             return (
                 f"velocities are differences of the positions{more}, which keep eps q/h of them, and each "
-                f"step is right to that: {DECLARED}"
+                f"step is right to that: {DECLARE_DIFFERENCES}"
             )
     # what SHAKE adds to velocities, as a difference, rounds at each step by itself; a wrong force does not
     off = (run.p[1:] - case.next_states[1]) / m
@@ -212,7 +212,7 @@ def _of_differences(case: Case) -> str:
     if held and alone and not step_defect(case).passed and step_defect(declared).passed:
         return (
             "what rods change of velocities rounds as differences of positions do, by eps q/h, and each step "
-            f"is right to that: {DECLARED}"
+            f"is right to that: {DECLARE_DIFFERENCES}"
         )
     return ""
 

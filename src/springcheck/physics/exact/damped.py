@@ -1,4 +1,4 @@
-"""The exact solution of particles whose modes friction or a magnetic field couples, by the matrix exponential.
+"""The exact solution of particles whose modes friction or a field couples, by the matrix exponential.
 
 In the modes of the springs alone, with the positions of each multiplied by its frequency w, the state z obeys
 z' = A z, A = [[0, W], [-W, -G]], G the friction between modes, and antisymmetric the field.  A + A^T is
@@ -23,13 +23,13 @@ from springcheck.physics.exact.normal import normal_modes
 from springcheck.physics.system import System
 from springcheck.physics.terms import Magnetic
 
-WORST_CONDITION = 2.0**16
+WORST_DRIFT_CONDITION = 2.0**16
 """Largest condition of the matrix that a drift solves."""
 
-REFINED = 3
+DRIFT_REFINEMENTS = 3
 """Solutions in double precision, each of what the one before has left."""
 
-MOST_COUPLED = 32
+MOST_COUPLED_MODES = 32
 """Most particles, for which the solution takes 0.1 s, and 40 us a frame."""
 
 SERIES_TERMS = 17
@@ -51,7 +51,7 @@ class CoupledModes(ClosedForm):
         """For springs, friction and fields alone, without growing modes."""
         super().__init__(system)
         plain, n = system.without("damping").without("magnetic"), system.n
-        self.need(plain.is_linear and n <= MOST_COUPLED)
+        self.need(plain.is_linear and n <= MOST_COUPLED_MODES)
         self.need(all(term.kind in ("potential", "friction", "magnetic") for term in system.terms))
         self.modes = modes = normal_modes(plain)
         held, unit = modes.w2 > 0, np.eye(n, dtype=np.longdouble)
@@ -74,8 +74,8 @@ class CoupledModes(ClosedForm):
         if np.any(self.pull[carried]):
             part = G[np.ix_(carried, carried)]
             self.condition = float(np.linalg.cond(part.astype(np.float64)))
-            self.need(self.condition < WORST_CONDITION)
-            for _ in range(REFINED):
+            self.need(self.condition < WORST_DRIFT_CONDITION)
+            for _ in range(DRIFT_REFINEMENTS):
                 left = self.pull[carried] - part @ self.drift[carried]
                 self.drift[carried] += np.linalg.solve(part.astype(np.float64), left.astype(np.float64))
             self.pull[carried] = 0
