@@ -17,7 +17,7 @@ from springcheck.physics import exact
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.arrays import Force, Reals
 from springcheck.physics.scene import Scene
-from springcheck.physics.terms import Damping, Magnetic, Spring, WallSpring
+from springcheck.physics.terms import Damping, Drive, Magnetic, Spring, WallSpring, Weight
 from springcheck.studies.stability import longest
 
 SCENES = ("magnetic", "foucault")
@@ -171,11 +171,12 @@ def test_where_no_stage_turns_by_the_field_the_turn_is_not_judged() -> None:
         assert found["gyration"].passed is None
 
 
-def test_the_exact_motion_has_friction_and_a_resting_place_too() -> None:
-    """Against RK4 in steps so short that it is exact to 1e-11."""
+@pytest.mark.parametrize("unlike", [0.0, 0.7])
+def test_the_exact_motion_has_friction_and_a_resting_place_too(unlike: float) -> None:
+    """Against RK4 in steps so short that it is exact to 1e-11, of springs alike along both axes or not."""
     scene = Scene(
         m=[1.7, 1.7], q=[0.3, -0.2], p=[0.7, 0.4], places=[0, 1], step=0.002, steps=1000,
-        terms=(WallSpring(i=[0, 1], k=[2.9, 2.9], at=[0.1, -0.3]), Damping(i=[0, 1], c=[0.2, 0.2]),
+        terms=(WallSpring(i=[0, 1], k=[2.9, 2.9 + unlike], at=[0.1, -0.3]), Damping(i=[0, 1], c=[0.2, 0.2]),
                Magnetic(a=[0], b=[1], strength=[2.3])),
     )  # fmt: skip
     run = springcheck.simulate(scene, "own:rk4")
@@ -184,10 +185,52 @@ def test_the_exact_motion_has_friction_and_a_resting_place_too() -> None:
     assert np.max(np.abs(run.p[-1] - p)) < 1e-11
 
 
-def test_springs_unlike_along_two_axes_have_no_closed_form_here() -> None:
-    scene = scenes.load_scene("foucault")
-    unlike = replace(scene, terms=(WallSpring(i=[0, 1], k=[2.9, 2.8], at=[0.0, 0.0]), scene.terms[-1]))
-    assert not exact.has_true_motion(unlike)
+def test_boris_turns_about_a_field_that_lies_along_no_axis(need: Any) -> None:
+    """v- = v + v x t, v+ = v + 2/(1 + t.t) v- x t: what of v is along the field stays.  The second particle
+    has a field in one plane, a drive pulls at the first."""
+    field, m, h = np.array([[0.7, -1.1, 0.4], [0.0, 0.8, 0.0]]), np.array([[1.7], [2.9]]), 0.1
+    start = np.array([[0.3, -0.2, 0.5], [1.1, 0.4, -0.6]]), np.array([[0.7, 0.4, -0.3], [0.2, -0.5, 0.9]])
+    k, axes = np.array([[2.9, 1.3, 0.8], [1.1, 2.2, 3.1]]), np.arange(3)
+    scene = Scene(
+        m=np.repeat(m, 3), q=start[0].ravel(), p=start[1].ravel(), places=range(6), step=h, steps=60,
+        terms=(WallSpring(i=range(6), k=k.ravel(), at=np.zeros(6)),
+               Magnetic(a=np.ravel([(axes + 1) % 3 + 3 * i for i in (0, 1)]), strength=field.ravel(),
+                        b=np.ravel([(axes + 2) % 3 + 3 * i for i in (0, 1)]))),
+    )  # fmt: skip
+    (x, v), turn = (start[0], start[1] / m), field / m * h / 2
+    for _ in range(scene.steps):
+        x = x + h / 2 * v
+        v = v - h / 2 * k * x / m
+        v = v + np.cross(v + np.cross(v, turn), 2 * turn / (1 + np.sum(turn**2, axis=1, keepdims=True)))
+        v = v - h / 2 * k * x / m
+        x = x + h / 2 * v
+    run = springcheck.simulate(scene, "own:boris")
+    assert np.allclose(run.q[-1], x.ravel(), rtol=0, atol=1e-13)
+    assert np.allclose(run.p[-1], (m * v).ravel(), rtol=0, atol=1e-13)
+    assert springcheck.judge(scene, run).passed
+    driven = replace(scene, terms=(*scene.terms, Drive(i=[1], amplitude=[0.3], frequency=[1.1], phase=[0.2])))
+    assert springcheck.judge(driven, springcheck.simulate(driven, "own:boris")).passed
+    need("openmm:boris")
+    assert springcheck.judge(scene, springcheck.simulate(scene, "openmm:boris")).passed
+
+
+def test_a_charge_in_crossed_fields_drifts_across_both() -> None:
+    """E along x and B along z: v = u + R(W t) (v0 - u) with u = (0, -E/B), beside a fall along z."""
+    m, force, field, fall = 1.7, 0.9, 2.3, -0.4
+    scene = Scene(
+        m=[m] * 3, q=[30.3, -0.2, 0.1], p=[0.7, 0.4, -0.3], places=[0, 1, 2], step=0.1, steps=400,
+        terms=(Weight(i=[0, 2], force=[force, fall], at=[0.0, 0.0]),
+               Magnetic(a=[0], b=[1], strength=[field])),
+    )  # fmt: skip
+    t, found = 40.0, springcheck.exact(scene)
+    u, w = -1j * force / field, -1j * field / m
+    v0 = (0.7 + 0.4j) / m - u
+    z, v = 30.3 - 0.2j + u * t + v0 * (np.exp(w * t) - 1) / w, u + v0 * np.exp(w * t)
+    q = [z.real, z.imag, 0.1 - 0.3 / m * t + fall / m * t * t / 2]
+    p = [m * v.real, m * v.imag, -0.3 + fall * t]
+    assert np.allclose(found.q[-1], q, rtol=1e-13, atol=0)
+    assert np.allclose(found.p[-1], p, rtol=1e-13, atol=0)
+    assert springcheck.judge(scene, springcheck.simulate(scene, "own:boris")).passed
 
 
 def test_a_field_needs_a_plane() -> None:

@@ -1,7 +1,6 @@
 """Causes that states with rods, or in a bath, show where they are not the scheme's.
 
-The impulse along a rod is the difference of a step from the same step without rods: its direction follows
-from the positions.  The effect of a bath is in the draws that the states imply, and in their size.
+The effect of a bath is in the draws that the states imply, and in their size.
 """
 
 from __future__ import annotations
@@ -12,10 +11,9 @@ from math import comb
 
 import numpy as np
 
-from springcheck.checks import driven, other
+from springcheck.checks import driven, other, rods
 from springcheck.checks.case import Case
 from springcheck.checks.requires import MAP, missing
-from springcheck.checks.rods import rod_length, rod_velocity
 from springcheck.checks.steps import STANDS_APART, seldom_off, step_defect
 from springcheck.checks.thermal import (
     collisions,
@@ -25,14 +23,11 @@ from springcheck.checks.thermal import (
     reading,
     thermostat,
 )
-from springcheck.physics.arrays import Floats, Reals
+from springcheck.physics.arrays import Floats
 from springcheck.text.wording import regularly
 from springcheck.thermal import THERMOSTATS
 from springcheck.thermal.catalogue import ENERGY_LEFT
 from springcheck.thermal.draws import Reading, law_of
-
-PUSH_ROUNDINGS = 64
-"""Roundings of the positions whose difference is an impulse: of a free step, and of the frame as recorded."""
 
 STANDARD_ERRORS = 6.0
 """Standard errors by which a size differs from another: a chance of 2e-9 for normal numbers."""
@@ -61,6 +56,9 @@ REMOVED_ROUNDINGS = 16
 FEWEST_ORDERS = 1e9
 """Ways to choose the steps that are off, of which one has the farthest by chance."""
 
+DECLARE_DIFFERENCES = "judge it with --differences (in Python: rebuilds_velocity=True)"
+"""What to do where velocities are right to what differences of positions keep."""
+
 OR_UNKNOWN = "or one that is not known here"
 """End of an identification that does not exclude other schemes: another cause goes before it."""
 
@@ -71,7 +69,7 @@ def found(case: Case, shown: Callable[[int, bool], str] = lambda *_: "") -> str:
     run, system = case.trajectory, case.scene.system
     first, few = seldom_off(case)
     looks: list[Callable[[Case], str]] = [lambda _: shown(first, bool(few)), other.found]
-    if not (system.is_linear and system.is_separate):
+    if case.scene.n > 1 or not system.is_linear:
         # of one particle by itself states show more than which number is another
         looks.reverse()
     ways: list[Callable[[Case], str]] = []
@@ -81,7 +79,7 @@ def found(case: Case, shown: Callable[[int, bool], str] = lambda *_: "") -> str:
         ways = [_of_no_noise, _of_bath, _of_collisions, _of_removal]
         looks = [*looks, _of_reach, _of_state, _of_size]
     elif run.every == 1 and not missing(case, MAP):
-        ways = [_of_differences, driven.found, _of_rods, _of_removal, _of_factor]
+        ways = [_of_differences, driven.found, rods.pushed, _of_removal, _of_factor]
         looks = [*looks, _of_reach]
     vague = ""
     for way in ways + looks:
@@ -150,11 +148,16 @@ def _of_factor(case: Case) -> str:
     unit, ends = (np.concatenate(x, axis=1) for x in (case.allowance, case.next_states))
     made = np.concatenate([run.q[1:], run.p[1:]], axis=1)
     off = np.abs(made - ends) / unit
-    for what, kept, of in (("momenta", slice(n), slice(n, None)), ("positions and momenta", [], slice(None))):
+    held = case.system.rods
+    # of one freedom any change of a momentum is a factor
+    free = held.freedoms if held else n
+    for what, kept, of, freedoms in (
+        ("momenta", slice(n), slice(n, None), free), ("positions and momenta", [], slice(None), 2 * free),
+    ):  # fmt: skip
         x, y = ends[:, of] / unit[:, of], made[:, of] / unit[:, of]
         factor = np.sum(x * y, axis=1) / np.sum(x * x, axis=1)
         left = [np.max(np.abs(y - one * x)) for one in (factor[:, None], np.mean(factor))]
-        if x.shape[1] > 1 and np.all(off[:, kept] <= room) and left[0] <= room < left[1]:
+        if freedoms > 1 and np.all(off[:, kept] <= room) and left[0] <= room < left[1]:
             size = " to ".join(f"{float(one):.6g}" for one in (np.min(factor), np.max(factor)))
             return (
                 f"each step is the scheme's own, and all {what} are multiplied by one factor after it, from "
@@ -185,72 +188,32 @@ def _of_reach(case: Case) -> str:
 
 def _of_differences(case: Case) -> str:
     """Velocities that are differences of the positions, where every step is right to what those keep."""
-    run, m = case.trajectory, case.judged.m
+    run, m, held = case.trajectory, case.judged.m, case.system.rods
+    declared = replace(case, trajectory=replace(run, rebuilds_velocity=True))
     for more, n, kick in (("", 1, 0.0), (" over two steps", 2, 0.0), (" and half a kick", 1, 0.5)):
         q, p = (x[1 : len(x) - n + 1] for x in (run.q, run.p))
         made = m * (run.q[n:] - run.q[:-n]) / (n * run.step)
         right, size = made + kick * run.step * case.system.force(q, p), np.abs(p) + np.abs(made)
-        if rods := case.system.rods:
-            right, size = rods.projected(q, right), np.max(size, axis=1, keepdims=True)
+        if held:
+            right, size = held.projected(q, right), np.max(size, axis=1, keepdims=True)
         # and those of their own decimals: what has finer ones than the positions was not made of them
         half = run.arithmetic.recorded(m, n * run.step, False)[1]
         off = (np.abs(p - right) - half) / (DIFFERENCE_ROUNDINGS * run.arithmetic.state)
         are = not run.rebuilds_velocity and np.all(off <= size)
-        if are and step_defect(replace(case, trajectory=replace(run, rebuilds_velocity=True))).passed:
+        if are and step_defect(declared).passed:
             return (
                 f"velocities are differences of the positions{more}, which keep eps q/h of them, and each "
-                "step is right to that: judge it with --differences (in Python: rebuilds_velocity=True)"
+                f"step is right to that: {DECLARE_DIFFERENCES}"
             )
-    return ""
-
-
-def _of_rods(case: Case) -> str:
-    """Momenta that are not projected, impulses along other directions than that of the rods before the drift,
-    or of another size than keeps their lengths."""
-    rods, run = case.system.rods, case.trajectory
-    if rods is None or len(run.t) < 3:
-        return ""
-    q, p = (x.astype(np.longdouble) for x in (run.q, run.p))
-    held = np.concatenate([run.p[:1], rods.projected(q[1:], p[1:]).astype(np.float64)])
-    across = replace(case, trajectory=replace(run, p=held))
-    if rod_velocity(case).passed is False and not seldom_off(case)[1] and step_defect(across).passed:
+    # what SHAKE adds to velocities, as a difference, rounds at each step by itself; a wrong force does not
+    off = (run.p[1:] - case.next_states[1]) / m
+    again = abs(np.sum(off[1:] * off[:-1])) / np.sum(off * off) * np.sqrt(len(off))
+    alone = not run.rebuilds_velocity and again <= STANDARD_ERRORS < np.sqrt(len(off))
+    if held and alone and not step_defect(case).passed and step_defect(declared).passed:
         return (
-            "momenta keep their part along rods, which RATTLE takes off at the end of a step; without it "
-            "each step is the scheme's own"
+            "what rods change of velocities rounds as differences of positions do, by eps q/h, and each step "
+            f"is right to that: {DECLARE_DIFFERENCES}"
         )
-    drifts = [kind for kind in case.scheme.kinds if kind.drifts]
-    if len(drifts) != 1:
-        return ""
-    scene, q, p = case.judged, q[:-1], p[:-1]
-    free = scene.derived(terms=tuple(x for x in scene.terms if x.kind != "constraint"))
-    loose = Case(trajectory=run, scene=free).step(q, p)[0]
-    push, noise = run.q[1:] - loose, 2.0**-53 * (np.abs(run.q[1:]) + np.abs(loose))
-    moved = rods.apart(push)
-    allowed = PUSH_ROUNDINGS * rods.spans(noise)
-
-    def along(way: Reals) -> bool:
-        size = rods.solve(way, way, rods.dot(moved, way))
-        part = rods.apart(rods.spread(rods.each(size) * way) / scene.m)
-        off = np.sqrt(rods.dot(moved - part, moved - part))
-        return bool(np.all(off[1:] <= allowed[1:]))
-
-    ways = rods.ways(q)
-    if np.all(np.sqrt(rods.dot(moved, moved)) <= allowed):
-        return ""
-    if along(ways):
-        off = float(np.max(np.abs(rods.strain(run.q[1:].astype(np.longdouble)))))
-        return other.found(case) or (
-            "SHAKE pushes along rods in their direction, and not as much as keeps lengths, off by up to "
-            f"{off:.2g} of themselves: a wide tolerance, an iteration that stops early, other masses in it, "
-            "or a spring in its place"
-        ) * (rod_length(case).passed is False)
-    if along(rods.ways(loose)):
-        return (
-            "SHAKE pushes the ends of a rod along it as it lies after the drift, where "
-            f"{case.scheme.title} takes it as it lay before"
-        )
-    if along(np.concatenate([ways[:1], ways[:-1]])):
-        return "SHAKE pushes the ends of a rod along it as it lay a step before"
     return ""
 
 

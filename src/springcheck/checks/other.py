@@ -6,11 +6,11 @@ squares of what the steps miss.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import combinations
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,13 +28,37 @@ VALUE_SLACK = 2.0
 SQUARES_FALL = 4.0
 """Factor by which the squares of what steps miss have to fall from one Newton step to the next."""
 MOST_ALONE = 16
-"""Rows of a term, or masses, that are looked at one by one; of more of them, all together alone."""
+"""Objects of a term, or particles, that are looked at one by one; of more of them, all together alone."""
 NEAR_SINGLE = 2.0**-40
 """Relative distance from a number's single precision, 2**-24 off it at most, within which a value is that."""
 SAME = "each step is the scheme's own"
 
 Number: TypeAlias = tuple[str, float, float, Callable[[float], Case]]
 """A number in words, its value, the least size of changes of it, and the case where it has another value."""
+
+Rows: TypeAlias = tuple[str, NDArray[np.bool_]]
+"""Some of a term's rows, or of the coordinates (s,), in words."""
+
+
+class Kind(NamedTuple):
+    """The numbers (s,) of one kind in a scene, and the case that has others."""
+
+    name: str
+    of: str
+    numbers: Floats
+    other: Callable[[Floats], Case]
+    objects: list[Rows]
+    """Rows that have one number: of a particle, or of a spring, bond or rod, along all axes."""
+    alone: Sequence[Rows] = ()
+    """Single rows of them, where they may have each its own."""
+    size: float = 0.0
+    power: int = 1
+    """-1 where a scene file has the inverse of the numbers."""
+
+    def changed(self, here: NDArray[np.bool_] | None, x: float) -> Case:
+        """The case with the number x in some rows, or with a factor x to all."""
+        more = x**self.power
+        return self.other(self.numbers * more if here is None else np.where(here, more, self.numbers))
 
 
 def found(case: Case) -> str:
@@ -47,9 +71,9 @@ def found(case: Case) -> str:
         shown = dict.fromkeys(_said(name, own, x) for name, own, x in values if x is not None)
         if shown:
             return f"{SAME} with another number, {either([*shown])}"
-        return next(
-            (f"{SAME} with {words}" for words, of in _exchanged(case) if _fits(case, of)), _frame(case)
-        )
+        # what is off by no more than the slack of a fit fits without an exchange as well
+        ways = () if _fits(case, case) else _exchanged(case)
+        return next((f"{SAME} with {words}" for words, of in ways if _fits(case, of)), _frame(case))
 
 
 def _said(name: str, own: float, value: float) -> str:
@@ -60,21 +84,24 @@ def _said(name: str, own: float, value: float) -> str:
     return f"{name}: {value:.{max(6, min(17, digits))}g}, not {own:.15g}{single}"
 
 
-def _off(case: Case, unit: Extended, at: Integers) -> Extended:
-    """What the steps after these frames miss, in bounds (2, r, n), but for a clock."""
-    run, n = case.trajectory, case.scene.n - case.scene.system.is_driven
-    ends = np.stack(sight.ends(case, at)) - np.stack([run.q[at + 1], run.p[at + 1]])
-    return np.asarray(np.where(unit[:, at] > 0, ends / unit[:, at], 0)[..., :n])
+def _off(case: Case, other: Case, at: Integers) -> Extended:
+    """What the steps after these frames miss in another case (2, r, n), in bounds, but for a clock."""
+    assert case.ahead is not None
+    run, n = other.trajectory, case.scene.n - case.scene.system.is_driven
+    unit = case.roundings * case.ahead.allowance[:, at]
+    if run.p is not case.trajectory.p:
+        # momenta that are made anew of velocities, and so are their bounds
+        unit[1] *= other.judged.m / case.judged.m
+    ends = np.stack(sight.ends(other, at)) - np.stack([run.q[at + 1], run.p[at + 1]])
+    return np.asarray(np.where(unit > 0, ends / unit, 0)[..., :n])
 
 
 def _value(case: Case, own: float, size: float, of: Callable[[float], Case]) -> float | None:
     """The value of a number by which all steps are the scheme's own, or None."""
-    assert case.ahead is not None
-    unit, every = case.roundings * case.ahead.allowance, np.arange(len(case.trajectory.t) - 1)
-    at, x, left = sight.rows(case, len(every)), own, np.inf
+    at, x, left = sight.rows(case, len(case.trajectory.t) - 1), own, np.inf
     for _ in range(VALUE_STEPS):
-        change, here = sight.CHANGE * max(abs(x), size), _off(of(x), unit, at)
-        slope = (_off(of(x + change), unit, at) - here) / change
+        change, here = sight.CHANGE * max(abs(x), size), _off(case, of(x), at)
+        slope = (_off(case, of(x + change), at) - here) / change
         # what roundings, all of the sign that hurts, do to the value
         error = VALUE_SLACK * float(np.sum(np.abs(slope)) / np.sum(slope * slope))
         if not SQUARES_FALL * np.sum(here * here) < left:
@@ -107,81 +134,82 @@ def _quicker(case: Case, m: Floats) -> Case:
 
 def _fits(case: Case, other: Case) -> bool:
     """Whether all steps are the scheme's own in another case."""
-    assert case.ahead is not None
-    unit, every = case.roundings * case.ahead.allowance, np.arange(len(case.trajectory.t) - 1)
+    every = np.arange(len(case.trajectory.t) - 1)
     # some of them tell nearly all others
     parts = sight.rows(case, len(every)), every
-    return all(np.max(np.abs(_off(other, unit, at))) <= VALUE_SLACK for at in parts)
+    return all(np.max(np.abs(_off(case, other, at))) <= VALUE_SLACK for at in parts)
 
 
 def _exchanged(case: Case) -> Iterator[tuple[str, Case]]:
-    """Cases in which two particles have exchanged their masses, or two rows of a term a number."""
-    scene, n = case.judged, case.judged.n - case.judged.system.is_driven
-    of = scene.all_places[:n] // 3
-    kinds: list[tuple[str, Floats, Callable[[Floats], Case], Integers]] = [
-        ("masses of particles", scene.m[:n], partial(way, case), of) for way in (_heavier, _quicker)
-    ]
+    """Cases in which two particles have exchanged their masses, or two springs, bonds or rods a number."""
+    for kind in _kinds(case):
+        pairs = combinations(kind.objects if len(kind.objects) <= MOST_ALONE else [], 2)
+        for (one, mine), (two, its) in pairs:
+            swapped = kind.numbers.copy()
+            if np.sum(mine) == np.sum(its) and np.any(swapped[mine] != swapped[its]):
+                swapped[mine], swapped[its] = swapped[its], swapped[mine]
+                yield f"the {kind.name} of {one} and that of {two} exchanged", kind.other(swapped)
+
+
+def _kinds(case: Case) -> Iterator[Kind]:
+    """The numbers of a scene."""
+    run, scene = case.trajectory, case.judged
+    n, places = scene.n - scene.system.is_driven, scene.all_places
+    reach = float(np.max(np.ptp(run.q[:, :n], axis=0)))
     for number, term in enumerate(scene.terms):
+        objects = _objects(term.objects(places))
+        alone = _alone(objects, places[term.particles[0]])
         for column in term.columns:
-            if (numbers := term.arrays[column.field]).dtype.kind == "f":
-                words = f"numbers ({column.name}) of {term.key.removeprefix('wall-')}s"
-                changed = partial(_with, case, number, column.field)
-                kinds.append((words, numbers, changed, np.arange(len(numbers))))
-    for words, numbers, other, rows in kinds:
-        for i, j in combinations(range(int(np.max(rows, initial=-1)) + 1), 2):
-            mine, its = numbers[rows == i], numbers[rows == j]
-            if len(mine) == len(its) and np.any(mine != its) and len(numbers) <= MOST_ALONE:
-                swapped = numbers.copy()
-                swapped[rows == i], swapped[rows == j] = its, mine
-                yield f"the {words} {i} and {j} exchanged", other(swapped)
+            place = column.field == term.origin and term.bodies == 1
+            name = f"{'place' if place else column.name} of the {term.key.removeprefix('wall-')}"
+            numbers = term.arrays[column.field]
+            if numbers.dtype.kind == "f" and column.field != "number":
+                of_axes = alone if term.is_by_axes or place else []
+                other = partial(_with, case, number, column.field)
+                yield Kind(name, " of ", numbers, other, objects, of_axes, reach, -1 if column.inverse else 1)
+    objects = _objects([((int(place) // 3,), 1) for place in places[:n]])
+    for of, way in ((" of ", _heavier), (" that divides the force on ", _quicker)):
+        yield Kind("mass", of, scene.m[:n], partial(way, case), objects)
+
+
+def _objects(of: list[tuple[tuple[int, ...], int]]) -> list[Rows]:
+    """The rows (s,) of each object, named by its particles."""
+    found = []
+    for one in dict.fromkeys(of):
+        ends = [*dict.fromkeys(map(str, one[0]))]
+        name = f"particle{'s' if len(ends) > 1 else ''} {' and '.join(ends)}"
+        found.append((name, np.array([each == one for each in of])))
+    return found
+
+
+def _alone(objects: list[Rows], places: Integers) -> list[Rows]:
+    """Each row of the objects that have several."""
+    several = [(name, row) for name, here in objects if np.sum(here) > 1 for row in np.flatnonzero(here)]
+    every = np.arange(len(places))
+    return [(f"{name} along {'xyz'[places[row] % 3]}", every == row) for name, row in several]
 
 
 def _numbers(case: Case) -> Iterator[Number]:
     """The numbers of a scene, each by itself, and those of one kind together by a factor."""
     run, scene = case.trajectory, case.judged
-    n, of = scene.n - scene.system.is_driven, [str(j // 3) for j in scene.all_places]
-    reach = float(np.max(np.ptp(run.q[:, :n], axis=0)))
-    for number, term in enumerate(scene.terms):
-        ends = [dict.fromkeys(of[j] for j in row) for row in zip(*term.particles, strict=True)]
-        where = [f"particle{'s' if len(one) > 1 else ''} {' and '.join(one)}" for one in ends]
-        for column in term.columns:
-            place = column.field == term.origin and term.bodies == 1
-            kind = f"{'place' if place else column.name} of the {term.key.removeprefix('wall-')}"
-            numbers = term.arrays[column.field]
-            if numbers.dtype.kind == "f":
-                other = partial(_with, case, number, column.field)
-                yield from _each(kind, " of ", numbers, other, where, reach, -1 if column.inverse else 1)
-
+    for kind in _kinds(case):
+        name, own = kind.name, kind.numbers
+        for words, here in [x for y in (kind.objects, kind.alone) if len(y) <= MOST_ALONE for x in y]:
+            if np.all(own[here] == own[here][0]):
+                value = float(own[here][0]) ** kind.power
+                yield f"the {name}{kind.of}{words}", value, kind.size, partial(kind.changed, here)
+        if len(kind.objects) > 1 or np.any(own != own[0]):
+            yield f"a factor to each {name}", 1.0, 0.0, partial(kind.changed, None)
     if sum(term.kind == "potential" for term in scene.terms) > 1:
         yield "a factor to every force", 1.0, 0.0, lambda x: sight.of_scene(case, scene.system.scaled(x))
-
-    where = [f"particle {one}" for one in of[:n]]
-    yield from _each("mass", " of ", scene.m[:n], partial(_heavier, case), where)
-    yield from _each("mass", " that divides the force on ", scene.m[:n], partial(_quicker, case), where)
     yield "the step", run.step, 0.0, lambda x: sight.changed(case, "step", x / run.step - 1)
-
-
-def _each(
-    kind: str, of: str, numbers: Floats, other: Callable[[Floats], Case], where: list[str],
-    size: float = 0.0, power: int = 1,
-) -> Iterator[Number]:  # fmt: skip
-    """The numbers (s,) of a kind; `power` is -1 where a scene file has their inverse."""
-
-    def changed(here: NDArray[np.bool_], x: float) -> Case:
-        return other(np.where(here, x**power, numbers))
-
-    for row, own in enumerate(numbers.tolist() if len(numbers) <= MOST_ALONE else []):
-        here = np.arange(len(numbers)) == row
-        yield f"the {kind}{of}{where[row]}", own**power, size, partial(changed, here)
-    if len(numbers) > 1:
-        yield f"a factor to each {kind}", 1.0, 0.0, lambda x: other(numbers * x**power)
 
 
 def _frame(case: Case) -> str:
     """The one frame from which on states are a step too late or too early, or ""."""
     assert case.ahead is not None
     run, unit = case.trajectory, case.roundings * case.ahead.allowance
-    off = np.flatnonzero(~np.all(np.abs(_off(case, unit, np.arange(len(run.t) - 1))) <= 1, axis=(0, 2)))
+    off = np.flatnonzero(~np.all(np.abs(_off(case, case, np.arange(len(run.t) - 1))) <= 1, axis=(0, 2)))
     if len(off) != 1 or run.every > 1:
         return ""
     i, states = int(off[0]), np.stack([run.q, run.p])

@@ -31,6 +31,7 @@ class RadialSpring(LinearLaw, Term):
         Column("number", "number", single=False),
     )
     ends: ClassVar[tuple[str, ...]] = ("a", "b")
+    is_by_axes: ClassVar[bool] = False
     a: Integers
     b: Integers
     k: Floats

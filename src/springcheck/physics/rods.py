@@ -40,6 +40,7 @@ class Rod(WithoutPotential):
     formula: ClassVar[str] = "|q[b] - q[a]| = length"
     columns: ClassVar[tuple[Column, ...]] = (Column("length", "length", sign="positive"),)
     ends: ClassVar[tuple[str, ...]] = ("a", "b")
+    is_by_axes: ClassVar[bool] = False
     kind: ClassVar[Origin] = "constraint"
     a: Integers
     b: Integers
@@ -56,6 +57,7 @@ class WallRod(WithoutPotential, OnParticles):
         Column("length", "length", sign="positive"),
         Column("wall", "at", 0.0, single=False),
     )
+    is_by_axes: ClassVar[bool] = False
     kind: ClassVar[Origin] = "constraint"
     length: Floats
 
@@ -76,20 +78,15 @@ class Rods:
         self.m = m
         self._terms: list[Any] = [term for term in terms if term.kind == "constraint"]
         self._places = places = 3 * np.arange(len(m)) if places is None else places
-        met: dict[Any, int] = {}
         rods: dict[Any, int] = {}
-        number, axes = [], []
-        for term in self._terms:
-            for ends in zip(*(index.tolist() for index in term.particles), strict=True):
-                of = term.key, *(int(places[j]) // 3 for j in ends)
-                row = *of, int(places[ends[0]]) % 3
-                axes.append(row[-1])
-                # of several rods between the same ends each has one row along an axis
-                met[row] = met.get(row, 0) + 1
-                number.append(rods.setdefault((of, met[row]), len(rods)))
-        self.ends = tuple(of[1:] for of, _ in rods)
+        number = [
+            rods.setdefault((one, term.key, term.fast), len(rods))
+            for term in self._terms
+            for one in term.objects(places)
+        ]
+        self.ends = tuple(ends for (ends, _), *_ in rods)
         """The particles of each rod: two, or one joined to a fixed point."""
-        self._axes = np.asarray(axes, np.int64)
+        self._axes = np.concatenate([places[term.particles[0]] % 3 for term in self._terms])
         self._order = np.argsort(number, kind="stable")
         self._rod = np.asarray(number, np.int64)[self._order]
         self._starts = np.flatnonzero(np.diff(self._rod, prepend=-1))

@@ -8,6 +8,7 @@ written once for every width of float, for one state and for a whole trajectory 
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
@@ -66,6 +67,8 @@ class Term(FrozenArrays):
     """The field that is subtracted from the elongation, and is therefore no argument of the law."""
     is_linear: ClassVar[bool] = False
     """Whether the force is linear in positions and velocities, up to a constant."""
+    is_by_axes: ClassVar[bool] = True
+    """Whether the rows of an object along several axes may have each its own parameters."""
     kind: ClassVar[Origin] = "potential"
     """Origin of its force: a potential energy, the velocities, the time, or a constrained length."""
     fast: bool = False
@@ -129,6 +132,16 @@ class Term(FrozenArrays):
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Its numbers by the names of their fields, (s,) each: the ends of each row, then the columns."""
         return {name: getattr(self, name) for name in (*self.ends, *(c.field for c in self.columns))}
+
+    def objects(self, places: Integers) -> list[tuple[tuple[int, ...], int]]:
+        """The particles of each row, and which of several objects between them it belongs to: in space a
+        spring, bond or rod has a row for each axis; `places` as in `Scene`."""
+        met: Counter[tuple[int, ...]] = Counter()
+        found = []
+        for row in zip(*(places[index].tolist() for index in self.particles), strict=True):
+            met[row] += 1
+            found.append((tuple(place // 3 for place in row), met[row]))
+        return found
 
     def rows(self) -> Iterator[tuple[Any, ...]]:
         """Each row as Python's numbers: its ends, then its columns."""

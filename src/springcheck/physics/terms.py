@@ -266,19 +266,27 @@ class Magnetic(WithoutPotential):
             where: Any = (..., index)
             np.add.at(out, where, push)
 
-    def by_velocity(self, m: Floats) -> Floats:
-        """Derivatives of the force by the momenta (n, n) [1/T]."""
-        out = np.zeros((len(m), len(m)))
+    def by_velocity(self, m: Reals) -> Reals:
+        """Derivatives of the force by the momenta (n, n) [1/T], as wide as the masses."""
+        out = np.zeros((len(m), len(m)), m.dtype)
         np.add.at(out, (self.a, self.b), self.strength / m[self.b])
         np.subtract.at(out, (self.b, self.a), self.strength / m[self.a])
         return out
 
-    def turns(self, m: Floats) -> Floats:
-        """Angular frequency at which the field alone rotates the velocity of each coordinate (n,) [1/T]."""
-        out = np.zeros(len(m))
+    def turns(self, m: Floats, places: Integers) -> Floats:
+        """Angular frequency at which the field alone rotates the velocity of each coordinate (n,) [1/T]; of a
+        field along no axis (3, n), with its direction and the number of the particle."""
+        out, field, of = np.zeros(len(m)), np.zeros((np.max(places) // 3 + 1, 3)), places // 3
         for index in (self.a, self.b):
             np.add.at(out, index, np.abs(self.strength) / m[index])
-        return out
+        one, other = places[self.a] % 3, places[self.b] % 3
+        sign = np.where((other - one) % 3 == 1, 1, -1)
+        np.add.at(field, (of[self.a], 3 - one - other), sign * self.strength / m[self.a])
+        if np.all(np.count_nonzero(field, axis=1) <= 1):
+            return out
+        size = np.sqrt(np.sum(field * field, axis=1, keepdims=True))
+        way = np.where(size > 0, field / np.where(size > 0, size, 1), 0)
+        return np.stack([size[of, 0], way[of, places % 3], of])
 
 
 _KNOWN: dict[str, type[Term]] = {

@@ -31,7 +31,8 @@ class Setting:
     rate: Reals | None
     force: Reals
     turns: Reals | None = None
-    """Angular frequencies (n,) at which magnetic fields turn the velocities; None where there is no field."""
+    """Angular frequencies (n,) at which magnetic fields turn the velocities; None where there is no field; of
+    fields along no axis their directions too, as `Magnetic.turns`."""
 
 
 Effect: TypeAlias = Callable[[Reals, Reals, Any, Setting], tuple[Reals, Reals]]
@@ -107,18 +108,31 @@ def _implicit_friction_sizes(q: Reals, p: Reals, x: Any, at: Setting) -> tuple[R
 
 
 def _gyrate(q: Reals, p: Reals, x: Any, at: Setting) -> tuple[Reals, Reals]:
-    """P - p = x F((P + p)/2), a rotation by 2 atan(x W/2): with T p = x F(p)/2 and T**2 = -(x W/2)**2."""
+    """P - p = x F((P + p)/2), a rotation by 2 atan(x W/2): with T p = x F(p)/2 and T**2 = -(x W/2)**2 on what
+    of p is not along the field."""
     if at.turns is None:
         return q, p
-    square = (x * at.turns / 2) ** 2
-    return q, p + (x * at.force - 2 * square * p) / (1 + square)
+    rate, along = _along(at.turns, p)
+    square = (x * rate / 2) ** 2
+    return q, p + (x * at.force - 2 * square * (p - along)) / (1 + square)
 
 
 def _gyrate_sizes(q: Reals, p: Reals, x: Any, at: Setting) -> tuple[Reals, Reals]:
     if at.turns is None:
         return q, p
-    square = (x * at.turns / 2) ** 2
-    return q, p + (np.abs(x) * at.force + 2 * square * p) / (1 + square)
+    rate, along = _along(np.abs(at.turns), p)
+    square = (x * rate / 2) ** 2
+    # of a direction that is rounded, and of two products and sums with it
+    return q, p + (np.abs(x) * at.force + 2 * square * (p + 2 * along)) / (1 + square)
+
+
+def _along(turns: Reals, p: Reals) -> tuple[Reals, Any]:
+    """Rates (n,) of turning by the field, and the momenta (..., n) along it."""
+    if turns.ndim == 1:
+        return turns, 0
+    rate, way, of = turns
+    sums = np.add.reduceat(way * p, np.flatnonzero(np.diff(of, prepend=-1)), axis=-1)
+    return rate, way * np.take(sums, of.astype(np.int64), axis=-1)
 
 
 _ALL = (

@@ -89,9 +89,10 @@ class Law:
 
     @cached_property
     def turns(self) -> Reals | None:
-        """The rates at which magnetic fields turn velocities (n,) [1/T]; None where there is none."""
+        """The rates at which magnetic fields turn velocities [1/T], as `Magnetic.turns`; None where there is
+        none."""
         found: list[Any] = [term for row in self.fields for term in row]
-        return found[0].turns(self.scene.m) if found else None
+        return found[0].turns(self.scene.m, self.scene.all_places) if found else None
 
     @cached_property
     def stiffness(self) -> Any:

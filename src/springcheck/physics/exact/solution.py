@@ -111,10 +111,10 @@ def _of_whole_scenes(system: SolvedSystem[Any]) -> Iterator[type[ClosedForm]]:
         from springcheck.physics.exact.response import Response
 
         yield from (Response, ModulatedMotion)
-    elif system.is_damped and system.is_linear:
-        from springcheck.physics.exact.damped import UnlikeFriction
+    if ("magnetic" in system.acting or system.is_damped) and not system.is_driven:
+        from springcheck.physics.exact.damped import CoupledModes
 
-        yield UnlikeFriction
+        yield CoupledModes
     if system.rods:
         from springcheck.physics.exact.lumped import LumpedMotion
 
