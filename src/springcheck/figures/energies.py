@@ -112,13 +112,13 @@ def _said(runs: Runs, found: Mapping[str, Floats], differences: Mapping[str, Flo
             return f"all keep the energy to rounding, {most:.0e}" if most else "all keep the energy exactly"
         for group in runs.groups:
             each = steady(found[group.members[0].label], group.members[0].every)
-            if each and not group.failed:
+            if each and not group.failed and len(said) < FINDINGS_SAID:
                 percent = float(f"{100 * abs(each):.2g}")
                 said.append(f"{group.title} {'gains' if each > 0 else 'loses'} {percent:g} % a step")
                 del largest[group.title]
-        said = said[:FINDINGS_SAID]
     if largest:
-        said.append(extremes(largest, "energy off by at most {}", beyond=LARGE_ENERGY))
+        whose = "energy of all others" if said else "energy"
+        said.append(extremes(largest, f"{whose} off by at most {{}}", beyond=LARGE_ENERGY))
     return "; ".join(said)
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from springcheck.errors import StoreError
-from springcheck.formats.columns import Fixed, Floats, States, kinds, listed, named, split, times
+from springcheck.formats.columns import STEPS, Fixed, Floats, States, kinds, listed, named, split, times
 from springcheck.formats.lines import Lines, number
 
 SHOWN = 1000
@@ -81,7 +81,7 @@ def of_rows(
     if not names and len(header) == width - 1 and _are_counted(values[:, 0]):
         header = ["", *header]
     chosen = names or header
-    counted = [i for i, name in enumerate(chosen[:width]) if re.fullmatch(r"(?i)\s*(time)?steps?\s*", name)]
+    counted = [i for i, name in enumerate(chosen[:width]) if re.fullmatch(STEPS, name)]
     if counted and "t" not in kinds(chosen).values():
         i, values, chosen = counted[0], values.copy(), [*chosen]
         values[:, i], chosen[i] = times(path, values[:, i], step), "t"
