@@ -609,8 +609,8 @@ def test_a_logarithmic_axis_can_be_read_however_short_it_is(high: float, labels:
     ("numbers", "said"),
     [
         ({"a": 1e-3, "b": 0.5}, "off by 0.1 % (a) to 50 % (b)"),
-        ({"a": 1e-3, "b": np.nan}, "off by 0.1 % (a); b leaves it"),
-        ({"a": 1e-3, "b": 11.0, "c": np.inf}, "off by 0.1 % (a); 2 of 3 leave it"),
+        ({"a": 1e-3, "b": np.nan}, "off by 0.1 % (a); b leaves the chart"),
+        ({"a": 1e-3, "b": 11.0, "c": np.inf}, "off by 0.1 % (a); 2 of 3 leave the chart"),
         # "3 of 3 leave it" was all that was said, of nothing
         ({"a": 11.0, "b": np.inf}, "2 of 2 leave the chart"),
         ({"a": 11.0}, "a leaves the chart"),

@@ -87,7 +87,7 @@ class Runs:
     def part(self) -> str:
         """From when on they are shown, where that is not from the start on."""
         first, (factor, unit) = min((float(run.t[0]) for run in self.every), key=abs), self.time_unit
-        return f", from t = {factor * first:.3g} {unit}".rstrip() + " on" if first else ""
+        return f", from t = {factor * first:.6g} {unit}".rstrip() + " on" if first else ""
 
     @property
     def wrong(self) -> str:
@@ -121,7 +121,7 @@ class Runs:
                     Curve(
                         name=run.label,
                         group=REJECTED if group.failed else group.scheme,
-                        title=("is not " if group.failed else "") + looks.title(group.scheme),
+                        title=("claims " if group.failed else "") + looks.title(group.scheme),
                         x=x,
                         y=y,
                         line=not dots or faint,

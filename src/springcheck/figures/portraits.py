@@ -245,7 +245,7 @@ def extremes(found: Mapping[str, float], text: str, *, beyond: float = 10.0) -> 
     small, large = min(stay, key=lambda x: stay[x]), max(stay, key=lambda x: stay[x])
     numbers = f"{share(stay[small])} ({small})"
     numbers += f" to {share(stay[large])} ({large})" if share(stay[large]) != share(stay[small]) else ""
-    return text.format(numbers) + (f"; {gone} it" if left else "")
+    return text.format(numbers) + (f"; {gone} the chart" if left else "")
 
 
 def _spans(runs: Runs, shown: Sequence[View], truth: Motion | None) -> list[tuple[float, float]]:
