@@ -755,6 +755,70 @@ def test_names_that_are_wrong_are_one_line(capsys: pytest.CaptureFixture[str]) -
 
 
 @pytest.mark.parametrize(
+    ("names", "q", "v", "m"),
+    [
+        ("t,x1,x2,v2,v1,m2,m1", "x1 x2", "v1 v2", "m1 m2"),
+        ("t,x2,x1,v2,v1,m1,m2", "x1 x2", "v1 v2", "m1 m2"),
+        ("t,x1,x2,y1,y2,vx1,vx2,vy1,vy2,m1,m2", "x1 y1 x2 y2", "vx1 vy1 vx2 vy2", "m1 m2"),
+        ("t,q[0],q[1],v[1],v[0]", "q[0] q[1]", "v[0] v[1]", ""),
+        ("t,x1 [1],x2 [1],v2 [1],v1 [1]", "x1 [1] x2 [1]", "v1 [1] v2 [1]", ""),
+        ("t,x,y,v_y,v_x", "x y", "v_x v_y", ""),
+        ("t,x,x'", "x", "x'", ""),
+        ("t,'x','v'", "'x'", "'v'", ""),
+        ("t,x1,x2,x2dot,x1dot", "x1 x2", "x1dot x2dot", ""),
+        ("t,q2,q1,v,v", "q2 q1", "v v", ""),
+    ],
+)
+def test_a_column_is_that_of_the_particle_and_the_axis_in_its_name(
+    names: str, q: str, v: str, m: str
+) -> None:
+    """Masses stood in the order of the file, of x1, x2, y1, y2 half of them at other coordinates; x' was a
+    second position, and v_x was left out."""
+    known = names.split(",")
+    numbers = [
+        np.full(9, 10.0 * i) if x[0] == "m" else 10.0 * i + np.arange(9.0) for i, x in enumerate(known)
+    ]
+    np.savetxt("a.csv", np.column_stack(numbers), header=names, comments="", delimiter=",")
+    (found,) = formats.read(Path("a.csv")).values()
+    mass = [] if found.mass is None else found.mass.tolist()
+    for have, wanted in ((found.q[0], q), (found.v, v), (mass, m)):
+        places = [int(x // 10) for x in np.atleast_2d(have)[0]] if have is not None else []
+        assert " ".join(known[i] for i in places) == wanted
+
+
+def test_arrays_along_axes_are_those_of_their_particles() -> None:
+    """Of x (f, n) and y (f, n) the masses were repeated as if the particles' axes stood side by side."""
+    x, y, vx, vy = (10.0 * i + np.arange(18.0).reshape(9, 2) / 7 for i in range(4))
+    np.savez("a.npz", t=np.arange(9.0), x=x, y=y, vx=vx, vy=vy, m=[1.5, 2.5])
+    (found,) = formats.read(Path("a.npz")).values()
+    np.testing.assert_array_equal(found.q, np.stack([x, y], axis=2).reshape(9, 4))
+    np.testing.assert_array_equal(found.v, np.stack([vx, vy], axis=2).reshape(9, 4))
+    assert found.mass is not None
+    assert found.mass.tolist() == [1.5, 2.5]
+
+
+@pytest.mark.parametrize(
+    ("names", "said"),
+    [
+        # a radius and a speed were the third coordinate
+        ("t,x,y,r,vx,vy,v", "positions along axes and others: x, y, r"),
+        # a temperature was the time
+        ("step,T,x,v", "counts steps and knows no times"),
+    ],
+)
+def test_a_column_that_may_be_another_quantity_is_not_taken(names: str, said: str) -> None:
+    np.savetxt(
+        "a.csv",
+        np.arange(36.0).reshape(4, -1)[:, : len(names.split(","))],
+        header=names,
+        comments="",
+        delimiter=",",
+    )
+    with pytest.raises(StoreError, match=said):
+        formats.read(Path("a.csv"))
+
+
+@pytest.mark.parametrize(
     ("names", "units"), [("t,x,v", "s,m,m/s"), ("time;x;v", "[s];[m];[m/s]"), ("t x v", "ms - 1/s")]
 )
 def test_a_row_of_units_below_the_names_is_left_out_and_said(names: str, units: str) -> None:

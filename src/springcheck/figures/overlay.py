@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 
+from springcheck.doors.function import UNKNOWN
 from springcheck.figures import looks, naming
 from springcheck.figures.charts import EXACTLY, REJECTED, Bank, Chart, Curve, Scale
 from springcheck.figures.frames import Frame
@@ -57,7 +58,9 @@ class Runs:
             if len(run.t) > 1 and label in failed:
                 wrong.append(run)
             elif len(run.t) > 1:
-                found.setdefault(run.scheme, []).append(run)
+                # methods of no known scheme are not of one
+                named = run.scheme not in ("", UNKNOWN.name)
+                found.setdefault(run.scheme if named else label, []).append(run)
         self.groups = [Group(name, tuple(members)) for name, members in found.items()]
         # drawn last: on top of all that is right
         self.groups += [Group(run.scheme, (run,), failed=True) for run in wrong]
@@ -121,7 +124,7 @@ class Runs:
                     Curve(
                         name=run.label,
                         group=REJECTED if group.failed else group.scheme,
-                        title=("claims " if group.failed else "") + looks.title(group.scheme),
+                        title=("claims " if group.failed else "") + looks.title(run.scheme),
                         x=x,
                         y=y,
                         line=not dots or faint,
@@ -200,5 +203,5 @@ def exact_curve(x: Floats, y: Floats) -> Curve:
 def share(x: float) -> str:
     """A fraction in a readable form: in percent, or as a power of ten."""
     if not 5e-4 <= x < 1000:
-        return f"{x:.0e}"
+        return f"{x:.0e}" if x else "0"
     return f"{100 * x:.2g} %" if x < 0.995 else f"{100 * x:.0f} %"

@@ -176,7 +176,7 @@ def split(path: Path, columns: Columns, roundoff: float = 2.0**-53) -> States:
             places[what] = [("", number) for _, number in found]
         elif what == "q" and "" in axes:
             names = listed(name for name, one in meant.items() if one == what)
-            raise StoreError(f"{path}: positions along axes and others: {names}; name all columns, as --columns")
+            raise StoreError(f"{path}: positions along axes and others: {names}; name all by --columns t,q,v")
     alike = [sorted(places[what]) for what in "qpv" if what in places]
     if all(x == alike[0] and len({*x}) == len(x) for x in alike):
         # momenta and velocities belong to the positions of their numbers, and so do masses
@@ -208,17 +208,12 @@ def split(path: Path, columns: Columns, roundoff: float = 2.0**-53) -> States:
     mass = np.hstack(parts["m"]) if "m" in parts else None
     if mass is not None and np.any(mass != mass[:1]):
         raise StoreError(f"{path}: the masses change from row to row")
-    return States(
-        t=t[:, 0], q=states["q"], p=states.get("p"), v=states.get("v"), roundoff=roundoff,
-        mass=None if mass is None else mass[0], notes=_left_out(columns, meant),
-    )  # fmt: skip
-
-
-def _left_out(columns: Columns, meant: Mapping[str, Kind]) -> tuple[str, ...]:
-    """The note on columns that were left out as capitals beside small letters."""
     left = [name for name in columns if kind(name) is not None and name not in meant]
     said = "left out: a capital beside small letters is an energy or another quantity"
-    return (f"{listed(left)} {said}",) if left else ()
+    return States(
+        t=t[:, 0], q=states["q"], p=states.get("p"), v=states.get("v"), roundoff=roundoff,
+        mass=None if mass is None else mass[0], notes=(f"{listed(left)} {said}",) if left else (),
+    )  # fmt: skip
 
 
 def is_single(x: Floats) -> bool:

@@ -19,11 +19,12 @@ const element = (name, attributes, ...children) =>
 const by = (id) => document.getElementById(id);
 const number = (x, digits = 3) => String(Number(x.toPrecision(Math.min(17, Math.max(1, digits)))));
 const colourOf = (look) => look.colours[Number(DARK.matches)];
-const marked = (d, look) => element("path", { class: "marks", d, style: { stroke: colourOf(look) } });
+const kind = (name, look) => (look.failed ? `${name} failed` : name);
+const marked = (d, look) => element("path", { class: kind("marks", look), d, style: { stroke: colourOf(look) } });
 
 function stroked(d, look) {
   const style = { stroke: colourOf(look), "--printed": look.printed || "none" };
-  return element("path", { class: "curve", d, "stroke-dasharray": look.dash, style });
+  return element("path", { class: kind("curve", look), d, "stroke-dasharray": look.dash, style });
 }
 
 // A tile of a kind: a shade of the style sheet, or a colour.
