@@ -797,6 +797,31 @@ def test_arrays_along_axes_are_those_of_their_particles() -> None:
     assert found.mass.tolist() == [1.5, 2.5]
 
 
+def test_one_mass_in_json_is_the_mass() -> None:
+    rows = {name: [0.0, 0.3, 0.7, *range(9)] for name in "txv"}
+    Path("a.json").write_text(json.dumps({**rows, "mass": 2.5}))
+    (found,) = formats.read(Path("a.json")).values()
+    assert found.mass is not None
+    assert found.mass.tolist() == [2.5]
+
+
+def test_a_picture_says_which_frames_are_not_finite_and_names_units(tmp_path: Path) -> None:
+    """A coordinate with nan counted as one that rests, and was left out without a word."""
+    path = tmp_path / "a.h5"
+    t = np.arange(40) * 0.1
+    q, v = np.cos(t)[:, None, None] * [1.0, 0.0, 2.0], np.sin(t)[:, None, None] * [1.0, 0.0, 2.0]
+    q[17, 0, 2] = np.nan
+    with h5py.File(path, "w") as file:
+        for name, values, unit in (("position", q, "nm"), ("velocity", v, "nm ps-1")):
+            file[f"particles/all/{name}/value"] = values
+            file[f"particles/all/{name}/value"].attrs["unit"] = unit
+            file[f"particles/all/{name}/time"] = t
+    assert main(["plot", str(path), "-o", str(tmp_path / "figures"), "--quiet"]) == 0
+    said = (tmp_path / "figures" / "states.svg").read_text()
+    for part in ("not finite: 1 frame, the first of them frame 17", "coordinate 2", "q (nm)", "v (nm ps-1)"):
+        assert part in said
+
+
 @pytest.mark.parametrize(
     ("names", "said"),
     [

@@ -228,10 +228,10 @@ def _off(runs: Runs, view: View) -> str:
         return ""
     found = {}
     for group in runs.groups:
-        run = group.members[0]
-        x, true = (view.pick(*one)[0] for one in ((run.q, run.p), exact.at(run)))
+        both = [(view.pick(run.q, run.p)[0], view.pick(*exact.at(run))[0]) for run in group.members]
         with np.errstate(all="ignore"):
-            found[group.title] = float(np.max(np.abs(x - true))) / (float(np.ptp(true)) or 1.0)
+            each = [np.max(np.abs(x - true)) / (np.ptp(true) or 1.0) for x, true in both]
+            found[group.title] = float(np.max(each))
     return extremes(found, f"off the exact {view.what} by at most {{}} of its peak-to-peak range")
 
 
