@@ -237,6 +237,12 @@ def test_a_motion_that_explodes_is_said_to_explode(
     # its scheme was not stated, so that nothing judges it
     assert main(["run", "spring", "--stepper", "mine.py:f", "--method", "own:euler"]) == 2
     assert "explodes" in " ".join(capsys.readouterr().out.split())
+    (tmp_path / "mine.py").write_text("def f(q, p, h, force, mass):\n    return q * float('nan'), p\n")
+    # that it ended is judged of any scheme
+    assert main(["run", "spring", "--stepper", "mine.py:f", "--method", "own:euler", "--force"]) == 1
+    said = " ".join(capsys.readouterr().out.split())
+    assert "nan in place of numbers from the next frame on" in said
+    assert "explodes" not in said
 
 
 def program(tmp_path: Path, body: str) -> str:

@@ -338,8 +338,28 @@ def test_the_title_of_energies_says_who_gains_and_who_loses() -> None:
     assert "implicit Euler loses 0.99 % a step" in title
     assert "semi-implicit Euler, kick-drift gains" not in title
     assert "semi-implicit Euler, kick-drift loses" not in title
+    # of more than are named the others count among those that are off
+    more = {f"own:{name}": driver.run(scene, "own:euler") for name in "abcde"}
+    more = {label: replace(run, label=label, scheme=label) for label, run in more.items()}
+    (title,) = (bank.heading for bank in of_runs(scene, more, more) if bank.name == "energy")
+    assert title.count("gains") == 3
+    assert "; energy of all others off by at most 632 % (own:d)" in title
     (title,) = (bank.heading for bank in of_runs(scene, made, made) if bank.name == "phase-portrait")
     assert "explicit Euler spirals out; implicit Euler spirals in; semi-implicit Euler" in title
+
+
+def test_methods_of_no_known_scheme_have_a_line_each() -> None:
+    """The second was marks alone, on the line of the first, and the report page did not draw it."""
+    scene = scenefile.load_scene("spring")
+    made = {f"stepper:{x}": driver.run(scene, f"own:{x}") for x in ("euler", "velocity-verlet")}
+    made = {label: replace(run, label=label, scheme="unknown") for label, run in made.items()}
+    for bank in of_runs(scene, made, made):
+        for chart in bank.charts:
+            lines = {one.name: one.group for one in chart.curves if one.name in made and not one.over}
+            assert len(lines) == len({*lines.values()}) == len({*lines} & {*made}), bank.name
+        assert all("no scheme that is known" in x.title for x in bank.charts[0].curves if x.name in made)
+    headings = [bank.heading for bank in of_runs(scene, made, made)]
+    assert "stepper:euler spirals out; stepper:velocity-verlet keeps to its orbit" in headings[0]
 
 
 def test_marks_on_an_edge_are_whole_and_none_lies_beyond_it() -> None:
@@ -609,11 +629,12 @@ def test_a_logarithmic_axis_can_be_read_however_short_it_is(high: float, labels:
     ("numbers", "said"),
     [
         ({"a": 1e-3, "b": 0.5}, "off by 0.1 % (a) to 50 % (b)"),
-        ({"a": 1e-3, "b": np.nan}, "off by 0.1 % (a); b leaves it"),
-        ({"a": 1e-3, "b": 11.0, "c": np.inf}, "off by 0.1 % (a); 2 of 3 leave it"),
+        ({"a": 1e-3, "b": np.nan}, "off by 0.1 % (a); b leaves the chart"),
+        ({"a": 1e-3, "b": 11.0, "c": np.inf}, "off by 0.1 % (a); 2 of 3 leave the chart"),
         # "3 of 3 leave it" was all that was said, of nothing
         ({"a": 11.0, "b": np.inf}, "2 of 2 leave the chart"),
         ({"a": 11.0}, "a leaves the chart"),
+        ({"a": 0.0, "b": 0.0}, "off by 0 (a)"),
         ({}, ""),
     ],
 )

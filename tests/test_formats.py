@@ -755,6 +755,95 @@ def test_names_that_are_wrong_are_one_line(capsys: pytest.CaptureFixture[str]) -
 
 
 @pytest.mark.parametrize(
+    ("names", "q", "v", "m"),
+    [
+        ("t,x1,x2,v2,v1,m2,m1", "x1 x2", "v1 v2", "m1 m2"),
+        ("t,x2,x1,v2,v1,m1,m2", "x1 x2", "v1 v2", "m1 m2"),
+        ("t,x1,x2,y1,y2,vx1,vx2,vy1,vy2,m1,m2", "x1 y1 x2 y2", "vx1 vy1 vx2 vy2", "m1 m2"),
+        ("t,q[0],q[1],v[1],v[0]", "q[0] q[1]", "v[0] v[1]", ""),
+        ("t,x1 [1],x2 [1],v2 [1],v1 [1]", "x1 [1] x2 [1]", "v1 [1] v2 [1]", ""),
+        ("t,x,y,v_y,v_x", "x y", "v_x v_y", ""),
+        ("t,x,x'", "x", "x'", ""),
+        ("t,'x','v'", "'x'", "'v'", ""),
+        ("t,x1,x2,x2dot,x1dot", "x1 x2", "x1dot x2dot", ""),
+        ("t,q2,q1,v,v", "q2 q1", "v v", ""),
+    ],
+)
+def test_a_column_is_that_of_the_particle_and_the_axis_in_its_name(
+    names: str, q: str, v: str, m: str
+) -> None:
+    """Masses stood in the order of the file, of x1, x2, y1, y2 half of them at other coordinates; x' was a
+    second position, and v_x was left out."""
+    known = names.split(",")
+    numbers = [
+        np.full(9, 10.0 * i) if x[0] == "m" else 10.0 * i + np.arange(9.0) for i, x in enumerate(known)
+    ]
+    np.savetxt("a.csv", np.column_stack(numbers), header=names, comments="", delimiter=",")
+    (found,) = formats.read(Path("a.csv")).values()
+    mass = [] if found.mass is None else found.mass.tolist()
+    for have, wanted in ((found.q[0], q), (found.v, v), (mass, m)):
+        places = [int(x // 10) for x in np.atleast_2d(have)[0]] if have is not None else []
+        assert " ".join(known[i] for i in places) == wanted
+
+
+def test_arrays_along_axes_are_those_of_their_particles() -> None:
+    """Of x (f, n) and y (f, n) the masses were repeated as if the particles' axes stood side by side."""
+    x, y, vx, vy = (10.0 * i + np.arange(18.0).reshape(9, 2) / 7 for i in range(4))
+    np.savez("a.npz", t=np.arange(9.0), x=x, y=y, vx=vx, vy=vy, m=[1.5, 2.5])
+    (found,) = formats.read(Path("a.npz")).values()
+    np.testing.assert_array_equal(found.q, np.stack([x, y], axis=2).reshape(9, 4))
+    np.testing.assert_array_equal(found.v, np.stack([vx, vy], axis=2).reshape(9, 4))
+    assert found.mass is not None
+    assert found.mass.tolist() == [1.5, 2.5]
+
+
+def test_one_mass_in_json_is_the_mass() -> None:
+    rows = {name: [0.0, 0.3, 0.7, *range(9)] for name in "txv"}
+    Path("a.json").write_text(json.dumps({**rows, "mass": 2.5}))
+    (found,) = formats.read(Path("a.json")).values()
+    assert found.mass is not None
+    assert found.mass.tolist() == [2.5]
+
+
+def test_a_picture_says_which_frames_are_not_finite_and_names_units(tmp_path: Path) -> None:
+    """A coordinate with nan counted as one that rests, and was left out without a word."""
+    path = tmp_path / "a.h5"
+    t = np.arange(40) * 0.1
+    q, v = np.cos(t)[:, None, None] * [1.0, 0.0, 2.0], np.sin(t)[:, None, None] * [1.0, 0.0, 2.0]
+    q[17, 0, 2] = np.nan
+    with h5py.File(path, "w") as file:
+        for name, values, unit in (("position", q, "nm"), ("velocity", v, "nm ps-1")):
+            file[f"particles/all/{name}/value"] = values
+            file[f"particles/all/{name}/value"].attrs["unit"] = unit
+            file[f"particles/all/{name}/time"] = t
+    assert main(["plot", str(path), "-o", str(tmp_path / "figures"), "--quiet"]) == 0
+    said = (tmp_path / "figures" / "states.svg").read_text()
+    for part in ("not finite: 1 frame, the first of them frame 17", "coordinate 2", "q (nm)", "v (nm ps-1)"):
+        assert part in said
+
+
+@pytest.mark.parametrize(
+    ("names", "said"),
+    [
+        # a radius and a speed were the third coordinate
+        ("t,x,y,r,vx,vy,v", "positions along axes and others: x, y, r"),
+        # a temperature was the time
+        ("step,T,x,v", "counts steps and knows no times"),
+    ],
+)
+def test_a_column_that_may_be_another_quantity_is_not_taken(names: str, said: str) -> None:
+    np.savetxt(
+        "a.csv",
+        np.arange(36.0).reshape(4, -1)[:, : len(names.split(","))],
+        header=names,
+        comments="",
+        delimiter=",",
+    )
+    with pytest.raises(StoreError, match=said):
+        formats.read(Path("a.csv"))
+
+
+@pytest.mark.parametrize(
     ("names", "units"), [("t,x,v", "s,m,m/s"), ("time;x;v", "[s];[m];[m/s]"), ("t x v", "ms - 1/s")]
 )
 def test_a_row_of_units_below_the_names_is_left_out_and_said(names: str, units: str) -> None:

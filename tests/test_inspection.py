@@ -259,7 +259,23 @@ def test_a_part_of_a_run_is_called_one_and_errors_are_those_of_all_of_it(tmp_pat
     for bank, most in ((phase, "200 %"), (position, "100 %"), (error, "200 %")):
         assert f"by at most {most} (velocity Verlet)" in bank.heading
     for bank in (phase, position):
-        assert "from t = 2.94e+04 on" in bank.heading
+        assert "from t = 29415.4 on" in bank.heading
+
+
+def test_a_run_that_ended_early_has_no_part_in_the_end_of_the_others(tmp_path: Path) -> None:
+    """Its own last frames stood beside theirs, from other times: as "the first and the last 6 periods"."""
+    scene = scenes.parse(long_scene(60_000, 0.9), name="long")
+    session.run(scene, tmp_path / "long.h5", methods=["own:velocity-verlet", "own:euler"])
+    found = drawable(tmp_path / "long.h5")
+    assert len(found.runs["own:euler"].t) > 1
+    assert [*found.followed] == ["own:velocity-verlet"]
+    assert any("without own:euler, which ended before" in note for note in found.notes)
+    position = of_runs(scene, found.runs, found.followed)[1]
+    first = (60_000 - 499) * 0.9
+    for chart in position.charts:
+        curves = [np.asarray(one.x) for one in chart.curves if one.name == "own:velocity-verlet"]
+        assert len(curves[0]) > 40
+        assert all(first - 1e-6 <= np.min(x) for x in curves)
 
 
 def test_what_has_left_a_picture_before_its_first_frame_is_said_so(tmp_path: Path) -> None:

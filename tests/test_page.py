@@ -530,6 +530,12 @@ def test_what_failed_is_drawn_and_the_check_says_so(tmp_path: Path, opened: Any)
     assert "and its verdicts say so" in said
     picture = chromium.run('document.querySelector("#motion figure svg").innerHTML')
     assert "rgb(221, 0, 51)" in picture
+    # "is wrong (red)" is true on paper too, where the others are black
+    chromium.send("Emulation.setEmulatedMedia", media="print")
+    strokes = '[...document.querySelectorAll("#motion .curve")].map((one) => getComputedStyle(one).stroke)'
+    printed = set(chromium.run(strokes))
+    chromium.send("Emulation.setEmulatedMedia", media="")
+    assert {"rgb(221, 0, 51)", "rgb(0, 0, 0)"} == printed
 
 
 def test_a_browser_runs_nothing_of_a_hostile_store(content: page.Content, opened: Any) -> None:
@@ -782,6 +788,7 @@ def test_a_file_that_is_dropped_is_named_and_goes_nowhere(
     said = 'document.getElementById("dropped").textContent'
     for name, text, found in (
         ("it's mine.csv", "\n".join(["t,q,v", *rows]), "Velocity Verlet, h ω = 0.1: all 201 frames are its"),
+        ("prime.csv", "\n".join(["t,x,x'", *rows]), "Velocity Verlet, h ω = 0.1: all 201 frames are its"),
         ("few.csv", "t,q,v\n0,1,2", "Twelve or more rows"),
     ):
         script = (

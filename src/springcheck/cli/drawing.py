@@ -81,13 +81,15 @@ def draw_foreign(
     from springcheck.figures.charts import Bank, Chart, Curve, Scale
     from springcheck.figures.motion import periods
     from springcheck.figures.style import drawn, files_of, style
+    from springcheck.figures.views import with_unit
 
     found = states_in(path, columns, step, trajectory)
     other, name = (found.p, "p") if found.p is not None else (np.asarray(found.v), "v")
     n = found.q.shape[1]
     if particle is not None and not 0 <= particle < n:
         raise SpringcheckError(f"{path}: --particle {particle}: it has coordinates 0 to {n - 1}")
-    moving = np.flatnonzero(np.ptp(found.q, axis=0) > 0)
+    # one with nan moves
+    moving = np.flatnonzero(~(np.ptp(found.q, axis=0) == 0))
     chosen = moving[:MOST_COORDINATES] if particle is None else np.array([particle])
     left = len(moving) - len(chosen)
     notes = [*found.notes]
@@ -111,13 +113,17 @@ def draw_foreign(
         ]
 
     solid = [name for name, look in looks.LOOKS.items() if look.linestyle == looks.SOLID]
-    q, t = Scale(name="q"), Scale(name="t")
+    q, t, y = (Scale(name=with_unit(x, found.units.get(x, ""))) for x in ("q", "t", name))
     charts = [
-        Chart(title=f"{name} over q.", x=q, y=Scale(name=name), curves=curves(found.q, other, joined=False)),
+        Chart(title=f"{name} over q.", x=q, y=y, curves=curves(found.q, other, joined=False)),
         Chart(title="q over time.", x=t, y=q, curves=curves(found.t[:, None], found.q, joined=True)),
     ]
     which = f", {trajectory}" if trajectory else ""
     heading = f"{path.name}{which}: {_found(found.q[:, chosen[0]], len(found.t))}"
+    bad = np.flatnonzero(~np.isfinite(np.hstack([found.q, other])).all(axis=1))
+    heading += (
+        f"; not finite: {count(len(bad), 'frame')}, the first of them frame {bad[0]}" if len(bad) else ""
+    )
     bank = Bank(name="states", title="Coordinates", charts=charts, heading=heading, size=(4.4, 3.8))
     folder.check(files_of(bank.name), into, path)
     with style():

@@ -262,4 +262,6 @@ class _Steps:
                         raise MethodError(f"{self._name} failed: {told(error, self._where)}") from error
                 q[row], p[row] = self._q, self._p
                 if not (np.all(np.isfinite(self._q)) and np.all(np.isfinite(self._p))):
-                    raise Stopped(row, "the motion explodes: nan or infinite numbers from the next frame on")
+                    infinite = np.any(np.isinf([self._q, self._p]))
+                    what = "the motion explodes: infinite numbers" if infinite else "nan in place of numbers"
+                    raise Stopped(row, f"{what} from the next frame on")

@@ -105,20 +105,20 @@ def _energies(scene: Scene, q: Reals, p: Reals, unit: float = 1.0) -> Floats:
 def _said(runs: Runs, found: Mapping[str, Floats], differences: Mapping[str, Floats]) -> str:
     """Who gains or loses energy in every step alike, and how far the others are off."""
     largest = _largest(runs, differences)
-    said = []
+    said: list[str] = []
     if runs.scene.system.keeps_energy:
         if max(largest.values()) <= ALL_ROUNDED:
             most = max(largest.values())
             return f"all keep the energy to rounding, {most:.0e}" if most else "all keep the energy exactly"
         for group in runs.groups:
             each = steady(found[group.members[0].label], group.members[0].every)
-            if each and not group.failed:
+            if each and not group.failed and len(said) < FINDINGS_SAID:
                 percent = float(f"{100 * abs(each):.2g}")
                 said.append(f"{group.title} {'gains' if each > 0 else 'loses'} {percent:g} % a step")
                 del largest[group.title]
-        said = said[:FINDINGS_SAID]
     if largest:
-        said.append(extremes(largest, "energy off by at most {}", beyond=LARGE_ENERGY))
+        whose = "energy of all others" if said else "energy"
+        said.append(extremes(largest, f"{whose} off by at most {{}}", beyond=LARGE_ENERGY))
     return "; ".join(said)
 
 
@@ -150,7 +150,8 @@ def orbits(runs: Runs, parts: Runs, exact: Exact) -> str:
         if group.failed:
             continue
         if exact.known:
-            off[group.title] = max(float(np.max(exact.error(run))), parts.errors.get(run.label, 0.0))
+            each = [max(np.max(exact.error(x)), parts.errors.get(x.label, 0.0)) for x in group.members]
+            off[group.title] = float(np.max(each))
         if scene.system.keeps_energy:
             e = _energies(scene, run.q, run.p)
             first, last = e[: len(e) // 4 + 1], e[-(len(e) // 4) - 1 :]

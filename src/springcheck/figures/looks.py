@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 from springcheck import engines, schemes
+from springcheck.doors.function import UNKNOWN
 from springcheck.errors import MethodError
 
 Line: TypeAlias = str | tuple[int, tuple[float, ...]]
@@ -160,7 +161,9 @@ def scheme_of(label: str) -> str:
 
 def title(scheme: str) -> str:
     """The title of a scheme as short as a legend needs it: without its mechanism and its orders."""
-    return schemes.title(scheme).partition(":")[0].partition(", orders ")[0]
+    found = UNKNOWN.title if scheme in ("", UNKNOWN.name) else schemes.title(scheme)
+    # a method's own label stays whole
+    return found if found == scheme else found.partition(":")[0].partition(", orders ")[0]
 
 
 MOST_MEMBERS = 6

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 
+from springcheck.doors.function import UNKNOWN
 from springcheck.figures import looks, naming
 from springcheck.figures.charts import EXACTLY, REJECTED, Bank, Chart, Curve, Scale
 from springcheck.figures.frames import Frame
@@ -57,7 +58,9 @@ class Runs:
             if len(run.t) > 1 and label in failed:
                 wrong.append(run)
             elif len(run.t) > 1:
-                found.setdefault(run.scheme, []).append(run)
+                # methods of no known scheme are not of one
+                named = run.scheme not in ("", UNKNOWN.name)
+                found.setdefault(run.scheme if named else label, []).append(run)
         self.groups = [Group(name, tuple(members)) for name, members in found.items()]
         # drawn last: on top of all that is right
         self.groups += [Group(run.scheme, (run,), failed=True) for run in wrong]
@@ -87,7 +90,7 @@ class Runs:
     def part(self) -> str:
         """From when on they are shown, where that is not from the start on."""
         first, (factor, unit) = min((float(run.t[0]) for run in self.every), key=abs), self.time_unit
-        return f", from t = {factor * first:.3g} {unit}".rstrip() + " on" if first else ""
+        return f", from t = {factor * first:.6g} {unit}".rstrip() + " on" if first else ""
 
     @property
     def wrong(self) -> str:
@@ -121,7 +124,7 @@ class Runs:
                     Curve(
                         name=run.label,
                         group=REJECTED if group.failed else group.scheme,
-                        title=("is not " if group.failed else "") + looks.title(group.scheme),
+                        title=("claims " if group.failed else "") + looks.title(run.scheme),
                         x=x,
                         y=y,
                         line=not dots or faint,
@@ -200,5 +203,5 @@ def exact_curve(x: Floats, y: Floats) -> Curve:
 def share(x: float) -> str:
     """A fraction in a readable form: in percent, or as a power of ten."""
     if not 5e-4 <= x < 1000:
-        return f"{x:.0e}"
+        return f"{x:.0e}" if x else "0"
     return f"{100 * x:.2g} %" if x < 0.995 else f"{100 * x:.0f} %"

@@ -228,10 +228,10 @@ def _off(runs: Runs, view: View) -> str:
         return ""
     found = {}
     for group in runs.groups:
-        run = group.members[0]
-        x, true = (view.pick(*one)[0] for one in ((run.q, run.p), exact.at(run)))
+        both = [(view.pick(run.q, run.p)[0], view.pick(*exact.at(run))[0]) for run in group.members]
         with np.errstate(all="ignore"):
-            found[group.title] = float(np.max(np.abs(x - true))) / (float(np.ptp(true)) or 1.0)
+            each = [np.max(np.abs(x - true)) / (np.ptp(true) or 1.0) for x, true in both]
+            found[group.title] = float(np.max(each))
     return extremes(found, f"off the exact {view.what} by at most {{}} of its peak-to-peak range")
 
 
@@ -245,7 +245,7 @@ def extremes(found: Mapping[str, float], text: str, *, beyond: float = 10.0) -> 
     small, large = min(stay, key=lambda x: stay[x]), max(stay, key=lambda x: stay[x])
     numbers = f"{share(stay[small])} ({small})"
     numbers += f" to {share(stay[large])} ({large})" if share(stay[large]) != share(stay[small]) else ""
-    return text.format(numbers) + (f"; {gone} it" if left else "")
+    return text.format(numbers) + (f"; {gone} the chart" if left else "")
 
 
 def _spans(runs: Runs, shown: Sequence[View], truth: Motion | None) -> list[tuple[float, float]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, TypeAlias
@@ -22,11 +22,14 @@ Kind: TypeAlias = Literal["t", "q", "p", "v", "m"]
 NAMES: dict[Kind, str] = {
     "t": r"t|time|times",
     "q": r"q|r|(pos|position|positions|coordinate|coordinates)([_ ][xyz])?|[xyz]",
-    "p": r"p[xyz]?|(mom|momentum|momenta)([_ ][xyz])?",
-    "v": r"v[xyz]?|(vel|velocity|velocities)([_ ][xyz])?|[qxyz]_?dot|d[qxyz]/dt",
+    "p": r"p(_?[xyz])?|(mom|momentum|momenta)([_ ][xyz])?",
+    "v": r"v(_?[xyz])?|(vel|velocity|velocities)([_ ][xyz])?|[qxyz](_?dot|')|d[qxyz]/?dt",
     "m": r"m|mass|masses",
 }
 
+
+STEPS = r"(?i)\s*(time)?steps?\s*"
+"""Name of a column that counts steps."""
 
 FEWEST_SINGLE, FEW_ROWS, SHORT = 8, 1000, 0xFFF
 """Evidence that numbers are of single precision: so many different ones in so many rows, and bits among the
@@ -107,14 +110,16 @@ def kind(name: str) -> Kind | None:
     return found[0] if found else None
 
 
-def kinds(names: Iterable[str]) -> dict[str, Kind]:
+def kinds(names: Collection[str]) -> dict[str, Kind]:
     """The quantity of each column that holds one.
 
-    A capital letter beside the small letter of its quantity means something else: beside t and p, or v, T and
-    V are energies (or a temperature), and P is a pressure.
+    A capital letter beside the small letter of its quantity means something else: beside t or steps and p, or
+    v, T and V are energies (or a temperature), and P is a pressure.
     """
     found = {name: what for name in names if (what := kind(name)) is not None}
     small = {what for name, what in found.items() if not _is_capital(name)}
+    if any(re.fullmatch(STEPS, name) for name in names):
+        small.add("t")
     if small & {"p", "v"}:
         small |= {"p", "v"}
     return {name: what for name, what in found.items() if not (_is_capital(name) and what in small)}
@@ -126,41 +131,59 @@ def _is_capital(name: str) -> bool:
 
 
 def _without_unit(name: str) -> str:
-    return re.sub(r"[\[(].*?[\])]", "", name.strip().strip("\"'#")).strip()
+    bare = re.sub(r"^'(.*)'$", r"\1", name.strip().strip('"#').strip())
+    # the index of an array is its number
+    return re.sub(r"[\[(].*?[\])]", "", re.sub(r"(?<=[^\W\d])\s*[\[(](\d+)[\])]", r"_\1", bare)).strip()
 
 
 def _parted(name: str) -> tuple[str, str]:
-    """A name without its unit and case, and the number at its end."""
+    """A name without its unit and case, and the number at its end, or before the sign of a derivative."""
     if len(name) > LONGEST_NAME:
         return "", ""
-    bare = _without_unit(name).lower()
+    bare = re.sub(r"(\d+)(_?dot|'|/?dt)$", r"\2\1", _without_unit(name).lower())
     found = re.search(r"[\s_.]*(\d*)$", bare)
     return (bare[: found.start()], found[1]) if found else (bare, "")
 
 
-def _place(name: str) -> tuple[str, str]:
-    """Axis and number in a column's name: ("x", "2") of ``vx2``."""
+def _place(name: str) -> tuple[str, float]:
+    """Axis and number in a column's name: ("x", 2) of ``vx2``; ("", -1) of ``v``."""
     bare, number = _parted(name)
-    axis = re.search(r"[xyz](?=$|_?dot|/dt)", bare)
-    return axis[0] if axis else "", number
+    axis = re.search(r"[xyz](?=$|_?dot|'|/?dt)", bare)
+    return axis[0] if axis else "", float(number or -1)
+
+
+def _by_place(parts: Sequence[Floats], places: Sequence[tuple[str, float]]) -> Floats:
+    """Columns by the particle, and then by the axis, that their names give; of an array its columns are the
+    particles."""
+    wide = [x.shape[1] for x in parts]
+    number, axis = (np.repeat(x, wide) for x in ([n for _, n in places], [ord(a or "q") for a, _ in places]))
+    particle = np.concatenate([np.arange(width) for width in wide])
+    return np.asarray(np.hstack(parts)[:, np.lexsort((axis, particle, number))])
 
 
 def split(path: Path, columns: Columns, roundoff: float = 2.0**-53) -> States:
     """Named columns as states.  StoreError names those that are missing or do not fit together."""
     parts: dict[Kind, list[Floats]] = {}
-    places: dict[Kind, list[tuple[str, str]]] = {}
+    places: dict[Kind, list[tuple[str, float]]] = {}
     meant = kinds(columns)
     for name, what in meant.items():
         values = columns[name]
         parts.setdefault(what, []).append(values if values.ndim > 1 else values[:, None])
         places.setdefault(what, []).append(_place(name))
     for what, found in places.items():
-        if len({axis for axis, _ in found}) == 1:
+        axes = {axis for axis, _ in found}
+        if len(axes) == 1:
             places[what] = [("", number) for _, number in found]
-    for what in places.keys() & {"p", "v"}:
-        # momenta and velocities take the order of the positions, where their names number them
-        if len({*places[what]}) == len(parts[what]) and {*places[what]} == {*places.get("q", ())}:
-            parts[what] = [parts[what][places[what].index(place)] for place in places["q"]]
+        elif what == "q" and "" in axes:
+            names = listed(name for name, one in meant.items() if one == what)
+            raise StoreError(f"{path}: positions along axes and others: {names}; name all by --columns t,q,v")
+    alike = [sorted(places[what]) for what in "qpv" if what in places]
+    if all(x == alike[0] and len({*x}) == len(x) for x in alike):
+        # momenta and velocities belong to the positions of their numbers, and so do masses
+        for what in places.keys() & {"q", "p", "v"}:
+            parts[what] = [_by_place(parts[what], places[what])]
+        if "m" in places and {*places["m"]} == {("", number) for _, number in places.get("q", ())}:
+            parts["m"] = [_by_place(parts["m"], places["m"])]
     for what, why in (("t", "times"), ("q", "positions")):
         if what not in parts:
             how = "name all columns, as --columns t,q,v"
@@ -185,17 +208,12 @@ def split(path: Path, columns: Columns, roundoff: float = 2.0**-53) -> States:
     mass = np.hstack(parts["m"]) if "m" in parts else None
     if mass is not None and np.any(mass != mass[:1]):
         raise StoreError(f"{path}: the masses change from row to row")
-    return States(
-        t=t[:, 0], q=states["q"], p=states.get("p"), v=states.get("v"), roundoff=roundoff,
-        mass=None if mass is None else mass[0], notes=_left_out(columns, meant),
-    )  # fmt: skip
-
-
-def _left_out(columns: Columns, meant: Mapping[str, Kind]) -> tuple[str, ...]:
-    """The note on columns that were left out as capitals beside small letters."""
     left = [name for name in columns if kind(name) is not None and name not in meant]
     said = "left out: a capital beside small letters is an energy or another quantity"
-    return (f"{listed(left)} {said}",) if left else ()
+    return States(
+        t=t[:, 0], q=states["q"], p=states.get("p"), v=states.get("v"), roundoff=roundoff,
+        mass=None if mass is None else mass[0], notes=(f"{listed(left)} {said}",) if left else (),
+    )  # fmt: skip
 
 
 def is_single(x: Floats) -> bool:

@@ -181,7 +181,8 @@ def read_json(path: Path, columns: list[str], step: float | None) -> States:
         raise StoreError(f"{path}: no lists by name, and no list of rows of as many numbers each")
     arrays = {}
     for name, column in found.items():
-        values = [*column.values()] if isinstance(column, dict) else column
+        one = [column] if isinstance(column, float | int) else column
+        values = [*column.values()] if isinstance(column, dict) else one
         if isinstance(values, list):
             try:
                 arrays[str(name)] = np.asarray(values, np.float64)

@@ -60,7 +60,10 @@ def states_of(path: Path, arrays: Mapping[str, Any], names: Sequence[str] = ()) 
     numbers = {
         name: a for name, a in arrays.items() if not isinstance(a, StoreError) and a.dtype.kind in "fiu"
     }
-    numbers = {name: _turned(a) if kind(name) == "t" else a for name, a in numbers.items()}
+    numbers = {
+        name: a.ravel() if kind(name) == "t" and a.ndim == 2 and 1 in a.shape else a
+        for name, a in numbers.items()
+    }
     rows = next((len(a) for name, a in numbers.items() if kind(name) == "t" and a.ndim == 1), 0)
     if not rows:
         refused = [a for a in arrays.values() if isinstance(a, StoreError)]
@@ -102,11 +105,6 @@ def shortened(arrays: Mapping[str, Any]) -> Mapping[str, Any]:
     """Arrays of structs by their own names, ``t`` for ``run.t``, where these are unique."""
     own = {name.rpartition(".")[2]: a for name, a in arrays.items()}
     return own if len(own) == len(arrays) else arrays
-
-
-def _turned(a: Any) -> Any:
-    """A row or column of numbers as a one-dimensional array."""
-    return a.ravel() if a.ndim == 2 and 1 in a.shape else a
 
 
 def _chosen(path: Path, arrays: Mapping[str, Any], names: Sequence[str]) -> Mapping[str, Any]:

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from springcheck.errors import StoreError
-from springcheck.formats.columns import Fixed, Floats, States, kinds, listed, named, split, times
+from springcheck.formats.columns import STEPS, Fixed, Floats, States, kinds, listed, named, split, times
 from springcheck.formats.lines import Lines, number
 
 SHOWN = 1000
@@ -78,10 +78,16 @@ def of_rows(
 ) -> States:  # fmt: skip
     """The states in the rows of a table, the first of which are also given as text."""
     width = values.shape[1]
-    if not names and len(header) == width - 1 and _are_counted(values[:, 0]):
+    # an index that numbers the rows is written without a name
+    if (
+        not names
+        and len(header) == width - 1
+        and values[0, 0] in (0, 1)
+        and np.all(np.diff(values[:, 0]) == 1)
+    ):
         header = ["", *header]
     chosen = names or header
-    counted = [i for i, name in enumerate(chosen[:width]) if re.fullmatch(r"(?i)\s*(time)?steps?\s*", name)]
+    counted = [i for i, name in enumerate(chosen[:width]) if re.fullmatch(STEPS, name)]
     if counted and "t" not in kinds(chosen).values():
         i, values, chosen = counted[0], values.copy(), [*chosen]
         values[:, i], chosen[i] = times(path, values[:, i], step), "t"
@@ -125,11 +131,6 @@ def _numbers(cells: Iterable[str]) -> list[float] | None:
         return [number(cell) for cell in cells]
     except ValueError:
         return None
-
-
-def _are_counted(column: Floats) -> bool:
-    """Whether the first column numbers the rows, as in tables that are written with their index."""
-    return column[0] in (0, 1) and np.array_equal(column, column[0] + np.arange(len(column)))
 
 
 def roundoff(rows: Sequence[Sequence[str]], columns: Iterable[int]) -> float:

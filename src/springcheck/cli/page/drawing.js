@@ -19,12 +19,11 @@ const element = (name, attributes, ...children) =>
 const by = (id) => document.getElementById(id);
 const number = (x, digits = 3) => String(Number(x.toPrecision(Math.min(17, Math.max(1, digits)))));
 const colourOf = (look) => look.colours[Number(DARK.matches)];
-const marked = (d, look) => element("path", { class: "marks", d, style: { stroke: colourOf(look) } });
-
-function stroked(d, look) {
-  const style = { stroke: colourOf(look), "--printed": look.printed || "none" };
-  return element("path", { class: "curve", d, "stroke-dasharray": look.dash, style });
-}
+// What failed keeps its colour in print.
+const shaped = (kind, d, look, more) => element("path", { class: look.failed ? `${kind} failed` : kind, d,
+  style: { stroke: colourOf(look), "--printed": look.printed || "none" }, ...more });
+const marked = (d, look) => shaped("marks", d, look);
+const stroked = (d, look) => shaped("curve", d, look, { "stroke-dasharray": look.dash });
 
 // A tile of a kind: a shade of the style sheet, or a colour.
 function tile(name, shade, attributes) {

@@ -9,7 +9,7 @@ function columns(text) {
   const [head, ...rest] = text.split(/\r?\n/).map((line) => line.trim()).filter(Boolean);
   const cells = (line) => line.split(/[,;\t]/.test(head) ? /[,;\t]/ : /\s+/).map((cell) => cell.trim());
   const patterns = Object.entries(DATA.columns).map(([kind, names]) => [kind, `^(${names})[\\s_.]*\\d*$`]);
-  const bare = (name) => name.replace(/["'#]|\(.*?\)|\[.*?\]/g, "").trim();
+  const bare = (name) => name.replace(/^'(.*)'$/, "$1").replace(/["#]|\(.*?\)|\[.*?\]/g, "").trim();
   const kind = (name) => (patterns.find((one) => new RegExp(one[1], "i").test(bare(name))) || [""])[0];
   const kinds = cells((head || "").replace(/^#\s*/, "")).map(kind), held = [...kinds].sort().join("");
   if (!["qtv", "pqt"].includes(held)) return "Columns t, q and v, or t, q and p, of one particle are needed";

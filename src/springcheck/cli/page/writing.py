@@ -126,6 +126,7 @@ def _with_looks(data: Mapping[str, Any]) -> dict[str, Any]:
         return {
             "colours": colours, "dash": DASHES[(line + count) % len(DASHES)],
             "printed": DASHES[place % len(DASHES)], "mark": SHAPES[place % len(SHAPES)],
+            "failed": group == REJECTED,
         }  # fmt: skip
 
     def seen(bank: Mapping[str, Any]) -> dict[str, Any]:

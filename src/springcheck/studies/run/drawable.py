@@ -62,10 +62,12 @@ def drawable(path: Path, most: int = MOST_FRAMES) -> Drawable:
             fast |= not _shows_motion(runs[run.label], end, stride)
     followed = runs
     if fast:
-        followed = {run.label: keeper.end(path, run.label, min(END_FRAMES, frames)) for run in summary.runs}
-        notes.append(
-            f"position and phase portrait: the last {min(END_FRAMES, frames)} frames, energy: the whole run"
-        )
+        kept, longest = min(END_FRAMES, frames), max(run.frames for run in summary.runs)
+        here = {run.label: kept - longest + run.frames for run in summary.runs}
+        followed = {label: keeper.end(path, label, count) for label, count in here.items() if count > 1}
+        notes.append(f"position and phase portrait: the last {kept} frames, energy: the whole run")
+        if gone := sorted({*runs} - {*followed}):
+            notes.append(f"position and phase portrait: without {', '.join(gone)}, which ended before")
     return Drawable(scene=scene, runs=runs, followed=followed, notes=notes)
 
 
