@@ -28,6 +28,18 @@ from springcheck.thermal import THERMOSTATS, chance
 from springcheck.thermal.draws import Reading
 
 
+@pytest.mark.parametrize("scheme", ["bbk", "gj-i-half", "lammps-langevin", "nose-hoover"])
+def test_what_is_off_by_little_more_than_its_bound_has_no_momentum_taken_away(scheme: str) -> None:
+    """What a draw or a chain carries on tells nothing of other momenta: the same step is no sign of them."""
+    scene, off, seen = baths.springs(3, steps=60), 1e-13, 0.0
+    while not 1 < seen < 3:
+        off *= 2 / seen if seen else 1
+        run = springcheck.simulate(scene.replace(terms=scene.system.scaled(1 + off).terms), f"own:{scheme}", seed=5)
+        (found,) = checks.judge(scene, run, [checks.thermal.noise_direction])
+        seen = found.value / found.bound
+    assert causes._of_removal(Case(trajectory=run, scene=scene)) == ""
+
+
 @pytest.mark.parametrize(
     ("name", "said"),
     [("rod-after-drift", "after the drift"), ("rod-a-step-late", "a step before"), ("rod-no-impulse", ""),

@@ -106,7 +106,10 @@ def _off(case: Case, p: Floats | None = None) -> Floats:
         off = np.abs(np.stack(ends) - np.stack([run.q[1:], run.p[1:]])) / np.stack(case.allowance)
         return np.asarray(np.max(off, axis=(0, 2)) / case.roundings, np.float64)
     bath, seen, every = thermostat(case), reading(case), 1
-    if p is not None and not (bath.carried or bath.chain):
+    if p is not None:
+        if bath.carried or bath.chain:
+            # what these carry on is that of their own states
+            return found + np.inf
         # each end beside its start, so that every other step is one of these
         both = zip(starts, (run.q, run.p), strict=True)
         pairs = (np.stack([x[:-1], y[1:]], axis=1).reshape(-1, case.scene.n) for x, y in both)
