@@ -12,14 +12,13 @@ from math import comb
 
 import numpy as np
 
-from springcheck.checks import driven, other
+from springcheck.checks import driven, other, stages
 from springcheck.checks.case import Case
+from springcheck.checks.check import FALSE_ALARMS
 from springcheck.checks.requires import MAP, missing
 from springcheck.checks.rods import rod_length, rod_velocity
 from springcheck.checks.steps import STANDS_APART, seldom_off, step_defect
 from springcheck.checks.thermal import (
-    collisions,
-    draws_particles,
     noise_direction,
     read_frames,
     reading,
@@ -27,7 +26,7 @@ from springcheck.checks.thermal import (
 )
 from springcheck.physics.arrays import Floats, Reals
 from springcheck.text.wording import regularly
-from springcheck.thermal import THERMOSTATS
+from springcheck.thermal import THERMOSTATS, chance
 from springcheck.thermal.catalogue import ENERGY_LEFT
 from springcheck.thermal.draws import Reading, law_of
 
@@ -78,7 +77,7 @@ def found(case: Case, shown: Callable[[int, bool], str] = lambda *_: "") -> str:
     random = run.scheme in THERMOSTATS
     if run.every == 1 and random:
         # of draws that are read by the map of another scheme the size says nothing
-        ways = [_of_no_noise, _of_bath, _of_collisions, _of_removal]
+        ways = [_of_no_noise, _of_bath, stages.collided, _of_removal, stages.found]
         looks = [*looks, _of_reach, _of_state, _of_size]
     elif run.every == 1 and not missing(case, MAP):
         ways = [_of_differences, driven.found, _of_rods, _of_removal, _of_factor]
@@ -345,9 +344,11 @@ def _of_size(case: Case) -> str:
     """Noise whose size is not the bath's, of each coordinate where these are unlike, and of none where
     coordinates share draws."""
     seen = reading(case)
-    if not _told(seen) or any(one(case).passed is False for one in (noise_direction, draws_particles)):
+    if not _told(seen) or noise_direction(case).passed is False:
         return ""
     of = seen.draws**2
+    if chance.pairs(seen.draws / np.sqrt(np.mean(of, axis=0))) < FALSE_ALARMS:
+        return ""
     mean, error = np.mean(of, axis=0), np.std(of, axis=0) / np.sqrt(len(of))
     asked = "as large as the temperature, the masses and the friction ask"
     sizes = [(np.mean(of), np.std(of) / np.sqrt(of.size)), *zip(mean, error, strict=True)]
@@ -390,14 +391,3 @@ def _rescaled(case: Case, kinetic: Floats) -> str:
             "times the noise that goes with that: the coupling acts on one of both alone"
         ) + f", or the friction is {rate:.4g} +- {error:.1g} times the bath's" * bool(of_both)
     return ""
-
-
-def _of_collisions(case: Case) -> str:
-    """How often momenta are drawn anew, where that is not as the friction asks."""
-    hits, bath = reading(case).hits, case.judged.bath
-    # where nothing is left of any step, its map is another
-    if hits is None or bath is None or np.all(hits) or collisions(case).passed is not False:
-        return ""
-    share, x = float(np.mean(hits)), bath.friction * case.trajectory.step
-    rate, error = -np.log1p(-share) / x, np.sqrt(share / (1 - share) / hits.size) / x
-    return f"collisions come {rate:.4g} +- {error:.1g} times as often as the friction asks"
