@@ -30,7 +30,6 @@ from springcheck.thermal import THERMOSTATS, chance
 from springcheck.thermal.catalogue import HALF, Act
 from springcheck.thermal.draws import Reading
 
-
 STAGES = {name: one.acts for name, one in THERMOSTATS.items()}
 
 
@@ -46,10 +45,13 @@ def test_a_stage_that_is_another_is_named(scheme: str, runs: Any, said: str, wel
     """Whatever the force is: the scheme with that stage explains every step to rounding."""
     scene = baths.springs(2, steps=80)
     if well:
-        scene = scene.derived(terms=(*scene.terms, Quartic(i=np.arange(2), b=np.array([0.7, 1.9]), at=np.zeros(2))))
+        scene = scene.derived(
+            terms=(*scene.terms, Quartic(i=np.arange(2), b=np.array([0.7, 1.9]), at=np.zeros(2)))
+        )
     of = Broken(scene=scene, scheme=THERMOSTATS[scheme], seed=4, x=0.0)
     shown = causes.found(Case(trajectory=baths.played(of, runs=runs), scene=scene))
-    assert shown.startswith("each step is the scheme's own but for ") and said in shown
+    assert shown.startswith("each step is the scheme's own but for ")
+    assert said in shown
 
 
 def test_noise_without_the_root_of_the_mass_is_told_of_each_coordinate() -> None:
@@ -63,7 +65,9 @@ def test_noise_without_the_root_of_the_mass_is_told_of_each_coordinate() -> None
 
 
 @pytest.mark.parametrize(("scheme", "off"), [("gj-i-half", 1e-12), ("nose-hoover", 5e-14)])
-def test_what_is_off_by_little_more_than_its_bound_has_no_momentum_taken_away(scheme: str, off: float) -> None:
+def test_what_is_off_by_little_more_than_its_bound_has_no_momentum_taken_away(
+    scheme: str, off: float
+) -> None:
     """What a draw or a chain carries on tells nothing of other momenta: the same step is no sign of them."""
     scene = baths.springs(3, steps=60)
     assert scene.bath is not None

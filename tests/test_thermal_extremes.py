@@ -201,7 +201,9 @@ def published(number: str, at: Scene, *, half: bool) -> Trajectory:
     for draw in rng.standard_normal((at.steps, 2)):
         shot = np.sqrt(2 * x * at.thermal / m) * draw
         if half:
-            v = c2 * v + np.sqrt(c3) * (h * force(q, 0 * q) / m + (np.sqrt(2 * x * at.thermal / m) * last + shot) / 2)
+            v = c2 * v + np.sqrt(c3) * (
+                h * force(q, 0 * q) / m + (np.sqrt(2 * x * at.thermal / m) * last + shot) / 2
+            )
             q, last = q + np.sqrt(c3) * h * v, draw
         else:
             u = np.sqrt(c1) * v + np.sqrt(c3) / 2 * (h * force(q, 0 * q) / m + shot)

@@ -131,7 +131,8 @@ def test_a_drag_without_its_noise_is_seen_from_the_stated_limit_on(scheme: str) 
         return checks.shared([checks.thermal.draws_state(checks.Case(trajectory=run, scene=at))])[0]
 
     limit = judged(0, 0.0).sees.friction
-    assert limit is not None and 0.2 < limit < 0.8
+    assert limit is not None
+    assert 0.2 < limit < 0.8
     for off, least, most in ((limit, 10, 12), (-limit, 10, 12), (0.1 * limit, 0, 0)):
         seen = sum(judged(seed, off).passed is False for seed in range(12))
         assert least <= seen <= most

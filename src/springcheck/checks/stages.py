@@ -55,5 +55,7 @@ def _others(scheme: Thermostat) -> Iterator[tuple[str, Thermostat]]:
             yield "its last friction, which is that of the velocity before it", replace(scheme, acts=made)
     if scheme.carried:
         made = tuple(act._replace(draw=0) for act in acts)
-        said = "its random numbers: each acts in both halves of one step, not in the second and the next first"
+        said = (
+            "its random numbers: each acts in both halves of one step, not in the second and the next first"
+        )
         yield said, replace(scheme, acts=made, draws=1, carried=0)

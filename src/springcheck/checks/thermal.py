@@ -114,7 +114,7 @@ def _draws(case: Case) -> Floats:
         raise MethodError(HIDDEN if scheme.fresh < 3 or summed else NOT_SUMMED)
     x = found.draws
     if scheme.uniform and not case.scene.system.rods:
-        x = thermal.chance.normal_scores(x)
+        x = thermal.draws.normal_scores(x)
     if np.count_nonzero(~np.isnan(x)) < 2:
         raise MethodError("there were no draws")
     return x

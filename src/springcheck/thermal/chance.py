@@ -396,13 +396,3 @@ def crossed(x: Floats, y: Floats) -> float:
     later, earlier = squares[n - far], squares[n] - squares[far]
     z = np.concatenate([sums[far] / np.sqrt(later), sums[-far[1:]] / np.sqrt(earlier[1:])])
     return min(1.0, len(z) * of_normal(float(np.max(np.abs(z))))) if np.all(np.isfinite(z)) else 0.0
-
-
-def normal_scores(x: Any) -> Floats:
-    """Uniform draws of variance 1 as the normal numbers of the same rank; beyond their range infinite."""
-    from scipy.special import ndtri
-
-    u = np.asarray(x, np.float64) / math.sqrt(12) + 0.5
-    # the ends of the range are known to a rounding
-    u = np.where((u <= 0) & (u > -1e-9), 1e-12, np.where((u >= 1) & (u < 1 + 1e-9), 1 - 1e-12, u))
-    return np.where((u > 0) & (u < 1), ndtri(np.clip(u, 1e-300, 1 - 2.0**-53)), np.inf)
