@@ -36,7 +36,7 @@ STAGES = {name: one.acts for name, one in THERMOSTATS.items()}
 @pytest.mark.parametrize("well", [False, True])
 @pytest.mark.parametrize(
     ("scheme", "runs", "said"),
-    [("baoab", (*STAGES["baoab"][:4], Act("held", HALF)), "kick 2 of 2, which has the force of the one before"),
+    [("baoab", (*STAGES["baoab"][:4], Act("held", HALF)), "kick 2 of 2, which has the force of the"),
      ("gj-i", STAGES["gj-i"][:4], "kick 2 of 2, which is left out"),
      ("bbk", tuple(x._replace(draw=0) for x in STAGES["bbk"]), "each acts in both halves of one step"),
      ("bbk", (*STAGES["bbk"][:6], STAGES["bbk"][6]._replace(kind="damp")), "its last friction")],
