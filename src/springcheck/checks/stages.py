@@ -21,7 +21,7 @@ def found(case: Case) -> str:
     if scheme.rescales or case.scene.system.rods or noise_direction(case).passed is not False:
         return ""
     for said, other in _others(scheme):
-        seen = read_frames(case, case.trajectory.q, case.trajectory.p, other)
+        seen = read_frames(case, case.trajectory.q, case.trajectory.p, scheme=other)
         few = seen.hits is None or np.mean(seen.hits) < MOST_HIT
         if few and seen.across is not None and np.all(seen.across[other.carried :] <= seen.roundings):
             return f"each step is the scheme's own but for {said}"

@@ -45,7 +45,7 @@ def _reading(case: Case) -> Reading:
     return read_frames(case, *(x[_unread(case) :] for x in (case.trajectory.q, case.trajectory.p)))
 
 
-def read_frames(case: Case, q: Floats, p: Floats, scheme: Thermostat | None = None) -> Reading:
+def read_frames(case: Case, q: Floats, p: Floats, *, scheme: Thermostat | None = None) -> Reading:
     """The draws behind other frames q, p (f, n) of the case's scene, by its scheme or another."""
     run, scheme = case.trajectory, scheme or thermostat(case)
     by = thermal.rigid.read if case.judged.system.rods else thermal.draws.read
