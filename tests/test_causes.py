@@ -21,12 +21,62 @@ from springcheck.physics.builders import spring
 from springcheck.physics.radial import RadialSpring
 from springcheck.physics.rods import Rods
 from springcheck.physics.scene import Scene
+from springcheck.physics.terms import Quartic
 from springcheck.physics.trajectory import Trajectory, Verdict, of_scene
 from springcheck.studies.faults import baths
 from springcheck.studies.faults.rigid import Once
+from springcheck.studies.faults.seeded import Case as Broken
 from springcheck.studies.faults.table import FAULTS
 from springcheck.thermal import THERMOSTATS, chance
+from springcheck.thermal.catalogue import HALF, Act
 from springcheck.thermal.draws import Reading
+
+STAGES = {name: one.acts for name, one in THERMOSTATS.items()}
+
+
+@pytest.mark.parametrize("well", [False, True])
+@pytest.mark.parametrize(
+    ("scheme", "runs", "said"),
+    [("baoab", (*STAGES["baoab"][:4], Act("held", HALF)), "kick 2 of 2, which has the force of the"),
+     ("gj-i", STAGES["gj-i"][:4], "kick 2 of 2, which is left out"),
+     ("bbk", tuple(x._replace(draw=0) for x in STAGES["bbk"]), "each acts in both halves of one step"),
+     ("bbk", (*STAGES["bbk"][:6], STAGES["bbk"][6]._replace(kind="damp")), "its last friction")],
+)  # fmt: skip
+def test_a_stage_that_is_another_is_named(scheme: str, runs: Any, said: str, well: bool) -> None:
+    """Whatever the force is: the scheme with that stage explains every step to rounding."""
+    scene = baths.springs(2, steps=80)
+    if well:
+        scene = scene.derived(
+            terms=(*scene.terms, Quartic(i=np.arange(2), b=np.array([0.7, 1.9]), at=np.zeros(2)))
+        )
+    of = Broken(scene=scene, scheme=THERMOSTATS[scheme], seed=4, x=0.0)
+    shown = causes.found(Case(trajectory=baths.played(of, runs=runs), scene=scene))
+    assert shown.startswith("each step is the scheme's own but for ")
+    assert said in shown
+
+
+def test_noise_without_the_root_of_the_mass_is_told_of_each_coordinate() -> None:
+    """Draws of unequal size are correlated beyond what those of variance 1 may be, and share nothing."""
+    scene = baths.springs(3)
+    m = scene.m
+    of = Broken(scene=scene, scheme=THERMOSTATS["baoab"], seed=4, x=0.0)
+    run = baths.played(of, baths.by(40 * np.sqrt(m)))
+    assert checks.thermal.draws_particles(Case(trajectory=run, scene=scene)).passed is False
+    assert "the noise of the coordinates is " in causes.found(Case(trajectory=run, scene=scene))
+
+
+@pytest.mark.parametrize(("scheme", "off"), [("gj-i-half", 1e-12), ("nose-hoover", 5e-14)])
+def test_what_is_off_by_little_more_than_its_bound_has_no_momentum_taken_away(
+    scheme: str, off: float
+) -> None:
+    """What a draw or a chain carries on tells nothing of other momenta: the same step is no sign of them."""
+    scene = baths.springs(3, steps=60)
+    assert scene.bath is not None
+    other = replace(scene.bath, friction=scene.bath.friction * (1 + off))
+    run = springcheck.simulate(scene.replace(bath=other), f"own:{scheme}", seed=5)
+    (found,) = checks.judge(scene, run, [checks.thermal.noise_direction])
+    assert 1 < found.value / found.bound < 4
+    assert causes.found(Case(trajectory=run, scene=scene)) == ""
 
 
 @pytest.mark.parametrize(

@@ -17,6 +17,7 @@ from springcheck.physics.arrays import WIDE
 from springcheck.physics.bath import Bath
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Quartic, WallSpring
+from springcheck.physics.trajectory import Trajectory
 
 needs_lammps = pytest.mark.skipif(bool(engines.absence("lammps")), reason="needs LAMMPS")
 
@@ -187,3 +188,37 @@ def test_velocities_in_another_unit_name_no_scheme() -> None:
     run = driver.run(scene(x=0.25, turn=0.2, steps=1000), "own:baoab", seed=4)
     found = of_bath(run.t, 0.6 * run.q[:, :1], run.p[:, :1], None, scene().m[:1])
     assert found is None or found.verdict != "named", found.statement
+
+
+def published(number: str, at: Scene, *, half: bool) -> Trajectory:
+    """A GJ scheme as its authors write it, by c1 = (1 + c2)/2 and c3 = (1 - c2)/x of a c2 that is rounded."""
+    assert at.bath is not None
+    rng, x, h, m = np.random.default_rng(7), at.bath.friction * at.step, at.step, at.m
+    c2 = {"i": (1 - x / 2) / (1 + x / 2), "iv": (np.sqrt(1 + 4 * x) - 1) / (2 * x), "v": 1 / (1 + x)}[number]
+    c1, c3, force = (1 + c2) / 2, (1 - c2) / x, at.system.potential_force
+    q, v, last = at.q, at.p / m, rng.standard_normal(2)
+    states = [(q, m * v)]
+    for draw in rng.standard_normal((at.steps, 2)):
+        shot = np.sqrt(2 * x * at.thermal / m) * draw
+        if half:
+            v = c2 * v + np.sqrt(c3) * (
+                h * force(q, 0 * q) / m + (np.sqrt(2 * x * at.thermal / m) * last + shot) / 2
+            )
+            q, last = q + np.sqrt(c3) * h * v, draw
+        else:
+            u = np.sqrt(c1) * v + np.sqrt(c3) / 2 * (h * force(q, 0 * q) / m + shot)
+            q = q + np.sqrt(c3) * h * u
+            v = c2 / np.sqrt(c1) * u + np.sqrt(c3 / c1) / 2 * (h * force(q, 0 * q) / m + shot)
+        states.append((q, m * v))
+    t, (q, p) = np.arange(at.steps + 1) * h, np.array(states).transpose(1, 0, 2)
+    return Trajectory.from_arrays(t, q, p, scene=at, scheme=f"gj-{number}" + "-half" * half)
+
+
+@pytest.mark.parametrize("half", [False, True])
+@pytest.mark.parametrize("number", ["i", "iv", "v"])
+def test_a_loop_by_published_coefficients_passes_at_small_friction(number: str, half: bool) -> None:
+    """1 - c2 of a rounded c2 keeps 1e-16/x of itself; a spring off by 1e-9 is seen all the same."""
+    at = scene(x=1e-3, turn=0.1)
+    assert checks.status(checks.judge(at, published(number, at, half=half))) == 0
+    wrong = published(number, at.derived(terms=at.system.scaled(1 + 1e-9).terms), half=half)
+    assert checks.status(checks.judge(at, replace(wrong, scene=at))) == 1

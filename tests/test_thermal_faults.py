@@ -12,11 +12,13 @@ import pytest
 
 from clean import clean_bath
 from springcheck import checks, cli, driver, engines
+from springcheck.physics.trajectory import Verdict
 from springcheck.studies.faults import baths
 from springcheck.studies.faults.measure import probe, scene
+from springcheck.studies.faults.seeded import Case as Broken
 from springcheck.studies.faults.seeded import Fault
 from springcheck.studies.faults.table import FAULTS
-from springcheck.thermal import chance
+from springcheck.thermal import THERMOSTATS, chance
 
 
 def test_there_are_forty_faults_of_thermostats_at_least() -> None:
@@ -114,3 +116,23 @@ def test_experiments_with_seeds_pass_for_what_is_right(label: str) -> None:
     found = checks.judge_thoroughly(baths.springs(3), label, driver.run, seed=5)
     assert [v.why for v in found if v.passed is False] == []
     assert sum(v.passed is True for v in found) >= 2
+
+
+@pytest.mark.parametrize("scheme", ["baoab", "baoa"])
+def test_a_drag_without_its_noise_is_seen_from_the_stated_limit_on(scheme: str) -> None:
+    """It is missed in a run of 20; a tenth of it is seen in none."""
+    at = baths.springs(3, steps=2000)
+    x = baths.forgetting(at)
+
+    def judged(seed: int, off: float) -> Verdict:
+        right_noise = baths.by(np.sqrt(np.expm1(-2 * x) / np.expm1(-2 * x * (1 + off))))
+        broken = Broken(scene=at, scheme=THERMOSTATS[scheme], seed=seed, x=0.0)
+        run = baths.played(broken, right_noise, rate=1 + off)
+        return checks.shared([checks.thermal.draws_state(checks.Case(trajectory=run, scene=at))])[0]
+
+    limit = judged(0, 0.0).sees.friction
+    assert limit is not None
+    assert 0.2 < limit < 0.8
+    for off, least, most in ((limit, 10, 12), (-limit, 10, 12), (0.1 * limit, 0, 0)):
+        seen = sum(judged(seed, off).passed is False for seed in range(12))
+        assert least <= seen <= most

@@ -278,6 +278,21 @@ def test_the_error_of_a_variance_is_that_of_many_runs_with_collisions(name: str,
     assert found.error_of_variances(frames, 2)[0] == pytest.approx(np.std(off, axis=1), rel=5 * 0.015)
 
 
+def test_squares_of_sums_of_uniform_draws_vary_less_than_those_of_normal_ones() -> None:
+    """Of z = sum c_j xi_j with uniform xi of variance 1, var z**2 is 2 (sum c_j**2)**2 - 6/5 sum c_j**4."""
+    h, m, k, rate, thermal = SPRINGS[0]
+    stepper = Stepper(
+        THERMOSTATS["lammps-langevin"], h=h, m=np.array([m]), rate=rate, thermal=thermal, width=np.float64
+    )  # fmt: skip
+    z, made = np.zeros((2, 1)), []
+    for j in range(400):
+        draws = [np.ones(1) * (j == 1), np.ones(1) * (j == 0)]
+        made.append(z := np.stack(stepper(*z, lambda q, p: -k * q, draws)))
+    two, four = (np.sum(np.array(made)[..., 0] ** i, axis=0) for i in (2, 4))
+    error = law("lammps-langevin", *SPRINGS[0]).error_of_variances(1)[0]
+    assert error == pytest.approx(np.sqrt(2 - 1.2 * four / two**2), rel=1e-9)
+
+
 def test_squares_of_a_motion_with_heavy_tails_have_no_variance() -> None:
     """ASE's Andersen at large steps has a temperature, and its fourth moments grow without a bound."""
     found = law("andersen-after-kick", 1.3, 1.0, 1.0, 0.1, 1.0)

@@ -11,13 +11,12 @@ from math import comb
 
 import numpy as np
 
-from springcheck.checks import driven, other, rods
+from springcheck.checks import driven, other, rods, stages
 from springcheck.checks.case import Case
+from springcheck.checks.check import FALSE_ALARMS
 from springcheck.checks.requires import MAP, missing
 from springcheck.checks.steps import STANDS_APART, seldom_off, step_defect
 from springcheck.checks.thermal import (
-    collisions,
-    draws_particles,
     noise_direction,
     read_frames,
     reading,
@@ -25,7 +24,7 @@ from springcheck.checks.thermal import (
 )
 from springcheck.physics.arrays import Floats
 from springcheck.text.wording import regularly
-from springcheck.thermal import THERMOSTATS
+from springcheck.thermal import THERMOSTATS, chance
 from springcheck.thermal.catalogue import ENERGY_LEFT
 from springcheck.thermal.draws import Reading, law_of
 
@@ -76,7 +75,7 @@ def found(case: Case, shown: Callable[[int, bool], str] = lambda *_: "") -> str:
     random = run.scheme in THERMOSTATS
     if run.every == 1 and random:
         # of draws that are read by the map of another scheme the size says nothing
-        ways = [_of_no_noise, _of_bath, _of_collisions, _of_removal]
+        ways = [_of_no_noise, _of_bath, stages.collided, _of_removal, stages.found]
         looks = [*looks, _of_reach, _of_state, _of_size]
     elif run.every == 1 and not missing(case, MAP):
         ways = [_of_differences, driven.found, rods.pushed, _of_removal, _of_factor]
@@ -104,7 +103,10 @@ def _off(case: Case, p: Floats | None = None) -> Floats:
         off = np.abs(np.stack(ends) - np.stack([run.q[1:], run.p[1:]])) / np.stack(case.allowance)
         return np.asarray(np.max(off, axis=(0, 2)) / case.roundings, np.float64)
     bath, seen, every = thermostat(case), reading(case), 1
-    if p is not None and not (bath.carried or bath.chain):
+    if p is not None:
+        if bath.carried or bath.chain:
+            # what these carry on is that of their own states
+            return found + np.inf
         # each end beside its start, so that every other step is one of these
         both = zip(starts, (run.q, run.p), strict=True)
         pairs = (np.stack([x[:-1], y[1:]], axis=1).reshape(-1, case.scene.n) for x, y in both)
@@ -305,9 +307,11 @@ def _of_size(case: Case) -> str:
     """Noise whose size is not the bath's, of each coordinate where these are unlike, and of none where
     coordinates share draws."""
     seen = reading(case)
-    if not _told(seen) or any(one(case).passed is False for one in (noise_direction, draws_particles)):
+    if not _told(seen) or noise_direction(case).passed is False:
         return ""
     of = seen.draws**2
+    if chance.pairs(seen.draws / np.sqrt(np.mean(of, axis=0))) < FALSE_ALARMS:
+        return ""
     mean, error = np.mean(of, axis=0), np.std(of, axis=0) / np.sqrt(len(of))
     asked = "as large as the temperature, the masses and the friction ask"
     sizes = [(np.mean(of), np.std(of) / np.sqrt(of.size)), *zip(mean, error, strict=True)]
@@ -350,14 +354,3 @@ def _rescaled(case: Case, kinetic: Floats) -> str:
             "times the noise that goes with that: the coupling acts on one of both alone"
         ) + f", or the friction is {rate:.4g} +- {error:.1g} times the bath's" * bool(of_both)
     return ""
-
-
-def _of_collisions(case: Case) -> str:
-    """How often momenta are drawn anew, where that is not as the friction asks."""
-    hits, bath = reading(case).hits, case.judged.bath
-    # where nothing is left of any step, its map is another
-    if hits is None or bath is None or np.all(hits) or collisions(case).passed is not False:
-        return ""
-    share, x = float(np.mean(hits)), bath.friction * case.trajectory.step
-    rate, error = -np.log1p(-share) / x, np.sqrt(share / (1 - share) / hits.size) / x
-    return f"collisions come {rate:.4g} +- {error:.1g} times as often as the friction asks"

@@ -45,9 +45,9 @@ def _reading(case: Case) -> Reading:
     return read_frames(case, *(x[_unread(case) :] for x in (case.trajectory.q, case.trajectory.p)))
 
 
-def read_frames(case: Case, q: Floats, p: Floats) -> Reading:
-    """The draws behind other frames q, p (f, n) of the case's scene and scheme."""
-    run, scheme = case.trajectory, thermostat(case)
+def read_frames(case: Case, q: Floats, p: Floats, *, scheme: Thermostat | None = None) -> Reading:
+    """The draws behind other frames q, p (f, n) of the case's scene, by its scheme or another."""
+    run, scheme = case.trajectory, scheme or thermostat(case)
     by = thermal.rigid.read if case.judged.system.rods else thermal.draws.read
     return by(scheme, case.judged, q, p, how=run.arithmetic, rebuilt=run.rebuilds_velocity)
 
@@ -114,7 +114,7 @@ def _draws(case: Case) -> Floats:
         raise MethodError(HIDDEN if scheme.fresh < 3 or summed else NOT_SUMMED)
     x = found.draws
     if scheme.uniform and not case.scene.system.rods:
-        x = thermal.chance.normal_scores(x)
+        x = thermal.draws.normal_scores(x)
     if np.count_nonzero(~np.isnan(x)) < 2:
         raise MethodError("there were no draws")
     return x
@@ -214,7 +214,8 @@ def draws_state(case: Case) -> Chance | str:
     x = x.reshape(len(q), -1, x.shape[1]).transpose(1, 0, 2)
     if hits is not None:
         x, y = np.where(hits, x, 0), np.where(hits, y, 0)
-    return Chance.of(thermal.chance.foretold(x, y))
+    drag = 0.0 if thermostat(case).rescales else thermal.draws.drag_in_draws(thermostat(case), scene)
+    return Chance.of(thermal.chance.foretold(x, y, drag))
 
 
 @check("hits", family="noise", requires={"every-step"})

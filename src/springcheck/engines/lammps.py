@@ -379,11 +379,7 @@ ENGINE = Engine(
     ),
     start=_Run,
     version=version,
-    arithmetic=lambda label: Arithmetic(
-        lengths=LENGTHS.get(label.method, 0.0),
-        # (1 - c2)/x of a c2 that is rounded, that of method 4 by (sqrt(1 + 4x) - 1)/2x
-        cancels=(1 + label.method.startswith("gjf-4")) * label.method.startswith("gjf"),
-    ),
+    arithmetic=lambda label: Arithmetic(lengths=LENGTHS.get(label.method, 0.0)),
     any_axis=True,
     periodic=True,
     squares_lengths=True,

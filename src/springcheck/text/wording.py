@@ -29,8 +29,8 @@ def few(names: Sequence[str], most: int, joint: str = ", ") -> str:
 
 def regularly(at: Sequence[int], what: str = "frame") -> str:
     """How often something is that is in at least three places, equally far apart; "" where it is not so."""
-    apart = {b - a for a, b in pairwise(at)}
-    return f", and so every {count(apart.pop(), what)}" if len(at) > 2 and len(apart) == 1 else ""
+    apart = {b - a for a, b in pairwise(at)} if len(at) > 2 else set()
+    return f", and so every {count(apart.pop(), what).removeprefix('1 ')}" if len(apart) == 1 else ""
 
 
 def either(names: Sequence[str]) -> str:

@@ -75,6 +75,8 @@ class Thermostat(Scheme):
     """Whether the momentum that it stores belongs to the time of the position."""
     most: float = inf
     """Limit of gamma h, from which on the variance of its noise is negative."""
+    cancels: int = 0
+    """`Arithmetic.cancels` of its coefficients as they are published, in terms of 1 - c2."""
     chain: Chain | None = None
     """The bath of a scheme that takes no draws."""
     held: tuple[Act, ...] = ()
@@ -191,6 +193,11 @@ _GJ_SOURCE = (
 )
 
 
+def _cancelled(number: str) -> int:
+    """Powers of 1/x that 1 - c2 loses: one more where c2 is (sqrt(1 + 4x) - 1)/2x, a difference itself."""
+    return 1 + (number == "iv")
+
+
 def _gj(number: str) -> Thermostat:
     """BAOAB with c2 in the place of exp(-x), kicks and drifts longer by q."""
     c2 = GJ[number]
@@ -198,7 +205,7 @@ def _gj(number: str) -> Thermostat:
     acts = (Act("kick", half), Act("drift", half), Act("exchange", c2), Act("drift", half), Act("kick", half))
     return Thermostat(
         name=f"gj-{number}", title=f"GJ-{number.upper()}, on-site velocity", acts=acts,
-        most=MOST_FRICTION.get(number, inf), source=_GJ_SOURCE,
+        most=MOST_FRICTION.get(number, inf), cancels=_cancelled(number), source=_GJ_SOURCE,
     )  # fmt: skip
 
 
@@ -216,7 +223,8 @@ def _gj_half(number: str) -> Thermostat:
     )  # fmt: skip
     return Thermostat(
         name=f"gj-{number}-half", title=f"GJ-{number.upper()}, half-step velocity", acts=acts, draws=2,
-        carried=1, synchronised=False, most=MOST_FRICTION.get(number, inf), source=_GJ_SOURCE,
+        carried=1, synchronised=False, most=MOST_FRICTION.get(number, inf), cancels=_cancelled(number),
+        source=_GJ_SOURCE,
     )  # fmt: skip
 
 

@@ -280,14 +280,17 @@ def neighbours(x: Floats) -> Statistic:
     return Statistic(draws=x.size, sums=sums, law=law)
 
 
-def foretold(x: Floats, y: Floats) -> Statistic:
+def foretold(x: Floats, y: Floats, drag: float = 0.0) -> Statistic:
     """How well numbers y (k, s, n) of the usual size 1, each known before its draws x (u, s, n), go with
     those of one column, or of all n together, or with the sizes of these; a draw of 0 is none.
 
     With S = sum x y and V = sum y**2, exp(l S - l**2 V/2) is 1 in the mean however y comes of draws before;
     so is its average over normal l of variance 1/t, and the product of several x, which is 1/a or more with
     a chance of at most a (Robbins, Ann. Math. Stat. 41 (1970) 1397): no less than the chance, for any s.
+    `drag` is the correlation of draws with the first of y for each relative change of a friction.
     """
+    from scipy.special import erfinv
+
     names = ("the momentum", "the force", "the size of momenta", "the size of forces")[-2 * (len(y) == 1) :]
     sized = np.where(x == 0, 0, normal_sizes(x))
 
@@ -306,9 +309,19 @@ def foretold(x: Floats, y: Floats) -> Statistic:
         logs = np.sum(np.log1p(V / t) / 2 - S * S / (2 * (V + t)), axis=0)
         return min(1.0, float(logs.size) * math.exp(min(float(np.min(logs)), 0.0))), words
 
+    def limits(n: int, chance: float) -> Limits:
+        # of all others S**2 is V at least in the mean, which is left out
+        paid = len(x) * math.log1p(FEW_TIMES) / 2 + math.log(len(y) * (y.shape[-1] + 1) / chance)
+        away = math.sqrt(2 * paid * (1 + 1 / FEW_TIMES)) + math.sqrt(2) * float(erfinv(1 - 2 * MISSED))
+        if not drag > 0:
+            return NOT_KNOWN
+        # a friction more by x than its noise leaves momenta that are smaller by the root of 1 + x
+        held = away / (drag * math.sqrt(n))
+        return Limits(friction=held * held / 2 + held * math.hypot(1, held / 2))
+
     x = np.concatenate([x, sized])
     sums = x.shape[1], np.einsum("usn,ksn->ukn", x, y), np.sum(y * y, axis=1), float(np.sum(x * x))
-    return Statistic(draws=x.size // 2, sums=sums, law=law)
+    return Statistic(draws=x.size // 2, sums=sums, law=law, limits=limits)
 
 
 def count(hits: int, n: int, p: float) -> Statistic:
@@ -383,13 +396,3 @@ def crossed(x: Floats, y: Floats) -> float:
     later, earlier = squares[n - far], squares[n] - squares[far]
     z = np.concatenate([sums[far] / np.sqrt(later), sums[-far[1:]] / np.sqrt(earlier[1:])])
     return min(1.0, len(z) * of_normal(float(np.max(np.abs(z))))) if np.all(np.isfinite(z)) else 0.0
-
-
-def normal_scores(x: Any) -> Floats:
-    """Uniform draws of variance 1 as the normal numbers of the same rank; beyond their range infinite."""
-    from scipy.special import ndtri
-
-    u = np.asarray(x, np.float64) / math.sqrt(12) + 0.5
-    # the ends of the range are known to a rounding
-    u = np.where((u <= 0) & (u > -1e-9), 1e-12, np.where((u >= 1) & (u < 1 + 1e-9), 1 - 1e-12, u))
-    return np.where((u > 0) & (u < 1), ndtri(np.clip(u, 1e-300, 1 - 2.0**-53)), np.inf)

@@ -29,6 +29,9 @@ LOST, UNTOLD = 0.01, -1.0
 """Error of a chain's state, relative to the usual one, from which on it predicts nothing; and what stands for
 the contradictions of the frames from there on."""
 
+SMALL_RATE = 1e-4
+"""Relative change of a friction over which its effect is linear."""
+
 LARGEST_DRAW = 8.0
 """Size that no draw of a run of a few steps exceeds: the chance is 1e-15 for each."""
 
@@ -80,6 +83,21 @@ def law_of(scheme: Thermostat, scene: Scene) -> Law:
         scheme=scheme, h=scene.step, m=scene.m, k=all_k, rate=scene.bath.friction, thermal=scene.thermal,
         fast=fast,
     )  # fmt: skip
+
+
+def drag_in_draws(scheme: Thermostat, scene: Scene) -> float:
+    """Correlation of the draws with the momenta before them for each relative change of the friction that
+    acts without its noise; 0 where more than one draw acts in a step, or it is not known."""
+    law = law_of(scheme, scene)
+    if scheme.draws > 1 or scheme.collides:
+        return 0.0
+    changed = [replace(law, rate=law.rate * (1 + x)).A.astype(np.float64) for x in (-SMALL_RATE, SMALL_RATE)]
+    slope, G = (changed[1] - changed[0]) / (2 * SMALL_RATE), law.G.astype(np.float64)[:, :, 0]
+    row = 0 if np.any(np.abs(G[:, 0]) > 0) else 1
+    S, own = law.covariance, scene.thermal * np.asarray(scene.m, np.float64)
+    held = np.einsum("ni,ni->n", slope[:, row], S[:, :, 1]) / G[:, row] / np.sqrt(own)
+    found = abs(np.sum(held)) / np.sqrt(len(held) * float(np.sum(S[:, 1, 1] / own)))
+    return float(found) if np.isfinite(found) else 0.0
 
 
 def read(
@@ -344,3 +362,13 @@ def _whitened(x: Floats) -> Floats:
         out[i] = last
         below = 0.5 / size
     return out
+
+
+def normal_scores(x: Any) -> Floats:
+    """Uniform draws of variance 1 as the normal numbers of the same rank; beyond their range infinite."""
+    from scipy.special import ndtri
+
+    u = np.asarray(x, np.float64) / np.sqrt(12) + 0.5
+    # the ends of the range are known to a rounding
+    u = np.where((u <= 0) & (u > -1e-9), 1e-12, np.where((u >= 1) & (u < 1 + 1e-9), 1 - 1e-12, u))
+    return np.where((u > 0) & (u < 1), ndtri(np.clip(u, 1e-300, 1 - 2.0**-53)), np.inf)

@@ -59,9 +59,9 @@ def one_rounding(
     for first in [True, False] if wide else [False]:
         sizes = forces(sizer.scheme, scene.system, partial(pull, first=first))
         q, p = sizer(size, np.abs(start[1]), sizes, draws, hit, met=met, loose=loose)
-    if how.cancels:
+    if cancels := max(how.cancels, sizer.scheme.cancels):
         # coefficients of all that is added to q, and of p
-        lost = max(x, 1 / x) ** how.cancels
+        lost = max(x, 1 / x) ** cancels
         q, p = q + lost * (q - size), p + lost * p
     if rebuilt:
         p = p + scene.m * q / abs(scene.step)
