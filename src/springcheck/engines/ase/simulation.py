@@ -144,7 +144,7 @@ class _Dynamics:
     def force_calls(self) -> int:
         """Forces that ASE asked for, those of one state once: positions that are no numbers are unequal to
         themselves, and it asks twice in each step."""
-        return min(self._atoms.calc.force_calls, 1 + self._steps)
+        return min(int(self._atoms.calc.force_calls), 1 + self._steps)
 
     def advance(self, every: int, q: Floats, p: Floats) -> None:
         atoms, run = self._atoms, self._dynamics.run
