@@ -10,19 +10,19 @@ import springcheck
 HOME = Path(springcheck.__file__).parent
 
 BUDGETS = {
-    ("physics",): 6935,
+    ("physics",): 6945,
     ("schemes",): 1695,
     ("thermal",): 3317,
     ("engines/own",): 1591,
-    ("engines/openmm", "engines/ase", "engines/sundials"): 1278,
+    ("engines/openmm", "engines/ase", "engines/sundials"): 1280,
     ("engines",): 2819,
-    ("driver", "conformance", "doors"): 1202,
+    ("driver", "conformance", "doors"): 1203,
     ("checks",): 5588,
     ("identify",): 9245,
     ("formats", "store"): 5183,
     ("studies",): 1456,
-    ("studies/*",): 9818,
-    ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 7231,
+    ("studies/*",): 9848,
+    ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 7248,
 }
 """Lines of each room, or of several: of an engine in one file, and of what all studies share, in the first
 folder."""

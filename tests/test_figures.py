@@ -95,6 +95,22 @@ def test_marks_of_runs_that_lie_on_one_another_stand_apart() -> None:
     assert len(first) == len(set(first)) == 4
 
 
+@pytest.mark.parametrize(("steps", "dots"), [(2000, False), (10_000, True)])
+def test_points_of_many_periods_are_not_joined_to_chords_that_the_exact_solution_never_takes(
+    steps: int, dots: bool
+) -> None:
+    """Of 159 periods it has nine points in each, and lines between them miss its circle by 5 % of it."""
+    scene = replace(scenefile.load_scene("spring"), steps=steps)
+    made = runs(scene, "own:rk4")
+    few = {label: run.at(slice(None, None, 7)) for label, run in made.items()}
+    for shown in (made, few):
+        (chart,) = of_runs(scene, shown, shown)[0].charts
+        exactly = next(x for x in chart.curves if x.name == "exact solution")
+        run = next(x for x in chart.curves if x.name == "own:rk4")
+        assert (exactly.dots, exactly.line) == (dots, not dots)
+        assert run.dots == (shown is few)
+
+
 def test_every_colour_is_seen_on_white_and_on_black() -> None:
     assert {look.color for look in (*looks.LOOKS.values(), *looks._REST)} <= set(looks.ON_SCREEN)
     css = (Path(looks.__file__).parents[1] / "cli" / "page" / "page.css").read_text()

@@ -17,7 +17,7 @@ from springcheck.physics import exact, scenefile
 from springcheck.physics.arrays import WIDE
 from springcheck.physics.exact.mathieu import floquet
 from springcheck.physics.scene import Scene
-from springcheck.physics.terms import ModulatedSpring
+from springcheck.physics.terms import Damping, ModulatedSpring
 from springcheck.physics.trajectory import Outcome
 from springcheck.studies.stability import longest, measure, multipliers, page
 
@@ -130,6 +130,31 @@ def test_the_floquet_multiplier_is_that_of_hills_exponent(name: str) -> None:
     assert multiplier[0] == pytest.approx(grown, rel=1e-13)
     assert np.cos(multiplier[2]) == pytest.approx(np.cos(float(mpmath.re(nu)) * np.pi), abs=1e-13)
     assert (grown > 1.01) == (name in GROWING)
+
+
+@pytest.mark.parametrize("friction", [0.05, 2.2])
+def test_a_damped_modulated_spring_decays_as_its_wronskian_and_a_step_that_grows_is_warned_of(
+    friction: float,
+) -> None:
+    """By the series of the undamped one: with u = exp(-r t/2) y the stiffness of y is lower by m r**2/4."""
+    m, (k, depth, turn), rate = 3.7, POINTS["between two tongues"], friction / 3.7
+    level = k - m * rate**2 / 4
+    found = scene("between two tongues")
+    (term,) = found.terms
+    alike = replace(term, k=np.array([level]), depth=np.array([k * depth / level]))
+    damped = replace(found, terms=(*found.terms, Damping(i=[0], c=[friction])))
+    with_friction, without = (floquet(x.system) for x in (damped, replace(found, terms=(alike,))))
+    assert with_friction is not None
+    assert without is not None
+    assert with_friction[0] == pytest.approx(without[0] * np.exp(-np.pi * rate / turn), rel=1e-12)
+    assert with_friction[2] == pytest.approx(without[2], abs=1e-12)
+    # far beyond the limit of Verlet, and within it
+    assert longest.resonating("velocity-verlet", replace(damped, step=2.9))
+    assert longest.resonating("velocity-verlet", replace(damped, step=0.1)) is None
+    study = springcheck.stability(damped, ["own:velocity-verlet", "own:rk4"])
+    assert study.passed
+    assert [x.method for x in study.multipliers] == ["own:rk4"] or len(study.multipliers) == 2
+    assert "decays by a factor of" in str(study)
 
 
 @pytest.mark.parametrize("name", ["mathieu-stable", "mathieu-tongue"])

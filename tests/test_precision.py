@@ -102,6 +102,22 @@ def test_every_method_has_the_order_of_its_scheme(label: str, name: str, need: C
     assert fit.standard_error < 0.01
 
 
+def test_slopes_that_drift_evenly_claim_no_order_and_coarse_ones_do_not_hide_it() -> None:
+    def halved(start: float, *slopes: float) -> list[Point]:
+        return made_up([start * 0.5 ** sum(slopes[:j]) for j in range(len(slopes) + 1)])
+
+    # RK4 on three pendulums that nearly reach the top: they fall towards 4, where nothing shows that they end
+    assert fits.order(halved(1e-3, 4.73, 4.598, 4.437, 4.279)) is None
+    # halved in each step they end at 4, and the standard error reaches there
+    found = fits.order(halved(1e-4, 4.32, 4.16, 4.08))
+    assert found is not None
+    assert abs(found.order - 4) < found.standard_error
+    # the blog's four: the coarsest four errors are those of a term of order 5
+    found = fits.order(halved(1.5e-3, 5.137, 4.427, 3.814, 3.839, 3.913, 3.973))
+    assert found is not None
+    assert abs(found.order - 4) < found.standard_error < 0.33
+
+
 def test_a_step_that_is_slightly_too_long_loses_the_order(need: Callable[[str], None]) -> None:
     # one part in 1e4 of the step is an error of phase that no smaller step removes
     scene = scenes.load_scene("spring-uneven")

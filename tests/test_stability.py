@@ -246,6 +246,34 @@ def test_the_largest_step_is_where_the_scene_itself_begins_to_grow(
     assert above > (1.2 if name == "rlc-circuit" and method == "own:euler" else 1e10) * below
 
 
+@pytest.mark.parametrize(("given", "wrong", "unmeasured"), [(np.nan, 0, 12), (np.inf, 7, 0)])
+def test_points_at_which_an_engine_stops_are_not_measured_and_those_it_loses_are_wrong(
+    given: float, wrong: int, unmeasured: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plain = propagators.measured
+
+    def lost(springs: Springs) -> np.ndarray:
+        out = plain(springs)
+        out[:12] = given
+        return out
+
+    monkeypatch.setattr(propagators, "measured", lost)
+    # of these twelve, five are beyond the limit by theory too
+    found = regions.measure(engines.parse("own:velocity-verlet"), points=12)
+    assert (found.wrong, found.unmeasured, found.points) == (wrong, unmeasured, 144)
+    assert (found.off < 1) == (wrong == 0)
+
+
+def test_what_an_engine_does_not_take_of_a_scan_is_said_of_the_scan() -> None:
+    engine = engines.parse("box2d:distance-joint")
+    if engines.absence("box2d"):
+        pytest.skip("needs Box2D")
+    said = propagators.absence(engine, limits.FIRST_H_W, limits.LAST_H_W)
+    assert said is not None
+    assert said.startswith("springs of h w = 1e-09 to 1e+06")
+    assert "units" not in said
+
+
 def test_of_joined_masses_with_unlike_friction_the_weakest_decay_sets_explicit_euler_s_limit() -> None:
     m, k, c = np.array([2.3, 0.071]), np.array([1.7, 5.3, 0.0]), np.array([0.31, 0.0])
     scene = builders.chain(2, m, k)

@@ -126,13 +126,13 @@ def play(
     while frame < scene.frames:
         f = min(ready, scene.frames - frame)
         q[f - 1], p[f - 1] = UNTOUCHED, UNTOUCHED
-        ended, seconds = _advance(simulation, scene.every, piece, q[:f], p[:f], progress)
+        ended, begun, seconds = _advance(simulation, scene.every, piece, q[:f], p[:f], progress)
         good = ended.step // scene.every
         run_seconds += seconds
         before, calls = calls, simulation.force_calls
         if ended.status == "diverged" and not method.adaptive:
             # steps to the last frame that is kept: every step costs the same, but for a first force
-            calls = before - (before - calls) * good // f
+            calls = before - (before - calls) * good // begun
         ready = min(rows, 4 * ready) if whole and seconds < QUICK else ready
         if good:
             _hand_over(scene, sink, frame, q[:good], p[:good], simulation.last_steps(good))
@@ -168,12 +168,13 @@ def _advance(
     q: Floats,
     p: Floats,
     progress: Progress | None,
-) -> tuple[Outcome, float]:
-    """Fill q and p (f, n): how it ended, after how many steps of this call, and the seconds it took.
+) -> tuple[Outcome, int, float]:
+    """Fill q and p (f, n): how it ended, after how many steps of this call, the rows begun, and the seconds.
 
     Where a call takes fewer steps than lie between frames there is one row; `progress` is called after each.
     """
     outcome, good, told = Outcome(status="complete", step=0), len(q), 0
+    begun = good
     began = perf_counter()
     try:
         for left in range(every, 0, -piece):
@@ -186,7 +187,7 @@ def _advance(
         if stop.rows not in range(len(q) + 1):
             raise MethodError(f"{simulation.label}: Stopped after {stop.rows!r} rows of {len(q)}") from stop
         # a row that is filled before its last piece is no frame
-        good = stop.rows if left <= piece else 0
+        good, begun = stop.rows if left <= piece else 0, min(stop.rows + 1, begun)
         outcome = Outcome(status="stopped", step=0, message=str(stop), fastest=stop.fastest)
     seconds = perf_counter() - began
     finite = np.isfinite(q[:good]).all(axis=1) & np.isfinite(p[:good]).all(axis=1)
@@ -203,7 +204,7 @@ def _advance(
         outcome = replace(outcome, status="diverged")
     if progress:
         progress(good * every - told)
-    return replace(outcome, step=good * every), seconds
+    return replace(outcome, step=good * every), begun, seconds
 
 
 def _hand_over(scene: Scene, sink: Sink, frame: int, q: Floats, p: Floats, last: Floats | None) -> None:

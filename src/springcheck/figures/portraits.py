@@ -88,7 +88,8 @@ def _portrait(runs: Runs, view: View, truth: Motion | None, *, alone: bool) -> C
         Curve(name=SEPARATRIX, group=SEPARATRIX, x=x, y=sign * y) for x, y in parting for sign in (1.0, -1.0)
     ]
     if true is not None:
-        lines.append(exact_curve(*_parted(*near(*true), xs, ys)))
+        sparse = _sparse(truth, view, xs, ys)
+        lines.append(replace(exact_curve(*_parted(*near(*true), xs, ys)), line=not sparse, dots=sparse))
     dots = _chords(runs.longest, truth, view, xs, ys)
     curves = runs.curves(lambda run: near(*picked[run.label]), dots=dots, timed=not view.turn)
     start = view.pick(runs.scene.q[None], runs.scene.p[None])
@@ -192,11 +193,27 @@ def _steep(motion: State) -> tuple[Frame, Frame] | None:
     return Frame(x[0], x[1], clipped=True), Frame(y[0], y[1], clipped=True)
 
 
+def _sparse(truth: Motion | None, view: View, *frames: Frame) -> bool:
+    """Whether lines between points of the exact solution visibly miss it, in a tenth of the points: by a
+    quarter of a point's distance from the line between its neighbours."""
+    if truth is None or len(truth[0]) < 3:
+        return False
+    t, *motion = truth[0], *view.pick(truth[1], truth[2])
+    share = (t[1:-1] - t[:-2]) / (t[2:] - t[:-2])
+    return any(
+        float(np.quantile(np.abs(x[1:-1] - x[:-2] - share * (x[2:] - x[:-2])), 0.9)) > 4 * CHORD * its.half
+        for x, its in zip(motion, frames, strict=False)
+    )
+
+
 def _chords(run: Trajectory, truth: Motion | None, view: View, *frames: Frame) -> bool:
     """Whether frames are so far apart that lines between them visibly miss the exact solution."""
     if truth is None:
         return False
     t, *motion = np.abs(truth[0]), *view.pick(truth[1], truth[2])
+    if _sparse(truth, view, *frames):
+        # it shows no chord of frames that are as far apart as its own points
+        return len(run.t) < 2 * len(t)
     at = np.abs(run.t)
     inside = (t >= at[0]) & (t <= at[-1])
     with np.errstate(all="ignore"):

@@ -138,12 +138,13 @@ class _Dynamics:
         self._on_a_line = not method.generator
         self._length, self._momentum = length, length / time
         self._where, self._elsewhere = scene.where, scene.elsewhere
-        self.off_axis = 0.0
+        self.off_axis, self._steps = 0.0, 0
 
     @property
     def force_calls(self) -> int:
-        """Forces that ASE asked for."""
-        return int(self._atoms.calc.force_calls)
+        """Forces that ASE asked for, those of one state once: positions that are no numbers are unequal to
+        themselves, and it asks twice in each step."""
+        return min(int(self._atoms.calc.force_calls), 1 + self._steps)
 
     def advance(self, every: int, q: Floats, p: Floats) -> None:
         atoms, run = self._atoms, self._dynamics.run
@@ -152,6 +153,7 @@ class _Dynamics:
             warnings.simplefilter("ignore", RuntimeWarning)
             for row in range(len(q)):
                 try:
+                    self._steps += every
                     run(every)
                 except RuntimeError as error:
                     # lengths of constraints that its iteration does not reach

@@ -28,20 +28,23 @@ MOST_NODES = 1 << 14
 
 
 class _Mode:
-    """One particle: u'' = -w2 (1 + depth cos(turn t + phase)) u, u = q - at, and its start (u, v).
+    """One particle: u'' = -w2 (level + depth cos(turn t + phase)) u, u = q - at, and its start (u, v).
+
+    Without friction the level is 1.  With friction u is (q - at) exp(friction t/2).
 
     `rate` is the larger angular frequency, of the spring or of the modulation [1/T], and `nodes` (j + 1, 2,
     2) are the matrices that take (u, v) from the start to each node of a period, `node` [T] apart, the last
     to its end.
     """
 
-    def __init__(self, found: Extended, row: Sequence[float]) -> None:
-        """From mass, position and momentum, and a row of its term.  NoClosedFormError for too long a
-        period."""
+    def __init__(self, found: Extended, row: Sequence[float], friction: float = 0.0) -> None:
+        """From mass, position and momentum, a row of its term, and the rate of friction [1/T].
+        NoClosedFormError for too long a period."""
         m, q, p = found
         k, self.depth, self.turn, self.phase, self.at = wide(row)
         self.w2, self.start = k / m, np.array([q - self.at, p / m])
-        spring = np.sqrt(np.abs(self.w2) * (1 + np.abs(self.depth)))
+        self.level = 1 - (np.square(np.longdouble(friction)) / (4 * self.w2) if friction else 0)
+        spring = np.sqrt(np.abs(self.w2) * (np.abs(self.level) + np.abs(self.depth)))
         self.rate = float(np.maximum(spring, np.abs(self.turn)))
         if self.turn == 0 or not 2 * self.rate * 2 * np.pi / abs(float(self.turn)) < MOST_NODES:
             raise NoClosedFormError
@@ -60,7 +63,7 @@ class _Mode:
         for j in range(TAYLOR_ORDER):
             # the j-th derivative of the cosine: cos, -sin, -cos, sin
             wave = (np.cos(angle), -np.sin(angle), -np.cos(angle), np.sin(angle))[j % 4]
-            waves.append(self.depth * factor * wave + (1 if j == 0 else 0))
+            waves.append(self.depth * factor * wave + (self.level if j == 0 else 0))
             factor = factor * self.turn / (j + 1)
         # both unit starts at once, coefficients (order, 2, f)
         u = [np.stack([np.ones_like(s), np.zeros_like(s)]), np.stack([np.zeros_like(s), np.ones_like(s)])]
@@ -140,14 +143,21 @@ def _balance(M: Extended) -> float:
 
 
 def floquet(system: System[Any]) -> tuple[float, float, float] | None:
-    """Growth factor of the exact motion in a period of the modulation (its larger Floquet multiplier, at
-    least 1), the period [T], and the angle of the multiplier, 0 to pi [rad], of the fastest growing particle;
-    None for other scenes."""
-    each = []
-    found = ModulatedMotion.of(system)
-    for mode in found.modes if found else ():
+    """Growth factor of the exact motion in a period of the modulation (its larger Floquet multiplier, below 1
+    by friction alone), the period [T], and the angle of the multiplier, 0 to pi [rad], of the fastest growing
+    particle; None for other scenes."""
+    each, bare = [], system.without("damping")
+    if ModulatedMotion.of(bare) is None:
+        return None
+    (term,), found = bare.terms, wide([system.m, system.q, system.p])
+    for (i, *row), friction in zip(sorted(term.rows()), system.friction_rates.tolist(), strict=True):
+        try:
+            mode = _Mode(found[:, i], row, friction)
+        except NoClosedFormError:
+            return None
         half = float(np.trace(mode.nodes[-1])) / 2
         # the matrix of a period has the determinant 1
-        grown = abs(half) + float(np.sqrt(max(half * half - 1, 0)))
-        each.append((max(grown, 1.0), float(mode.period), float(np.arccos(np.clip(half, -1, 1)))))
+        grown = max(1.0, abs(half) + float(np.sqrt(max(half * half - 1, 0))))
+        grown *= float(np.exp(-friction * mode.period / 2))
+        each.append((grown, float(mode.period), float(np.arccos(np.clip(half, -1, 1)))))
     return max(each, default=None)

@@ -127,7 +127,9 @@ def measure(scene: Scene, cells: Plan, chunk: int, label: Label) -> Columns:
         mine = np.flatnonzero(group.ravel() == number)
         first = together(scene, changes, mine[:1])
         # all joints of a run are as long as the largest motion needs them
-        alone = engines.method(label).adaptive or engines.arithmetic(label).joints
+        how = engines.arithmetic(label)
+        # what an engine that keeps forces does between frames does not show
+        alone = engines.method(label).adaptive or how.joints or (how.stale and first.every > 1)
         size = 1 if alone else max(1, NUMBERS_PER_ARRAY // (first.frames * first.n))
         for start in range(0, len(mine), size):
             _run(scene, changes, mine[start : start + size], label, found)
@@ -176,6 +178,12 @@ def _run(scene: Scene, changes: Any, chosen: np.ndarray, label: Label, found: di
     left = frames > 1
     found["energy_drift"][chosen] = np.where(left, drift, np.nan)
     found["max_error"][chosen] = np.where(left, np.max(np.where(held, error, 0), axis=0), np.nan)
+    kept = engines.arithmetic(label).stale
+    if kept and copies > 1 and len(q) > 1:
+        # a cell that moves so little keeps its forces when it is alone, and not beside one that moves more
+        moved = np.max(np.abs(np.diff(states[0], axis=0)), axis=2)
+        for j in np.flatnonzero(np.any(moved <= 2 * kept, axis=0)):
+            _run(scene, changes, chosen[j : j + 1], label, found)
 
 
 def _of_copies(values: Reals, copies: int) -> Reals:

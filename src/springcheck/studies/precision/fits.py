@@ -186,12 +186,17 @@ def order(points: Sequence[Point], how: Condition | None = None) -> Fit | None:
     if len(chosen) < FEWEST_FITTED:
         return None
     x, y = _logarithms(chosen)
-    while len(x) > FEWEST_FITTED and _curvature(x, y) > MOST_CURVATURE:
+    while len(x) > FEWEST_FITTED and (_curvature(x, y) > MOST_CURVATURE or np.ptp(_slopes(x, y)) > 0.5):
         x, y = x[1:], y[1:]
     found, slopes = line(x, y), _slopes(x, y)
-    *_, before, last = np.abs(np.diff(slopes))
+    *_, before, last = np.diff(slopes)
     error = max(found.standard_error, float(np.ptp(slopes)))
-    if last > max(before, MOST_DRIFT) or error > 0.5:
+    if abs(last) > MOST_DRIFT:
+        # where a term vanishes the slopes end beyond the last by the sum of a geometric series (Aitken)
+        if not abs(last) < abs(before):
+            return None
+        error = max(error, abs(float(slopes[-1] + last * last / (before - last)) - found.slope))
+    if error > 0.5:
         return None
     return Fit(
         order=found.slope,

@@ -304,9 +304,10 @@ def resonating(name: str, scene: Scene) -> float | None:
     exactly = floquet(scene.system) if scene.n <= MOST_COUPLED else None
     if exactly is None or exactly[0] > 1:
         return None
-    (term,), n = scene.terms, scene.n
-    assert isinstance(term, ModulatedSpring)
-    about = scene.derived(terms=(replace(term, at=np.zeros_like(term.at)),))
+    n = scene.n
+    about = scene.derived(terms=tuple(
+        replace(x, at=np.zeros_like(x.at)) if isinstance(x, ModulatedSpring) else x for x in scene.terms
+    ))  # fmt: skip
     unit = scene.m * fastest(scene)
     q, p = np.zeros((2, 2, MODULATED_STEPS, n + 1), np.longdouble)
     q[..., n], p[..., n] = scene.step * np.arange(MODULATED_STEPS), CLOCK

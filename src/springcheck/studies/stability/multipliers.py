@@ -62,9 +62,8 @@ def measure(scene: Scene, label: Label) -> Multiplier:
     """Run a period from two starts, with the whole number of steps, `MOST_STEPS` at most, that is nearest to
     the scene's step."""
     found = floquet(scene.system)
-    spring = scene.terms[0]
+    spring = next(x for x in scene.terms if isinstance(x, ModulatedSpring))
     assert found is not None
-    assert isinstance(spring, ModulatedSpring)
     _, period, _ = found
     steps = int(np.clip(round(period / abs(scene.step)), 1, MOST_STEPS))
     scene = replace(scene, step=np.copysign(period / steps, scene.step), steps=steps, every=steps)

@@ -92,6 +92,7 @@ KINDS = (
 
 def _region(x: Region) -> Chart:
     kinds = np.where(x.stable, np.where(x.stable_predicted, 0, 2), np.where(x.stable_predicted, 3, 1))
+    kinds[np.isnan(x.radius)] = -1
     critical = float(np.interp(0.0, np.log(x.damping_ratio), np.arange(len(x.damping_ratio))))
     return Chart(
         title=f"{x.method}: {x.points} points, {x.wrong} against theory, {x.undecided} decided by rounding.",

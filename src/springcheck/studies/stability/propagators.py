@@ -82,13 +82,14 @@ def units(springs: Springs, *, slow: bool = False) -> tuple[Floats, Floats]:
 
 
 def measured(springs: Springs) -> Floats:
-    """The engine's own one-step matrices (n, 2, 2); NaN where a step does not end finite."""
+    """The engine's own one-step matrices (n, 2, 2); infinite where a step does not end finite, NaN where the
+    engine stops."""
     n = len(springs.turn)
     # an engine may stop at a speed; the digits of a fixed-point sum need the large forces
     for slow in (False, True)[: 1 + (engines.arithmetic(springs.label).quantum == 0)]:
         of_q, of_p = units(springs, slow=slow)
         out = matrices(scene(springs, of_q, of_p), springs.label, of_q[:, None], of_p[:, None])
-        if not np.isnan(out).all():
+        if np.isfinite(out).any():
             return out
     if n > 1:
         # an engine that stops over one spring loses all the others: bisect to find it
@@ -103,10 +104,11 @@ Stepper = Callable[[Scene, Label], tuple[Reals, Reals]]
 
 
 def by_engine(scene: Scene, label: Label) -> tuple[Floats, Floats]:
-    """The engine's own step; NaN where it does not end finite."""
+    """The engine's own step; infinite where it does not end finite, NaN where the engine stops."""
     run = driver.run(scene, label)
     if len(run.t) < 2:
-        return np.full(scene.n, np.nan), np.full(scene.n, np.nan)
+        lost = np.full(scene.n, np.nan if run.outcome.status == "stopped" else np.inf)
+        return lost, lost
     return run.q[1], run.p[1]
 
 
@@ -199,7 +201,11 @@ def absence(label: Label, *turns: float) -> str | None:
         a, _ = units(springs)
         driver.run(scene(springs, a, np.zeros(len(turns))), label)
     except MethodError as error:
-        return str(error)
+        if len(turns) == 1 or (alone := absence(label, 1.0)):
+            return str(error) if len(turns) == 1 else alone
+        # advice behind it is on a user's scene, and these springs are not
+        why, _, _ = str(error).removeprefix(f"{label}: ").partition("; ")
+        return f"springs of h w = {turns[0]:g} to {turns[-1]:g}, which a limit is searched among: {why}"
     return None
 
 

@@ -39,12 +39,17 @@ class Region:
     undecided: int
     """Points whose predicted radius differs from 1 by less than the rounding of the entries."""
     wrong: int
-    """Further points at which measurement and theory disagree."""
+    """Further points at which measurement and theory disagree, of those that were measured."""
 
     @property
     def points(self) -> int:
-        """Number of points measured."""
+        """Number of points of the grid."""
         return int(self.radius.size)
+
+    @property
+    def unmeasured(self) -> int:
+        """Number of points at which the engine stopped."""
+        return int(np.count_nonzero(np.isnan(self.radius)))
 
 
 def measure(label: Label, points: int = 200) -> Region:
@@ -67,12 +72,14 @@ def measure(label: Label, points: int = 200) -> Region:
     rounding = propagators.noise(label)
     radius, moved = propagators.radius(measured, rounding)
     truth, moved_truth = propagators.radius(predicted, rounding)
-    allowed = np.maximum(moved, moved_truth)
+    allowed = np.where(np.isfinite(moved), np.maximum(moved, moved_truth), moved_truth)
     # for a method of one friction the product h c/m has a rounding of its own
     allowed += rounding * (1 + brake)
     stable = propagators.bounded(measured, rounding)
     inside = truth <= 1
-    undecided = np.abs(truth - 1) <= allowed
+    undecided, known = np.abs(truth - 1) <= allowed, ~np.isnan(measured).any(axis=(1, 2))
+    radius = np.where(known & np.isnan(radius), np.inf, radius)
+    off = np.where(np.isinf(radius), np.inf, np.abs(radius - truth) / allowed)
     shape = (points, points)
     return Region(
         method=str(label),
@@ -82,7 +89,7 @@ def measure(label: Label, points: int = 200) -> Region:
         radius_predicted=truth.reshape(shape),
         stable=stable.reshape(shape),
         stable_predicted=inside.reshape(shape),
-        off=float(np.max(np.abs(radius - truth) / allowed)),
+        off=float(np.max(off[known], initial=0.0)),
         undecided=int(np.count_nonzero(undecided)),
-        wrong=int(np.count_nonzero((stable != inside) & ~undecided)),
+        wrong=int(np.count_nonzero((stable != inside) & ~undecided & known)),
     )

@@ -74,6 +74,7 @@ class Stability(Studied):
                 out.append(f"{x.method}: grows by {x.growth_below:.3g} a step below its limit")
         wrong = (x for x in self.regions if x.wrong)
         out += [f"{x.method}: {count(x.wrong, 'point')} of the damped plane against theory" for x in wrong]
+        out += [f"{x.method}: no point measured" for x in self.regions if x.unmeasured == x.points]
         apart = (y for y in self.resonances if y.bands != y.bands_predicted and not _apart(y) <= 1e-6)
         out += [f"{y.method}: bands {y.bands}, the exact map's {y.bands_predicted}" for y in apart]
         strayed = (z for z in self.multipliers if not z.off <= z.bound)
@@ -107,7 +108,8 @@ class Stability(Studied):
         """Results beside the table of limits, in sentences."""
         out = [
             f"{x.method}: stable in {np.count_nonzero(x.stable)} of {x.points} points of the damped plane, "
-            f"{x.wrong} against theory; radii off by up to {x.off:.2f} roundings of the map's entries"
+            f"{x.wrong} against theory{f', {x.unmeasured} not measured' * bool(x.unmeasured)}; "
+            f"radii off by up to {x.off:.2f} roundings of the map's entries"
             + ", not counting those of its substeps, which may be larger"
             * (x.off > 1)
             for x in self.regions
@@ -133,7 +135,7 @@ class Stability(Studied):
             ],
             regions=[
                 {"stable": np.count_nonzero(x.stable)}
-                | _named(x, "method", "points", "wrong", "undecided", "off")
+                | _named(x, "method", "points", "wrong", "undecided", "unmeasured", "off")
                 for x in self.regions
             ],
             resonances=[_named(x, "method", "bands", "bands_predicted") for x in self.resonances],

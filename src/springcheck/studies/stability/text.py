@@ -77,7 +77,8 @@ def _of_scene(study: Stability) -> Lines:
         out.append(plain("  within the limit of every method measured here"))
     if modulated := floquet(scene.system):
         grown, period, _ = modulated
-        bounded = "stays bounded" if grown == 1 else f"grows by a factor of {grown:.6g}"
+        changes = "grows" if grown > 1 else "decays"
+        bounded = "stays bounded" if grown == 1 else f"{changes} by a factor of {grown:.6g}"
         said = f"the exact motion {bounded} (Floquet)"
         out.append(plain(f"  in each period of its modulation, {period:.4g}, {said}"))
     if is_modulated(scene):
