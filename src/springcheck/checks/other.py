@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
-from itertools import combinations
+from itertools import combinations, product
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -19,6 +19,8 @@ from springcheck.checks import sight
 from springcheck.checks.case import Case
 from springcheck.checks.requires import MAP, missing
 from springcheck.physics.arrays import Extended, Floats, Integers
+from springcheck.physics.scene import Scene
+from springcheck.physics.term import Term
 from springcheck.text.wording import either
 
 VALUE_STEPS = 8
@@ -28,7 +30,8 @@ VALUE_SLACK = 2.0
 SQUARES_FALL = 4.0
 """Factor by which the squares of what steps miss have to fall from one Newton step to the next."""
 MOST_ALONE = 16
-"""Rows of a term, or masses, that are looked at one by one; of more of them, all together alone."""
+"""Rows of a term, or masses, that are looked at one by one, and in pairs: those whose steps are farthest
+off."""
 NEAR_SINGLE = 2.0**-40
 """Relative distance from a number's single precision, 2**-24 off it at most, within which a value is that."""
 SAME = "each step is the scheme's own"
@@ -116,64 +119,93 @@ def _fits(case: Case, other: Case) -> bool:
 
 def _exchanged(case: Case) -> Iterator[tuple[str, Case]]:
     """Cases in which two particles have exchanged their masses, or two rows of a term a number."""
-    scene, n = case.judged, case.judged.n - case.judged.system.is_driven
+    scene, n, off = case.judged, case.judged.n - case.judged.system.is_driven, _off_by(case)
     of = scene.all_places[:n] // 3
-    kinds: list[tuple[str, Floats, Callable[[Floats], Case], Integers]] = [
-        ("masses of particles", scene.m[:n], partial(way, case), of) for way in (_heavier, _quicker)
+    kinds: list[tuple[str, Floats, Callable[[Floats], Case], Integers, Floats]] = [
+        ("masses of particles", scene.m[:n], partial(way, case), of, off) for way in (_heavier, _quicker)
     ]
     for number, term in enumerate(scene.terms):
-        for column in term.columns:
-            if (numbers := term.arrays[column.field]).dtype.kind == "f":
-                words = f"numbers ({column.name}) of {term.key.removeprefix('wall-')}s"
-                changed = partial(_with, case, number, column.field)
-                kinds.append((words, numbers, changed, np.arange(len(numbers))))
-    for words, numbers, other, rows in kinds:
-        for i, j in combinations(range(int(np.max(rows, initial=-1)) + 1), 2):
+        least = np.min([off[ends] for ends in term.particles], axis=0)
+        for column, rows in product(term.columns, _wholes(scene, term)):
+            words = f"numbers ({column.name}) of {term.key.removeprefix('wall-')}s"
+            changed = partial(_with, case, number, column.field)
+            if column.field != term.shared:
+                kinds.append((words, term.arrays[column.field], changed, rows, least))
+    for words, numbers, other, rows, least in kinds:
+        for i, j in combinations(sorted(_farthest(rows, least)), 2):
             mine, its = numbers[rows == i], numbers[rows == j]
-            if len(mine) == len(its) and np.any(mine != its) and len(numbers) <= MOST_ALONE:
+            if len(mine) == len(its) and np.any(mine != its):
                 swapped = numbers.copy()
                 swapped[rows == i], swapped[rows == j] = its, mine
                 yield f"the {words} {i} and {j} exchanged", other(swapped)
 
 
+def _wholes(scene: Scene, term: Term) -> list[Integers]:
+    """Numbers of the whole of each row of a term (s,): that of its axis alone, and of all its axes."""
+    ends = np.stack([scene.all_places[one] // 3 for one in term.particles])
+    bodies = np.unique(ends, axis=1, return_inverse=True)[1].ravel()
+    return [term.groups, bodies][: 1 + (len({*bodies}) < len({*term.groups}))]
+
+
+def _off_by(case: Case) -> Floats:
+    """How far the steps of each coordinate are off at most, in bounds (n,); of a clock not at all."""
+    assert case.ahead is not None
+    at = sight.rows(case, len(case.trajectory.t) - 1)
+    off = np.max(np.abs(_off(case, case.roundings * case.ahead.allowance, at)), axis=(0, 1))
+    return np.pad(off.astype(np.float64), (0, case.scene.n - len(off)))
+
+
+def _farthest(rows: Integers, off: Floats) -> list[int]:
+    """The wholes of rows (s,) that are farthest off, each by its own farthest."""
+    most = np.zeros(int(np.max(rows, initial=-1)) + 1)
+    np.maximum.at(most, rows, off[: len(rows)])
+    return [int(i) for i in np.argsort(-most, kind="stable")[:MOST_ALONE]]
+
+
 def _numbers(case: Case) -> Iterator[Number]:
     """The numbers of a scene, each by itself, and those of one kind together by a factor."""
-    run, scene = case.trajectory, case.judged
+    run, scene, off = case.trajectory, case.judged, _off_by(case)
     n, of = scene.n - scene.system.is_driven, [str(j // 3) for j in scene.all_places]
     reach = float(np.max(np.ptp(run.q[:, :n], axis=0)))
     for number, term in enumerate(scene.terms):
         ends = [dict.fromkeys(of[j] for j in row) for row in zip(*term.particles, strict=True)]
         where = [f"particle{'s' if len(one) > 1 else ''} {' and '.join(one)}" for one in ends]
-        for column in term.columns:
+        least = np.min([off[x] for x in term.particles], axis=0)
+        for column, rows in product(term.columns, _wholes(scene, term)):
             place = column.field == term.origin and term.bodies == 1
             kind = f"{'place' if place else column.name} of the {term.key.removeprefix('wall-')}"
-            numbers = term.arrays[column.field]
-            if numbers.dtype.kind == "f":
-                other = partial(_with, case, number, column.field)
-                yield from _each(kind, " of ", numbers, other, where, reach, -1 if column.inverse else 1)
+            if column.field != term.shared:
+                numbers, other = term.arrays[column.field], partial(_with, case, number, column.field)
+                power = -1 if column.inverse else 1
+                yield from _each(kind, " of ", numbers, other, where, rows, least, reach, power)
 
     if sum(term.kind == "potential" for term in scene.terms) > 1:
         yield "a factor to every force", 1.0, 0.0, lambda x: sight.of_scene(case, scene.system.scaled(x))
 
-    where = [f"particle {one}" for one in of[:n]]
-    yield from _each("mass", " of ", scene.m[:n], partial(_heavier, case), where)
-    yield from _each("mass", " that divides the force on ", scene.m[:n], partial(_quicker, case), where)
+    bodies = scene.all_places[:n] // 3
+    where = [f"particle {one}" for one in bodies]
+    for words, way in ((" of ", _heavier), (" that divides the force on ", _quicker)):
+        yield from _each("mass", words, scene.m[:n], partial(way, case), where, bodies, off)
     yield "the step", run.step, 0.0, lambda x: sight.changed(case, "step", x / run.step - 1)
 
 
 def _each(
     kind: str, of: str, numbers: Floats, other: Callable[[Floats], Case], where: list[str],
-    size: float = 0.0, power: int = 1,
+    rows: Integers, off: Floats, size: float = 0.0, power: int = 1,
 ) -> Iterator[Number]:  # fmt: skip
-    """The numbers (s,) of a kind; `power` is -1 where a scene file has their inverse."""
+    """The numbers (s,) of a kind, one for each whole of rows, and how far these are off; `power` is -1 where
+    a scene file has their inverse."""
 
     def changed(here: NDArray[np.bool_], x: float) -> Case:
         return other(np.where(here, x**power, numbers))
 
-    for row, own in enumerate(numbers.tolist() if len(numbers) <= MOST_ALONE else []):
-        here = np.arange(len(numbers)) == row
-        yield f"the {kind}{of}{where[row]}", own**power, size, partial(changed, here)
-    if len(numbers) > 1:
+    for whole in sorted(_farthest(rows, off)):
+        here = rows == whole
+        first = int(np.argmax(here))
+        if np.ptp(numbers[here]) == 0:
+            own = float(numbers[first]) ** power
+            yield f"the {kind}{of}{where[first]}", own, size, partial(changed, here)
+    if len(np.unique(rows)) > 1:
         yield f"a factor to each {kind}", 1.0, 0.0, lambda x: other(numbers * x**power)
 
 

@@ -279,13 +279,16 @@ def sentence(
 
 def shown(scene: Scene, run: Trajectory, about: int, few: bool = False) -> str:
     """One sentence that identifies a run around a frame, `few` as in `sentence`; "" where none is known."""
+    taken = "" if few else seen_to_take(scene, run, about)
     if not scene.system.is_linear:
-        return seen_to_take(scene, run, about)
+        return taken
     alone = scene.system.is_separate
     k = scene.system.hessian_diagonal(scene.q).astype(np.float64) if alone else None
     said = sentence(run, scene.m, k, about=about, few=few, damped=scene.system.is_damped)
     # springs couple the particles of a scene that has them
-    return said if alone or not said.startswith(str(COUPLED.cause).partition(":")[0]) else ""
+    coupled = not alone and said.startswith(str(COUPLED.cause).partition(":")[0])
+    own = taken.rpartition(" of ")[2].casefold()
+    return said if said.casefold().startswith(own) and not coupled else taken
 
 
 def titled(file: Path | str, label: str) -> str:

@@ -31,6 +31,7 @@ class RadialSpring(LinearLaw, Term):
         Column("number", "number", single=False),
     )
     ends: ClassVar[tuple[str, ...]] = ("a", "b")
+    shared: ClassVar[str] = "number"
     a: Integers
     b: Integers
     k: Floats
@@ -38,18 +39,13 @@ class RadialSpring(LinearLaw, Term):
     number: Floats
 
     @cached_property
-    def _bond(self) -> Integers:
-        """Index of the bond of each row."""
-        return np.cumsum(np.append(0, np.diff(self.number) != 0))[: len(self)]
-
-    @cached_property
     def _starts(self) -> Integers:
         """The first row of each bond."""
-        return np.flatnonzero(np.diff(self._bond, prepend=-1))
+        return np.flatnonzero(np.diff(self.groups, prepend=-1))
 
     def _sum(self, values: Reals) -> Reals:
         """Sums over the axes of each bond, for each of its rows (..., s)."""
-        return np.take(np.add.reduceat(values, self._starts, axis=-1), self._bond, axis=-1)
+        return np.take(np.add.reduceat(values, self._starts, axis=-1), self.groups, axis=-1)
 
     def _vectors(self, q: Reals) -> tuple[Reals, Reals]:
         """Vector between the ends, and its length, for each axis (..., s)."""
@@ -60,7 +56,7 @@ class RadialSpring(LinearLaw, Term):
 
     def energies(self, q: Reals) -> Reals:
         # the energy of a bond is no sum over its axes: its first row has all of it
-        s, first = np.sqrt(self._sum(self.stretch(q) ** 2)), np.diff(self._bond, prepend=-1) > 0
+        s, first = np.sqrt(self._sum(self.stretch(q) ** 2)), np.diff(self.groups, prepend=-1) > 0
         return np.where(first, 0.5 * (self.k * (s - self.rest) * (s - self.rest)), 0.0)
 
     def pull(self, q: Reals) -> Reals:
@@ -82,9 +78,9 @@ class RadialSpring(LinearLaw, Term):
     def elements(self, q: Reals) -> Iterator[tuple[Integers, Integers, Reals]]:
         d, s = self._vectors(q)
         # each row beside all rows of its bond, without a matrix of all rows
-        each = np.bincount(self._bond)[self._bond]
+        each = np.bincount(self.groups)[self.groups]
         one = np.repeat(np.arange(len(self)), each)
-        other = np.repeat(self._starts[self._bond] + each - np.cumsum(each), each) + np.arange(len(one))
+        other = np.repeat(self._starts[self.groups] + each - np.cumsum(each), each) + np.arange(len(one))
         bent, e = (self.rest / s)[..., one], d / s
         k = self.k[one] * ((1 - bent) * (one == other) + bent * e[..., one] * e[..., other])
         for here in self.particles:

@@ -64,6 +64,8 @@ class Term(FrozenArrays):
     """The fields that hold the particles of each row: one, or two that the row joins."""
     origin: ClassVar[str] = ""
     """The field that is subtracted from the elongation, and is therefore no argument of the law."""
+    shared: ClassVar[str] = ""
+    """The field whose number the rows of one whole share, and stand together, as those of a bond in space."""
     is_linear: ClassVar[bool] = False
     """Whether the force is linear in positions and velocities, up to a constant."""
     kind: ClassVar[Origin] = "potential"
@@ -133,6 +135,12 @@ class Term(FrozenArrays):
     def rows(self) -> Iterator[tuple[Any, ...]]:
         """Each row as Python's numbers: its ends, then its columns."""
         return zip(*(values.tolist() for values in self.arrays.values()), strict=True)
+
+    @cached_property
+    def groups(self) -> Integers:
+        """Number of the whole that each row is of (s,): its own, unless rows share one."""
+        number = getattr(self, self.shared) if self.shared else np.arange(len(self))
+        return np.cumsum(np.append(0, np.diff(number) != 0))[: len(self)]
 
     @cached_property
     def parameters(self) -> tuple[Floats, ...]:
