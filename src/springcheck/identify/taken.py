@@ -27,8 +27,8 @@ def takers(
     every: int = 1,
 ) -> tuple[str, ...]:  # fmt: skip
     """The schemes of `names` that take each row of q, p (f, n) to the next by `every` steps of h [T].  Their
-    error is estimated by twice as many of half the length.  `least` is the distance from a scheme's step, relative to
-    the state, that may be rounding."""
+    error is estimated by twice as many of half the length.  `least` is the distance from a scheme's step,
+    relative to the state, that may be rounding."""
     start, end = (q[:-1].astype(np.longdouble), p[:-1].astype(np.longdouble)), (q[1:], p[1:])
     size = [np.max(np.abs(x), axis=1, keepdims=True) for x in end]
     found = []
@@ -74,17 +74,18 @@ def springs_of(scene: Scene) -> Floats:
 
 def has_a_start(
     scheme: Scheme, h: float, springs: Sequence[Floats], steps: Integers, q: Floats, p: Floats,
-    roundoff: float,
+    roundoff: float, last: Sequence[Floats],
 ) -> bool:  # fmt: skip
     """Whether a scheme leads from some start to all of these states q, p (f, n) of oscillators with mass,
     stiffness and friction `springs` [M, M/T2, M/T] after so many steps (f,), as far as their digits show.
 
-    A start and an equilibrium are fitted by least squares, in units of the last digit and of what a program
-    in single precision rounds on its way.  Numbers that are rounded are half a unit off at most, and cut off
-    one unit: so is then the root mean square with the start that is best.
+    A start and an equilibrium are fitted by least squares, in units of the last digit, at least those of the
+    decimals of text (2, n), `last`, and of what a program in single precision rounds on its way.  Numbers
+    that are rounded are half a unit off at most, and cut off one unit: so is then the root mean square with
+    the start that is best.
     """
     for j, (m, k, c) in enumerate(np.transpose(springs)):
-        units = [_unit(x[:, j], steps, roundoff) for x in (q, p)]
+        units = [_unit(x[:, j], steps, roundoff, unit[j]) for x, unit in zip((q, p), last, strict=True)]
         with np.errstate(all="ignore"):
             one_step = matrix(scheme, h=h, m=np.array([m]), k=np.array([k]), c=np.array([c]))
             try:
@@ -107,13 +108,14 @@ def has_a_start(
     return True
 
 
-def _unit(x: Floats, steps: Integers, roundoff: float) -> Floats:
+def _unit(x: Floats, steps: Integers, roundoff: float, least: float) -> Floats:
     """The last digit of numbers (f,), and one rounding of each of so many steps: in single precision where
     digits do not exclude it, or in the shorter format that they are stored in."""
     form = storage(x)
     unit = 2 * roundoff * np.max(np.abs(x)) if form.name == "double" else form.quantum(x)
     # a 0 is written with no digit, and is that of a start mostly
     unit = np.where(unit > 0, unit, np.min(unit, where=unit > 0, initial=np.max(unit)))
+    unit = np.maximum(unit, least)
     coarse = form.name in BINARY or np.max(unit) >= 2.0**-24 * np.max(np.abs(x))
     own = 2.0 ** -BINARY.get(form.name, BINARY["single"]) if coarse else 2.0**-53
     return np.asarray(unit + own * steps * np.maximum.accumulate(np.abs(x)))
