@@ -155,7 +155,7 @@ def _of_factor(case: Case) -> str:
         x, y = ends[:, of] / unit[:, of], made[:, of] / unit[:, of]
         factor = np.sum(x * y, axis=1) / np.sum(x * x, axis=1)
         left = [np.max(np.abs(y - one * x)) for one in (factor[:, None], np.mean(factor))]
-        if x.shape[1] > 1 and np.all(off[:, kept] <= room) and left[0] <= room < left[1]:
+        if x.shape[1] > 1 and np.all(off[:, kept] <= room) and left[0] <= room < left[1] / driven.SLACK:
             size = " to ".join(f"{float(one):.6g}" for one in (np.min(factor), np.max(factor)))
             return (
                 f"each step is the scheme's own, and all {what} are multiplied by one factor after it, from "

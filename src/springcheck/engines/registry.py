@@ -213,9 +213,7 @@ def engine(name: str) -> Engine:
     if isinstance(found, str):
         raise MethodError(f"engine {name} of {origin(name)} cannot be used: {found}")
     if name in GIVEN:
-        raise MethodError(
-            f"{name} is the engine of {GIVEN[name]}, which is known while that is given: repeat it"
-        )
+        raise MethodError(f"{name} is the engine of {GIVEN[name]}, which is not given here: give it again")
     known = names()
     raise MethodError(f"unknown engine {name!r}{nearest(name, known)}; known are {', '.join(known)}")
 
