@@ -338,11 +338,11 @@ def test_mended_code_runs_again_and_the_others_are_shown_all_the_same(
     assert not (tmp_path / "spring.h5.parts").exists()
 
 
-def test_a_stored_run_of_a_function_asks_for_it_again(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_stored_run_of_a_function_asks_for_it_again() -> None:
     """It was of an unknown engine."""
     Path("mine.py").write_text(VERLET)
     assert main(["run", "spring", "--stepper", "mine.py:leapfrog", "-o", "s.h5", "--quiet"]) == 0
-    assert main(["run", "--from", "s.h5"]) == 2
-    assert (
-        "stepper is the engine of --stepper FILE.py:FUNCTION, which is not given" in capsys.readouterr().err
-    )
+    command = [sys.executable, "-m", "springcheck", "run", "--from", "s.h5"]
+    ran = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert ran.returncode == 2
+    assert "engine of --stepper FILE.py:FUNCTION, which is not given" in ran.stderr
