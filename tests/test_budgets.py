@@ -10,19 +10,19 @@ import springcheck
 HOME = Path(springcheck.__file__).parent
 
 BUDGETS = {
-    ("physics",): 6884,
+    ("physics",): 6889,
     ("schemes",): 1680,
     ("thermal",): 3274,
     ("engines/own",): 1591,
     ("engines/openmm", "engines/ase", "engines/sundials"): 1278,
-    ("engines",): 2821,
+    ("engines",): 2827,
     ("driver", "conformance", "doors"): 1200,
-    ("checks",): 5480,
-    ("identify",): 9245,
-    ("formats", "store"): 5165,
+    ("checks",): 5553,
+    ("identify",): 9275,
+    ("formats", "store"): 5172,
     ("studies",): 1456,
     ("studies/*",): 9816,
-    ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 7217,
+    ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 7244,
 }
 """Lines of each room, or of several: of an engine in one file, and of what all studies share, in the first
 folder."""

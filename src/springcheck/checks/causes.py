@@ -1,7 +1,6 @@
 """Causes that states with rods, or in a bath, show where they are not the scheme's.
 
-The impulse along a rod is the difference of a step from the same step without rods: its direction follows
-from the positions.  The effect of a bath is in the draws that the states imply, and in their size.
+What holds rods is in `held`.  The effect of a bath is in the draws that the states imply, and in their size.
 """
 
 from __future__ import annotations
@@ -12,10 +11,9 @@ from math import comb
 
 import numpy as np
 
-from springcheck.checks import driven, other
+from springcheck.checks import driven, held, other
 from springcheck.checks.case import Case
 from springcheck.checks.requires import MAP, missing
-from springcheck.checks.rods import rod_length, rod_velocity
 from springcheck.checks.steps import STANDS_APART, seldom_off, step_defect
 from springcheck.checks.thermal import (
     collisions,
@@ -25,15 +23,11 @@ from springcheck.checks.thermal import (
     reading,
     thermostat,
 )
-from springcheck.physics.arrays import Floats, Reals
-from springcheck.physics.rods import Rods
+from springcheck.physics.arrays import Floats
 from springcheck.text.wording import regularly
 from springcheck.thermal import THERMOSTATS
 from springcheck.thermal.catalogue import ENERGY_LEFT
 from springcheck.thermal.draws import Reading, law_of
-
-PUSH_ROUNDINGS = 64
-"""Roundings of the positions whose difference is an impulse: of a free step, and of the frame as recorded."""
 
 STANDARD_ERRORS = 6.0
 """Standard errors by which a size differs from another: a chance of 2e-9 for normal numbers."""
@@ -82,7 +76,7 @@ def found(case: Case, shown: Callable[[int, bool], str] = lambda *_: "") -> str:
         ways = [_of_no_noise, _of_bath, _of_collisions, _of_removal]
         looks = [*looks, _of_reach, _of_state, _of_size]
     elif run.every == 1 and not missing(case, MAP):
-        ways = [_of_differences, driven.found, _of_rods, _of_removal, _of_factor]
+        ways = [_of_differences, driven.found, held.found, _of_removal, _of_factor]
         looks = [_of_cut_numbers, *looks, _of_reach]
     vague = ""
     for way in ways + looks:
@@ -217,69 +211,6 @@ def _of_differences(case: Case) -> str:
                 "step is right to that: judge it with --differences (in Python: rebuilds_velocity=True)"
             )
     return ""
-
-
-def _of_rods(case: Case) -> str:
-    """Momenta that are not projected, impulses along other directions than that of the rods before the drift,
-    or of another size than keeps their lengths."""
-    rods, run = case.system.rods, case.trajectory
-    if rods is None or len(run.t) < 3:
-        return ""
-    q, p = (x.astype(np.longdouble) for x in (run.q, run.p))
-    held = np.concatenate([run.p[:1], rods.projected(q[1:], p[1:]).astype(np.float64)])
-    across = replace(case, trajectory=replace(run, p=held))
-    if rod_velocity(case).passed is False and not seldom_off(case)[1] and step_defect(across).passed:
-        return (
-            "momenta keep their part along rods, which RATTLE takes off at the end of a step; without it "
-            "each step is the scheme's own"
-        )
-    if len([kind for kind in case.scheme.kinds if kind.drifts]) != 1:
-        return _of_wide_tolerance(case, rods)
-    scene, q, p = case.judged, q[:-1], p[:-1]
-    free = scene.derived(terms=tuple(x for x in scene.terms if x.kind != "constraint"))
-    loose = Case(trajectory=run, scene=free).step(q, p)[0]
-    push, noise = run.q[1:] - loose, 2.0**-53 * (np.abs(run.q[1:]) + np.abs(loose))
-    moved = rods.apart(push)
-    allowed = PUSH_ROUNDINGS * rods.spans(noise)
-
-    def along(way: Reals) -> bool:
-        size = rods.solve(way, way, rods.dot(moved, way))
-        part = rods.apart(rods.spread(rods.each(size) * way) / scene.m)
-        off = np.sqrt(rods.dot(moved - part, moved - part))
-        return bool(np.all(off[1:] <= allowed[1:]))
-
-    ways = rods.ways(q)
-    if np.all(np.sqrt(rods.dot(moved, moved)) <= allowed):
-        return ""
-    if along(ways):
-        off = float(np.max(np.abs(rods.strain(run.q[1:].astype(np.longdouble)))))
-        return other.found(case) or (
-            "SHAKE pushes along rods in their direction, and not as much as keeps lengths, off by up to "
-            f"{off:.2g} of themselves: a wide tolerance, an iteration that stops early, other masses in it, "
-            "or a spring in its place"
-        ) * (rod_length(case).passed is False)
-    if along(rods.ways(loose)):
-        return (
-            "SHAKE pushes the ends of a rod along it as it lies after the drift, where "
-            f"{case.scheme.title} takes it as it lay before"
-        )
-    if along(np.concatenate([ways[:1], ways[:-1]])):
-        return "SHAKE pushes the ends of a rod along it as it lay a step before"
-    return ""
-
-
-def _of_wide_tolerance(case: Case, rods: Rods) -> str:
-    """Steps that are right but for what lengths of rods miss, where a step pushes along them more than once,
-    at places that no frame holds."""
-    run = case.trajectory
-    off = float(np.max(np.abs(rods.strain(run.q.astype(np.longdouble)))))
-    loose = replace(run, arithmetic=replace(run.arithmetic, lengths=off))
-    if rod_length(case).passed is not False or not step_defect(replace(case, trajectory=loose)).passed:
-        return ""
-    return other.found(case) or (
-        f"each step is the scheme's own to the lengths of rods, which are kept to {off:.2g} of themselves: "
-        "SHAKE has a wide tolerance, or its iteration stops early"
-    )
 
 
 def _of_no_noise(case: Case) -> str:
