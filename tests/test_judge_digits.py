@@ -340,3 +340,14 @@ def test_decimals_that_are_cut_off_are_named(
     assert checks.cause_of(found.verdicts).startswith("the decimals of the file are cut off, towards 0")
     wrong = file.judge(tmp_path / "a.csv", scene=scene, scheme="position-verlet")
     assert "cut off" not in checks.cause_of(wrong.verdicts)
+
+
+def test_subnormal_numbers_of_single_precision_are_judged_to_what_they_hold(tmp_path: Path) -> None:
+    """A damped motion below 1e-38 failed: such numbers are multiples of 1.4e-45."""
+    scene = spring(c=1.3, step=0.2, every=1)
+    rows = states(scene, "own:rk4")
+    assert 0 < np.max(np.abs(rows[-1])) < 1e-39
+    np.savetxt(tmp_path / "a.csv", np.c_[scene.step * np.arange(len(rows)), np.float32(rows)],
+               delimiter=",", header="t,q,v", comments="")  # fmt: skip
+    found = file.judge(tmp_path / "a.csv", scene=scene, scheme="rk4")
+    assert [v.check for v in found.verdicts if v.passed is False] == []
