@@ -10,19 +10,19 @@ import springcheck
 HOME = Path(springcheck.__file__).parent
 
 BUDGETS = {
-    ("physics",): 6945,
+    ("physics",): 6946,
     ("schemes",): 1695,
     ("thermal",): 3317,
     ("engines/own",): 1591,
     ("engines/openmm", "engines/ase", "engines/sundials"): 1280,
-    ("engines",): 2819,
+    ("engines",): 2825,
     ("driver", "conformance", "doors"): 1203,
-    ("checks",): 5588,
-    ("identify",): 9245,
-    ("formats", "store"): 5183,
+    ("checks",): 5631,
+    ("identify",): 9275,
+    ("formats", "store"): 5190,
     ("studies",): 1456,
     ("studies/*",): 9848,
-    ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 7248,
+    ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 7280,
 }
 """Lines of each room, or of several: of an engine in one file, and of what all studies share, in the first
 folder."""

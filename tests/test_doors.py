@@ -342,3 +342,13 @@ def test_mended_code_runs_again_and_the_others_are_shown_all_the_same(
     assert "stepper:mine" in capsys.readouterr().out
     assert (tmp_path / "spring.h5").exists()
     assert not (tmp_path / "spring.h5.parts").exists()
+
+
+def test_a_stored_run_of_a_function_asks_for_it_again() -> None:
+    """It was of an unknown engine."""
+    Path("mine.py").write_text(VERLET)
+    assert main(["run", "spring", "--stepper", "mine.py:leapfrog", "-o", "s.h5", "--quiet"]) == 0
+    command = [sys.executable, "-m", "springcheck", "run", "--from", "s.h5"]
+    ran = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert ran.returncode == 2
+    assert "engine of --stepper FILE.py:FUNCTION, which is not given" in ran.stderr

@@ -193,3 +193,16 @@ def test_a_thermostat_is_explained_by_numbers_that_make_its_step() -> None:
     kinds = {name: "\n".join(explain.scheme_lines(schemes.scheme(name))) for name in THERMOSTATS}
     assert not any("c(x)" in text for text in kinds.values())
     assert kinds["gj-iv"] != kinds["gj-vi"].replace("VI", "IV").replace("gj-vi", "gj-iv")
+
+
+def test_sentences_are_there_without_docstrings() -> None:
+    """Python leaves docstrings out by -OO, and with them went the sentence of every check."""
+    for word in ("step-defect", "quartic"):
+        ran = [
+            subprocess.run(
+                [sys.executable, *flags, "-m", "springcheck", "explain", word],
+                capture_output=True, text=True, check=True,
+            ).stdout
+            for flags in ([], ["-OO"])
+        ]  # fmt: skip
+        assert ran[0] == ran[1]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -318,3 +319,35 @@ def test_rounded_numbers_are_judged_to_their_digits_in_any_format(tmp_path: Path
         else:
             np.savetxt(path, np.c_[*arrays.values()], fmt="%.8f", header="t x v", comments="")
         assert file.judge(path, scene=scene, scheme="velocity-verlet").status == wrong
+
+
+@pytest.mark.parametrize(
+    ("step", "cut", "decimals"),
+    [(0.1, lambda x: repr(int(x * 1e6) / 1e6), 6), (0.17, lambda x: repr(int(x * 1e6) / 1e6), 6),
+     (0.1, lambda x: str(x)[:8], 5)],
+)  # fmt: skip
+def test_decimals_that_are_cut_off_are_named(
+    tmp_path: Path, step: float, cut: Callable[[float], str], decimals: int
+) -> None:
+    """They failed without a cause, or with noise as one; str(x)[:8] leaves one decimal less to -x."""
+    scene = springcheck.load_scene("spring-uneven").derived(step=step)
+    run = driver.run(scene, "own:velocity-verlet")
+    rows = [[repr(t), cut(q), cut(p)] for t, q, p in np.c_[run.t, run.q, run.p].tolist()]
+    (tmp_path / "a.csv").write_text("t,q,p\n" + "\n".join(map(",".join, rows)))
+    found = file.judge(tmp_path / "a.csv", scene=scene, scheme="velocity-verlet")
+    assert f"by up to {0.5 * 10.0**-decimals:.1g}" in " ".join(found.notes)
+    assert found.status == 1
+    assert checks.cause_of(found.verdicts).startswith("the decimals of the file are cut off, towards 0")
+    wrong = file.judge(tmp_path / "a.csv", scene=scene, scheme="position-verlet")
+    assert "cut off" not in checks.cause_of(wrong.verdicts)
+
+
+def test_subnormal_numbers_of_single_precision_are_judged_to_what_they_hold(tmp_path: Path) -> None:
+    """A damped motion below 1e-38 failed: such numbers are multiples of 1.4e-45."""
+    scene = spring(c=1.3, step=0.2, every=1)
+    rows = states(scene, "own:rk4")
+    assert 0 < np.max(np.abs(rows[-1])) < 1e-39
+    np.savetxt(tmp_path / "a.csv", np.c_[scene.step * np.arange(len(rows)), np.float32(rows)],
+               delimiter=",", header="t,q,v", comments="")  # fmt: skip
+    found = file.judge(tmp_path / "a.csv", scene=scene, scheme="rk4")
+    assert [v.check for v in found.verdicts if v.passed is False] == []

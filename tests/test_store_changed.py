@@ -254,3 +254,9 @@ def test_every_flipped_bit_of_an_array_is_found(whole: Path) -> None:
         flipped(whole, extent.name)
         assert extent.name in {finding.place for finding in store.check("s.h5")}
     assert np.all([extent.size > 800 for extent in known.extents])
+
+
+def test_what_makes_a_store_unreadable_is_said_once(whole: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("s.h5").write_bytes(whole.read_bytes()[: whole.stat().st_size // 2])
+    assert main(["report", "s.h5"]) == 2
+    assert capsys.readouterr().err.count("its end is missing") == 1

@@ -171,7 +171,13 @@ def identify(
 
     if isinstance(found, str | Path):
         stated = {"mass": mass, "stiffness": stiffness, "friction": friction, "step": step}
-        return {one.label: files.identify_states(one, **stated) for one in files.read(path_of(found))}
+        with spoken():
+            return {
+                one.label: files.of_springs(
+                    files.identify_states(one, **stated), one.whole, stated=stiffness is not None
+                )
+                for one in files.read(path_of(found))
+            }
     if callable(found):
         return identify_stepper(found)
     t = found
@@ -190,7 +196,9 @@ def identify(
     given = {name: x for name, x in given.items() if x is not None}
     arrays = zip(given, reals("identify", **given), strict=True)
     numbers: dict[str, Any] = {name: x if x.ndim else x.item() for name, x in arrays}
-    return of_states(**numbers)
+    positions = np.reshape(numbers["q"], (len(numbers["q"]), -1)) if np.ndim(numbers["q"]) else None
+    with spoken():
+        return files.of_springs(of_states(**numbers), positions, stated=stiffness is not None)
 
 
 @typed

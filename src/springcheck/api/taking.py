@@ -81,7 +81,9 @@ def scene_of(scene: Scene | str | Path) -> Scene:
 def path_of(given: Any) -> Path:
     """The path of a file; "" is none.  SpringcheckError for anything else."""
     named = given if not isinstance(given, str) or given else None
-    return Path(needed(named, str | PathLike, "the path of a file"))
+    if "\0" in str(needed(named, str | PathLike, "the path of a file")):
+        raise SpringcheckError(f"{given!r}: a path without zero bytes is needed")
+    return Path(given)
 
 
 def needed(given: Any, kind: Any, what: str) -> Any:

@@ -1,6 +1,6 @@
 """Causes that states with rods, or in a bath, show where they are not the scheme's.
 
-The effect of a bath is in the draws that the states imply, and in their size.
+What holds rods is in `held`.  The effect of a bath is in the draws that the states imply, and in their size.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from math import comb
 
 import numpy as np
 
-from springcheck.checks import driven, other, rods, stages
+from springcheck.checks import driven, held, other, stages
 from springcheck.checks.case import Case
 from springcheck.checks.check import FALSE_ALARMS
 from springcheck.checks.requires import MAP, missing
@@ -78,8 +78,8 @@ def found(case: Case, shown: Callable[[int, bool], str] = lambda *_: "") -> str:
         ways = [_of_no_noise, _of_bath, stages.collided, _of_removal, stages.found]
         looks = [*looks, _of_reach, _of_state, _of_size]
     elif run.every == 1 and not missing(case, MAP):
-        ways = [_of_differences, driven.found, rods.pushed, _of_removal, _of_factor]
-        looks = [*looks, _of_reach]
+        ways = [_of_differences, driven.found, held.found, _of_removal, _of_factor]
+        looks = [_of_cut_numbers, *looks, _of_reach]
     vague = ""
     for way in ways + looks:
         said = way(case)
@@ -159,7 +159,7 @@ def _of_factor(case: Case) -> str:
         x, y = ends[:, of] / unit[:, of], made[:, of] / unit[:, of]
         factor = np.sum(x * y, axis=1) / np.sum(x * x, axis=1)
         left = [np.max(np.abs(y - one * x)) for one in (factor[:, None], np.mean(factor))]
-        if freedoms > 1 and np.all(off[:, kept] <= room) and left[0] <= room < left[1]:
+        if freedoms > 1 and np.all(off[:, kept] <= room) and left[0] <= room < left[1] / driven.SLACK:
             size = " to ".join(f"{float(one):.6g}" for one in (np.min(factor), np.max(factor)))
             return (
                 f"each step is the scheme's own, and all {what} are multiplied by one factor after it, from "
@@ -185,6 +185,20 @@ def _of_reach(case: Case) -> str:
                     f"steps that end within {most:.6g} of the rest of each {term.key} are the scheme's, and "
                     f"none beyond {least:.6g} is: the force is another there, as where it is cut off"
                 )
+    return ""
+
+
+def _of_cut_numbers(case: Case) -> str:
+    """Decimals of a file that were cut off and not rounded: right is the middle of what they leave open."""
+    run = case.trajectory
+    half = run.arithmetic.recorded(case.judged.m, run.step, False).astype(np.float64)
+    for words, sign in (("towards 0", np.sign), ("downwards", np.ones_like)) if np.any(half) else ():
+        q, p = (x + one * sign(x) for x, one in zip((run.q, run.p), half, strict=True))
+        if step_defect(replace(case, trajectory=replace(run, q=q, p=p))).passed:
+            return (
+                f"the decimals of the file are cut off, {words}, and not rounded: each step is the scheme's "
+                "own from and to the middle of what they leave open; write all digits, as by %.17g, or round"
+            )
     return ""
 
 

@@ -12,6 +12,7 @@ from springcheck.checks.requires import REQUIREMENTS, missing
 from springcheck.errors import MethodError
 from springcheck.physics.arrays import WIDE, Reals
 from springcheck.physics.trajectory import NOT_KNOWN, Limits, Verdict
+from springcheck.text.wording import described
 
 if TYPE_CHECKING:
     from springcheck.thermal.chance import Statistic
@@ -153,7 +154,7 @@ def check(
         )
 
     def made(judge: Judge) -> Check:
-        first = " ".join((judge.__doc__ or "").partition("\n\n")[0].split()).partition(". ")[0]
+        first = " ".join(described(judge).partition("\n\n")[0].split()).partition(". ")[0]
         tells = family not in ("record", "repeat") if telling is None else telling
         return Check(
             name=judge.__name__.replace("_", "-"), short=short, family=family, requires=frozenset(requires),

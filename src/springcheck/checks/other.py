@@ -28,7 +28,7 @@ VALUE_SLACK = 2.0
 SQUARES_FALL = 4.0
 """Factor by which the squares of what steps miss have to fall from one Newton step to the next."""
 MOST_ALONE = 16
-"""Objects of a term, or particles, that are looked at one by one; of more of them, all together alone."""
+"""Objects of a term, or particles, that are looked at one by one, and in pairs: those farthest off."""
 NEAR_SINGLE = 2.0**-40
 """Relative distance from a number's single precision, 2**-24 off it at most, within which a value is that."""
 SAME = "each step is the scheme's own"
@@ -47,6 +47,8 @@ class Kind(NamedTuple):
     of: str
     numbers: Floats
     other: Callable[[Floats], Case]
+    off: Floats
+    """How far the steps of each row's coordinates are off at most (s,), in bounds."""
     objects: list[Rows]
     """Rows that have one number: of a particle, or of a spring, bond or rod, along all axes."""
     alone: Sequence[Rows] = ()
@@ -59,6 +61,11 @@ class Kind(NamedTuple):
         """The case with the number x in some rows, or with a factor x to all."""
         more = x**self.power
         return self.other(self.numbers * more if here is None else np.where(here, more, self.numbers))
+
+    def farthest(self, rows: Sequence[Rows]) -> list[Rows]:
+        """Those that are farthest off."""
+        most = np.array([np.max(self.off[here]) for _, here in rows])
+        return [rows[i] for i in sorted(np.argsort(-most, kind="stable")[:MOST_ALONE])]
 
 
 def found(case: Case) -> str:
@@ -143,8 +150,7 @@ def _fits(case: Case, other: Case) -> bool:
 def _exchanged(case: Case) -> Iterator[tuple[str, Case]]:
     """Cases in which two particles have exchanged their masses, or two springs, bonds or rods a number."""
     for kind in _kinds(case):
-        pairs = combinations(kind.objects if len(kind.objects) <= MOST_ALONE else [], 2)
-        for (one, mine), (two, its) in pairs:
+        for (one, mine), (two, its) in combinations(kind.farthest(kind.objects), 2):
             swapped = kind.numbers.copy()
             if np.sum(mine) == np.sum(its) and np.any(swapped[mine] != swapped[its]):
                 swapped[mine], swapped[its] = swapped[its], swapped[mine]
@@ -156,7 +162,10 @@ def _kinds(case: Case) -> Iterator[Kind]:
     run, scene = case.trajectory, case.judged
     n, places = scene.n - scene.system.is_driven, scene.all_places
     reach = float(np.max(np.ptp(run.q[:, :n], axis=0)))
+    steps = sight.rows(case, len(run.t) - 1)
+    off = np.pad(np.max(np.abs(_off(case, case, steps)), axis=(0, 1)).astype(np.float64), (0, scene.n - n))
     for number, term in enumerate(scene.terms):
+        least = np.min([off[ends] for ends in term.particles], axis=0)
         objects = _objects(term.objects(places))
         alone = _alone(objects, places[term.particles[0]])
         for column in term.columns:
@@ -165,11 +174,11 @@ def _kinds(case: Case) -> Iterator[Kind]:
             numbers = term.arrays[column.field]
             if numbers.dtype.kind == "f" and column.field != "number":
                 of_axes = alone if term.is_by_axes or place else []
-                other = partial(_with, case, number, column.field)
-                yield Kind(name, " of ", numbers, other, objects, of_axes, reach, -1 if column.inverse else 1)
+                other, power = partial(_with, case, number, column.field), -1 if column.inverse else 1
+                yield Kind(name, " of ", numbers, other, least, objects, of_axes, reach, power)
     objects = _objects([((int(place) // 3,), 1) for place in places[:n]])
     for of, way in ((" of ", _heavier), (" that divides the force on ", _quicker)):
-        yield Kind("mass", of, scene.m[:n], partial(way, case), objects)
+        yield Kind("mass", of, scene.m[:n], partial(way, case), off, objects)
 
 
 def _objects(of: list[tuple[tuple[int, ...], int]]) -> list[Rows]:
@@ -194,7 +203,7 @@ def _numbers(case: Case) -> Iterator[Number]:
     run, scene = case.trajectory, case.judged
     for kind in _kinds(case):
         name, own = kind.name, kind.numbers
-        for words, here in [x for y in (kind.objects, kind.alone) if len(y) <= MOST_ALONE for x in y]:
+        for words, here in kind.farthest(kind.objects) + kind.farthest(kind.alone):
             if np.all(own[here] == own[here][0]):
                 value = float(own[here][0]) ** kind.power
                 yield f"the {name}{kind.of}{words}", value, kind.size, partial(kind.changed, here)

@@ -3,7 +3,6 @@ themselves.  The faults that a check rejects, and its detection limits, are meas
 
 from __future__ import annotations
 
-import inspect
 import math
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
@@ -19,6 +18,7 @@ from springcheck.physics import terms
 from springcheck.schemes import Scheme
 from springcheck.studies.faults.seeded import Fault
 from springcheck.studies.faults.table import FAULTS
+from springcheck.text.wording import described
 from springcheck.thermal import THERMOSTATS, Law
 from springcheck.thermal.catalogue import Act
 
@@ -75,7 +75,7 @@ def lines(name: str) -> Iterator[str]:
     if name in _CHECKS:
         parts.insert(0, chain(check_lines(_CHECKS[name]), _seen(_CHECKS[name])))
     parts += [meaning_lines(MEANINGS[name])] if name in MEANINGS else []
-    parts += [iter([_line(f"{name}, a term: {inspect.getdoc(of_terms[name])}")])] if name in of_terms else []
+    parts += [iter([_line(f"{name}, a term: {described(of_terms[name])}")])] if name in of_terms else []
     if parts:
         return chain(parts[0], *(chain([""], part) for part in parts[1:]))
     said = word(name)
@@ -104,7 +104,7 @@ _CHECKS = {check.name: check for check in (*checks.ALL, *checks.RANDOM, *SEEDED)
 def check_lines(check: Any) -> Iterator[str]:
     """What a pass proves, how it is measured, the scope of the check, and the faults that it must reject."""
     yield f"{check.name}, a check of the {check.family}"
-    first, _, rest = inspect.cleandoc(check.judge.__doc__ or "").partition("\n\n")
+    first, _, rest = described(check.judge).partition("\n\n")
     yield _line(first)
     if rest.strip():
         yield ""

@@ -29,6 +29,8 @@ from springcheck.text.wording import count
 
 TIMES = "times were taken as whole numbers of steps from the first frame on"
 NOT_DOUBLE = "(single|mixed|fixed-point force) arithmetic explains every step"
+SMALLEST_SINGLE = 2.0**-126
+"""Smallest normal number of single precision."""
 NOT_JUDGED = "not judged: nothing that applies to these states could tell the scheme from another"
 
 
@@ -197,6 +199,9 @@ def as_trajectory(
     if states.p is None:
         other, halves[1] = other * scene.m, halves[1] * scene.m
     p = other
+    if states.roundoff >= 2.0**-24 and np.any((np.abs(q) < SMALLEST_SINGLE) & (q != 0)):
+        # subnormal numbers of single precision are whole multiples of 2**-149
+        halves = np.maximum(halves, [np.full(scene.n, 2.0**-150), 2.0**-150 * scene.m])
     if len(q) < 2:
         raise StoreError(f"{path}: holds {len(q)} frame; two are needed")
     if not np.isfinite(states.t).all():
@@ -277,7 +282,7 @@ def as_trajectory(
     else:
         # a line that is no axis is rounded in each of its coordinates
         off_axis = beside if beside > 8 * states.roundoff else None
-        arithmetic = Arithmetic(name=AS_WRITTEN, state=unit, written=halves if fixed else ((), ()))
+        arithmetic = Arithmetic(name=AS_WRITTEN, state=unit, written=halves if np.any(halves) else ((), ()))
         tolerance = scene.tolerance if schemes.scheme(scheme).has("adaptive") else None
         run = Trajectory(**known, arithmetic=arithmetic, off_axis=off_axis, tolerance=tolerance)
         if tolerance is not None:

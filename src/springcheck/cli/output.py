@@ -109,8 +109,9 @@ def warned(file: str, found: Sequence[dict[str, str]]) -> Iterator[None]:
         with readable(file):
             yield
     except SpringcheckError as error:
-        if found:
-            raise type(error)(f"{_changed(file, found, 250)}: {error}") from error
+        # what makes it unreadable is said by the error
+        if others := [one for one in found if one["what"] not in str(error)]:
+            raise type(error)(f"{_changed(file, others, 250)}: {error}") from error
         raise
     warn(file, found)
 

@@ -10,6 +10,7 @@ import numpy as np
 from springcheck import schemes
 from springcheck.errors import IdentificationError
 from springcheck.formats import States
+from springcheck.formats.columns import Fixed
 from springcheck.identify import files
 from springcheck.identify.families import FAMILIES
 from springcheck.identify.files import identify_states, of_arrays
@@ -75,10 +76,11 @@ def other_scheme(scene: Scene, run: Trajectory, states: States) -> Verdict:
         said = "" if found.undecided or not any(x.shown for x in found.explanations[:1]) else said
     springs = (m, k, c) if states.p is not None else (np.ones_like(m), k / m, c / m)
     steps = np.arange(len(run.t)) * run.every
-    numbers = parts["q"], other[:, columns]
+    numbers, fixed = (parts["q"], other[:, columns]), states.fixed or Fixed(0.0, 0.0, 0.0)
+    last = [2 * np.broadcast_to(x, width)[columns] for x in (fixed.q, fixed.v)]
     if (
         known and not run.rebuilds_velocity
-        and not has_a_start(scheme, run.step, springs, steps, *numbers, states.roundoff)
+        and not has_a_start(scheme, run.step, springs, steps, *numbers, states.roundoff, last)
     ):  # fmt: skip
         return verdict(False, said or NO_START.format(scheme.title))
     return verdict(None, unread)

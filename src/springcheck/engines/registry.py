@@ -195,6 +195,10 @@ def unusable() -> dict[str, str]:
     }
 
 
+GIVEN = {"stepper": "--stepper FILE.py:FUNCTION", "command": "--command 'NAME=PROGRAM {scene} {out}'"}
+"""Names of the engines of what a user brings, and the options that bring it."""
+
+
 def _find(name: str) -> Engine | str | None:
     """An engine, why it cannot be used, or None where there is none of this name."""
     found = _look(name)
@@ -210,6 +214,8 @@ def engine(name: str) -> Engine:
         return found
     if isinstance(found, str):
         raise MethodError(f"engine {name} of {origin(name)} cannot be used: {found}")
+    if name in GIVEN:
+        raise MethodError(f"{name} is the engine of {GIVEN[name]}, which is not given here: give it again")
     known = names()
     raise MethodError(f"unknown engine {name!r}{nearest(name, known)}; known are {', '.join(known)}")
 

@@ -20,6 +20,9 @@ FEWEST_CELLS = 8
 """Different numbers of nine digits, too many to be of single precision by chance."""
 FEWEST_LONG = 20
 """Numbers that would need 17 digits as doubles, by expectation, of which none has them in text of 16."""
+AS_WIDE = 0.75
+"""Share of the numbers of a column that are as wide as any where all were cut off at one width: of others the
+last digits are zeros by chance, and may be left out."""
 COMMENT = ("#", "%")
 """Prefix of a comment, which may name the columns and holds no row of numbers."""
 
@@ -186,8 +189,12 @@ def fixed(rows: Sequence[Sequence[str]], q: Iterable[int], v: Iterable[int]) -> 
         cells = {row[i] for row in rows[:SHOWN]}
         x = np.array([*map(number, cells)])
         places = np.array([len(cell.partition(".")[2]) for cell in cells])
-        digits = np.array([*map(_digits, cells)])
-        most = int(np.max(places))
+        digits, width = (np.array([*map(of, cells)]) for of in (_digits, len))
+        most, whole = int(np.max(places)), width == np.max(width)
+        if np.mean(whole) >= AS_WIDE and np.max(digits) < 16 and np.ptp(digits[whole]) > 0:
+            # cut off behind so many letters, a minus among them
+            places = np.where(whole, np.min(places[whole]), places)
+            most = int(np.max(places))
         with np.errstate(divide="ignore"):
             decade = np.floor(np.log10(np.abs(x)))
         plain = not any(re.search(r"[eEdD]|\d[+-]", cell) for cell in cells)

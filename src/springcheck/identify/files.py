@@ -197,7 +197,9 @@ def rod_of(q: Floats | None, *, fits: bool = False) -> RodSeen | None:
             arm, bent = _arm(x[:, i]), _bent(x[:, i])
             length, off = _kept(arm)
             # a straight path lies on a circle as well, and an orbit may without a rod, but does not turn back
-            if off <= RIGID * bent and bent >= TURNED**2 * length and _turns_back(arm):
+            # a parabola, as of frequencies of 1 to 2, departs from its circle by some bent**2 / length
+            share = RIGID * min(1.0, bent / (TURNED**2 * length))
+            if off <= share * bent and _turns_back(arm):
                 kept = f"keeps its distance from a fixed point, {length:.6g} to {off:.1g}: a rod"
                 return RodSeen(statement=f"particle {i} swings and {kept}")
     return on_circles
@@ -279,13 +281,16 @@ def sentence(
 
 def shown(scene: Scene, run: Trajectory, about: int, few: bool = False) -> str:
     """One sentence that identifies a run around a frame, `few` as in `sentence`; "" where none is known."""
+    taken = "" if few else seen_to_take(scene, run, about)
     if not scene.system.is_linear:
-        return seen_to_take(scene, run, about)
+        return taken
     alone = scene.system.is_separate
     k = scene.system.hessian_diagonal(scene.q).astype(np.float64) if alone else None
     said = sentence(run, scene.m, k, about=about, few=few, damped=scene.system.is_damped)
     # springs couple the particles of a scene that has them
-    return said if alone or not said.startswith(str(COUPLED.cause).partition(":")[0]) else ""
+    coupled = not alone and said.startswith(str(COUPLED.cause).partition(":")[0])
+    own = taken.rpartition(" of ")[2].casefold()
+    return said if said.casefold().startswith(own) and not coupled else taken
 
 
 def titled(file: Path | str, label: str) -> str:
@@ -304,18 +309,8 @@ def identify_file(
     found = {}
     for states in read(path, trajectory, columns, given.get("step")):
         try:
-            found[states.label] = told = identify_states(states, **given)
-            fits = told.verdict != "none"
-            # springs that are stated are there
-            with np.errstate(all="ignore"):
-                rod = None if fits and "stiffness" in given else rod_of(states.whole, fits=fits)
-            if rod and rod.or_springs:
-                found[states.label] = told.noting(rod.statement)
-            elif rod:
-                raise IdentificationError(
-                    f"{rod.statement}; schemes are told by springs: judge it, with a --scene that has the "
-                    f"[[rod]]{', or state the --stiffness of springs' if fits else ''}"
-                )
+            told = identify_states(states, **given)
+            found[states.label] = of_springs(told, states.whole, stated="stiffness" in given)
         except SpringcheckError as error:
             raise type(error)(f"{titled(path, states.label)}: {error}") from error
         except (ArithmeticError, ValueError) as error:
@@ -324,6 +319,20 @@ def identify_file(
                 f"{titled(path, states.label)}: nothing can be worked out with {numbers}: {error}"
             ) from error
     return found
+
+
+def of_springs(told: Identification, q: Floats | None, *, stated: bool) -> Identification:
+    """An identification of states with positions q (f, N), as long as these show no rod, or springs are
+    `stated`.  Raises IdentificationError."""
+    fits = told.verdict != "none"
+    with np.errstate(all="ignore"):
+        rod = None if fits and stated else rod_of(q, fits=fits)
+    if rod and not rod.or_springs:
+        raise IdentificationError(
+            f"{rod.statement}; schemes are told by springs: judge it, with a --scene that has the "
+            f"[[rod]]{', or state the --stiffness of springs' if fits else ''}"
+        )
+    return told.noting(rod.statement) if rod else told
 
 
 def identify_states(

@@ -219,7 +219,7 @@ COUPLED = Cause(
     kind="is another oscillator's",
     cause="The oscillators are coupled: coordinate {j} follows from the states of all, which {moved}",
     columns=lambda e: [*(x for m in e.others for x in m.z[:-1].astype(np.float64).T), np.ones(e.pairs)],
-    remedy="leave the coupling out, or give the normal modes, which are independent",
+    remedy="leave the coupling out, or judge it with a --scene that has it",
 )  # fmt: skip
 
 CONSTANT = Cause(

@@ -42,8 +42,12 @@ class Timeless:
 def returned(step: Callable[..., Any], out: Any) -> tuple[Floats, Floats]:
     """The position and the momentum that a step returned, as doubles.  MethodError, with the place of the
     function, for anything but two real numbers or arrays."""
-    what = f"{type(out).__name__}{f' of {len(out)}' if isinstance(out, tuple | list) else ''}"
+    several, unordered = isinstance(out, tuple | list), isinstance(out, dict | set | frozenset | str | bytes)
+    what = f"{type(out).__name__}{f' of {len(out)}' if several or unordered else ''}"
     try:
+        if unordered:
+            # keys, letters and elements of a set may be two as well
+            raise TypeError(what)
         q, p = out
         what = "no numbers"
         if not (np.iscomplexobj(q) or np.iscomplexobj(p)):

@@ -8,34 +8,38 @@ import numpy as np
 
 from springcheck.identify.storage import BINARY, storage
 from springcheck.physics.arrays import Floats, Integers, Reals
+from springcheck.physics.driven import CLOCK
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory
-from springcheck.schemes import SCHEMES, Law, Scheme, matrix, propagate, title
+from springcheck.schemes import ATTACHED, SCHEMES, Law, Scheme, matrix, propagate, scheme, title
 from springcheck.text.wording import either
 
 OF_ERROR = 1e-3
 """Largest difference from a scheme's step, relative to its truncation error: that of an engine's solver of
 implicit steps.  Other schemes differ by about 1."""
 
-STEPS = 24
-"""Recorded steps that are compared."""
+STEPS, MOST_STEPS = 24, 100
+"""Recorded frames that are compared, and most steps from one to the next."""
 
 
 def takers(
-    names: Iterable[str], scene: Scene, h: float, q: Reals, p: Reals, least: float = 2.0**-49
-) -> tuple[str, ...]:
-    """The schemes of `names` that take each row of q, p (f, n) to the next by a step of h [T].  The error of
-    a step is estimated by two of half its length.  `least` is the distance from a scheme's step, relative to
-    the state, that may be rounding."""
+    names: Iterable[str], scene: Scene, h: float, q: Reals, p: Reals, least: float = 2.0**-49, *,
+    every: int = 1,
+) -> tuple[str, ...]:  # fmt: skip
+    """The schemes of `names` that take each row of q, p (f, n) to the next by `every` steps of h [T].  Their
+    error is estimated by twice as many of half the length.  `least` is the distance from a scheme's step,
+    relative to the state, that may be rounding."""
     start, end = (q[:-1].astype(np.longdouble), p[:-1].astype(np.longdouble)), (q[1:], p[1:])
     size = [np.max(np.abs(x), axis=1, keepdims=True) for x in end]
     found = []
     for name in names:
-        whole, half = (Law(scheme=SCHEMES[name], scene=scene, h=h / n) for n in (1, 2))
+        whole, half = (Law(scheme=scheme(name), scene=scene, h=h / n) for n in (1, 2))
+        once = twice = start
         with np.errstate(all="ignore"):
-            once, twice = whole.step(*start), half.step(*half.step(*start))
+            for _ in range(every):
+                once, twice = whole.step(*once), half.step(*half.step(*twice))
             room = [
-                np.maximum(OF_ERROR * np.max(np.abs(a - b), axis=1, keepdims=True), least * c)
+                np.maximum(OF_ERROR * np.minimum(np.max(np.abs(a - b), axis=1, keepdims=True), c), least * c)
                 for a, b, c in zip(once, twice, size, strict=True)
             ]
             if all(np.all(np.abs(a - b) <= c) for a, b, c in zip(once, end, room, strict=True)):
@@ -70,17 +74,18 @@ def springs_of(scene: Scene) -> Floats:
 
 def has_a_start(
     scheme: Scheme, h: float, springs: Sequence[Floats], steps: Integers, q: Floats, p: Floats,
-    roundoff: float,
+    roundoff: float, last: Sequence[Floats],
 ) -> bool:  # fmt: skip
     """Whether a scheme leads from some start to all of these states q, p (f, n) of oscillators with mass,
     stiffness and friction `springs` [M, M/T2, M/T] after so many steps (f,), as far as their digits show.
 
-    A start and an equilibrium are fitted by least squares, in units of the last digit and of what a program
-    in single precision rounds on its way.  Numbers that are rounded are half a unit off at most, and cut off
-    one unit: so is then the root mean square with the start that is best.
+    A start and an equilibrium are fitted by least squares, in units of the last digit, at least those of the
+    decimals of text (2, n), `last`, and of what a program in single precision rounds on its way.  Numbers
+    that are rounded are half a unit off at most, and cut off one unit: so is then the root mean square with
+    the start that is best.
     """
     for j, (m, k, c) in enumerate(np.transpose(springs)):
-        units = [_unit(x[:, j], steps, roundoff) for x in (q, p)]
+        units = [_unit(x[:, j], steps, roundoff, unit[j]) for x, unit in zip((q, p), last, strict=True)]
         with np.errstate(all="ignore"):
             one_step = matrix(scheme, h=h, m=np.array([m]), k=np.array([k]), c=np.array([c]))
             try:
@@ -103,13 +108,14 @@ def has_a_start(
     return True
 
 
-def _unit(x: Floats, steps: Integers, roundoff: float) -> Floats:
+def _unit(x: Floats, steps: Integers, roundoff: float, least: float) -> Floats:
     """The last digit of numbers (f,), and one rounding of each of so many steps: in single precision where
     digits do not exclude it, or in the shorter format that they are stored in."""
     form = storage(x)
     unit = 2 * roundoff * np.max(np.abs(x)) if form.name == "double" else form.quantum(x)
     # a 0 is written with no digit, and is that of a start mostly
     unit = np.where(unit > 0, unit, np.min(unit, where=unit > 0, initial=np.max(unit)))
+    unit = np.maximum(unit, least)
     coarse = form.name in BINARY or np.max(unit) >= 2.0**-24 * np.max(np.abs(x))
     own = 2.0 ** -BINARY.get(form.name, BINARY["single"]) if coarse else 2.0**-53
     return np.asarray(unit + own * steps * np.maximum.accumulate(np.abs(x)))
@@ -117,15 +123,26 @@ def _unit(x: Floats, steps: Integers, roundoff: float) -> Floats:
 
 def seen_to_take(scene: Scene, run: Trajectory, about: int) -> str:
     """One sentence on the schemes of the catalogue that take the recorded steps around a frame; "" where none
-    does, where not all forces are potentials, and where frames are several steps apart."""
-    if run.every != 1 or any(term.kind != "potential" for term in scene.terms):
+    does, and where frames are more than `MOST_STEPS` apart."""
+    if run.every > MOST_STEPS:
         return ""
     first = max(0, min(about - STEPS // 2, len(run.t) - STEPS))
-    frames = slice(first, first + STEPS + 1)
-    # r-RESPA without fast springs is velocity Verlet
-    others = {"friction"} if any(term.fast for term in scene.terms) else {"friction", "mixes"}
-    names = [name for name, x in SCHEMES.items() if x.has("one-step") and not x.traits & others]
-    found = takers(names, scene, run.step, run.q[frames], run.p[frames])
+    frames, system = slice(first, first + STEPS + 1), scene.system
+    q, p = run.q[frames], run.p[frames]
+    if system.is_driven:
+        t = run.t[frames, None]
+        q, p = np.hstack([q, t]), np.hstack([p, np.full_like(t, CLOCK)])
+    # without what they take apart such schemes are others: Boris' rotation position Verlet
+    idle = {"mixes"} if not any(term.fast for term in scene.terms) else set[str]()
+    idle |= {"friction"} if not system.is_damped or system.brakes_by_place else set()
+    idle |= {"magnetic"} if "magnetic" not in system.acting else set()
+    found: tuple[str, ...] = ()
+    for known in (SCHEMES, ATTACHED):
+        here = {x: {*y.traits, *(kind.evaluates for kind in y.kinds)} for x, y in known.items()}
+        names = [name for name, traits in here.items() if "one-step" in traits and not idle & traits]
+        # a force that is held is that of a plain scheme where it is constant
+        found = found or takers(names, system.clocked, run.step, q, p, every=run.every)
     # that steps which failed are nearly the scheme's own is no cause
     titles = [title(name) for name in found if run.scheme not in found]
-    return f"Every step recorded there is that of {either(titles)}" if titles else ""
+    what = "step recorded there is that" if run.every == 1 else f"frame there follows by {run.every} steps"
+    return f"Every {what} of {either(titles)}" if titles else ""

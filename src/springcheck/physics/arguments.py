@@ -32,6 +32,7 @@ ANNOTATED: dict[str, tuple[str, Callable[[Any], bool]]] = {
     "Sequence[str]": ("texts", lambda x: isinstance(x, Sequence) and all(isinstance(y, str) for y in x)),
     "Path": ("a path", lambda x: isinstance(x, PathLike)),
     "Scene": ("a Scene", lambda x: type(x).__name__ == "Scene"),
+    "Axes": ("an Axes of matplotlib", lambda x: hasattr(x, "plot")),
     "Trajectory": ("a Trajectory", lambda x: type(x).__name__ == "Trajectory"),
     "None": ("", lambda x: x is None),
 }

@@ -99,8 +99,8 @@ class Trajectory:
         m, every = (mass, every) if scene is None else (scene.m if mass is None else mass, scene.every)
         if p is None and m is None:
             raise SpringcheckError(f"{label}: velocities make momenta with mass= or scene=")
-        if not every >= 1 or every % 1:
-            raise SpringcheckError(f"{label}: every = {every}: a whole number of steps, 1 or more, is needed")
+        if not 1 <= every <= 2**53 or every % 1:
+            raise SpringcheckError(f"{label}: every = {every}: a whole number from 1 to 2**53 is needed")
         given = {"t": t, "q": q, "p or v": v if p is None else p, "mass": m if p is None else 1.0}
         time, where, speed, m = reals(label, **given)
         where, speed = (x[:, None] if x.ndim == 1 else x for x in (where, speed))

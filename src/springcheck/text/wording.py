@@ -2,12 +2,26 @@
 
 from __future__ import annotations
 
+import ast
+import inspect
 import math
+import sys
+import textwrap
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import Any, cast
 
 STATES_SHOW = ". What the states show: "
 """Separator between the reason of a failed verdict and its cause."""
+
+
+def described(one: Any) -> str:
+    """The docstring of a function or class, without its indent: that of its source where Python leaves
+    docstrings out (-OO)."""
+    if sys.flags.optimize < 2:
+        return inspect.cleandoc(one.__doc__ or "")
+    tree = ast.parse(textwrap.dedent(inspect.getsource(one)))
+    return ast.get_docstring(cast(Any, tree.body[0])) or ""
 
 
 def ordinal(n: int) -> str:
