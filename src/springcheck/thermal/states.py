@@ -106,6 +106,8 @@ def _identified(q: Floats, v: Floats, h: float, beside: Floats | None, mixed: bo
         return None
     z = np.stack([x, u])
     sizes_left, left = residuals.left_of(z, np.empty((0, z.shape[1] - 1)))
+    if residuals.of_state(left[1], x[:-1], u[:-1]):
+        return None
     # a nonlinear force is no scheme's draw
     known = np.stack([x[:-1], u[:-1], np.ones(len(x) - 1)], axis=1)
     bent = residuals.follows(left[1], np.stack([x**2, x**3], axis=1)[:-1], known)
