@@ -83,8 +83,8 @@ def is_of_digits(x: Floats) -> bool:
 
 
 def of_state(left: Floats, x: Floats, u: Floats) -> bool:
-    """Whether residuals (f,) follow from the states x, u (f,) of size 1 where they begin: those of the nearest
-    states are as large, and of noise, even a few single draws, at least half of the variance is unlike."""
+    """Whether residuals (f,) follow from the states x, u (f,), of size 1, where they begin: neighbouring
+    states then have nearly the same."""
     from scipy.spatial import cKDTree
 
     z = np.stack([x, u], axis=1)
