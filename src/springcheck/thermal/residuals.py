@@ -88,7 +88,7 @@ def of_state(left: Floats, x: Floats, u: Floats) -> bool:
     from scipy.spatial import cKDTree
 
     z = np.stack([x, u], axis=1)
-    nearest = cKDTree(z).query(z, 2)[1][:, 1]
+    nearest = np.asarray(cKDTree(z).query(z, 2)[1])[:, 1]
     return bool(np.mean((left - left[nearest]) ** 2) < UNLIKE * np.var(left))
 
 
