@@ -83,8 +83,8 @@ def _unlike(e: Evidence, fitting: list[Match]) -> Explanation | None:
         return None
     return Explanation(
         f"The map of coordinate {e.j} alone may be that of {titles(x.scheme for x in fitting)}, but no known "
-        "scheme has the maps of all coordinates: one that takes some forces in other steps, as r-RESPA, or an "
-        "unknown one",
+        "scheme has the maps of all coordinates: one that takes some forces in other steps, as r-RESPA, or "
+        "an unknown one",
         "compare the order of its stages and their coefficients with the scheme's; give one coordinate alone",
     )
 
