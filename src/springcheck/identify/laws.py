@@ -338,4 +338,6 @@ def explained_by(e: Evidence, found: Regression) -> Explanation:
 def alone(law: Cause, e: Evidence) -> Explanation | None:
     """Explanation by a law that leaves almost no residual."""
     found = regression(e, law)
-    return explained_by(e, found) if found.shows and found.left < 1 / FALLS else None
+    # what pushes along the velocity is no friction
+    along = law is DRY and found.x[-1, 1] > 0
+    return explained_by(e, found) if found.shows and found.left < 1 / FALLS and not along else None

@@ -14,12 +14,13 @@ import numpy as np
 
 from springcheck.identify.evidence import FALLS, FIXED, LEFT_BY_ROUNDING, Evidence
 from springcheck.identify.fit import fit
+from springcheck.identify.noise import least_squares
 from springcheck.identify.record import Record
 from springcheck.identify.result import Explanation
 from springcheck.physics.arrays import Extended, Floats
 
 LEAPS = 4.0
-"""Ratio of a displacement to the median one from which a position jumps."""
+"""Ratio of the length of a box to what the velocities of a step leave of its way, beside a box."""
 
 AGAINST = 0.3
 """Relative difference up to which displacements are opposite to the velocities."""
@@ -63,25 +64,24 @@ def _ways(record: Record, columns: list[int]) -> tuple[Floats, Floats]:
 def _wrapped(record: Record, j: int) -> Iterator[Repair]:
     """Undo positions wrapped into a box: jumps of one length."""
     (moved,), (mean,) = (x.T for x in _ways(record, [j]))
-    way, usual = moved - mean, float(np.median(np.abs(moved)))
-    leaps = np.abs(way) > LEAPS * max(usual, 1e-300)
-    if not np.any(leaps):
+    # beside the mean of both velocities a step moves by its error, and at the edge of a box by its length
+    way = moved - mean
+    box = float(np.max(np.abs(way)))
+    times = np.rint(way / max(box, 1e-300))
+    if np.any(LEAPS * np.abs(way - times * box) > box):
         return
-    box = float(np.median(np.abs(way[leaps])))
-    times = np.rint(way / box)
-    if not LEAPS * usual < box > np.ptp(record.q[:, j]) - usual or np.any(
-        np.abs(way - times * box) > LEAPS * usual
-    ):
+    # of positions with so many boxes added there is one map, and it tells the box better than a leap does
+    often = np.concatenate([[0.0], np.cumsum(times)])
+    columns = [record.q[:-1, j], record.v[:-1, j], often[:-1], often[1:], np.ones(len(way), np.longdouble)]
+    box = float(least_squares(np.stack(columns, axis=1), record.q[1:, [j]])[3, 0])
+    if not box > np.ptp(record.q[:, j]) - np.max(np.abs(moved - times * box)):
         return
-    # a box edge is a number of few digits; its estimate from the states is exact only to their rounding
-    short = next((x for n in range(1, 17) if abs((x := float(f"{box:.{n}g}")) - box) < usual), box)
-    shift = np.concatenate([[0.0], np.cumsum(times)]) * short
     unwrapped = record.q.copy()
-    unwrapped[:, j] -= shift
+    unwrapped[:, j] -= box * often
     first = int(np.flatnonzero(times)[0]) + 1
     yield (
         replace(record, q=unwrapped),
-        f"The positions of coordinate {j} are wrapped into a box of {short:.6g}, first at frame {first}",
+        f"The positions of coordinate {j} are wrapped into a box of {box:.6g}, first at frame {first}",
         "write unwrapped positions, or unwrap them by the length of the box",
     )
 

@@ -25,7 +25,7 @@ from springcheck.text.wording import either
 from springcheck.thermal.catalogue import THERMOSTATS, family_of, random_scheme
 from springcheck.thermal.likelihood import SUBSTEPS_TRIED
 from springcheck.thermal.modes import FREE_OF_NOISE, modes
-from springcheck.thermal.residuals import FEWEST
+from springcheck.thermal.residuals import FEWEST, is_of_digits
 from springcheck.thermal.states import Thermal, identify_thermal
 
 MOST = 8
@@ -51,7 +51,7 @@ def one_factor(h: float, q: Floats, v: Floats) -> tuple[str, float, Floats] | No
     here, both = (np.column_stack([y, np.ones(len(y))]) for y in (x[:-1], x[:-1] + x[1:]))
     ways = ((v[:-1], np.diff(x, axis=0) / h, here), (v[1:], v[:-1], both), (v[1:], v[:-1], here))
     for i, (a, b, F) in enumerate(ways):
-        misfit, pulled = 0.0, b.copy()
+        misfit, pulled, irregular = 0.0, b.copy(), True
         for j in range(1, n):
             one, other = a[:, j] * b[:, 0], a[:, 0] * b[:, j]
             unlike = float(np.linalg.norm(one - other))
@@ -59,7 +59,10 @@ def one_factor(h: float, q: Floats, v: Floats) -> tuple[str, float, Floats] | No
                 return None
             columns = np.concatenate([-a[:, [j]] * F, a[:, [0]] * F], axis=1)
             c = np.linalg.lstsq(columns, one - other, rcond=None)[0]
-            misfit = max(misfit, float(np.linalg.norm(one - other - columns @ c)) / unlike)
+            left = one - other - columns @ c
+            misfit = max(misfit, float(np.linalg.norm(left)) / unlike)
+            # of a short arc many constants come near any smooth motion; rounding is all that a factor leaves
+            irregular = irregular and is_of_digits(left[::2])
             pulled[:, 0], pulled[:, j] = b[:, 0] + F @ c[: n + 1], b[:, j] + F @ c[n + 1 :]
         of, made = (pulled, a) if i else (a, pulled)
         factor = np.sum(of * made, axis=1) / np.sum(of**2, axis=1)
@@ -68,7 +71,7 @@ def one_factor(h: float, q: Floats, v: Floats) -> tuple[str, float, Floats] | No
         high, low = np.quantile(factor, [0.9, 0.1])
         # a factor of either sign, which Bussi's thermostat draws, comes near more motions
         sharp = SHARP_FACTOR if low > 0 else SHARP_FACTOR**2
-        if max(misfit, *off) < sharp * (high - low) / max(abs(high), abs(low)):
+        if irregular and max(misfit, *off) < sharp * (high - low) / max(abs(high), abs(low)):
             return PLACES_OF_FACTOR[i], misfit, np.asarray(factor)
     return None
 

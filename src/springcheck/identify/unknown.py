@@ -14,7 +14,7 @@ from springcheck.identify.evidence import AGREES, FALLS, LEFT_BY_ROUNDING, Evide
 from springcheck.identify.families import title
 from springcheck.identify.fit import Map, fit
 from springcheck.identify.hypothesis import STRIDES, SURE, distinct
-from springcheck.identify.laws import LAWS, Cause, Regression, regression
+from springcheck.identify.laws import ANHARMONIC, LAWS, OF_VELOCITY, Cause, Regression, regression
 from springcheck.identify.record import DEEP
 from springcheck.identify.result import Explanation
 from springcheck.physics.arrays import Floats
@@ -171,10 +171,14 @@ def lasting(e: Evidence) -> Explanation | None:
     """A multistep map whose parasitic solution does not decay.
 
     A disturbance of relative size d with a few frequencies obeys a multistep map to d**2, and a drive of one
-    frequency obeys it exactly.
+    frequency obeys it exactly.  So do the few harmonics of a force that is
+    not quite linear.
     """
     found = None if e.size**2 < LEFT_BY_ROUNDING * np.max(e.unit) else _remembering(e)
-    if found is None or any(regression(e, law).exact for law in LAWS):
+    if found is None or any(
+        x.exact or (x.law.kind in (ANHARMONIC, OF_VELOCITY) and x.shows and FALLS * x.left < 1)
+        for x in (regression(e, law) for law in LAWS)
+    ):
         return None
     return Explanation(
         f"{found.law.cause}, and what is remembered does not fade: a scheme of several steps (as Milne's), "
@@ -209,7 +213,7 @@ def memory(e: Evidence) -> Explanation | None:
     if any(x[e.pairs // 4 :].max() > FORGOTTEN * x.max() for x in fading):
         return None
     several = _remembering(e)
-    follows = several.law.cause if several else "Each state follows from several before it, and not from one"
+    follows = several.law.cause if several else "The first frames follow another map than those after them"
     found = several or found
     # the first frames alone show the other map, but for which all follow one
     later = fit(e.record, e.j, kept=np.arange(e.pairs) >= e.pairs // 2)
@@ -227,8 +231,10 @@ def memory(e: Evidence) -> Explanation | None:
         return None
     whose = either(_remembered(e, later))
     kind = "several steps or with an acceleration of its own (Adams, BDF, generalised alpha, Gear)"
+    # what fades may be a force that is not linear, where no multistep map explains it
+    other = "" if whose or several else ", or a force that is not linear where the motion is largest"
     return Explanation(
-        f"{follows}: a scheme with memory, of {whose or kind}, whose start differs from one map by "
+        f"{follows}: a scheme with memory, of {whose or kind}{other}, whose start differs from one map by "
         f"{before:.1e} of the state's size",
         "leave the first frames out, and judge it as a scheme of as many steps",
         found.worst / weighted,

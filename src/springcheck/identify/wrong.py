@@ -53,8 +53,11 @@ def wrong_map(e: Evidence) -> list[Explanation]:
         found = Explanation(cause, family.remedy, joint.misfit, hypothesis=joint.parts[0])
         ranked.append((_rank(e, joint), found))
     if fitting:
-        own = [x for rank, x in ranked if rank == 0 and e.stiffness is not None]
-        return own or [_departing(e, fitting)]
+        each = {x: Joint(family=x.family, stride=x.stride, parts=(x,)) for x in fitting}
+        of_stated = [x for x, joint in each.items() if _rank(e, joint) == 0]
+        # a fault explains no more than a scheme of the stated stiffness does
+        own = [x for rank, x in ranked if rank == 0 and e.stiffness is not None and not of_stated]
+        return own or [_unlike(e, fitting) or _departing(e, of_stated or fitting)]
     ranked += [(2, x) for x in _negative_friction(e)]
     scaled, certain = _scales(e)
     if certain and (other := by_parameter(e)):
@@ -71,14 +74,30 @@ def wrong_map(e: Evidence) -> list[Explanation]:
     return [x for _, x in sorted(ranked, key=lambda pair: pair[0])]
 
 
-def _departing(e: Evidence, fitting: list[Match]) -> Explanation:
-    size = float(np.max(np.abs(e.residuals)))
+def _unlike(e: Evidence, fitting: list[Match]) -> Explanation | None:
+    """The cause where each coordinate's map may be a scheme's, and no scheme has all of them."""
+    names = {x.scheme for x in fitting}
+    for found in e.others:
+        names &= {x.scheme for x in matched(found, e.terms)}
+    if names:
+        return None
     return Explanation(
-        f"The map is {title(fitting[0].scheme)}'s, but single steps depart from it by up to {size:.1e} of "
-        "the state's size, which no arithmetic that is known explains",
-        "look at what is rounded in a step beside positions, velocities and forces",
+        f"The map of coordinate {e.j} alone may be that of {titles(x.scheme for x in fitting)}, but no known "
+        "scheme has the maps of all coordinates: one that takes some forces in other steps, as r-RESPA, or "
+        "an unknown one",
+        "compare the order of its stages and their coefficients with the scheme's; give one coordinate alone",
+    )
+
+
+def _departing(e: Evidence, fitting: list[Match]) -> Explanation:
+    size, names = float(np.max(np.abs(e.residuals))), {x.scheme for x in fitting}
+    whose = f"that of {titles(x.scheme for x in fitting)}" if len(names) > 1 else f"{title(*names)}'s"
+    return Explanation(
+        f"The map is {whose}, but single steps depart from it by up to {size:.1e} of the state's size, which "
+        "no arithmetic that is known explains",
+        "look at what is rounded, rescaled or added in a step beside positions, velocities and forces",
         size,
-        hypothesis=fitting[0],
+        hypothesis=fitting[0] if len(names) == 1 else None,
     )
 
 

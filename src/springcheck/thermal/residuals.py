@@ -22,6 +22,10 @@ WHITE = 1e-9
 EVEN = 1e-4
 """Chance below which noise on momenta may be a factor, and no draw is inferred from it."""
 
+UNLIKE = 0.8
+"""Mean squared difference of the residuals of neighbouring states, over their variance, below which these
+follow from the state: 2 of noise, 1 of one draw beside none, less than 0.1 of a smooth function."""
+
 UNIFORM = "uniform, not normal"
 
 JOINED_FROM = 6.0
@@ -76,6 +80,16 @@ def is_white(x: Floats) -> bool:
 def is_of_digits(x: Floats) -> bool:
     """Whether residuals are rounding to digits: their size goes with a number's, their sign with nothing."""
     return is_white(np.sign(x - np.median(x)))
+
+
+def of_state(left: Floats, x: Floats, u: Floats) -> bool:
+    """Whether residuals (f,) follow from the states x, u (f,), of size 1, where they begin: neighbouring
+    states then have nearly the same."""
+    from scipy.spatial import cKDTree
+
+    z = np.stack([x, u], axis=1)
+    nearest = np.asarray(cKDTree(z).query(z, 2)[1])[:, 1]
+    return bool(np.mean((left - left[nearest]) ** 2) < UNLIKE * np.var(left))
 
 
 def unlike_normal(x: Floats) -> str:

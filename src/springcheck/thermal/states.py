@@ -102,10 +102,10 @@ def _identified(q: Floats, v: Floats, h: float, beside: Floats | None, mixed: bo
     # a constant beside the state: the centre is not known
     frames = np.stack([x[1:], u[1:], x[:-1], u[:-1], np.ones(len(x) - 1)], axis=1)
     weights, turned = np.linalg.svd(frames, full_matrices=False)[1:]
-    if weights[3] < NOISE * weights[0]:
-        return None
     z = np.stack([x, u])
     sizes_left, left = residuals.left_of(z, np.empty((0, z.shape[1] - 1)))
+    if weights[3] < NOISE * weights[0] or residuals.of_state(left[1], x[:-1], u[:-1]):
+        return None
     # a nonlinear force is no scheme's draw
     known = np.stack([x[:-1], u[:-1], np.ones(len(x) - 1)], axis=1)
     bent = residuals.follows(left[1], np.stack([x**2, x**3], axis=1)[:-1], known)
