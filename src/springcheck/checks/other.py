@@ -178,7 +178,7 @@ def _kinds(case: Case) -> Iterator[Kind]:
                 yield Kind(name, " of ", numbers, other, least, objects, of_axes, reach, power)
     objects = _objects([((int(place) // 3,), 1) for place in places[:n]])
     for of, way in ((" of ", _heavier), (" that divides the force on ", _quicker)):
-        yield Kind("mass", of, scene.m[:n], partial(way, case), off, objects)
+        yield Kind("mass", of, scene.m[:n], partial(way, case), off[:n], objects)
 
 
 def _objects(of: list[tuple[tuple[int, ...], int]]) -> list[Rows]:
