@@ -22,7 +22,7 @@ WHITE = 1e-9
 EVEN = 1e-4
 """Chance below which noise on momenta may be a factor, and no draw is inferred from it."""
 
-UNLIKE = 0.8
+NEIGHBOURS_DIFFER = 0.8
 """Mean squared difference of the residuals of neighbouring states, over their variance, below which these
 follow from the state: 2 of noise, 1 of one draw beside none, less than 0.1 of a smooth function."""
 
@@ -89,7 +89,7 @@ def of_state(left: Floats, x: Floats, u: Floats) -> bool:
 
     z = np.stack([x, u], axis=1)
     nearest = np.asarray(cKDTree(z).query(z, 2)[1])[:, 1]
-    return bool(np.mean((left - left[nearest]) ** 2) < UNLIKE * np.var(left))
+    return bool(np.mean((left - left[nearest]) ** 2) < NEIGHBOURS_DIFFER * np.var(left))
 
 
 def unlike_normal(x: Floats) -> str:
