@@ -230,7 +230,7 @@ def maps(scheme: Scheme, of: Linear, h: Floats) -> Extended:
 
 def eigenvalues(maps: Extended) -> np.ndarray:
     """Eigenvalues (..., 2n) of maps, NaN of those that are not finite."""
-    finite = np.isfinite(maps).all(axis=(-1, -2))
+    finite = np.asarray(np.isfinite(maps).all(axis=(-1, -2)))
     values = np.linalg.eigvals(np.where(finite[..., None, None], maps, 0).astype(np.float64))
     return np.where(finite[..., None], values, np.nan)
 
