@@ -125,6 +125,20 @@ def test_every_colour_is_seen_on_white_and_on_black() -> None:
         assert len(set(shades)) == len(shades)
 
 
+def test_names_in_the_colour_of_a_curve_are_read_on_white_and_on_black() -> None:
+    css = (Path(looks.__file__).parents[1] / "cli" / "page" / "page.css").read_text()
+    (share,) = re.findall(r"svg \.name .*color-mix\(in srgb, var\(--of\) (\d+)%, var\(--ink\)\)", css)
+    inks, papers = (re.findall(rf"--{name}: (#[0-9a-f]+)", css)[:2] for name in ("ink", "paper"))
+    papers[0] = {"#fff": "#ffffff"}[papers[0]]
+    for pair in (*looks.ON_SCREEN.values(), looks.FAILED_ON_SCREEN):
+        for colour, ink, paper in zip(pair, inks, papers, strict=True):
+            both = zip(bytes.fromhex(colour[1:]), bytes.fromhex(ink[1:]), strict=True)
+            mixed = "#" + bytes(round((int(share) * a + (100 - int(share)) * b) / 100) for a, b in both).hex()
+            high, low = sorted((luminance(mixed), luminance(paper)), reverse=True)
+            # 1.4.3 asks more of text
+            assert (high + 0.05) / (low + 0.05) >= 4.5, (mixed, paper)
+
+
 def luminance(colour: str) -> float:
     """Of #rrggbb, relative to white, as those guidelines define it."""
     parts = [int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5)]

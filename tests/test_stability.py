@@ -22,7 +22,7 @@ from springcheck.physics import scenefile as scenes
 from springcheck.physics.arrays import Extended
 from springcheck.physics.driven import ModulatedSpring
 from springcheck.physics.scene import Scene
-from springcheck.physics.terms import Damping, Quartic, Spring, Weight
+from springcheck.physics.terms import Damping, Quartic, Spring, WallSpring, Weight
 from springcheck.schemes import lookup
 from springcheck.studies.choose import LeftOut
 from springcheck.studies.run import measure as session
@@ -244,6 +244,43 @@ def test_the_largest_step_is_where_the_scene_itself_begins_to_grow(
     assert below < 10
     # the lightly damped circuit grows by 7e-6 a step there, the others by far more
     assert above > (1.2 if name == "rlc-circuit" and method == "own:euler" else 1e10) * below
+
+
+@pytest.mark.parametrize("stiff", [3e3, 1e5])
+def test_a_resonance_narrower_than_the_scan_is_found(stiff: float, need: Need) -> None:
+    need("own:respa8")
+    m, label = np.array([1.3, 0.9]), engines.parse("own:respa8")
+    wall = WallSpring(i=[0], k=[1.7], at=[0.0])
+    scene = Scene(
+        m=m,
+        terms=(wall, Spring(a=[0], b=[1], k=[stiff], rest=[0.0], fast=True)),
+        q=[0.3, 0.3],
+        p=[0.6, 0.4],
+        step=1e-3,
+        steps=1,
+    )
+    w = np.sqrt(stiff * (1 / m).sum())
+    # a slow kick every half turn of the fast spring's own 8 steps: just below h w = 16 sin(pi/16)
+    (low, high), second = resonance.measure(scene, label).bands
+    assert high == pytest.approx(16 * np.sin(np.pi / 16), rel=1e-7)
+    # to first order in the slow spring's share of w**2 of the fast mode
+    share = 1.7 / m[0] * m[1] / m.sum() / w**2
+    assert (high - low) / high == pytest.approx(share, rel=5e-3)
+    assert second[0] > 6
+    assert longest(schemes.scheme("respa8"), scene) * w == pytest.approx(low, rel=1e-8)
+
+
+def test_the_largest_step_of_fast_springs_alone_is_that_of_their_own_steps() -> None:
+    m, k = np.array([1.7, 0.9]), np.array([4.0, 11.0])
+    terms = (
+        WallSpring(i=[0], k=k[:1], at=[0.0], fast=True),
+        Spring(a=[0], b=[1], k=k[1:], rest=[0.0], fast=True),
+    )
+    scene = Scene(m=m, terms=terms, q=[0.3, 0.3], p=[0.6, 0.4], step=0.1, steps=1)
+    stiff = np.array([[k.sum(), -k[1]], [-k[1], k[1]]]) / np.sqrt(np.outer(m, m))
+    assert longest(schemes.scheme("respa8"), scene) == pytest.approx(
+        16 / np.sqrt(np.linalg.eigvalsh(stiff)[-1]), rel=1e-8
+    )
 
 
 @pytest.mark.parametrize(("given", "wrong", "unmeasured"), [(np.nan, 0, 12), (np.inf, 7, 0)])

@@ -106,7 +106,7 @@ class Chart {
     inside.append(...texts);
     const fills = new Map(this.seen().map(({ group, look }) => [group, colourOf(look)])), [a, b, c, d] = all;
     for (const one of spec.labels.filter(({ group }) => fills.has(group)).sort((p, q) => q.y - p.y)) {
-      const style = { fill: fills.get(one.group) }, [off, more] = one.x > 0.6 ? [-4, END] : [4, {}];
+      const style = { "--of": fills.get(one.group) }, [off, more] = one.x > 0.6 ? [-4, END] : [4, {}];
       // those beside the axes are pushed down from the edge, each below the one above it
       above = Math.max(T + 9, y(c + one.y * (d - c)) - 4, one.x === 1 ? above + LINE : 0);
       const place = { x: x(a + one.x * (b - a)) + off, y: above };

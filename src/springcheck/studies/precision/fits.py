@@ -191,11 +191,15 @@ def order(points: Sequence[Point], how: Condition | None = None) -> Fit | None:
     found, slopes = line(x, y), _slopes(x, y)
     *_, before, last = np.diff(slopes)
     error = max(found.standard_error, float(np.ptp(slopes)))
-    if abs(last) > MOST_DRIFT:
-        # where a term vanishes the slopes end beyond the last by the sum of a geometric series (Aitken)
-        if not abs(last) < abs(before):
-            return None
-        error = max(error, abs(float(slopes[-1] + last * last / (before - last)) - found.slope))
+    slower = abs(last) < abs(before)
+    if not slower and abs(last) > MOST_DRIFT:
+        return None
+    # where a term vanishes the slopes end beyond the last by the sum of a geometric series (Aitken)
+    beyond = last * last / (before - last) if slower else np.copysign(np.inf, last)
+    if abs(last) <= MOST_DRIFT:
+        # no end is in sight where rounding, too, may change the slope: they may drift as far again
+        beyond = np.clip(beyond, *(np.array([-1, 1]) * len(slopes) * abs(last)))
+    error = max(error, abs(float(slopes[-1] + beyond - found.slope)))
     if error > 0.5:
         return None
     return Fit(

@@ -208,10 +208,10 @@ def _oscillators(w2: Floats, modes: Floats, rate: Floats) -> Linear:
     )
 
 
-def grows(scheme: Scheme, of: Linear, h: Floats) -> np.ndarray:
-    """Whether a step of h (j,) [T] makes some mode grow; modes on a barrier (A < 0) grow anyway."""
+def maps(scheme: Scheme, of: Linear, h: Floats) -> Extended:
+    """One-step matrices of a step of h (j,) [T], in units of each step (j, g, 2n, 2n)."""
     g, n = of.rate.shape
-    # in units of each step: A h**2 and r h
+    # A h**2 and r h
     t = np.asarray(h, np.longdouble)[:, None, None, None]
     slow, fast, rate = of.slow * t * t, of.fast * t * t, of.rate[:, None, :] * t
     eye, none = np.eye(n, dtype=np.longdouble), np.zeros((n, n), dtype=np.longdouble)
@@ -220,19 +220,29 @@ def grows(scheme: Scheme, of: Linear, h: Floats) -> np.ndarray:
     def force(a: Extended, brake: Extended | float) -> Force:
         return lambda q, p: np.asarray(-(q @ a) - brake * p)
 
-    one = np.longdouble(1)
     q, p = schemes.step(
-        scheme, q, p, h=one, m=np.ones(n), force=force(slow + fast, rate),
+        scheme, q, p, h=np.longdouble(1), m=np.ones(n), force=force(slow + fast, rate),
         rate=rate if np.any(rate) else None, parts=(force(slow, rate), force(fast, 0.0)),
     )  # fmt: skip
     # rows are the images of the unit vectors
-    maps = np.swapaxes(np.concatenate([q, p], axis=-1), -1, -2)
-    if n == 1:
-        wild = ~propagators.bounded(maps.reshape(-1, 2, 2), 64 * ROUNDOFF).reshape(len(h), g)
-        return np.asarray(np.any(wild & ((of.slow + of.fast)[:, 0, 0] >= 0), axis=-1))
-    finite = np.isfinite(maps).all(axis=(-1, -2))
+    return np.swapaxes(np.concatenate([q, p], axis=-1), -1, -2)
+
+
+def eigenvalues(maps: Extended) -> np.ndarray:
+    """Eigenvalues (..., 2n) of maps, NaN of those that are not finite."""
+    finite = np.asarray(np.isfinite(maps).all(axis=(-1, -2)))
     values = np.linalg.eigvals(np.where(finite[..., None, None], maps, 0).astype(np.float64))
-    return np.asarray(np.any(~finite | (np.max(np.abs(values), axis=-1) > 1 + COUPLED_GROWTH), axis=-1))
+    return np.where(finite[..., None], values, np.nan)
+
+
+def grows(scheme: Scheme, of: Linear, h: Floats) -> np.ndarray:
+    """Whether a step of h (j,) [T] makes some mode grow; modes on a barrier (A < 0) grow anyway."""
+    found = maps(scheme, of, h)
+    if of.rate.shape[1] == 1:
+        wild = ~propagators.bounded(found.reshape(-1, 2, 2), 64 * ROUNDOFF).reshape(found.shape[:2])
+        return np.asarray(np.any(wild & ((of.slow + of.fast)[:, 0, 0] >= 0), axis=-1))
+    largest = np.max(np.abs(eigenvalues(found)), axis=-1)
+    return np.asarray(np.any(~(largest <= 1 + COUPLED_GROWTH), axis=-1))
 
 
 @lru_cache(maxsize=64)
@@ -352,7 +362,11 @@ def _first(scheme: Scheme, of: Linear, scale: float) -> float:
     """The first growing step of a scan, to a part in 1e10."""
     h = np.geomspace(FIRST_STEP, LAST_STEP, SCANNED_STEPS) / scale
     if scheme.has("mixes"):
-        # a resonance may be narrow: equal spacing up to the limit of the fast springs alone
-        h = np.linspace(0, scheme.limit, SCANNED_STEPS + 1)[1:] / scale
+        # a resonance may be narrow: equal spacing up to the limit of the fast springs alone, and where
+        # eigenvalues meet
+        even = np.linspace(0, scheme.limit, SCANNED_STEPS + 1)[1:] / scale
+        with np.errstate(all="ignore"):
+            met = propagators.meetings(lambda h: eigenvalues(maps(scheme, of, h))[:, 0], even)
+        h = np.append(np.sort(np.append(even, met)), h[h > even[-1]])
     with np.errstate(all="ignore"):
         return propagators.first(lambda h: (grows(scheme, of, h), h), h, REFINED_STEPS, 6)

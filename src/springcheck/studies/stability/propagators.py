@@ -30,6 +30,13 @@ STEP = 0.125
 """Step of every scan: a power of 2, so that h w is known to a rounding of sqrt(k/m)."""
 
 
+EQUAL_ANGLES = 1e-6
+"""Difference of two angles of eigenvalues below which they count as equal throughout."""
+
+CLOSING_ROUNDS = 9
+"""Times that the interval about a meeting is divided by 4, to 4e-6 of the grid's spacing."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Springs:
     """Uncoupled springs under one method: h w (n,), and friction rate times step, one number or (n,)."""
@@ -188,6 +195,35 @@ def first(
             break
         grid = np.linspace(low, high, fine)
     return float((low + high) / 2)
+
+
+def meetings(values: Callable[[Floats], Floats | np.ndarray], grid: Floats) -> Floats:
+    """Points (c,) between those of a grid (j,) at which angles of eigenvalues `values` (j, 2n) come nearest.
+
+    Eigenvalues of a symplectic map leave the unit circle only where two of them meet, so that a band of
+    growth narrower than the grid's spacing lies there or nowhere (Krein).
+    """
+
+    def gaps(x: Floats) -> tuple[Floats, Floats]:
+        # real matrices: each angle from 0 to pi is there twice, with its conjugate or with its inverse
+        found = values(x)
+        angle = np.sort(np.abs(np.angle(found)), axis=-1)[:, ::2]
+        return np.diff(angle, axis=-1, prepend=0.0, append=np.pi), np.max(np.abs(found), axis=-1) - 1
+
+    found, _ = gaps(grid)
+    before, here, after = found[:-2], found[1:-1], found[2:]
+    # equal frequencies have no gap to close
+    apart = np.maximum(before, after) > EQUAL_ANGLES
+    at, which = np.nonzero((here <= np.minimum(before, after)) & apart)
+    low, middle, high, each = grid[at], grid[at + 1], grid[at + 2], np.arange(len(at))
+    for _ in range(CLOSING_ROUNDS if len(at) else 0):
+        x = np.linspace(low, high, 9)
+        gap, growth = gaps(x.ravel())
+        # where the gap is closed, the point of most growth
+        least = gap.reshape(*x.shape, -1)[:, each, which] - growth.reshape(x.shape)
+        best = np.argmin(least, axis=0)
+        low, middle, high = (x[np.clip(best + i, 0, 8), each] for i in (-1, 0, 1))
+    return middle
 
 
 def absence(label: Label, *turns: float) -> str | None:

@@ -23,7 +23,7 @@ RESONANCE_TURNS = (1.0, 7.0)
 """Range of h w of the fast spring."""
 
 CHAIN_COPIES = 1200
-"""Copies of the chain in the first scan: a band of 0.01 holds two of them."""
+"""Copies of the chain in the first scan, to which those where two eigenvalues meet are added."""
 
 RESONANT_GROWTH = 1e-7
 """Growth per step from which a step counts as growing: nearly equal eigenvalues of a 4 x 4 matrix are known
@@ -64,6 +64,8 @@ def serves(scene: Scene, label: Label) -> bool:
 def measure(scene: Scene, label: Label) -> Resonance:
     """Scan the bands of a scene with springs marked fast, and find their edges to 1e-9."""
     turn = np.linspace(*RESONANCE_TURNS, CHAIN_COPIES)
+    met = propagators.meetings(lambda x: np.linalg.eigvals(maps(scene, label, x, _by_scheme)), turn)
+    turn = np.sort(np.append(turn, met))
 
     def scanned(step: Stepper) -> tuple[Floats, tuple[tuple[float, float], ...]]:
         radius = radii(scene, label, turn, step)
@@ -83,6 +85,11 @@ def measure(scene: Scene, label: Label) -> Resonance:
 
 def radii(scene: Scene, label: Label, turn: Floats, step: Stepper) -> Floats:
     """Spectral radii of one step (j,) of copies of the scene at these h w of the fast spring."""
+    return np.asarray(np.max(np.abs(np.linalg.eigvals(maps(scene, label, turn, step))), axis=-1))
+
+
+def maps(scene: Scene, label: Label, turn: Floats, step: Stepper) -> Floats:
+    """One-step matrices (j, 2n, 2n) of these copies."""
     copies = len(turn)
     scale = (turn / (abs(scene.step) * fast_frequency(scene))) ** 2
     # coordinates in which q and p/(m w) have one scale
@@ -92,8 +99,7 @@ def radii(scene: Scene, label: Label, turn: Floats, step: Stepper) -> Floats:
     many = linear.system.tiled(copies)
     terms = tuple(term.scaled(np.repeat(scale, len(term) // copies)) for term in many.terms)
     units = np.ones((copies, scene.n)), scene.m * w[:, None]
-    matrices = propagators.matrices(replace(many, terms=terms), label, *units, step)
-    return np.asarray(np.max(np.abs(np.linalg.eigvals(matrices)), axis=-1))
+    return propagators.matrices(replace(many, terms=terms), label, *units, step)
 
 
 def _by_scheme(scene: Scene, label: Label) -> tuple[Reals, Reals]:
