@@ -276,7 +276,12 @@ def _borders(box: tuple[float, ...] | None, size: float) -> dict[str, Any]:
     coordinate; in a box atoms are put back at every step, and a bond finds the nearest image of its end up to half a box
     away."""
     if box is None:
-        return {"border": "s s s", "every": 2000000000, "cutoff": 1.0, "edges": " ".join([f"{-size!r} {size!r}"] * 3)}
+        return {
+            "border": "s s s",
+            "every": 2000000000,
+            "cutoff": 1.0,
+            "edges": " ".join([f"{-size!r} {size!r}"] * 3),
+        }
     edges = " ".join(f"0 {length!r}" for length in box)
     return {"border": "p p p", "every": 1, "cutoff": 0.51 * max(box), "edges": edges}
 
