@@ -338,7 +338,7 @@ def test_a_modulated_spring_beside_others_is_warned_of_as_well(beside: str) -> N
     term = ModulatedSpring(i=where, k=400.0, depth=0.3, frequency=2.0, phase=0.0, at=0.7)
     more = {
         "spring": WallSpring(i=where, k=[k], at=[0.4]),
-        "weight": Weight(i=where, force=[1.3]),
+        "weight": Weight(i=where, force=[1.3], at=[0.0]),
         "drive": Drive(i=where, amplitude=[0.3], frequency=[1.1], phase=[0.2]),
         "friction": Damping(i=where, c=[1e-9]),
     }

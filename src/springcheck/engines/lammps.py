@@ -273,8 +273,8 @@ def _drives(scene: Scene, h: float) -> Iterator[str]:
 def _borders(box: tuple[float, ...] | None, size: float) -> dict[str, Any]:
     """How LAMMPS treats borders.  Without a box there are no images, neighbour lists are built once, and what
     borders keep from atoms, 1e-4 of their first distance, is not lost to rounding if that is the largest
-    coordinate; in a box atoms are put back at every step, and a bond finds the nearest image of its end up to half a box
-    away."""
+    coordinate; in a box atoms are put back at every step, and a bond finds the nearest image of its end up to
+    half a box away."""
     if box is None:
         return {
             "border": "s s s",

@@ -9,7 +9,7 @@ bounded again beyond it.  Of one step the product of many tells.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
