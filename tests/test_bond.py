@@ -18,7 +18,7 @@ from springcheck.errors import MethodError, SceneError
 from springcheck.physics import exact, scenefile
 from springcheck.physics.arrays import Floats, Reals
 from springcheck.physics.scene import Scene
-from springcheck.physics.terms import RadialSpring
+from springcheck.physics.terms import RadialSpring, WallSpring
 from springcheck.studies.faults import steppers
 
 Need = Callable[[str], None]
@@ -393,3 +393,14 @@ def test_a_file_of_points_in_space_is_judged_by_a_scene_in_a_plane(
 def test_the_mistakes_are_as_many_as_are_said() -> None:
     assert len(WRONG) == 10
     assert "Ten mistakes (a spring along each axis" in words_of("validation/README.md")
+
+
+@pytest.mark.parametrize("label", ["lammps:bond", "lammps:external"])
+def test_lammps_keeps_atoms_that_begin_far_apart(label: str, need: Any) -> None:
+    """The margin of its box is a part of the box's first width, and was lost to rounding beyond 2**40."""
+    need(label)
+    wall = WallSpring(i=[0], k=[2.9], at=[0.0])
+    scene = Scene(m=[1.3], q=[3e17], p=[0.1], terms=(wall,), step=0.1, steps=3)
+    run = driver.run(scene, label)
+    assert run.outcome.status == "complete"
+    assert [v.check for v in checks.judge(scene, run) if v.passed is False] == []

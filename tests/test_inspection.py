@@ -426,3 +426,16 @@ def test_a_study_of_precision_that_lacks_a_table_is_refused(tmp_path: Path) -> N
         journal.commit(scene, documents={"precision": '{"methods": [{"method": "own:euler"}]}'})
     with pytest.raises(StoreError, match="lacks 'precision/own:euler'"):
         precision.stored(path)
+
+
+def test_the_numbers_of_a_trajectory_have_the_units_of_its_scene(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = str(tmp_path / "co.h5")
+    assert main(["run", "carbon-monoxide", "--method", "own:euler", "-o", path, "--quiet"]) in (0, 1)
+    capsys.readouterr()
+    assert main(["inspect", path, "--trajectory", "own:euler", "--rows", "3"]) == 0
+    heading = capsys.readouterr().out.splitlines()[2]
+    assert [x.strip() for x in heading.split("  ") if x] == [
+        "t (ps)", "q0 (nm)", "q1 (nm)", "p0 (u nm/ps)", "p1 (u nm/ps)",
+    ]  # fmt: skip

@@ -17,7 +17,7 @@ from springcheck.physics import exact, scenefile
 from springcheck.physics.arrays import WIDE
 from springcheck.physics.exact.mathieu import floquet
 from springcheck.physics.scene import Scene
-from springcheck.physics.terms import Damping, ModulatedSpring
+from springcheck.physics.terms import Damping, Drive, ModulatedSpring, WallSpring, Weight
 from springcheck.physics.trajectory import Outcome
 from springcheck.studies.stability import longest, measure, multipliers, page
 
@@ -329,3 +329,36 @@ def test_of_a_modulated_spring_no_largest_step_is_known_and_why_is_said(name: st
     (chart,) = page.banks(found)[0].charts
     assert "limit 2" in {rule.name for rule in chart.rules}
     assert not [rule for rule in chart.rules if rule.look == "here"]
+
+
+@pytest.mark.parametrize("beside", ["nothing", "spring", "weight", "drive", "friction"])
+def test_a_modulated_spring_beside_others_is_warned_of_as_well(beside: str) -> None:
+    """Whatever moves a linear scene besides, differences of two motions obey its springs alone."""
+    where, k, m = np.array([0]), 90.0 * (beside == "spring"), 3.7
+    term = ModulatedSpring(i=where, k=400.0, depth=0.3, frequency=2.0, phase=0.0, at=0.7)
+    more = {
+        "spring": WallSpring(i=where, k=[k], at=[0.4]),
+        "weight": Weight(i=where, force=[1.3], at=[0.0]),
+        "drive": Drive(i=where, amplitude=[0.3], frequency=[1.1], phase=[0.2]),
+        "friction": Damping(i=where, c=[1e-9]),
+    }
+    terms = (term, *([more[beside]] if beside in more else []))
+    scene = Scene(m=[m], q=[0.1], p=[0.2], terms=terms, step=0.22, steps=10)
+    product, grown = np.eye(2), 0.0
+    for i in range(4096):
+        first, last = (k + 400 * (1 + 0.3 * np.cos(2 * 0.22 * j)) for j in (i, i + 1))
+        kicks = [np.array([[1, 0], [-0.11 * stiffness, 1]]) for stiffness in (first, last)]
+        product = kicks[1] @ np.array([[1, 0.22 / m], [0, 1]]) @ kicks[0] @ product
+        grown, product = grown + np.log(np.max(np.abs(product))), product / np.max(np.abs(product))
+    assert longest.resonating("velocity-verlet", scene) == pytest.approx(np.exp(grown / 4096), rel=5e-3)
+    short = replace(scene, step=0.01)
+    assert longest.resonating("velocity-verlet", short) is None
+
+
+def test_of_two_modulations_of_one_particle_nothing_is_said() -> None:
+    term = ModulatedSpring(
+        i=np.array([0, 0]), k=[400.0, 1.0], depth=[0.3, 0.2], frequency=[2.0, 3.0], phase=[0.0, 0.0],
+        at=[0.0, 0.0],
+    )  # fmt: skip
+    scene = Scene(m=[3.7], q=[0.1], p=[0.2], terms=(term,), step=0.22, steps=10)
+    assert longest.resonating("velocity-verlet", scene) is None

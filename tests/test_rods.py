@@ -317,7 +317,7 @@ def test_what_a_rounding_of_a_length_does_to_a_step_is_what_its_bound_says() -> 
         held = known.drifted(q, q + x * p / scene.m, p, x)
         ends.append((*held, known.projected(*held)))
     off_q, _, off_p = (np.abs(more - less) / part for less, more in zip(*ends, strict=True))
-    of_q, of_p = rods(scene).sizes(q, *ends[0][:2], x, (0 * q, 0 * p), 0.0)
+    of_q, of_p = rods(scene).sizes(q, *ends[0][:2], x, (0 * q, 0 * p), (0.0, 0.0))
     assert np.asarray(of_q / off_q, float) == pytest.approx(1, abs=10 * part)
     # and what is taken back along the rod, whose sizes of two axes are added up
     assert 1 <= np.linalg.norm(of_p.astype(float)) / np.linalg.norm(off_p.astype(float)) <= 1 + 2**0.5
@@ -931,3 +931,30 @@ def test_states_that_overflow_are_judged_without_a_warning() -> None:
         springcheck.Trajectory.from_arrays(scene.step * np.arange(5), q, 0 * q, scheme="velocity-verlet"),
     )
     assert any(verdict.passed is False for verdict in found)
+
+
+@pytest.mark.parametrize(("units", "length", "clock"), [("md", 0.1, 1.0), ("reduced", 1.0, 100.0)])
+def test_ase_projects_momenta_to_a_rate_in_its_own_units_of_time(
+    units: str, length: float, clock: float, need: Need
+) -> None:
+    need("ase:rattle")
+    m, ways = np.array([12.0, 1.0, 16.0, 35.0]), np.linalg.qr(np.random.default_rng(5).normal(size=(3, 3)))[0]
+    x = np.concatenate([[np.zeros(3)], length * ways])
+    x = x - np.average(x, axis=0, weights=m)
+    v = np.cross([0.5, -0.3, 0.4], x) / clock
+    star = Rod(a=np.tile([0, 1, 2], 3), b=np.arange(3, 12), length=np.full(9, length))
+    scene = Scene(
+        m=np.repeat(m, 3), q=x.ravel(), p=np.repeat(m, 3) * v.ravel(), terms=(star,), places=np.arange(12),
+        step=clock / 2, steps=60, units=units,
+    )  # fmt: skip
+    run = driver.run(scene, "ase:rattle")
+    rate = run.arithmetic.rates
+
+    def failed(declared: float) -> set[str]:
+        one = replace(run, arithmetic=replace(run.arithmetic, rates=declared))
+        return {v.check for v in checks.judge(scene, one) if v.passed is False}
+
+    assert failed(rate) == set()
+    assert failed(rate / 10) == failed(0.0) == {"step-defect", "rod-velocity"}
+    assert "grid" in failed(1.0)
+    assert engines.arithmetic(engines.parse("ase:rattle"), units).rates == rate

@@ -54,8 +54,8 @@ def found(case: Case) -> str:
         off = float(np.max(np.abs(rods.strain(run.q[1:].astype(np.longdouble)))))
         return other.found(case) or (
             "SHAKE pushes along rods in their direction, and not as much as keeps lengths, off by up to "
-            f"{off:.2g} of themselves: a wide tolerance, an iteration that stops early, other masses in it, "
-            "or a spring in its place"
+            f"{off:.2g} of themselves: a wide tolerance, an iteration that stops early, other lengths or "
+            "masses in it, or a spring in its place"
         ) * (rod_length(case).passed is False)
     if along(rods.ways(loose)):
         return (

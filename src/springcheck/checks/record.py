@@ -87,6 +87,9 @@ def beyond(run: Trajectory) -> list[str]:
     how, most_declared = run.arithmetic, MOST_DECLARED
     if run.rebuilds_velocity and not how.keeps_displacement:
         most_declared = most_declared | {"state": MOST_REBUILT}
+    if how.rates and run.step:
+        most, why = MOST_DECLARED["lengths"]
+        most_declared = most_declared | {"rates": (most / abs(run.step), f"over one step, {why}")}
     return [
         f"the engine declares {name} = {value:.3g} of its arithmetic, and at most {most:.3g} is taken: {why}"
         for name, (most, why) in most_declared.items()

@@ -38,13 +38,14 @@ def of_step(
     how = run.arithmetic
     q, p = q.astype(np.longdouble), p.astype(np.longdouble)
     h, m = np.longdouble(abs(run.step)), scene.m.astype(np.longdouble)
+    once = how.state * case.roundings
     fine: list[Reals] = []
     # of a force that is coarser than the state, first the sizes that it has without its own error
     for way in [how] if how.force <= how.state else [replace(how, force=how.state, quantum=0.0), how]:
         size_q, size_p = schemes.magnitude_step(
             case.scheme, q, p, h=run.step, m=m, rate=case.law.rate, turns=case.law.turns,
             met=_evaluations(case, partial(_force, case, way, fine), places, recorded), hold=case.system.rods,
-            loose=0.0 if paired else how.lengths / (how.state * case.roundings),
+            loose=(0.0, 0.0) if paired else (how.lengths / once, how.rates / once),
         )  # fmt: skip
     # the reference step rounds as well
     state = how.state + ROUNDOFF

@@ -312,7 +312,7 @@ def arithmetic(case: Case) -> Finding | str:
     """The size of the step defect is that of the arithmetic the method says it has."""
     named = case.trajectory.arithmetic
     # a tolerance of lengths is no rounding
-    plain = Arithmetic(lengths=named.lengths)
+    plain = Arithmetic(lengths=named.lengths, rates=named.rates)
     if named.is_double and named.force <= plain.force and not named.quantum:
         return "plain double precision: the step defect says it all"
     case = case.clocked

@@ -40,6 +40,9 @@ WORDS = {
     "ulp": "unit in the last place: the distance of neighbouring numbers, 2**-52 of one between 1 and 2",
     "energy norm": "the size of a difference of states: the root of its energy, over that of the start or, "
     "of a start without any, of what it may gain",
+    "SHAKE": "impulses along rods as they lay before a drift bring their lengths back after it",
+    "RATTLE": "SHAKE, and a step ends with momenta without their parts along rods: velocity Verlet with rods",
+    "SETTLE": "the impulses of SHAKE and RATTLE for a rigid triangle, in closed form",
     "ensemble": "many runs of a scene with numbers varied: `springcheck run SCENE --vary FIELD=A:B:N`",
 }
 """Terms of the field and of springcheck, each with its meaning."""
@@ -72,15 +75,15 @@ def lines(name: str) -> Iterator[str]:
 
     of_terms = terms.known()
     parts = [_fault(fault) for fault in FAULTS if fault.name == name]
-    if name in _CHECKS:
-        parts.insert(0, chain(check_lines(_CHECKS[name]), _seen(_CHECKS[name])))
+    # tables head their columns by the short names of checks
+    asked = [check for check in _CHECKS.values() if name in (check.name, check.short)]
+    parts[:0] = [chain(check_lines(check), _seen(check)) for check in asked]
     parts += [meaning_lines(MEANINGS[name])] if name in MEANINGS else []
     parts += [iter([_line(f"{name}, a term: {described(of_terms[name])}")])] if name in of_terms else []
+    if said := word(name):
+        parts.append(iter([f"{said[0]}: {said[1]}"]))
     if parts:
         return chain(parts[0], *(chain([""], part) for part in parts[1:]))
-    said = word(name)
-    if said:
-        return iter([f"{said[0]}: {said[1]}"])
     methods = [
         f"{engine}:{method}" for engine in engines.names() for method in engines.engine(engine).methods
     ]

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from springcheck import engines, schemes, store
+from springcheck.figures.views import Units, units, with_unit
 from springcheck.physics.trajectory import Trajectory
 from springcheck.studies import STUDIES, keeper
 from springcheck.studies.study import Study, StudyResult
@@ -31,7 +32,8 @@ def lines(summary: store.Summary, options: Namespace) -> Lines:
     out: Lines = [plain(f"{summary.path}: {summary.size / 1e6:.3g} MB", "bold")]
     run, stride = _asked_for(summary, options)
     if run is not None:
-        out += _frames(run, stride, store.end(summary.path, run.label, 1))
+        of = units(keeper.stored_scene(summary.path))
+        out += _frames(run, stride, store.end(summary.path, run.label, 1), of)
         if not options.verdicts:
             return out
     if not summary.complete:
@@ -79,16 +81,17 @@ def _runs(summary: store.Summary) -> TextTable:
     return table(titles, rows, left=("trajectory", "outcome", "sha256"), prose="versions")
 
 
-def _frames(run: Trajectory, stride: int, last: Trajectory) -> Lines:
+def _frames(run: Trajectory, stride: int, last: Trajectory, of: Units) -> Lines:
     """Table of some frames, and of the last one."""
     n = run.q.shape[1]
     shown = min(n, 3)
     title = f"{run.label}" + (f", every {ordinal(stride)} frame and the last" if stride > 1 else "")
     if n > shown:
         title += f", the first {shown} of {n} particles"
-    names = [f"{name}{i}" if n > 1 else name for name in ("q", "p") for i in range(shown)]
+    numbers = range(shown) if n > 1 else [""]
+    names = [("t", of.t), *((f"{x}{i}", unit) for x, unit in (("q", of.q), ("p", of.p)) for i in numbers)]
     if run.last_step is not None:
-        names.append("last step")
+        names.append(("last step", of.t))
     rows = [
         [repr(float(x)) for x in (t, *q[:shown], *p[:shown], *h)]
         for one in (run, last)
@@ -98,7 +101,7 @@ def _frames(run: Trajectory, stride: int, last: Trajectory) -> Lines:
     ]
     if rows[-2:-1] == rows[-1:]:
         del rows[-1]
-    return [plain(title, "italic"), table(("t", *names), rows)]
+    return [plain(title, "italic"), table([with_unit(*name) for name in names], rows)]
 
 
 def document(summary: store.Summary, options: Namespace) -> dict[str, Any]:

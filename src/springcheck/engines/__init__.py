@@ -11,6 +11,7 @@ import importlib.util
 import os
 from collections.abc import Callable, Iterable
 from contextlib import suppress
+from dataclasses import replace
 from fnmatch import fnmatchcase
 from functools import cache, partial
 from typing import Any, TypeVar
@@ -147,12 +148,14 @@ def start(scene: Scene, label: Label, seed: Any = None) -> Simulation:
     return found
 
 
-def arithmetic(label: Label) -> Arithmetic:
-    """The rounding that the engine of a label declares.  MethodError where its own code fails."""
-    found: object = guarded(label, load(label.engine).arithmetic, label, form="arithmetic(label)")
+def arithmetic(label: Label, units: str = "") -> Arithmetic:
+    """The rounding that the engine of a label declares, in units of a scene.  MethodError where its own code
+    fails."""
+    driver = load(label.engine)
+    found: object = guarded(label, driver.arithmetic, label, form="arithmetic(label)")
     if not isinstance(found, Arithmetic):
         raise MethodError(f"{label} failed: its arithmetic is of type {type(found).__name__}")
-    return found
+    return replace(found, rates=found.rates * driver.picosecond) if units == "md" else found
 
 
 def origin_of(label: Label) -> dict[str, str]:

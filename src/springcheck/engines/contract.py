@@ -157,6 +157,8 @@ class Engine:
     """Versions of the library and of its own dependencies, by name."""
     arithmetic: Callable[[Label], Arithmetic] = lambda label: Arithmetic()
     """How the library rounds: double precision throughout by default."""
+    picosecond: float = 1.0
+    """One in the unit of time in which its `arithmetic` states rates of scenes in units "md"."""
     convention: Callable[[Method], str] = lambda method: "synchronised"
     """How the library stores velocities, as a phrase for the report."""
     thermostats: Mapping[str, Method] = field(default_factory=dict)

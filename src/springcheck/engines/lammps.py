@@ -169,7 +169,8 @@ class _Run:
         layers = _layered(scene, [t for t in held if isinstance(t, WallSpring)], self._origins)
         anchors = [x for *_, x in springs if x is not None]
         most = max([1, *np.bincount([i for a, b, *_ in springs for i in (a, b)], minlength=1).tolist()])
-        for line in SETTINGS.format(**_borders(scene.box)).strip().splitlines():
+        size = max(1.0, float(np.max(np.abs(scene.q))))
+        for line in SETTINGS.format(**_borders(scene.box, size)).strip().splitlines():
             command(line)
         more = f"angle/types {len(angles)} extra/angle/per/atom 1 extra/special/per/atom 8" if rods else ""
         command(f"create_box 1 all bond/types {max(len(springs), 1)} extra/bond/per/atom {most} {more}")
@@ -269,12 +270,18 @@ def _drives(scene: Scene, h: float) -> Iterator[str]:
             yield f"fix drive{row} drive{row} addforce {' '.join(force)}"
 
 
-def _borders(box: tuple[float, ...] | None) -> dict[str, Any]:
-    """How LAMMPS treats borders.  Without a box there are no images, and neighbour lists are built once; in a
-    box atoms are put back at every step, and a bond finds the nearest image of its end up to half a box
-    away."""
+def _borders(box: tuple[float, ...] | None, size: float) -> dict[str, Any]:
+    """How LAMMPS treats borders.  Without a box there are no images, neighbour lists are built once, and what
+    borders keep from atoms, 1e-4 of their first distance, is not lost to rounding if that is the largest
+    coordinate; in a box atoms are put back at every step, and a bond finds the nearest image of its end up to
+    half a box away."""
     if box is None:
-        return {"border": "s s s", "every": 2000000000, "cutoff": 1.0, "edges": "-1 1 -1 1 -1 1"}
+        return {
+            "border": "s s s",
+            "every": 2000000000,
+            "cutoff": 1.0,
+            "edges": " ".join([f"{-size!r} {size!r}"] * 3),
+        }
     edges = " ".join(f"0 {length!r}" for length in box)
     return {"border": "p p p", "every": 1, "cutoff": 0.51 * max(box), "edges": edges}
 

@@ -162,8 +162,9 @@ def scheme_of(label: str) -> str:
 def title(scheme: str) -> str:
     """The title of a scheme as short as a legend needs it: without its mechanism and its orders."""
     found = UNKNOWN.title if scheme in ("", UNKNOWN.name) else schemes.title(scheme)
-    # a method's own label stays whole
-    return found if found == scheme else found.partition(":")[0].partition(", orders ")[0]
+    # a method's own label stays whole, and so does what tells the members of a family apart
+    whole = found == scheme or ": fast springs" in found
+    return found if whole else found.partition(":")[0].partition(", orders ")[0]
 
 
 MOST_MEMBERS = 6

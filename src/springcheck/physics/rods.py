@@ -244,14 +244,15 @@ class Rods:
         return np.asarray(p - self._push(self._along(r, p), r))
 
     def sizes(
-        self, before: Reals | None, q: Reals, p: Reals, x: Any, of: tuple[Reals, Reals], loose: float
-    ) -> tuple[Reals, Reals]:
+        self, before: Reals | None, q: Reals, p: Reals, x: Any, of: tuple[Reals, Reals],
+        loose: tuple[float, float],
+    ) -> tuple[Reals, Reals]:  # fmt: skip
         """Bound on the rounding of a stage with rods, from the bound `of` it without them.
 
         The stage leads from `before`, None where nothing moves, to q, with momenta p that are not projected
         yet.  An error of the vectors s is measured along s and corrected along r, which amplifies it by r/(r
-        s).  In the momenta only its part across the rod remains.  `loose` is the tolerance of lengths, in
-        roundings.
+        s).  In the momenta only its part across the rod remains.  `loose` are the tolerances of lengths
+        and of their rates [1/T], in roundings.
         """
         of_q, of_p = of
         m, s, ones = self.m.astype(q.dtype), self.ways(q), np.ones(len(self))
@@ -259,13 +260,13 @@ class Rods:
         around = self._most(of_q)
         if before is not None:
             r = self.ways(before)
-            k = self._bound(s, r, self.dot(np.abs(s), around) + square * (ones + loose))
+            k = self._bound(s, r, self.dot(np.abs(s), around) + square * (ones + loose[0]))
             of_q = of_q + self.spread(np.abs(r) * self.each(k), size=True) / m
             across = np.abs(r - s * self.each(self.dot(r, s) / self.dot(s, s)))
             of_p = of_p + self.spread(across * self.each(k), size=True) / np.abs(x)
             around = self._most(of_q)
         along = np.abs(self._along(s, p))
-        seen = self.sum_of_sizes(s, of_p / m)
+        seen = self.sum_of_sizes(s, of_p / m) + square * ones * loose[1]
         held = np.abs(s) * self.each(self._bound(s, s, seen)) + around * self.each(along)
         return of_q, of_p + self.spread(held, size=True)
 

@@ -57,12 +57,13 @@ def magnitude_step(
     rate: Reals | None = None,
     turns: Reals | None = None,
     hold: Rods | None = None,
-    loose: float = 0.0,
+    loose: tuple[float, float] = (0.0, 0.0),
 ) -> tuple[Reals, Reals]:
     """Running error bound of `step` from (q, p): the same step with every difference taken as a sum.
 
     `met` has one entry for each evaluation of the force, in their order.  Rods `hold` after every stage of
-    the step itself, to the tolerance `loose` of their lengths, in roundings.
+    the step itself, to the tolerances `loose` of their lengths, and of their rates [1/T] at its
+    end, in roundings.
     """
     start = way = q, p
     pull: Reals | None = None
@@ -71,7 +72,7 @@ def magnitude_step(
     each = iter(met)
     if scheme.stages:
         last = np.zeros_like(p)
-        for kind, (_, c) in zip(scheme.kinds, scheme.stages, strict=True):
+        for left, kind, (_, c) in zip(range(-len(scheme.kinds), 0), scheme.kinds, scheme.stages, strict=True):
             if kind.evaluates:
                 here = next(each)
                 last = here.magnitude(q, np.zeros_like(p) if kind.evaluates == "potential" else p)
@@ -85,7 +86,8 @@ def magnitude_step(
                 before, act = way[0], replace(setting, rate=None, force=0 * p if pull is None else pull)
                 way = kind.act(*way, part, act)
                 way = hold.drifted(before, *way, part) if kind.drifts else way
-                q, p = hold.sizes(before if kind.drifts else None, *way, part, (q, p), loose)
+                ends = loose if left == -1 else (loose[0], 0.0)
+                q, p = hold.sizes(before if kind.drifts else None, *way, part, (q, p), ends)
                 way = way[0], hold.projected(*way)
         return q, p
     return _tableau(scheme, start, each, h=wide, m=m, rate=rate)

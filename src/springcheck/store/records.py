@@ -66,6 +66,7 @@ class Run:
     force_excess: Annotated[float, "arithmetic.excess"] = _DOUBLE.excess
     forces_kept_within: Annotated[float, "arithmetic.stale"] = _DOUBLE.stale
     rod_tolerance: Annotated[float, "arithmetic.lengths"] = 0.0
+    rod_rate_tolerance: Annotated[float, "arithmetic.rates"] = 0.0
     bath_cancels: Annotated[int, "arithmetic.cancels"] = 0
     keeps_displacement: Annotated[bool, "arithmetic.keeps_displacement"] = False
     counts_from_start: Annotated[bool, "arithmetic.from_start"] = False

@@ -38,7 +38,7 @@ def one_rounding(
     assert scene.bath is not None
     size, unit, x = np.abs(start[0]), how.state, scene.bath.friction * abs(scene.step)
     once, wide = unit * roundings_of(sizer.scheme, scene), how.force / unit * (how.force > unit)
-    loose = how.lengths / once
+    loose = how.lengths / once, how.rates / once
     fine: list[Reals] = []
 
     def pull(terms: Sequence[Term], *, first: bool) -> Force:

@@ -87,14 +87,14 @@ class Stepper:
 
     def __call__(
         self, q: Reals, p: Reals, force: Any, draws: Sequence[Any], hit: Any = None, end: Reals | None = None,
-        met: list[Met] | None = None, loose: float = 0.0,
+        met: list[Met] | None = None, loose: tuple[float, float] = (0.0, 0.0),
     ) -> tuple[Reals, Reals]:  # fmt: skip
         """One step from (q, p), each (..., n), by what `forces` gives.
 
         `draws` are `scheme.draws` arrays of the shape of q; `hit` is the mask of collisions, or the factor
         of all momenta, otherwise computed from the draws.  A force after the last drift is evaluated at
         `end`, if given: draws of other particles act there.  `met` collects the states at which rods
-        project; a step of absolute values reads them, with the tolerance `loose` of lengths in roundings.
+        project; a step of absolute values reads them, with the tolerances `loose` of `Rods.sizes`.
         """
         m, h, last, q_old, held = self.m, self.h, p, q, q
         way = iter(met or ())
@@ -127,7 +127,8 @@ class Stepper:
             elif kind in ("shake", "project"):
                 assert self._hold is not None
                 if self._sign > 0:
-                    q, p = self._hold.sizes(*next(way), c, (q, p), loose)
+                    ends = loose if i == len(self._acts) - 1 else (loose[0], 0.0)
+                    q, p = self._hold.sizes(*next(way), c, (q, p), ends)
                     continue
                 if kind == "shake":
                     q, p = self._hold.drifted(held, q, p, c)

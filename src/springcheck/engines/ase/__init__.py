@@ -46,5 +46,7 @@ ENGINE = Engine(
         ),
     ),
     any_axis=True,
+    # of A sqrt(u/eV)
+    picosecond=98.22694788,
     **deferred(f"{__name__}.simulation", "arithmetic"),
 )  # fmt: skip

@@ -35,8 +35,10 @@ def version() -> dict[str, str]:
 
 
 def arithmetic(label: Label) -> Arithmetic:
-    """NumPy's double precision; `compare_atoms` treats positions within 1e-15 of each other as equal."""
-    return Arithmetic(stale=1e-15, lengths=1e-13 if label.method in ("rattle", "langevin-rods") else 0.0)
+    """NumPy's double precision; `compare_atoms` treats positions within 1e-15 of each other as equal, and
+    `FixBondLengths` has one tolerance for relative lengths and, in ASE's units, for their rates."""
+    rods = 1e-13 if label.method in ("rattle", "langevin-rods") else 0.0
+    return Arithmetic(stale=1e-15, lengths=rods, rates=rods)
 
 
 class Springs(Calculator):  # type: ignore[misc]

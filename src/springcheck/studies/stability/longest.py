@@ -9,8 +9,9 @@ bounded again beyond it.  Of one step the product of many tells.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -18,11 +19,11 @@ from springcheck import schemes
 from springcheck.errors import SceneError
 from springcheck.physics import exact
 from springcheck.physics.arrays import ROUNDOFF, Extended, Floats, Force, Reals
-from springcheck.physics.driven import CLOCK, ModulatedSpring
+from springcheck.physics.driven import CLOCK, Drive, ModulatedSpring
 from springcheck.physics.exact.mathieu import floquet
 from springcheck.physics.scene import Scene
 from springcheck.physics.system import MOST_DENSE, System
-from springcheck.physics.terms import WallSpring
+from springcheck.physics.terms import WallSpring, Weight
 from springcheck.schemes import Scheme
 from springcheck.studies.stability import propagators
 
@@ -311,14 +312,12 @@ def resonating(name: str, scene: Scene) -> float | None:
         return None
     if "magnetic" in scene.system.acting:
         return _in_field(scheme, scene)
-    exactly = floquet(scene.system) if scene.n <= MOST_COUPLED else None
-    if exactly is None or exactly[0] > 1:
+    mixed = scheme.has("mixes") and scene.system.fast
+    about = _homogeneous(scene) if is_modulated(scene) and scene.n <= MOST_COUPLED and not mixed else None
+    exactly = about and floquet(about.system)
+    if about is None or not exactly or exactly[0] > 1:
         return None
-    n = scene.n
-    about = scene.derived(terms=tuple(
-        replace(x, at=np.zeros_like(x.at)) if isinstance(x, ModulatedSpring) else x for x in scene.terms
-    ))  # fmt: skip
-    unit = scene.m * fastest(scene)
+    n, unit = about.n, about.m * fastest(about)
     q, p = np.zeros((2, 2, MODULATED_STEPS, n + 1), np.longdouble)
     q[..., n], p[..., n] = scene.step * np.arange(MODULATED_STEPS), CLOCK
     q[0, :, :n], p[1, :, :n] = 1, unit
@@ -335,6 +334,35 @@ def resonating(name: str, scene: Scene) -> float | None:
             largest = np.maximum(largest, grown)
     most = float(np.max(largest))
     return float(np.exp(most / MODULATED_STEPS)) if most > 2 * np.log(MODULATED_STEPS) else None
+
+
+def _homogeneous(scene: Scene) -> Scene | None:
+    """One modulated spring about 0 on each particle, of all springs that act on it: differences between two
+    motions of the scene, whatever else moves them.  None where terms bend or join particles, or where two
+    modulations act on one."""
+    plain, forces = (WallSpring, ModulatedSpring), (Drive, Weight)
+    if not all(isinstance(x, (*plain, *forces)) or x.key == "damping" for x in scene.terms):
+        return None
+    springs = [x for x in scene.terms if isinstance(x, plain)]
+    found: list[Any] = [None] * scene.n
+    k = np.zeros(scene.n)
+    for x in springs:
+        np.add.at(k, x.i, x.k)
+        for i, *row in x.rows() if isinstance(x, ModulatedSpring) else ():
+            if found[i] is not None:
+                return None
+            found[i] = row[:4]
+    known = [row for row in found if row is not None]
+    if np.any(k == 0):
+        return None
+    # a plain spring is one of no depth
+    rows = [row or (0.0, 0.0, *known[0][2:]) for row in found]
+    alone, depth, frequency, phase = np.transpose(rows)
+    one = ModulatedSpring(
+        i=np.arange(scene.n), k=k, depth=alone * depth / k, frequency=frequency, phase=phase,
+        at=np.zeros(scene.n),
+    )  # fmt: skip
+    return scene.derived(terms=(one, *(x for x in scene.terms if x.key == "damping")))
 
 
 def _in_field(scheme: Scheme, scene: Scene) -> float | None:
