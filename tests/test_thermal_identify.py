@@ -75,6 +75,18 @@ def test_one_oscillator_in_a_bath_is_seen_in_rows_and_in_columns_alike() -> None
         assert identify(t, positions, v=velocities, mass=mass).statement == wanted.statement
 
 
+def test_times_of_few_digits_leave_no_room_for_noise() -> None:
+    """Steps of a frame were taken to be as unlike as the times are rounded: "Several schemes fit: exact,
+    velocity Verlet"."""
+    step = 0.07216648648628693
+    for name, rate in (("baoab", 1.2), ("obabo", 4.9)):
+        still = scene(400)
+        bath = replace(still.bath, friction=rate)  # type: ignore[type-var]
+        made = driver.run(replace(still, step=step, bath=bath), f"own:{name}", seed=3)
+        t, q, v = (np.vectorize(lambda x: float(f"{x:.6g}"))(x) for x in (made.t, made.q, made.p / M))
+        assert not {x.scheme for x in identify(t, q, v=v, mass=M).candidates} & {"exact", "velocity-verlet"}
+
+
 def test_what_would_tell_thermostats_apart_is_noted_and_what_is_free_of_noise() -> None:
     t, q, v = run("baoab", 1000)
     of_every_step, of_every_third = identify(t, q, v=v, mass=M), identify(t[::3], q[::3], v=v[::3], mass=M)
