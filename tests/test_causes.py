@@ -39,7 +39,7 @@ STAGES = {name: one.acts for name, one in THERMOSTATS.items()}
     ("scheme", "runs", "said"),
     [("baoab", (*STAGES["baoab"][:4], Act("held", HALF)), "kick 2 of 2, which has the force of the"),
      ("gj-i", STAGES["gj-i"][:4], "kick 2 of 2, which is left out"),
-     ("baoab", (*STAGES["baoab"][:2], *STAGES["baoab"][3:], STAGES["baoab"][2]), "its noise with its friction"),
+     ("baoab", (*(x for x in STAGES["baoab"] if x.kind != "exchange"), STAGES["baoab"][2]), "its noise with"),
      ("euler-maruyama", (STAGES["euler-maruyama"][4], *STAGES["euler-maruyama"][:4]), "acts at its start"),
      ("bbk", tuple(x._replace(draw=0) for x in STAGES["bbk"]), "each acts in both halves of one step"),
      ("bbk", (*STAGES["bbk"][:6], STAGES["bbk"][6]._replace(kind="damp")), "its last friction")],
