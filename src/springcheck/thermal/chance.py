@@ -380,7 +380,7 @@ def pairs(x: Floats) -> tuple[float, str]:
     both, sums, squares = np.triu(drawn.T.astype(float) @ drawn, 1) > 0, some.T @ some, (some**2).T @ drawn
     z = np.where(both, sums / np.sqrt(squares), 0.0)
     at = np.argmax(np.where(np.isfinite(z), np.abs(z), np.inf))
-    found = max(np.count_nonzero(both), 1) * of_normal(float(z.flat[at]))
+    found = max(int(np.count_nonzero(both)), 1) * of_normal(float(z.flat[at]))
     if len(z) > 2 and np.all(drawn):
         found = 2 * min(found, neighbours(x.T).chance)
     size = abs((sums / np.sqrt(squares * squares.T)).flat[at])
