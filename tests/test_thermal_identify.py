@@ -15,6 +15,7 @@ import springcheck
 from springcheck import driver
 from springcheck.cli import main
 from springcheck.identify import identify
+from springcheck.identify.clock import clock_of
 from springcheck.identify.result import Candidate, Explanation, nothing
 from springcheck.physics import scenefile
 from springcheck.physics.bath import Bath
@@ -78,12 +79,13 @@ def test_one_oscillator_in_a_bath_is_seen_in_rows_and_in_columns_alike() -> None
 def test_times_of_few_digits_leave_no_room_for_noise() -> None:
     """Steps of a frame were taken to be as unlike as the times are rounded: "Several schemes fit: exact,
     velocity Verlet"."""
-    step = 0.07216648648628693
-    for name, rate in (("baoab", 1.2), ("obabo", 4.9)):
-        still = scene(400)
+    step = float(0.621 / OMEGA)
+    for name, rate in (("baoab", 0.774 / step), ("baoab", 0.758 / step)):
+        still = scene(616)
         bath = replace(still.bath, friction=rate)  # type: ignore[type-var]
         made = driver.run(replace(still, step=step, bath=bath), f"own:{name}", seed=3)
         t, q, v = (np.vectorize(lambda x: float(f"{x:.6g}"))(x) for x in (made.t, made.q, made.p / M))
+        assert clock_of(t).unlike < 1e-12 < clock_of(t).quantum
         assert not {x.scheme for x in identify(t, q, v=v, mass=M).candidates} & {"exact", "velocity-verlet"}
 
 
