@@ -39,6 +39,8 @@ STAGES = {name: one.acts for name, one in THERMOSTATS.items()}
     ("scheme", "runs", "said"),
     [("baoab", (*STAGES["baoab"][:4], Act("held", HALF)), "kick 2 of 2, which has the force of the"),
      ("gj-i", STAGES["gj-i"][:4], "kick 2 of 2, which is left out"),
+     ("baoab", (*(x for x in STAGES["baoab"] if x.kind != "exchange"), STAGES["baoab"][2]), "its noise with"),
+     ("euler-maruyama", (STAGES["euler-maruyama"][4], *STAGES["euler-maruyama"][:4]), "acts at its start"),
      ("bbk", tuple(x._replace(draw=0) for x in STAGES["bbk"]), "each acts in both halves of one step"),
      ("bbk", (*STAGES["bbk"][:6], STAGES["bbk"][6]._replace(kind="damp")), "its last friction")],
 )  # fmt: skip
@@ -53,6 +55,22 @@ def test_a_stage_that_is_another_is_named(scheme: str, runs: Any, said: str, wel
     shown = causes.found(Case(trajectory=baths.played(of, runs=runs), scene=scene))
     assert shown.startswith("each step is the scheme's own but for ")
     assert said in shown
+
+
+@pytest.mark.parametrize("scheme", ["baoab", "obabo", "bbk", "lammps-langevin"])
+def test_noise_that_adds_up_to_0_is_named(scheme: str) -> None:
+    scene = baths.springs(3, steps=300)
+    of = Broken(scene=scene, scheme=THERMOSTATS[scheme], seed=4, x=0.0)
+
+    def balanced(right: Any) -> Any:
+        pushes = np.sqrt(scene.m) * right[-1]
+        return (pushes - np.mean(pushes)) / np.sqrt(scene.m)
+
+    run = baths.played(of, balanced)
+    assert checks.status(checks.judge(scene, run)) == 1
+    assert causes.found(Case(trajectory=run, scene=scene)).startswith(
+        "the noise of all particles adds up to 0"
+    )
 
 
 def test_noise_without_the_root_of_the_mass_is_told_of_each_coordinate() -> None:

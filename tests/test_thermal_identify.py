@@ -15,6 +15,7 @@ import springcheck
 from springcheck import driver
 from springcheck.cli import main
 from springcheck.identify import identify
+from springcheck.identify.clock import clock_of
 from springcheck.identify.result import Candidate, Explanation, nothing
 from springcheck.physics import scenefile
 from springcheck.physics.bath import Bath
@@ -73,6 +74,19 @@ def test_one_oscillator_in_a_bath_is_seen_in_rows_and_in_columns_alike() -> None
     column = q[:, None]
     for positions, velocities, mass in ((q, v, [M]), (column, v, M), (q, v[:, None], [M])):
         assert identify(t, positions, v=velocities, mass=mass).statement == wanted.statement
+
+
+def test_times_of_few_digits_leave_no_room_for_noise() -> None:
+    """Steps of a frame were taken to be as unlike as the times are rounded: "Several schemes fit: exact,
+    velocity Verlet"."""
+    step = float(0.621 / OMEGA)
+    for name, rate in (("baoab", 0.774 / step), ("baoab", 0.758 / step)):
+        still = scene(616)
+        bath = replace(still.bath, friction=rate)  # type: ignore[type-var]
+        made = driver.run(replace(still, step=step, bath=bath), f"own:{name}", seed=3)
+        t, q, v = (np.vectorize(lambda x: float(f"{x:.6g}"))(x) for x in (made.t, made.q, made.p / M))
+        assert clock_of(t).unlike < 1e-12 < clock_of(t).quantum
+        assert not {x.scheme for x in identify(t, q, v=v, mass=M).candidates} & {"exact", "velocity-verlet"}
 
 
 def test_what_would_tell_thermostats_apart_is_noted_and_what_is_free_of_noise() -> None:

@@ -31,6 +31,7 @@ from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Spring, WallSpring
 from springcheck.physics.trajectory import Trajectory, of_scene
 from springcheck.studies.faults import baths
+from springcheck.studies.faults.seeded import Fault
 from springcheck.studies.run import measure
 from springcheck.thermal import THERMOSTATS, Stepper, chance
 from springcheck.thermal.heat import Heat
@@ -137,7 +138,7 @@ def test_chances_are_those_of_their_null() -> None:
     assert chance.shape(rng.standard_exponential(2000) - 1).chance < 1e-15
     assert chance.variance(1.01 * rng.standard_normal(1_000_000)).chance < 1e-30
     assert chance.neighbours(np.repeat(rng.standard_normal(500), 2)).chance < 1e-15
-    assert np.mean([chance.pairs(rng.standard_normal((300, 5))) <= 0.05 for _ in range(1000)]) < 0.085
+    assert np.mean([chance.pairs(rng.standard_normal((300, 5)))[0] <= 0.05 for _ in range(1000)]) < 0.085
 
 
 def test_a_mean_and_a_variance_of_one_coordinate_are_not_made_up_for_by_another() -> None:
@@ -323,6 +324,31 @@ def test_noise_that_any_two_particles_share_is_seen_at_once_and_later(
     assert not [one.why for one in right if one.passed is False]
     wrong = driver.run(scene, f"own:{name}", seed=_Shared(0, to, steps, part))
     assert [one.check for one in checks.judge(scene, wrong) if one.passed is False] == [check]
+
+
+@pytest.mark.parametrize("n", [2, 3])
+def test_draws_that_particles_share_in_common_collisions_are_seen(n: int) -> None:
+    """Of two particles nothing else showed them: their collisions are independent of each other."""
+    scene = baths.springs(n, steps=1200)
+    for shared, outcome in ((False, True), (True, False)):
+        fault = Fault(
+            "",
+            "",
+            (),
+            lambda c, shared=shared: baths.played(
+                c, lambda right: np.full(n, right[-1][0]) if shared else right[-1]
+            ),
+            scheme="andersen",
+        )
+        run = fault.run(scene, size=None, seed=5)
+        assert checks.thermal.draws_particles(checks.Case(trajectory=run, scene=scene)).passed is outcome
+    rng = np.random.default_rng(2)
+    for many, hit in ((2, 0.1), (5, 0.3), (12, 0.02)):
+        each = np.where(rng.random((1000, 200, many)) < hit, rng.standard_normal((1000, 200, many)), np.nan)
+        for level in (0.1, 0.01):
+            share = np.mean([chance.pairs(x)[0] <= level for x in each])
+            room = 5 * np.sqrt(level / 1000)
+            assert 0.7 * level - room < share < level + room
 
 
 @pytest.mark.parametrize("name", [name for name, one in THERMOSTATS.items() if not one.splits])

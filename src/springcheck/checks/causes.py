@@ -75,7 +75,7 @@ def found(case: Case, shown: Callable[[int, bool], str] = lambda *_: "") -> str:
     random = run.scheme in THERMOSTATS
     if run.every == 1 and random:
         # of draws that are read by the map of another scheme the size says nothing
-        ways = [_of_no_noise, _of_bath, stages.collided, _of_removal, stages.found]
+        ways = [_of_no_noise, _of_bath, stages.balanced, stages.collided, _of_removal, stages.found]
         looks = [*looks, _of_reach, _of_state, _of_size]
     elif run.every == 1 and not missing(case, MAP):
         ways = [_of_differences, driven.found, held.found, _of_removal, _of_factor]
@@ -236,7 +236,7 @@ def _of_differences(case: Case) -> str:
 def _of_no_noise(case: Case) -> str:
     """Coordinates whose draws are a linear map of the state before: no noise acts, or one number does."""
     seen, run = reading(case), case.trajectory
-    if not _told(seen):
+    if not _told(seen) or noise_direction(case).passed is False:
         return ""
     x = seen.draws.reshape(-1, max(thermostat(case).fresh, 1), seen.draws.shape[1])
     known = np.column_stack([*(y[-len(x) - 1 : -1] for y in (run.q, run.p)), np.ones(len(x))])
@@ -324,7 +324,7 @@ def _of_size(case: Case) -> str:
     if not _told(seen) or noise_direction(case).passed is False:
         return ""
     of = seen.draws**2
-    if chance.pairs(seen.draws / np.sqrt(np.mean(of, axis=0))) < FALSE_ALARMS:
+    if chance.pairs(seen.draws / np.sqrt(np.mean(of, axis=0)))[0] < FALSE_ALARMS:
         return ""
     mean, error = np.mean(of, axis=0), np.std(of, axis=0) / np.sqrt(len(of))
     asked = "as large as the temperature, the masses and the friction ask"

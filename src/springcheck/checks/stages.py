@@ -10,6 +10,10 @@ import numpy as np
 from springcheck.checks.case import Case
 from springcheck.checks.thermal import collisions, noise_direction, read_frames, reading, thermostat
 from springcheck.thermal import Thermostat
+from springcheck.thermal.decays import Decay
+
+ROUNDINGS_OF_A_SUM = 4
+"""Rounding errors of draws, added up, by which a sum of draws departs from 0 at most."""
 
 MOST_HIT = 0.5
 """Largest share of momenta drawn anew, of which each explains itself whatever its stage."""
@@ -26,6 +30,20 @@ def found(case: Case) -> str:
         if few and seen.across is not None and np.all(seen.across[other.carried :] <= seen.roundings):
             return f"each step is the scheme's own but for {said}"
     return ""
+
+
+def balanced(case: Case) -> str:
+    """Noise that adds up to 0 over all particles at every step, along each axis, to its rounding."""
+    seen, size, axes = reading(case), np.sqrt(case.judged.m), case.scene.all_places % 3
+    drawn = seen.hits is None and seen.rescaled is None and seen.draws.size and seen.known
+    if not drawn or case.scene.particles < 2 or noise_direction(case).passed is False:
+        return ""
+    # a draw acts on momenta by the root of the mass
+    along = np.equal.outer(axes, axes).astype(float)
+    total, room = np.abs((size * seen.draws) @ along), (size * seen.error) @ along
+    return "the noise of all particles adds up to 0 at every step, as with LAMMPS' `zero yes`" * bool(
+        np.all(total <= ROUNDINGS_OF_A_SUM * room)
+    )
 
 
 def collided(case: Case) -> str:
@@ -50,6 +68,8 @@ def _others(scheme: Thermostat) -> Iterator[tuple[str, Thermostat]]:
             yield old, replace(scheme, acts=(*acts[:i], acts[i]._replace(kind="held"), *acts[i + 1 :]))
         yield f"{of} is left out", replace(scheme, acts=(*acts[:i], *acts[i + 1 :]))
     for i, act in enumerate(acts):
+        if scheme.draws == 1 and act.kind in ("exchange", "noise"):
+            yield from _moved(scheme, i)
         if act.kind == "undamp":
             made = (*acts[:i], act._replace(kind="damp"), *acts[i + 1 :])
             yield "its last friction, which is that of the velocity before it", replace(scheme, acts=made)
@@ -59,3 +79,22 @@ def _others(scheme: Thermostat) -> Iterator[tuple[str, Thermostat]]:
             "its random numbers: each acts in both halves of one step, not in the second and the next first"
         )
         yield said, replace(scheme, acts=made, draws=1, carried=0)
+
+
+def _moved(scheme: Thermostat, i: int) -> Iterator[tuple[str, Thermostat]]:
+    """Those whose noise, stage i, acts elsewhere in the step, with its friction and without."""
+    act, before, after = scheme.acts[i], scheme.acts[:i], scheme.acts[i + 1 :]
+    ways = [("noise", act, before)]
+    if isinstance(c := act.part, Decay):
+        shot = act._replace(kind="noise", part=lambda x: np.sqrt(c.lost(x) * c.both(x) / (2 * x)))
+        ways = [
+            ("noise with its friction", act, before),
+            ("noise", shot, (*before, act._replace(kind="damp", part=c.lost))),
+        ]  # fmt: skip
+    for what, moved, first in ways:
+        rest = (*first, *after)
+        for j in {*range(len(rest) + 1)} - {len(before), len(first)}:
+            where = (
+                "at its start" if not j else f"after stage {j} of the other {len(rest)}, a {rest[j - 1].kind}"
+            )
+            yield f"its {what}, which acts {where}", replace(scheme, acts=(*rest[:j], moved, *rest[j:]))

@@ -181,13 +181,12 @@ def draws_repeat(case: Case) -> Chance | str:
 @check("apart", family="noise", requires={"company", "every-step"})
 def draws_particles(case: Case) -> Chance | str:
     """The draws of one particle say nothing of those of another."""
-    if THERMOSTATS[case.trajectory.scheme].collides:
-        return "there are no draws of two particles side by side"
     if THERMOSTATS[case.trajectory.scheme].rescales:
         return "one number acts on all particles"
-    x = _drawn(case)
-    largest = np.max(np.abs(thermal.chance.products(x))) / np.sqrt(len(x))
-    return Chance(thermal.chance.pairs(x), f"largest correlation {largest:.2e}, of {count(x.size, 'draw')}")
+    x = _draws(case)
+    if not np.any(np.count_nonzero(~np.isnan(x), axis=1) > 1):
+        return "no step has draws of two particles"
+    return Chance(*thermal.chance.pairs(x))
 
 
 @check("state", family="noise", requires={"every-step"})

@@ -167,7 +167,7 @@ def _unlike(record: Record, found: Map, matches: list[Match]) -> Floats:
         each = ways[::-1] @ change[i] @ ways
         apart = np.sum(np.abs(each - np.mean(each, axis=0)), axis=(0, 2))
         # where steps differ alike in every frame another stiffness takes a part of it, and is off by as much
-        out[i] = match.stride * record.clock * lengths[:, None] * apart
+        out[i] = match.stride * record.unlike * lengths[:, None] * apart
     return out
 
 

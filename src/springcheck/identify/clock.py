@@ -31,6 +31,8 @@ class Clock:
     """Relative uncertainty of the interval."""
     quantum: float
     """Rounding of the times, in intervals."""
+    unlike: float
+    """The part of it that steps may have, in intervals: decimals are those of a file."""
     deviations: Extended | None
     """Relative deviation (f - 1,) of each interval from the mean, where double precision shows it."""
 
@@ -95,8 +97,10 @@ def clock_of(t: Floats) -> Clock:
     deviations = None
     if quantum == even and float(off[worst]) > 2 * ROUNDING * abs(float(interval)):
         deviations = np.asarray(np.diff(wide) / interval - 1)
+    size = abs(float(interval))
     return Clock(
-        interval=interval, jitter=jitter, quantum=quantum / abs(float(interval)), deviations=deviations,
+        interval=interval, jitter=jitter, quantum=quantum / size, deviations=deviations,
+        unlike=(quantum if binary else even) / size,
     )  # fmt: skip
 
 

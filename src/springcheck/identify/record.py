@@ -37,6 +37,8 @@ class Record:
     """Relative uncertainty of the interval, from the rounding of the recorded times."""
     clock: float
     """Rounding of the recorded times, in intervals."""
+    unlike: float
+    """The part of it that steps may have: decimals are those of a file."""
     deviations: Extended | None
     """Relative deviation (f - 1,) of each interval from the mean; None where times are coarse or even."""
     q: Extended
@@ -209,6 +211,7 @@ def read(
         interval=interval,
         jitter=clock.jitter,
         clock=clock.quantum,
+        unlike=clock.unlike,
         deviations=clock.deviations if finely else None,
         q=positions[kept].astype(np.longdouble),
         v=moving[kept].astype(np.longdouble) / unit,

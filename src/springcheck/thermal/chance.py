@@ -369,20 +369,22 @@ MOST_PAIRED = 512
 """Columns that are compared in pairs."""
 
 
-def products(x: Floats) -> Floats:
-    """Sums of products of each pair of the first `MOST_PAIRED` columns of draws x (f, n), in standard
-    deviations given the first of the two: normal numbers (n, n), 0 on and below the diagonal."""
-    some = x[:, :MOST_PAIRED]
-    sums = some.T @ some
-    return np.asarray(np.triu(sums, 1) / np.sqrt(np.diag(sums))[:, None])
+@np.errstate(all="ignore")
+def pairs(x: Floats) -> tuple[float, str]:
+    """Chance of the largest of the sums of products of two columns of draws x (f, n), of the first
+    `MOST_PAIRED`, and the correlation in words: normal given the first of both.
 
-
-def pairs(x: Floats) -> float:
-    """Chance of the largest of the sums of products of two columns of draws x (f, n), and of all neighbours
-    together."""
-    one, z = neighbours(x.T).chance, products(x)
-    n = len(z)
-    return one if n < 3 else min(1.0, 2 * one, n * (n - 1) * of_normal(float(np.max(np.abs(z)))))
+    NaN where a step had no draw; where each has one, of all neighbours together as well.
+    """
+    some, drawn = np.nan_to_num(x[:, :MOST_PAIRED], nan=0.0), ~np.isnan(x[:, :MOST_PAIRED])
+    both, sums, squares = np.triu(drawn.T.astype(float) @ drawn, 1) > 0, some.T @ some, (some**2).T @ drawn
+    z = np.where(both, sums / np.sqrt(squares), 0.0)
+    at = np.argmax(np.where(np.isfinite(z), np.abs(z), np.inf))
+    found = max(int(np.count_nonzero(both)), 1) * of_normal(float(z.flat[at]))
+    if len(z) > 2 and np.all(drawn):
+        found = 2 * min(found, neighbours(x.T).chance)
+    size = abs((sums / np.sqrt(squares * squares.T)).flat[at])
+    return min(1.0, found), f"largest correlation {size:.2e}, of {np.count_nonzero(~np.isnan(x))} draws"
 
 
 def crossed(x: Floats, y: Floats) -> float:
