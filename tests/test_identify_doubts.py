@@ -473,6 +473,20 @@ def test_velocities_of_another_particle_are_no_magnetic_field() -> None:
     assert "turns" not in found.statement
 
 
+@pytest.mark.parametrize(("digits", "off"), [(10, 1e-6), (7, 3e-5), (5, 2e-3)])
+def test_springs_that_are_not_quite_alike_along_two_axes_are_no_magnetic_field(
+    digits: int, off: float
+) -> None:
+    """To few digits one complex map holds of both, whose velocity seemed to turn by 4e-8 in a frame."""
+    one, other = euler(0.1, count=120), euler(0.1, K * (1 + off), q=0.3, v=0.7, count=120)
+    states = np.stack([one, other], axis=-1) * np.array([1, 1.0371])[:, None, None]
+    q, v = np.vectorize(lambda x: float(f"{x:.{digits}g}"))(states)
+    found = identify(0.1 * np.arange(121), q, v=v, mass=M)
+    assert not found.fits
+    assert "One linear map" in found.statement
+    assert "magnetic" not in found.statement
+
+
 def test_a_force_constant_of_half_the_size_is_said_beside_the_fault_that_does_the_same() -> None:
     q, v = euler(0.1, K / 2)
     found = identify(0.1 * np.arange(301), q, v=v, mass=M, stiffness=K)
