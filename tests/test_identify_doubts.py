@@ -463,6 +463,12 @@ def test_a_single_position_of_the_other_sign_is_in_no_box() -> None:
     q, v = euler(0.1)
     found = identify(0.1 * np.arange(301), (q + 0.5) % 1 - 0.5, v=v, mass=M)
     assert "wrapped into a box of 1," in found.statement
+    # of one frame that is off by a length a box is one cause of several
+    q, v = euler(0.1, count=60)
+    for length, said in ((3.7, True), (0.2, False)):
+        found = identify(0.1 * np.arange(61), q + length * (np.arange(61) < 1), v=v, mass=M)
+        assert "frame 0 does not belong to it: a wrong start" in found.statement
+        assert ("wrapped into a box of 3.7," in found.statement) == ("box" in found.statement) == said
 
 
 def test_velocities_of_another_particle_are_no_magnetic_field() -> None:
