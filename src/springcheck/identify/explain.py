@@ -49,7 +49,7 @@ def explain(seen: Measured) -> tuple[Explanation, ...]:
     """Causes of states that no scheme fits, the likeliest first."""
     # a coordinate that hardly moves far from 0 has large residuals, all of rounding
     each = [seen.evidence(i) for i in range(len(seen.maps))]
-    evidence = max(each, key=lambda e: float(np.max(e.excess)))
+    evidence = max(each, key=lambda e: float(np.mean(e.excess**2)))
     if out := turned(seen.record, seen.moving) or _drift(evidence):
         return (out,)
     if np.max(evidence.excess) <= LINEAR_LEAVES:
