@@ -36,7 +36,7 @@ def test_a_motion_that_dies_within_a_few_frames_of_single_precision_excludes_no_
     q_, v_ = np.array(frames).astype(np.float32).astype(float).T
     found = identify(12.0 * np.arange(50), q_, v=v_)
     assert found.undecided
-    assert found.statement.startswith("The motion shows in 3 frames, too few to exclude a scheme; what fits: Impl")
+    assert found.statement.startswith("The motion shows in 3 frames, too few to exclude a scheme; what fits")
     assert [(x.scheme, x.stride) for x in found.candidates] == [("implicit-euler", 12)]
 
 

@@ -114,5 +114,6 @@ def test_a_pendulum_that_hardly_swings_is_in_no_bath(amplitude: float) -> None:
         angle += h * rate
         rate -= h / 2 * g / length * np.sin(angle)
     q, v = (np.array(x) for x in zip(*states, strict=True))
-    assert "anharmonic" in springcheck.identify(h * np.arange(401), q, v=v, mass=m).statement
-    assert "anharmonic" in springcheck.identify(h * np.arange(401), q[:, ::-1], v=v[:, ::-1], mass=m).statement
+    for order in ([0, 1], [1, 0]):
+        found = springcheck.identify(h * np.arange(401), q[:, order], v=v[:, order], mass=m)
+        assert "anharmonic" in found.statement
