@@ -367,3 +367,14 @@ def test_subnormal_numbers_of_single_precision_are_judged_to_what_they_hold(tmp_
                delimiter=",", header="t,q,v", comments="")  # fmt: skip
     found = file.judge(tmp_path / "a.csv", scene=scene, scheme="rk4")
     assert [v.check for v in found.verdicts if v.passed is False] == []
+
+
+def test_velocities_of_few_digits_in_another_mass_are_no_noise(tmp_path: Path) -> None:
+    """Momenta made of them have all digits: what the text rounds was "noise" as the cause of a wrong step."""
+    scene = springcheck.load_scene("spring-uneven")
+    run = driver.run(scene.derived(step=1.001 * scene.step), "own:trapezoidal")
+    rows = np.c_[scene.step * np.arange(len(run.t)), run.q, run.p / scene.m]
+    np.savetxt(tmp_path / "a.csv", rows, "%.6g", ",", header="t,q,v", comments="")
+    found = file.judge(tmp_path / "a.csv", scene=scene, scheme="trapezoidal")
+    assert found.status == 1
+    assert "noise" not in checks.cause_of(found.verdicts).casefold()
