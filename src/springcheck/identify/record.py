@@ -22,7 +22,7 @@ SIZES = 1e-75, 1e75
 """Smallest and largest magnitudes accepted: their fourth powers neither underflow nor overflow."""
 
 
-KEPT_DIGITS = 14
+THROUGH_A_PRODUCT = 14
 """Most digits of text that a product with a mass and the quotient by it leave as they were."""
 
 AT_REST = "nothing moves: at rest all schemes agree; start away from rest"
@@ -202,7 +202,7 @@ def read(
     elif v is None and masses is not None and v_storage.name == "double":
         # momenta made as m v from velocities in single precision or text are so only after the division
         made = moving[computed] / masses
-        text = np.array([float(f"{x:.{KEPT_DIGITS}g}") for x in made.flat]).reshape(made.shape)
+        text = np.array([float(f"{x:.{THROUGH_A_PRODUCT}g}") for x in made.flat]).reshape(made.shape)
         v_storage = storage(text if np.all(np.abs(text - made) <= 2 * np.spacing(np.abs(made))) else made)
         quantum = v_storage.quantum(moving / masses)
     else:
