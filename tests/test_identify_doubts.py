@@ -463,6 +463,12 @@ def test_a_single_position_of_the_other_sign_is_in_no_box() -> None:
     q, v = euler(0.1)
     found = identify(0.1 * np.arange(301), (q + 0.5) % 1 - 0.5, v=v, mass=M)
     assert "wrapped into a box of 1," in found.statement
+    # of one frame that is off by a length a box is one cause of several
+    q, v = euler(0.1, count=60)
+    for length, said in ((3.7, True), (0.2, False)):
+        found = identify(0.1 * np.arange(61), q + length * (np.arange(61) < 1), v=v, mass=M)
+        assert "frame 0 does not belong to it: a wrong start" in found.statement
+        assert ("wrapped into a box of 3.7," in found.statement) == ("box" in found.statement) == said
 
 
 def test_velocities_of_another_particle_are_no_magnetic_field() -> None:
@@ -471,6 +477,20 @@ def test_velocities_of_another_particle_are_no_magnetic_field() -> None:
     found = identify(0.1 * np.arange(301), states[0], v=states[1, :, ::-1], mass=[M, M])
     assert not found.fits
     assert "turns" not in found.statement
+
+
+@pytest.mark.parametrize(("digits", "off"), [(10, 1e-6), (7, 3e-5), (5, 2e-3)])
+def test_springs_that_are_not_quite_alike_along_two_axes_are_no_magnetic_field(
+    digits: int, off: float
+) -> None:
+    """To few digits one complex map holds of both, whose velocity seemed to turn by 4e-8 in a frame."""
+    one, other = euler(0.1, count=120), euler(0.1, K * (1 + off), q=0.3, v=0.7, count=120)
+    states = np.stack([one, other], axis=-1) * np.array([1, 1.0371])[:, None, None]
+    q, v = np.vectorize(lambda x: float(f"{x:.{digits}g}"))(states)
+    found = identify(0.1 * np.arange(121), q, v=v, mass=M)
+    assert not found.fits
+    assert "One linear map" in found.statement
+    assert "magnetic" not in found.statement
 
 
 def test_a_force_constant_of_half_the_size_is_said_beside_the_fault_that_does_the_same() -> None:

@@ -100,3 +100,20 @@ def test_noise_or_a_frame_that_stands_twice_is_no_factor(name: str, noise: float
     if not noise:
         q[40], v[40] = q[39], v[39]
     assert one_factor(scene.step, q, v) is None
+
+
+@pytest.mark.parametrize("amplitude", [1e-4, 1e-5, 1e-6])
+def test_a_pendulum_that_hardly_swings_is_in_no_bath(amplitude: float) -> None:
+    """Along an arc there is one freedom, of which any factor may be: it was a Nose-Hoover chain."""
+    m, g, length, h = 1.7, 2.9, 1.3, 0.13
+    angle, rate, states = amplitude, 0.3 * amplitude, []
+    for _ in range(401):
+        around = np.array([np.cos(angle), np.sin(angle)])
+        states.append((length * around[::-1] * [1, -1], length * rate * around))
+        rate -= h / 2 * g / length * np.sin(angle)
+        angle += h * rate
+        rate -= h / 2 * g / length * np.sin(angle)
+    q, v = (np.array(x) for x in zip(*states, strict=True))
+    for order in ([0, 1], [1, 0]):
+        found = springcheck.identify(h * np.arange(401), q[:, order], v=v[:, order], mass=m)
+        assert "anharmonic" in found.statement

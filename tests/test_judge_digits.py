@@ -342,6 +342,22 @@ def test_decimals_that_are_cut_off_are_named(
     assert "cut off" not in checks.cause_of(wrong.verdicts)
 
 
+@pytest.mark.parametrize("name", ["spring", "spring-uneven", "chain"])
+def test_positions_and_momenta_that_are_exchanged_are_named(tmp_path: Path, name: str) -> None:
+    """It was said that frame 0 did not belong to the motion, or that the scheme had memory."""
+    scene = springcheck.load_scene(name)
+    run = driver.run(scene, "own:velocity-verlet")
+    names = [f"{x}{i}" for x in "qp" for i in range(scene.n)]
+    rows = np.concatenate([run.p, run.q], axis=1)
+    rows[0] = [*run.q[0], *run.p[0]]
+    np.savetxt(
+        tmp_path / "a.csv", np.c_[run.t, rows], "%.17g", ",", header=",".join(["t", *names]), comments=""
+    )
+    found = file.judge(tmp_path / "a.csv", scene=scene, scheme="velocity-verlet")
+    assert found.status == 1
+    assert "positions and momenta are exchanged from frame 1 on" in checks.cause_of(found.verdicts)
+
+
 def test_subnormal_numbers_of_single_precision_are_judged_to_what_they_hold(tmp_path: Path) -> None:
     """A damped motion below 1e-38 failed: such numbers are multiples of 1.4e-45."""
     scene = spring(c=1.3, step=0.2, every=1)
@@ -351,3 +367,14 @@ def test_subnormal_numbers_of_single_precision_are_judged_to_what_they_hold(tmp_
                delimiter=",", header="t,q,v", comments="")  # fmt: skip
     found = file.judge(tmp_path / "a.csv", scene=scene, scheme="rk4")
     assert [v.check for v in found.verdicts if v.passed is False] == []
+
+
+def test_velocities_of_few_digits_in_another_mass_are_no_noise(tmp_path: Path) -> None:
+    """Momenta made of them have all digits: what the text rounds was "noise" as the cause of a wrong step."""
+    scene = springcheck.load_scene("spring-uneven")
+    run = driver.run(scene.derived(step=1.001 * scene.step), "own:trapezoidal")
+    rows = np.c_[scene.step * np.arange(len(run.t)), run.q, run.p / scene.m]
+    np.savetxt(tmp_path / "a.csv", rows, "%.6g", ",", header="t,q,v", comments="")
+    found = file.judge(tmp_path / "a.csv", scene=scene, scheme="trapezoidal")
+    assert found.status == 1
+    assert "noise" not in checks.cause_of(found.verdicts).casefold()

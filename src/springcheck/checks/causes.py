@@ -79,7 +79,7 @@ def found(case: Case, shown: Callable[[int, bool], str] = lambda *_: "") -> str:
         looks = [*looks, _of_reach, _of_state, _of_size]
     elif run.every == 1 and not missing(case, MAP):
         ways = [_of_differences, driven.found, held.found, _of_removal, _of_factor]
-        looks = [_of_cut_numbers, *looks, _of_reach]
+        looks = [_of_numbers, *looks, _of_reach]
     vague = ""
     for way in ways + looks:
         said = way(case)
@@ -188,9 +188,13 @@ def _of_reach(case: Case) -> str:
     return ""
 
 
-def _of_cut_numbers(case: Case) -> str:
-    """Decimals of a file that were cut off and not rounded: right is the middle of what they leave open."""
+def _of_numbers(case: Case) -> str:
+    """Positions and momenta in each other's columns, or decimals of a file that were cut off and not rounded:
+    right is the middle of what they leave open."""
     run = case.trajectory
+    q, p = (np.concatenate([x[:1], y[1:]]) for x, y in ((run.q, run.p), (run.p, run.q)))
+    if step_defect(replace(case, trajectory=replace(run, q=q, p=p))).passed:
+        return "each step is the scheme's own, but positions and momenta are exchanged from frame 1 on"
     half = run.arithmetic.recorded(case.judged.m, run.step, False).astype(np.float64)
     for words, sign in (("towards 0", np.sign), ("downwards", np.ones_like)) if np.any(half) else ():
         q, p = (x + one * sign(x) for x, one in zip((run.q, run.p), half, strict=True))

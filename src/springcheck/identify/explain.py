@@ -47,7 +47,9 @@ LINEAR_LEAVES = 4
 
 def explain(seen: Measured) -> tuple[Explanation, ...]:
     """Causes of states that no scheme fits, the likeliest first."""
-    evidence = seen.evidence(max(range(len(seen.maps)), key=lambda i: float(np.max(seen.maps[i].residual))))
+    # a coordinate that hardly moves far from 0 has large residuals, all of rounding
+    each = [seen.evidence(i) for i in range(len(seen.maps))]
+    evidence = max(each, key=lambda e: float(np.mean(e.excess**2)))
     if out := turned(seen.record, seen.moving) or _drift(evidence):
         return (out,)
     if np.max(evidence.excess) <= LINEAR_LEAVES:

@@ -198,8 +198,8 @@ def rod_of(q: Floats | None, *, fits: bool = False) -> RodSeen | None:
             length, off = _kept(arm)
             # a straight path lies on a circle as well, and an orbit may without a rod, but does not turn back
             # a parabola, as of frequencies of 1 to 2, departs from its circle by some bent**2 / length
-            share = RIGID * min(1.0, bent / (TURNED**2 * length))
-            if off <= share * bent and _turns_back(arm):
+            share = RIGID * min(TURNED**2 * length, bent)
+            if off * TURNED**2 * length <= share * bent and _turns_back(arm):
                 kept = f"keeps its distance from a fixed point, {length:.6g} to {off:.1g}: a rod"
                 return RodSeen(statement=f"particle {i} swings and {kept}")
     return on_circles

@@ -297,17 +297,19 @@ def _interruption(
                 more = f"{n - 1} frames are missing from frame {at} on" if n > 2 else f"frame {at} is missing"
                 return f"{but} {more}", "write every frame, or give a part without a gap"
             power = b @ power
+        off = (to - b @ from_).astype(np.float64)
+        back = np.linalg.lstsq(b.astype(np.float64), off)[0]
         if first == 0:
+            box = f" positions wrapped into a box of {abs(back[0]) * float(found.size[0]):.6g},"
+            box = box if abs(back[0]) > max(np.ptp(z[1:, 0]), 1e2 * abs(back[1])) else ""
             return (
-                f"{but} frame 0 does not belong to it: a wrong start, a scheme with memory, whose force or "
-                "velocity is that of the step before, or a solver that begins with steps of its own",
+                f"{but} frame 0 does not belong to it: a wrong start,{box} a scheme with memory, whose force "
+                "or velocity is that of the step before, or a solver that begins with steps of its own",
                 "look at how the start is set and recorded, or leave frame 0 out",
             )
-        off = (to - b @ from_).astype(np.float64)
         if at == len(z) - 1:
             cause = f"{but} frame {at}, the last, is wrong: {_amount(off, to)}"
             return cause, "look at how the last frame is written"
-        back = np.linalg.lstsq(b.astype(np.float64), off)[0]
         for kick, later in ((back, False), (off, True)):
             if abs(kick[0]) < 1e-2 * abs(kick[1]):
                 return _kicked(e, found, np.array([x[0] for x in runs]), later, whose, fitting)

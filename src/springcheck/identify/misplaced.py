@@ -117,6 +117,9 @@ def turned(record: Record, moving: list[int]) -> Explanation | None:
     whose = "all coordinates" if against == moving else f"coordinate {', '.join(map(str, against))}"
     cause = f"The velocities of {whose} have the wrong sign: positions move against them"
     remedy = "change the sign of the velocities, or write the frames in the order of time"
+    if against == moving:
+        # of m w = 1 the momentum in the place of the position moves so as well
+        cause += ", or positions and velocities are exchanged"
     if against == moving and record.interval < 0:
         cause = "The motion runs forwards while its times fall: each step is |h|, not h"
         remedy = "look for abs(dt); if the step is right, all velocities have the wrong sign"

@@ -72,12 +72,10 @@ def of_few(record: Record, found: Identification) -> Identification:
         return found
     fewest = max(fewest, math.ceil(FEWEST_DIGITS * frames / max(digits, 1.0)))
     more = f"give {fewest} frames or more that show it, or more digits"
+    few = f"motion shows in {count(frames, 'frame')}{of_text}, too few to exclude a scheme"
     if not found.candidates:
-        raise IdentificationError(
-            f"no known scheme fits, but {frames} frames{of_text} that show the motion exclude none: {more}"
-        )
-    said = f"{frames} frames{of_text} that show the motion exclude no scheme; what fits: {found.statement}"
-    return found.doubted(said, f"what would tell: {more}")
+        raise IdentificationError(f"no known scheme fits, but the {few}: {more}")
+    return found.doubted(f"The {few}; what fits: {found.statement}", f"what would tell: {more}")
 
 
 def beside_unknown(record: Record, found: Identification, *, stated: bool, seen: bool) -> Identification:

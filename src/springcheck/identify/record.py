@@ -22,6 +22,9 @@ SIZES = 1e-75, 1e75
 """Smallest and largest magnitudes accepted: their fourth powers neither underflow nor overflow."""
 
 
+THROUGH_A_PRODUCT = 14
+"""Most digits of text that a product with a mass and the quotient by it leave as they were."""
+
 AT_REST = "nothing moves: at rest all schemes agree; start away from rest"
 
 
@@ -199,9 +202,10 @@ def read(
         v_storage, quantum = Storage(name="text, fixed decimals"), np.broadcast_to(last, moving.shape)
         v_storage = q_storage if q_storage.decimals is not None else v_storage
     elif v is None and masses is not None and v_storage.name == "double":
-        # momenta made as m v from single-precision velocities are single only after the division
-        velocities = storage(moving[computed] / masses)
-        v_storage = velocities if velocities.name == "single" else v_storage
+        # momenta made as m v from velocities in single precision or text are so only after the division
+        made = moving[computed] / masses
+        text = np.array([float(f"{x:.{THROUGH_A_PRODUCT}g}") for x in made.flat]).reshape(made.shape)
+        v_storage = storage(text if np.all(np.abs(text - made) <= 2 * np.spacing(np.abs(made))) else made)
         quantum = v_storage.quantum(moving / masses)
     else:
         quantum = v_storage.quantum(moving) / unit.astype(np.float64)

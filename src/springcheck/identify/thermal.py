@@ -46,8 +46,11 @@ UNLIKE_MOTION = 1e-5
 
 def one_factor(h: float, q: Floats, v: Floats) -> tuple[str, float, Floats] | None:
     """Place in a step of h at which one factor multiplies the velocities v (f, n) of q (f, n), the relative
-    residual, and the factors (f - 1,); None where no factor that varies from step to step explains them."""
+    residual, and the factors (f - 1,); None where no factor that varies from step to step explains them, and
+    where a path that bends only once leaves them one freedom, of which any factor may be."""
     x, n = q - np.mean(q, axis=0), q.shape[1]
+    if any(_bends(x[:, 0], y) or _bends(y, x[:, 0]) for y in x[:, 1:].T):
+        return None
     here, both = (np.column_stack([y, np.ones(len(y))]) for y in (x[:-1], x[:-1] + x[1:]))
     ways = ((v[:-1], np.diff(x, axis=0) / h, here), (v[1:], v[:-1], both), (v[1:], v[:-1], here))
     for i, (a, b, F) in enumerate(ways):
@@ -74,6 +77,13 @@ def one_factor(h: float, q: Floats, v: Floats) -> tuple[str, float, Floats] | No
         if irregular and max(misfit, *off) < sharp * (high - low) / max(abs(high), abs(low)):
             return PLACES_OF_FACTOR[i], misfit, np.asarray(factor)
     return None
+
+
+def _bends(x: Floats, y: Floats) -> bool:
+    """Whether y (f,) is a quadratic function of x (f,), as along an arc."""
+    powers = np.vander(x / np.max(np.abs(x)), 3)
+    left = y - powers @ np.linalg.lstsq(powers, y)[0]
+    return bool(np.linalg.norm(left) <= UNLIKE_MOTION * np.linalg.norm(y))
 
 
 def explained(

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from springcheck.identify.evidence import LEFT_BY_ROUNDING
+from springcheck.identify.fit import CERTAIN
 from springcheck.identify.hypothesis import SURE
 from springcheck.identify.misplaced import MOST_COMPARED, unsorted
 from springcheck.identify.record import Record
@@ -119,11 +120,11 @@ def distance(record: Record) -> Record | None:
 
 
 def of_rotation(record: Record, found: Identification) -> Identification:
-    """Add a rotation of the velocity as a cause, or as an alternative to springs."""
+    """Add a rotation of the velocity as a cause, or as an alternative to what one coordinate alone shows."""
     if found.explanations and (cause := (not found.fits and unsorted(record)) or of_plane(record)):
         # numbers of one coordinate are none of what moves both
         return nothing((cause,), determinant=(math.nan,) * len(found.determinant), notes=found.notes)
-    if not found.fits or (pair := _turning(record)) is None:
+    if (pair := _turning(record)) is None:
         return found
     i, j, factor, error = pair
     grows = abs(abs(factor) - 1) > LEFT_BY_ROUNDING * ROUNDING + error
@@ -167,46 +168,51 @@ BORIS_AGREES = 1e-10
 
 
 def of_plane(record: Record) -> Explanation | None:
-    """The first pair of coordinates that a rotation couples: a magnetic field across their plane, or a
-    rotating frame.
+    """The pair of coordinates that a rotation couples: a magnetic field across their plane, or a rotating
+    frame.
 
     With z = x + i y, on isotropic springs, a frame takes (z, z') to A (z, z') with a complex A, which is real
     without a field.  The phase of its determinant is the angle by which it turns a velocity.
     """
-    for i, j in combinations(record.moving[:MOST_COMPARED], 2):
-        if found := _of_two(record, i, j):
-            return found
-    return None
+    pairs = [_of_two(record, *two) for two in combinations(record.moving[:MOST_COMPARED], 2)]
+    return max(pairs, key=lambda x: x[0], default=(0.0, None))[1]
 
 
-def _of_two(record: Record, i: int, j: int) -> Explanation | None:
+def _of_two(record: Record, i: int, j: int) -> tuple[float, Explanation | None]:
+    """Squares that maps of two coordinates alone leave over those that one complex map leaves, 0 where that
+    is no map, and the rotation that it shows."""
     (x, y), (u, v) = (a[:, [i, j]].astype(np.float64).T for a in (record.q, record.v * record.interval))
     z = np.stack([x + 1j * y, u + 1j * v, np.ones(len(x))], axis=1)
     if not np.all(size := np.max(np.abs(z), axis=0)):
-        return None
+        return 0.0, None
     # where the motion grows or decays, each frame is weighted by its size
     each = np.max(np.abs(z[:-1, :2]) / size[:2], axis=1, keepdims=True)
     weight = 1 / each if np.all(each > 0) else 1.0
     scaled = weight * z[:-1] / size
-    rows = np.linalg.lstsq(scaled, weight * z[1:] / size)[0]
-    left = np.abs(weight * z[1:] / size - scaled @ rows)[:, :2]
+    ends = (weight * z[1:] / size)[:, :2]
+    rows = np.linalg.lstsq(scaled, ends)[0]
+    left = np.abs(ends - scaled @ rows)
     # half a unit of both coordinates, at either end of a step
     unit = np.hypot(*(record.quanta(k) for k in (i, j))) * (0.0 if record.fine else 0.5) / size[:2]
-    if np.any(left > LEFT + weight * (unit[1:] + unit[:-1] @ np.abs(rows[:2, :2]))):
-        return None
+    if np.any(left > LEFT + weight * (unit[1:] + unit[:-1] @ np.abs(rows[:2]))):
+        return 0.0, None
+    # maps of each coordinate alone have as many numbers, and hold on springs that are not alike as well
+    apart = (scaled.real, ends.real), (np.where([False, False, True], scaled, -1j * scaled).real, ends.imag)
+    parted = sum(float(np.sum((to - x @ np.linalg.lstsq(x, to)[0]) ** 2)) for x, to in apart)
+    gain = parted / max(float(np.sum(left**2)), np.finfo(np.float64).tiny)
+    if not gain > math.exp(CERTAIN / (2 * len(left))):
+        return 0.0, None
     spread = np.sqrt(np.diag(np.linalg.pinv(np.real(scaled.conj().T @ scaled), hermitian=True))[:2])
     size = size[:2]
     scale = size[:, None] / size
-    entries = np.asarray(rows[:2, :2].T * scale, np.complex128)
+    entries = np.asarray(rows[:2].T * scale, np.complex128)
     error = SURE * np.sqrt(np.mean(left**2, axis=0))[:, None] * spread * scale
-    if np.all(np.abs(entries.imag) < LEFT * scale + error):
-        return None
     interval = abs(float(record.interval))
     det = complex(np.linalg.det(entries))
     angle, open_to = cmath.phase(det), float(np.sum(np.abs(entries[::-1, ::-1]) * error))
     if abs(angle) < LEFT + open_to:
         # the velocities are other numbers than these positions', and nothing turns them
-        return None
+        return gain, None
     of = f" of coordinates {i} and {j}" if record.q.shape[1] > 2 else ""
     turned = _known(angle, open_to) if abs(abs(det) - 1) < KEPT else f"about {angle:.2g}"
     cause = (
@@ -225,7 +231,8 @@ def _of_two(record: Record, i: int, j: int) -> Explanation | None:
             f"{_known(2 * half / interval, open_to / interval)}, stiffness over mass "
             f"{_known(stiff / interval**2, float(error[1, 0]) / interval**2)}"
         )
-    return Explanation(cause, "judge it against a scene with [[magnetic]]", float(np.max(left)), local=True)
+    remedy = "judge it against a scene with [[magnetic]]"
+    return gain, Explanation(cause, remedy, float(np.max(left)), local=True)
 
 
 def _known(x: float, error: float) -> str:
