@@ -17,12 +17,12 @@ BUDGETS = {
     ("engines/openmm", "engines/ase", "engines/sundials"): 1284,
     ("engines",): 2837,
     ("driver", "conformance", "doors"): 1203,
-    ("checks",): 5677,
-    ("identify",): 9338,
+    ("checks",): 5678,
+    ("identify",): 9339,
     ("formats", "store"): 5191,
     ("studies",): 1456,
     ("studies/*",): 9936,
-    ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 7287,
+    ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 7288,
 }
 """Lines of each room, or of several: of an engine in one file, and of what all studies share, in the first
 folder."""

@@ -135,7 +135,7 @@ def test_some_start_leads_to_the_right_states_and_none_to_those_of_another_stiff
     def found(k: float) -> bool:
         run = driver.run(spring(k), "own:velocity-verlet")
         q, p = (np.round(x, digits) for x in (run.q, run.p))
-        return has_a_start(scheme, 0.02, springs, steps, q, p, 5e-4)
+        return has_a_start(scheme, 0.02, springs, steps, q, p, 5e-4, np.zeros((2, 1)))
 
     assert found(4.9)
     assert not found(4.9 * (1 + 40 * 10.0**-digits))

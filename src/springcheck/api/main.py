@@ -196,9 +196,10 @@ def identify(
     given = {name: x for name, x in given.items() if x is not None}
     arrays = zip(given, reals("identify", **given), strict=True)
     numbers: dict[str, Any] = {name: x if x.ndim else x.item() for name, x in arrays}
-    positions = np.reshape(numbers["q"], (len(numbers["q"]), -1)) if np.ndim(numbers["q"]) else None
     with spoken():
-        return files.of_springs(of_states(**numbers), positions, stated=stiffness is not None)
+        told = of_states(**numbers)
+        whole = np.reshape(numbers["q"], (len(numbers["q"]), -1))
+        return files.of_springs(told, whole, stated=stiffness is not None)
 
 
 @typed

@@ -7,10 +7,10 @@ squares of what the steps miss.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import combinations
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,7 +40,8 @@ Rows: TypeAlias = tuple[str, NDArray[np.bool_]]
 """Some of a term's rows, or of the coordinates (s,), in words."""
 
 
-class Kind(NamedTuple):
+@dataclass(frozen=True, slots=True, eq=False)
+class Kind:
     """The numbers (s,) of one kind in a scene, and the case that has others."""
 
     name: str

@@ -199,7 +199,8 @@ def rod_of(q: Floats | None, *, fits: bool = False) -> RodSeen | None:
             # a straight path lies on a circle as well, and an orbit may without a rod, but does not turn back
             # a parabola, as of frequencies of 1 to 2, departs from its circle by some bent**2 / length
             share = RIGID * min(TURNED**2 * length, bent)
-            if off * TURNED**2 * length <= share * bent and _turns_back(arm):
+            least = max(off, ROUNDING * length)
+            if least * TURNED**2 * length <= share * bent and _turns_back(arm):
                 kept = f"keeps its distance from a fixed point, {length:.6g} to {off:.1g}: a rod"
                 return RodSeen(statement=f"particle {i} swings and {kept}")
     return on_circles
