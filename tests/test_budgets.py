@@ -15,7 +15,7 @@ BUDGETS = {
     ("thermal",): 3334,
     ("engines/own",): 1591,
     ("engines/openmm", "engines/ase", "engines/sundials"): 1284,
-    ("engines",): 2837,
+    ("engines",): 2836,
     ("driver", "conformance", "doors"): 1203,
     ("checks",): 5678,
     ("identify",): 9339,

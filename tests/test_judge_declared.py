@@ -153,6 +153,7 @@ DECLARED: dict[str, dict[str, Any]] = {
     "excess": {"arithmetic": Arithmetic(excess=1e-7)},
     "stale": {"arithmetic": Arithmetic(stale=1e-3)},
     "lengths": {"arithmetic": Arithmetic(lengths=1e-8)},
+    "rates": {"arithmetic": Arithmetic(rates=1e-8)},
     "cancels": {"arithmetic": Arithmetic(cancels=2)},
     "keeps_displacement": {"arithmetic": Arithmetic(keeps_displacement=True), "rebuilds_velocity": True},
     "from_start": {"arithmetic": Arithmetic(from_start=True)},

@@ -59,6 +59,9 @@ LENGTHS = {"shake": 1e-13, "rattle": 1e-13, "rattle-as-in-its-manual": 1e-4, "ra
 
 MOST_ITERATIONS = 500
 
+LARGEST_EDGE = 1e100
+"""Half a box whose volume is finite."""
+
 SETTINGS = """
 units lj
 atom_style angle
@@ -169,7 +172,7 @@ class _Run:
         layers = _layered(scene, [t for t in held if isinstance(t, WallSpring)], self._origins)
         anchors = [x for *_, x in springs if x is not None]
         most = max([1, *np.bincount([i for a, b, *_ in springs for i in (a, b)], minlength=1).tolist()])
-        size = max(1.0, float(np.max(np.abs(scene.q))))
+        size = min(max(1.0, float(np.max(np.abs(scene.q)))), LARGEST_EDGE)
         for line in SETTINGS.format(**_borders(scene.box, size)).strip().splitlines():
             command(line)
         more = f"angle/types {len(angles)} extra/angle/per/atom 1 extra/special/per/atom 8" if rods else ""
@@ -276,12 +279,8 @@ def _borders(box: tuple[float, ...] | None, size: float) -> dict[str, Any]:
     coordinate; in a box atoms are put back at every step, and a bond finds the nearest image of its end up to
     half a box away."""
     if box is None:
-        return {
-            "border": "s s s",
-            "every": 2000000000,
-            "cutoff": 1.0,
-            "edges": " ".join([f"{-size!r} {size!r}"] * 3),
-        }
+        edges = " ".join([f"{-size!r} {size!r}"] * 3)
+        return {"border": "s s s", "every": 2000000000, "cutoff": 1.0, "edges": edges}
     edges = " ".join(f"0 {length!r}" for length in box)
     return {"border": "p p p", "every": 1, "cutoff": 0.51 * max(box), "edges": edges}
 
