@@ -394,19 +394,14 @@ def test_frames_far_apart_are_reached_in_pieces_to_the_same_numbers(
 
 
 @pytest.mark.parametrize(
-    ("label", "h", "every", "first"),
-    [
-        *((label, 1e3, every, int("verlet" in label))
-          for label in ("own:euler", "own:velocity-verlet", "ase:velocity-verlet") for every in (1, 5)),
-        ("pymunk:force", 3.0, 1, 0),
-    ],
-)  # fmt: skip
+    ("label", "first"), [("own:euler", 0), ("own:velocity-verlet", 1), ("ase:velocity-verlet", 1)]
+)
+@pytest.mark.parametrize("every", [1, 5])
 def test_force_calls_of_a_diverged_run_are_those_up_to_its_last_frame(
-    label: str, h: float, every: int, first: int, need: Need
+    label: str, every: int, first: int
 ) -> None:
-    """Its last piece is filled to the end with what is not finite, or ends where the engine stops."""
-    need(label)
-    scene = replace(scenes.load_scene("spring"), step=h, steps=1500, every=every)
+    """Its last piece is filled to the end with what is not finite."""
+    scene = replace(scenes.load_scene("spring"), step=1e3, steps=1500, every=every)
     run = springcheck.simulate(scene, label)
     assert run.outcome.status == "diverged"
     assert run.force_calls == run.outcome.step + first > 20

@@ -493,3 +493,10 @@ def test_rapier_takes_no_spring_whose_inverse_it_takes_for_nothing(m: float, k: 
     scene = one_spring(m=m, k=k, q=0.3, p=0.7 * m, step=0.1, steps=20)
     with pytest.raises(MethodError, match=r"Rapier takes 1/x for 0 where x is below 1e-20"):
         run(scene, "rapier:spring-joint")
+
+
+def test_force_calls_of_a_run_whose_engine_stops_are_those_up_to_its_last_frame(need: Need) -> None:
+    need("pymunk:force")
+    run = driver.run(replace(load_scene("spring"), step=3.0, steps=1500), "pymunk:force")
+    assert run.outcome.status == "diverged"
+    assert run.force_calls == run.outcome.step > 20
