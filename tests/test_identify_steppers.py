@@ -16,11 +16,11 @@ import pytest
 
 import springcheck
 from springcheck import checks, doors, driver
-from springcheck.doors.function import UNKNOWN
 from springcheck.errors import MethodError
 from springcheck.identify import identify_stepper
 from springcheck.identify.files import shown
 from springcheck.identify.taken import seen_to_take
+from springcheck.schemes import UNKNOWN
 
 Force = Callable[..., Any]
 

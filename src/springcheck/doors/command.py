@@ -18,11 +18,11 @@ from typing import Any
 import numpy as np
 
 from springcheck import interrupts, schemes
-from springcheck.doors.function import UNKNOWN
 from springcheck.engines import BRAKES, DRIVEN, EVERY_FORCE, Engine, Label, Method, Simulation
 from springcheck.errors import MethodError, StoreError
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
+from springcheck.schemes import UNKNOWN
 
 SECONDS = 600.0
 """Seconds that a command may take where `--timeout` does not say."""

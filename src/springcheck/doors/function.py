@@ -24,17 +24,7 @@ from springcheck.identify.pair import returned
 from springcheck.physics.arrays import Floats
 from springcheck.physics.driven import timed
 from springcheck.physics.scene import Scene
-from springcheck.schemes import Scheme
-
-UNKNOWN = Scheme(
-    name="unknown",
-    title="no scheme that is known here",
-    order=0,
-    limit=np.inf,
-    symplectic=False,
-    unnamed=True,
-    source="none: only what needs no scheme is judged",
-)
+from springcheck.schemes import UNKNOWN
 
 Spec = str | Callable[..., Any]
 """A function, or the text that says where one is."""

@@ -15,7 +15,6 @@ from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 from springcheck import engines, schemes
-from springcheck.doors.function import UNKNOWN
 from springcheck.errors import MethodError
 
 Line: TypeAlias = str | tuple[int, tuple[float, ...]]
@@ -161,7 +160,7 @@ def scheme_of(label: str) -> str:
 
 def title(scheme: str) -> str:
     """The title of a scheme as short as a legend needs it: without its mechanism and its orders."""
-    found = UNKNOWN.title if scheme in ("", UNKNOWN.name) else schemes.title(scheme)
+    found = schemes.UNKNOWN.title if scheme in ("", schemes.UNKNOWN.name) else schemes.title(scheme)
     # a method's own label stays whole, and so does what tells the members of a family apart
     whole = found == scheme or ": fast springs" in found
     return found if whole else found.partition(":")[0].partition(", orders ")[0]

@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 
-from springcheck.doors.function import UNKNOWN
 from springcheck.figures import looks, naming
 from springcheck.figures.charts import EXACTLY, REJECTED, Bank, Chart, Curve, Scale
 from springcheck.figures.frames import Frame
@@ -16,6 +15,7 @@ from springcheck.figures.views import units, with_unit
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory
+from springcheck.schemes import UNKNOWN
 
 TRUTH = "exact solution"
 

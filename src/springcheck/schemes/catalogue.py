@@ -320,6 +320,17 @@ ATTACHED: dict[str, Scheme] = {scheme.name: scheme for scheme in _ATTACHED}
 that is set once and held over substeps, friction that is taken implicitly where the force is not, a spring
 that is solved for in every substep; and Boris' rotation, which is position Verlet without a field."""
 
+UNKNOWN = Scheme(
+    name="unknown",
+    title="no scheme that is known here",
+    order=0,
+    limit=np.inf,
+    symplectic=False,
+    unnamed=True,
+    source="none: only what needs no scheme is judged",
+)
+"""What a function, command or file claims that states no scheme, where none is found."""
+
 
 def number(c: Coefficient, width: Any) -> Any:
     """A coefficient rounded once to a float of this width (np.float64, np.longdouble)."""
