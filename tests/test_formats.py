@@ -81,6 +81,21 @@ def blanks(run: Trajectory) -> list[str]:
     return ["x.txt", "--columns", "t,q,v"]
 
 
+def slashes(run: Trajectory) -> list[str]:
+    rows = np.stack([run.t, run.q[:, 0], run.p[:, 0]], axis=1)
+    np.savetxt("x.txt", rows, fmt="%.17g", header="t, q, p", comments="// ", delimiter=", ")
+    return ["x.txt"]
+
+
+def grace(run: Trajectory) -> list[str]:
+    """As GROMACS writes an .xvg file."""
+    names = '@    xaxis  label "Time (ps)"\n@TYPE xy\n@ s0 legend "q"\n@ s1 legend "p"'
+    header = f'# made by hand\n@    title "t, q, p"\n@ view 0.15, 0.15, 0.75\n{names}'
+    rows = np.stack([run.t, run.q[:, 0], run.p[:, 0]], axis=1)
+    np.savetxt("x.xvg", rows, fmt="%.17g", header=header, comments="")
+    return ["x.xvg"]
+
+
 def six_digits(run: Trajectory) -> list[str]:
     np.savetxt("x.txt", np.stack([run.t, run.q[:, 0], run.p[:, 0]], axis=1), fmt="%.6g", header="t q p")
     return ["x.txt"]
@@ -425,7 +440,7 @@ def store(run: Trajectory) -> list[str]:
 Writer = Callable[[Trajectory], list[str]]
 WRITERS: list[Writer] = [
     csv, with_index, printed_with_index, decimal_commas, blanks,
-    six_digits, npy, structured, npz, single, in_space, ase_trajectory, dump, h5md, store,
+    slashes, grace, six_digits, npy, structured, npz, single, in_space, ase_trajectory, dump, h5md, store,
     extended_xyz, trr, gro, fixed_decimals, arrays_in_hdf5, groups_in_hdf5, named_in_hdf5, named_in_npz,
     gzipped, fortran, plain_xyz, lammps_log, json_of_lists, json_of_rows,
     json_of_bare_rows, json_of_pandas, excel, parquet, feather, matlab, matlab_7_3, octave, amber,

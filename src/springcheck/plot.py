@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from springcheck.errors import SpringcheckError
 from springcheck.physics.arguments import typed
 from springcheck.physics.norm import energy_changes
 from springcheck.physics.trajectory import Trajectory
@@ -15,19 +16,13 @@ if TYPE_CHECKING:
 @typed
 def phase(*runs: Trajectory, particle: int = 0, ax: Axes | None = None) -> Axes:
     """Phase portraits, p over q, of one particle of each trajectory; returns the axes."""
-    axes = _axes(ax)
-    for run in runs:
-        axes.plot(*run.of_particle(particle), label=run.label)
-    return _finished(axes, "q", "p")
+    return _drawn([(run.label, *run.of_particle(particle)) for run in runs], ("q", "p"), ax)
 
 
 @typed
 def position(*runs: Trajectory, particle: int = 0, ax: Axes | None = None) -> Axes:
     """Positions over time of one particle of each trajectory; returns the axes."""
-    axes = _axes(ax)
-    for run in runs:
-        axes.plot(run.t, run.of_particle(particle)[0], label=run.label)
-    return _finished(axes, "t", "q")
+    return _drawn([(run.label, run.t, run.of_particle(particle)[0]) for run in runs], ("t", "q"), ax)
 
 
 @typed
@@ -37,22 +32,24 @@ def energy(*runs: Trajectory, ax: Axes | None = None) -> Axes:
 
     SpringcheckError where a trajectory was recorded without energies.
     """
-    axes = _axes(ax)
-    for run in runs:
-        axes.plot(run.t, energy_changes(run), label=run.label)
-    return _finished(axes, "t", "(H - H0) / (initial T + |V|)")
+    curves = [(run.label, run.t, energy_changes(run)) for run in runs]
+    return _drawn(curves, ("t", "(H - H0) / (initial T + |V|)"), ax)
 
 
-def _axes(ax: Axes | None) -> Axes:
-    if ax is not None:
-        return ax
-    from matplotlib import pyplot
+def _drawn(curves: list[tuple[str, Any, Any]], names: tuple[str, str], ax: Axes | None) -> Axes:
+    """The axes, or new ones, with these curves, each a label, x (f,) and y (f,).  SpringcheckError where
+    there is none."""
+    if not curves:
+        raise SpringcheckError(
+            "no trajectory is given to draw; give one or more, as springcheck.run has them"
+        )
+    if ax is None:
+        from matplotlib import pyplot
 
-    return pyplot.figure(layout="constrained").add_subplot()
-
-
-def _finished(axes: Axes, x: str, y: str) -> Axes:
-    axes.set_xlabel(x)
-    axes.set_ylabel(y)
-    axes.legend()
-    return axes
+        ax = pyplot.figure(layout="constrained").add_subplot()
+    for label, x, y in curves:
+        ax.plot(x, y, label=label)
+    ax.set_xlabel(names[0])
+    ax.set_ylabel(names[1])
+    ax.legend()
+    return ax

@@ -23,13 +23,16 @@ FEWEST_LONG = 20
 AS_WIDE = 0.75
 """Share of the numbers of a column that are as wide as any where all were cut off at one width: of others the
 last digits are zeros by chance, and may be left out."""
-COMMENT = ("#", "%")
+COMMENT = ("#", "%", "!", "//")
 """Prefix of a comment, which may name the columns and holds no row of numbers."""
+GRACE = re.compile(r"\s*@\s*(?:xaxis\s+label|s\d+\s+legend)\s+(\".*\")")
+"""Line of a Grace file (.xvg of GROMACS) that names its next column; others with an @ are its layout."""
 
 
 def read_table(path: Path, columns: list[str], step: float | None) -> States:
     """The states of a text table; the last line before the numbers names the columns, or has their units."""
     header: list[str] = []
+    legends: list[str] = []
     units = ""
     first: list[list[str]] = []
     numbers, width = array("d"), 0
@@ -42,6 +45,10 @@ def read_table(path: Path, columns: list[str], step: float | None) -> States:
                 continue
             if width == 1 and len(first) == SHOWN:
                 break  # the message is the same, however many follow
+            if not width and line.lstrip().startswith("@"):
+                legends += GRACE.findall(line)
+                header = [*map(_bare, legends)] or header
+                continue
             cells, is_comment = _cells(line), line.lstrip().startswith(COMMENT)
             row = _numbers(cells)
             if not cells or (is_comment and (width or row)):
@@ -101,7 +108,7 @@ def of_rows(
 
 
 def _cells(line: str) -> list[str]:
-    text = line.strip(" ").lstrip("#%").strip(" ")
+    text = line.strip(" ").lstrip("#%!/").strip(" ")
     if ";" in text or "\t" in text:
         # there a comma stands for a decimal point
         parts = [re.sub(r"^([+-]?\d*),(\d+)(?![\d.,])", r"\1.\2", _bare(x)) for x in re.split(r"[;\t]", text)]
