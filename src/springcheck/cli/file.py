@@ -167,88 +167,12 @@ def as_trajectory(
     StoreError where they are not of the scene: another number of particles, other times, another start.
     """
     start.contradicted(path, states, scene)
-    notes, taken, q, moved = [*states.notes, *start.clock(states, scene)], dict[str, str](), states.q, 0.0
-    other, rates = (states.p, "momenta") if states.p is not None else (np.asarray(states.v), "velocities")
-    for name, values in (("positions", q), (rates, other)):
-        good = np.isfinite(values).all(axis=1)
-        if not good.all():
-            raise StoreError(
-                f"{path}: the {name} of row {int(np.argmin(good)) + 1} are not finite numbers; leave out the "
-                "frames from there on, and those before it are judged"
-            )
-    beside, fixed = 0.0, states.fixed
-    halves = np.zeros((2, q.shape[1]))
-    if fixed:
-        halves[0], halves[1] = fixed.q, fixed.v
-    off = max(1e-6, 4 * states.roundoff)
-    if scene.places is not None and q.shape[1] == 3 * scene.particles > scene.n:
-        q, other, beside = _in_plane(path, q, other, scene, off)
-        halves = halves[:, scene.where]
-    elif q.shape[1] == 3 * scene.n:
-        far = float(np.max(np.abs(q), initial=0.0))
-        q, other, beside, line = _along(path, q, other, scene, notes, off)
-        halves = halves.reshape(2, -1, 3) @ np.abs(line)
-        if moved := _beside_start(q, scene, off):
-            # displaced from 0 by as much as the points are, since they are rounded there
-            notes.append(f"positions counted from {moved:.6g} along it, where the scene has its 0")
-            terms = tuple(term.shifted(far) if term.bodies == 1 else term for term in scene.terms)
-            q, scene = q - moved + far, replace(scene, q=scene.q + far, terms=terms)
-            beside /= max(1.0, far / (float(np.ptp(q)) or 1.0))
-    if q.shape[1] != scene.n:
-        raise StoreError(f"{path}: positions in a frame: {q.shape[1]}, in scene {scene.name}: {scene.n}")
-    if states.p is None:
-        other, halves[1] = other * scene.m, halves[1] * scene.m
-    p = other
-    if states.roundoff >= 2.0**-24 and np.any((np.abs(q) < SMALLEST_SINGLE) & (q != 0)):
-        # subnormal numbers of single precision are whole multiples of 2**-149
-        halves = np.maximum(halves, [np.full(scene.n, 2.0**-150), 2.0**-150 * scene.m])
-    if len(q) < 2:
-        raise StoreError(f"{path}: holds {len(q)} frame; two are needed")
-    if not np.isfinite(states.t).all():
-        raise StoreError(f"{path}: row {int(np.argmin(np.isfinite(states.t))) + 1} of t is not finite")
-    apart, own = float(states.t[1] - states.t[0]), units(scene).t
-    every = round(apart / scene.step)
-    for name, one in files.TIMES.items() if own in files.TIMES else ():
-        factor = files.TIMES[own] / one
-        if factor != 1 and abs(apart - factor * scene.step * scene.every) <= 1e-6 * apart:
-            raise StoreError(
-                f"{path}: the times look like {name}: frames lie {apart:.6g} apart, {factor:g} times as far "
-                f"as in scene {scene.name}, which has {own}; divide them by {factor:g}"
-            )
-    t = np.arange(len(q), dtype=np.float64) * max(every, 1) * scene.step
-    off = np.abs(states.t - states.t[0] - t)
-    # of times with fixed decimals the last digit does not grow with them
-    allowed = 1e-9 * np.abs(t + scene.step) + 2 * states.roundoff * np.abs(states.t)
-    allowed += storage(states.t).quantum(states.t)
-    if every < 1 or np.any(off > allowed):
-        row = int(np.argmax(off > allowed))
-        raise StoreError(
-            f"{path}: row {row + 1} is at t = {states.t[row]:.12g}, and {states.t[0] + t[row]:.12g} is due: "
-            f"frames lie whole steps of {scene.step:g} apart in scene {scene.name}, as the first two do"
-            + "".join(f"; {x}" for x in start.clock(states, scene))
-        )
-    if np.any(states.t != t):
-        notes.append(TIMES)
-        taken["times"] = f"{TIMES}; they are up to {np.max(off):.2g} beside them" if np.any(off) else TIMES
-    size = scene.system.norm(q[0] - scene.q, p[0] - scene.p)
-    # far from 0 the rounding of a coordinate is larger relative to the amplitude
-    both = zip((q[0], p[0]), halves, strict=True)
-    rounded = scene.system.norm.most(*(states.roundoff * np.abs(x) + half for x, half in both))
-    if not size <= max(1e-9, 10 * states.roundoff) and not 0 < size * scene.system.norm.unit <= 2 * rounded:
-        raise StoreError(
-            f"{path}: its first frame is {float(size):.2g} of the amplitude off the start of {scene.name}: "
-            + start.differs(scene, scheme, states, q, p, every)
-        )
-    if size > 0 or moved:
-        taken["start"] = f"the start was taken as it is written in the file, {size:.2g} of the amplitude off"
-        notes += [taken["start"]] if size > 0 else []
-    if fixed:
-        halves_of = {"positions": fixed.q, rates: fixed.v}
-        sizes = {name: f"{np.max(x):.1g}" for name, x in halves_of.items() if np.any(x)}
-        of, each = (" and ".join(words) for words in (sizes, sizes.values()))
-        notes += [f"{of} are rounded to decimals, by up to {each}, and judged to that"] * bool(sizes)
-    if (unit := fixed.beside if fixed else states.roundoff) > 2.0**-53:
-        notes.append(f"numbers are written to {unit:.1g}, and judged to that")
+    notes, taken = [*states.notes, *start.clock(states, scene)], dict[str, str]()
+    of = _placed(path, states, scene, notes)
+    scene, q, p = of.scene, of.q, of.p
+    t, every = _times(path, states, scene, notes, taken)
+    _begins(path, states, of, scheme, every, notes, taken)
+    _digits(states, notes)
     steps = (len(q) - 1) * every
     if steps != scene.steps:
         notes.append(f"ends after step {steps:,}, the scene after {scene.steps:,}")
@@ -279,17 +203,141 @@ def as_trajectory(
     }  # fmt: skip
     if ours is not None:
         run = replace(ours, **known, tolerance=ours.tolerance if ours.scheme == scheme else None)
-    else:
-        # a line that is no axis is rounded in each of its coordinates
-        off_axis = beside if beside > 8 * states.roundoff else None
-        arithmetic = Arithmetic(name=AS_WRITTEN, state=unit, written=halves if np.any(halves) else ((), ()))
-        tolerance = scene.tolerance if schemes.scheme(scheme).has("adaptive") else None
-        run = Trajectory(**known, arithmetic=arithmetic, off_axis=off_axis, tolerance=tolerance)
-        if tolerance is not None:
-            taken["tolerance"] = (
-                "the file does not say what tolerance its solver has, nor how many steps it took"
-            )
+        return judged, run, tuple(notes), taken
+    # a line that is no axis is rounded in each of its coordinates
+    off_axis = of.beside if of.beside > 8 * states.roundoff else None
+    written = of.halves if np.any(of.halves) else ((), ())
+    tolerance = scene.tolerance if schemes.scheme(scheme).has("adaptive") else None
+    if tolerance is not None:
+        taken["tolerance"] = "the file does not say what tolerance its solver has, nor how many steps it took"
+    arithmetic = Arithmetic(name=AS_WRITTEN, state=_unit(states), written=written)
+    run = Trajectory(**known, arithmetic=arithmetic, off_axis=off_axis, tolerance=tolerance)
     return judged, run, tuple(notes), taken
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class _Placed:
+    """The states of a file in the coordinates of a scene."""
+
+    scene: Scene
+    """With 0 where the file has it."""
+    q: Floats
+    p: Floats
+    halves: Floats
+    """Half a unit of the last decimal of q and p (2, n), 0 where decimals are not fixed."""
+    beside: float
+    """Largest motion along what the scene leaves out, relative to the whole."""
+    moved: float
+    """Distance of the file's 0 from the scene's along its line [L]."""
+
+
+def _placed(path: Path, states: States, scene: Scene, notes: list[str]) -> _Placed:
+    """The states in the scene's coordinates; StoreError where they cannot be placed there."""
+    q, beside, moved, halves = states.q, 0.0, 0.0, np.zeros((2, states.q.shape[1]))
+    other, rates = (states.p, "momenta") if states.p is not None else (np.asarray(states.v), "velocities")
+    for name, values in (("positions", q), (rates, other)):
+        good = np.isfinite(values).all(axis=1)
+        if not good.all():
+            raise StoreError(
+                f"{path}: the {name} of row {int(np.argmin(good)) + 1} are not finite numbers; leave out the "
+                "frames from there on, and those before it are judged"
+            )
+    if states.fixed:
+        halves[0], halves[1] = states.fixed.q, states.fixed.v
+    off = max(1e-6, 4 * states.roundoff)
+    if scene.places is not None and q.shape[1] == 3 * scene.particles > scene.n:
+        q, other, beside = _in_plane(path, q, other, scene, off)
+        halves = halves[:, scene.where]
+    elif q.shape[1] == 3 * scene.n:
+        far = float(np.max(np.abs(q), initial=0.0))
+        q, other, beside, line = _along(path, q, other, scene, notes, off)
+        halves = halves.reshape(2, -1, 3) @ np.abs(line)
+        if moved := _beside_start(q, scene, off):
+            # displaced from 0 by as much as the points are, since they are rounded there
+            notes.append(f"positions counted from {moved:.6g} along it, where the scene has its 0")
+            terms = tuple(term.shifted(far) if term.bodies == 1 else term for term in scene.terms)
+            q, scene = q - moved + far, replace(scene, q=scene.q + far, terms=terms)
+            beside /= max(1.0, far / (float(np.ptp(q)) or 1.0))
+    if q.shape[1] != scene.n:
+        raise StoreError(f"{path}: positions in a frame: {q.shape[1]}, in scene {scene.name}: {scene.n}")
+    if len(q) < 2:
+        raise StoreError(f"{path}: holds {len(q)} frame; two are needed")
+    if states.p is None:
+        other, halves[1] = other * scene.m, halves[1] * scene.m
+    if states.roundoff >= 2.0**-24 and np.any((np.abs(q) < SMALLEST_SINGLE) & (q != 0)):
+        # subnormal numbers of single precision are whole multiples of 2**-149
+        halves = np.maximum(halves, [np.full(scene.n, 2.0**-150), 2.0**-150 * scene.m])
+    return _Placed(scene=scene, q=q, p=other, halves=halves, beside=beside, moved=moved)
+
+
+def _times(
+    path: Path, states: States, scene: Scene, notes: list[str], taken: dict[str, str]
+) -> tuple[Floats, int]:
+    """The times of the frames (f,) as whole numbers of steps, and the steps from frame to frame; StoreError
+    where they are none."""
+    if not np.isfinite(states.t).all():
+        raise StoreError(f"{path}: row {int(np.argmin(np.isfinite(states.t))) + 1} of t is not finite")
+    apart, own = float(states.t[1] - states.t[0]), units(scene).t
+    every = round(apart / scene.step)
+    for name, one in files.TIMES.items() if own in files.TIMES else ():
+        factor = files.TIMES[own] / one
+        if factor != 1 and abs(apart - factor * scene.step * scene.every) <= 1e-6 * apart:
+            raise StoreError(
+                f"{path}: the times look like {name}: frames lie {apart:.6g} apart, {factor:g} times as far "
+                f"as in scene {scene.name}, which has {own}; divide them by {factor:g}"
+            )
+    t = np.arange(len(states.t), dtype=np.float64) * max(every, 1) * scene.step
+    off = np.abs(states.t - states.t[0] - t)
+    # of times with fixed decimals the last digit does not grow with them
+    allowed = 1e-9 * np.abs(t + scene.step) + 2 * states.roundoff * np.abs(states.t)
+    allowed += storage(states.t).quantum(states.t)
+    if every < 1 or np.any(off > allowed):
+        row = int(np.argmax(off > allowed))
+        raise StoreError(
+            f"{path}: row {row + 1} is at t = {states.t[row]:.12g}, and {states.t[0] + t[row]:.12g} is due: "
+            f"frames lie whole steps of {scene.step:g} apart in scene {scene.name}, as the first two do"
+            + "".join(f"; {x}" for x in start.clock(states, scene))
+        )
+    if np.any(states.t != t):
+        notes.append(TIMES)
+        taken["times"] = f"{TIMES}; they are up to {np.max(off):.2g} beside them" if np.any(off) else TIMES
+    return t, every
+
+
+def _begins(
+    path: Path, states: States, of: _Placed, scheme: str, every: int, notes: list[str], taken: dict[str, str]
+) -> None:
+    """Note a first frame that differs from the scene's start; StoreError where it is another one."""
+    scene, q, p = of.scene, of.q, of.p
+    size = scene.system.norm(q[0] - scene.q, p[0] - scene.p)
+    # far from 0 the rounding of a coordinate is larger relative to the amplitude
+    both = zip((q[0], p[0]), of.halves, strict=True)
+    rounded = scene.system.norm.most(*(states.roundoff * np.abs(x) + half for x, half in both))
+    if not size <= max(1e-9, 10 * states.roundoff) and not 0 < size * scene.system.norm.unit <= 2 * rounded:
+        raise StoreError(
+            f"{path}: its first frame is {float(size):.2g} of the amplitude off the start of {scene.name}: "
+            + start.differs(scene, scheme, states, q, p, every)
+        )
+    if size > 0 or of.moved:
+        taken["start"] = f"the start was taken as it is written in the file, {size:.2g} of the amplitude off"
+        notes += [taken["start"]] if size > 0 else []
+
+
+def _unit(states: States) -> float:
+    """Unit roundoff to which the numbers of a file are judged, but for fixed decimals."""
+    return states.fixed.beside if states.fixed else states.roundoff
+
+
+def _digits(states: States, notes: list[str]) -> None:
+    """Note the digits of the numbers."""
+    if states.fixed:
+        rates = "momenta" if states.p is not None else "velocities"
+        halves_of = {"positions": states.fixed.q, rates: states.fixed.v}
+        sizes = {name: f"{np.max(x):.1g}" for name, x in halves_of.items() if np.any(x)}
+        of, each = (" and ".join(words) for words in (sizes, sizes.values()))
+        notes += [f"{of} are rounded to decimals, by up to {each}, and judged to that"] * bool(sizes)
+    if (unit := _unit(states)) > 2.0**-53:
+        notes.append(f"numbers are written to {unit:.1g}, and judged to that")
 
 
 def _in_plane(path: Path, q: Floats, other: Floats, scene: Scene, off: float) -> tuple[Floats, Floats, float]:
