@@ -17,12 +17,12 @@ BUDGETS = {
     ("engines/openmm", "engines/ase", "engines/sundials"): 1284,
     ("engines",): 2836,
     ("driver", "conformance", "doors"): 1193,
-    ("checks",): 5678,
+    ("checks",): 5756,
     ("identify",): 9339,
-    ("formats", "store"): 5191,
+    ("formats", "store"): 5198,
     ("studies",): 1456,
     ("studies/*",): 9936,
-    ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 7287,
+    ("figures", "cli", "api", "plot", "text", "errors", "interrupts", "__init__", "__main__"): 7332,
 }
 """Lines of each room, or of several: of an engine in one file, and of what all studies share, in the first
 folder."""
