@@ -15,7 +15,7 @@ import pytest
 from springcheck import cli, driver, store
 from springcheck.errors import SpringcheckError
 from springcheck.physics import scenefile
-from springcheck.studies.ensemble import measure, page, text, vary
+from springcheck.studies.ensemble import measure, page, vary
 from springcheck.studies.run.tally import Tally
 from springcheck.studies.team import Processes
 
@@ -387,6 +387,6 @@ def test_the_limit_that_a_figure_shows_is_that_of_the_scheme() -> None:
 def test_the_column_of_energies_says_whose_energy_is_taken_off(name: str, said: str, tmp_path: Path) -> None:
     cells = vary.plan(["time.step=0.001,0.002"], text=text_of(name))
     found = measure.record(scenefile.load_scene(name), cells, tmp_path / "e.h5", ["own:rk4"])
-    assert f"energy: (H - {said})/(initial T + |V|)" in "\n".join(map(str, text.lines(found)))
+    assert f"energy: (H - {said})/(initial T + |V|)" in "\n".join(map(str, found.lines()))
     (drawn,) = page.banks(found, quantity="energy_drift")
     assert drawn.charts[0].y.name == f"|H - {said}| / (initial T + |V|) where it is largest"
