@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from argparse import Namespace
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from math import nan
 from typing import Any, ClassVar
@@ -88,6 +88,20 @@ class Entry:
     """The orbit of the blog's spring (f,)."""
     p: Floats = field(default_factory=lambda: np.empty(0))
 
+    @property
+    def cells(self) -> list[Cell]:
+        """Its row of `TITLES`, without the last one, or with a thermostat of `HEATED`."""
+        velocity = "-" if np.isnan(self.velocity_offset) else f"{self.velocity_offset:+.1f} h"
+        measured = [
+            number(self.amplitude, ".4f"), amount(self.area, 1e-13, "+.2e"), velocity,
+            amount(self.friction, 1e-9, "+.2e"), number(self.limit, ".3f", "none"),
+        ]  # fmt: skip
+        if self.thermostat:
+            pairs = (self.configurational, self.configurational_error), (self.kinetic, self.kinetic_error)
+            measured = [*(f"{value:.4f} +- {error:.1g}" for value, error in pairs), velocity]
+        method = plain("  " + self.method, "" if self.agrees else "bold red")
+        return [method, *measured, self.precision, f"{self.force_calls:.3g}", seconds(self.seconds)]
+
 
 ENTRIES: RecordForm[Entry] = RecordForm(kind=Entry, beginning="census/", signal="p", axes=("q",))
 """A table for each method: the orbit, and everything else as attributes."""
@@ -139,9 +153,7 @@ class Census(Studied):
             *resumed(self.resumed, "method"),
             plain(),
         ]
-        partners = self.partners
-        cold = _under(self, False, lambda x: [*_cold(x), few(partners[x.method], 2)])
-        hot = _under(self, True, _heated)
+        cold, hot = (_under(self, thermostats=heated) for heated in (False, True))
         if cold:
             out.append(table(TITLES, cold, left=("method", "arithmetic"), prose=TITLES[-1]))
         if hot:
@@ -181,32 +193,17 @@ class Census(Studied):
         return keeper.document(entries=rows, left_out=self.left_out, **more)
 
 
-def _under(census: Census, thermostats: bool, row: Callable[[Entry], Row]) -> list[Row]:
+def _under(census: Census, *, thermostats: bool) -> list[Row]:
     """Rows with or without a thermostat, grouped by the scheme that was found."""
     rows: list[Row] = []
+    partners = census.partners
     for name, members in census.grouped.items():
-        some = [row(x) for x in members if bool(x.thermostat) is thermostats]
+        some = [
+            [*x.cells, *([] if thermostats else [few(partners[x.method], 2)])]
+            for x in members
+            if bool(x.thermostat) is thermostats
+        ]
         several = name.split(" or ")
         called = few(several, 3, " or ") if len(several) > 1 else title(name)
         rows += [plain(called, "italic"), *some] if some else []
     return rows
-
-
-def _heated(x: Entry) -> list[Cell]:
-    temperatures = (x.configurational, x.configurational_error), (x.kinetic, x.kinetic_error)
-    return _row(x, *(f"{value:.4f} +- {error:.1g}" for value, error in temperatures), _velocity(x))
-
-
-def _cold(x: Entry) -> list[Cell]:
-    amplitude, area = number(x.amplitude, ".4f"), amount(x.area, 1e-13, "+.2e")
-    friction, limit = amount(x.friction, 1e-9, "+.2e"), number(x.limit, ".3f", "none")
-    return _row(x, amplitude, area, _velocity(x), friction, limit)
-
-
-def _velocity(x: Entry) -> str:
-    return "-" if np.isnan(x.velocity_offset) else f"{x.velocity_offset:+.1f} h"
-
-
-def _row(x: Entry, *measured: str) -> list[Cell]:
-    method = plain("  " + x.method, "" if x.agrees else "bold red")
-    return [method, *measured, x.precision, f"{x.force_calls:.3g}", seconds(x.seconds)]

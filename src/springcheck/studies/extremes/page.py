@@ -8,7 +8,7 @@ import numpy as np
 
 from springcheck.figures.charts import Bank, Chart, Scale, Tiles
 from springcheck.studies.extremes.judging import Cell
-from springcheck.studies.extremes.result import OUTCOMES, Atlas
+from springcheck.studies.extremes.result import OUTCOME_LOOKS, OUTCOMES, Atlas
 from springcheck.text.wording import count
 
 
@@ -47,15 +47,14 @@ def _chart(method: str, cells: Sequence[Cell]) -> Chart:
     turns = {turn: cell.parameters["h_w"] for (turn, _), cell in reversed(placed.items())}
     decades = sorted({decade for _, decade in placed})
     rows = [[placed.get((turn, decade)) for decade in decades] for turn in sorted(turns)]
-    kinds = list(OUTCOMES)
     return Chart(
         title=method,
         short=method,
         x=Scale(name="log10 of the force", values=decades),
         y=Scale(name="h \N{GREEK SMALL LETTER OMEGA}", values=[turns[turn] for turn in sorted(turns)]),
         tiles=Tiles(
-            kinds=[(outcome, shade) for outcome, (_, shade) in OUTCOMES.items()],
-            rows=[_filled([-1 if x is None else kinds.index(x.outcome) for x in row]) for row in rows],
+            kinds=[(outcome, shade) for outcome, (_, shade) in OUTCOME_LOOKS.items()],
+            rows=[_filled([-1 if x is None else OUTCOMES.index(x.outcome) for x in row]) for row in rows],
             notes=[["" if x is None else x.reason for x in row] for row in rows],
         ),
     )

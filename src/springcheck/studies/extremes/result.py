@@ -18,7 +18,7 @@ from springcheck.studies.text import left_out, resumed
 from springcheck.text.lines import Lines, plain, table
 from springcheck.text.wording import count
 
-OUTCOMES: Mapping[Outcome, tuple[str, str]] = {
+OUTCOME_LOOKS: Mapping[Outcome, tuple[str, str]] = {
     "right": ("right", "good"),
     "unstable, as theory says": ("unstable", "wild"),
     "engine's limit": ("limit", "limit"),
@@ -26,6 +26,7 @@ OUTCOMES: Mapping[Outcome, tuple[str, str]] = {
     "not measured": ("", "#8c6bb1"),
 }
 """Of each outcome the title of its column, "" for none, and its shade on a map."""
+OUTCOMES = tuple(OUTCOME_LOOKS)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,7 +71,7 @@ class Atlas(Studied):
         return 0 if self.passed else 1
 
     def lines(self, options: Namespace | None = None) -> Lines:
-        titles = {outcome: title for outcome, (title, _) in OUTCOMES.items() if title}
+        titles = {outcome: title for outcome, (title, _) in OUTCOME_LOOKS.items() if title}
         rows = []
         for method in dict.fromkeys(cell.method for cell in self.cells):
             counts = self.counts(method)
@@ -107,7 +108,7 @@ class Atlas(Studied):
 
 def _for_viewers(cells: Sequence[Cell]) -> dict[str, np.ndarray]:
     """Outcomes, numbered, over decades of force and of h w, where cells have both."""
-    found = {"outcome_number": np.array([list(OUTCOMES).index(cell.outcome) for cell in cells], np.int8)}
+    found = {"outcome_number": np.array([OUTCOMES.index(cell.outcome) for cell in cells], np.int8)}
     for name in ("force", "h_w"):
         values = np.array([cell.parameters.get(name, np.nan) for cell in cells], np.float64)
         found[f"log10_{name}"] = np.log10(np.where(np.isfinite(values) & (values > 0), values, np.nan))
