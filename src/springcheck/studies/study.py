@@ -131,15 +131,14 @@ class Study:
 
     def lines(self, found: StudyResult, options: Namespace | None = None, path: Path | None = None) -> Lines:
         """The report as text; with the `path` of its store the one of `inspect`."""
-        lines = found.lines(options)
         where: Path | None = path or getattr(found, "path", None)
         if self.trajectories or where is None:
-            return lines
+            return found.lines(options)
         from springcheck.studies import keeper
         from springcheck.text.lines import plain
 
         said = [] if path else [f"Stored in {where}"]
-        return [*lines, *map(plain, [*said, *keeper.who(where)])]
+        return [*found.lines(options), *map(plain, [*said, *keeper.who(where)])]
 
     def held(self, summary: Summary) -> bool:
         """Whether a store holds a study of this kind."""
