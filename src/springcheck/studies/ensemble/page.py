@@ -125,8 +125,8 @@ def _map(x: Floats, y: Floats, values: Floats, *, grid: bool) -> Reduced:
     held, first = np.unique(tile[order], return_index=True)
     for which, mine in zip(held, np.split(values[order], first[1:]), strict=True):
         found[which] = np.median(mine)
-    found = found.reshape(len(vs), len(us))
-    return Reduced(places=(us, vs), values=found, ends=(found, found))
+    plane = found.reshape(len(vs), len(us))
+    return Reduced(places=(us, vs), values=plane, ends=(plane, plane))
 
 
 def _tiles(x: Floats, most: int, *, grid: bool) -> tuple[Floats, np.ndarray]:

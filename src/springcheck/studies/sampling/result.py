@@ -80,11 +80,9 @@ class Sampled:
             self.configurational[1], self.configurational_law[1], self.kinetic[1], self.kinetic_law[1],
             self.off[-1], self.off_law[-1], self.limit[at], self.limit_law[at],
         )  # fmt: skip
-        return [
-            plain("  " + self.method, "bold red" if self.departs else ""),
-            *(number(one, ".4f", "none") for one in measured), f"{self.force_calls:.3g}",
-            seconds(self.seconds),
-        ]  # fmt: skip
+        method = plain("  " + self.method, "bold red" if self.departs else "")
+        numbers = (number(one, ".4f", "none") for one in measured)
+        return [method, *numbers, f"{self.force_calls:.3g}", seconds(self.seconds)]
 
 
 SAMPLED: RecordForm[Sampled] = RecordForm(

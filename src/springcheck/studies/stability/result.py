@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from argparse import Namespace
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
@@ -127,18 +128,18 @@ class Stability(Studied):
         return out + self.failures
 
     def lines(self, options: Namespace | None = None) -> Lines:
+        largest_steps = [self.largest(x) for x in self.limits]
         out: Lines = [
             plain(f"{self.scene.title}: limits of stability, measured on one step", "bold"),
-            *_of_scene(self),
+            *_of_scene(self, largest_steps),
             *resumed(self.resumed, "measurement"),
             plain(),
         ]
         if self.limits:
             rows = []
-            for x in self.limits:
+            for x, largest in zip(self.limits, largest_steps, strict=True):
                 off = 0.0 if x.limit == x.theory else abs(x.limit - x.theory)
                 predicted = np.nan if np.isnan(x.growth_above) else x.growth_predicted
-                largest = self.largest(x)
                 cells = (
                     x.method, *(number(y, ".9f", "none") for y in (x.limit, x.theory)), f"{off:.0e}",
                     *(number(y, ".7f") for y in (x.growth_above, predicted)),
@@ -187,7 +188,7 @@ class Stability(Studied):
         )  # fmt: skip
 
 
-def _of_scene(study: Stability) -> Lines:
+def _of_scene(study: Stability, largest_steps: Sequence[float]) -> Lines:
     """The scene's fastest motion, its step, and the methods for which it is too long."""
     scene, w, field = study.scene, fastest(study.scene), "magnetic" in study.scene.system.acting
     if not w and not scene.system.is_damped:
@@ -205,10 +206,11 @@ def _of_scene(study: Stability) -> Lines:
     where += "".join(f", without its {name}" for name, acts in left.items() if acts)
     here = f"its step h = {scene.step:g} makes h w = {abs(scene.step) * w:.4g}"
     out: Lines = [plain(f"  fastest angular frequency of this scene{where}: w = {w:.6g}; {here}")]
-    beyond = [x.method for x in study.limits if study.largest(x) < abs(scene.step)]
+    h = abs(scene.step)
+    beyond = [x.method for x, most in zip(study.limits, largest_steps, strict=True) if most < h]
     if beyond:
         out.append(plain(f"  beyond the limit there: {', '.join(beyond)}", "bold yellow"))
-    elif any(study.largest(x) >= abs(scene.step) for x in study.limits):
+    elif any(most >= h for most in largest_steps):
         out.append(plain("  within the limit of every method measured here"))
     if modulated := floquet(scene.system):
         grown, period, _ = modulated
