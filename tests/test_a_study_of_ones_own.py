@@ -17,6 +17,7 @@ from pathlib import Path
 from springcheck.studies import keeper
 from springcheck.studies.keeper import Piece
 from springcheck.studies.tables import Rows
+from springcheck.text.lines import table
 
 @dataclass(frozen=True, kw_only=True)
 class Square:
@@ -27,6 +28,8 @@ class Square:
 class Squares:
     rows: tuple
     status: int = 0
+    def lines(self, options=None):
+        return [table(("number", "square"), [(str(x.number), str(x.square)) for x in self.rows])]
     def document(self):
         return keeper.plain({"largest": max(x.square for x in self.rows), "nothing": float("nan")})
 
@@ -47,11 +50,6 @@ def perform(options, progress):
 @keeper.restoring("squares")
 def stored(kept):
     return Squares(rows=tuple(x for i in range(4) for x in kept.found(FORM, str(i))))
-"""
-TEXT = """
-from springcheck.text.lines import table
-def lines(found, options=None):
-    return [table(("number", "square"), [(str(x.number), str(x.square)) for x in found.rows])]
 """
 PAGE = """
 from springcheck.figures.charts import Bank, Chart, Curve, Scale
@@ -78,7 +76,7 @@ def test_a_folder_and_a_line_make_a_study(
 ) -> None:
     folder = tmp_path / "squares_study"
     folder.mkdir()
-    for name, text in (("__init__", STUDY), ("measure", MEASURE), ("text", TEXT), ("page", PAGE)):
+    for name, text in (("__init__", STUDY), ("measure", MEASURE), ("page", PAGE)):
         (folder / f"{name}.py").write_text(text)
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.chdir(tmp_path)

@@ -219,14 +219,12 @@ def test_columns_of_a_store_find_their_axes() -> None:
 
 
 def test_a_report_says_what_a_pass_does_not_cover(tmp_path: Path) -> None:
-    from springcheck.studies.run.text import lines
-
     for scene, said in (
         (orbit(), "here: periodic boxes"),
         (spring(), "here: axes y and z"),
     ):
         report = springcheck.run(scene, "own:euler", path=tmp_path / f"{scene.name}.h5")
-        assert said in str(lines(report))
+        assert said in str(report.lines())
 
 
 def test_the_path_of_a_particle_is_drawn_in_each_plane(tmp_path: Path) -> None:

@@ -16,7 +16,6 @@ from springcheck import cli, engines, store
 from springcheck.physics import scenefile
 from springcheck.studies.extremes import measure as extremes
 from springcheck.studies.precision import measure as precision
-from springcheck.studies.precision import text
 from springcheck.studies.stability import measure as stability
 from springcheck.studies.team import Processes
 from springcheck.text.wording import count
@@ -104,6 +103,6 @@ def test_errors_by_workers_are_those_of_one_and_times_are_measured_alone(tmp_pat
         sum(x.complete and not x.run_seconds_repeats for x in points)
         for points in (many.points, fewer.points)
     )
-    said = "\n".join(map(str, text.lines(fewer)))
+    said = "\n".join(map(str, fewer.lines()))
     assert after == before + 1
     assert f"{count(after, 'point')} of errors alone: workers measure no times" in said

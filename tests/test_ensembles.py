@@ -15,7 +15,7 @@ import pytest
 from springcheck import cli, driver, store
 from springcheck.errors import SpringcheckError
 from springcheck.physics import scenefile
-from springcheck.studies.ensemble import measure, page, text, vary
+from springcheck.studies.ensemble import measure, page, vary
 from springcheck.studies.run.tally import Tally
 from springcheck.studies.team import Processes
 
@@ -250,21 +250,21 @@ def grid_of(counts: tuple[int, ...], value: Callable[..., Any]) -> tuple[Any, di
 def test_every_cell_of_a_grid_stands_in_its_map() -> None:
     found, cells = grid_of((5, 4), lambda a, b: a + 1000 * b)
     part = page.reduced(cells, found, "max_error", page.fields_over(found))
-    assert isinstance(part, page.Map)
-    np.testing.assert_allclose(part.values, part.x + 1000 * part.y[:, None], rtol=1e-14)
+    x, y = part.places
+    np.testing.assert_allclose(part.values, x + 1000 * y[:, None], rtol=1e-14)
 
 
 def test_a_grid_of_many_cells_is_shown_by_the_medians_of_neighbours() -> None:
     found, cells = grid_of((200, 130), lambda a, b: np.log(a))
     part = page.reduced(cells, found, "max_error", page.fields_over(found))
-    assert isinstance(part, page.Map)
+    x = part.places[0]
     assert part.values.shape == (44, 50)
-    np.testing.assert_allclose(part.values, np.broadcast_to(np.log(part.x), (44, 50)), atol=1e-12)
+    np.testing.assert_allclose(part.values, np.broadcast_to(np.log(x), (44, 50)), atol=1e-12)
     found, cells = grid_of((2001,), lambda a: a * (1 + 0.5 * (np.arange(len(a)) % 2)))
     line = page.reduced(cells, found, "max_error", page.fields_over(found))
-    assert isinstance(line, page.Line)
-    assert len(line.x) == page.MOST_POINTS
-    assert np.all((line.low <= line.x * 1.01) & (line.high >= 1.48 * line.x))
+    (at,), (low, high) = line.places, line.ends
+    assert len(at) == page.MOST_POINTS
+    assert np.all((low <= at * 1.01) & (high >= 1.48 * at))
 
 
 def test_one_method_that_explodes_does_not_set_the_axis_of_the_others() -> None:
@@ -293,9 +293,9 @@ def test_shades_of_a_map_follow_the_signs_of_its_numbers_and_not_what_explodes()
 def test_fields_that_are_not_shown_have_the_value_in_their_middle() -> None:
     found, cells = grid_of((5, 4, 3), lambda a, b, c: a + 1000 * b + 1e6 * c)
     part = page.reduced(cells, found, "max_error", page.fields_over(found, "c,a"))
-    assert isinstance(part, page.Map)
+    x, y = part.places
     assert page.fixed(cells, found, ("c", "a")) == {"b": pytest.approx(2 / 3)}
-    expected = part.y[:, None] + 2000 / 3 + 1e6 * part.x
+    expected = y[:, None] + 2000 / 3 + 1e6 * x
     np.testing.assert_allclose(part.values, expected, rtol=1e-14)
 
 
@@ -306,14 +306,13 @@ def test_random_samples_are_put_together_in_tiles_and_nothing_is_lost() -> None:
     cells["max_error"][7] = np.nan
     found: Any = SimpleNamespace(fields=("a", "b"), grid=False)
     part = page.reduced(cells, found, "max_error", ("a", "b"))
-    assert isinstance(part, page.Map)
-    assert np.all(part.values[part.y > 0.1] == 2)
-    low = part.values[part.y < -0.1]
-    assert np.all(np.abs(np.log(low / part.x)) < np.log(part.x[1] / part.x[0]))
+    x, y = part.places
+    assert np.all(part.values[y > 0.1] == 2)
+    low = part.values[y < -0.1]
+    assert np.all(np.abs(np.log(low / x)) < np.log(x[1] / x[0]))
     # without a line: the other field differs, too
     line = page.reduced(cells, found, "max_error", ("a",))
-    assert isinstance(line, page.Line)
-    assert np.min(line.low) == np.nanmin(cells["max_error"])
+    assert np.min(line.ends[0]) == np.nanmin(cells["max_error"])
 
 
 def test_the_report_page_shows_an_ensemble_of_two_fields_as_maps_of_powers_of_ten(tmp_path: Path) -> None:
@@ -387,6 +386,6 @@ def test_the_limit_that_a_figure_shows_is_that_of_the_scheme() -> None:
 def test_the_column_of_energies_says_whose_energy_is_taken_off(name: str, said: str, tmp_path: Path) -> None:
     cells = vary.plan(["time.step=0.001,0.002"], text=text_of(name))
     found = measure.record(scenefile.load_scene(name), cells, tmp_path / "e.h5", ["own:rk4"])
-    assert f"energy: (H - {said})/(initial T + |V|)" in "\n".join(map(str, text.lines(found)))
+    assert f"energy: (H - {said})/(initial T + |V|)" in "\n".join(map(str, found.lines()))
     (drawn,) = page.banks(found, quantity="energy_drift")
     assert drawn.charts[0].y.name == f"|H - {said}| / (initial T + |V|) where it is largest"

@@ -33,7 +33,6 @@ from springcheck.physics import scenefile as scenes
 from springcheck.studies.extremes import grid
 from springcheck.studies.extremes import measure as extremes
 from springcheck.studies.precision import measure as precision
-from springcheck.studies.precision import text as report
 from springcheck.studies.run import measure as session
 from springcheck.studies.run.drawable import drawable
 from springcheck.studies.run.page import of_runs
@@ -413,7 +412,7 @@ def test_a_study_of_precision_is_read_back_with_all_that_follows_from_its_points
     assert (kept.front, kept.cheapest) == (fresh.front, fresh.cheapest)
     assert kept.document() == fresh.document()
     for study in (fresh, kept):
-        output.show(report.lines(study, Namespace(points=True)))
+        output.show(study.lines(Namespace(points=True)))
     text = capsys.readouterr().out
     assert text[: len(text) // 2] == text[len(text) // 2 :]
     assert main(["inspect", str(path)]) == 0

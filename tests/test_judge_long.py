@@ -17,7 +17,7 @@ from springcheck.physics.terms import Quartic
 from springcheck.physics.trajectory import Outcome
 from springcheck.studies import keeper
 from springcheck.studies.faults import steppers
-from springcheck.studies.run import measure, text
+from springcheck.studies.run import measure
 from springcheck.studies.run.result import Report
 
 Change = Callable[[int, Floats, Floats, Floats, Floats], tuple[Floats, Floats]]
@@ -84,7 +84,7 @@ def test_a_closed_form_tells_what_happened_between_the_pieces_of_springs(tmp_pat
     report = judged(tmp_path, springs(400), FAULTS[fault])
     assert report.judged_frames < 100
     assert report.status == (fault != "right")
-    said = "\n".join(str(line) for line in text.lines(report))
+    said = "\n".join(str(line) for line in report.lines())
     assert "error, energy and same motion are of these" in said
 
 

@@ -23,7 +23,7 @@ from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Cosine, Quartic, WallSpring
 from springcheck.studies.extremes import grid, running
 from springcheck.studies.faults import steppers
-from springcheck.studies.run import measure, text
+from springcheck.studies.run import measure
 
 Need = Callable[[str], None]
 LAZY = "ase:velocity-verlet"
@@ -234,7 +234,7 @@ def test_a_motion_below_the_rounding_of_its_place_is_named(tmp_path: Path) -> No
         (found,) = checks.judge(scene, replace(run, q=q, p=p), [checks.step_defect])
         assert found.passed is passed
     report = measure.run(scene, tmp_path / "a.h5", methods=["own:velocity-verlet"])
-    said = "\n".join(str(line) for line in text.lines(report))
+    said = "\n".join(str(line) for line in report.lines())
     assert f"own:velocity-verlet: q of particle 0, p of particle 0 {checks.BLIND}" in said
 
 

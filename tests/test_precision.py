@@ -20,7 +20,7 @@ from springcheck.physics.arrays import WIDE
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Damping, WallSpring
 from springcheck.schemes import SCHEMES, matrix
-from springcheck.studies.precision import STUDY, accuracy, fits, sweeps, text
+from springcheck.studies.precision import STUDY, accuracy, fits, result, sweeps
 from springcheck.studies.precision import measure as precision
 from springcheck.studies.precision.accuracy import Accuracy
 from springcheck.studies.precision.fits import POINTS, Point
@@ -565,7 +565,7 @@ def test_no_order_is_claimed_where_the_slope_changes_ever_faster() -> None:
      (1.0, 0.0, "1.0000(0e+00)"), (4.0015, 0.0013, "4.002(1e-03)")],
 )  # fmt: skip
 def test_an_order_has_the_digits_that_its_error_allows(order: float, error: float, said: str) -> None:
-    assert text._order(fits.Fit(order=order, standard_error=error, constant=1.0, points=4)) == said
+    assert result._order(fits.Fit(order=order, standard_error=error, constant=1.0, points=4)) == said
 
 
 def test_no_order_is_claimed_from_three_points() -> None:

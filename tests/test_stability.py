@@ -26,7 +26,6 @@ from springcheck.physics.terms import Damping, Quartic, Spring, WallSpring, Weig
 from springcheck.schemes import lookup
 from springcheck.studies.choose import LeftOut
 from springcheck.studies.run import measure as session
-from springcheck.studies.run import text as run_text
 from springcheck.studies.stability import STUDY, limits, propagators, regions, resonance
 from springcheck.studies.stability import measure as stability
 from springcheck.studies.stability.longest import fastest, longest
@@ -196,7 +195,7 @@ def test_a_scheme_that_states_a_wrong_limit_fails_and_the_largest_step_is_by_wha
         # so does the report of a run beyond it
         scene = scenes.load_scene("spring").derived(step=2.3, steps=20)
         report = session.run(scene, tmp_path / "r.h5", methods=["stated:velocity-verlet"])
-        said = as_text(run_text.lines(report))
+        said = as_text(report.lines())
         assert "h = 2.3 is beyond the limit of velocity Verlet here, 2: stated:velocity-verlet" in said
 
 
@@ -453,5 +452,5 @@ def test_an_error_that_is_not_known_is_told_why(tmp_path: Path) -> None:
     for terms, unknown in (((weight,), False), ((weight, bent), True)):
         scene = plain.derived(terms=(*plain.terms, *terms))
         report = session.run(scene, tmp_path / f"{unknown}.h5", methods=["own:euler"])
-        said = as_text(run_text.lines(report))
+        said = as_text(report.lines())
         assert ("-: no exact solution of this scene is known here" in said) == unknown

@@ -16,15 +16,12 @@ from springcheck import store
 from springcheck.cli import main, output
 from springcheck.physics import scenefile
 from springcheck.studies.census import result as census_result
-from springcheck.studies.census import text as census_text
 from springcheck.studies.choose import LeftOut
 from springcheck.studies.faults import measure as faults
 from springcheck.studies.faults import result as faults_result
-from springcheck.studies.faults import text as faults_text
 from springcheck.studies.faults.table import FAULTS
 from springcheck.studies.precision import measure as precision
 from springcheck.studies.run import measure as run_study
-from springcheck.studies.run import text as run_text
 from springcheck.text.lines import COLUMN_GAP, Lines, TextTable, drawn, table
 
 WIDTHS = (60, 80, 100, 200)
@@ -98,12 +95,11 @@ def test_every_word_of_a_study_of_precision_is_on_every_terminal(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     from springcheck import engines
-    from springcheck.studies.precision import text
 
     scene = scenefile.load_scene("spring-uneven")
     found = precision.record(scene, list(engines.match(("own:euler", "own:semi-implicit-euler"))), budget=0.5)
 
-    on_terminals(text.lines(found, Namespace(points=True)), monkeypatch, capsys)
+    on_terminals(found.lines(Namespace(points=True)), monkeypatch, capsys)
 
 
 def on_terminals(lines: Lines, monkeypatch: Patch, capsys: Captured) -> None:
@@ -128,7 +124,7 @@ def test_every_word_of_a_run_with_faults_is_on_every_terminal(
     scene = scenefile.load_scene("chain")
     faults = ("action-not-reaction", "mass")
     found = run_study.run(scene, tmp_path / "r.h5", methods=["own:semi-implicit-euler"], faults=faults)
-    lines = run_text.lines(found)
+    lines = found.lines()
     # the store's name is as long as its folder's
     on_terminals([line for line in lines if str(tmp_path) not in str(line)], monkeypatch, capsys)
 
@@ -145,7 +141,7 @@ def test_every_word_of_the_faults_is_on_every_terminal(monkeypatch: Patch, capsy
         )
         for j, fault in enumerate(FAULTS)
     )
-    on_terminals(faults_text.lines(faults_result.FaultReport(results=results)), monkeypatch, capsys)
+    on_terminals(faults_result.FaultReport(results=results).lines(), monkeypatch, capsys)
 
 
 def test_every_word_of_a_census_is_on_every_terminal(monkeypatch: Patch, capsys: Captured) -> None:
@@ -162,7 +158,7 @@ def test_every_word_of_a_census_is_on_every_terminal(monkeypatch: Patch, capsys:
     )  # fmt: skip
     left = (LeftOut(method="dart:joint-spring", reason="its library cannot be loaded here"),)
     on_terminals(
-        census_text.lines(census_result.Census(entries=entries, left_out=left, resumed=1)),
+        census_result.Census(entries=entries, left_out=left, resumed=1).lines(),
         monkeypatch,
         capsys,
     )

@@ -46,7 +46,7 @@ from springcheck import engines
 from springcheck.physics import scenefile as scenes
 from springcheck.schemes import SCHEMES
 from springcheck.studies.choose import choose
-from springcheck.studies.precision import STUDY, text
+from springcheck.studies.precision import STUDY
 from springcheck.studies.precision import measure as precision
 from springcheck.studies.precision.result import PrecisionStudy
 from springcheck.text.lines import as_text
@@ -79,7 +79,7 @@ def main() -> int:
         scene = scenes.load_scene(name)
         labels, _, _ = choose(scene, ())
         study = precision.record(scene, labels, budget=budget)
-        print(as_text(text.lines(study)))
+        print(as_text(study.lines()))
         for path in STUDY.draw(study, folder / name):
             print(str(path))
         wrong += failures(study)

@@ -1,7 +1,7 @@
-"""Definition of a study: a folder with its measure, result, text and charts, and a line in the list.
+"""Definition of a study: a folder with its measure, result and charts, and a line in the list.
 
 The folder's `__init__` declares the study and imports nothing heavy; its parts are imported on use:
-`measure.perform` and `measure.stored`, `text.lines`, and `page.banks` where it has charts.
+`measure.perform` and `measure.stored`, whose results say themselves, and `page.banks` where it has charts.
 """
 
 from __future__ import annotations
@@ -42,6 +42,10 @@ class StudyResult:
 
     def document(self) -> dict[str, Any]:
         """Plain data for JSON; non-finite numbers are None."""
+        raise NotImplementedError
+
+    def lines(self, options: Namespace | None = None) -> Lines:
+        """The whole report as text, with these options of the command."""
         raise NotImplementedError
 
     def __str__(self) -> str:
@@ -127,15 +131,14 @@ class Study:
 
     def lines(self, found: StudyResult, options: Namespace | None = None, path: Path | None = None) -> Lines:
         """The report as text; with the `path` of its store the one of `inspect`."""
-        lines: Lines = self._part("text").lines(found, options)
         where: Path | None = path or getattr(found, "path", None)
         if self.trajectories or where is None:
-            return lines
+            return found.lines(options)
         from springcheck.studies import keeper
         from springcheck.text.lines import plain
 
         said = [] if path else [f"Stored in {where}"]
-        return [*lines, *map(plain, [*said, *keeper.who(where)])]
+        return [*found.lines(options), *map(plain, [*said, *keeper.who(where)])]
 
     def held(self, summary: Summary) -> bool:
         """Whether a store holds a study of this kind."""

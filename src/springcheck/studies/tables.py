@@ -68,29 +68,28 @@ class Form(Generic[T]):
     def _key(self, table: Table) -> dict[str, Any]:
         return {self.named: table.name.removeprefix(self.beginning)} if self.named else {}
 
+    @property
+    def _fields(self) -> list[_Field]:
+        return [one for one in _fields(self.kind) if one.name != self.named]
+
 
 class RecordForm(Form[T]):
     """One result per table: its arrays are the columns, its numbers and texts the attributes."""
 
     def _split(self, found: T) -> tuple[dict[str, Any], dict[str, Any]]:
-        kept: dict[str, Any] = {}
-        more: dict[str, Any] = {}
-        for one in _fields(self.kind):
-            value = getattr(found, one.name)
-            if one.is_array:
-                kept[one.name] = value if isinstance(value, np.ndarray) else np.reshape(value, (-1, 2))
-            elif one.name != self.named:
-                more[one.name] = value
-        return kept, more
+        values = [(one, getattr(found, one.name)) for one in self._fields]
+        arrays = {one.name: x for one, x in values if one.is_array}
+        pairs = {name: np.reshape(x, (-1, 2)) for name, x in arrays.items() if isinstance(x, tuple)}
+        return arrays | pairs, {one.name: x for one, x in values if not one.is_array}
 
     def found(self, table: Table) -> T:
         values = self._key(table)
-        for one in _fields(self.kind):
+        for one in self._fields:
             if one.is_array:
                 array = np.asarray(table.columns[one.name])
                 pairs = get_origin(one.hint) is tuple
                 values[one.name] = tuple(map(tuple, array.tolist())) if pairs else array
-            elif one.name != self.named and (one.name in table.attributes or not one.has_default):
+            elif one.name in table.attributes or not one.has_default:
                 # fields that an earlier version did not measure have their default
                 values[one.name] = table.attributes[one.name]
         return self.kind(**values)  # type: ignore[no-any-return]
@@ -100,11 +99,11 @@ class Rows(Form[Sequence[T]]):
     """One result per row."""
 
     def _split(self, found: Sequence[T]) -> tuple[dict[str, Any], dict[str, Any]]:
-        return dict(_columns(_fields(self.kind), self.named, found)), {}
+        return dict(_columns(self._fields, found)), {}
 
     def found(self, table: Table) -> list[T]:
         key = self._key(table)
-        parts = [(one, _values(one, table)) for one in _fields(self.kind) if one.name != self.named]
+        parts = [(one, _values(one, table)) for one in self._fields]
         count = len(parts[0][1]) if parts else 0
         return [self.kind(**key, **{one.name: values[row] for one, values in parts}) for row in range(count)]
 
@@ -146,13 +145,11 @@ def _fields(kind: Any) -> tuple[_Field, ...]:
     return tuple(found)
 
 
-def _columns(parts: Sequence[_Field], named: str, rows: Sequence[Any]) -> Iterator[tuple[str, Any]]:
+def _columns(parts: Sequence[_Field], rows: Sequence[Any]) -> Iterator[tuple[str, Any]]:
     for one in parts:
-        if one.name == named:
-            continue
         values: list[Any] = [None if row is None else getattr(row, one.name) for row in rows]
         if is_dataclass(one.hint):
-            yield from _columns(_fields(one.hint), "", values)
+            yield from _columns(_fields(one.hint), values)
         elif one.keys:
             for key in one.keys:
                 yield key, np.array([value.get(key, np.nan) for value in values], np.float64)

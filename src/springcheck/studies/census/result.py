@@ -1,7 +1,11 @@
-"""Result of the census: one entry for each engine and way to attach a spring."""
+"""Result of the census: one entry for each engine and way to attach a spring.
+
+Its text has one row a method, under the scheme that its states show.
+"""
 
 from __future__ import annotations
 
+from argparse import Namespace
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
@@ -10,11 +14,22 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from springcheck.figures.looks import title
 from springcheck.physics.arrays import Floats
 from springcheck.studies import keeper
+from springcheck.studies.census.table import amount
 from springcheck.studies.study import Studied
 from springcheck.studies.tables import RecordForm
-from springcheck.text.wording import count
+from springcheck.studies.text import left_out, resumed
+from springcheck.text.lines import Cell, Lines, Row, hanging, plain, table
+from springcheck.text.wording import count, few, number, seconds
+
+TITLES = (
+    "method", "amplitude", "det - 1", "velocity", "friction", "limit", "arithmetic", "forces", "time",
+    "same bits as"
+)  # fmt: skip
+
+HEATED = ("method", "configurational", "kinetic", "velocity", "arithmetic", "forces", "time")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -73,6 +88,20 @@ class Entry:
     """The orbit of the blog's spring (f,)."""
     p: Floats = field(default_factory=lambda: np.empty(0))
 
+    @property
+    def cells(self) -> list[Cell]:
+        """Its row of `TITLES`, without the last one, or with a thermostat of `HEATED`."""
+        velocity = "-" if np.isnan(self.velocity_offset) else f"{self.velocity_offset:+.1f} h"
+        measured = [
+            number(self.amplitude, ".4f"), amount(self.area, 1e-13, "+.2e"), velocity,
+            amount(self.friction, 1e-9, "+.2e"), number(self.limit, ".3f", "none"),
+        ]  # fmt: skip
+        if self.thermostat:
+            pairs = (self.configurational, self.configurational_error), (self.kinetic, self.kinetic_error)
+            measured = [*(f"{value:.4f} +- {error:.1g}" for value, error in pairs), velocity]
+        method = plain("  " + self.method, "" if self.agrees else "bold red")
+        return [method, *measured, self.precision, f"{self.force_calls:.3g}", seconds(self.seconds)]
+
 
 ENTRIES: RecordForm[Entry] = RecordForm(kind=Entry, beginning="census/", signal="p", axes=("q",))
 """A table for each method: the orbit, and everything else as attributes."""
@@ -117,6 +146,41 @@ class Census(Studied):
             return 2
         return 0 if all(entry.agrees for entry in self.entries) and not self.changes else 1
 
+    def lines(self, options: Namespace | None = None) -> Lines:
+        out: Lines = [
+            plain("What every engine runs, by its states", "bold"),
+            plain("Amplitude: of the blog's spring after 200 steps, exactly 1.  All else: spring-uneven."),
+            *resumed(self.resumed, "method"),
+            plain(),
+        ]
+        cold, hot = (_under(self, thermostats=heated) for heated in (False, True))
+        if cold:
+            out.append(table(TITLES, cold, left=("method", "arithmetic"), prose=TITLES[-1]))
+        if hot:
+            out += [
+                *([plain()] if cold else []),
+                plain("Temperatures over that of the bath, by springs of h omega = 0.5 and gamma h = 0.4:"),
+                table(HEATED, hot, left=("method", "arithmetic")),
+            ]
+        out += [
+            plain(f"{x.method} is declared as {title(x.claimed)}; its states show {title(x.found)}")
+            for x in self.entries
+            if not x.agrees
+        ]
+        versions = {x.method.partition(":")[0]: x.version for x in self.entries}
+        out += [plain(), *hanging("Versions: ", "; ".join(dict.fromkeys(versions.values())))]
+        notes = dict.fromkeys(f"{x.method}: {x.note}" for x in self.entries if x.note)
+        out += [line for note in notes for line in hanging("  note: ", note)]
+        if self.changes is not None:
+            since = f" ({self.since})" if self.since else ""
+            out += [
+                plain(),
+                plain(f"Changes{since}" if self.changes else f"Nothing has changed{since}", "bold"),
+            ]
+            out += [line for one in self.changes for line in hanging("  ", one)]
+        out += left_out(self.left_out)
+        return out
+
     def document(self) -> dict[str, Any]:
         """Plain data for JSON; the orbits are in the tables of the store."""
         names = [one.name for one in fields(Entry) if one.name not in ("q", "p")]
@@ -127,3 +191,19 @@ class Census(Studied):
         ]
         more = {} if self.changes is None else {"changes": self.changes}
         return keeper.document(entries=rows, left_out=self.left_out, **more)
+
+
+def _under(census: Census, *, thermostats: bool) -> list[Row]:
+    """Rows with or without a thermostat, grouped by the scheme that was found."""
+    rows: list[Row] = []
+    partners = census.partners
+    for name, members in census.grouped.items():
+        some = [
+            [*x.cells, *([] if thermostats else [few(partners[x.method], 2)])]
+            for x in members
+            if bool(x.thermostat) is thermostats
+        ]
+        several = name.split(" or ")
+        called = few(several, 3, " or ") if len(several) > 1 else title(name)
+        rows += [plain(called, "italic"), *some] if some else []
+    return rows

@@ -44,24 +44,16 @@ FEWEST_BINNED = 9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Line:
-    """Values over one field, in increasing order; bins of many cells have their median and range."""
+class Reduced:
+    """Values of one method over one field (i,) or two (j, i), of many cells their median; NaN for none."""
 
-    x: Floats
+    places: tuple[Floats, ...]
+    """Increasing values of the fields: x (i,), or x and y (j,)."""
     values: Floats
-    low: Floats
-    high: Floats
-    joined: bool
-    """Whether neighbours differ in this field alone; otherwise no line joins them."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Map:
-    """Values (len(y), len(x)) over two fields; NaN where there is none."""
-
-    x: Floats
-    y: Floats
-    values: Floats
+    ends: tuple[Floats, Floats]
+    """Least and largest value at each place of one field."""
+    joined: bool = True
+    """Whether neighbours differ in these fields alone; otherwise no line joins them."""
 
 
 def _title(quantity: str, scene: Scene) -> str:
@@ -85,7 +77,7 @@ def fixed(cells: Columns, found: Ensemble, over: Sequence[str]) -> dict[str, flo
     return {name: float(known[len(known) // 2]) for name, known in others.items()}
 
 
-def reduced(cells: Columns, found: Ensemble, quantity: str, over: Sequence[str]) -> Line | Map:
+def reduced(cells: Columns, found: Ensemble, quantity: str, over: Sequence[str]) -> Reduced:
     """The cells of one method to draw, with the other fields of a grid at their middle value."""
     keep = np.ones(len(cells[quantity]), dtype=bool)
     for name, value in fixed(cells, found, over).items():
@@ -108,22 +100,22 @@ def even_in_logarithm(values: Floats) -> bool:
     return bool(abs(middle - np.log(low * high) / 2) < abs(middle - np.log((low + high) / 2)))
 
 
-def _line(x: Floats, y: Floats, *, joined: bool) -> Line:
+def _line(x: Floats, y: Floats, *, joined: bool) -> Reduced:
     order = np.argsort(x, kind="stable")
     x, y = x[order], y[order]
     most = MOST_POINTS if joined else len(x) // FEWEST_BINNED
     if len(x) <= max(most, FEW_POINTS):
-        return Line(x=x, values=y, low=y, high=y, joined=joined)
+        return Reduced(places=(x,), values=y, ends=(y, y), joined=joined)
     pieces = [np.array_split(z, min(most, MOST_POINTS)) for z in (x, y)]
     known = [(float(np.median(a)), b[np.isfinite(b)]) for a, b in zip(*pieces, strict=True)]
     low, middle, high = (
         np.array([f(b) if len(b) else np.nan for _, b in known]) for f in (np.min, np.median, np.max)
     )
     at = np.array([a for a, _ in known])
-    return Line(x=at, values=middle, low=low, high=high, joined=True)
+    return Reduced(places=(at,), values=middle, ends=(low, high))
 
 
-def _map(x: Floats, y: Floats, values: Floats, *, grid: bool) -> Map:
+def _map(x: Floats, y: Floats, values: Floats, *, grid: bool) -> Reduced:
     most = MOST_TILES if grid else int(np.clip(np.sqrt(len(values) / FEWEST_BINNED), 2, MOST_TILES))
     (us, i), (vs, j) = (_tiles(z, most, grid=grid) for z in (x, y))
     found = np.full(len(us) * len(vs), np.nan)
@@ -133,7 +125,8 @@ def _map(x: Floats, y: Floats, values: Floats, *, grid: bool) -> Map:
     held, first = np.unique(tile[order], return_index=True)
     for which, mine in zip(held, np.split(values[order], first[1:]), strict=True):
         found[which] = np.median(mine)
-    return Map(x=us, y=vs, values=found.reshape(len(vs), len(us)))
+    plane = found.reshape(len(vs), len(us))
+    return Reduced(places=(us, vs), values=plane, ends=(plane, plane))
 
 
 def _tiles(x: Floats, most: int, *, grid: bool) -> tuple[Floats, np.ndarray]:
@@ -185,9 +178,8 @@ def banks(found: Ensemble, *, quantity: str | None = None, over: str | None = No
         shown = {method: one for method, one in every.items() if np.isfinite(one.values).any()}
         if not shown:
             continue
-        lines = {method: one for method, one in shown.items() if isinstance(one, Line)}
-        maps = {method: one for method, one in shown.items() if isinstance(one, Map)}
-        charts = _lines(found.scene, name, fields, lines) if lines else _maps(found.scene, name, fields, maps)
+        lines = len(fields) == 1
+        charts = (_lines if lines else _maps)(found.scene, name, fields, shown)
         others = fixed(found.of(next(iter(shown))), found, fields)
         of = "" if over is None else "-over-" + "-".join(fields)
         title = "Methods drawn" if lines else f"Colour: {_title(name, found.scene)}"
@@ -202,7 +194,7 @@ def banks(found: Ensemble, *, quantity: str | None = None, over: str | None = No
 
 
 def _heading(
-    scene: Scene, quantity: str, over: Sequence[str], shown: Mapping[str, Line | Map],
+    scene: Scene, quantity: str, over: Sequence[str], shown: Mapping[str, Reduced],
     others: Mapping[str, float],
 ) -> str:  # fmt: skip
     """The quantity, the fields on the axes, and the values of the fields that are not shown."""
@@ -218,7 +210,7 @@ def _heading(
         said.append(f"smallest by {best}{with_it}, {typical[best]:.1g} in the middle")
     if others:
         said.append("at " + ", ".join(f"{named(name, scene)} = {x:.4g}" for name, x in others.items()))
-    if any(isinstance(x, Line) and np.any(x.low < x.high) for x in shown.values()):
+    if any(np.any(x.ends[0] < x.ends[1]) for x in shown.values()):
         said.append("bands: all cells; lines: their median")
     return "; ".join(said)
 
@@ -245,27 +237,26 @@ def _limits(scene: Scene, method: str) -> dict[str, float]:
     }
 
 
-def _lines(scene: Scene, quantity: str, fields: Sequence[str], shown: Mapping[str, Line]) -> list[Chart]:
+def _lines(scene: Scene, quantity: str, fields: Sequence[str], shown: Mapping[str, Reduced]) -> list[Chart]:
     title, (over,) = _title(quantity, scene), fields
-    every = [np.concatenate([one.low, one.values, one.high]) for one in shown.values()]
+    every = [np.concatenate([one.values, *one.ends]) for one in shown.values()]
     seen: set[str] = set()
     curves = []
     for method, one in shown.items():
         scheme = scheme_of(method)
         curves.append(
             Curve(
-                name=method, group=scheme, x=one.x, y=one.values, line=one.joined, dots=not one.joined,
-                marks=True, over=scheme in seen and one.joined,
-                band=None if scheme in seen or np.array_equal(one.low, one.high, equal_nan=True)
-                else (one.low, one.high),
+                name=method, group=scheme, x=one.places[0], y=one.values, line=one.joined,
+                dots=not one.joined, marks=True, over=scheme in seen and one.joined,
+                band=None if scheme in seen or np.array_equal(*one.ends, equal_nan=True) else one.ends,
             )
         )  # fmt: skip
         seen.add(scheme)
     limits = {at[over]: f"{H_LIMIT} = {at[H_LIMIT]:.3g}" for x in shown if over in (at := _limits(scene, x))}
-    low, high = (f([f(one.x) for one in shown.values()]) for f in (np.min, np.max))
+    low, high = (f([f(one.places) for one in shown.values()]) for f in (np.min, np.max))
     chart = Chart(
         title=f"{title[:1].upper()}{title[1:]}, over {over}.",
-        x=Scale(name=named(over, scene), log=all(even_in_logarithm(one.x) for one in shown.values())),
+        x=Scale(name=named(over, scene), log=all(even_in_logarithm(*one.places) for one in shown.values())),
         y=_axis(quantity, scene, every),
         curves=curves,
         rules=[Rule(axis="x", at=at, name=name) for at, name in limits.items() if low < at < high],
@@ -294,17 +285,21 @@ def _most(values: Sequence[Floats]) -> float:
     return 2 * sizes[(len(sizes) - 1) // 2]
 
 
-def _maps(scene: Scene, quantity: str, over: Sequence[str], shown: Mapping[str, Map]) -> list[Chart]:
+def _maps(scene: Scene, quantity: str, over: Sequence[str], shown: Mapping[str, Reduced]) -> list[Chart]:
     kinds, bounds = _kinds(quantity, [one.values.ravel() for one in shown.values()])
     charts = []
     for method, one in shown.items():
         rows = np.searchsorted(bounds, one.values, side="right")
+        x, y = (
+            Scale(name=named(field, scene), values=at.tolist())
+            for field, at in zip(over, one.places, strict=True)
+        )
         charts.append(
             Chart(
                 title=f"{method}.",
                 short=method,
-                x=Scale(name=named(over[0], scene), values=one.x.tolist()),
-                y=Scale(name=named(over[1], scene), values=one.y.tolist()),
+                x=x,
+                y=y,
                 tiles=Tiles(kinds=kinds, rows=np.where(np.isnan(one.values), -1, rows).tolist()),
                 curves=_across(scene, over, one, _limits(scene, method)),
             )
@@ -312,12 +307,12 @@ def _maps(scene: Scene, quantity: str, over: Sequence[str], shown: Mapping[str, 
     return charts
 
 
-def _across(scene: Scene, over: Sequence[str], one: Map, at: Mapping[str, float]) -> list[Curve]:
+def _across(scene: Scene, over: Sequence[str], one: Reduced, at: Mapping[str, float]) -> list[Curve]:
     """The line at the limit of h omega on a map of stiffness against step, in coordinates of its tiles."""
     if {*over, H_LIMIT} != set(at):
         return []
     flat = over[0] == "time.step"
-    steps, ks = (one.x, one.y) if flat else (one.y, one.x)
+    steps, ks = one.places if flat else one.places[::-1]
     k = np.geomspace(float(ks[0]), float(ks[-1]), 200)
     h = at[H_LIMIT] * np.sqrt(float(scene.m[0]) / k)
     inside = (h >= steps[0]) & (h <= steps[-1])

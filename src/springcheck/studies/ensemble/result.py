@@ -1,7 +1,8 @@
-"""Result of an ensemble: columns of numbers, one row a cell."""
+"""Result of an ensemble: columns of numbers, one row a cell, and its text."""
 
 from __future__ import annotations
 
+from argparse import Namespace
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
@@ -12,6 +13,8 @@ from springcheck.physics.scene import Scene
 from springcheck.studies.keeper import Table, document, tables
 from springcheck.studies.study import Studied
 from springcheck.studies.tables import Form
+from springcheck.studies.text import left_out, of_energy, resumed
+from springcheck.text.lines import Lines, plain, table
 from springcheck.text.wording import count
 
 QUANTITIES = ("max_error", "energy_drift", "steps")
@@ -70,6 +73,12 @@ class Tally:
         complete = self.complete + int(np.count_nonzero(good))
         return replace(self, cells=self.cells + len(good), complete=complete, smallest=low, largest=high)
 
+    def span(self, name: str) -> tuple[str, str]:
+        """The extremes of a quantity, for a table."""
+        if name not in self.smallest:
+            return "-", "-"
+        return f"{self.smallest[name]:.1e}", f"{self.largest[name]:.1e}"
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
 class Ensemble(Studied):
@@ -107,6 +116,26 @@ class Ensemble(Studied):
     def status(self) -> Literal[0, 2]:
         """Exit status: 2 where no cell is complete."""
         return 0 if any(tally.complete for tally in self.tallies) else 2
+
+    def lines(self, options: Namespace | None = None) -> Lines:
+        """One line a method."""
+        cells = max((tally.cells for tally in self.tallies), default=0)
+        how = "a grid" if self.grid else "random samples"
+        rows = [
+            (x.method, str(x.cells), str(x.complete), *x.span("max_error"), *x.span("energy_drift"))
+            for x in self.tallies
+        ]
+        titles = ("method", "cells", "complete", "error from", "to", "energy from", "to")
+        energy = of_energy(self.scene, CELL_SCALE)
+        return [
+            plain(f"{self.scene.title}: {count(cells, 'cell')}, {how} over {', '.join(self.fields)}", "bold"),
+            *resumed(self.resumed, "chunk"),
+            plain(),
+            table(titles, rows),
+            plain(f"error: largest distance from the exact solution; energy: {energy}", "dim"),
+            plain("no cell is judged: `springcheck run SCENE --set FIELD=NUMBER` judges one of them", "dim"),
+            *left_out(self.left_out),
+        ]
 
     def document(self) -> dict[str, Any]:
         """Plain data for JSON; the cells are in the tables."""

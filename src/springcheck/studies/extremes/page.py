@@ -8,16 +8,8 @@ import numpy as np
 
 from springcheck.figures.charts import Bank, Chart, Scale, Tiles
 from springcheck.studies.extremes.judging import Cell
-from springcheck.studies.extremes.result import OUTCOMES, Atlas
+from springcheck.studies.extremes.result import OUTCOME_LOOKS, OUTCOMES, Atlas
 from springcheck.text.wording import count
-
-SHADES = {
-    "right": "good",
-    "unstable, as theory says": "wild",
-    "engine's limit": "limit",
-    "silently wrong": "wrong",
-    "not measured": "#8c6bb1",
-}
 
 
 def _filled(row: list[int]) -> list[int]:
@@ -61,7 +53,7 @@ def _chart(method: str, cells: Sequence[Cell]) -> Chart:
         x=Scale(name="log10 of the force", values=decades),
         y=Scale(name="h \N{GREEK SMALL LETTER OMEGA}", values=[turns[turn] for turn in sorted(turns)]),
         tiles=Tiles(
-            kinds=[(outcome, SHADES[outcome]) for outcome in OUTCOMES],
+            kinds=[(outcome, shade) for outcome, (_, shade) in OUTCOME_LOOKS.items()],
             rows=[_filled([-1 if x is None else OUTCOMES.index(x.outcome) for x in row]) for row in rows],
             notes=[["" if x is None else x.reason for x in row] for row in rows],
         ),

@@ -1,11 +1,12 @@
-"""Result of the atlas of extreme cases: plain data, and its stored form."""
+"""Result of the atlas of extreme cases: plain data, its text, and its stored form."""
 
 from __future__ import annotations
 
+from argparse import Namespace
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal, get_args
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
@@ -13,6 +14,19 @@ from springcheck.studies.extremes.judging import Cell, Outcome
 from springcheck.studies.keeper import document
 from springcheck.studies.study import Studied
 from springcheck.studies.tables import Rows
+from springcheck.studies.text import left_out, resumed
+from springcheck.text.lines import Lines, plain, table
+from springcheck.text.wording import count
+
+OUTCOME_LOOKS: Mapping[Outcome, tuple[str, str]] = {
+    "right": ("right", "good"),
+    "unstable, as theory says": ("unstable", "wild"),
+    "engine's limit": ("limit", "limit"),
+    "silently wrong": ("wrong", "wrong"),
+    "not measured": ("", "#8c6bb1"),
+}
+"""Of each outcome the title of its column, "" for none, and its shade on a map."""
+OUTCOMES = tuple(OUTCOME_LOOKS)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,6 +70,29 @@ class Atlas(Studied):
         """Exit status: 0 where `passed`."""
         return 0 if self.passed else 1
 
+    def lines(self, options: Namespace | None = None) -> Lines:
+        titles = {outcome: title for outcome, (title, _) in OUTCOME_LOOKS.items() if title}
+        rows = []
+        for method in dict.fromkeys(cell.method for cell in self.cells):
+            counts = self.counts(method)
+            rows.append((method, str(sum(counts.values())), *(str(counts[outcome]) for outcome in titles)))
+        wrong = self.wrong
+        verdict = f"{count(len(wrong), 'cell')} silently wrong" if wrong else "no cell is silently wrong"
+        return [
+            plain(f"{len(self.cells)} extreme cases", "bold"),
+            *resumed(self.resumed, "table"),
+            plain(),
+            table(("method", "cells", *titles.values()), rows),
+            plain(),
+            *(plain(window.sentence) for window in self.windows),
+            *(
+                plain(f"silently wrong: {cell.method} {cell.parameters}: {cell.reason}", "bold red")
+                for cell in wrong[:20]
+            ),
+            plain(verdict, "bold red" if wrong else "bold green"),
+            *left_out(self.left_out),
+        ]
+
     def document(self) -> dict[str, Any]:
         """Plain data for JSON."""
         return document(
@@ -77,8 +114,6 @@ def _for_viewers(cells: Sequence[Cell]) -> dict[str, np.ndarray]:
         found[f"log10_{name}"] = np.log10(np.where(np.isfinite(values) & (values > 0), values, np.nan))
     return found
 
-
-OUTCOMES: tuple[Outcome, ...] = get_args(Outcome)
 
 CELLS: Rows[Cell] = Rows(
     kind=Cell,

@@ -1,7 +1,8 @@
-"""Result of the study of faults: plain data."""
+"""Result of the study of faults: plain data, and its text."""
 
 from __future__ import annotations
 
+from argparse import Namespace
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
@@ -10,6 +11,8 @@ import numpy as np
 from springcheck.studies.keeper import Table, document
 from springcheck.studies.study import Studied
 from springcheck.studies.tables import Documents
+from springcheck.studies.text import resumed
+from springcheck.text.lines import Lines, Row, plain, table
 from springcheck.text.wording import count
 
 
@@ -43,6 +46,33 @@ class FaultReport(Studied):
     def status(self) -> Literal[0, 1]:
         """Exit status: 0 where every fault was rejected by all that must reject it."""
         return 1 if any(result.missed_by for result in self.results) else 0
+
+    def lines(self, options: Namespace | None = None) -> Lines:
+        """Every fault with what rejects it and the smallest size that is seen."""
+        rows: list[Row] = []
+        for result in self.results:
+            limit = min(result.limits.values(), default=None)
+            rows.append(
+                (
+                    plain(result.name, "bold red" if result.missed_by else ""),
+                    "" if result.size is None else f"{result.size:.0e}",
+                    "" if limit is None else f"{limit:.1e}",
+                    ", ".join(result.rejected_by),
+                )
+            )
+            rows.append(plain(f"  {result.about}", "dim"))
+        rejected = sum(bool(result.rejected_by) for result in self.results)
+        return [
+            *resumed(self.resumed, "piece"),
+            table(("fault", "size", "seen from", "rejected by"), rows, left=("fault",), prose="rejected by"),
+            plain(),
+            *(
+                plain(f"FAILED {result.name}: not rejected by {', '.join(result.missed_by)}", "bold red")
+                for result in self.results
+                if result.missed_by
+            ),
+            plain(f"{rejected} of {len(self.results)} faults rejected"),
+        ]
 
     def document(self) -> dict[str, Any]:
         """As one JSON document."""

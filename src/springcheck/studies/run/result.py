@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shlex
+from argparse import Namespace
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -14,8 +16,12 @@ from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Comparison, Trajectory, Verdict
 from springcheck.studies.choose import LeftOut
 from springcheck.studies.keeper import document, read
+from springcheck.studies.run import text
+from springcheck.studies.run.tally import MethodRun
 from springcheck.studies.study import StudyResult
-from springcheck.text.wording import count
+from springcheck.studies.text import left_out
+from springcheck.text.lines import Lines, Text, hanging, plain
+from springcheck.text.wording import count, few
 
 if TYPE_CHECKING:
     from springcheck.studies.run.drawable import Drawable
@@ -23,28 +29,6 @@ if TYPE_CHECKING:
 
 FAULT = "fault"
 """Engine name in the labels of engines broken on purpose."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MethodRun:
-    """One row of the report."""
-
-    method: str
-    scheme: str
-    outcome: str
-    steps: int
-    """Steps that were taken."""
-    message: str
-    max_error: float
-    """Largest distance from the exact solution (`Norm`); NaN where that is unknown."""
-    error_below: bool
-    """Whether `max_error` is only an upper bound: the uncertainty of the exact solution."""
-    energy_drift: float
-    """H - H0 over the scene's `energy_scale` where it is largest, > 0 where energy is gained.  With friction
-    or a drive the exact solution's H replaces H0, where it is known."""
-    start_seconds: float
-    run_seconds: float
-    force_calls: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
@@ -108,6 +92,48 @@ class Report(StudyResult):
         """Methods for which no check that applied distinguishes schemes: a pass proves nothing."""
         return checks.not_judged(self.verdicts)
 
+    def lines(self, options: Namespace | None = None) -> Lines:
+        scene, verdicts = self.scene, self.verdicts
+        size = "" if scene.n == 1 else f", {scene.size}"
+        out = [
+            plain(f"{scene.title}: {scene.stepping}{size}", "bold"),
+            plain(),
+            *text.methods(scene, self.runs),
+            *text.same_motions(self.same),
+            *text.temperatures(scene, self.temperatures),
+            *text.fractions(verdicts, "Is the engine right?  "),
+            *text.failures(v for v in verdicts if v.method not in self.faults),
+            *text.faults(self.faults, verdicts),
+            *text.beyond(scene, self.runs),
+            *left_out(self.left_out),
+        ]
+        if self.others:
+            others = few(self.others, 8)
+            out.append(plain(f"Left out {others}: not among the default methods; --all runs every one"))
+        if self.judged_frames < scene.frames:
+            which = "pieces at equal distances, the first and the last"
+            of = f"Judged on {self.judged_frames} of {scene.frames} frames: {which}"
+            out.append(plain(f"{of}; error, energy and same motion are of these"))
+        out += [plain(), *text.unjudged(verdicts, self.path), *self._summary()]
+        return [*out, *text.in_full(verdicts, options)]
+
+    def _summary(self) -> Lines:
+        """Counts of the verdicts, the path of the store, and the next command."""
+        if self.broke:
+            # the message gives the reason
+            names = " and ".join(self.broke)
+            return [plain(f"{self.counts}; nothing is stored: {names} did not run", "bold red")]
+        failed, left = any(v.passed is False for v in self.verdicts), checks.not_exercised(self.scene)
+        out: Lines = [*hanging("", left)] if left and not failed else []
+        taken = f"; resumed from an interrupted run: {', '.join(self.resumed)}" if self.resumed else ""
+        look = "bold red" if failed else "bold yellow" if self.not_judged else "bold green"
+        out.append(plain(f"{self.counts}{taken}", look))
+        if self.path is not None:
+            name = shlex.quote(str(self.path))
+            out.append(plain(f"Stored in {self.path}", look))
+            out.append(plain(f"next: springcheck plot {name}, or springcheck report {name}", "dim"))
+        return out
+
     def document(self) -> dict[str, Any]:
         """The report as plain data for JSON."""
         return document(
@@ -141,6 +167,16 @@ class Repeat:
     changed: tuple[str, ...]
     """Versions that have changed, as ``numpy 2.0.1 -> 2.4.6``."""
 
+    @property
+    def said(self) -> Text:
+        """Its line in the report."""
+        if self.equal:
+            return plain(f"{self.method}: equal bit for bit")
+        why = f"; {', '.join(self.changed)}" if self.changed else ""
+        if self.as_written:
+            why = "; equal bit for bit to what was written: the store was changed since"
+        return plain(f"{self.method}: NOT equal, differs by up to {self.difference:.1e}{why}", "bold red")
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Repeats(StudyResult):
@@ -152,6 +188,9 @@ class Repeats(StudyResult):
     def status(self) -> Literal[0, 1]:
         """Exit status: 0 all are equal."""
         return 0 if all(one.equal for one in self.repeats) else 1
+
+    def lines(self, options: Namespace | None = None) -> Lines:
+        return [one.said for one in self.repeats]
 
     def document(self) -> dict[str, Any]:
         """Repetitions as plain data for JSON."""
@@ -178,6 +217,16 @@ class Stored(StudyResult):
     def notes(self) -> list[str]:
         """Notes on what the figures leave out."""
         return self.drawable.notes
+
+    def lines(self, options: Namespace | None = None) -> Lines:
+        out: Lines = []
+        if self.verdicts:
+            out += [*text.fractions(self.verdicts), *text.failures(self.verdicts)]
+            out += [*text.unjudged(self.verdicts, self.path), *text.in_full(self.verdicts, options)]
+        if self.comparison is not None:
+            out += [plain(), plain("Largest differences, relative to the initial energy norm:")]
+            out.append(text.differences(self.comparison))
+        return out
 
     def document(self) -> dict[str, Any]:
         """Plain data for JSON."""

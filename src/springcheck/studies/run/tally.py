@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,13 +14,34 @@ from springcheck.physics.arrays import Extended, Reals
 from springcheck.physics.norm import energy_scale
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory
-from springcheck.studies.run.result import MethodRun
 
 if TYPE_CHECKING:
     from springcheck.thermal.heat import Heat
 
 FAINTEST_ENERGY = np.finfo(np.float64).tiny / np.finfo(np.float64).eps
 """Scale of energies below which they are subnormal in double precision and lose digits."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MethodRun:
+    """One row of the report."""
+
+    method: str
+    scheme: str
+    outcome: str
+    steps: int
+    """Steps that were taken."""
+    message: str
+    max_error: float
+    """Largest distance from the exact solution (`Norm`); NaN where that is unknown."""
+    error_below: bool
+    """Whether `max_error` is only an upper bound: the uncertainty of the exact solution."""
+    energy_drift: float
+    """H - H0 over the scene's `energy_scale` where it is largest, > 0 where energy is gained.  With friction
+    or a drive the exact solution's H replaces H0, where it is known."""
+    start_seconds: float
+    run_seconds: float
+    force_calls: int
 
 
 class Tally:

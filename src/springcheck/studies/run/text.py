@@ -1,4 +1,4 @@
-"""The report of a run as text."""
+"""Parts of the report of a run as text."""
 
 from __future__ import annotations
 
@@ -6,81 +6,30 @@ import shlex
 from argparse import Namespace
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from springcheck import checks, schemes
+from springcheck.checks.compare import Same
 from springcheck.physics.exact import has_true_motion
+from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Comparison, Verdict
-from springcheck.studies.run.result import MethodRun, Repeat, Repeats, Report, Stored
-from springcheck.studies.text import left_out, of_energy
-from springcheck.text.lines import Lines, Row, Text, TextTable, hanging, plain, table
-from springcheck.text.wording import count, few, number, seconds
+from springcheck.studies.run.tally import MethodRun
+from springcheck.studies.text import of_energy
+from springcheck.text.lines import Lines, Row, Text, TextTable, plain, table
+from springcheck.text.wording import count, number, seconds
 
-
-def lines(found: Report | Repeats | Stored, options: Namespace | None = None) -> Lines:
-    """Reports of `springcheck run`, `run --from`, and `inspect` of a stored run."""
-    verdicts = getattr(options, "verdicts", False)
-    if isinstance(found, Repeats):
-        return [_repeat(one) for one in found.repeats]
-    if isinstance(found, Report):
-        return [*_report(found), *([verdicts_table(found.verdicts)] if verdicts else [])]
-    out: Lines = []
-    if found.verdicts:
-        out += _fractions(found.verdicts)
-        out += [*failures(found.verdicts), *unjudged(found.verdicts, found.path)]
-        if verdicts:
-            out.append(verdicts_table(found.verdicts))
-    if found.comparison is not None:
-        out += [plain(), plain("Largest differences, relative to the initial energy norm:")]
-        out.append(_comparison(found.comparison))
-    return out
-
+if TYPE_CHECKING:
+    from springcheck.thermal.heat import Heated
 
 BELOW = "the exact solution is known no better than this, and the run is no further from it"
 
 
-def _report(report: Report) -> Lines:
-    scene = report.scene
-    size = "" if scene.n == 1 else f", {scene.size}"
-    head = f"{scene.title}: {scene.stepping}{size}"
-    out: Lines = [plain(head, "bold"), plain(), _runs(report.runs)]
-    unit = f"root of the {scene.system.norm.of or 'unit'}, as the start has no energy"
-    unit = "initial energy norm" if "initial" in unit else unit
-    out += [
-        plain(f"error: largest distance from the exact solution, over the {unit}", "dim"),
-        *[plain(f"<: {BELOW}", "dim") for run in report.runs[:1] if any(x.error_below for x in report.runs)],
-        *[plain("-: no exact solution of this scene is known here", "dim")] * (not has_true_motion(scene)),
-        plain(f"energy: {of_energy(report.scene)}", "dim"),
-    ]
-    out += [
-        plain(f"  {run.method}: {run.outcome} after step {run.steps}: {run.message}")
-        for run in report.runs
-        if run.outcome != "complete" or run.message
-    ]
-    out += _same_motions(report)
-    out += _temperatures(report)
-    out += _fractions(report.verdicts, "Is the engine right?  ")
-    out += failures(v for v in report.verdicts if v.method not in report.faults)
-    out += _faults(report)
-    out += _beyond(report)
-    out += left_out(report.left_out)
-    if report.others:
-        others = few(report.others, 8)
-        out.append(plain(f"Left out {others}: not among the default methods; --all runs every one"))
-    if report.judged_frames < report.scene.frames:
-        which = (
-            "pieces at equal distances, the first and the last; error, energy and same motion are of these"
-        )
-        out.append(plain(f"Judged on {report.judged_frames} of {report.scene.frames} frames: {which}"))
-    out += [plain(), *unjudged(report.verdicts, report.path), *_summary(report)]
-    return out
-
-
-def _beyond(report: Report) -> Lines:
+def beyond(scene: Scene, runs: Sequence[MethodRun]) -> Lines:
     """Warnings for methods whose step is beyond the limit of stability: their motion grows without bound."""
-    system, h, known = report.scene.system, abs(report.scene.step), schemes.known()
-    ran = [known[name] for name in {run.scheme for run in report.runs} if name in known]
+    system, h, known = scene.system, abs(scene.step), schemes.known()
+    ran = [known[name] for name in {run.scheme for run in runs} if name in known]
     ours = schemes.SCHEMES | schemes.ATTACHED
     plainly = all(one is ours.get(one.name) and not one.has("mixes") for one in ran)
     if system.has_modes and not system.is_damped and plainly:
@@ -91,11 +40,11 @@ def _beyond(report: Report) -> Lines:
     from springcheck.studies.stability.longest import resonating, too_long
 
     out: Lines = []
-    for scheme in dict.fromkeys(run.scheme for run in report.runs):
+    for scheme in dict.fromkeys(run.scheme for run in runs):
         title = schemes.title(scheme)
-        if (limit := too_long(scheme, report.scene)) is not None:
+        if (limit := too_long(scheme, scene)) is not None:
             said = f"is beyond the limit of {title} here, {limit:.4g}"
-        elif (factor := resonating(scheme, report.scene)) is not None:
+        elif (factor := resonating(scheme, scene)) is not None:
             said = (
                 f"makes {title} grow by a factor of {factor:.4f} a step, and the exact solution stays bounded"
             )
@@ -103,12 +52,12 @@ def _beyond(report: Report) -> Lines:
             said += f"; take a step that is short beside the {of}"
         else:
             continue
-        names = ", ".join(run.method for run in report.runs if run.scheme == scheme)
-        out.append(plain(f"h = {report.scene.step:g} {said}: {names}", "bold yellow"))
+        names = ", ".join(run.method for run in runs if run.scheme == scheme)
+        out.append(plain(f"h = {scene.step:g} {said}: {names}", "bold yellow"))
     return [plain(), *out] if out else []
 
 
-def _fractions(verdicts: Sequence[Verdict], question: str = "") -> Lines:
+def fractions(verdicts: Sequence[Verdict], question: str = "") -> Lines:
     """Value over bound of each check for each method."""
     return [
         plain(),
@@ -119,8 +68,8 @@ def _fractions(verdicts: Sequence[Verdict], question: str = "") -> Lines:
     ]
 
 
-def _runs(runs: Sequence[MethodRun]) -> TextTable:
-    """One row for each method, grouped by scheme."""
+def methods(scene: Scene, runs: Sequence[MethodRun]) -> Lines:
+    """One row for each method, grouped by scheme; what its columns are, and the runs that ended early."""
     rows: list[Row] = []
     for scheme in dict.fromkeys(run.scheme for run in runs):
         rows.append(plain(schemes.title(scheme), "italic"))
@@ -137,7 +86,20 @@ def _runs(runs: Sequence[MethodRun]) -> TextTable:
             if run.scheme == scheme
         ]
     titles = ("method", "error", "energy", "start", "run", "outcome")
-    return table(titles, rows, left=("method", "outcome"))
+    unit = f"root of the {scene.system.norm.of or 'unit'}, as the start has no energy"
+    unit = "initial energy norm" if "initial" in unit else unit
+    return [
+        table(titles, rows, left=("method", "outcome")),
+        plain(f"error: largest distance from the exact solution, over the {unit}", "dim"),
+        *[plain(f"<: {BELOW}", "dim")] * any(run.error_below for run in runs),
+        *[plain("-: no exact solution of this scene is known here", "dim")] * (not has_true_motion(scene)),
+        plain(f"energy: {of_energy(scene)}", "dim"),
+        *(
+            plain(f"  {run.method}: {run.outcome} after step {run.steps}: {run.message}")
+            for run in runs
+            if run.outcome != "complete" or run.message
+        ),
+    ]
 
 
 def _error(x: float) -> str:
@@ -147,13 +109,11 @@ def _error(x: float) -> str:
     return f"{x:.2e}" if x < 1e100 else f"{x:.1e}"
 
 
-def _same_motions(report: Report) -> Lines:
+def same_motions(found: Sequence[Same]) -> Lines:
     """Which trajectories are one motion, and how closely they agree."""
-    if not report.same:
-        return []
     out: Lines = []
     titles = {"rounding": "The same motion, to rounding:", "tolerance": "As near as a tolerance allows:"}
-    for same in report.same:
+    for same in found:
         title = plain(titles[same.within])
         out += [] if title in out else [plain(), title]
         names = " = ".join("exact solution" if label == "exact" else label for label in same.labels)
@@ -163,9 +123,9 @@ def _same_motions(report: Report) -> Lines:
     return out
 
 
-def _temperatures(report: Report) -> Lines:
+def temperatures(scene: Scene, found: Sequence[Heated]) -> Lines:
     """Temperatures of runs in a bath, each beside the exact one of its scheme."""
-    if not report.temperatures:
+    if not found:
         return []
     rows: list[Row] = [
         (
@@ -173,10 +133,10 @@ def _temperatures(report: Report) -> Lines:
             number(one.configurational_law, ".6f"), _measured(one.configurational, one.configurational_error),
             number(one.kinetic_law, ".6f"), _measured(one.kinetic, one.kinetic_error),
         )
-        for one in report.temperatures
+        for one in found
     ]  # fmt: skip
     titles = ("method", "configurational", "measured", "kinetic", "measured ")
-    scene, of = report.scene, ""
+    of = ""
     if scene.system.rods:
         of = f", in {count(scene.system.rods.freedoms, 'degree')} of freedom"
     return [
@@ -265,11 +225,11 @@ def failures(verdicts: Iterable[Verdict]) -> Lines:
     return out
 
 
-def _faults(report: Report) -> Lines:
+def faults(broken: Mapping[str, str], verdicts: Sequence[Verdict]) -> Lines:
     """The fault of each engine that is broken on purpose, and the checks that reject it."""
     out: Lines = []
-    for method, about in report.faults.items():
-        mine = [v for v in report.verdicts if v.method == method and v.passed is not None]
+    for method, about in broken.items():
+        mine = [v for v in verdicts if v.method == method and v.passed is not None]
         seen = [v.check for v in mine if not v.passed]
         said = f"rejected by {', '.join(seen)}" if seen else "NOT rejected: nothing here sees it"
         out.append(plain(f"{method}, broken on purpose ({about}): {said}", "" if seen else "bold yellow"))
@@ -308,45 +268,21 @@ def verdict_line(v: Verdict) -> str:
     return f"{v.value:.3g} of {v.bound:.3g} {v.unit} (ratio {ratio(v):.2g}): {v.reason}"
 
 
-def verdicts_table(verdicts: Iterable[Verdict]) -> TextTable:
-    """Every verdict in full."""
+def in_full(verdicts: Iterable[Verdict], options: Namespace | None) -> Lines:
+    """Every verdict in full, where `--verdicts` asks for it."""
+    if not getattr(options, "verdicts", False):
+        return []
     words = {True: ("passed", ""), False: ("FAILED", "bold red"), None: ("n/a", "dim")}
     titles = ("method", "check", "verdict", "value, bound, ratio, why")
     rows = [
         (v.method, v.check, plain(*words[v.passed]), plain(verdict_line(v), words[v.passed][1]))
         for v in verdicts
     ]
-    return table(titles, rows, left=titles, prose=titles[-1])
+    return [table(titles, rows, left=titles, prose=titles[-1])]
 
 
-def _repeat(one: Repeat) -> Text:
-    if one.equal:
-        return plain(f"{one.method}: equal bit for bit")
-    why = f"; {', '.join(one.changed)}" if one.changed else ""
-    if one.as_written:
-        why = "; equal bit for bit to what was written: the store was changed since"
-    return plain(f"{one.method}: NOT equal, differs by up to {one.difference:.1e}{why}", "bold red")
-
-
-def _summary(report: Report) -> Lines:
-    """Counts of the verdicts, the path of the store, and the next command."""
-    if report.broke:
-        # the message gives the reason
-        names = " and ".join(report.broke)
-        return [plain(f"{report.counts}; nothing is stored: {names} did not run", "bold red")]
-    failed, left = any(v.passed is False for v in report.verdicts), checks.not_exercised(report.scene)
-    out: Lines = [*hanging("", left)] if left and not failed else []
-    taken = f"; resumed from an interrupted run: {', '.join(report.resumed)}" if report.resumed else ""
-    look = "bold red" if failed else "bold yellow" if report.not_judged else "bold green"
-    out.append(plain(f"{report.counts}{taken}", look))
-    if report.path is not None:
-        name = shlex.quote(str(report.path))
-        out.append(plain(f"Stored in {report.path}", look))
-        out.append(plain(f"next: springcheck plot {name}, or springcheck report {name}", "dim"))
-    return out
-
-
-def _comparison(comparison: Comparison) -> TextTable:
+def differences(comparison: Comparison) -> TextTable:
+    """The largest difference of each pair of runs."""
     rows = [
         (f"{i} {label}", *(_short(x) for x in comparison.max_difference[i, : i + 1]))
         for i, label in enumerate(comparison.labels)

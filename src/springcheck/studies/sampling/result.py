@@ -1,17 +1,29 @@
-"""Result of the study of sampling: one record for each thermostat."""
+"""Result of the study of sampling: one record for each thermostat, and the text of all."""
 
 from __future__ import annotations
 
+from argparse import Namespace
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
 
+from springcheck.figures.looks import title
 from springcheck.physics.arrays import Floats
 from springcheck.studies import keeper
 from springcheck.studies.study import Studied
 from springcheck.studies.tables import RecordForm
-from springcheck.text.wording import count
+from springcheck.studies.text import left_out, resumed
+from springcheck.text.lines import Lines, Row, plain, table
+from springcheck.text.wording import count, number, seconds
+
+TITLES = ("method", "configurational", "law", "kinetic", "law ", "off", "law  ", "limit", "law   ", "forces",
+          "time")  # fmt: skip
+
+CAPTION = (
+    "Temperatures over the bath's at h omega = 0.5 and friction 0.4 omega; what k<q2>/kT over 500",
+    "steps is off from 1; the largest stable h omega at friction omega.  Each beside its law.",
+)
 
 DEPARTING_ERRORS = 6.0
 """Standard errors from which a measured number contradicts its law: chance 2e-9."""
@@ -60,6 +72,18 @@ class Sampled:
         with np.errstate(all="ignore"):
             return any(bool(np.any(np.abs(x - law) > DEPARTING_ERRORS * error)) for x, law, error in pairs)
 
+    @property
+    def row(self) -> Row:
+        """Its row in the report."""
+        at = list(self.friction).index(1.0)
+        measured = (
+            self.configurational[1], self.configurational_law[1], self.kinetic[1], self.kinetic_law[1],
+            self.off[-1], self.off_law[-1], self.limit[at], self.limit_law[at],
+        )  # fmt: skip
+        method = plain("  " + self.method, "bold red" if self.departs else "")
+        numbers = (number(one, ".4f", "none") for one in measured)
+        return [method, *numbers, f"{self.force_calls:.3g}", seconds(self.seconds)]
+
 
 SAMPLED: RecordForm[Sampled] = RecordForm(
     kind=Sampled, beginning="sampling/", signal="configurational", axes=("turn",)
@@ -84,6 +108,21 @@ class Sampling(Studied):
         if not self.methods:
             return 2
         return 1 if any(x.departs for x in self.methods) else 0
+
+    def lines(self, options: Namespace | None = None) -> Lines:
+        rows: list[Row] = []
+        for name in dict.fromkeys(x.scheme for x in self.methods):
+            rows += [plain(title(name), "italic"), *(x.row for x in self.methods if x.scheme == name)]
+        apart = [x.method for x in self.methods if x.departs]
+        return [
+            plain("How well thermostats sample a spring", "bold"),
+            *map(plain, CAPTION),
+            *resumed(self.resumed, "method"),
+            plain(),
+            table(TITLES, rows, left=("method",)),
+            *(plain(f"{method}: a temperature is not its law's", "bold red") for method in apart),
+            *left_out(self.left_out),
+        ]
 
     def document(self) -> dict[str, Any]:
         """Plain data for JSON."""

@@ -1,7 +1,9 @@
-"""Result of a study of stability: plain data, its failures, and its stored forms."""
+"""Result of a study of stability: plain data, its failures, its text, and its stored forms."""
 
 from __future__ import annotations
 
+from argparse import Namespace
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Literal
 
@@ -9,17 +11,22 @@ import numpy as np
 
 from springcheck import engines, schemes
 from springcheck.errors import MethodError
+from springcheck.physics.exact import has_true_motion
+from springcheck.physics.exact.mathieu import floquet
 from springcheck.physics.scene import Scene
+from springcheck.studies.choose import LeftOut
 from springcheck.studies.keeper import document
 from springcheck.studies.stability import limits, propagators
 from springcheck.studies.stability.limits import Limit
-from springcheck.studies.stability.longest import fastest, longest
+from springcheck.studies.stability.longest import fastest, is_modulated, longest
 from springcheck.studies.stability.multipliers import Multiplier
 from springcheck.studies.stability.regions import Region
 from springcheck.studies.stability.resonance import Resonance
 from springcheck.studies.study import Studied
 from springcheck.studies.tables import RecordForm
-from springcheck.text.wording import count
+from springcheck.studies.text import left_out, resumed
+from springcheck.text.lines import Lines, plain, table
+from springcheck.text.wording import count, number
 
 GROWTH_AGREES = 1e-6
 """Relative difference allowed between measured and predicted growth in double precision: the decaying
@@ -120,6 +127,42 @@ class Stability(Studied):
         ]
         return out + self.failures
 
+    def lines(self, options: Namespace | None = None) -> Lines:
+        largest_steps = [self.largest(x) for x in self.limits]
+        out: Lines = [
+            plain(f"{self.scene.title}: limits of stability, measured on one step", "bold"),
+            *_of_scene(self, largest_steps),
+            *resumed(self.resumed, "measurement"),
+            plain(),
+        ]
+        if self.limits:
+            rows = []
+            for x, largest in zip(self.limits, largest_steps, strict=True):
+                off = 0.0 if x.limit == x.theory else abs(x.limit - x.theory)
+                predicted = np.nan if np.isnan(x.growth_above) else x.growth_predicted
+                cells = (
+                    x.method, *(number(y, ".9f", "none") for y in (x.limit, x.theory)), f"{off:.0e}",
+                    *(number(y, ".7f") for y in (x.growth_above, predicted)),
+                    "none" if largest == 0 else number(largest, ".4g", "any"),
+                )  # fmt: skip
+                rows.append([plain(cell, "" if x.agrees else "bold red") for cell in cells])
+            titles = ("method", "limit h w", "theory", "off", "growth above", "predicted", "largest h here")
+            out += [table(titles, rows), plain()]
+        if self.multipliers and (exact := floquet(self.scene.system)):
+            grown, period, turned = exact
+            steps = self.multipliers[0].steps
+            by = f"{steps} x {period / steps:.6g}"
+            out.append(plain(f"Floquet multipliers of a period of the modulation, by {by}"))
+            found = [("exact motion", grown, turned, "")]
+            found += [(x.method, x.grown, x.turned, f"{x.off:.0e}") for x in self.multipliers]
+            turning = [(name, f"{x:.9f}", f"{y:.9f}", off) for name, x, y, off in found]
+            out += [table(("method", "grows by", "turns by", "off its scheme's"), turning), plain()]
+        out += [plain(line) for line in self.sentences]
+        refused = [LeftOut(method=x.method, reason=why) for x in self.limits if (why := self.refusal(x))]
+        out += left_out(refused, "No largest step here by")
+        out += left_out(self.left_out)
+        return out
+
     def document(self) -> dict[str, Any]:
         """Plain data for JSON (a limit of None: there is none)."""
         return document(
@@ -143,6 +186,47 @@ class Stability(Studied):
             left_out=self.left_out,
             failures=self.failures,
         )  # fmt: skip
+
+
+def _of_scene(study: Stability, largest_steps: Sequence[float]) -> Lines:
+    """The scene's fastest motion, its step, and the methods for which it is too long."""
+    scene, w, field = study.scene, fastest(study.scene), "magnetic" in study.scene.system.acting
+    if not w and not scene.system.is_damped:
+        said = " at its start, which says nothing of where it goes"
+        if field:
+            said = " but by its magnetic field, with which no largest step is worked out"
+        elif scene.system.is_linear:
+            said = ": no step is too long for its stability"
+        return [plain(f"  nothing in this scene oscillates{said}")]
+    most = ", its modulated springs at their stiffest" * is_modulated(scene)
+    there = ", where its motion is stiffest" if has_true_motion(scene) else f", at its start{most}"
+    straight = scene.system.without("drive").without("magnetic").is_linear
+    where = "" if straight else there
+    left = {"friction": scene.system.is_damped, "field": field}
+    where += "".join(f", without its {name}" for name, acts in left.items() if acts)
+    here = f"its step h = {scene.step:g} makes h w = {abs(scene.step) * w:.4g}"
+    out: Lines = [plain(f"  fastest angular frequency of this scene{where}: w = {w:.6g}; {here}")]
+    h = abs(scene.step)
+    beyond = [x.method for x, most in zip(study.limits, largest_steps, strict=True) if most < h]
+    if beyond:
+        out.append(plain(f"  beyond the limit there: {', '.join(beyond)}", "bold yellow"))
+    elif any(most >= h for most in largest_steps):
+        out.append(plain("  within the limit of every method measured here"))
+    if modulated := floquet(scene.system):
+        grown, period, _ = modulated
+        changes = "grows" if grown > 1 else "decays"
+        bounded = "stays bounded" if grown == 1 else f"{changes} by a factor of {grown:.6g}"
+        said = f"the exact motion {bounded} (Floquet)"
+        out.append(plain(f"  in each period of its modulation, {period:.4g}, {said}"))
+    if is_modulated(scene):
+        said = "no largest step is known: one may resonate with the modulation below its limit on a spring"
+        out.append(plain(f"  {said}", "dim"))
+    elif field:
+        out.append(plain("  no largest step is worked out with a magnetic field", "dim"))
+    elif not straight:
+        said = "limits of small oscillations there; an anharmonic motion may be lost below them"
+        out.append(plain(f"  {said}", "dim"))
+    return out
 
 
 def _named(found: Any, *names: str) -> dict[str, Any]:
