@@ -492,6 +492,24 @@ def test_a_fit_finds_the_order_of_a_power_law(order: float) -> None:
     assert fit.constant == pytest.approx(0.01, rel=1e-12)
 
 
+@pytest.mark.parametrize(("scene", "lowered"), [("driven-spring", True), ("magnetic", True), ("spring", False)])
+def test_an_order_that_friction_lowers_is_explained(scene: str, lowered: bool) -> None:
+    """Velocity Verlet has order 2, and where forces depend on velocities order 1; RK4 has order 4 anywhere."""
+    methods = tuple(
+        result.MethodSummary(
+            method=label, points=tuple(made_up([0.01 * 0.5**i for i in range(7)])), duration=1.0,
+            condition=None, first_start_seconds=None,
+        ) for label in ("own:velocity-verlet", "own:rk4", "own:unheard-of")
+    )  # fmt: skip
+    study = result.PrecisionStudy(
+        scene=scenes.load_scene(scene), budget=1.0, seconds=1.0, methods=methods, tick=1e-9,
+        machine={"processor": "one"}, left_out=(), resumed=0,
+    )  # fmt: skip
+    said = [str(line) for line in study.lines() if "of order 1" in str(line)]
+    assert bool(said) is lowered
+    assert all(line.startswith("  own:velocity-verlet: of order 1 where forces") for line in said)
+
+
 @pytest.mark.parametrize(("order", "bend"), [(4, 3.0), (4, -0.6), (2, 0.5), (1, 1.0)])
 def test_a_bend_that_is_left_stands_in_the_standard_error(order: int, bend: float) -> None:
     # the next term of an error: the slope falls from point to point, all on one side of the order

@@ -11,6 +11,8 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
+from springcheck import schemes
+from springcheck.figures.looks import scheme_of
 from springcheck.physics.scene import Scene
 from springcheck.studies.choose import LeftOut
 from springcheck.studies.keeper import Table, document
@@ -19,7 +21,7 @@ from springcheck.studies.precision.fits import CANNOT_RUN, Condition, Fit, Point
 from springcheck.studies.study import Studied
 from springcheck.studies.text import left_out, resumed
 from springcheck.text.lines import Lines, Row, TextTable, plain, table
-from springcheck.text.wording import count, duration, number, seconds
+from springcheck.text.wording import count, duration, few, number, seconds
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,6 +109,9 @@ class MethodSummary:
         }
 
 
+MOST_LOWERED = 4
+"""Methods of a lowered order that the report names."""
+
 TARGETS = (1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
 """Target errors for which the cheapest point is reported."""
 
@@ -176,6 +181,9 @@ class PrecisionStudy(Studied):
                 longer = "" if each is None else f", {duration(steps * each)}"
                 there = f"near {error:.0e}, {steps:.0e} steps{longer} a run"
                 out.append(plain(f"  {method.method}: floor expected {there}"))
+        if lower := self._lowered:
+            why = "of order 1 where forces depend on velocities, which their kicks take as they begin"
+            out.append(plain(f"  {few(lower, MOST_LOWERED)}: {why}"))
         untimed = sum(point.complete and not point.run_seconds_repeats for point in self.points)
         if untimed:
             out.append(plain(f"  {count(untimed, 'point')} of errors alone: workers measure no times"))
@@ -193,6 +201,15 @@ class PrecisionStudy(Studied):
         unable = [LeftOut(method=x.method, reason=x.message) for x in self.points if x.outcome == CANNOT_RUN]
         out += left_out([*self.left_out, *unable])
         return out
+
+    @property
+    def _lowered(self) -> list[str]:
+        """Methods with an order that friction or a magnetic field in their kicks lowers."""
+        if not any(term.kind in ("friction", "magnetic") for term in self.scene.terms):
+            return []
+        known, fitted = schemes.known(), [m.method for m in self.methods if m.fit]
+        found = [(label, known.get(scheme_of(label))) for label in fitted]
+        return [label for label, scheme in found if scheme and scheme.braked_order < scheme.order]
 
     def document(self) -> dict[str, Any]:
         """The study as plain data for JSON; unknown values are None."""
