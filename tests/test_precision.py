@@ -492,9 +492,9 @@ def test_a_fit_finds_the_order_of_a_power_law(order: float) -> None:
     assert fit.constant == pytest.approx(0.01, rel=1e-12)
 
 
-@pytest.mark.parametrize(("scene", "lowered"), [("driven-spring", True), ("magnetic", True), ("spring", False)])
-def test_an_order_that_friction_lowers_is_explained(scene: str, lowered: bool) -> None:
-    """Velocity Verlet has order 2, and where forces depend on velocities order 1; RK4 has order 4 anywhere."""
+@pytest.mark.parametrize(("scene", "lowered"), [("driven-spring", 1), ("magnetic", 1), ("spring", 0)])
+def test_an_order_that_friction_lowers_is_explained(scene: str, lowered: int) -> None:
+    """Velocity Verlet has order 1 where forces depend on velocities, and RK4 order 4 anywhere."""
     methods = tuple(
         result.MethodSummary(
             method=label, points=tuple(made_up([0.01 * 0.5**i for i in range(7)])), duration=1.0,
@@ -506,7 +506,7 @@ def test_an_order_that_friction_lowers_is_explained(scene: str, lowered: bool) -
         machine={"processor": "one"}, left_out=(), resumed=0,
     )  # fmt: skip
     said = [str(line) for line in study.lines() if "of order 1" in str(line)]
-    assert bool(said) is lowered
+    assert len(said) == lowered
     assert all(line.startswith("  own:velocity-verlet: of order 1 where forces") for line in said)
 
 

@@ -331,7 +331,7 @@ def test_wrong_arguments_are_answered_in_words() -> None:
         (lambda: scene.replace(m=np.ma.array([3.0], mask=[True])), "m: real numbers"),
         (lambda: springcheck.plot.phase([run, run]), "phase: runs = .*: a Trajectory is needed"),
         (lambda: springcheck.plot.energy(5), "a Trajectory is needed"),
-        (lambda: springcheck.plot.energy(), "no trajectory is given to draw"),
+        (springcheck.plot.energy, "no trajectory is given to draw"),
         (lambda: springcheck.plot.phase(run, particle=1), "particle = 1: 0 to 0 are here"),
         (lambda: springcheck.plot.position(run, run, particle="a"), "particle = 'a': a whole number"),
         (lambda: springcheck.precision(scene, "own:rk4", path=5), "path = 5: a text or a path"),
