@@ -746,7 +746,7 @@ def test_a_step_that_is_hardly_another_is_no_rescaling() -> None:
 )
 def test_a_wrong_temperature_is_said_of_several_draws_a_step_and_of_rods(name: str, method: str) -> None:
     """Both were a ValueError: a step of three draws shows two sums of them, and one of a rod fewer."""
-    scene = baths.springs(3, steps=200) if name == "springs" else scenefile.load_scene(name).derived(steps=200)
+    scene = (baths.springs(3) if name == "springs" else scenefile.load_scene(name)).derived(steps=200)
     run = driver.run(scene, method, seed=3)
     assert scene.bath is not None
     claimed = scene.derived(bath=replace(scene.bath, temperature=4 * scene.bath.temperature))

@@ -19,7 +19,7 @@ from springcheck.checks.steps import STANDS_APART, seldom_off, step_defect
 from springcheck.checks.thermal import noise_direction, read_frames, reading, rows_a_step, thermostat
 from springcheck.physics.arrays import Floats
 from springcheck.text.wording import regularly
-from springcheck.thermal import THERMOSTATS, chance, residuals
+from springcheck.thermal import THERMOSTATS, chance
 from springcheck.thermal.catalogue import ENERGY_LEFT
 from springcheck.thermal.draws import Reading, law_of
 
@@ -208,7 +208,7 @@ def _of_differences(case: Case) -> str:
     """Velocities that are differences of the positions, where every step is right to what those keep."""
     run, m, held = case.trajectory, case.judged.m, case.system.rods
     declared = replace(case, trajectory=replace(run, rebuilds_velocity=True))
-    if run.rebuilds_velocity or step_defect(case).passed or not step_defect(declared).passed:
+    if run.rebuilds_velocity or step_defect(case).passed:
         return ""
     for more, n, kick in (("", 1, 0.0), (" over two steps", 2, 0.0), (" and half a kick", 1, 0.5)):
         q, p = (x[1 : len(x) - n + 1] for x in (run.q, run.p))
@@ -219,7 +219,7 @@ def _of_differences(case: Case) -> str:
         # and those of their own decimals: what has finer ones than the positions was not made of them
         half = run.arithmetic.recorded(m, n * run.step, False)[1]
         off = (np.abs(p - right) - half) / (DIFFERENCE_ROUNDINGS * run.arithmetic.state)
-        if np.all(off <= size):
+        if np.all(off <= size) and step_defect(declared).passed:
             return (
                 f"velocities are differences of the positions{more}, which keep eps q/h of them, and each "
                 f"step is right to that: {DECLARE_DIFFERENCES}"
@@ -227,7 +227,7 @@ def _of_differences(case: Case) -> str:
     # what SHAKE adds to velocities, as a difference, rounds at each step by itself; a wrong force does not
     off = (run.p[1:] - case.next_states[1]) / m
     again = abs(np.sum(off[1:] * off[:-1])) / np.sum(off * off) * np.sqrt(len(off))
-    if held and again <= STANDARD_ERRORS < np.sqrt(len(off)):
+    if held and again <= STANDARD_ERRORS < np.sqrt(len(off)) and step_defect(declared).passed:
         return (
             "what rods change of velocities rounds as differences of positions do, by eps q/h, and each step "
             f"is right to that: {DECLARE_DIFFERENCES}"
@@ -280,7 +280,8 @@ def _of_bath(case: Case) -> str:
         if lag == sign == 1 and rows_a_step(case) == 2 and not np.any(again % 2):
             return "both random numbers of a step are one number, where each is one of its own"
         if len(again) < NEARLY_ALL * (len(x) - lag - again[0]):
-            return f"{len(again)} of {len(x) - lag} rows of random numbers are {what} {lag} rows before, again"
+            of = f"{len(again)} of {len(x) - lag} rows of random numbers"
+            return f"{of} are {what} {lag} rows before, again"
         return f"the random numbers from row {lag + again[0]} on are {what} from row {again[0]} on, again"
     return ""
 
@@ -302,10 +303,10 @@ def _of_state(case: Case) -> str:
     if not abs(held[which, i]) * np.sqrt(len(x)) > STANDARD_ERRORS:
         return ""
     # beside the draws before, which made a part of that momentum
-    known = np.column_stack([x[:-rows, i], np.ones(len(x) - rows)])
-    alone = (residuals.regressed(known, y[rows:, i])[1] for y in (x, both[which]))
-    if not abs(np.corrcoef(*alone)[0, 1]) * np.sqrt(len(x)) > STANDARD_ERRORS:
-        again = np.corrcoef(x[rows:, i], x[:-rows, i])[0, 1]
+    three = np.corrcoef([both[which, rows:, i], x[rows:, i], x[:-rows, i]])
+    own, of_both, again = three[0, 1], three[0, 2], three[1, 2]
+    alone = (own - again * of_both) / np.sqrt((1 - again**2) * (1 - of_both**2))
+    if abs(alone) * np.sqrt(len(x)) <= STANDARD_ERRORS:
         return f"the draws of coordinate {i} go with those a step before, with a correlation of {again:+.2g}"
     # what the force at a step's end in place of that at its start adds to draws, and what another drag does
     made = np.max(np.abs(law_of(thermostat(case), case.judged).G[:, 1]), axis=1)
