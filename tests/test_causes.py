@@ -738,3 +738,52 @@ def test_a_step_that_is_hardly_another_is_no_rescaling() -> None:
         run = driver.run(scene.derived(step=scene.step * (1 + change)), "own:ruth3")
         run = replace(run, step=scene.step, t=scene.step * np.arange(len(run.t)))
         assert "rescaling" not in said(scene, run)
+
+
+@pytest.mark.parametrize(
+    ("name", "method"),
+    [("springs", "own:baoab-respa3"), ("bath-dumbbell", "own:baoab"), ("bath-dumbbell", "own:obabo")],
+)
+def test_a_wrong_temperature_is_said_of_several_draws_a_step_and_of_rods(name: str, method: str) -> None:
+    """Both were a ValueError: a step of three draws shows two sums of them, and one of a rod fewer."""
+    scene = (baths.springs(3) if name == "springs" else scenefile.load_scene(name)).derived(steps=200)
+    run = driver.run(scene, method, seed=3)
+    assert scene.bath is not None
+    claimed = scene.derived(bath=replace(scene.bath, temperature=4 * scene.bath.temperature))
+    _, said = failed_and_said(claimed, replace(run, scene=claimed))
+    assert np.isclose(float(said.removeprefix("the noise is ").split()[0]), 1 / 2, rtol=0.1), said
+
+
+def test_draws_that_are_nothing_but_rounding_do_not_come_again() -> None:
+    """A motion without noise that comes to rest had random numbers "from 826 rows before, again"."""
+    scene = baths.springs(1, steps=1200)
+    _, said = failed_and_said(scene, loop(scene, np.zeros((1200, 1))))
+    assert said.startswith("no noise acts on coordinate 0,")
+
+
+def test_draws_that_hold_those_before_them_hold_no_momentum() -> None:
+    """Both were "the drag is not the one that the friction asks for"."""
+    scene, x = baths.springs(3, steps=3000), np.random.default_rng(3).standard_normal((3001, 3))
+    opposite = x[:3000].copy()
+    opposite[1::2] = -opposite[::2]
+    _, said = failed_and_said(scene, loop(scene, opposite))
+    assert said == "1500 of 2999 rows of random numbers are the opposite of those 1 rows before, again"
+    _, said = failed_and_said(scene, loop(scene, 0.8 * x[1:] + 0.6 * x[:-1]))
+    assert "go with those a step before, with a correlation of +0.4" in said or "+0.5" in said
+
+
+def test_a_factor_at_another_place_in_the_step_is_no_other_factor() -> None:
+    """It was "a step leaves 0.73 +- 0.02 of the kinetic energy where the friction asks for 0.57"."""
+    scene = baths.springs(40)
+    run = replace(driver.run(scene, "own:bussi-after", seed=3), scheme="bussi")
+    shown = causes.found(Case(trajectory=run, scene=scene))
+    assert "a step leaves" not in shown
+
+
+def test_velocities_that_are_right_are_not_said_to_be_differences() -> None:
+    """Those of velocity Verlet are central differences, and were so where single precision was declared."""
+    scene = scenefile.load_scene("spring-uneven")
+    single = Arithmetic(name="single", state=2.0**-24, force=2.0**-24)
+    run = replace(driver.run(scene, VERLET), arithmetic=single)
+    assert checks.steps.arithmetic(Case(trajectory=run, scene=scene)).passed is False
+    assert "differences" not in said(scene, run)

@@ -16,12 +16,7 @@ from springcheck.checks.case import Case
 from springcheck.checks.check import FALSE_ALARMS
 from springcheck.checks.requires import MAP, missing
 from springcheck.checks.steps import STANDS_APART, seldom_off, step_defect
-from springcheck.checks.thermal import (
-    noise_direction,
-    read_frames,
-    reading,
-    thermostat,
-)
+from springcheck.checks.thermal import noise_direction, read_frames, reading, rows_a_step, thermostat
 from springcheck.physics.arrays import Floats
 from springcheck.text.wording import regularly
 from springcheck.thermal import THERMOSTATS, chance
@@ -75,8 +70,12 @@ def found(case: Case, shown: Callable[[int, bool], str] = lambda *_: "") -> str:
     random = run.scheme in THERMOSTATS
     if run.every == 1 and random:
         # of draws that are read by the map of another scheme the size says nothing
-        ways = [_of_no_noise, _of_bath, stages.balanced, stages.collided, _of_removal, stages.found]
-        looks = [*looks, _of_reach, _of_state, _of_size]
+        drawn = _told(reading(case)) and noise_direction(case).passed is not False
+        # of rods each is a combination of those of all coordinates
+        own = drawn and system.rods is None
+        ways = [*[_of_no_noise] * own, _of_bath, *[stages.balanced] * own]
+        ways += [stages.collided, _of_removal, stages.found]
+        looks = [*looks, _of_reach, *[_of_state] * own, *[_of_size] * drawn]
     elif run.every == 1 and not missing(case, MAP):
         ways = [_of_differences, driven.found, images.found, held.found, _of_removal, _of_factor]
         looks = [_of_numbers, *looks, _of_reach]
@@ -150,9 +149,8 @@ def _of_factor(case: Case) -> str:
     unit, ends = (np.concatenate(x, axis=1) for x in (case.allowance, case.next_states))
     made = np.concatenate([run.q[1:], run.p[1:]], axis=1)
     off = np.abs(made - ends) / unit
-    held = case.system.rods
     # of one freedom any change of a momentum is a factor
-    free = held.freedoms if held else n
+    free = case.system.rods.freedoms if case.system.rods else n
     for what, kept, of, freedoms in (
         ("momenta", slice(n), slice(n, None), free), ("positions and momenta", [], slice(None), 2 * free),
     ):  # fmt: skip
@@ -210,6 +208,8 @@ def _of_differences(case: Case) -> str:
     """Velocities that are differences of the positions, where every step is right to what those keep."""
     run, m, held = case.trajectory, case.judged.m, case.system.rods
     declared = replace(case, trajectory=replace(run, rebuilds_velocity=True))
+    if run.rebuilds_velocity or step_defect(case).passed:
+        return ""
     for more, n, kick in (("", 1, 0.0), (" over two steps", 2, 0.0), (" and half a kick", 1, 0.5)):
         q, p = (x[1 : len(x) - n + 1] for x in (run.q, run.p))
         made = m * (run.q[n:] - run.q[:-n]) / (n * run.step)
@@ -219,8 +219,7 @@ def _of_differences(case: Case) -> str:
         # and those of their own decimals: what has finer ones than the positions was not made of them
         half = run.arithmetic.recorded(m, n * run.step, False)[1]
         off = (np.abs(p - right) - half) / (DIFFERENCE_ROUNDINGS * run.arithmetic.state)
-        are = not run.rebuilds_velocity and np.all(off <= size)
-        if are and step_defect(declared).passed:
+        if np.all(off <= size) and step_defect(declared).passed:
             return (
                 f"velocities are differences of the positions{more}, which keep eps q/h of them, and each "
                 f"step is right to that: {DECLARE_DIFFERENCES}"
@@ -228,8 +227,7 @@ def _of_differences(case: Case) -> str:
     # what SHAKE adds to velocities, as a difference, rounds at each step by itself; a wrong force does not
     off = (run.p[1:] - case.next_states[1]) / m
     again = abs(np.sum(off[1:] * off[:-1])) / np.sum(off * off) * np.sqrt(len(off))
-    alone = not run.rebuilds_velocity and again <= STANDARD_ERRORS < np.sqrt(len(off))
-    if held and alone and not step_defect(case).passed and step_defect(declared).passed:
+    if held and again <= STANDARD_ERRORS < np.sqrt(len(off)) and step_defect(declared).passed:
         return (
             "what rods change of velocities rounds as differences of positions do, by eps q/h, and each step "
             f"is right to that: {DECLARE_DIFFERENCES}"
@@ -240,16 +238,14 @@ def _of_differences(case: Case) -> str:
 def _of_no_noise(case: Case) -> str:
     """Coordinates whose draws are a linear map of the state before: no noise acts, or one number does."""
     seen, run = reading(case), case.trajectory
-    if not _told(seen) or noise_direction(case).passed is False:
-        return ""
-    x = seen.draws.reshape(-1, max(thermostat(case).fresh, 1), seen.draws.shape[1])
+    x, error = (y.reshape(-1, rows_a_step(case), y.shape[1]) for y in (seen.draws, seen.error))
     known = np.column_stack([*(y[-len(x) - 1 : -1] for y in (run.q, run.p)), np.ones(len(x))])
     if len(x) < FEWEST_DRAWS + known.shape[1]:
         return ""
     flat = x.reshape(len(x), -1)
     rest = (flat - known @ np.linalg.lstsq(known, flat, rcond=None)[0]).reshape(x.shape)
     least = SAME_DRAWS * np.sqrt(np.mean(x * x))
-    still = np.flatnonzero(np.all(np.abs(rest) <= least, axis=(0, 1)))
+    still = np.flatnonzero(np.all((np.abs(rest) <= least) | (np.abs(x) <= error), axis=(0, 1)))
     of = x[:, :, still]
     if len(still) and np.all(np.ptp(of, axis=0) <= least) and np.all(np.abs(of[0]) > least):
         return "every step takes the same random numbers"
@@ -261,7 +257,7 @@ def _of_bath(case: Case) -> str:
     """Draws that two coordinates share or that come again, or a factor of momenta that is not the bath's."""
     seen = reading(case)
     if seen.rescaled is not None:
-        return _rescaled(case, seen.rescaled)
+        return "" if noise_direction(case).passed is False else _rescaled(case, seen.rescaled)
     x = seen.draws
     if not _told(seen):
         return ""
@@ -273,31 +269,32 @@ def _of_bath(case: Case) -> str:
             for words, sign in (("the same as", 1), ("the opposite of", -1)):
                 if np.all(np.abs(x[:, i] - sign * x[:, j]) <= SAME_DRAWS * size):
                     return f"the random numbers of coordinate {i} are {words} those of coordinate {j}"
-    # pairs of equal numbers, and the distance that most of them have
-    order = np.argsort(x[:, 0])
-    lags = np.abs(np.diff(order)[np.diff(x[order, 0]) <= SAME_DRAWS * size])
+    # pairs of numbers of equal size, and the distance that most of them have
+    order = np.argsort(np.abs(x[:, 0]))
+    lags = np.abs(np.diff(order)[np.diff(np.abs(x[order, 0])) <= SAME_DRAWS * size])
     lag = int(np.argmax(np.bincount(lags, minlength=2)))
-    again = np.flatnonzero(np.all(np.abs(x[lag:] - x[:-lag]) <= SAME_DRAWS * size, axis=1)) if lag else lags
-    if len(again) < FEWEST_DRAWS:
-        return ""
-    if lag == 1 and thermostat(case).fresh == 2 and not np.any(again % 2):
-        return "both random numbers of a step are one number, where each is one of its own"
-    if len(again) < NEARLY_ALL * (len(x) - lag - again[0]):
-        return f"{len(again)} of {len(x) - lag} rows of random numbers are those {lag} rows before, again"
-    return f"the random numbers from row {lag + again[0]} on are those from row {again[0]} on, again"
+    for what, sign in (("those", 1), ("the opposite of those", -1)) if lag else ():
+        again = np.flatnonzero(np.all(np.abs(x[lag:] - sign * x[:-lag]) <= SAME_DRAWS * size, axis=1))
+        if len(again) < FEWEST_DRAWS:
+            continue
+        if lag == sign == 1 and rows_a_step(case) == 2 and not np.any(again % 2):
+            return "both random numbers of a step are one number, where each is one of its own"
+        if len(again) < NEARLY_ALL * (len(x) - lag - again[0]):
+            of = f"{len(again)} of {len(x) - lag} rows of random numbers"
+            return f"{of} are {what} {lag} rows before, again"
+        return f"the random numbers from row {lag + again[0]} on are {what} from row {again[0]} on, again"
+    return ""
 
 
 def _told(seen: Reading) -> bool:
+    """Whether draws are known, and many."""
     many = seen.rescaled is None and seen.known and seen.draws.size >= FEWEST_DRAWS
     return many and bool(np.all(np.isfinite(seen.draws)))
 
 
 def _of_state(case: Case) -> str:
     """Draws that hold a part of the momentum or of the force before them."""
-    seen, run, system = reading(case), case.trajectory, case.judged.system
-    if not _told(seen) or noise_direction(case).passed is False or system.rods:
-        return ""
-    rows, x = max(thermostat(case).fresh, 1), seen.draws
+    run, system, rows, x = case.trajectory, case.judged.system, rows_a_step(case), reading(case).draws
     q, p = (np.repeat(y[-(len(x) // rows) - 1 :], rows, axis=0) for y in (run.q, run.p))
     force = system.potential_force(q, 0 * p)
     both = np.stack([p[:-rows], force[:-rows]])
@@ -305,6 +302,12 @@ def _of_state(case: Case) -> str:
     which, i = np.unravel_index(int(np.argmax(np.abs(np.nan_to_num(held)))), held.shape)
     if not abs(held[which, i]) * np.sqrt(len(x)) > STANDARD_ERRORS:
         return ""
+    # beside the draws before, which made a part of that momentum
+    three = np.corrcoef([both[which, rows:, i], x[rows:, i], x[:-rows, i]])
+    own, of_both, again = three[0, 1], three[0, 2], three[1, 2]
+    alone = (own - again * of_both) / np.sqrt((1 - again**2) * (1 - of_both**2))
+    if abs(alone) * np.sqrt(len(x)) <= STANDARD_ERRORS:
+        return f"the draws of coordinate {i} go with those a step before, with a correlation of {again:+.2g}"
     # what the force at a step's end in place of that at its start adds to draws, and what another drag does
     made = np.max(np.abs(law_of(thermostat(case), case.judged).G[:, 1]), axis=1)
     change, drag = (np.asarray(y / made, float) for y in (run.step * (force[rows:] - force[:-rows]), both[0]))
@@ -324,11 +327,9 @@ def _of_state(case: Case) -> str:
 def _of_size(case: Case) -> str:
     """Noise whose size is not the bath's, of each coordinate where these are unlike, and of none where
     coordinates share draws."""
-    seen = reading(case)
-    if not _told(seen) or noise_direction(case).passed is False:
-        return ""
-    of = seen.draws**2
-    if chance.pairs(seen.draws / np.sqrt(np.mean(of, axis=0)))[0] < FALSE_ALARMS:
+    x = reading(case).draws
+    of = x**2
+    if chance.pairs(x / np.sqrt(np.mean(of, axis=0)))[0] < FALSE_ALARMS:
         return ""
     mean, error = np.mean(of, axis=0), np.std(of, axis=0) / np.sqrt(len(of))
     asked = "as large as the temperature, the masses and the friction ask"

@@ -86,7 +86,8 @@ def found(case: Case) -> str:
 
 def _said(name: str, own: float, value: float) -> str:
     if not own or not value:
-        return f"{name}: {value:.6g}, not {own:.6g}"
+        # -0 is 0
+        return f"{name}: {value:.6g}, not {own + 0.0:.6g}"
     digits, kept = 3 - int(np.floor(np.log10(abs(value / own - 1)))), float(np.float32(own))
     single = ", as in single precision" if own != kept and abs(value / kept - 1) < NEAR_SINGLE else ""
     return f"{name}: {value:.{max(6, min(17, digits))}g}, not {own:.15g}{single}"

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -192,9 +193,7 @@ def of_steps(
         some = _weakest(case, every_row(case, name, copies), at)
         return [ends(changed(case, name, change, one), at) for one in some]
 
-    def coarse(name: str) -> list[States]:
-        return motions(name, COARSER * change)
-
+    coarse = partial(motions, change=COARSER * change)
     found, hidden = limits(ends(case, at), motions, change, lambda off: part(at, off), coarse)
     names = {"stiffness": "spring", "friction": "friction"}
     blind = [count(hidden[name], noun) for name, noun in names.items() if hidden[name]]
