@@ -118,15 +118,6 @@ def changed(changes: Floats, after: Floats, state: Floats, close: float) -> tupl
     return often, True, bool(np.all(np.abs(entries[:2]) < 5 * errors[:2]))
 
 
-def drawn(v: Floats, kicks: Floats, state: Floats, close: float, after: bool) -> Floats:
-    """Draws (k,) that took the place of momenta v (f,) after the kicks (f - 1,) of a step, or before them,
-    beside what follows of the state (f - 1, 3) before the step."""
-    made, before = (v[1:], v[:-1] - kicks) if after else (v[1:] + kicks, v[:-1])
-    struck = np.abs(made - before) > close * np.std(v)
-    known = state[struck]
-    return np.asarray(made[struck] - known @ np.linalg.lstsq(known, made[struck], rcond=None)[0])
-
-
 def _is_in_time(struck: NDArray[np.bool_]) -> bool:
     """Whether what takes place in some steps (f,) does so after every so many of them: no collisions do."""
     gaps = np.diff(np.flatnonzero(struck))
