@@ -227,14 +227,11 @@ def _of_x(*coefficients: Fraction | int) -> Callable[[Any], Any]:
     return value
 
 
-_VEC_FRICTION = Act("damp", _of_x(0, HALF, Fraction(-1, 8)))
-_VEC_KICK = Act("kick", _of_x(HALF, Fraction(-1, 8)))
-_VEC_NOISE = (
-    Act("noise", _of_x(HALF, Fraction(-1, 8)), 0),
+_VEC_PART = _of_x(HALF, Fraction(-1, 8))
+_VEC_PUSH = (
+    Act("damp", _of_x(0, HALF, Fraction(-1, 8))), Act("kick", _VEC_PART), Act("noise", _VEC_PART, 0),
     Act("noise", lambda x: -x / (4 * np.sqrt(3 * np.ones_like(x))), 1),
-)
-
-_VEC_PUSH = (_VEC_FRICTION, _VEC_KICK, *_VEC_NOISE)
+)  # fmt: skip
 _VEC = (
     (*_VEC_PUSH, Act("drift"), Act("jump", lambda x: 1 / (2 * np.sqrt(3 * np.ones_like(x))), 1)), _VEC_PUSH,
 )  # fmt: skip
