@@ -18,6 +18,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cache
+from itertools import count
 from math import inf
 from typing import Any, ClassVar, Literal, NamedTuple, TypeAlias
 
@@ -136,16 +137,13 @@ def value_of(part: Part, x: Any) -> Any:
 def splitting(letters: str) -> tuple[Act, ...]:
     """The stages of a splitting by its letters: A drift, B kick, O exchange with the bath; letters that come
     n times take an nth of the step each."""
-    times, drawn = Counter(letters), 0
-    acts = []
-    for letter in letters:
-        share = Fraction(1, times[letter])
-        if letter == "O":
-            acts.append(Act("exchange", decay(times[letter]), drawn))
-            drawn += 1
-        else:
-            acts.append(Act("drift" if letter == "A" else "kick", share))
-    return tuple(acts)
+    times, draws = Counter(letters), count()
+    return tuple(
+        Act("exchange", decay(times[letter]), next(draws))
+        if letter == "O"
+        else Act("drift" if letter == "A" else "kick", Fraction(1, times[letter]))
+        for letter in letters
+    )
 
 
 _SAID = {
