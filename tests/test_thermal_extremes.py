@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from springcheck import checks, driver, engines
-from springcheck.checks.seeds import Seeded, noise_size, seed_kept
+from springcheck.checks.seeds import Seeded, noise_map, noise_matrix, noise_size, seed_kept
 from springcheck.errors import MethodError
 from springcheck.identify.thermal import of_bath
 from springcheck.physics.arrays import WIDE
@@ -222,3 +222,13 @@ def test_a_loop_by_published_coefficients_passes_at_small_friction(number: str, 
     assert checks.status(checks.judge(at, published(number, at, half=half))) == 0
     wrong = published(number, at.derived(terms=at.system.scaled(1 + 1e-9).terms), half=half)
     assert checks.status(checks.judge(at, replace(wrong, scene=at))) == 1
+
+
+def test_a_momentum_that_is_no_number_passes_no_experiment_with_a_seed() -> None:
+    def play(*where: Any, seed: Any) -> Trajectory:
+        run = driver.run(*where, seed=seed)
+        return replace(run, p=np.where(run.t[:, None] > 0, np.nan, run.p))
+
+    for one in (noise_map, noise_size, noise_matrix):
+        subject = replace(seeded(scene(), "own:baoab", 1), play=play)
+        assert one(subject).passed is False

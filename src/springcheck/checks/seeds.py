@@ -14,7 +14,6 @@ from springcheck.checks.check import Chance, Finding, check
 from springcheck.checks.thermal import HIDDEN, NO_DRAWS, reading
 from springcheck.errors import MethodError
 from springcheck.physics.arrays import Extended, Floats
-from springcheck.physics.bath import Bath
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory
 from springcheck.thermal import THERMOSTATS, Stepper, Thermostat, chance
@@ -68,8 +67,8 @@ class Seeded:
         """The scheme's own step on a scene."""
         return Stepper.of(self.scheme, scene, absolute=absolute)
 
-    def allowed(self, run: Trajectory, row: int = 0, factor: Any = True) -> tuple[Extended, Extended]:
-        """Bound on the rounding of a step from a frame; `factor` is a thermostat's factor on all momenta."""
+    def allowed(self, run: Trajectory, row: int = 0, factor: Any = True) -> Extended:
+        """Bound on the rounding of a step from a frame (2, n); `factor` is a thermostat's on all momenta."""
         start = run.q[row].astype(np.longdouble), run.p[row].astype(np.longdouble)
         draws = [np.full(self.scene.n, LARGEST_DRAW)] * self.scheme.draws
         met: list[Met] = []
@@ -83,12 +82,16 @@ class Seeded:
         if self.scheme.rescales_after:
             # the kinetic energy that determines the factor has the roundings of all steps before it
             of_p = of_p + np.sqrt(self.scene.m * np.sum(of_p**2 / self.scene.m))
-        many = roundings_of(self.scheme, self.scene)
-        return many * of_q, many * of_p
+        return roundings_of(self.scheme, self.scene) * np.stack([of_q, of_p])
 
 
-def _off(found: tuple[Any, Any], expected: tuple[Any, Any], allowed: tuple[Any, Any]) -> float:
-    return float(max(np.max(np.abs(f - e) / a) for f, e, a in zip(found, expected, allowed, strict=True)))
+WITHIN = 1.0, "of what rounding allows"
+"""Bound and unit of a difference over what is allowed."""
+
+
+def _off(found: Any, expected: Any, allowed: Extended) -> Any:
+    """The largest difference of states (2, n) over what is allowed; NaN, which max() drops, of one of NaN."""
+    return np.max(np.abs(np.subtract(found, expected)) / allowed)
 
 
 @check("map", family="noise")
@@ -102,9 +105,9 @@ def noise_map(subject: Seeded) -> Finding | str:
     if not scene.system.is_linear or scene.n > FEW:
         return f"a linear scene of {FEW} particles at most is needed"
     size_p = np.sqrt(scene.m * scene.thermal)
-    pushes = np.concatenate([np.diag(abs(scene.step) * size_p / scene.m), np.diag(size_p)])
+    pushes = np.diag(np.concatenate([abs(scene.step) * size_p / scene.m, size_p])).reshape(-1, 2, scene.n)
     base = subject.run(scene, 2)
-    none, worst = np.zeros(scene.n, np.longdouble), 0.0
+    none, off = np.zeros(scene.n, np.longdouble), list[Any]()
 
     def without_rest(terms: Any) -> Any:
         force = scene.system.force_of(terms)
@@ -112,17 +115,15 @@ def noise_map(subject: Seeded) -> Finding | str:
         return lambda q, p: force(q, p) - rest
 
     force = forces(scheme, scene.system, without_rest)
-    for i, push in enumerate(pushes):
-        dq, dp = (push, 0 * push) if i < scene.n else (0 * push, push)
+    for dq, dp in pushes:
         other = subject.run(replace(scene, q=scene.q + dq, p=scene.p + dp), 2)
         # the second step: a draw that acts in two steps is then the same in both
         d = [(a - b)[1:].astype(np.longdouble) for a, b in ((other.q, base.q), (other.p, base.p))]
         draws = [none] * scheme.draws
         ideal = subject.stepper(scene)(d[0][0], d[1][0], force, draws)
-        both = [subject.allowed(run, 1) for run in (base, other)]
-        allowed = both[0][0] + both[1][0], both[0][1] + both[1][1]
-        worst = max(worst, _off((d[0][1], d[1][1]), ideal, allowed))
-    return Finding(worst, 1.0, "of what rounding allows", f"{2 * scene.n} pushes, roundings of both runs")
+        allowed = subject.allowed(base, 1) + subject.allowed(other, 1)
+        off.append(_off((d[0][1], d[1][1]), ideal, allowed))
+    return Finding(np.max(off), *WITHIN, f"{2 * scene.n} pushes, roundings of both runs")
 
 
 @check("size", family="noise")
@@ -145,22 +146,21 @@ def noise_size(subject: Seeded) -> Finding | str:
     least = scheme.chain.least if scheme.chain else 0.0
     if least / 4 <= np.sum(one.p[-1] ** 2 / scene.m) / 2 < least:
         return "its chain rests at this temperature, and not at four times as much"
-    hot = replace(scene, bath=Bath(temperature=4 * scene.bath.temperature, friction=scene.bath.friction))
-    hot = replace(hot, q=2 * scene.q, p=2 * scene.p)
+    warmer = replace(scene.bath, temperature=4 * scene.bath.temperature)
+    hot = replace(scene, q=2 * scene.q, p=2 * scene.p, bath=warmer)
     heavy = replace(scene.system.scaled(4.0), m=4 * scene.m, q=scene.q / 2, p=2 * scene.p)
-    worst = 0.0
-    allowed = [4 * steps * x for x in subject.allowed(one)]
+    off, allowed = list[Any](), 4 * steps * subject.allowed(one)
     for other, of_q, of_p in ((subject.run(hot, steps), 2.0, 2.0), (subject.run(heavy, steps), 0.5, 2.0)):
         expected = of_q * one.q[-1], of_p * one.p[-1]
-        worst = max(worst, _off((other.q[-1], other.p[-1]), expected, (allowed[0], allowed[1])))
+        off.append(_off((other.q[-1], other.p[-1]), expected, allowed))
     if scheme.draws and not np.any(one.p[-1]):
         if collides:
             return f"no collision in {COLLIDED} steps"
-        return Finding(np.inf, 1.0, "of what rounding allows", "there is no noise")
+        return Finding(np.inf, *WITHIN, "there is no noise")
     # where a step takes two draws, its state determines only their sum, weighted by friction
     if not collides and not scheme.rescales and scheme.fresh == 1:
-        worst = max(worst, _redrawn(subject, one))
-    return Finding(worst, 1.0, "of what rounding allows", "a factor of 2, and the same draws, of both runs")
+        off.append(_redrawn(subject, one))
+    return Finding(np.max(off), *WITHIN, "a factor of 2, and the same draws, of both runs")
 
 
 def _redrawn(subject: Seeded, one: Trajectory) -> float:
@@ -214,7 +214,7 @@ def noise_matrix(subject: Seeded) -> Finding | str:
     if not scheme.draws or scheme.uniform or scheme.collides:
         return NO_NORMAL_NUMBERS
     runs = [subject.run(scene, 1, Script(unit)) for unit in np.eye(scheme.draws)]
-    worst, pull = 0.0, forces(scheme, scene.system)
+    off, pull = list[Any](), forces(scheme, scene.system)
     assert scene.bath is not None
     start = scene.q.astype(np.longdouble), scene.p.astype(np.longdouble)
     none = subject.stepper(scene)(*start, pull, [np.zeros(scene.n, np.longdouble)] * scheme.draws)
@@ -228,12 +228,9 @@ def noise_matrix(subject: Seeded) -> Finding | str:
             factor = max(1.0, float(np.max(np.abs(both[0])) / np.max(np.abs(both[1]))))
         # an amplitude formed from 1 - c, with c rounded, loses digits by cancellation
         lost = run.arithmetic.unit / min(1.0, scene.bath.friction * scene.step)
-        allowed = [
-            x + lost * np.abs(y - z)
-            for x, y, z in zip(subject.allowed(run, factor=factor), ideal, none, strict=True)
-        ]
-        worst = max(worst, _off((run.q[1], run.p[1]), ideal, (allowed[0], allowed[1])))
-    return Finding(worst, 1.0, "of what rounding allows", f"{scheme.draws} unit draws")
+        allowed = subject.allowed(run, factor=factor) + lost * np.abs(np.subtract(ideal, none))
+        off.append(_off((run.q[1], run.p[1]), ideal, allowed))
+    return Finding(np.max(off), *WITHIN, f"{scheme.draws} unit draws")
 
 
 @check("seed", family="noise")

@@ -15,9 +15,10 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cache
+from itertools import count
 from math import inf
 from typing import Any, ClassVar, Literal, NamedTuple, TypeAlias
 
@@ -136,16 +137,13 @@ def value_of(part: Part, x: Any) -> Any:
 def splitting(letters: str) -> tuple[Act, ...]:
     """The stages of a splitting by its letters: A drift, B kick, O exchange with the bath; letters that come
     n times take an nth of the step each."""
-    times, drawn = Counter(letters), 0
-    acts = []
-    for letter in letters:
-        share = Fraction(1, times[letter])
-        if letter == "O":
-            acts.append(Act("exchange", decay(times[letter]), drawn))
-            drawn += 1
-        else:
-            acts.append(Act("drift" if letter == "A" else "kick", share))
-    return tuple(acts)
+    times, draws = Counter(letters), count()
+    return tuple(
+        Act("exchange", decay(times[letter]), next(draws))
+        if letter == "O"
+        else Act("drift" if letter == "A" else "kick", Fraction(1, times[letter]))
+        for letter in letters
+    )
 
 
 _SAID = {
@@ -187,49 +185,32 @@ def by_groups(substeps: int) -> Thermostat:
     )  # fmt: skip
 
 
-_GJ_SOURCE = (
-    "Groenbech-Jensen 2020; VII: Finkelstein et al., J. Chem. Phys. 155 (2021) 184104; "
-    "VIII: Groenbech-Jensen, J. Stat. Phys. 191 (2024) 137"
-)
-
-
-def _cancelled(number: str) -> int:
-    """Powers of 1/x that 1 - c2 loses: one more where c2 is (sqrt(1 + 4x) - 1)/2x, a difference itself."""
-    return 1 + (number == "iv")
-
-
-def _gj(number: str) -> Thermostat:
-    """BAOAB with c2 in the place of exp(-x), kicks and drifts longer by q."""
+def _gj(number: str) -> tuple[Thermostat, Thermostat]:
+    """BAOAB with c2 in the place of exp(-x), kicks and drifts longer by q; and the same motion with the
+    velocity of the half step, whose noise acts again in the next one."""
     c2 = GJ[number]
-    half = _times(HALF, c2.stretch)
-    acts = (Act("kick", half), Act("drift", half), Act("exchange", c2), Act("drift", half), Act("kick", half))
-    return Thermostat(
-        name=f"gj-{number}", title=f"GJ-{number.upper()}, on-site velocity", acts=acts,
-        most=MOST_FRICTION.get(number, inf), cancels=_cancelled(number), source=_GJ_SOURCE,
-    )  # fmt: skip
 
-
-def _gj_half(number: str) -> Thermostat:
-    """The same motion with the velocity of the half step, whose noise acts again in the next one."""
-    c2 = GJ[number]
+    def half(x: Any) -> Any:
+        return c2.stretch(x) / 2
 
     def root(x: Any) -> Any:
         return np.sqrt(c2.lost(x) / x)
 
-    noise = _times(HALF, root)
-    acts = (
-        Act("damp", c2.lost), Act("noise", noise, 0), Act("kick", root), Act("noise", noise, 1),
-        Act("drift", root),
+    kick, drift = Act("kick", half), Act("drift", half)
+    on_site = Thermostat(
+        name=f"gj-{number}", title=f"GJ-{number.upper()}, on-site velocity",
+        acts=(kick, drift, Act("exchange", c2), drift, kick), most=MOST_FRICTION.get(number, inf),
+        # 1 - c2 loses one power of 1/x, one more where c2 is (sqrt(1 + 4x) - 1)/2x, a difference itself
+        cancels=1 + (number == "iv"),
+        source="Groenbech-Jensen 2020; VII: Finkelstein et al., J. Chem. Phys. 155 (2021) 184104; "
+        "VIII: Groenbech-Jensen, J. Stat. Phys. 191 (2024) 137",
     )  # fmt: skip
-    return Thermostat(
-        name=f"gj-{number}-half", title=f"GJ-{number.upper()}, half-step velocity", acts=acts, draws=2,
-        carried=1, synchronised=False, most=MOST_FRICTION.get(number, inf), cancels=_cancelled(number),
-        source=_GJ_SOURCE,
+    first, last = (Act("noise", lambda x: root(x) / 2, i) for i in range(2))
+    acts = Act("damp", c2.lost), first, Act("kick", root), last, Act("drift", root)
+    return on_site, replace(
+        on_site, name=f"gj-{number}-half", title=f"GJ-{number.upper()}, half-step velocity", acts=acts,
+        draws=2, carried=1, synchronised=False,
     )  # fmt: skip
-
-
-def _times(part: Fraction, function: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    return lambda x: function(x) * value_of(part, x)
 
 
 def _of_x(*coefficients: Fraction | int) -> Callable[[Any], Any]:
@@ -244,14 +225,11 @@ def _of_x(*coefficients: Fraction | int) -> Callable[[Any], Any]:
     return value
 
 
-_VEC_FRICTION = Act("damp", _of_x(0, HALF, Fraction(-1, 8)))
-_VEC_KICK = Act("kick", _of_x(HALF, Fraction(-1, 8)))
-_VEC_NOISE = (
-    Act("noise", _of_x(HALF, Fraction(-1, 8)), 0),
+_VEC_PART = _of_x(HALF, Fraction(-1, 8))
+_VEC_PUSH = (
+    Act("damp", _of_x(0, HALF, Fraction(-1, 8))), Act("kick", _VEC_PART), Act("noise", _VEC_PART, 0),
     Act("noise", lambda x: -x / (4 * np.sqrt(3 * np.ones_like(x))), 1),
-)
-
-_VEC_PUSH = (_VEC_FRICTION, _VEC_KICK, *_VEC_NOISE)
+)  # fmt: skip
 _VEC = (
     (*_VEC_PUSH, Act("drift"), Act("jump", lambda x: 1 / (2 * np.sqrt(3 * np.ones_like(x))), 1)), _VEC_PUSH,
 )  # fmt: skip
@@ -265,6 +243,9 @@ _LAMMPS = (
 """The stages up to the one that restores the rods' lengths, and those after it."""
 
 _VERLET = (Act("kick", HALF), Act("drift"), Act("kick", HALF))
+
+ENERGY_LEFT = Decay(lambda x: np.exp(-2 * x), lambda x: -np.expm1(-2 * x))
+"""What a step of Bussi's thermostat leaves of a kinetic energy, which relaxes at twice a momentum's rate."""
 
 _OTHERS = (
     *map(by_groups, (2, 3, 4)),
@@ -314,12 +295,6 @@ _OTHERS = (
         acts=(Act("collide"), Act("kick"), Act("drift")), synchronised=False,
         source="as OpenMM's VerletIntegrator with AndersenThermostat runs it",
     ),
-)  # fmt: skip
-
-ENERGY_LEFT = Decay(lambda x: np.exp(-2 * x), lambda x: -np.expm1(-2 * x))
-"""What a step of Bussi's thermostat leaves of a kinetic energy, which relaxes at twice a momentum's rate."""
-
-_RESCALED = (
     Thermostat(
         name="bussi", title="Bussi: one factor for all momenta, then velocity Verlet",
         acts=(Act("rescale", ENERGY_LEFT), *_VERLET), source="Bussi & Parrinello 2008",
@@ -332,9 +307,6 @@ _RESCALED = (
         name="bussi-after", title="velocity Verlet, then Bussi without the sign of the factor",
         acts=(*_VERLET, Act("scale", ENERGY_LEFT)), source="Bussi et al. 2007; as LAMMPS runs it",
     ),
-)  # fmt: skip
-
-_CHAINS = (
     Thermostat(
         name="nose-hoover", title="Nose-Hoover chain of 3, half of it before and after velocity Verlet",
         acts=(Act("chain", HALF), *_VERLET, Act("chain", HALF)), draws=0, chain=Chain(),
@@ -356,9 +328,10 @@ _CHAINS = (
 NO_NORMAL_NUMBERS = "it takes no generator of normal numbers"
 """Why a method cannot be given a scripted generator."""
 
+_ON_SITE, _HALF_STEP = zip(*map(_gj, GJ), strict=True)
+
 THERMOSTATS: dict[str, Thermostat] = {
-    one.name: one
-    for one in (*map(_by_letters, _SAID), *map(_gj, GJ), *map(_gj_half, GJ), *_OTHERS, *_RESCALED, *_CHAINS)
+    one.name: one for one in (*map(_by_letters, _SAID), *_ON_SITE, *_HALF_STEP, *_OTHERS)
 }
 
 

@@ -179,22 +179,18 @@ def shape(x: Floats) -> Statistic:
     The means of the Legendre polynomials of degrees 3 and 4 of the ranks 2 Phi(x) - 1 (Neyman's smooth test),
     of draws normalised to variance 1, in each piece by itself: bounded, so that no single draw decides.
     """
-    size = math.sqrt(max(float(np.mean(x * x)), 1e-300))
+    from scipy.special import erf
+
+    square = max(float(np.mean(x * x)), 1e-300)
+    ranks, size = erf(x.ravel() / math.sqrt(2 * square)), math.sqrt(square)
 
     def law(n: int, *sums: float) -> tuple[float, str]:
         chances = [2 * _saddlepoint(x / n, n, degree) for x, degree in zip(sums, (3, 4), strict=False)]
         return min(1.0, *chances), f"third moment {sums[2] / n:+.4f}, fourth {sums[3] / n:.4f}, of {n} draws"
 
+    sums = [float(np.sum(Legendre.basis(degree)(ranks))) for degree in (3, 4)]
     moments = [float(np.sum((x / size) ** i)) for i in (3, 4)]
-    return Statistic(draws=x.size, sums=(*(_of_ranks(x, degree) for degree in (3, 4)), *moments), law=law)
-
-
-def _of_ranks(x: Floats, degree: int) -> float:
-    """The sum of a Legendre polynomial of the ranks of draws x (...), normalised to variance 1."""
-    from scipy.special import erf
-
-    u = erf(x.ravel() / math.sqrt(2 * max(float(np.mean(x * x)), 1e-300)))
-    return float(np.sum(Legendre.basis(degree)(u)))
+    return Statistic(draws=x.size, sums=(*sums, *moments), law=law)
 
 
 @cache

@@ -68,18 +68,20 @@ def between_collisions(q: Floats, v: Floats, h: float) -> list[Candidate] | None
     apart, least = abs(A[0, 0] - A[1, 1]), -A[0, 1] * A[1, 0] / MOST_A_FRAME
     alike = {apart <= room} if apart > room or room < least else {True, False}
     names = [name for name, one in THERMOSTATS.items() if one.collides and one.synchronised in alike]
+    error = float(np.sqrt((1 - share) / (share * n)) / h)
+    friction = {"friction": float(-np.log(share) / h), "friction_error": error}
     if -A[0, 1] * A[1, 0] < room < A[0, 1]:
         # without a spring all are alike, in any number of steps
         heat, lasting = float(np.var(v)), (1 + share) / (1 - share)
         soft = Candidate(
-            scheme="", omega=0.0, omega_error=float(np.sqrt(room) / h), **_friction(share, n, h),
+            scheme="", omega=0.0, omega_error=float(np.sqrt(room) / h), **friction,
             thermal=heat, thermal_error=heat * float(np.sqrt(2 * lasting / n)),
             strides=tuple(range(1, MOST_A_FRAME + 1)),
         )  # fmt: skip
         return [replace(soft, scheme=name) for name in names]
     close = room * (1 / abs(A[0, 1]) + 1 / abs(A[1, 0]))
     A = A * sizes[:, None] / sizes
-    return [y for name in names for y in _of_scheme(name, A, h, share, n, float(np.var(v)), close)]
+    return [y for name in names for y in _of_scheme(name, A, h, n, float(np.var(v)), close, friction)]
 
 
 def collide(changes: Floats, known: Floats) -> tuple[bool, bool]:
@@ -118,15 +120,6 @@ def changed(changes: Floats, after: Floats, state: Floats, close: float) -> tupl
     return often, True, bool(np.all(np.abs(entries[:2]) < 5 * errors[:2]))
 
 
-def drawn(v: Floats, kicks: Floats, state: Floats, close: float, after: bool) -> Floats:
-    """Draws (k,) that took the place of momenta v (f,) after the kicks (f - 1,) of a step, or before them,
-    beside what follows of the state (f - 1, 3) before the step."""
-    made, before = (v[1:], v[:-1] - kicks) if after else (v[1:] + kicks, v[:-1])
-    struck = np.abs(made - before) > close * np.std(v)
-    known = state[struck]
-    return np.asarray(made[struck] - known @ np.linalg.lstsq(known, made[struck], rcond=None)[0])
-
-
 def _is_in_time(struck: NDArray[np.bool_]) -> bool:
     """Whether what takes place in some steps (f,) does so after every so many of them: no collisions do."""
     gaps = np.diff(np.flatnonzero(struck))
@@ -147,11 +140,11 @@ def is_a_factor(before: Floats, after: Floats) -> bool:
 
 
 def _of_scheme(
-    name: str, A: Floats, h: float, share: float, n: int, size: float, close: float
+    name: str, A: Floats, h: float, n: int, size: float, close: float, friction: dict[str, float]
 ) -> list[Candidate]:
-    """Parameters at which a scheme has the map A between frames, a `share` of them without a collision, with
-    every possible number of steps; A is known to the relative error `close`."""
-    found: list[Candidate] = []
+    """Parameters at which a scheme has the map A between n frames without a collision, with every possible
+    number of steps; A is known to the relative error `close`."""
+    fits: list[tuple[int, float]] = []
     # the sine of a small angle is known better than its cosine
     sine = np.sqrt(max(-A[0, 1] * A[1, 0] - (A[0, 0] - A[1, 1]) ** 2 / 4, 0.0))
     turned, frequency = float(np.arctan2(sine, np.trace(A) / 2)), float(np.sqrt(-A[1, 0] / A[0, 1]))
@@ -161,24 +154,20 @@ def _of_scheme(
         # of Verlet A01 = h sin(n y) / sin y and A10 = -sin(n y) sin y / h; of leapfrog 2 sin(y/2) for sin y
         of_step = np.sin(angles) if THERMOSTATS[name].synchronised else 2 * np.sin(angles / 2)
         near = np.abs(of_step - frequency * h / steps) < close * (frequency * h + sine) / steps
-        fits = near & (np.sin(steps * angles) * A[0, 1] > 0)
-        for angle in angles[fits]:
-            w, rate = 2 * np.sin(angle / 2) * steps / h, _friction(share, n, h)
-            law = Law(
-                scheme=THERMOSTATS[name], h=h / steps, m=np.ones(1), k=np.array([w * w]),
-                rate=rate["friction"], thermal=1.0,
-            )  # fmt: skip
-            heat = size / float(law.covariance[0, 1, 1])
-            found.append(
-                Candidate(
-                    scheme=name, omega=float(w), omega_error=0.0, **rate, thermal=heat, strides=(steps,),
-                    thermal_error=heat * float(law.error_of_variances(n, steps)[0, 1]),
-                )
-            )  # fmt: skip
-    return [replace(found[0], strides=tuple(sorted({s for y in found for s in y.strides})))] if found else []
-
-
-def _friction(share: float, n: int, h: float) -> dict[str, float]:
-    """The friction of n frames h apart of which a share has no collision, and its standard error."""
-    error = np.sqrt((1 - share) / (share * n)) / h
-    return {"friction": float(-np.log(share) / h), "friction_error": float(error)}
+        fits += [(steps, x) for x in angles[near & (np.sin(steps * angles) * A[0, 1] > 0)]]
+    if not fits:
+        return []
+    steps, angle = fits[0]
+    w = float(2 * np.sin(angle / 2) * steps / h)
+    law = Law(
+        scheme=THERMOSTATS[name], h=h / steps, m=np.ones(1), k=np.array([w * w]),
+        rate=friction["friction"], thermal=1.0,
+    )  # fmt: skip
+    heat = size / float(law.covariance[0, 1, 1])
+    return [
+        Candidate(
+            scheme=name, omega=w, omega_error=0.0, **friction, thermal=heat,
+            thermal_error=heat * float(law.error_of_variances(n, steps)[0, 1]),
+            strides=tuple(sorted({steps for steps, _ in fits})),
+        )
+    ]  # fmt: skip

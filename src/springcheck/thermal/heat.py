@@ -139,24 +139,19 @@ class Heat:
 
     def line(self, method: str) -> Heated:
         """What was found."""
-        nan = np.full(self._scene.n, np.nan)
-        thermal, bound = self._scene.thermal, self._bound
+        n, bound, rods = self._scene.n, self._bound, self._scene.system.rods
+        law, errors, freedoms = np.full((2, n), np.nan), np.full((2, n), np.nan), n
         with np.errstate(all="ignore"):
-            q, p = self._sums / (self._frames * thermal) if self._frames else (nan, nan)
-            if self._law is None:
-                law, errors = (nan, nan), np.stack([nan, nan])
-            else:
-                law = self._law.configurational, self._law.kinetic
-                several = self._law.error_of_variances(max(self._frames, 2), self._every)
-                errors = several.T * np.stack(law)
+            q, p = self._sums / (self._frames * self._scene.thermal)
+            if self._law is not None:
+                law = np.stack([self._law.configurational, self._law.kinetic])
+                errors = law * self._law.error_of_variances(max(self._frames, 2), self._every).T
         error = np.sqrt(np.sum(errors**2, axis=1)) / errors.shape[1]
-        if bound < len(nan):
+        if bound < n:
             # of motion that nothing holds the law has no stationary state
-            law, error[1] = (law[0], nan), np.nan
-        freedoms = len(nan)
-        if rods := self._scene.system.rods:
-            law_of_rods, error[1] = self._of_rods(rods)
-            law, freedoms = (nan, np.full(len(nan), law_of_rods)), rods.freedoms
+            law[1] = error[1] = np.nan
+        if rods:
+            (law[1], error[1]), freedoms = self._of_rods(rods), rods.freedoms
         return Heated(
             method=method, scheme=self._scheme, configurational=float(np.sum(q)) / bound if bound else np.nan,
             configurational_error=float(error[0]), configurational_law=float(np.mean(law[0])),

@@ -73,13 +73,13 @@ class Candidate:
 def likely(
     names: tuple[str, ...], q: Floats, v: Floats, h: float, *, turn: float | None = None
 ) -> list[Candidate]:
-    """Schemes by the likelihood of their innovations in frames of every step; `turn` is (h w)**2 if known.
+    """Schemes of noise of rank one by the likelihood of their innovations in frames of every step; `turn` is
+    (h w)**2 if known.
 
     Empty where every one falls short of a free map and a free noise by more than chance allows.
     """
     found = [y for name in names for y in _of_scheme(THERMOSTATS[name], q, v, h, (1,), turn)]
-    found += _of_more_substeps(found, q, v, h)
-    return _compared(found, q, v, rank=2 if THERMOSTATS[names[0]].full_rank else 1)
+    return _compared(found, q, v, rank=1)
 
 
 def likely_apart(q: Floats, v: Floats, h: float, *, white: bool = True) -> list[Candidate]:

@@ -17,7 +17,7 @@ import numpy as np
 from springcheck.physics.arrays import Floats
 from springcheck.thermal import residuals
 from springcheck.thermal.catalogue import random_scheme
-from springcheck.thermal.collisions import between_collisions, changed, drawn, is_a_factor
+from springcheck.thermal.collisions import between_collisions, changed, is_a_factor
 from springcheck.thermal.decays import GJ
 from springcheck.thermal.likelihood import ODDS, Candidate, likely, likely_apart
 from springcheck.thermal.residuals import is_white, regressed, unlike_normal
@@ -171,13 +171,21 @@ def _of_one(
     def near(value: float, wanted: float) -> bool:
         return bool(abs(value - wanted) <= close * max(abs(wanted), abs(d), h))
 
-    after = bool(abs(b) <= close * h and near(d, -h))
+    # where the noise acts on the momentum: after both half kicks, or ahead of them
+    after, ahead = bool(abs(b) <= close * h and near(d, -h)), bool(abs(d) <= close * h and near(b, h * c))
+
+    def acted(w: float) -> tuple[Floats, Floats]:
+        """Momenta before and after what acts there, (f - 1,) each, beside kicks of frequency w."""
+        return (v[:-1] - w**2 * kicks, v[1:]) if after else (v[:-1], v[1:] + w**2 * kicks)
+
     state = np.stack([(q[:-1] - q[0]) / np.std(q), v[:-1] / np.std(v), np.ones(len(v) - 1)], axis=1)
-    if (after or (abs(d) <= close * h and near(b, h * c))) and (counted := between_collisions(q, v, h)):
+    if (after or ahead) and (counted := between_collisions(q, v, h)):
         # of several steps no combination is free of noise, and of a collision that ends a step another one
         ends = (y for y in counted if after == (random_scheme(y.scheme).acts[-1].kind == "collide"))
         each = tuple(replace(y, strides=(1,)) for y in ends)
-        shape = unlike_normal(drawn(v, each[0].omega ** 2 * kicks, state, close, after)) if each else ""
+        before, made = acted(each[0].omega if each else 0.0)
+        struck = np.abs(made - before) > close * np.std(v)
+        shape = unlike_normal(regressed(state[struck], made[struck])[1]) if each else ""
         return Thermal(candidates=each, free=tuple(map(float, free)), misfit=misfit, draws=shape)
     found, added, sparse = list[Candidate](), False, bool(np.median(np.abs(left)) < SPARSE)
     if near(b, d) and near(c, -1):
@@ -204,34 +212,27 @@ def _of_one(
             often, _, anew = changed(np.diff(v) / np.std(v), v[1:], state, close)
             found = [*found * (not anew or (often and even)), *[Candidate(scheme="bussi-after")] * often]
             found, left = ([*found, Candidate(scheme="andersen-after")], left[:0]) if anew else (found, left)
-    elif abs(c) > 1 + close and abs(d) <= close * h and near(b, h * c):
-        # what a collision has left of the momentum, the rest of the step takes on without noise
-        known: dict[str, Any] = {"omega": float(np.sqrt(2 * (1 + 1 / c)) / h), "omega_error": 0.0}
+    elif (ahead and abs(c) > 1 + close) or (after and -1 < c < 1):
+        w = float(np.sqrt(2 * (1 + (c if after else 1 / c))) / h)
+        before, made = acted(w)
         # some steps have no collision, unless these are many; a factor acts in every step, if little
-        made = v[1:] + known["omega"] ** 2 * kicks
-        often, collides, _ = changed((made - v[:-1]) / np.std(v), made, state, close)
+        often, collides, anew = changed((made - before) / np.std(v), made, state, close)
         often = often or close > COARSE
-        # OAB has the null vector of twice its spring: of a collision nothing of a kick is left
-        slopes, _, errors = regressed(state, made / np.std(v))
-        collides = collides and bool(abs(slopes[0]) < 5 * errors[0] + close * np.std(q) / h / np.std(v))
-        names: tuple[str, ...] = ("andersen", "andersen-after-kick") if collides else ()
-        names += ("bussi", "bussi-unsigned") if often and (mixed or is_a_factor(v[:-1], made)) else ()
-        if not names:
-            return None
-        found = [Candidate(scheme=name, **known) for name in names]
-        left = np.empty(0)
-    elif after and -1 < c < 1:
-        # noise that is no factor of the momenta, and no friction of theirs, is added to them
-        known = {"omega": float(np.sqrt(2 * (1 + c)) / h), "omega_error": 0.0}
-        made = v[:-1] - known["omega"] ** 2 * kicks
-        often, collides, anew = changed((v[1:] - made) / np.std(v), v[1:], state, close)
-        names = ("andersen-after",) if collides and (mixed or anew) else ()
-        added = not names and even and _decay(q, v)[0] >= 1 - UNIT_ROOT / len(q) and is_white(left)
-        if not added and (often or close > COARSE) and is_a_factor(made, v[1:]):
-            names += ("bussi-after",)
+        if after:
+            collides = collides and (mixed or anew)
+            # noise that is no factor of the momenta, and no friction of theirs, is added to them
+            added = not collides and even and _decay(q, v)[0] >= 1 - UNIT_ROOT / len(q) and is_white(left)
+            names = ("andersen-after",) * collides
+            names += ("bussi-after",) if often and not added and is_a_factor(before, made) else ()
+        else:
+            # OAB has the null vector of twice its spring: of a collision nothing of a kick is left
+            slopes, _, errors = regressed(state, made / np.std(v))
+            collides = collides and bool(abs(slopes[0]) < 5 * errors[0] + close * np.std(q) / h / np.std(v))
+            names = ("andersen", "andersen-after-kick") if collides else ()
+            names += ("bussi", "bussi-unsigned") if often and (mixed or is_a_factor(before, made)) else ()
         if not names and not added:
             return None
-        found = [Candidate(scheme=name, **known) for name in names]
+        found = [Candidate(scheme=name, omega=w, omega_error=0.0) for name in names]
         left = left if added else np.empty(0)
     elif near(c, -1) and abs(d) <= close * h:
         roots = {n: (lambda x, c2=c2: np.sqrt((1 - c2(x)) / x)) for n, c2 in GJ.items()}

@@ -75,22 +75,19 @@ def played(
     rng = source if hasattr(source, "standard_normal") else np.random.default_rng(source)
     right: list[Floats] = []
 
-    def some(number: int) -> list[Any]:
-        found = []
-        for _ in range(number):
-            uniform = np.sqrt(12) * (rng.random(scene.n) - 0.5) if claims.uniform else None
-            right.append(rng.standard_normal(scene.n) if uniform is None else uniform)
-            found.append(draws(right))
-        return found
+    def drawn() -> Any:
+        uniform = claims.uniform
+        right.append(np.sqrt(12) * (rng.random(scene.n) - 0.5) if uniform else rng.standard_normal(scene.n))
+        return draws(right)
 
     def stiffer(terms: Sequence[Term]) -> Force:
         right = scene.system.force_of(terms)
         return lambda q, p: np.asarray(right(q, p) * k)
 
-    force, carried = forces(of, scene.system, stiffer), some(of.carried)
+    force, carried = forces(of, scene.system, stiffer), [drawn() for _ in range(of.carried)]
 
     def one(i: int, q: Floats, p: Floats) -> State:
-        taken = [*carried, *some(of.fresh)]
+        taken = [*carried, *(drawn() for _ in range(of.fresh))]
         hit = rng.random(scene.n) < collision * stepper.collision if of.collides else None
         carried[:] = taken[len(taken) - of.carried :]
         return stepper(q, p, force, taken, hit)  # type: ignore[return-value]

@@ -73,9 +73,9 @@ def measured(label: Label) -> Sampled:
     """Measure one thermostat."""
     method = engines.method(label)
     linear = not THERMOSTATS[method.scheme].rescales
+    laws = [law_at(method.scheme, turn, RATE) if linear else None for turn in SAMPLED_TURNS]
     rows, run, q = [], None, np.empty(0)
-    for i, turn in enumerate(SAMPLED_TURNS):
-        law = law_at(method.scheme, turn, RATE) if linear else None
+    for i, (turn, law) in enumerate(zip(SAMPLED_TURNS, laws, strict=True)):
         exact = (nan, nan) if law is None else (float(law.configurational[0]), float(law.kinetic[0]))
         if linear and not max(exact) < HOTTEST_LAW:
             rows.append((nan,) * 6)
@@ -91,7 +91,7 @@ def measured(label: Label) -> Sampled:
             run, q = made, STIFFNESS * made.q[wait:] ** 2 / KT
     if run is None:
         raise MethodError(f"{label}: no step is stable from h omega {SAMPLED_TURNS[0]} on")
-    law = law_at(method.scheme, SAMPLED_TURNS[1], RATE) if linear else None
+    law = laws[1]
     columns = np.array(rows).T
     steps = max(run.outcome.step, 1)
     return Sampled(
