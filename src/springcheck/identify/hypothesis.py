@@ -178,13 +178,10 @@ def same_map(one: Family, other: Family, g: tuple[float, ...] = (0, 0, 0)) -> bo
 @cache
 def distinct(*, damped: bool) -> tuple[Family, ...]:
     """One family for each map: the implicit midpoint rule represents the trapezoidal rule, and so on."""
-    out: list[Family] = []
-    for family in DAMPED if damped else UNDAMPED:
-        if not damped and SCHEMES[family.scheme].has("friction"):
-            continue
-        if not any(same_map(family, other, (0.1, 0.2, 0.5)) for other in out):
-            out.append(family)
-    return tuple(out)
+    every = DAMPED if damped else [x for x in UNDAMPED if not SCHEMES[x.scheme].has("friction")]
+    return tuple(
+        x for i, x in enumerate(every) if not any(same_map(x, y, (0.1, 0.2, 0.5)) for y in every[:i])
+    )
 
 
 @cache

@@ -209,13 +209,9 @@ def recurrence_of(m: Reals) -> tuple[Reals, Reals]:
 @cache
 def classes() -> tuple[tuple[Family, ...], ...]:
     """Classes of undamped schemes whose positions agree for every step."""
-    out: list[list[Family]] = []
-    for family in distinct(damped=False):
-        own = _shape(family)
-        same = next((x for x in out if np.allclose(_shape(x[0]), own, rtol=0, atol=1e-13)), [])
-        out += [] if same else [same]
-        same.append(family)
-    return tuple(tuple(x) for x in out)
+    every = distinct(damped=False)
+    alike = (tuple(y for y in every if np.allclose(_shape(x), _shape(y), rtol=0, atol=1e-13)) for x in every)
+    return tuple(dict.fromkeys(alike))
 
 
 @cache

@@ -127,9 +127,7 @@ def storages(x: Floats) -> list[Storage]:
         if np.all(y >= 1) or (short and np.all(y > 0) and np.sum(np.log(y)) >= 0)
         or (x.decimals is not None and np.sum(np.log(np.maximum(y, 1))) > -math.log(BY_CHANCE))
     ]  # fmt: skip
-    if found:
-        # both can hold the numbers; the coarser of the two leaves less to chance.  A power of ten has its
-        # neighbours below it ten times as close as those above
-        below = sample * (1 - 2.0**-40)
-        found.sort(key=lambda s: -float(np.mean(np.log10(s.quantum(below)))))
-    return found or [binary]
+    # both can hold the numbers; the coarser of the two leaves less to chance.  A power of ten has its
+    # neighbours below it ten times as close as those above
+    below = sample * (1 - 2.0**-40)
+    return sorted(found, key=lambda s: -float(np.mean(np.log10(s.quantum(below))))) or [binary]
