@@ -347,3 +347,30 @@ def test_a_scheme_that_is_only_near_gives_no_numbers() -> None:
     assert (found.verdict, found.stiffness, found.document()["omega"]) == ("none", None, None)
     assert "frequency" not in str(found)
     assert "stiffness:" not in str(found)
+
+
+def test_a_velocity_made_from_the_position_is_named_whatever_the_first_frame_leaves() -> None:
+    """It was driven or anharmonic, or "in about 10 frames: too few to show its cause"."""
+    rows = states(verlet, 0.11, 121)
+    # (q2 - q)/2h with q2 = 2 q1 + q - h**2 k/m q1
+    rows[1:, 2] = (2 - 0.11**2 * K / M) / 0.22 * rows[1:, 1]
+    found = seen(rows, mass=M)
+    assert found.statement == (
+        "The velocity follows the position: from frame 1 on it is 9.0478 times its distance from rest"
+    )
+
+
+def test_one_oscillator_alone_is_coupled_to_none() -> None:
+    """It was "the oscillators are coupled": generalised alpha that moves by h, not by h v."""
+    m, k, h, shares = 1.9, 0.8, 0.43, (1 / 3, 4 / 9)
+    gamma, beta = 0.5 - shares[0] + shares[1], (1 - shares[0] + shares[1]) ** 2 / 4
+    rows, a = [(0.0, 1.3, 0.7)], -k * 1.3 / m
+    for i in range(120):
+        _, q, v = rows[-1]
+        ahead = q + h * v + h * h * (0.5 - beta) * a
+        left = -k / m * ((1 - shares[1]) * ahead + shares[1] * q) - shares[0] * a
+        new = left / (1 - shares[0] + (1 - shares[1]) * h * h * beta * k / m)
+        q = q + h + h * h * ((0.5 - beta) * a + beta * new)
+        rows.append(((i + 1) * h, q, v + h * ((1 - gamma) * a + gamma * new)))
+        a = new
+    assert "are coupled" not in seen(np.array(rows), mass=m).statement

@@ -25,7 +25,7 @@ from springcheck.identify.interrupted import broken, few_bad_frames, two_parts
 from springcheck.identify.laws import Regression, alone, explained_by, regression
 from springcheck.identify.misplaced import misplaced, turned
 from springcheck.identify.result import Explanation
-from springcheck.identify.unknown import lasting, memory, misfit
+from springcheck.identify.unknown import lasting, memory, misfit, tied
 from springcheck.identify.wrong import wrong_map
 from springcheck.text.wording import count
 
@@ -50,7 +50,7 @@ def explain(seen: Measured) -> tuple[Explanation, ...]:
     # a coordinate that hardly moves far from 0 has large residuals, all of rounding
     each = [seen.evidence(i) for i in range(len(seen.maps))]
     evidence = max(each, key=lambda e: float(np.mean(e.excess**2)))
-    if out := turned(seen.record, seen.moving) or _drift(evidence):
+    if out := turned(seen.record, seen.moving) or _drift(evidence) or tied(evidence):
         return (out,)
     if np.max(evidence.excess) <= LINEAR_LEAVES:
         return tuple(wrong_map(evidence)) or (misfit(evidence),)

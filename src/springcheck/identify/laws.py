@@ -218,7 +218,10 @@ DRY = Cause(
 COUPLED = Cause(
     kind="is another oscillator's",
     cause="The oscillators are coupled: coordinate {j} follows from the states of all, which {moved}",
-    columns=lambda e: [*(x for m in e.others for x in m.z[:-1].astype(np.float64).T), np.ones(e.pairs)],
+    columns=lambda e: [
+        *(x for m in e.others for x in m.z[:-1].astype(np.float64).T),
+        np.full(e.pairs, 1.0 if e.others else math.nan),
+    ],
     remedy="leave the coupling out, or judge it with a --scene that has it",
 )  # fmt: skip
 
