@@ -374,3 +374,138 @@ def test_one_oscillator_alone_is_coupled_to_none() -> None:
         rows.append(((i + 1) * h, q, v + h * ((1 - gamma) * a + gamma * new)))
         a = new
     assert "are coupled" not in seen(np.array(rows), mass=m).statement
+
+
+def implicit_midpoint(q: float, v: float, h: float, k: float = K) -> tuple[float, float]:
+    a = h * h * k / M / 4
+    return ((1 - a) * q + h * v) / (1 + a), ((1 - a) * v - h * k / M * q) / (1 + a)
+
+
+@pytest.mark.parametrize(
+    ("force", "said"),
+    [(K * M, "the mass is left out"), (K * K, "the stiffness is squared"), (1.0, "the stiffness is left out"),
+     (M * M / K, "mass and stiffness are exchanged"),
+     (math.radians(K), "the force takes positions for degrees")],
+)  # fmt: skip
+def test_a_factor_of_the_stiffness_that_means_something_tells_schemes_of_one_map_apart(
+    force: float, said: str
+) -> None:
+    """It was Position Verlet alone, of a spring 2.32 times as stiff as stated, with the verdict "not told
+    apart"."""
+    found = seen(states(lambda q, v, h: implicit_midpoint(q, v, h, force)), mass=M, stiffness=K)
+    assert (found.scheme, found.fits, found.stiffness) == (
+        "implicit-midpoint",
+        False,
+        pytest.approx((force,)),
+    )
+    assert found.statement.endswith(f"times as stiff as stated: {said}")
+
+
+def test_schemes_of_one_map_on_other_springs_than_the_stated_are_all_named() -> None:
+    found = seen(states(lambda q, v, h: implicit_midpoint(q, v, h, 1.3 * K), 0.3), mass=M, stiffness=K)
+    assert found.statement == (
+        "Position Verlet, but of a spring 1.27086457 times as stiff as stated; or Implicit midpoint, but of "
+        "a spring 1.3 times as stiff as stated"
+    )
+    assert not any("the states show" in note for note in found.notes)
+
+
+def test_a_factor_of_the_stiffness_that_may_mean_several_things_means_each() -> None:
+    """Of a mass of 2 it was "k q**2 taken for k/2 q**2", whoever left the mass out."""
+    rows, m = [(0.0, Q, V)], 2.0
+    for i in range(100):
+        _, q, v = rows[-1]
+        v = v - H * K * q
+        rows.append(((i + 1) * H, q + H * v, v))
+    found = seen(np.array(rows), mass=m, stiffness=K)
+    assert found.statement.endswith("k q**2 taken for k/2 q**2, or the mass is left out")
+
+
+def euler(q: float, v: float, h: float) -> tuple[float, float]:
+    return q + h * v, v - h * K / M * q
+
+
+def midpoint(q: float, v: float, h: float) -> tuple[float, float]:
+    return q + h * (v - h / 2 * K * q / M), v - h * K / M * (q + h / 2 * v)
+
+
+@pytest.mark.parametrize(("step", "whose"), [(euler, "Explicit Euler"), (midpoint, "Explicit midpoint (RK2)"),
+                                             (implicit_midpoint, "Implicit midpoint")])  # fmt: skip
+@pytest.mark.parametrize("side", ["ahead of", "behind"])
+def test_velocities_of_another_frame_are_told_of_every_scheme(step: Step, whose: str, side: str) -> None:
+    """Explicit Euler's behind were semi-implicit Euler with a negative friction, implicit midpoint's position
+    Verlet's on a softer spring."""
+    rows = states(step, 0.3, 101)
+    at = rows[:-1, :2], rows[1:, 2]
+    rows = np.column_stack(at if side == "ahead of" else (rows[1:, :2], rows[:-1, 2]))
+    found = seen(rows, mass=M, stiffness=K)
+    assert found.statement == f"{whose} whose velocities are one step {side} the positions"
+    assert found.stiffness == pytest.approx((K,), rel=1e-9)
+    alone = seen(rows, mass=M)
+    assert (alone.stiffness is None) == (step is implicit_midpoint), "position Verlet has the same map"
+
+
+def test_a_factor_of_velocities_is_that_of_the_scheme_that_has_it_to_rounding() -> None:
+    """Yoshida's scheme in three steps has the mass as a factor to 5e-7: it was named for Gauss' method."""
+    a = np.array([[1 / 4, 1 / 4 - 3**0.5 / 6], [1 / 4 + 3**0.5 / 6, 1 / 4]])
+    m, k, h, rows = 3.7, 2.9, 0.31, [(0.0, 1.3, 0.7)]
+    slope = np.array([[0, 1], [-k / m, 0]])
+    stages = np.linalg.solve(np.eye(4) - h * np.kron(a, slope), np.vstack([slope, slope]))
+    one = np.eye(2) + h / 2 * (stages[:2] + stages[2:])
+    for i in range(150):
+        q, v = one @ rows[-1][1:]
+        rows.append(((i + 1) * h, float(q), float(v)))
+    found = seen(np.array(rows) * [1, 1, 1 / m], mass=m, stiffness=k)
+    assert found.statement.startswith("Gauss collocation, fourth order, but p is treated as a velocity")
+
+
+def test_forces_in_half_precision_are_no_single_ones() -> None:
+    """Each is a single-precision number too: "mixed arithmetic explains every step" was said of it."""
+    rows, m, k = [(0.0, 1.3, 0.7)], 1.9, 0.8
+    for i in range(150):
+        _, q, v = rows[-1]
+        v += 0.215 * float(np.float16(-k * q)) / m
+        q += 0.43 * v
+        rows.append(((i + 1) * 0.43, q, v + 0.215 * float(np.float16(-k * q)) / m))
+    found = seen(np.array(rows), mass=m, stiffness=k)
+    assert (found.scheme, found.fits) == (None, False)
+
+
+@pytest.mark.parametrize("step", [verlet, euler, midpoint])
+def test_a_motion_that_ends_within_the_file_is_said_to_end(step: Step) -> None:
+    """It was "another from there on: the step, the stiffness or the friction changes there"."""
+    rows = states(step, 0.3, 151)
+    rows[76:, 1:] = rows[75, 1:]
+    said = seen(rows, mass=M).statement
+    assert said.endswith(" ends: from frame 76 on all frames are frame 75")
+    rows[75:, 1:] = 0
+    assert seen(rows, mass=M).statement == said.replace(
+        "76 on all frames are frame 75", "75 on all numbers are 0"
+    )
+    rows = states(step, 0.3, 151)
+    rows[-1, 1:] = 0
+    # it was off by 1e+300 of the state's size
+    assert seen(rows, mass=M).statement.endswith("is off by 1 of the state's size")
+
+
+def test_another_run_from_the_start_is_no_kick() -> None:
+    """It was one kick of +1.81, since its position was 1 % beside that of such a kick."""
+    m, k, h, q, v = 1.9, 0.8, 0.43, 1.3, 0.7
+    a, run = h * h * k / m / 4, [(1.3, 0.7)]
+    for _ in range(74):
+        q, v = ((1 - a) * q + h * v) / (1 + a), ((1 - a) * v - h * k / m * q) / (1 + a)
+        run.append((q, v))
+    found = seen(np.column_stack([h * np.arange(150), [*run, *run]]), mass=m)
+    assert found.statement.endswith("between frames 74 and 75, as where another run begins")
+
+
+@pytest.mark.parametrize("rates", ["velocities", "momenta"])
+def test_exchanged_columns_are_told_on_any_spring(rates: str) -> None:
+    """They were "a one-step method that is not known here" but where w is about 1."""
+    t, q, v = states(lambda q, v, h: verlet(q, v, h, 4 * K), 0.3, 101).T
+    swapped = identify(t, v, v=q, mass=M) if rates == "velocities" else identify(t, M * v, q, mass=M)
+    assert (
+        swapped.statement
+        == f"Positions and {rates} are exchanged: put right they are those of Velocity Verlet"
+    )
+    assert swapped.stiffness == pytest.approx((4 * K,), rel=1e-9)

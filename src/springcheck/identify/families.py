@@ -226,6 +226,12 @@ def _fault(name: str, cause: str, remedy: str, *stages: Stage) -> Family:
     )  # fmt: skip
 
 
+LAGGED = (
+    EULER, EULER_LATE, VERLET, POSITION, "rk4", "exact", "explicit-euler", "implicit-euler", "rk2-midpoint",
+    "implicit-midpoint", "ruth3", "forest-ruth", "yoshida4",
+)  # fmt: skip
+"""Schemes whose velocities may be recorded a step ahead of the positions, or behind."""
+
 FAULTS = (
     _fault("old force", "Velocity Verlet whose second half kick uses the old force, "
            "so that one force is held over the whole step", "compute the force anew after the drift"),
@@ -261,7 +267,7 @@ FAULTS = (
             f"{'the' if side == 'behind' else 'of the'} positions",
             "write position and velocity of the same step",
         )
-        for name in (EULER, VERLET, POSITION, "rk4", "exact")
+        for name in LAGGED
         for side in ("behind", "ahead")
     ),
 )  # fmt: skip

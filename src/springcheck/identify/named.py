@@ -102,7 +102,7 @@ def _known(seen: Measured, explained: Explained, stated_fits: bool) -> Identific
     notes += dict.fromkeys(d.note for d in explained[simplest] if d.note)
     explanations: list[Explanation] = []
     if seen.stiffness is not None:
-        explanations, remarks = stated_stiffness(seen, simplest, worst[0].precision, seen.stiffness)
+        explanations, remarks = stated_stiffness(seen, joints, worst[0].precision, seen.stiffness)
         notes += remarks
         stated_fits = stated_fits and not explanations
     candidates = tuple(x for joint in joints for x in candidates_of(seen, joint))

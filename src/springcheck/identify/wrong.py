@@ -14,6 +14,7 @@ from springcheck.identify.families import (
     FAMILIES,
     FAULTS,
     G_ROUNDING,
+    KNOWN_ELSEWHERE,
     MOST_TITLES,
     SUBTRACTED,
     Family,
@@ -71,7 +72,31 @@ def wrong_map(e: Evidence) -> list[Explanation]:
     ranked += (
         [(1, x) for x in scaled] if certain else [(4, x) for x in (misfit(e), *scaled)] if scaled else []
     )
-    return [x for _, x in sorted(ranked, key=lambda pair: pair[0])]
+    ranked.sort(key=lambda pair: pair[0])
+    if len(ranked) > 1 and ranked[0][0] == ranked[1][0]:
+        # causes that are as likely have each a stiffness of its own
+        ranked[0] = ranked[0][0], replace(ranked[0][1], hypothesis=None)
+    return [x for _, x in ranked]
+
+
+def exchanged(e: Evidence) -> Explanation | None:
+    """Positions and velocities, or momenta, in each other's place, if a scheme has their map once they are
+    put right."""
+    mass = None if e.record.mass is None else float(e.record.mass[e.j])
+    for rates, m in (("velocities", 1.0), ("momenta", mass or 1.0)):
+        found, per = e.found, np.array([m, 1 / m]) * e.record.interval ** np.array([-1, 1])
+        right = replace(
+            found, entries=found.entries[::-1, ::-1], covariance=found.covariance[::-1, ::-1],
+            size=found.size[::-1] * per, centre=found.centre[::-1] * per, z=found.z[:, ::-1],
+        )  # fmt: skip
+        if fitting := matched(right, e.terms):
+            whose = titles(x.scheme for x in fitting)
+            return Explanation(
+                f"Positions and {rates} are exchanged: put right they are those of {whose}",
+                "write each number in the column of its name",
+                hypothesis=fitting[0] if len({x.scheme for x in fitting}) == 1 else None,
+            )
+    return None
 
 
 def _unlike(e: Evidence, fitting: list[Match]) -> Explanation | None:
@@ -131,6 +156,9 @@ def _either_way(factor: float, meaning: str) -> tuple[tuple[float, str], tuple[f
 
 MIXED = "kcal and kJ are mixed up"
 
+NEARLY = 32.0
+"""Ratio of distances from a factor up to which schemes mean it alike: rounding differs by less."""
+
 CONSTANTS = (
     (math.degrees(1), "positions are in degrees, velocities in radians"),
     (math.radians(1), "positions are in radians, velocities in degrees"),
@@ -155,19 +183,21 @@ def _scales(e: Evidence) -> tuple[list[Explanation], bool]:
     if e.terms.mass_unknown:
         return [], False
     loose = replace(e.terms, mass_unknown=True, vague=False)
-    fitting = compare([e.found], [loose], distinct(damped=False), range(1, 4))
+    fitting = compare([e.found], [loose], (*distinct(damped=False), *KNOWN_ELSEWHERE), range(1, 4))
     fitting = [x for x in fitting if abs(x.parts[0].log_mass) > SURE * x.parts[0].mass_error + 4 * ROUNDING]
     of_stated = [x for x in fitting if e.stated is not None and _rank(e, x) == 0]
     fitting = of_stated or fitting
     meant = [(x, *meaning) for x in fitting if (meaning := _meaning(e, x))]
     # a factor that agrees with the stated stiffness says more than one that is well known
     meant = [x for x in meant if x[1]] or meant
+    # in several steps another scheme comes near a factor, and the right one has it to rounding
+    meant = [x for x in meant if x[4] <= NEARLY * min(y[4] for y in meant) + ROUNDING]
     if meant:
         # schemes that differ by less than the numbers show would each mean the same
         names: dict[str, list[str]] = {}
-        for x, _, said, _ in meant:
+        for x, _, said, *_ in meant:
             names.setdefault(said, []).append(x.scheme)
-        x, _, _, remedy = meant[0]
+        x, _, _, remedy, _ = meant[0]
         cause = "; or ".join(f"{titles(schemes)}{said}" for said, schemes in names.items())
         return [Explanation(cause, remedy, x.misfit)], True
     if not fitting:
@@ -191,8 +221,9 @@ def _scales(e: Evidence) -> tuple[list[Explanation], bool]:
     return [Explanation(cause, advice, x.misfit)], len(alone) == 1 and abs(one - 1) > AGREES
 
 
-def _meaning(e: Evidence, x: Joint) -> tuple[bool, str, str] | None:
-    """Agreement of a velocity scale with the stated stiffness, its meaning, what to do; None without one."""
+def _meaning(e: Evidence, x: Joint) -> tuple[bool, str, str, float] | None:
+    """Agreement of a velocity scale with the stated stiffness, its meaning, what to do, and the relative
+    distance from the factor that means it; None without one."""
     part = x.parts[0]
     scale = math.exp(-part.log_mass)
     known = SURE * part.mass_error + part.a_room + e.record.jitter + 32 * ROUNDING
@@ -205,7 +236,7 @@ def _meaning(e: Evidence, x: Joint) -> tuple[bool, str, str] | None:
         if (factor is None or abs(scale / factor - 1) <= AGREES + known) and (
             power is None or abs(stiffer / scale**power - 1) <= room
         ):
-            return agrees, meaning, remedy
+            return agrees, meaning, remedy, abs(scale / factor - 1) if factor else 0.0
     return None
 
 
@@ -254,17 +285,20 @@ def faults_of(seen: Measured, friction: float | None) -> list[Explanation]:
     ]
 
 
-def stiffness_ratio(ratio: float, mass: float | None) -> str:
-    """Meaning of a stiffness that is `ratio` times the stated one; "" where there is none."""
+def stiffness_ratio(ratio: float, mass: float | None, stiffness: float) -> str:
+    """Meanings of a stiffness that is `ratio` times the stated one; "" where there is none."""
     if ratio < 0:
-        also = "" if abs(ratio + 1) < 1e-5 else stiffness_ratio(-ratio, mass)
+        also = "" if abs(ratio + 1) < 1e-5 else stiffness_ratio(-ratio, mass, stiffness)
         return "the force has the wrong sign" + f", and {also}" * bool(also)
-    m = math.nan if mass is None else mass
+    m, k = math.nan if mass is None else mass, stiffness or math.nan
     known = (
         (1 / 4.184, "kcal taken for kJ"), (4.184, "kJ taken for kcal"),
         *_either_way(4.814 / 4.184, "4.814 kJ to a kcal instead of 4.184"),
         (2.0, "k q**2 taken for k/2 q**2"), (0.5, "k/2 q**2 taken for k q**2"),
         *((10.0**n, "another unit of length or energy") for n in (-6, -4, -3, -2, -1, 1, 2, 3, 4, 6)),
         (1 / m, "the force is divided by the mass although p is a momentum"), (m, "the mass is left out"),
+        (1 / k, "the stiffness is left out"), (k, "the stiffness is squared"),
+        ((m / k) ** 2, "mass and stiffness are exchanged"),
+        (math.radians(1), "the force takes positions for degrees"),
     )  # fmt: skip
-    return next((text for value, text in known if abs(ratio / value - 1) < 1e-5), "")
+    return ", or ".join(dict.fromkeys(text for value, text in known if abs(ratio / value - 1) < 1e-5))
