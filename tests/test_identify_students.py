@@ -509,3 +509,53 @@ def test_exchanged_columns_are_told_on_any_spring(rates: str) -> None:
         == f"Positions and {rates} are exchanged: put right they are those of Velocity Verlet"
     )
     assert swapped.stiffness == pytest.approx((4 * K,), rel=1e-9)
+
+
+@pytest.mark.parametrize("m", [M, 0.62])
+def test_a_step_from_momenta_that_returns_velocities_has_no_friction(m: float) -> None:
+    """It was a friction of either sign, "which feeds energy in" of masses below 1."""
+    p, rows, h = 0.7 * m, [(0.0, 1.3, 0.7)], 0.11
+    for i in range(100):
+        v, q = p / m, rows[-1][1]
+        a = -K * q / m
+        q = q + h * v + h * h / 2 * a
+        p = v + h / 2 * (a - K * q / m)
+        rows.append(((i + 1) * h, q, p / m))
+    found = seen(np.array(rows), mass=m, stiffness=K)
+    assert (found.fits, found.statement) == (
+        False, "Velocity Verlet whose velocity is divided by the mass in every step",
+    )  # fmt: skip
+
+
+def test_a_gain_by_a_share_of_the_stiffness_is_no_friction_and_a_fault_on_another_spring_says_so() -> None:
+    """Kutta's third order with its first slope for the third, and Heun's method without its first force."""
+
+    def kutta(q: float, v: float, h: float) -> tuple[float, float]:
+        w = K / M
+        v2, a2 = v - h / 2 * w * q, -w * (q + h / 2 * v)
+        v3 = v + h * w * q + 2 * h * a2
+        return q + h / 6 * (v + 4 * v2 + v3), v + h / 6 * (-2 * w * q + 4 * a2)
+
+    found = seen(states(kutta, 0.31, 121), mass=M, stiffness=K)
+    assert found.statement.endswith("by a share of h k/m: the mark of a scheme that is written down wrongly")
+
+    def heun(q: float, v: float, h: float) -> tuple[float, float]:
+        return q + h * v - h * h / 2 * K / M * q, v - h / 2 * K / M * (q + h * v)
+
+    rows, fault = states(heun, 0.31, 121), "the midpoint method whose first stage takes a full step"
+    assert seen(rows, mass=M).statement == fault
+    assert (
+        seen(rows, mass=M, stiffness=K).statement == f"{fault}, but of a spring 0.5 times as stiff as stated"
+    )
+
+
+@pytest.mark.parametrize(
+    ("step", "whose"), [(implicit_midpoint, "Implicit midpoint"), (verlet, "Velocity Verlet")]
+)
+def test_a_step_that_is_written_into_a_program_names_the_scheme_of_few_digits(step: Step, whose: str) -> None:
+    """Of symmetric schemes it was the exact flow, or implicit midpoint, "or 3.10152 times", and so on."""
+    rows = states(step, 0.1, 151)
+    rows[:, 0] *= 3.1
+    assert seen(rows, mass=M, stiffness=K).statement == (
+        f"{whose}, but times are 3.1 times what was stepped: the step taken is 0.322581 times theirs"
+    )

@@ -234,7 +234,8 @@ LAGGED = (
 
 FAULTS = (
     _fault("old force", "Velocity Verlet whose second half kick uses the old force, "
-           "so that one force is held over the whole step", "compute the force anew after the drift"),
+           "so that one force is held over the whole step, or a Runge-Kutta method whose later stages do",
+           "compute the force anew after the drift, or in each stage"),
     _fault("halves swapped",
            "Velocity Verlet with its halves swapped: q + h/2 v + h**2 a, not q + h v + h**2/2 a",
            "move the factor 1/2 from h v to h**2 a"),

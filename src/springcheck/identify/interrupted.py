@@ -173,8 +173,7 @@ def few_bad_frames(e: Evidence) -> Explanation | None:
 
 
 def ended(e: Evidence) -> Explanation | None:
-    """The cause where all later frames repeat one, though its velocity, or the map of those before, would move
-    it."""
+    """The cause where all later frames repeat one, which its velocity, or the map of those before, moves."""
     states = np.concatenate([e.record.q[:, e.record.moving], e.record.v[:, e.record.moving]], axis=1)
     at = int(np.max(np.flatnonzero(np.any(states[1:] != states[-1], axis=1)), initial=-2)) + 2
     # what a start leaves behind has faded in the second half

@@ -85,7 +85,8 @@ def named(seen: Measured, explained: Explained, step: float | None) -> Identific
         found = of_stated_friction(found, friction, float(seen.record.mass[seen.moving[0]]))
     if seen.stiffness is None:
         return found if seen.record.fine else of_either_sign(found, turned(seen.record, seen.moving))
-    found = of_unasked_friction(found) if seen.friction is None else found
+    mass = math.nan if seen.record.mass is None else float(seen.record.mass[seen.moving[0]])
+    found = of_unasked_friction(found, mass) if seen.friction is None else found
     faults = faults_of(seen, friction) if found.explanations and found.candidates else []
     if not faults:
         return found

@@ -22,6 +22,7 @@ from springcheck.identify.families import (
     titles,
 )
 from springcheck.identify.hypothesis import SURE, Joint, Match, distinct, same_map
+from springcheck.identify.notes import DIVIDED, FACTORS, MARK, MOMENTUM, MOST_PARTS
 from springcheck.identify.result import Explanation
 from springcheck.identify.storage import ROUNDING
 from springcheck.identify.unknown import MAP_OF, ONE_MAP, by_parameter, misfit
@@ -51,8 +52,11 @@ def wrong_map(e: Evidence) -> list[Explanation]:
         family = FAMILIES[joint.family]
         steps = "" if joint.stride == 1 else f", {joint.stride} steps to a frame"
         cause = f"{family.cause}{steps}"
-        found = Explanation(cause, family.remedy, joint.misfit, hypothesis=joint.parts[0])
-        ranked.append((_rank(e, joint), found))
+        rank = _rank(e, joint)
+        if rank == OF_ANOTHER_SPRING:
+            ratio = joint.parts[0].a * joint.stride**2 / e.stated if e.stated else math.inf
+            cause += f", but of a spring {ratio:.6g} times as stiff as stated"
+        ranked.append((rank, Explanation(cause, family.remedy, joint.misfit, hypothesis=joint.parts[0])))
     if fitting:
         each = {x: Joint(family=x.family, stride=x.stride, parts=(x,)) for x in fitting}
         of_stated = [x for x, joint in each.items() if _rank(e, joint) == 0]
@@ -126,6 +130,10 @@ def _departing(e: Evidence, fitting: list[Match]) -> Explanation:
     )
 
 
+OF_ANOTHER_SPRING = 3
+"""Rank of a cause on another spring than the stated one."""
+
+
 def _rank(e: Evidence, joint: Joint) -> int:
     """0 for a fault of the stated stiffness, or if none is stated of one step to a frame; 2 of more steps, 3
     of another stiffness."""
@@ -133,21 +141,29 @@ def _rank(e: Evidence, joint: Joint) -> int:
         return 0 if joint.stride == 1 else 2
     part = joint.parts[0]
     room = 1e-7 + part.a_room + 2 * e.record.jitter
-    return 0 if abs(part.a * joint.stride**2 - stated) <= room * abs(stated) else 3
+    return 0 if abs(part.a * joint.stride**2 - stated) <= room * abs(stated) else OF_ANOTHER_SPRING
 
 
 def _negative_friction(e: Evidence) -> list[Explanation]:
     joints = [
         x
         for x in compare([e.found], [replace(e.terms, growing=True)], distinct(damped=True), range(1, 3))
-        if x.parts[0].g < -SURE * (x.parts[0].g_error + G_ROUNDING)
+        if x.parts[0].g < -SURE * (x.parts[0].g_error + G_ROUNDING) and _rank(e, x) != OF_ANOTHER_SPRING
     ]
     if not joints:
         return []
     best = min(joints, key=lambda x: x.simplicity)
     rate = best.parts[0].g * best.stride / float(e.record.interval)
+    part, mass = best.parts[0], math.nan if e.record.mass is None else float(e.record.mass[e.j])
+    gains = -part.g, math.expm1(-part.g), -math.expm1(part.g)
     cause = f"{title(best.scheme)} with a negative friction, c/m = {rate:.4g}, which feeds energy in"
-    return [Explanation(cause, "change the sign of the damping force", best.misfit, hypothesis=best.parts[0])]
+    remedy = "change the sign of the damping force"
+    if any(abs(x * n / part.a - 1) < MARK for x in gains for n in range(1, MOST_PARTS + 1)):
+        cause += ", by a share of h k/m: the mark of a scheme that is written down wrongly"
+        remedy = FACTORS
+    elif abs(math.exp(-part.g) * mass - 1) < MARK:
+        cause, remedy = f"{title(best.scheme)}{DIVIDED}", MOMENTUM
+    return [Explanation(cause, remedy, best.misfit, hypothesis=part)]
 
 
 def _either_way(factor: float, meaning: str) -> tuple[tuple[float, str], tuple[float, str]]:
@@ -190,8 +206,11 @@ def _scales(e: Evidence) -> tuple[list[Explanation], bool]:
     meant = [(x, *meaning) for x in fitting if (meaning := _meaning(e, x))]
     # a factor that agrees with the stated stiffness says more than one that is well known
     meant = [x for x in meant if x[1]] or meant
-    # in several steps another scheme comes near a factor, and the right one has it to rounding
-    meant = [x for x in meant if x[4] <= NEARLY * min(y[4] for y in meant) + ROUNDING]
+    # another scheme comes near a factor in several steps, or with a factor of its own; the right one has it
+    least = min((x[4] for x in meant), default=0.0)
+    meant = [x for x in meant if x[4] <= NEARLY * least + ROUNDING]
+    if least > AGREES and len({x.scheme for x, *_ in meant}) > 1:
+        return [], False
     if meant:
         # schemes that differ by less than the numbers show would each mean the same
         names: dict[str, list[str]] = {}
@@ -223,7 +242,8 @@ def _scales(e: Evidence) -> tuple[list[Explanation], bool]:
 
 def _meaning(e: Evidence, x: Joint) -> tuple[bool, str, str, float] | None:
     """Agreement of a velocity scale with the stated stiffness, its meaning, what to do, and the relative
-    distance from the factor that means it; None without one."""
+    distance, beyond errors, from the factor that means it: if that may be any, from one, or from a step, of
+    few digits.  None without a meaning."""
     part = x.parts[0]
     scale = math.exp(-part.log_mass)
     known = SURE * part.mass_error + part.a_room + e.record.jitter + 32 * ROUNDING
@@ -236,7 +256,8 @@ def _meaning(e: Evidence, x: Joint) -> tuple[bool, str, str, float] | None:
         if (factor is None or abs(scale / factor - 1) <= AGREES + known) and (
             power is None or abs(stiffer / scale**power - 1) <= room
         ):
-            return agrees, meaning, remedy, abs(scale / factor - 1) if factor else 0.0
+            off = [abs(y / float(f"{y:.3g}") - 1) for y in (scale, 1 / scale, abs(h) * scale)]
+            return agrees, meaning, remedy, max((abs(scale / factor - 1) if factor else min(off)) - known, 0)
     return None
 
 
