@@ -53,8 +53,8 @@ def wrong_map(e: Evidence) -> list[Explanation]:
         steps = "" if joint.stride == 1 else f", {joint.stride} steps to a frame"
         cause = f"{family.cause}{steps}"
         rank = _rank(e, joint)
-        if rank == OF_ANOTHER_SPRING:
-            ratio = joint.parts[0].a * joint.stride**2 / e.stated if e.stated else math.inf
+        if rank == OF_ANOTHER_SPRING and e.stated:
+            ratio = joint.parts[0].a * joint.stride**2 / e.stated
             cause += f", but of a spring {ratio:.6g} times as stiff as stated"
         ranked.append((rank, Explanation(cause, family.remedy, joint.misfit, hypothesis=joint.parts[0])))
     if fitting:
@@ -148,7 +148,8 @@ def _negative_friction(e: Evidence) -> list[Explanation]:
     joints = [
         x
         for x in compare([e.found], [replace(e.terms, growing=True)], distinct(damped=True), range(1, 3))
-        if x.parts[0].g < -SURE * (x.parts[0].g_error + G_ROUNDING) and _rank(e, x) != OF_ANOTHER_SPRING
+        if x.parts[0].g < -SURE * (x.parts[0].g_error + G_ROUNDING)
+        and not (e.stated and _rank(e, x) == OF_ANOTHER_SPRING)
     ]
     if not joints:
         return []
