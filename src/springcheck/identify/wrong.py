@@ -173,6 +173,9 @@ def _either_way(factor: float, meaning: str) -> tuple[tuple[float, str], tuple[f
 
 MIXED = "kcal and kJ are mixed up"
 
+TIMES = ", but times are "
+"""Beginning of the meaning of a step that is another than the times say."""
+
 NEARLY = 32.0
 """Ratio of distances from a factor up to which schemes mean it alike: rounding differs by less."""
 
@@ -209,8 +212,9 @@ def _scales(e: Evidence) -> tuple[list[Explanation], bool]:
     meant = [x for x in meant if x[1]] or meant
     # another scheme comes near a factor in several steps, or with a factor of its own; the right one has it
     least = min((x[4] for x in meant), default=0.0)
-    meant = [x for x in meant if x[4] <= NEARLY * least + ROUNDING]
-    if least > AGREES and len({x.scheme for x, *_ in meant}) > 1:
+    if least <= AGREES:
+        meant = [x for x in meant if x[4] <= NEARLY * least + ROUNDING]
+    elif len({x.scheme for x, *_ in meant}) > 1 and all(said.startswith(TIMES) for _, _, said, *_ in meant):
         return [], False
     if meant:
         # schemes that differ by less than the numbers show would each mean the same
@@ -276,7 +280,7 @@ def _meanings(
     units = "look at the units of positions, velocities and times"
     return [
         (1 / h**2, 2, ", but the step taken is 1/h: it divides by the step", "multiply by the step"),
-        (None, 2, f", but times are {taken}",
+        (None, 2, f"{TIMES}{taken}",
          "look at how time is counted: the times are wrong by that factor"),
         (mass, 0, ", but p is treated as a velocity: dq/dt = p and dp/dt = F/m",
          "divide p by the mass in the drift only"),
