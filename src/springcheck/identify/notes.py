@@ -156,10 +156,15 @@ def of_unasked_friction(found: Identification, mass: float) -> Identification:
     return found if fault is None else found.refuted(fault.cause, fault)
 
 
+def by_mass(g: float, mass: float) -> bool:
+    """Whether a velocity that decays by exp(-g) is divided by the mass [M], which may be NaN."""
+    return mass > 0 and mass != 1 and abs(g / math.log(mass) - 1) < MARK
+
+
 def divided(found: Identification, mass: float) -> Explanation | None:
     """The cause of a decay of the velocity by the factor 1/m in a step; None of another motion."""
     for x in found.candidates:
-        if x.law and len(x.friction) == 1 and abs(math.exp(x.friction[0] * x.step) / mass - 1) < MARK:
+        if x.law and len(x.friction) == 1 and by_mass(x.friction[0] * x.step, mass):
             return Explanation(f"{title(x.scheme)}{DIVIDED}", MOMENTUM)
     return None
 

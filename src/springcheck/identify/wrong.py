@@ -22,7 +22,7 @@ from springcheck.identify.families import (
     titles,
 )
 from springcheck.identify.hypothesis import SURE, Joint, Match, distinct, same_map
-from springcheck.identify.notes import DIVIDED, FACTORS, MARK, MOMENTUM, MOST_PARTS
+from springcheck.identify.notes import DIVIDED, FACTORS, MARK, MOMENTUM, MOST_PARTS, by_mass
 from springcheck.identify.result import Explanation
 from springcheck.identify.storage import ROUNDING
 from springcheck.identify.unknown import MAP_OF, ONE_MAP, by_parameter, misfit
@@ -162,7 +162,7 @@ def _negative_friction(e: Evidence) -> list[Explanation]:
     if any(abs(x * n / part.a - 1) < MARK for x in gains for n in range(1, MOST_PARTS + 1)):
         cause += ", by a share of h k/m: the mark of a scheme that is written down wrongly"
         remedy = FACTORS
-    elif abs(math.exp(-part.g) * mass - 1) < MARK:
+    elif by_mass(part.g, mass):
         cause, remedy = f"{title(best.scheme)}{DIVIDED}", MOMENTUM
     return [Explanation(cause, remedy, best.misfit, hypothesis=part)]
 
