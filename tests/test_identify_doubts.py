@@ -674,7 +674,7 @@ def test_a_remark_on_one_reading_of_the_states_is_not_one_on_another() -> None:
     # what is tried of a stated stiffness leaves no remark behind
     stated = replace(plain, stiffness=np.array([7.0]))
     joint = plain.compare(distinct(damped=False), range(1, 2))[0]
-    wrong, remarks = stated_stiffness(stated, joint, "double", np.array([7.0]))
+    wrong, remarks = stated_stiffness(stated, [joint], "double", np.array([7.0]))
     assert wrong[0].cause.startswith("Exact flow, but of a spring")
     assert "does not fit" in remarks[0]
     assert stated.notes == plain.notes

@@ -347,3 +347,215 @@ def test_a_scheme_that_is_only_near_gives_no_numbers() -> None:
     assert (found.verdict, found.stiffness, found.document()["omega"]) == ("none", None, None)
     assert "frequency" not in str(found)
     assert "stiffness:" not in str(found)
+
+
+def test_a_velocity_made_from_the_position_is_named_whatever_the_first_frame_leaves() -> None:
+    """It was driven or anharmonic, or "in about 10 frames: too few to show its cause"."""
+    rows = states(verlet, 0.11, 121)
+    # (q2 - q)/2h with q2 = 2 q1 + q - h**2 k/m q1
+    rows[1:, 2] = (2 - 0.11**2 * K / M) / 0.22 * rows[1:, 1]
+    found = seen(rows, mass=M)
+    assert found.statement == (
+        "The velocity follows the position: from frame 1 on it is 9.0478 times its distance from rest"
+    )
+
+
+def test_one_oscillator_alone_is_coupled_to_none() -> None:
+    """It was "the oscillators are coupled": generalised alpha that moves by h, not by h v."""
+    m, k, h, shares = 1.9, 0.8, 0.43, (1 / 3, 4 / 9)
+    gamma, beta = 0.5 - shares[0] + shares[1], (1 - shares[0] + shares[1]) ** 2 / 4
+    rows, a = [(0.0, 1.3, 0.7)], -k * 1.3 / m
+    for i in range(120):
+        _, q, v = rows[-1]
+        ahead = q + h * v + h * h * (0.5 - beta) * a
+        left = -k / m * ((1 - shares[1]) * ahead + shares[1] * q) - shares[0] * a
+        new = left / (1 - shares[0] + (1 - shares[1]) * h * h * beta * k / m)
+        q = q + h + h * h * ((0.5 - beta) * a + beta * new)
+        rows.append(((i + 1) * h, q, v + h * ((1 - gamma) * a + gamma * new)))
+        a = new
+    assert "are coupled" not in seen(np.array(rows), mass=m).statement
+
+
+def implicit_midpoint(q: float, v: float, h: float, k: float = K) -> tuple[float, float]:
+    a = h * h * k / M / 4
+    return ((1 - a) * q + h * v) / (1 + a), ((1 - a) * v - h * k / M * q) / (1 + a)
+
+
+@pytest.mark.parametrize(
+    ("force", "said"),
+    [(K * M, "the mass is left out"), (K * K, "the stiffness is squared"), (1.0, "the stiffness is left out"),
+     (M * M / K, "mass and stiffness are exchanged"),
+     (math.radians(K), "the force takes positions for degrees")],
+)  # fmt: skip
+def test_a_factor_of_the_stiffness_that_means_something_tells_schemes_of_one_map_apart(
+    force: float, said: str
+) -> None:
+    """It was Position Verlet alone, of a spring 2.32 times as stiff as stated, with the verdict "not told
+    apart"."""
+    found = seen(states(lambda q, v, h: implicit_midpoint(q, v, h, force)), mass=M, stiffness=K)
+    assert (found.scheme, found.fits, found.stiffness) == (
+        "implicit-midpoint",
+        False,
+        pytest.approx((force,)),
+    )
+    assert found.statement.endswith(f"times as stiff as stated: {said}")
+
+
+def test_schemes_of_one_map_on_other_springs_than_the_stated_are_all_named() -> None:
+    found = seen(states(lambda q, v, h: implicit_midpoint(q, v, h, 1.3 * K), 0.3), mass=M, stiffness=K)
+    assert found.statement == (
+        "Position Verlet, but of a spring 1.27086457 times as stiff as stated; or Implicit midpoint, but of "
+        "a spring 1.3 times as stiff as stated"
+    )
+    assert not any("the states show" in note for note in found.notes)
+
+
+def test_a_factor_of_the_stiffness_that_may_mean_several_things_means_each() -> None:
+    """Of a mass of 2 it was "k q**2 taken for k/2 q**2", whoever left the mass out."""
+    rows, m = [(0.0, Q, V)], 2.0
+    for i in range(100):
+        _, q, v = rows[-1]
+        v = v - H * K * q
+        rows.append(((i + 1) * H, q + H * v, v))
+    found = seen(np.array(rows), mass=m, stiffness=K)
+    assert found.statement.endswith("k q**2 taken for k/2 q**2, or the mass is left out")
+
+
+def euler(q: float, v: float, h: float) -> tuple[float, float]:
+    return q + h * v, v - h * K / M * q
+
+
+def midpoint(q: float, v: float, h: float) -> tuple[float, float]:
+    return q + h * (v - h / 2 * K * q / M), v - h * K / M * (q + h / 2 * v)
+
+
+@pytest.mark.parametrize(("step", "whose"), [(euler, "Explicit Euler"), (midpoint, "Explicit midpoint (RK2)"),
+                                             (implicit_midpoint, "Implicit midpoint")])  # fmt: skip
+@pytest.mark.parametrize("side", ["ahead of", "behind"])
+def test_velocities_of_another_frame_are_told_of_every_scheme(step: Step, whose: str, side: str) -> None:
+    """Explicit Euler's behind were semi-implicit Euler with a negative friction, implicit midpoint's position
+    Verlet's on a softer spring."""
+    rows = states(step, 0.3, 101)
+    at = rows[:-1, :2], rows[1:, 2]
+    rows = np.column_stack(at if side == "ahead of" else (rows[1:, :2], rows[:-1, 2]))
+    found = seen(rows, mass=M, stiffness=K)
+    assert found.statement == f"{whose} whose velocities are one step {side} the positions"
+    assert found.stiffness == pytest.approx((K,), rel=1e-9)
+    alone = seen(rows, mass=M)
+    assert (alone.stiffness is None) == (step is implicit_midpoint), "position Verlet has the same map"
+
+
+def test_a_factor_of_velocities_is_that_of_the_scheme_that_has_it_to_rounding() -> None:
+    """Yoshida's scheme in three steps has the mass as a factor to 5e-7: it was named for Gauss' method."""
+    a = np.array([[1 / 4, 1 / 4 - 3**0.5 / 6], [1 / 4 + 3**0.5 / 6, 1 / 4]])
+    m, k, h, rows = 3.7, 2.9, 0.31, [(0.0, 1.3, 0.7)]
+    slope = np.array([[0, 1], [-k / m, 0]])
+    stages = np.linalg.solve(np.eye(4) - h * np.kron(a, slope), np.vstack([slope, slope]))
+    one = np.eye(2) + h / 2 * (stages[:2] + stages[2:])
+    for i in range(150):
+        q, v = one @ rows[-1][1:]
+        rows.append(((i + 1) * h, float(q), float(v)))
+    found = seen(np.array(rows) * [1, 1, 1 / m], mass=m, stiffness=k)
+    assert found.statement.startswith("Gauss collocation, fourth order, but p is treated as a velocity")
+
+
+def test_forces_in_half_precision_are_no_single_ones() -> None:
+    """Each is a single-precision number too: "mixed arithmetic explains every step" was said of it."""
+    rows, m, k = [(0.0, 1.3, 0.7)], 1.9, 0.8
+    for i in range(150):
+        _, q, v = rows[-1]
+        v += 0.215 * float(np.float16(-k * q)) / m
+        q += 0.43 * v
+        rows.append(((i + 1) * 0.43, q, v + 0.215 * float(np.float16(-k * q)) / m))
+    found = seen(np.array(rows), mass=m, stiffness=k)
+    assert (found.scheme, found.fits) == (None, False)
+
+
+@pytest.mark.parametrize("step", [verlet, euler, midpoint])
+def test_a_motion_that_ends_within_the_file_is_said_to_end(step: Step) -> None:
+    """It was "another from there on: the step, the stiffness or the friction changes there"."""
+    rows = states(step, 0.3, 151)
+    rows[76:, 1:] = rows[75, 1:]
+    said = seen(rows, mass=M).statement
+    assert said.endswith(" ends: from frame 76 on all frames are frame 75")
+    rows[75:, 1:] = 0
+    assert seen(rows, mass=M).statement == said.replace(
+        "76 on all frames are frame 75", "75 on all numbers are 0"
+    )
+    rows = states(step, 0.3, 151)
+    rows[-1, 1:] = 0
+    # it was off by 1e+300 of the state's size
+    assert seen(rows, mass=M).statement.endswith("is off by 1 of the state's size")
+
+
+def test_another_run_from_the_start_is_no_kick() -> None:
+    """It was one kick of +1.81, since its position was 1 % beside that of such a kick."""
+    m, k, h, q, v = 1.9, 0.8, 0.43, 1.3, 0.7
+    a, run = h * h * k / m / 4, [(1.3, 0.7)]
+    for _ in range(74):
+        q, v = ((1 - a) * q + h * v) / (1 + a), ((1 - a) * v - h * k / m * q) / (1 + a)
+        run.append((q, v))
+    found = seen(np.column_stack([h * np.arange(150), [*run, *run]]), mass=m)
+    assert found.statement.endswith("between frames 74 and 75, as where another run begins")
+
+
+@pytest.mark.parametrize("rates", ["velocities", "momenta"])
+def test_exchanged_columns_are_told_on_any_spring(rates: str) -> None:
+    """They were "a one-step method that is not known here" but where w is about 1."""
+    t, q, v = states(lambda q, v, h: verlet(q, v, h, 4 * K), 0.3, 101).T
+    swapped = identify(t, v, v=q, mass=M) if rates == "velocities" else identify(t, M * v, q, mass=M)
+    assert (
+        swapped.statement
+        == f"Positions and {rates} are exchanged: put right they are those of Velocity Verlet"
+    )
+    assert swapped.stiffness == pytest.approx((4 * K,), rel=1e-9)
+
+
+@pytest.mark.parametrize("m", [M, 0.62])
+def test_a_step_from_momenta_that_returns_velocities_has_no_friction(m: float) -> None:
+    """It was a friction of either sign, "which feeds energy in" of masses below 1."""
+    p, rows, h = 0.7 * m, [(0.0, 1.3, 0.7)], 0.11
+    for i in range(100):
+        v, q = p / m, rows[-1][1]
+        a = -K * q / m
+        q = q + h * v + h * h / 2 * a
+        p = v + h / 2 * (a - K * q / m)
+        rows.append(((i + 1) * h, q, p / m))
+    found = seen(np.array(rows), mass=m, stiffness=K)
+    assert (found.fits, found.statement) == (
+        False, "Velocity Verlet whose velocity is divided by the mass in every step",
+    )  # fmt: skip
+
+
+def test_a_gain_by_a_share_of_the_stiffness_is_no_friction_and_a_fault_on_another_spring_says_so() -> None:
+    """Kutta's third order with its first slope for the third, and Heun's method without its first force."""
+
+    def kutta(q: float, v: float, h: float) -> tuple[float, float]:
+        w = K / M
+        v2, a2 = v - h / 2 * w * q, -w * (q + h / 2 * v)
+        v3 = v + h * w * q + 2 * h * a2
+        return q + h / 6 * (v + 4 * v2 + v3), v + h / 6 * (-2 * w * q + 4 * a2)
+
+    found = seen(states(kutta, 0.31, 121), mass=M, stiffness=K)
+    assert found.statement.endswith("by a share of h k/m: the mark of a scheme that is written down wrongly")
+
+    def heun(q: float, v: float, h: float) -> tuple[float, float]:
+        return q + h * v - h * h / 2 * K / M * q, v - h / 2 * K / M * (q + h * v)
+
+    rows, fault = states(heun, 0.31, 121), "the midpoint method whose first stage takes a full step"
+    assert seen(rows, mass=M).statement == fault
+    assert (
+        seen(rows, mass=M, stiffness=K).statement == f"{fault}, but of a spring 0.5 times as stiff as stated"
+    )
+
+
+@pytest.mark.parametrize(
+    ("step", "whose"), [(implicit_midpoint, "Implicit midpoint"), (verlet, "Velocity Verlet")]
+)
+def test_a_step_that_is_written_into_a_program_names_the_scheme_of_few_digits(step: Step, whose: str) -> None:
+    """Of symmetric schemes it was the exact flow, or implicit midpoint, "or 3.10152 times", and so on."""
+    rows = states(step, 0.1, 151)
+    rows[:, 0] *= 3.1
+    assert seen(rows, mass=M, stiffness=K).statement == (
+        f"{whose}, but times are 3.1 times what was stepped: the step taken is 0.322581 times theirs"
+    )

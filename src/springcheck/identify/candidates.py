@@ -12,7 +12,7 @@ import numpy as np
 
 from springcheck.identify.coarse import QUANTUM
 from springcheck.identify.evidence import SINGLE_ROOM, Measured
-from springcheck.identify.families import FAMILIES, title, titles
+from springcheck.identify.families import FAMILIES, MOST_TITLES, title, titles
 from springcheck.identify.hypothesis import Joint, aliases, frictionless
 from springcheck.identify.notes import LEAPFROG, hidden_friction, same_maps, untold
 from springcheck.identify.record import DEEP, Record
@@ -22,6 +22,7 @@ from springcheck.identify.wrong import stiffness_ratio
 from springcheck.physics.arrays import Floats
 from springcheck.schemes import SCHEMES
 from springcheck.schemes.elsewhere import ELSEWHERE
+from springcheck.text.wording import few
 
 T = TypeVar("T")
 
@@ -63,11 +64,11 @@ def steps_between(stride: int | None) -> str:
 
 
 def stated_stiffness(
-    seen: Measured, simplest: Joint, precision: str, stated: Floats
+    seen: Measured, joints: Sequence[Joint], precision: str, stated: Floats
 ) -> tuple[list[Explanation], list[str]]:
-    """The cause of a stiffness that differs significantly from the stated one, and notes on the
-    difference."""
-    quantum = QUANTUM if precision in SINGLE_CONSTANTS else 0.0
+    """The cause of a stiffness of the hypotheses, the simplest first, that differs significantly from the
+    stated one, and notes on the difference."""
+    simplest, quantum = joints[0], QUANTUM if precision in SINGLE_CONSTANTS else 0.0
     against = seen.disagreements(simplest)
     if not against or (quantum and not seen.disagreements(simplest, quantum=quantum)):
         return [], []
@@ -79,22 +80,33 @@ def stated_stiffness(
         if (quantum and of_force) or room < 0.1 * float(np.max(np.abs(other / stated - 1))):
             why = ", as GPU-type platforms keep it" if quantum else ""
             return [], [f"the {what} is the stated one in single precision{why}"]
-    _, stiffness, _ = seen.numbers(simplest)
+    several = joints if np.all(stated) else joints[:1]
+    every = {x.cause: x for x, _ in (_of_a_spring(seen, joint, stated) for joint in several)}
+    first = next(iter(every.values()))
+    # of several schemes each has a stiffness of its own
+    return [replace(first, cause=few(list(every), MOST_TITLES, "; or "))], against * (len(every) == 1)
+
+
+def _of_a_spring(seen: Measured, joint: Joint, stated: Floats) -> tuple[Explanation, str]:
+    """The cause of a hypothesis' stiffness that differs from the stated one, and the meaning of their ratio,
+    "" where it has none."""
+    _, stiffness, _ = seen.numbers(joint)
     each, masses = zip(seen.moving, stiffness or (math.nan,), strict=False), seen.record.mass
     j, found = max(each, key=lambda one: abs(one[1] - stated[one[0]]) / (stated[one[0]] or 1.0))
-    ratio = found / float(stated[j]) if stated[j] else math.inf
-    meaning = stiffness_ratio(ratio, None if masses is None else float(masses[j]))
+    k = float(stated[j])
+    ratio = found / k if k else math.inf
+    meaning = stiffness_ratio(ratio, None if masses is None else float(masses[j]), k)
     stiff = (
         f"{ratio:.9g} times as stiff as stated" if abs(ratio - 1) > 1e-6 else f"stiffer by {ratio - 1:+.1e}"
     )
-    stiff = stiff if stated[j] else f"of stiffness {found:.9g} where 0 is stated"
-    cause = f"{title(simplest.scheme)}, but of a spring {stiff}"
+    stiff = stiff if k else f"of stiffness {found:.9g} where 0 is stated"
+    cause = f"{title(joint.scheme)}, but of a spring {stiff}"
     remedy = "look at the units of the force constant, and at whether V is k/2 q**2"
     if ratio < 0:
         sign = "look at the sign of the force, F = -k q, and of the kick, p + h F"
         remedy = sign if abs(ratio + 1) < 1e-5 else f"{sign}; {remedy}"
     cause = f"{cause}: {meaning}" if meaning else cause
-    return [Explanation(cause, remedy, abs(ratio - 1))], against
+    return Explanation(cause, remedy, abs(ratio - 1)), meaning
 
 
 def of_stated_stiffness(seen: Measured, precisions: dict[Joint, str], stated: Floats) -> list[Joint]:
@@ -103,7 +115,7 @@ def of_stated_stiffness(seen: Measured, precisions: dict[Joint, str], stated: Fl
     first."""
     joints = list(precisions)
     agreeing = [x for x in joints if not seen.disagreements(x)] or [
-        x for x in joints if not stated_stiffness(seen, x, precisions[x], stated)[0]
+        x for x in joints if not stated_stiffness(seen, [x], precisions[x], stated)[0]
     ]
     found = {x: zip(seen.moving, seen.numbers(x)[1] or (), strict=False) for x in joints}
     if agreeing:
@@ -115,7 +127,9 @@ def of_stated_stiffness(seen: Measured, precisions: dict[Joint, str], stated: Fl
            for x, each in found.items()}  # fmt: skip
     # to within single precision and errors
     room = {x: SINGLE_ROOM + max(part.a_room for part in x.parts) for x in joints}
-    return [x for x in joints if off[x] <= 2 * min(off.values()) + room[x]]
+    near = [x for x in joints if off[x] <= 2 * min(off.values()) + room[x]]
+    # a factor that means something is likelier than one that does not
+    return [x for x in near if _of_a_spring(seen, x, stated)[1]] or near
 
 
 def _single_constants(record: Record, stated: Floats, stride: int) -> list[tuple[str, Floats, bool]]:

@@ -163,6 +163,8 @@ def _kinematic(record: Record, j: int, found: Map, match: Match) -> tuple[str, s
     mass = 1.0 if record.mass is None else float(record.mass[j])
     readable = noise < 0.05 * float(np.median(single))
     for name, quantum, factor, note in (
+        # which those of half precision are as well
+        ("", np.ldexp(single, 13), 1.0, ""),
         ("mixed", single, 1.0, "single-precision numbers"),
         ("mixed", single, float(over_single(mass)), "single-precision numbers, and so is the mass"),
         ("fixed-point force", fixed, 1.0, "whole multiples of 2**-32, a 64-bit fixed-point sum"),
@@ -179,7 +181,7 @@ def _kinematic(record: Record, j: int, found: Map, match: Match) -> tuple[str, s
             # the sum of n numbers, each uniform up to 1, is at most s with a chance of s**n/n! or less
             n, total = len(left), float(np.sum(2 * left)) or math.ulp(1.0)
             if n * math.log(total) - math.lgamma(n + 1) < math.log(CHANCE):
-                return name, f"states are double, and forces are {note}"
+                return name, note and f"states are double, and forces are {note}"
             readable = False
     return ("", "") if readable and consistent else None
 

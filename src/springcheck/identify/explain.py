@@ -21,12 +21,12 @@ from springcheck.identify.evidence import (
 )
 from springcheck.identify.families import title
 from springcheck.identify.hypothesis import FEW, distinct
-from springcheck.identify.interrupted import broken, few_bad_frames, two_parts
+from springcheck.identify.interrupted import broken, ended, few_bad_frames, two_parts
 from springcheck.identify.laws import Regression, alone, explained_by, regression
 from springcheck.identify.misplaced import misplaced, turned
 from springcheck.identify.result import Explanation
-from springcheck.identify.unknown import lasting, memory, misfit
-from springcheck.identify.wrong import wrong_map
+from springcheck.identify.unknown import lasting, memory, misfit, tied
+from springcheck.identify.wrong import exchanged, wrong_map
 from springcheck.text.wording import count
 
 FEWEST_MISSES = 24.0
@@ -50,10 +50,13 @@ def explain(seen: Measured) -> tuple[Explanation, ...]:
     # a coordinate that hardly moves far from 0 has large residuals, all of rounding
     each = [seen.evidence(i) for i in range(len(seen.maps))]
     evidence = max(each, key=lambda e: float(np.mean(e.excess**2)))
-    if out := turned(seen.record, seen.moving) or _drift(evidence):
+    if out := turned(seen.record, seen.moving) or _drift(evidence) or tied(evidence):
         return (out,)
     if np.max(evidence.excess) <= LINEAR_LEAVES:
-        return tuple(wrong_map(evidence)) or (misfit(evidence),)
+        first = exchanged(evidence)
+        return (first,) if first else tuple(wrong_map(evidence)) or (misfit(evidence),)
+    if out := ended(evidence):
+        return (out,)
     found = (look(evidence) for look in SEARCHED)
     return (next(filter(None, found), None) or _law(evidence),)
 

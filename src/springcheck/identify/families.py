@@ -226,9 +226,16 @@ def _fault(name: str, cause: str, remedy: str, *stages: Stage) -> Family:
     )  # fmt: skip
 
 
+LAGGED = (
+    EULER, EULER_LATE, VERLET, POSITION, "rk4", "exact", "explicit-euler", "implicit-euler", "rk2-midpoint",
+    "implicit-midpoint", "ruth3", "forest-ruth", "yoshida4",
+)  # fmt: skip
+"""Schemes whose velocities may be recorded a step ahead of the positions, or behind."""
+
 FAULTS = (
     _fault("old force", "Velocity Verlet whose second half kick uses the old force, "
-           "so that one force is held over the whole step", "compute the force anew after the drift"),
+           "so that one force is held over the whole step, or a Runge-Kutta method whose later stages do",
+           "compute the force anew after the drift, or in each stage"),
     _fault("halves swapped",
            "Velocity Verlet with its halves swapped: q + h/2 v + h**2 a, not q + h v + h**2/2 a",
            "move the factor 1/2 from h v to h**2 a"),
@@ -261,7 +268,7 @@ FAULTS = (
             f"{'the' if side == 'behind' else 'of the'} positions",
             "write position and velocity of the same step",
         )
-        for name in (EULER, VERLET, POSITION, "rk4", "exact")
+        for name in LAGGED
         for side in ("behind", "ahead")
     ),
 )  # fmt: skip

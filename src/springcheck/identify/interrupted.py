@@ -60,6 +60,9 @@ DRAWS = 256
 NUMBER = re.compile(r"[-+]?\d[\d.]*(e[-+]\d+)?")
 """Numbers in a cause, without which interruptions of one kind are the same."""
 
+FEWEST_REPEATED = 2
+"""Fewest repeated frames at the end of a motion that has ended."""
+
 FEWEST_PAIRS = 8
 """Fewest pairs beside the bad ones, and of those that move."""
 
@@ -167,6 +170,30 @@ def few_bad_frames(e: Evidence) -> Explanation | None:
         )
     own = fitting[0] if len(fitting) == 1 and whose else None
     return Explanation(cause, remedy, after / before, local=True, hypothesis=own)
+
+
+def ended(e: Evidence) -> Explanation | None:
+    """The cause where all later frames repeat one, which its velocity, or the map of those before, moves."""
+    states = np.concatenate([e.record.q[:, e.record.moving], e.record.v[:, e.record.moving]], axis=1)
+    at = int(np.max(np.flatnonzero(np.any(states[1:] != states[-1], axis=1)), initial=-2)) + 2
+    # what a start leaves behind has faded in the second half
+    kept = (np.arange(e.pairs) < at - 1) & (np.arange(e.pairs) >= (at - 1) // 2)
+    if len(states) - at < FEWEST_REPEATED or np.count_nonzero(kept) < FEWEST_PAIRS:
+        return None
+    found = fit(e.record, e.j, kept=kept)
+    off = np.max(np.abs(found.residuals()), axis=1)
+    left, rounding = float(np.max(off[kept])), LARGER * float(np.max(e.unit))
+    moves = abs(float(e.found.z[-1, 1] * e.found.size[1] / e.found.size[0]))
+    if not (moves > rounding or np.max(off[at - 1 : at + 1]) > max(LARGER * left, rounding)):
+        return None
+    whose = titles(x.scheme for x in matched(found, e.terms)) if left <= rounding else ""
+    zero = not np.any(states[-1])
+    what = "all numbers are 0" if zero else f"all frames are frame {at}"
+    return Explanation(
+        f"The motion{f' of {whose}' if whose else ''} ends: from frame {at + (not zero)} on {what}",
+        "look for a loop that ends early, or for rows that are never written or written again",
+        local=True,
+    )
 
 
 def two_parts(e: Evidence) -> Explanation | None:
@@ -310,8 +337,10 @@ def _interruption(
         if at == len(z) - 1:
             cause = f"{but} frame {at}, the last, is wrong: {_amount(off, to)}"
             return cause, "look at how the last frame is written"
+        # a kick leaves the position of a motion of one map to rounding, and another run's start is only near
+        room = LARGER * max(float(np.max(e.unit[run])), float(np.max(found.residual)))
         for kick, later in ((back, False), (off, True)):
-            if abs(kick[0]) < 1e-2 * abs(kick[1]):
+            if abs(kick[0]) < min(1e-2 * abs(kick[1]), room):
                 return _kicked(e, found, np.array([x[0] for x in runs]), later, whose, fitting)
         size = max(float(np.max(np.abs(back))), 1e-16)
         jumps = f"The motion{whose} jumps by {size:.1e} of its size between frames {first} and {at}, as"
@@ -365,6 +394,6 @@ def _kicked(
 
 
 def _amount(off: Floats, state: Extended) -> str:
-    share = np.abs(off) / max(float(np.max(np.abs(state))), 1e-300)
+    share = np.abs(off) / float(np.max(np.abs([state, state - off])))
     name = "velocity" if share[1] > share[0] else "position"
     return f"its {name} is off by {float(np.max(share)):.2g} of the state's size"

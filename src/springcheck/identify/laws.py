@@ -110,13 +110,13 @@ def regression(e: Evidence, law: Cause) -> Regression:
         own = (every / size)[:, : len(e.linear)]
         missing = missing - own @ np.linalg.lstsq(own, missing)[0]
     square, above = np.sum(missing**2, axis=1), np.any(np.abs(missing) > FALLS * rounding, axis=1)
-    total = float(np.sum(square))
+    total, relative = float(np.sum(square)), square / (np.max(square, initial=0.0) or 1.0)
     share = len(missing) / max(len(missing) - int(rank), 1)
     return Regression(
         law=law, pairs=len(missing), rank=int(rank), x=x / size[:, None], turn=turn,
         # a frequency that is looked for counts as numbers more, the map's own constant does not
         parameters=int(rank) - (len(e.linear) - 2) + 3 * law.waves,
-        counted=total**2 / float(np.sum(square**2)) if total else 0.0,
+        counted=float(np.sum(relative)) ** 2 / float(np.sum(relative**2)) if total else 0.0,
         left=math.sqrt(float(np.sum(left**2)) * share / total) if total else 1.0,
         worst=float(np.max(np.abs(left), initial=0.0)), above=int(np.count_nonzero(above)),
         exact=bool(np.all(np.abs(left) <= rounding)),
@@ -218,7 +218,10 @@ DRY = Cause(
 COUPLED = Cause(
     kind="is another oscillator's",
     cause="The oscillators are coupled: coordinate {j} follows from the states of all, which {moved}",
-    columns=lambda e: [*(x for m in e.others for x in m.z[:-1].astype(np.float64).T), np.ones(e.pairs)],
+    columns=lambda e: [
+        *(x for m in e.others for x in m.z[:-1].astype(np.float64).T),
+        np.full(e.pairs, 1.0 if e.others else math.nan),
+    ],
     remedy="leave the coupling out, or judge it with a --scene that has it",
 )  # fmt: skip
 

@@ -11,7 +11,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from springcheck.identify.families import EULER, FAMILIES, POSITION, PREDICTED, VERLET, Family
+from springcheck.identify.families import FAMILIES, LAGGED, PREDICTED, Family
 from springcheck.physics.arrays import Extended, Floats, Integers, Reals
 from springcheck.schemes import SCHEMES, Scheme, matrix, number, rotation
 
@@ -299,7 +299,7 @@ FORMULAS: dict[str, Callable[[Reals, Reals], Reals]] = {
     **{name: partial(_predicted, share=share) for name, share in PREDICTED.items()},
     **{
         f"{name} {'behind' if n < 0 else 'ahead'}": partial(_lagging, base=name, steps=n)
-        for name in (EULER, VERLET, POSITION, "rk4", "exact")
+        for name in LAGGED
         for n in (-1, 1)
     },
 }

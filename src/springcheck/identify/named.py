@@ -85,7 +85,8 @@ def named(seen: Measured, explained: Explained, step: float | None) -> Identific
         found = of_stated_friction(found, friction, float(seen.record.mass[seen.moving[0]]))
     if seen.stiffness is None:
         return found if seen.record.fine else of_either_sign(found, turned(seen.record, seen.moving))
-    found = of_unasked_friction(found) if seen.friction is None else found
+    mass = math.nan if seen.record.mass is None else float(seen.record.mass[seen.moving[0]])
+    found = of_unasked_friction(found, mass) if seen.friction is None else found
     faults = faults_of(seen, friction) if found.explanations and found.candidates else []
     if not faults:
         return found
@@ -102,7 +103,7 @@ def _known(seen: Measured, explained: Explained, stated_fits: bool) -> Identific
     notes += dict.fromkeys(d.note for d in explained[simplest] if d.note)
     explanations: list[Explanation] = []
     if seen.stiffness is not None:
-        explanations, remarks = stated_stiffness(seen, simplest, worst[0].precision, seen.stiffness)
+        explanations, remarks = stated_stiffness(seen, joints, worst[0].precision, seen.stiffness)
         notes += remarks
         stated_fits = stated_fits and not explanations
     candidates = tuple(x for joint in joints for x in candidates_of(seen, joint))

@@ -11,7 +11,7 @@ from springcheck.errors import IdentificationError
 from springcheck.identify.clock import FEWEST_STATES
 from springcheck.identify.compare import Target, compare
 from springcheck.identify.evidence import Measured
-from springcheck.identify.families import FAMILIES, titles
+from springcheck.identify.families import FAMILIES, title, titles
 from springcheck.identify.fit import Map
 from springcheck.identify.guesses import Guesses
 from springcheck.identify.hypothesis import ERRORS, SURE, Joint, Terms
@@ -35,8 +35,15 @@ start have seven unknowns."""
 CERTAIN_STEPS = 12
 """Most steps to a frame from which coarse numbers name a scheme: truncation errors of more are too alike."""
 
-MOST_PARTS, MARK = 4, 1e-9
+MOST_PARTS, MARK = 6, 1e-9
 """Largest n of a friction h k/(n m) that is a fault's, and the relative difference up to which it is that."""
+
+DIVIDED = " whose velocity is divided by the mass in every step"
+MOMENTUM = "return the momentum, m v, where momenta are passed on"
+"""The cause of a step from p that returns v, and its remedy."""
+
+FACTORS = "compare the factors 1/2 of the step with the scheme's"
+"""Remedy of a scheme that is written down wrongly."""
 
 LEAPFROG = {
     "semi-implicit-euler": "leapfrog with velocities half a step early",
@@ -142,11 +149,24 @@ def _between(low: float, high: float) -> str:
     return f"{low:.5g} to {high:.5g} (by its law)"
 
 
-def of_unasked_friction(found: Identification) -> Identification:
-    """Reject the friction of a faulty or implicit scheme, unless a scheme without friction has the stated
-    stiffness."""
-    fault = _fault(found) if found.fits else None
+def of_unasked_friction(found: Identification, mass: float) -> Identification:
+    """Reject the friction of a faulty or implicit scheme, or a decay by the mass [M], unless a scheme without
+    friction has the stated stiffness."""
+    fault = (divided(found, mass) or _fault(found)) if found.fits else None
     return found if fault is None else found.refuted(fault.cause, fault)
+
+
+def by_mass(g: float, mass: float) -> bool:
+    """Whether a velocity that decays by exp(-g) is divided by the mass [M], which may be NaN."""
+    return mass > 0 and mass != 1 and abs(g / math.log(mass) - 1) < MARK
+
+
+def divided(found: Identification, mass: float) -> Explanation | None:
+    """The cause of a decay of the velocity by the factor 1/m in a step; None of another motion."""
+    for x in found.candidates:
+        if x.law and len(x.friction) == 1 and by_mass(x.friction[0] * x.step, mass):
+            return Explanation(f"{title(x.scheme)}{DIVIDED}", MOMENTUM)
+    return None
 
 
 def _fault(found: Identification, *, stated: bool = False) -> Explanation | None:

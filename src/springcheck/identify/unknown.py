@@ -46,21 +46,26 @@ FEWEST_WITH_MEMORY = 12
 """Fewest frames for a map of two states."""
 
 
-def misfit(e: Evidence) -> Explanation:
-    """The class of a map of no known scheme, and its distance from the nearest."""
+def tied(e: Evidence) -> Explanation | None:
+    """The cause where the velocity is a multiple of the position from frame 1 on; None where it is not."""
     q, v = e.found.z[1:].astype(np.float64).T
     slope = float(q @ v / (q @ q)) if np.any(q) else 0.0
-    if slope and np.all(np.abs(v - slope * q) <= 8 * e.unit):
-        times = slope * float(e.found.size[1] / e.found.size[0] / e.record.interval)
-        still = np.all(np.abs(v) <= 8 * e.unit)
-        return Explanation(
-            "The velocity is 0 from frame 1 on"
-            if still
-            else f"The velocity follows the position: from frame 1 on it is {times:.6g} times its distance "
-            "from rest",
-            "look for a buffer that both share, or a velocity that is made from the position",
-            float(np.max(np.abs(v - slope * q))),
-        )
+    if not (slope and np.all(np.abs(v - slope * q) <= 8 * e.unit)):
+        return None
+    times = slope * float(e.found.size[1] / e.found.size[0] / e.record.interval)
+    still = np.all(np.abs(v) <= 8 * e.unit)
+    return Explanation(
+        "The velocity is 0 from frame 1 on"
+        if still
+        else f"The velocity follows the position: from frame 1 on it is {times:.6g} times its distance "
+        "from rest",
+        "look for a buffer that both share, or a velocity that is made from the position",
+        float(np.max(np.abs(v - slope * q))),
+    )
+
+
+def misfit(e: Evidence) -> Explanation:
+    """The class of a map of no known scheme, and its distance from the nearest."""
     entries = e.found.entries.astype(np.float64)
     det = float(np.linalg.det(entries))
     joints = nearest([e.found], [e.terms], distinct(damped=False), range(1, 2))

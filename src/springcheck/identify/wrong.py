@@ -14,6 +14,7 @@ from springcheck.identify.families import (
     FAMILIES,
     FAULTS,
     G_ROUNDING,
+    KNOWN_ELSEWHERE,
     MOST_TITLES,
     SUBTRACTED,
     Family,
@@ -21,6 +22,7 @@ from springcheck.identify.families import (
     titles,
 )
 from springcheck.identify.hypothesis import SURE, Joint, Match, distinct, same_map
+from springcheck.identify.notes import DIVIDED, FACTORS, MARK, MOMENTUM, MOST_PARTS, by_mass
 from springcheck.identify.result import Explanation
 from springcheck.identify.storage import ROUNDING
 from springcheck.identify.unknown import MAP_OF, ONE_MAP, by_parameter, misfit
@@ -50,8 +52,11 @@ def wrong_map(e: Evidence) -> list[Explanation]:
         family = FAMILIES[joint.family]
         steps = "" if joint.stride == 1 else f", {joint.stride} steps to a frame"
         cause = f"{family.cause}{steps}"
-        found = Explanation(cause, family.remedy, joint.misfit, hypothesis=joint.parts[0])
-        ranked.append((_rank(e, joint), found))
+        rank = _rank(e, joint)
+        if rank == OF_ANOTHER_SPRING and e.stated:
+            ratio = joint.parts[0].a * joint.stride**2 / e.stated
+            cause += f", but of a spring {ratio:.6g} times as stiff as stated"
+        ranked.append((rank, Explanation(cause, family.remedy, joint.misfit, hypothesis=joint.parts[0])))
     if fitting:
         each = {x: Joint(family=x.family, stride=x.stride, parts=(x,)) for x in fitting}
         of_stated = [x for x, joint in each.items() if _rank(e, joint) == 0]
@@ -71,7 +76,31 @@ def wrong_map(e: Evidence) -> list[Explanation]:
     ranked += (
         [(1, x) for x in scaled] if certain else [(4, x) for x in (misfit(e), *scaled)] if scaled else []
     )
-    return [x for _, x in sorted(ranked, key=lambda pair: pair[0])]
+    ranked.sort(key=lambda pair: pair[0])
+    if len(ranked) > 1 and ranked[0][0] == ranked[1][0]:
+        # causes that are as likely have each a stiffness of its own
+        ranked[0] = ranked[0][0], replace(ranked[0][1], hypothesis=None)
+    return [x for _, x in ranked]
+
+
+def exchanged(e: Evidence) -> Explanation | None:
+    """Positions and velocities, or momenta, in each other's place, if a scheme has their map once they are
+    put right."""
+    mass = None if e.record.mass is None else float(e.record.mass[e.j])
+    for rates, m in (("velocities", 1.0), ("momenta", mass or 1.0)):
+        found, per = e.found, np.array([m, 1 / m]) * e.record.interval ** np.array([-1, 1])
+        right = replace(
+            found, entries=found.entries[::-1, ::-1], covariance=found.covariance[::-1, ::-1],
+            size=found.size[::-1] * per, centre=found.centre[::-1] * per, z=found.z[:, ::-1],
+        )  # fmt: skip
+        if fitting := matched(right, e.terms):
+            whose = titles(x.scheme for x in fitting)
+            return Explanation(
+                f"Positions and {rates} are exchanged: put right they are those of {whose}",
+                "write each number in the column of its name",
+                hypothesis=fitting[0] if len({x.scheme for x in fitting}) == 1 else None,
+            )
+    return None
 
 
 def _unlike(e: Evidence, fitting: list[Match]) -> Explanation | None:
@@ -101,6 +130,10 @@ def _departing(e: Evidence, fitting: list[Match]) -> Explanation:
     )
 
 
+OF_ANOTHER_SPRING = 3
+"""Rank of a cause on another spring than the stated one."""
+
+
 def _rank(e: Evidence, joint: Joint) -> int:
     """0 for a fault of the stated stiffness, or if none is stated of one step to a frame; 2 of more steps, 3
     of another stiffness."""
@@ -108,7 +141,7 @@ def _rank(e: Evidence, joint: Joint) -> int:
         return 0 if joint.stride == 1 else 2
     part = joint.parts[0]
     room = 1e-7 + part.a_room + 2 * e.record.jitter
-    return 0 if abs(part.a * joint.stride**2 - stated) <= room * abs(stated) else 3
+    return 0 if abs(part.a * joint.stride**2 - stated) <= room * abs(stated) else OF_ANOTHER_SPRING
 
 
 def _negative_friction(e: Evidence) -> list[Explanation]:
@@ -116,13 +149,22 @@ def _negative_friction(e: Evidence) -> list[Explanation]:
         x
         for x in compare([e.found], [replace(e.terms, growing=True)], distinct(damped=True), range(1, 3))
         if x.parts[0].g < -SURE * (x.parts[0].g_error + G_ROUNDING)
+        and not (e.stated and _rank(e, x) == OF_ANOTHER_SPRING)
     ]
     if not joints:
         return []
     best = min(joints, key=lambda x: x.simplicity)
     rate = best.parts[0].g * best.stride / float(e.record.interval)
+    part, mass = best.parts[0], math.nan if e.record.mass is None else float(e.record.mass[e.j])
+    gains = -part.g, math.expm1(-part.g), -math.expm1(part.g)
     cause = f"{title(best.scheme)} with a negative friction, c/m = {rate:.4g}, which feeds energy in"
-    return [Explanation(cause, "change the sign of the damping force", best.misfit, hypothesis=best.parts[0])]
+    remedy = "change the sign of the damping force"
+    if any(abs(x * n / part.a - 1) < MARK for x in gains for n in range(1, MOST_PARTS + 1)):
+        cause += ", by a share of h k/m: the mark of a scheme that is written down wrongly"
+        remedy = FACTORS
+    elif by_mass(part.g, mass):
+        cause, remedy = f"{title(best.scheme)}{DIVIDED}", MOMENTUM
+    return [Explanation(cause, remedy, best.misfit, hypothesis=part)]
 
 
 def _either_way(factor: float, meaning: str) -> tuple[tuple[float, str], tuple[float, str]]:
@@ -130,6 +172,12 @@ def _either_way(factor: float, meaning: str) -> tuple[tuple[float, str], tuple[f
 
 
 MIXED = "kcal and kJ are mixed up"
+
+TIMES = ", but times are "
+"""Beginning of the meaning of a step that is another than the times say."""
+
+NEARLY = 32.0
+"""Ratio of distances from a factor up to which schemes mean it alike: rounding differs by less."""
 
 CONSTANTS = (
     (math.degrees(1), "positions are in degrees, velocities in radians"),
@@ -155,19 +203,25 @@ def _scales(e: Evidence) -> tuple[list[Explanation], bool]:
     if e.terms.mass_unknown:
         return [], False
     loose = replace(e.terms, mass_unknown=True, vague=False)
-    fitting = compare([e.found], [loose], distinct(damped=False), range(1, 4))
+    fitting = compare([e.found], [loose], (*distinct(damped=False), *KNOWN_ELSEWHERE), range(1, 4))
     fitting = [x for x in fitting if abs(x.parts[0].log_mass) > SURE * x.parts[0].mass_error + 4 * ROUNDING]
     of_stated = [x for x in fitting if e.stated is not None and _rank(e, x) == 0]
     fitting = of_stated or fitting
     meant = [(x, *meaning) for x in fitting if (meaning := _meaning(e, x))]
     # a factor that agrees with the stated stiffness says more than one that is well known
     meant = [x for x in meant if x[1]] or meant
+    # another scheme comes near a factor in several steps, or with a factor of its own; the right one has it
+    least = min((x[4] for x in meant), default=0.0)
+    if least <= AGREES:
+        meant = [x for x in meant if x[4] <= NEARLY * least + ROUNDING]
+    elif len({x.scheme for x, *_ in meant}) > 1 and all(said.startswith(TIMES) for _, _, said, *_ in meant):
+        return [], False
     if meant:
         # schemes that differ by less than the numbers show would each mean the same
         names: dict[str, list[str]] = {}
-        for x, _, said, _ in meant:
+        for x, _, said, *_ in meant:
             names.setdefault(said, []).append(x.scheme)
-        x, _, _, remedy = meant[0]
+        x, _, _, remedy, _ = meant[0]
         cause = "; or ".join(f"{titles(schemes)}{said}" for said, schemes in names.items())
         return [Explanation(cause, remedy, x.misfit)], True
     if not fitting:
@@ -191,8 +245,10 @@ def _scales(e: Evidence) -> tuple[list[Explanation], bool]:
     return [Explanation(cause, advice, x.misfit)], len(alone) == 1 and abs(one - 1) > AGREES
 
 
-def _meaning(e: Evidence, x: Joint) -> tuple[bool, str, str] | None:
-    """Agreement of a velocity scale with the stated stiffness, its meaning, what to do; None without one."""
+def _meaning(e: Evidence, x: Joint) -> tuple[bool, str, str, float] | None:
+    """Agreement of a velocity scale with the stated stiffness, its meaning, what to do, and the relative
+    distance, beyond errors, from the factor that means it: if that may be any, from one, or from a step, of
+    few digits.  None without a meaning."""
     part = x.parts[0]
     scale = math.exp(-part.log_mass)
     known = SURE * part.mass_error + part.a_room + e.record.jitter + 32 * ROUNDING
@@ -205,7 +261,8 @@ def _meaning(e: Evidence, x: Joint) -> tuple[bool, str, str] | None:
         if (factor is None or abs(scale / factor - 1) <= AGREES + known) and (
             power is None or abs(stiffer / scale**power - 1) <= room
         ):
-            return agrees, meaning, remedy
+            off = [abs(y / float(f"{y:.3g}") - 1) for y in (scale, 1 / scale, abs(h) * scale)]
+            return agrees, meaning, remedy, max((abs(scale / factor - 1) if factor else min(off)) - known, 0)
     return None
 
 
@@ -223,7 +280,7 @@ def _meanings(
     units = "look at the units of positions, velocities and times"
     return [
         (1 / h**2, 2, ", but the step taken is 1/h: it divides by the step", "multiply by the step"),
-        (None, 2, f", but times are {taken}",
+        (None, 2, f"{TIMES}{taken}",
          "look at how time is counted: the times are wrong by that factor"),
         (mass, 0, ", but p is treated as a velocity: dq/dt = p and dp/dt = F/m",
          "divide p by the mass in the drift only"),
@@ -254,17 +311,20 @@ def faults_of(seen: Measured, friction: float | None) -> list[Explanation]:
     ]
 
 
-def stiffness_ratio(ratio: float, mass: float | None) -> str:
-    """Meaning of a stiffness that is `ratio` times the stated one; "" where there is none."""
+def stiffness_ratio(ratio: float, mass: float | None, stiffness: float) -> str:
+    """Meanings of a stiffness that is `ratio` times the stated one; "" where there is none."""
     if ratio < 0:
-        also = "" if abs(ratio + 1) < 1e-5 else stiffness_ratio(-ratio, mass)
+        also = "" if abs(ratio + 1) < 1e-5 else stiffness_ratio(-ratio, mass, stiffness)
         return "the force has the wrong sign" + f", and {also}" * bool(also)
-    m = math.nan if mass is None else mass
+    m, k = math.nan if mass is None else mass, stiffness or math.nan
     known = (
         (1 / 4.184, "kcal taken for kJ"), (4.184, "kJ taken for kcal"),
         *_either_way(4.814 / 4.184, "4.814 kJ to a kcal instead of 4.184"),
         (2.0, "k q**2 taken for k/2 q**2"), (0.5, "k/2 q**2 taken for k q**2"),
         *((10.0**n, "another unit of length or energy") for n in (-6, -4, -3, -2, -1, 1, 2, 3, 4, 6)),
         (1 / m, "the force is divided by the mass although p is a momentum"), (m, "the mass is left out"),
+        (1 / k, "the stiffness is left out"), (k, "the stiffness is squared"),
+        ((m / k) ** 2, "mass and stiffness are exchanged"),
+        (math.radians(1), "the force takes positions for degrees"),
     )  # fmt: skip
-    return next((text for value, text in known if abs(ratio / value - 1) < 1e-5), "")
+    return ", or ".join(dict.fromkeys(text for value, text in known if abs(ratio / value - 1) < 1e-5))
