@@ -12,7 +12,7 @@ import springcheck
 HOME = Path(springcheck.__file__).parent
 
 STILL_TWICE = {
-    "Candidate", "Case", "Check", "Clock", "Column", "Law", "Line", "Map", "Springs",
+    "Candidate", "Case", "Check", "Clock", "Column", "Law", "Springs",
     "Tally",
 }  # fmt: skip
 """Classes of two rooms that have one name still: none may join them."""
