@@ -49,10 +49,10 @@ def explain(seen: Measured) -> tuple[Explanation, ...]:
     """Causes of states that no scheme fits, the likeliest first."""
     # a coordinate that hardly moves far from 0 has large residuals, all of rounding
     each = [seen.evidence(i) for i in range(len(seen.maps))]
-    evidence = max(each, key=lambda e: float(np.mean(e.excess**2)))
+    evidence = max(each, key=lambda e: float(np.mean(e.excess(e.found) ** 2)))
     if out := turned(seen.record, seen.moving) or _drift(evidence):
         return (out,)
-    if np.max(evidence.excess) <= LINEAR_LEAVES:
+    if np.max(evidence.excess(evidence.found)) <= LINEAR_LEAVES:
         return tuple(wrong_map(evidence)) or (misfit(evidence),)
     found = (look(evidence) for look in SEARCHED)
     return (next(filter(None, found), None) or _law(evidence),)
@@ -99,7 +99,7 @@ def _solver(e: Evidence) -> Explanation | None:
 
 
 def _drift(e: Evidence) -> Explanation | None:
-    if not e.found.drifts or np.max(e.excess) > LEFT_BY_ROUNDING:
+    if not e.found.drifts or np.max(e.excess(e.found)) > LEFT_BY_ROUNDING:
         # where one map and a constant leave more than rounding, the constant may belong to something else
         return None
     back = (np.eye(2) - e.found.unscaled.astype(np.float64)) @ e.found.centre.astype(np.float64)
