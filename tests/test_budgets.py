@@ -18,7 +18,7 @@ BUDGETS = {
     ("engines",): 2836,
     ("driver", "conformance", "doors"): 1193,
     ("checks",): 5678,
-    ("identify",): 9331,
+    ("identify",): 9324,
     ("formats", "store"): 5191,
     ("studies",): 1456,
     ("studies/*",): 9936,

@@ -58,13 +58,6 @@ def explain(seen: Measured) -> tuple[Explanation, ...]:
     return (next(filter(None, found), None) or _law(evidence),)
 
 
-def _misplaced(e: Evidence) -> Explanation | None:
-    """Misplaced numbers, which make two bad pairs of a frame: none where one map of all coordinates holds but
-    for single pairs."""
-    found = misplaced(e)
-    return found and (broken(e, regular=True) or found)
-
-
 def _solver(e: Evidence) -> Explanation | None:
     """The exact solution to within a tolerance: an adaptive or high-order solver."""
     if min(regression(e, law).left for law in (laws.PARITY, laws.POWERS)) < 1 / FALLS:
@@ -214,7 +207,7 @@ def _unexplained(e: Evidence, counted: float) -> Explanation:
 
 
 SEARCHED = (
-    _misplaced, partial(alone, laws.DRY), memory, few_bad_frames, two_parts, broken,
+    misplaced, partial(alone, laws.DRY), memory, few_bad_frames, two_parts, broken,
     partial(alone, laws.COUPLED), lasting, _solver,
 )  # fmt: skip
 """Causes of the map's residuals, in the order in which they are looked for; `_law` comes last."""

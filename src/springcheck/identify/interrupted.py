@@ -197,9 +197,9 @@ def two_parts(e: Evidence) -> Explanation | None:
     return None
 
 
-def broken(e: Evidence, *, regular: bool = False) -> Explanation | None:
-    """A few bad pairs of a coupled motion, equally far apart if `regular`: one map of all coordinates takes
-    every other frame to the next.  It is that of a few pairs drawn at random, none of which is bad."""
+def broken(e: Evidence) -> Explanation | None:
+    """A few bad pairs of a coupled motion: one map of all coordinates takes every other frame to the next.
+    It is that of a few pairs drawn at random, none of which is bad."""
     moving, record = e.record.moving, e.record
     z = np.concatenate([record.q[:, moving], record.v[:, moving]], axis=1).astype(np.float64)
     quanta = np.concatenate([record.q_quantum[:, moving], record.v_quantum[:, moving]], axis=1)
@@ -229,7 +229,7 @@ def broken(e: Evidence, *, regular: bool = False) -> Explanation | None:
     runs = np.split(bad, np.flatnonzero(np.diff(bad) > 1) + 1)
     single = len(bad) == len(runs)
     often = regularly(bad.tolist()) if single else ""
-    most = OFTEN_BAD * e.pairs if often else 0 if regular else max(3, FEW_BAD * e.pairs)
+    most = OFTEN_BAD * e.pairs if often else max(3, FEW_BAD * e.pairs)
     if not 0 < len(bad) <= most:
         return None
     at = [f"from frame {x[0]} to {x[-1] + 1}" for x in runs]
