@@ -18,7 +18,7 @@ BUDGETS = {
     ("engines",): 2836,
     ("driver", "conformance", "doors"): 1193,
     ("checks",): 5756,
-    ("identify",): 9474,
+    ("identify",): 9459,
     ("formats", "store"): 5198,
     ("studies",): 1456,
     ("studies/*",): 9878,

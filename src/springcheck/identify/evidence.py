@@ -202,10 +202,9 @@ class Evidence:
         size = 8 * ROUNDING * size + quanta[1:].max(axis=1) + quanta[:-1].max(axis=1)
         return np.asarray(np.maximum(size, np.finfo(np.float64).tiny))
 
-    @property
-    def excess(self) -> Floats:
-        """Residual of each pair (f - 1,), in roundings."""
-        return np.asarray(np.max(np.abs(self.residuals), axis=1) / self.unit)
+    def excess(self, found: Map) -> Floats:
+        """Residual of each pair (f - 1,) of a map of this oscillator, in roundings."""
+        return np.asarray(np.max(np.abs(found.residuals()), axis=1) / self.unit)
 
     @property
     def turns(self) -> float:

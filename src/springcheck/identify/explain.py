@@ -49,23 +49,16 @@ def explain(seen: Measured) -> tuple[Explanation, ...]:
     """Causes of states that no scheme fits, the likeliest first."""
     # a coordinate that hardly moves far from 0 has large residuals, all of rounding
     each = [seen.evidence(i) for i in range(len(seen.maps))]
-    evidence = max(each, key=lambda e: float(np.mean(e.excess**2)))
+    evidence = max(each, key=lambda e: float(np.mean(e.excess(e.found) ** 2)))
     if out := turned(seen.record, seen.moving) or _drift(evidence) or tied(evidence):
         return (out,)
-    if np.max(evidence.excess) <= LINEAR_LEAVES:
+    if np.max(evidence.excess(evidence.found)) <= LINEAR_LEAVES:
         first = exchanged(evidence)
         return (first,) if first else tuple(wrong_map(evidence)) or (misfit(evidence),)
     if out := ended(evidence):
         return (out,)
     found = (look(evidence) for look in SEARCHED)
     return (next(filter(None, found), None) or _law(evidence),)
-
-
-def _misplaced(e: Evidence) -> Explanation | None:
-    """Misplaced numbers, which make two bad pairs of a frame: none where one map of all coordinates holds but
-    for single pairs."""
-    found = misplaced(e)
-    return found and (broken(e, regular=True) or found)
 
 
 def _solver(e: Evidence) -> Explanation | None:
@@ -102,7 +95,7 @@ def _solver(e: Evidence) -> Explanation | None:
 
 
 def _drift(e: Evidence) -> Explanation | None:
-    if not e.found.drifts or np.max(e.excess) > LEFT_BY_ROUNDING:
+    if not e.found.drifts or np.max(e.excess(e.found)) > LEFT_BY_ROUNDING:
         # where one map and a constant leave more than rounding, the constant may belong to something else
         return None
     back = (np.eye(2) - e.found.unscaled.astype(np.float64)) @ e.found.centre.astype(np.float64)
@@ -217,7 +210,7 @@ def _unexplained(e: Evidence, counted: float) -> Explanation:
 
 
 SEARCHED = (
-    _misplaced, partial(alone, laws.DRY), memory, few_bad_frames, two_parts, broken,
+    misplaced, partial(alone, laws.DRY), memory, few_bad_frames, two_parts, broken,
     partial(alone, laws.COUPLED), lasting, _solver,
 )  # fmt: skip
 """Causes of the map's residuals, in the order in which they are looked for; `_law` comes last."""

@@ -112,7 +112,7 @@ def few_bad_frames(e: Evidence) -> Explanation | None:
     kept = np.ones(e.pairs, dtype=bool)
     found = e.found
     for _ in range(8):
-        off = np.max(np.abs(found.residuals()), axis=1) / e.unit
+        off = e.excess(found)
         limit = max(8 * float(np.median(off[kept])), 2.0)
         now = off <= limit
         if np.count_nonzero(~now) > max(3, FEW_BAD * e.pairs) or np.array_equal(now, kept):
@@ -201,21 +201,17 @@ def two_parts(e: Evidence) -> Explanation | None:
     if e.pairs < 2 * FEWEST_PAIRS:
         return None
     frames = np.arange(e.pairs)
-
-    def off(found: Map) -> Floats:
-        return np.asarray(np.max(np.abs(found.residuals()), axis=1) / (OF_ROUNDING * e.unit))
-
     for half in (frames < e.pairs // 2, frames >= e.pairs // 2):
         one = fit(e.record, e.j, kept=half)
-        left = off(one)
-        bad = np.flatnonzero(left > 1)
+        left = e.excess(one)
+        bad = np.flatnonzero(left > OF_ROUNDING)
         # of what changes slowly a half that is one map to rounding shows too little in the other
-        if len(bad) < FEWEST_PAIRS or np.any(half[bad]) or np.max(left) < LARGER**2:
+        if len(bad) < FEWEST_PAIRS or np.any(half[bad]) or np.max(left) < LARGER**2 * OF_ROUNDING:
             continue
         at = int(bad[0] if half[0] else bad[-1] + 1)
         rest = (frames >= at) == half[0]
         other = fit(e.record, e.j, kept=rest)
-        if one.conditioned and other.conditioned and np.all(off(other)[rest] <= 1):
+        if one.conditioned and other.conditioned and np.all(e.excess(other)[rest] <= OF_ROUNDING):
             parts = (one, other) if half[0] else (other, one)
             fits = (titles(x.scheme for x in matched(part, e.terms)) for part in parts)
             before, after = (f" of {x}" if x else "" for x in fits)
@@ -228,9 +224,9 @@ def two_parts(e: Evidence) -> Explanation | None:
     return None
 
 
-def broken(e: Evidence, *, regular: bool = False) -> Explanation | None:
-    """A few bad pairs of a coupled motion, equally far apart if `regular`: one map of all coordinates takes
-    every other frame to the next.  It is that of a few pairs drawn at random, none of which is bad."""
+def broken(e: Evidence) -> Explanation | None:
+    """A few bad pairs of a coupled motion: one map of all coordinates takes every other frame to the next.
+    It is that of a few pairs drawn at random, none of which is bad."""
     moving, record = e.record.moving, e.record
     z = np.concatenate([record.q[:, moving], record.v[:, moving]], axis=1).astype(np.float64)
     quanta = np.concatenate([record.q_quantum[:, moving], record.v_quantum[:, moving]], axis=1)
@@ -260,7 +256,7 @@ def broken(e: Evidence, *, regular: bool = False) -> Explanation | None:
     runs = np.split(bad, np.flatnonzero(np.diff(bad) > 1) + 1)
     single = len(bad) == len(runs)
     often = regularly(bad.tolist()) if single else ""
-    most = OFTEN_BAD * e.pairs if often else 0 if regular else max(3, FEW_BAD * e.pairs)
+    most = OFTEN_BAD * e.pairs if often else max(3, FEW_BAD * e.pairs)
     if not 0 < len(bad) <= most:
         return None
     at = [f"from frame {x[0]} to {x[-1] + 1}" for x in runs]
@@ -299,6 +295,20 @@ def _damped(found: Map, e: Evidence) -> str:
     return f" of {titles(x.scheme for x in every)} with {law}"
 
 
+WITHOUT_A_GAP = "write every frame, or give a part without a gap"
+
+FOLLOWING = (
+    (1, 0, "The motion{whose} stands still for a step: it is repeated at frame {at}",
+     "write each frame once, or look for a step that is left out"),
+    (1, 2, "{but} frame {at} is missing", WITHOUT_A_GAP),
+    *((1, n, f"{{but}} {n - 1} frames are missing from frame {{at}} on", WITHOUT_A_GAP) for n in range(3, 9)),
+    (2, 2, "{but} frame {at} is wrong: {amount}{begins}", "look at how that frame is written"),
+    (3, 1, "{but} frames {at} and {last} have changed places", "sort the frames by time"),
+)  # fmt: skip
+"""Bad pairs in a row, the power of the map that leads from the frame before them to the second after it (of
+one pair to the first), what has happened, and what to do."""
+
+
 def _interruption(
     e: Evidence, found: Map, runs: list[NDArray[np.intp]], whose: str, fitting: list[Match]
 ) -> tuple[str, str]:
@@ -306,60 +316,43 @@ def _interruption(
     which is that of `fitting` schemes; of kicks, those of all of them."""
     z, b, run = found.z, found.entries, runs[0]
     first, last = int(run[0]), int(run[-1])
-
-    def near(x: Extended, y: Extended) -> bool:
-        # as near as the other pairs, or a thousandth of what is missing
-        missing = float(np.max(np.abs(z[last + 1] - b @ z[last])))
-        return float(np.max(np.abs(x - y))) <= max(4 * float(np.max(e.unit[run])), 1e-3 * missing)
-
-    but = f"The motion is one{whose}, but"
-    if len(run) == 1:
-        from_, to, at = z[first], z[first + 1], first + 1
-        if near(to, from_):
-            cause = f"The motion{whose} stands still for a step: it is repeated at frame {at}"
-            return cause, "write each frame once, or look for a step that is left out"
-        power = b @ b
-        for n in range(2, 9):
-            if near(to, power @ from_):
-                more = f"{n - 1} frames are missing from frame {at} on" if n > 2 else f"frame {at} is missing"
-                return f"{but} {more}", "write every frame, or give a part without a gap"
-            power = b @ power
-        off = (to - b @ from_).astype(np.float64)
-        back = np.linalg.lstsq(b.astype(np.float64), off)[0]
-        if first == 0:
-            box = f" positions wrapped into a box of {abs(back[0]) * float(found.size[0]):.6g},"
-            box = box if abs(back[0]) > max(np.ptp(z[1:, 0]), 1e2 * abs(back[1])) else ""
-            return (
-                f"{but} frame 0 does not belong to it: a wrong start,{box} a scheme with memory, whose force "
-                "or velocity is that of the step before, or a solver that begins with steps of its own",
-                "look at how the start is set and recorded, or leave frame 0 out",
-            )
-        if at == len(z) - 1:
-            cause = f"{but} frame {at}, the last, is wrong: {_amount(off, to)}"
-            return cause, "look at how the last frame is written"
-        # a kick leaves the position of a motion of one map to rounding, and another run's start is only near
-        room = LARGER * max(float(np.max(e.unit[run])), float(np.max(found.residual)))
-        for kick, later in ((back, False), (off, True)):
-            if abs(kick[0]) < min(1e-2 * abs(kick[1]), room):
-                return _kicked(e, found, np.array([x[0] for x in runs]), later, whose, fitting)
-        size = max(float(np.max(np.abs(back))), 1e-16)
-        jumps = f"The motion{whose} jumps by {size:.1e} of its size between frames {first} and {at}, as"
-        if (digits := round(-math.log10(size))) < 1:
-            return f"{jumps} where another run begins", "give each run a file of its own"
-        restart = f"after a restart from numbers of {count(digits, 'digit')}"
-        return f"{jumps} {restart}", "write restarts in full precision"
-    if len(run) == 2 and near(z[last + 1], b @ (b @ z[first])):
-        off = (z[last] - b @ z[first]).astype(np.float64)
-        begins = "; or a scheme of several steps begins so" if first == 0 else ""
-        cause = f"{but} frame {last} is wrong: {_amount(off, z[last])}{begins}"
-        return cause, "look at how that frame is written"
-    if len(run) == 3 and near(z[first + 2], b @ z[first]):
-        cause = f"{but} frames {first + 1} and {first + 2} have changed places"
-        return cause, "sort the frames by time"
-    begins = ": a solver of several orders or steps begins so" if first == 0 else ""
-    part = "after" if first == 0 else "before"
-    cause = f"{but} not from frame {first} to frame {last + 1}{begins}"
-    return cause, f"look at what happens there, or give the part {part} it"
+    from_, to, at = z[first], z[first + 1], first + 1
+    # as near as the other pairs, or a thousandth of what is missing
+    missing = float(np.max(np.abs(z[last + 1] - b @ z[last])))
+    room = max(4 * float(np.max(e.unit[run])), 1e-3 * missing)
+    off, but = (to - b @ from_).astype(np.float64), f"The motion is one{whose}, but"
+    amount, begins = _amount(off, to), "; or a scheme of several steps begins so" * (first == 0)
+    known = {"whose": whose, "but": but, "at": at, "last": last, "amount": amount, "begins": begins}
+    of_map = powers(b, 1 + max(power for _, power, _, _ in FOLLOWING))
+    for pairs, power, cause, remedy in FOLLOWING:
+        if len(run) == pairs and np.max(np.abs(z[first + min(pairs, 2)] - of_map[power] @ from_)) <= room:
+            return cause.format(**known), remedy
+    if len(run) > 1:
+        part, so = ("before", "") if first else ("after", ": a solver of several orders or steps begins so")
+        cause = f"{but} not from frame {first} to frame {last + 1}{so}"
+        return cause, f"look at what happens there, or give the part {part} it"
+    back = np.linalg.lstsq(b.astype(np.float64), off)[0]
+    if first == 0:
+        box = f" positions wrapped into a box of {abs(back[0]) * float(found.size[0]):.6g},"
+        box = box if abs(back[0]) > max(np.ptp(z[1:, 0]), 1e2 * abs(back[1])) else ""
+        return (
+            f"{but} frame 0 does not belong to it: a wrong start,{box} a scheme with memory, whose force "
+            "or velocity is that of the step before, or a solver that begins with steps of its own",
+            "look at how the start is set and recorded, or leave frame 0 out",
+        )
+    if at == len(z) - 1:
+        return f"{but} frame {at}, the last, is wrong: {amount}", "look at how the last frame is written"
+    # a kick leaves the position of a motion of one map to rounding, and another run's start is only near
+    still = LARGER * max(float(np.max(e.unit[run])), float(np.max(found.residual)))
+    for kick, later in ((back, False), (off, True)):
+        if abs(kick[0]) < min(1e-2 * abs(kick[1]), still):
+            return _kicked(e, found, np.array([x[0] for x in runs]), later, whose, fitting)
+    size = max(float(np.max(np.abs(back))), 1e-16)
+    jumps = f"The motion{whose} jumps by {size:.1e} of its size between frames {first} and {at}, as"
+    if (digits := round(-math.log10(size))) < 1:
+        return f"{jumps} where another run begins", "give each run a file of its own"
+    restart = f"after a restart from numbers of {count(digits, 'digit')}"
+    return f"{jumps} {restart}", "write restarts in full precision"
 
 
 def _kicked(
