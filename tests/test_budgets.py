@@ -17,7 +17,7 @@ BUDGETS = {
     ("engines/openmm", "engines/ase", "engines/sundials"): 1284,
     ("engines",): 2836,
     ("driver", "conformance", "doors"): 1193,
-    ("checks",): 5756,
+    ("checks",): 5758,
     ("identify",): 9459,
     ("formats", "store"): 5198,
     ("studies",): 1456,

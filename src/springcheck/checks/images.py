@@ -14,13 +14,13 @@ NEAR_WHOLE = 1e-6
 """Distance of what a step misses from a whole number of boxes, relative to the effect of one, beside twice
 what rounding allows."""
 
-WIDEST = 0.01
+WIDEST_ROOM = 0.01
 """Largest such distance in all: of wider ones any number is near a whole one."""
 
 NO_PART = 1e-3
 """Part of the largest change of an elongation below which another one is rounding."""
 
-FEWEST_STEPS = 10
+FEWEST_OFF = 10
 """Steps off of which multiples of a part of the box are no chance, as they are of one step."""
 
 MOST_SPRINGS = 64
@@ -55,11 +55,13 @@ def found(case: Case) -> str:
     size = np.abs(boxes)
     # of a box of another length each is a multiple of one number, which many steps tell
     least = float(np.min(size[size > NO_PART * np.max(size, initial=0.0)], initial=1.0))
-    many = FEWEST_STEPS <= np.count_nonzero(off) < len(off)
+    many = FEWEST_OFF <= np.count_nonzero(off) < len(off)
     for unit, few_off in ((1.0, 0.5), (least, 0.0)) if many else ((1.0, 0.5),):
         whole = np.rint(boxes / unit)
         near = NEAR_WHOLE * unit + room
-        told = np.all((np.abs(design @ (unit * whole) - steps) <= near) & (near <= WIDEST * unit), axis=0)
+        told = np.all(
+            (np.abs(design @ (unit * whole) - steps) <= near) & (near <= WIDEST_ROOM * unit), axis=0
+        )
         which = np.flatnonzero(np.any(whole[:, told] != 0, axis=1))
         if len(which) and np.mean(~told) <= few_off:
             share = f"{unit:.6g} times " if unit != 1 else ""

@@ -25,7 +25,7 @@ AS_WIDE = 0.75
 last digits are zeros by chance, and may be left out."""
 COMMENT = ("#", "%", "!", "//")
 """Prefix of a comment, which may name the columns and holds no row of numbers."""
-GRACE = re.compile(r"\s*@\s*(?:xaxis\s+label|s\d+\s+legend)\s+(\".*\")")
+GRACE_NAME = re.compile(r"\s*@\s*(?:xaxis\s+label|s\d+\s+legend)\s+(\".*\")")
 """Line of a Grace file (.xvg of GROMACS) that names its next column; others with an @ are its layout."""
 
 
@@ -46,7 +46,7 @@ def read_table(path: Path, columns: list[str], step: float | None) -> States:
             if width == 1 and len(first) == SHOWN:
                 break  # the message is the same, however many follow
             if not width and line.lstrip().startswith("@"):
-                legends += GRACE.findall(line)
+                legends += GRACE_NAME.findall(line)
                 header = [*map(_bare, legends)] or header
                 continue
             cells, is_comment = _cells(line), line.lstrip().startswith(COMMENT)
