@@ -903,3 +903,9 @@ def test_a_table_of_counted_steps_takes_its_time_step_from_the_command(
         comments="",
     )
     assert main(judged) == 0
+
+
+def test_a_grace_file_without_rows_is_told() -> None:
+    Path("x.xvg").write_text('@ s0 legend "q"\n@ nonsense without an end\n')
+    with pytest.raises(StoreError, match="holds no row of numbers"):
+        read_table(Path("x.xvg"), [], None)

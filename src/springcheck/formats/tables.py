@@ -46,8 +46,7 @@ def read_table(path: Path, columns: list[str], step: float | None) -> States:
             if width == 1 and len(first) == SHOWN:
                 break  # the message is the same, however many follow
             if not width and line.lstrip().startswith("@"):
-                legends += GRACE_NAME.findall(line)
-                header = [*map(_bare, legends)] or header
+                legends += map(_bare, GRACE_NAME.findall(line))
                 continue
             cells, is_comment = _cells(line), line.lstrip().startswith(COMMENT)
             row = _numbers(cells)
@@ -78,7 +77,7 @@ def read_table(path: Path, columns: list[str], step: float | None) -> States:
     if not width:
         # a row with some numbers in it was meant to be one
         raise wrong if header and len(bad) < len(header) else StoreError(f"{path}: holds no row of numbers")
-    states = of_rows(path, np.frombuffer(numbers).reshape(-1, width), first, columns, header, step)
+    states = of_rows(path, np.frombuffer(numbers).reshape(-1, width), first, columns, legends or header, step)
     return replace(states, notes=(*states.notes, *([units] if units else [])))
 
 
