@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
-from springcheck.checks import sight
+from springcheck.checks import other
 from springcheck.checks.case import Case
 from springcheck.text.wording import count, few
 
@@ -34,7 +32,8 @@ def found(case: Case) -> str:
     """The cause in one sentence, or "" where nothing is in a box or most steps that are off miss anything but
     whole boxes: linear springs make each of them the same change of every step."""
     scene, run = case.judged, case.trajectory
-    springs = [(i, j) for i, term in enumerate(scene.terms) if term.origin for j in range(len(term))]
+    terms = [(i, term) for i, term in enumerate(scene.terms) if term.origin]
+    springs = [(i, term, *row) for i, term in terms for row in other.single_rows(term, scene.all_places)]
     if scene.box is None or not scene.system.is_linear or not 0 < len(springs) <= MOST_SPRINGS:
         return ""
     missed = np.stack([run.q[1:], run.p[1:]]) - np.stack(case.next_states)
@@ -42,11 +41,9 @@ def found(case: Case) -> str:
     off = ~np.all(np.abs(missed) <= allowed, axis=(0, 2))
     one = np.stack([run.q[:1], run.p[:1]]).astype(np.longdouble)
     right, effects = np.stack(case.step(*one)), []
-    for i, j in springs:
-        term, terms = scene.terms[i], list[Any](scene.terms)
-        terms[i] = term.shifted(-scene.periods[term.particles[0]] * (np.arange(len(term)) == j))
-        other = sight.of_scene(case, scene.derived(terms=tuple(terms)))
-        effects.append((np.stack(other.step(*one)) - right)[:, 0])
+    for i, term, _, here in springs:
+        longer = term.arrays[term.origin] - here * scene.periods[term.particles[0]]
+        effects.append((np.stack(other.with_numbers(case, i, term.origin, longer).step(*one)) - right)[:, 0])
     # of positions, which the force at the start of a step moves, or where it moves none of momenta
     part = 0 if np.any(np.array(effects)[:, 0]) else 1
     of = np.array(effects)[:, part], missed[part, off], 2 * allowed[part, off]
@@ -65,16 +62,9 @@ def found(case: Case) -> str:
         which = np.flatnonzero(np.any(whole[:, told] != 0, axis=1))
         if len(which) and np.mean(~told) <= few_off:
             share = f"{unit:.6g} times " if unit != 1 else ""
-            names = few([_name(case, *springs[i]) for i in which], MOST_TOLD)
+            names = few([f"{springs[i][1].key} of {springs[i][2]}" for i in which], MOST_TOLD)
             return (
                 f"in {np.count_nonzero(told)} of {count(len(told), 'step')} off, elongations are longer or "
                 f"shorter by {share}the box, or several, than to the nearest image: {names}"
             )
     return ""
-
-
-def _name(case: Case, term: int, row: int) -> str:
-    of = case.judged.terms[term]
-    ends = [int(case.scene.all_places[index[row]]) for index in of.particles]
-    who = f"particle{'s' if len(ends) > 1 else ''} {' and '.join(str(x // 3) for x in ends)}"
-    return f"{of.key} of {who} along {'xyz'[ends[0] % 3]}"

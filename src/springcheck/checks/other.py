@@ -19,6 +19,7 @@ from springcheck.checks import sight
 from springcheck.checks.case import Case
 from springcheck.checks.requires import MAP, missing
 from springcheck.physics.arrays import Extended, Floats, Integers
+from springcheck.physics.term import Term
 from springcheck.text.wording import either
 
 VALUE_STEPS = 8
@@ -121,7 +122,7 @@ def _value(case: Case, own: float, size: float, of: Callable[[float], Case]) -> 
     return (x if abs(x) > error else 0.0) if _fits(case, of(x)) else None
 
 
-def _with(case: Case, number: int, field: str, values: Floats) -> Case:
+def with_numbers(case: Case, number: int, field: str, values: Floats) -> Case:
     """The case with other numbers in a field of a term."""
     terms: list[Any] = list(case.judged.terms)
     terms[number] = replace(terms[number], **{field: values})
@@ -176,7 +177,7 @@ def _kinds(case: Case) -> Iterator[Kind]:
             numbers = term.arrays[column.field]
             if numbers.dtype.kind == "f" and column.field != "number":
                 of_axes = alone if term.is_by_axes or place else []
-                other, power = partial(_with, case, number, column.field), -1 if column.inverse else 1
+                other, power = partial(with_numbers, case, number, column.field), -1 if column.inverse else 1
                 yield Kind(name, " of ", numbers, other, least, objects, of_axes, reach, power)
     objects = _objects([((int(place) // 3,), 1) for place in places[:n]])
     for of, way in ((" of ", _heavier), (" that divides the force on ", _quicker)):
@@ -191,6 +192,12 @@ def _objects(of: list[tuple[tuple[int, ...], int]]) -> list[Rows]:
         name = f"particle{'s' if len(ends) > 1 else ''} {' and '.join(ends)}"
         found.append((name, np.array([each == one for each in of])))
     return found
+
+
+def single_rows(term: Term, places: Integers) -> list[Rows]:
+    """Each row of a term by itself, named by its particles, and by its axis where these have several."""
+    objects = _objects(term.objects(places))
+    return [x for x in objects if np.sum(x[1]) == 1] + _alone(objects, places[term.particles[0]])
 
 
 def _alone(objects: list[Rows], places: Integers) -> list[Rows]:
