@@ -30,34 +30,6 @@ def rows_of(path: str) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
-def test_the_table_of_engines_has_the_rows_that_are_said() -> None:
-    rows = rows_of("validation/engines/engines.csv")
-    # programs that are called by a command have one name each
-    names = {
-        row["method"].split(":")[1].split("-")[0]
-        if row["method"].startswith("command:")
-        else row["method"].split(":")[0]
-        for row in rows
-    }
-    thermostats = [row for row in rows if row["thermostat"] != "none"]
-    held = [row for row in rows if row["constraint"] != "none"]
-    space_rows = [row for row in rows if row["axes"].startswith("x, y and z")]
-    boxes = [row for row in space_rows if "periodic box" in row["axes"]]
-    assert f"has {len(rows)} rows of {len(names)} engines, {len(thermostats)} of thermostats" in README
-    assert f"{len(rows)} rows of {len(names)} engines, {len(thermostats)} of them thermostats" in VALIDATION
-    assert f"temperatures and {len(held)} with what they do to a rod" in VALIDATION
-    said = f"{len(space_rows)} of the {len(rows)} rows move in space, {len(boxes)} of these in a box"
-    assert said in VALIDATION
-
-
-def test_the_table_of_schemes_and_the_figure_of_the_census_have_the_same_methods() -> None:
-    part = RAW.partition("| scheme, from the states | methods |")[2].partition("\n\n")[0]
-    methods = [one for row in re.findall(r"^\| .+? \| (.+?) \|", part, re.M) for one in row.split(", ")]
-    methods = [one for one in methods if ":" in one]
-    assert len(set(methods)) == len(methods)
-    assert f"by {len(set(methods)) + 2 + 6} methods of 14 engines, grouped by scheme" in README
-
-
 def test_the_findings_are_as_many_as_are_said() -> None:
     notes = {path.stem for path in (ROOT / "validation/upstream").glob("*.md")} - {"README"}
     shown = README.partition("## What it found")[2].partition("Each has a program")[0]

@@ -104,17 +104,6 @@ def test_the_damped_plane_is_divided_as_theory_says(name: str, need: Need) -> No
         assert 0.1 < np.mean(found.stable) < 0.9
 
 
-def test_an_engine_that_moves_nothing_faster_than_some_speed_is_measured_below_it(need: Need) -> None:
-    """Box2D stops at two lengths a step: its limit was 0, and all that it did against theory."""
-    need("box2d:force")
-    found = regions.measure(engines.parse("box2d:force"), points=6)
-    assert np.isfinite(found.radius).all()
-    assert found.wrong == 0
-    springs = Springs(label=engines.parse("box2d:force"), turn=np.array([1e-9, 1.9, 2.1, 1e6]))
-    inside = propagators.bounded(propagators.measured(springs), propagators.noise(springs.label))
-    assert inside.tolist() == [True, True, False, False]
-
-
 def test_resonances_of_multiple_time_steps_are_those_of_the_exact_matrix(need: Need) -> None:
     need("openmm:mts")
     wanted = np.array(json.loads(REFERENCE.read_text(encoding="utf-8"))["bands"], dtype=np.float64)
@@ -300,16 +289,6 @@ def test_points_at_which_an_engine_stops_are_not_measured_and_those_it_loses_are
     assert (found.off < 1) == (wrong == 0)
 
 
-def test_what_an_engine_does_not_take_of_a_scan_is_said_of_the_scan() -> None:
-    engine = engines.parse("box2d:distance-joint")
-    if engines.absence("box2d"):
-        pytest.skip("needs Box2D")
-    said = propagators.absence(engine, limits.FIRST_H_W, limits.LAST_H_W)
-    assert said is not None
-    assert said.startswith("springs of h w = 1e-09 to 1e+06")
-    assert "units" not in said
-
-
 def test_of_joined_masses_with_unlike_friction_the_weakest_decay_sets_explicit_euler_s_limit() -> None:
     m, k, c = np.array([2.3, 0.071]), np.array([1.7, 5.3, 0.0]), np.array([0.31, 0.0])
     scene = builders.chain(2, m, k)
@@ -395,15 +374,6 @@ def test_a_method_that_does_not_start_the_scene_is_left_out_with_its_reason(need
     (left,) = study.left_out
     assert left.method == "openmm:verlet"
     assert "a program's spring pulls alike along every axis" in left.reason
-
-
-def test_a_method_that_refuses_springs_of_the_scan_is_left_out_with_its_reason(need: Need) -> None:
-    """One of them ended the study of `--method 'box2d:*'`."""
-    need("box2d:distance-joint")
-    scene = scenes.load_scene("spring")
-    study = stability.record(scene, None, ["own:velocity-verlet", "box2d:distance-joint"])
-    assert [x.method for x in study.limits] == ["own:velocity-verlet"]
-    assert "a joint's length of" in study.left_out[0].reason
 
 
 def test_what_is_left_out_is_named_once() -> None:

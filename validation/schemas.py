@@ -50,7 +50,6 @@ WAYS = {
     ),
     "judge": ("judge table.csv --scene spring-uneven --scheme velocity-verlet",),
     "list": ("list",),
-    "census": ("census --method own:euler --method own:rk4 -o census.h5",),
     "sampling": ("sampling --method own:baoab -o sampling.h5",),
     "stability": ("stability spring --method own:euler -o stability.h5",),
     "precision": (

@@ -18,7 +18,6 @@ EXAMPLES: Mapping[str, Sequence[str]] = {
     "precision": ("spring --budget 20 --method own:rk4",),
     "stability": ("spring", "multiple-time-steps --method 'openmm:*'"),
     "extremes": ("--quick",),
-    "census": ("--method 'own:*' --against old.json",),
     "sampling": ("--method 'own:*' --method 'openmm:*'",),
     "inspect": ("spring.h5 --verdicts", "spring.h5 --trajectory own:euler --rows 5"),
     "plot": ("spring.h5 -o figures", "orbit.csv"),
@@ -37,10 +36,8 @@ EXAMPLES: Mapping[str, Sequence[str]] = {
 
 
 GROUPS: Mapping[str, Sequence[str]] = {
-    "input": ("file", "files", "label", "word", "shell", "--trajectory", "--columns", "--from",
-              "--against"),
-    "scene": ("scene", "--scene", "--step", "--steps", "--set", "--temperature", "--friction", "--seed",
-              "--thermostats"),
+    "input": ("file", "files", "label", "word", "shell", "--trajectory", "--columns", "--from"),
+    "scene": ("scene", "--scene", "--step", "--steps", "--set", "--temperature", "--friction", "--seed"),
     "methods": (
         "--method", "--all", "--engine", "--stepper", "--command", "--scheme", "--timeout", "--fault",
     ),

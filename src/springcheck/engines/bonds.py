@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from typing import TypeAlias
 
 import numpy as np
@@ -126,17 +126,6 @@ def without_push(rods: Rods, q: Floats, p: Floats, reach: Floats, row: int) -> F
             row, "no push along its rods leads to the next step, and momenta have lost their digits"
         )
     return np.asarray(projected, np.float64)
-
-
-@np.errstate(over="ignore")
-def within(label: Label, sizes: Iterable[tuple[float, str, float, float]]) -> None:
-    """MethodError where a number (least, its name, number, most) is none that an engine computes with."""
-    for lowest, what, size, highest in sizes:
-        if not lowest <= size <= highest:
-            raise MethodError(
-                f"{label}: a {what} of {size:.3g} is outside what it computes with, {lowest:.3g} to "
-                f"{highest:.3g}; the scene in other units, its numbers nearer to 1, is inside"
-            )
 
 
 def cells(scene: Scene, origins: Floats) -> Floats:
@@ -275,22 +264,3 @@ def hinges(scene: Scene, label: Label) -> Iterator[tuple[int, float, tuple[float
         away = inertia / (2 * pull) if pull else 0.0
         mass = pull / away if pull else 1.0
         yield i, mass, (away * np.cos(angle), -away * np.sin(angle), 0.0), inertia / 2 if pull else inertia
-
-
-def walls(scene: Scene, label: Label) -> Iterator[tuple[int, float, float]]:
-    """Particle, stiffness [M/T2] and rest position [L] of each wall spring, for joints that have one spring.
-
-    Springs of stiffness 0 are left out: their joints would be rigid.  Raises MethodError where a particle has
-    two, or a stiffness is negative.
-    """
-    taken: set[int] = set()
-    for term in scene.terms:
-        if isinstance(term, WallSpring):
-            for i, k, at in term.rows():
-                if i in taken or k < 0:
-                    raise MethodError(
-                        f"{label}: a joint has one spring, of stiffness 0 or more; particle {i}"
-                    )
-                taken.add(i)
-                if k:
-                    yield i, k, at
