@@ -244,11 +244,7 @@ def _thermostat(name: str) -> Iterator[str]:
     if scheme.carried:
         yield "  the first draw xi_1 of a step is the last of the step before"
     if scheme.rescales:
-        yield "No linear map: " + (
-            "the chain's own state is carried along those of the motion, and predicts each of them"
-            if scheme.chain
-            else "kinetic energies are noncentral chi-squared, whose ranks are judged"
-        )
+        yield "No linear map: kinetic energies are noncentral chi-squared, whose ranks are judged"
         return
     turn, x = SHOWN
     of = Law(scheme=scheme, h=turn, m=np.ones(1), k=np.ones(1), rate=x / turn, thermal=1.0)

@@ -54,9 +54,6 @@ DRIVEN = frozenset({"drive", "modulated-spring"})
 FIELD = frozenset({"magnetic"})
 """The term of a method whose force may turn velocities."""
 
-NO_NUMBERS = "none: a chain is deterministic"
-"""The generator of a thermostat whose bath is deterministic."""
-
 BRAKES = frozenset({"van-der-pol"})
 """The term of a method whose friction may depend on the position."""
 
