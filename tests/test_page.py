@@ -484,9 +484,7 @@ def test_every_scheme_of_one_particle_is_computed_again(
     content = page.gather(tmp_path / "a.h5")
     found, said = _checked(opened(content))
     assert found == "equal", said
-    # the length of its steps is a rule's, and its error is not that of a tolerance
-    left = {x["label"] for x in content.data["runs"] if x["scheme"] == "variable-verlet"}
-    assert said.partition("not computed again here: ")[2] == ", ".join(left)
+    assert "not computed again" not in said
     # a shift of a thousandth is seen in every one of them, in most a far smaller one
     runs = json.loads(json.dumps(content.data["runs"]))
     for run in runs:
@@ -496,7 +494,7 @@ def test_every_scheme_of_one_particle_is_computed_again(
     unseen = {
         x["label"] for x in runs if not re.search(rf"{re.escape(x['label'])} (differs first|is not) ", said)
     }
-    assert unseen == left
+    assert not unseen
 
 
 def test_counts_and_verdicts_that_were_changed_are_told(
