@@ -308,7 +308,7 @@ def test_a_long_run_is_thinned_and_says_so(tmp_path: Path) -> None:
 # studies
 
 
-NAMES = ("precision", "stability", "extremes", "census", "ensemble", "faults", "sampling")
+NAMES = ("precision", "stability", "extremes", "census", "faults", "sampling")
 FEW = tuple(fault for fault in FAULTS if fault.name in {"friction", "cut-off"})
 
 
@@ -323,7 +323,6 @@ def studies(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
         "extremes": ["extremes", "--quick", "--method", "own:semi-implicit-euler"],
         "census": ["census", *methods],
         "sampling": ["sampling", "--method", "own:baoab"],
-        "ensemble": ["ensemble", "spring", "--vary", "time.step=0.01:1:5:log", *methods],
     }
     for name, call in calls.items():
         with pytest.MonkeyPatch.context() as patch:

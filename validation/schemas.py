@@ -58,10 +58,6 @@ WAYS = {
     ),
     "extremes": ("extremes --quick --method own:euler --method own:implicit-euler -o extremes.h5",),
     "faults": ("faults --workers 1",),
-    "ensemble": (
-        "ensemble spring --vary spring.0.stiffness=1:2:3 --method own:euler -o ensemble.h5",
-        "run spring --vary spring.0.stiffness=1:2:3 --method own:euler -o vary.h5",
-    ),
     "doctor": ("doctor",),
 }
 """What is run of each command; `table.csv` is half a drift, `run.h5` the store of the first."""
