@@ -42,7 +42,6 @@ RIGHT: tuple[tuple[str, dict[str, float]], ...] = (
     ("ase:langevin", {"thermal": 1e-60}),
     ("ase:langevin-baoab", {"thermal": 1e-60}),
     ("ase:bussi", {"x": 1e-13}),
-    ("openmm:variable-langevin", {"thermal": 1e74}),
     ("ase:andersen", {"thermal": 1e-60}),
     *((f"lammps:gjf-{number}", {"x": x}) for number in range(1, 9) for x in (1e-10, 1e-3)),
     ("lammps:gjf-4-half", {"x": 0.01}),

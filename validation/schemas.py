@@ -32,15 +32,14 @@ FOLDER = Path(__file__).parents[1] / "data" / "schemas"
 
 WAYS = {
     "run": (
-        "run spring --method own:euler --method own:rk4 --method openmm:variable-verlet "
-        "--set time.tolerance=1e-3 -o run.h5",
+        "run spring --method own:euler --method own:rk4 -o run.h5",
         "run spring-uneven --method own:euler -o f.h5 --fault stiffness",
         "run --from run.h5",
     ),
     "inspect": (
         "inspect run.h5",
         "inspect run.h5 --verdicts",
-        "inspect run.h5 --trajectory openmm:variable-verlet",
+        "inspect run.h5 --trajectory own:rk4",
     ),
     "identify": (
         "identify run.h5",
@@ -59,10 +58,6 @@ WAYS = {
     ),
     "extremes": ("extremes --quick --method own:euler --method own:implicit-euler -o extremes.h5",),
     "faults": ("faults --workers 1",),
-    "ensemble": (
-        "ensemble spring --vary spring.0.stiffness=1:2:3 --method own:euler -o ensemble.h5",
-        "run spring --vary spring.0.stiffness=1:2:3 --method own:euler -o vary.h5",
-    ),
     "doctor": ("doctor",),
 }
 """What is run of each command; `table.csv` is half a drift, `run.h5` the store of the first."""
