@@ -49,7 +49,7 @@ def scenes(name: str) -> Scene:
     return replace(load_scene("rigid-triangle"), steps=60, step=0.03, bath=bath, quantities=("q", "p"))
 
 
-@pytest.mark.campaign("label")
+@pytest.mark.campaign
 @pytest.mark.parametrize("name", ["dumbbell", "triangle"])
 @pytest.mark.parametrize("label", LABELS)
 def test_right_engines_pass(label: str, name: str, need: Callable[[str], None]) -> None:
@@ -89,7 +89,7 @@ def right(name: str) -> tuple[Scene, Trajectory]:
     return scene, driver.run(scene, "own:baoab", seed=3)
 
 
-@pytest.mark.campaign("how")
+@pytest.mark.campaign
 @pytest.mark.parametrize(
     ("how", "seen"),
     [("velocity along a rod", "rod-velocity"), ("length", "rod-length"), ("swapped", "start"),
