@@ -241,7 +241,7 @@ def test_openmms_langevin_integrator_is_the_middle_one_bit_for_bit() -> None:
 
 @pytest.mark.parametrize("label", ["scipy:rk45", "scipy:radau", "sundials:adams"])
 def test_a_solver_that_would_take_hours_between_two_outputs_is_refused(label: str) -> None:
-    """A cell of an ensemble at a stiffness of 1e308 went on for ever."""
+    """A stiffness of 1e308 went on for ever."""
     fast = load_scene("spring").derived(m=np.array([1e-300]))
     with pytest.raises(MethodError, match=r"which takes .* internal steps or more, some [0-9.e+]+ hours"):
         run(fast, label)

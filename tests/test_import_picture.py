@@ -27,7 +27,7 @@ STUDIES = sorted(path.parent.name for path in HOME.glob("studies/*/__init__.py")
 HOMES = {
     "h5py": ("store",),
     "matplotlib": ("plot.py", "cli/drawing.py", "figures"),
-    "openmm": tuple(f"engines/openmm/{name}.py" for name in ("simulation", "thermostats", "variable")),
+    "openmm": tuple(f"engines/openmm/{name}.py" for name in ("simulation", "thermostats")),
     "ase": ("engines/ase/simulation.py", "formats/libraries.py"),
     "sksundae": ("engines/sundials/simulation.py",),
     "numba": ("engines/own",),

@@ -308,7 +308,7 @@ def test_a_long_run_is_thinned_and_says_so(tmp_path: Path) -> None:
 # studies
 
 
-NAMES = ("precision", "stability", "extremes", "census", "ensemble", "faults", "sampling")
+NAMES = ("precision", "stability", "extremes", "census", "faults", "sampling")
 FEW = tuple(fault for fault in FAULTS if fault.name in {"friction", "cut-off"})
 
 
@@ -323,7 +323,6 @@ def studies(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
         "extremes": ["extremes", "--quick", "--method", "own:semi-implicit-euler"],
         "census": ["census", *methods],
         "sampling": ["sampling", "--method", "own:baoab"],
-        "ensemble": ["ensemble", "spring", "--vary", "time.step=0.01:1:5:log", *methods],
     }
     for name, call in calls.items():
         with pytest.MonkeyPatch.context() as patch:
@@ -484,9 +483,7 @@ def test_every_scheme_of_one_particle_is_computed_again(
     content = page.gather(tmp_path / "a.h5")
     found, said = _checked(opened(content))
     assert found == "equal", said
-    # the length of its steps is a rule's, and its error is not that of a tolerance
-    left = {x["label"] for x in content.data["runs"] if x["scheme"] == "variable-verlet"}
-    assert said.partition("not computed again here: ")[2] == ", ".join(left)
+    assert "not computed again" not in said
     # a shift of a thousandth is seen in every one of them, in most a far smaller one
     runs = json.loads(json.dumps(content.data["runs"]))
     for run in runs:
@@ -496,7 +493,7 @@ def test_every_scheme_of_one_particle_is_computed_again(
     unseen = {
         x["label"] for x in runs if not re.search(rf"{re.escape(x['label'])} (differs first|is not) ", said)
     }
-    assert unseen == left
+    assert not unseen
 
 
 def test_counts_and_verdicts_that_were_changed_are_told(

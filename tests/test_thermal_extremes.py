@@ -47,7 +47,6 @@ RIGHT: tuple[tuple[str, dict[str, float]], ...] = (
     ("openmm:nose-hoover-bath", {"thermal": 1e-200}),
     ("openmm:nose-hoover-bath", {"thermal": 1e-40}),
     ("openmm:nose-hoover-bath", {"thermal": 3e-8}),
-    ("openmm:variable-langevin", {"thermal": 1e74}),
     ("ase:andersen", {"thermal": 1e-60}),
     *((f"lammps:gjf-{number}", {"x": x}) for number in range(1, 9) for x in (1e-10, 1e-3)),
     ("lammps:gjf-4-half", {"x": 0.01}),

@@ -414,7 +414,7 @@ def test_a_bath_that_makes_no_sense_is_one_line(text: str) -> None:
         (["--temperature", "300K", "--method", "openmm:verlet"],
          "the thermostats of OpenMM are openmm:langevin-middle-bath, "),
         (["--temperature", "0K", "--seed", "3"], "at 0 K there is none, and nothing is drawn"),
-        (["--seed", "3"], "--seed goes with --vary, or with a scene that has a bath"),
+        (["--seed", "3"], "--seed goes with a scene that has a bath"),
         (["--temperature", "1", "--seed", "0"], "seed = 0: a whole number from 1"),
         (["--friction", "2"], "--friction goes with --temperature"),
     ],

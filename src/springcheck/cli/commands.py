@@ -61,11 +61,8 @@ def _plot(options: Namespace) -> int:
     doubts = output.doubts(options.file) if ours else []
     with output.warned(options.file, doubts):
         if ours and options.trajectory is None:
-            chosen = {name: getattr(options, name) for name in ("particle", "quantity", "over")}
-            written, notes = drawing.draw(path, into, **chosen)
+            written, notes = drawing.draw(path, into, particle=options.particle)
         else:
-            if options.quantity or options.over:
-                raise SpringcheckError(f"{path}: --quantity and --over go with the store of an ensemble")
             which = {"columns": _columns(options), "step": options.step, "trajectory": options.trajectory}
             written, notes = drawing.draw_foreign(path, into, particle=options.particle, **which)
     if not options.quiet:
@@ -283,11 +280,6 @@ COMMANDS = (
         argument("-o", "--output", metavar="FOLDER", help="default: figures/ and the store's name"),
         argument("--particle", type=int, metavar="I",
                  help="the motion of this particle alone, from 0 on (default: of all)"),
-        argument("--quantity", metavar="NAME",
-                  help="of an ensemble: max_error, energy_drift, q0, p0, steps or outcome "
-                  "(default: error and energy)"),
-        argument("--over", metavar="FIELD[,FIELD]",
-                  help="of an ensemble: over which of the fields that were varied"),
         _NAMES,
         _STEPS,
         _GROUP,

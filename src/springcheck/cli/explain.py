@@ -43,7 +43,6 @@ WORDS = {
     "SHAKE": "impulses along rods as they lay before a drift bring their lengths back after it",
     "RATTLE": "SHAKE, and a step ends with momenta without their parts along rods: velocity Verlet with rods",
     "SETTLE": "the impulses of SHAKE and RATTLE for a rigid triangle, in closed form",
-    "ensemble": "many runs of a scene with numbers varied: `springcheck run SCENE --vary FIELD=A:B:N`",
 }
 """Terms of the field and of springcheck, each with its meaning."""
 

@@ -112,8 +112,7 @@ class Simulation(Protocol):
     """A started engine.  It advances and does nothing else: the driver records, times and judges.
 
     An engine in three dimensions may have an attribute `off_axis`, the largest |coordinate| that it has seen
-    along axes that the scene leaves out; one that chooses its steps by a rule an attribute `last_steps` (f,),
-    the lengths of those that ended at the rows which `advance` has filled last.
+    along axes that the scene leaves out.
     """
 
     @property

@@ -123,8 +123,6 @@ def laws(names: Iterable[str]) -> dict[str, Any]:
     """Schemes by name, as their stages or their tableau in doubles; "exact" for exact and adaptive ones."""
     known, found = schemes.known(), dict[str, Any]()
     for scheme in (known[name] for name in names if name in known):
-        if scheme.rule is not None:
-            continue  # its error is that of its rule, not of a tolerance of each step
         if scheme.has("flow") or scheme.has("adaptive"):
             found[scheme.name] = "exact"
         elif scheme.stages and {kind for kind, _ in scheme.stages} <= STAGES:

@@ -16,10 +16,6 @@ BOLTZMANN = 1.380649e-23 * 6.02214076e23 / 1000
 """kT of a kelvin [kJ/mol] as OpenMM has it."""
 
 
-LOOSE = 1e300
-"""A tolerance so large that it allows every step."""
-
-
 def thermostat(scene: Scene, name: str, step: float, seed: int, system: mm.System) -> mm.Integrator:
     """An integrator with noise of this seed, at the thermal energy of the scene."""
     assert scene.bath is not None
@@ -39,10 +35,6 @@ def thermostat(scene: Scene, name: str, step: float, seed: int, system: mm.Syste
     elif name.startswith("mts-langevin-"):
         groups = [(0, 1), (1, int(name.rpartition("-")[2]))]
         noise = made = mm.MTSLangevinIntegrator(temperature, rate, step, groups)
-    elif name == "variable-langevin":
-        noise = made = mm.VariableLangevinIntegrator(temperature, rate, LOOSE)
-        made.setStepSize(step)
-        made.setMaximumStepSize(step)
     else:
         kind = mm.LangevinIntegrator if name == "langevin-bath" else mm.LangevinMiddleIntegrator
         noise = made = kind(temperature, rate, step)
