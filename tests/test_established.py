@@ -39,7 +39,7 @@ def failed(scene: Scene, made: Trajectory) -> list[str]:
 SCENES = ("spring", "spring-uneven", "chain", "anharmonic", "overdamped")
 
 
-@pytest.mark.campaign("label", "name")
+@pytest.mark.campaign
 @pytest.mark.parametrize("label", LABELS)
 @pytest.mark.parametrize("name", SCENES)
 def test_each_attachment_passes_every_verdict_of_its_scheme(label: str, name: str, need: Need) -> None:

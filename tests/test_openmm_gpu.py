@@ -55,7 +55,7 @@ def failed(scene: Scene, run: Trajectory) -> dict[str, str]:
     return {v.check: v.why for v in checks.judge(scene, run) if v.passed is False}
 
 
-@pytest.mark.campaign("mode", "method")
+@pytest.mark.campaign
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("method", SCHEMES)
 @pytest.mark.parametrize("name", ["spring", "spring-uneven"])

@@ -54,7 +54,7 @@ def run(name: str, steps: int, seed: int = 3) -> tuple[np.ndarray, np.ndarray, n
         ("vanden-eijnden-ciccotti", "vanden-eijnden-ciccotti"),
     ],
 )  # fmt: skip
-@pytest.mark.campaign("name")
+@pytest.mark.campaign
 @pytest.mark.parametrize("seed", [3, 4])
 def test_a_thousand_frames_name_the_scheme_or_list_it_among_those_that_share_its_states(
     name: str, expected: str, seed: int

@@ -254,15 +254,6 @@ def _doctor(options: Namespace) -> int:
     return output.answer(options, lambda: found, lambda: doctor.lines(found), status)
 
 
-def _completion(options: Namespace) -> int:
-    from springcheck.cli import completing
-    from springcheck.studies import STUDIES
-
-    known = {one.name: one.arguments for one in STUDIES} | {one.name: one.arguments for one in COMMANDS}
-    print(completing.script(options.shell, known))
-    return 0
-
-
 FORMATS = (
     "H5MD, HDF5, NPY, .xlsx, NPZ, Parquet, Feather, MATLAB .mat, JSON, LAMMPS dump, LAMMPS log, DCD, GROMACS "
     ".xtc, .trr, .gro, Amber NetCDF, ASE .traj, extended .xyz, .xyz, Octave text, text tables; texts also "
@@ -342,8 +333,5 @@ COMMANDS = (
     )),
     Command("list", "scenes, engines with their versions, checks", _list, (JSON, ENGINE)),
     Command("doctor", "what this installation can do, and what is missing", _doctor, (JSON,)),
-    Command("completion", "a script that completes commands in your shell", _completion, (
-        argument("shell", choices=("bash", "zsh"), help="put its lines where your shell begins"),
-    )),
 )  # fmt: skip
 """Every command that is no study, in the order of `--help`."""

@@ -31,13 +31,12 @@ EXAMPLES: Mapping[str, Sequence[str]] = {
     "export": ("spring.h5 own:euler out.h5md",),
     "list": ("",),
     "doctor": ("",),
-    "completion": ("bash",),
 }
 """Examples of each command, without its name: the help prints them, and a test parses them."""
 
 
 GROUPS: Mapping[str, Sequence[str]] = {
-    "input": ("file", "files", "label", "word", "shell", "--trajectory", "--columns", "--from",
+    "input": ("file", "files", "label", "word", "--trajectory", "--columns", "--from",
               "--against"),
     "scene": ("scene", "--scene", "--step", "--steps", "--set", "--temperature", "--friction", "--seed",
               "--thermostats"),
