@@ -55,7 +55,7 @@ def radius(maps: Reals, rounding: float) -> tuple[Floats, Floats]:
 
 
 def grows(maps: Reals, rounding: float) -> np.ndarray:
-    """Whether powers of each map are unbounded beyond the rounding of its entries; also of non-finite ones."""
+    """Whether powers of each map are unbounded beyond the rounding of its entries, or not finite."""
     found, moved = radius(maps, rounding)
     return np.asarray(~(found <= 1 + np.where(np.isfinite(moved), np.minimum(moved, 1), 0)))
 

@@ -35,4 +35,6 @@ def banks(study: Stability) -> list[Bank]:
         curves=[*lines.values(), *marks], rules=rules,
     ))  # fmt: skip
     heading = f"Stable up to h \N{GREEK SMALL LETTER OMEGA}: {study.said.replace('up to ', '')}"
-    return [Bank(name="stability", title="Schemes (lines) and methods (marks)", heading=heading, charts=[chart])]
+    return [
+        Bank(name="stability", title="Schemes (lines) and methods (marks)", heading=heading, charts=[chart])
+    ]

@@ -135,11 +135,17 @@ class Stability(Studied):
             plain(f"Stable on a spring: {self.said}"),
             *resumed(self.resumed, "measurement"),
             plain(),
-            table(("method", "limit of h w", "in theory", f"largest step{f' ({t_unit})' * bool(t_unit)}"), rows),
+            table(
+                ("method", "limit of h w", "in theory", f"largest step{f' ({t_unit})' * bool(t_unit)}"), rows
+            ),
             plain(),
             plain(f"The scene's step h = {scene.step:g} has {h_w}."),
             plain(warned, "bold yellow" if beyond else ""),
-            *([] if scene.system.is_linear else [plain("Largest steps are those of small oscillations.", "dim")]),
+            *(
+                []
+                if scene.system.is_linear
+                else [plain("Largest steps are those of small oscillations.", "dim")]
+            ),
             *(plain(line, "bold red") for line in self.failures),
             *left_out(self.left_out),
         ]
