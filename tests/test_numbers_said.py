@@ -11,10 +11,9 @@ from pathlib import Path
 
 import pytest
 
-import constraints
 from documented import ROOT, words_of
 from springcheck.cli import main
-from springcheck.studies.faults import heat, measure, rigid, space, table
+from springcheck.studies.faults import heat, measure, space, table
 from springcheck.thermal import THERMOSTATS
 
 Need = Callable[[str], None]
@@ -40,12 +39,10 @@ def test_the_table_of_engines_has_the_rows_that_are_said() -> None:
         for row in rows
     }
     thermostats = [row for row in rows if row["thermostat"] != "none"]
-    held = [row for row in rows if row["constraint"] != "none"]
     space_rows = [row for row in rows if row["axes"].startswith("x, y and z")]
     boxes = [row for row in space_rows if "periodic box" in row["axes"]]
     assert f"has {len(rows)} rows of {len(names)} engines, {len(thermostats)} of thermostats" in README
     assert f"{len(rows)} rows of {len(names)} engines, {len(thermostats)} of them thermostats" in VALIDATION
-    assert f"temperatures and {len(held)} with what they do to a rod" in VALIDATION
     said = f"{len(space_rows)} of the {len(rows)} rows move in space, {len(boxes)} of these in a box"
     assert said in VALIDATION
 
@@ -72,7 +69,6 @@ def test_the_faults_are_as_many_as_are_said() -> None:
     for said in (
         f"breaks engines on purpose, {len(table.FAULTS)} of them",
         f"{baths} thermostats broken on purpose",
-        f"{len(rigid.RIGID)} faults (SHAKE along the rod",
     ):
         assert said in VALIDATION, said
     words = {5: "five", 7: "seven", 8: "eight", 10: "ten"}
@@ -80,7 +76,6 @@ def test_the_faults_are_as_many_as_are_said() -> None:
         (space.DRIVES, "unit or amplitude are {} faults"),
         (space.FIELDS, "{} faults (the other sign"),
         (space.BOX, "fail step-defect and closed-form, as do {} faults"),
-        (heat.RODS_IN_BATHS, "{} faults (the last projection left out"),
     ):
         word = words[len(part)]
         assert said.format(word) in VALIDATION or said.format(word.capitalize()) in VALIDATION, said
@@ -129,24 +124,6 @@ def test_the_parts_of_sums_make_their_sums() -> None:
     assert cells
     assert int(cells.group(1).replace(",", "")) == 6427 + 2025 + 2145 + 5
     assert "6427 right, 2025 unstable as theory says, 2145 at an engine's limit, 5 not measured" in VALIDATION
-
-
-def test_the_table_of_rods_is_that_of_the_data() -> None:
-    kept = rows_of(str(constraints.TABLE.relative_to(ROOT)))
-    part = RAW.partition("| engine | tolerance | length |")[2].partition("\n\n")[0]
-    said = re.findall(r"^\| (.+?) \| (.+?) \| (.+?) \| (.+?) \| (.+?) \| (.+?) \|$", part, re.M)
-    assert len(said) >= 8
-    for name, tolerance, *numbers in said:
-        asked = "rounding" if tolerance == "closed form" else f"{float(tolerance):.0e}"
-        found = [
-            [float(row[column]) for column in ("length", "turn", "step", "angular momentum")]
-            for row in kept
-            if row["h w"] == "0.15"
-            and row["tolerance"] == asked
-            and name.lower().startswith(row["engine"])
-            and (row["rods"] == "triangle") == ("triangle" in name)
-        ]
-        assert [float(number) for number in numbers] in found, name
 
 
 def test_the_readme_shows_what_the_first_command_prints(

@@ -21,7 +21,6 @@ from documented import words_of
 from springcheck import checks, driver, engines
 from springcheck.cli import file, main
 from springcheck.engines import Label
-from springcheck.engines.contract import Need
 from springcheck.engines.own import thermal as own_thermal
 from springcheck.errors import MethodError, SceneError, SpringcheckError
 from springcheck.physics import scenefile
@@ -41,9 +40,7 @@ LABELS = [
     f"{name}:{method}"
     for name in ("own", "openmm", "ase", "lammps")
     for method, declared in engines.engine(name).thermostats.items()
-    if Need.RODS not in declared.requires
 ]
-"""Those for rods have tests of their own."""
 
 
 def pair(steps: int = 400, step: float = 0.35) -> Scene:

@@ -34,11 +34,8 @@ def reading(case: Case) -> Reading:
 
 
 def thermostat(case: Case) -> Thermostat:
-    """The thermostat of a case.  MethodError where it is not known how it holds rods."""
-    scheme = THERMOSTATS[case.trajectory.scheme]
-    if case.judged.system.rods and not scheme.held:
-        raise MethodError(f"no stages of {scheme.title} with rods are known")
-    return scheme
+    """The thermostat of a case."""
+    return THERMOSTATS[case.trajectory.scheme]
 
 
 def _reading(case: Case) -> Reading:
@@ -48,8 +45,8 @@ def _reading(case: Case) -> Reading:
 def read_frames(case: Case, q: Floats, p: Floats, *, scheme: Thermostat | None = None) -> Reading:
     """The draws behind other frames q, p (f, n) of the case's scene, by its scheme or another."""
     run, scheme = case.trajectory, scheme or thermostat(case)
-    by = thermal.rigid.read if case.judged.system.rods else thermal.draws.read
-    return by(scheme, case.judged, q, p, how=run.arithmetic, rebuilt=run.rebuilds_velocity)
+    how, rebuilt = run.arithmetic, run.rebuilds_velocity
+    return thermal.draws.read(scheme, case.judged, q, p, how=how, rebuilt=rebuilt)
 
 
 def _unread(case: Case) -> int:
@@ -118,7 +115,7 @@ def _draws(case: Case) -> Floats:
         summed = case.judged.system.is_linear and case.scene.n <= thermal.jointly.MOST_JOINTLY
         raise MethodError(HIDDEN if scheme.fresh < 3 or summed else NOT_SUMMED)
     x = found.draws
-    if scheme.uniform and not case.scene.system.rods:
+    if scheme.uniform:
         x = thermal.draws.normal_scores(x)
     if np.count_nonzero(~np.isnan(x)) < 2:
         raise MethodError("there were no draws")
@@ -145,13 +142,11 @@ def draws_variance(case: Case) -> Chance:
 
 
 @check("shape", family="noise", requires={"every-step"})
-def draws_shape(case: Case) -> Chance | str:
+def draws_shape(case: Case) -> Chance:
     """The draws have the tails and the symmetry of their distribution, as fourth and third moment show.
 
     Judged by these Legendre polynomials of their ranks, which no single draw decides.
     """
-    if case.scene.system.rods and THERMOSTATS[case.trajectory.scheme].uniform:
-        return "a rod mixes uniform draws of its ends, and the tails of such sums are others"
     return Chance.of(thermal.chance.shape(_drawn(case)))
 
 
@@ -195,14 +190,12 @@ def draws_particles(case: Case) -> Chance | str:
 
 
 @check("state", family="noise", requires={"every-step"})
-def draws_state(case: Case) -> Chance | str:
+def draws_state(case: Case) -> Chance:
     """The draws of a step and their sizes say nothing of the state before: drag, forces, noise are right.
 
     A drag that is not that of the noise, a wrong force, or noise by place leaves a part of it in each draw.
     """
     x, hits = _draws(case), reading(case).hits
-    if case.scene.system.rods:
-        return "a rod turns the draws of its ends"
     scene, unread = case.judged, _unread(case)
     q, p = (y[unread:-1] for y in (case.trajectory.q, case.trajectory.p))
     known = [p / np.sqrt(scene.m * scene.thermal)]

@@ -40,9 +40,6 @@ WORDS = {
     "ulp": "unit in the last place: the distance of neighbouring numbers, 2**-52 of one between 1 and 2",
     "energy norm": "the size of a difference of states: the root of its energy, over that of the start or, "
     "of a start without any, of what it may gain",
-    "SHAKE": "impulses along rods as they lay before a drift bring their lengths back after it",
-    "RATTLE": "SHAKE, and a step ends with momenta without their parts along rods: velocity Verlet with rods",
-    "SETTLE": "the impulses of SHAKE and RATTLE for a rigid triangle, in closed form",
     "ensemble": "many runs of a scene with numbers varied: `springcheck run SCENE --vary FIELD=A:B:N`",
 }
 """Terms of the field and of springcheck, each with its meaning."""
@@ -237,10 +234,6 @@ def _thermostat(name: str) -> Iterator[str]:
         yield f"  {_act(act, scheme.draws)}"
     if any(callable(act.part) for act in scheme.acts):
         yield f"  with the numbers of x = gamma h = {SHOWN[1]}"
-    if scheme.held:
-        letters = {"kick": "B", "drift": "A", "exchange": "O"}
-        held = ", ".join(letters.get(act.kind, act.kind) for act in scheme.held)
-        yield f"  with rods: {held} (shake brings back lengths, project what moves ends apart)"
     if scheme.carried:
         yield "  the first draw xi_1 of a step is the last of the step before"
     if scheme.rescales:

@@ -12,11 +12,11 @@ from springcheck import schemes
 from springcheck.thermal.catalogue import THERMOSTATS, Thermostat
 
 if TYPE_CHECKING:
-    from springcheck.thermal import chance, draws, jointly, rigid, rounding
+    from springcheck.thermal import chance, draws, jointly, rounding
     from springcheck.thermal.laws import Law
     from springcheck.thermal.stepper import Stepper
 
-__all__ = ["THERMOSTATS", "Law", "Stepper", "Thermostat", "chance", "draws", "jointly", "rigid", "rounding"]
+__all__ = ["THERMOSTATS", "Law", "Stepper", "Thermostat", "chance", "draws", "jointly", "rounding"]
 
 _LATER = {"Law": "laws", "Stepper": "stepper"} | {x: x for x in __all__ if x.islower()}
 """Names that no run without a bath needs, and the modules that they are imported from on first use."""

@@ -4,21 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 
 from springcheck.physics.arrays import Force, Reals
-from springcheck.physics.rods import Rods
 from springcheck.physics.scene import Scene
 from springcheck.physics.system import System
 from springcheck.physics.term import Term
 from springcheck.thermal.catalogue import Thermostat, value_of
 from springcheck.thermal.decays import Decay
-
-Met: TypeAlias = tuple[Reals | None, Reals, Reals]
-"""What rods meet: where a drift began that they end, None where none did; and the state, its momenta not yet
-projected."""
 
 
 def forces(
@@ -37,9 +32,9 @@ class Stepper:
 
     `rate` is the friction rate gamma [1/T], > 0; `thermal` is kT [M L2/T2].  A chain swings on from step to
     step, at rest before the first, beside so many `freedoms`, one for each mass by default; with `single` it
-    keeps its step and its rate so, and its weights are `real`.  Rods `hold` where the scheme says so.  With
-    `absolute` every difference is taken as a sum of sizes: a unit roundoff of these, times the roundings of a
-    step, bounds its rounding.
+    keeps its step and its rate so, and its weights are `real`.  With `absolute`
+    every difference is taken as a sum of sizes: a unit roundoff of these, times the roundings of a step,
+    bounds its rounding.
     """
 
     @classmethod
@@ -48,12 +43,12 @@ class Stepper:
         assert scene.bath is not None
         return cls(
             scheme, h=scene.step, m=scene.m, rate=scene.bath.friction, thermal=scene.thermal, width=width,
-            freedoms=scheme.freedoms(scene.n, scene.particles), hold=scene.system.rods, **more,
+            freedoms=scheme.freedoms(scene.n, scene.particles), **more,
         )  # fmt: skip
 
     def __init__(
         self, scheme: Thermostat, *, h: float, m: Reals, rate: Reals | float, thermal: float, width: Any,
-        absolute: bool = False, freedoms: int = 0, hold: Rods | None = None, single: bool = False,
+        absolute: bool = False, freedoms: int = 0, single: bool = False,
         real: Any = np.float64,
     ) -> None:  # fmt: skip
         self.scheme, self.h, self.m = scheme, width(h), np.asarray(m, width)
@@ -65,17 +60,15 @@ class Stepper:
             Q = scheme.chain.masses(freedoms, width(thermal), kept(rate))
             self.of_chain = {"freedoms": freedoms, "thermal": width(thermal), "Q": Q}
             self.chain, self._swing = chain.start().astype(width), chain.swing
-        self._hold, acts = hold, scheme.held if hold else scheme.acts
         x = np.asarray(self.h * width(rate), width)
         self.collision = np.asarray(-np.expm1(-x), np.float64)[()]
         size = np.sqrt(self.m * width(thermal))
         shot = np.sqrt(2 * x) * size
         sizes = {"noise": shot, "jump": self.h * (shot / self.m), "drift": self.h, "creep": self.h * self.h}
-        sizes["shake"] = self.h
-        moves = [act.kind in ("drift", "jump", "creep") for act in acts]
+        moves = [act.kind in ("drift", "jump", "creep") for act in scheme.acts]
         self._moved = len(moves) - moves[::-1].index(True)
         self._acts, self._sign = [], 1 if absolute else -1
-        for kind, part, number in acts:
+        for kind, part, number in scheme.acts:
             c = value_of(part, x)
             lost = part.lost(x) if isinstance(part, Decay) else 1 - c
             noise = np.sqrt(lost * part.both(x)) * size if isinstance(part, Decay) else size
@@ -87,17 +80,14 @@ class Stepper:
 
     def __call__(
         self, q: Reals, p: Reals, force: Any, draws: Sequence[Any], hit: Any = None, end: Reals | None = None,
-        met: list[Met] | None = None, loose: tuple[float, float] = (0.0, 0.0),
     ) -> tuple[Reals, Reals]:  # fmt: skip
         """One step from (q, p), each (..., n), by what `forces` gives.
 
         `draws` are `scheme.draws` arrays of the shape of q; `hit` is the mask of collisions, or the factor
         of all momenta, otherwise computed from the draws.  A force after the last drift is evaluated at
-        `end`, if given: draws of other particles act there.  `met` collects the states at which rods
-        project; a step of absolute values reads them, with the tolerances `loose` of `Rods.sizes`.
+        `end`, if given: draws of other particles act there.
         """
-        m, h, last, q_old, held = self.m, self.h, p, q, q
-        way = iter(met or ())
+        m, h, last, q_old = self.m, self.h, p, q
         for i, (kind, c, noise, number) in enumerate(self._acts):
             if kind == "drift":
                 q = q + c * (p / m)
@@ -124,18 +114,6 @@ class Stepper:
                 p = p * np.expand_dims(factor, -1)
             elif kind in ("rescale", "scale", "chain"):
                 p = p * (self._factor(p, c, noise, draws[number], kind == "rescale") if hit is None else hit)
-            elif kind in ("shake", "project"):
-                assert self._hold is not None
-                if self._sign > 0:
-                    ends = loose if i == len(self._acts) - 1 else (loose[0], 0.0)
-                    q, p = self._hold.sizes(*next(way), c, (q, p), ends)
-                    continue
-                if kind == "shake":
-                    q, p = self._hold.drifted(held, q, p, c)
-                if met is not None:
-                    met.append((held if kind == "shake" else None, q, p))
-                held = q
-                p = self._hold.projected(q, p) if kind == "project" else p
             elif kind == "rebuild":
                 p = m * ((q + self._sign * q_old) / h)
             else:

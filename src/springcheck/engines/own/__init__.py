@@ -14,7 +14,6 @@ from springcheck.engines.contract import (
     EVERY_POTENTIAL,
     FIELD,
     NO_NUMBERS,
-    RODS,
     SPRINGS,
     Engine,
     Method,
@@ -50,10 +49,8 @@ def _requires(scheme: Scheme) -> frozenset[Need]:
 def _terms(scheme: Scheme) -> frozenset[str]:
     if scheme.has("implicit"):
         return SPRINGS | BRAKES | {"damping"}
-    # rods hold after every stage of a splitting
-    rods = RODS if scheme.has("symplectic", "splitting") else frozenset()
     # to kicks by all forces, and to a tableau, a field is a force like any other
-    return EVERY_FORCE | rods | (FIELD | BRAKES if scheme.has("plain") or scheme.b else frozenset())
+    return EVERY_FORCE | (FIELD | BRAKES if scheme.has("plain") or scheme.b else frozenset())
 
 
 def _method(scheme: Scheme) -> Method:
@@ -87,8 +84,7 @@ ENGINE = Engine(
         *(
             thermostat(
                 one.name, one.name, one.title, "NumPy, PCG64" if one.draws else NO_NUMBERS,
-                EVERY_POTENTIAL | (RODS if one.held else frozenset()),
-                scripted=one.draws > 0, kinds=EVERY_KIND, default=one.name in BY_DEFAULT,
+                EVERY_POTENTIAL, scripted=one.draws > 0, kinds=EVERY_KIND, default=one.name in BY_DEFAULT,
             )
             for one in THERMOSTATS.values()
         )
