@@ -11,6 +11,9 @@ import pytest
 
 import springcheck
 from springcheck import checks, driver, schemes
+from springcheck.bath import THERMOSTATS, chance
+from springcheck.bath.catalogue import HALF, Act
+from springcheck.bath.draws import Reading
 from springcheck.checks import Case, causes
 from springcheck.engines import Arithmetic
 from springcheck.identify import files
@@ -27,9 +30,6 @@ from springcheck.studies.faults import baths
 from springcheck.studies.faults.rigid import Once
 from springcheck.studies.faults.seeded import Case as Broken
 from springcheck.studies.faults.table import FAULTS
-from springcheck.thermal import THERMOSTATS, chance
-from springcheck.thermal.catalogue import HALF, Act
-from springcheck.thermal.draws import Reading
 
 STAGES = {name: one.acts for name, one in THERMOSTATS.items()}
 

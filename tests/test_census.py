@@ -17,6 +17,7 @@ import census as by_hand
 import claims
 import engines_table
 from springcheck import driver, engines
+from springcheck.bath import THERMOSTATS
 from springcheck.cli import main
 from springcheck.engines.own import thermal
 from springcheck.errors import SpringcheckError, StoreError
@@ -29,7 +30,6 @@ from springcheck.studies.census.limit import _of_states, first_limit
 from springcheck.studies.census.page import banks
 from springcheck.studies.census.result import ENTRIES, Entry
 from springcheck.studies.team import Processes
-from springcheck.thermal import THERMOSTATS
 
 OWN = ("own:euler", "own:semi-implicit-euler", "own:implicit-euler")
 

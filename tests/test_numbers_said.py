@@ -13,9 +13,9 @@ import pytest
 
 import constraints
 from documented import ROOT, words_of
+from springcheck.bath import THERMOSTATS
 from springcheck.cli import main
 from springcheck.studies.faults import heat, measure, rigid, space, table
-from springcheck.thermal import THERMOSTATS
 
 Need = Callable[[str], None]
 README, VALIDATION, UPSTREAM, CHANGES = (

@@ -9,6 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from springcheck.bath import THERMOSTATS, Stepper, Thermostat, chance
+from springcheck.bath.catalogue import NO_NORMAL_NUMBERS
+from springcheck.bath.draws import LARGEST_DRAW, law_of, read
+from springcheck.bath.rounding import one_rounding, roundings_of
+from springcheck.bath.stepper import Met, forces
 from springcheck.checks.case import Case, small_move
 from springcheck.checks.check import Chance, Finding, check
 from springcheck.checks.thermal import HIDDEN, reading
@@ -16,11 +21,6 @@ from springcheck.errors import MethodError
 from springcheck.physics.arrays import Extended, Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory
-from springcheck.thermal import THERMOSTATS, Stepper, Thermostat, chance
-from springcheck.thermal.catalogue import NO_NORMAL_NUMBERS
-from springcheck.thermal.draws import LARGEST_DRAW, law_of, read
-from springcheck.thermal.rounding import one_rounding, roundings_of
-from springcheck.thermal.stepper import Met, forces
 
 FEW = 8
 """Number of particles up to which each is perturbed by itself."""

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from springcheck import checks, engines, schemes
+from springcheck.bath import THERMOSTATS, Law
+from springcheck.bath.catalogue import Act
 from springcheck.checks.seeds import SEEDED
 from springcheck.errors import SpringcheckError
 from springcheck.physics import terms
@@ -19,8 +21,6 @@ from springcheck.schemes import Scheme
 from springcheck.studies.faults.seeded import Fault
 from springcheck.studies.faults.table import FAULTS
 from springcheck.text.wording import described
-from springcheck.thermal import THERMOSTATS, Law
-from springcheck.thermal.catalogue import Act
 
 if TYPE_CHECKING:
     from springcheck.identify.meanings import Meaning

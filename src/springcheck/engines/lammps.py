@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 
+from springcheck.bath.decays import GJ
 from springcheck.engines import bonds
 from springcheck.engines.contract import (
     DRIVEN,
@@ -41,7 +42,6 @@ from springcheck.physics.driven import timed
 from springcheck.physics.scene import Scene
 from springcheck.physics.term import Term
 from springcheck.physics.terms import Spring, WallSpring
-from springcheck.thermal.decays import GJ
 
 INNER = 8
 """Steps of the fast springs in one of r-RESPA, as its scheme has them."""

@@ -6,6 +6,7 @@ scene's `include` or by `--method`.
 
 from __future__ import annotations
 
+from springcheck.bath import THERMOSTATS
 from springcheck.engines.contract import (
     BRAKES,
     DRIVEN,
@@ -24,7 +25,6 @@ from springcheck.engines.contract import (
     thermostat,
 )
 from springcheck.schemes import ATTACHED, SCHEMES, Scheme
-from springcheck.thermal import THERMOSTATS
 
 NAMES = {"explicit-euler": "euler"}
 """Methods whose names differ from their scheme's."""

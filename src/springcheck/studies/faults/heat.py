@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from springcheck.bath import THERMOSTATS
+from springcheck.bath.catalogue import HALF, ONE, PROJECT, Act
 from springcheck.studies.faults.baths import Each, by, forgetting, heavy, of_rank, played, row
 from springcheck.studies.faults.rigid import Late, alike, solved
 from springcheck.studies.faults.seeded import Fault, each
-from springcheck.thermal import THERMOSTATS
-from springcheck.thermal.catalogue import HALF, ONE, PROJECT, Act
 
 _DIRECTION, _MATRIX, _MAP = ("noise-direction",), ("noise-matrix",), ("noise-map",)
 _VARIANCE, _SHAPE, _SCALE = ("draws-variance",), ("draws-shape",), ("draws-variance", "noise-size")

@@ -14,13 +14,13 @@ from typing import Any
 
 import numpy as np
 
+from springcheck.bath import residuals
+from springcheck.bath.catalogue import THERMOSTATS
+from springcheck.bath.collisions import between_collisions, changed, is_a_factor
+from springcheck.bath.decays import GJ
+from springcheck.bath.likelihood import ODDS, Candidate, likely, likely_apart
+from springcheck.bath.residuals import is_white, regressed, unlike_normal
 from springcheck.physics.arrays import Floats
-from springcheck.thermal import residuals
-from springcheck.thermal.catalogue import THERMOSTATS
-from springcheck.thermal.collisions import between_collisions, changed, is_a_factor
-from springcheck.thermal.decays import GJ
-from springcheck.thermal.likelihood import ODDS, Candidate, likely, likely_apart
-from springcheck.thermal.residuals import is_white, regressed, unlike_normal
 
 NOISE = 1e-3
 """Smallest noise of a step, relative to the motion, that is not taken for a file's rounding: that of gamma h

@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from springcheck.bath.catalogue import ENERGY_LEFT, Thermostat
+from springcheck.bath.jointly import jointly
+from springcheck.bath.laws import Law
+from springcheck.bath.rounding import one_rounding, roundings_of
+from springcheck.bath.stepper import Stepper, forces
 from springcheck.physics.arrays import Arithmetic, Extended, Floats, Reals
 from springcheck.physics.scene import Scene
-from springcheck.thermal.catalogue import ENERGY_LEFT, Thermostat
-from springcheck.thermal.jointly import jointly
-from springcheck.thermal.laws import Law
-from springcheck.thermal.rounding import one_rounding, roundings_of
-from springcheck.thermal.stepper import Stepper, forces
 
 HOTTEST = 1e4
 """Noncentrality of a chi-squared distribution up to which its rank is computed to all digits."""

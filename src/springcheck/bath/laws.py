@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
+from springcheck.bath.catalogue import Thermostat
+from springcheck.bath.stepper import Stepper
 from springcheck.physics.arrays import ROUNDOFF, Extended, Floats, Reals
-from springcheck.thermal.catalogue import Thermostat
-from springcheck.thermal.stepper import Stepper
 
 UNKNOWN_FROM = 1e-6
 """Relative error from which on a covariance is not reported."""

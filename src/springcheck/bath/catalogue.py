@@ -23,8 +23,8 @@ from typing import Any, ClassVar, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 
+from springcheck.bath.decays import GJ, MOST_FRICTION, Decay, decay
 from springcheck.schemes import Scheme
-from springcheck.thermal.decays import GJ, MOST_FRICTION, Decay, decay
 
 Part: TypeAlias = Fraction | Callable[[Any], Any]
 """A fraction of the step, or a function of x = gamma h."""

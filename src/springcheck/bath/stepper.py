@@ -7,13 +7,13 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from springcheck.bath.catalogue import Thermostat, value_of
+from springcheck.bath.decays import Decay
 from springcheck.physics.arrays import Force, Reals
 from springcheck.physics.rods import Rods
 from springcheck.physics.scene import Scene
 from springcheck.physics.system import System
 from springcheck.physics.term import Term
-from springcheck.thermal.catalogue import Thermostat, value_of
-from springcheck.thermal.decays import Decay
 
 Met: TypeAlias = tuple[Reals | None, Reals, Reals]
 """What rods meet: where a drift began that they end, None where none did; and the state, its momenta not yet

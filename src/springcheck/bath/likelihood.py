@@ -14,9 +14,9 @@ from math import inf, nan
 
 import numpy as np
 
+from springcheck.bath.catalogue import THERMOSTATS, Thermostat
+from springcheck.bath.laws import Law
 from springcheck.physics.arrays import Floats
-from springcheck.thermal.catalogue import THERMOSTATS, Thermostat
-from springcheck.thermal.laws import Law
 
 ODDS = float(np.log(1e6))
 """Log-likelihood ratio [nats] by which one scheme must exceed every other to be named."""

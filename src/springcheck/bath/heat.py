@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from springcheck.bath.catalogue import THERMOSTATS
+from springcheck.bath.laws import Law
 from springcheck.physics.arrays import Floats, Reals
 from springcheck.physics.rods import Rods
 from springcheck.physics.scene import Scene
 from springcheck.physics.system import MOST_DENSE
 from springcheck.physics.trajectory import Trajectory
-from springcheck.thermal.catalogue import THERMOSTATS
-from springcheck.thermal.laws import Law
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
