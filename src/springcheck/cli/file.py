@@ -106,7 +106,7 @@ def judge(
         run = replace(run, rebuilds_velocity=True)
         notes += ("velocities are differences of positions, as was said, and judged so",)
     if arithmetic is not None:
-        how = engines.arithmetic(engines.parse(arithmetic), found.units)
+        how = engines.arithmetic(engines.parse(arithmetic))
         state, written = max(how.state, run.arithmetic.state), run.arithmetic.written
         run = replace(run, arithmetic=replace(how, state=state, written=written))
         notes += (f"judged by the arithmetic of {arithmetic}, as was said: {str(how) or 'double'}",)

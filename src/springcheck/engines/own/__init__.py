@@ -6,6 +6,7 @@ scene's `include` or by `--method`.
 
 from __future__ import annotations
 
+from springcheck.bath import THERMOSTATS
 from springcheck.engines.contract import (
     BRAKES,
     DRIVEN,
@@ -13,7 +14,6 @@ from springcheck.engines.contract import (
     EVERY_KIND,
     EVERY_POTENTIAL,
     FIELD,
-    NO_NUMBERS,
     SPRINGS,
     Engine,
     Method,
@@ -24,7 +24,6 @@ from springcheck.engines.contract import (
     thermostat,
 )
 from springcheck.schemes import ATTACHED, SCHEMES, Scheme
-from springcheck.thermal import THERMOSTATS
 
 NAMES = {"explicit-euler": "euler"}
 """Methods whose names differ from their scheme's."""
@@ -83,8 +82,8 @@ ENGINE = Engine(
     thermostats=named(
         *(
             thermostat(
-                one.name, one.name, one.title, "NumPy, PCG64" if one.draws else NO_NUMBERS,
-                EVERY_POTENTIAL, scripted=one.draws > 0, kinds=EVERY_KIND, default=one.name in BY_DEFAULT,
+                one.name, one.name, one.title, "NumPy, PCG64", EVERY_POTENTIAL, scripted=True,
+                kinds=EVERY_KIND, default=one.name in BY_DEFAULT,
             )
             for one in THERMOSTATS.values()
         )

@@ -26,7 +26,6 @@ from springcheck.studies.faults.seeded import (
 )
 from springcheck.studies.faults.space import AXES, BOX, DRIVES, FIELDS
 from springcheck.studies.faults.steppers import State, Step, energies, record, textbook, trajectory
-from springcheck.studies.faults.varying import VARYING
 
 STEP = ("step-defect", "propagator")
 MOTION = ("step-defect", "closed-form", "frequency", "propagator")
@@ -290,5 +289,5 @@ ADAPTIVE = (
 
 FAULTS: tuple[Fault, ...] = (
     *PARAMETERS, *FORCES, *STEPS, *ARITHMETIC, *REPORTS, *AXES, *BOX, *DRIVES, *FIELDS, *ADAPTIVE,
-    *VARYING, *OF_NOISE, *THERMAL_STEPS,
+    *OF_NOISE, *THERMAL_STEPS,
 )  # fmt: skip
