@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from springcheck import checks, engines, schemes
+from springcheck.bath import THERMOSTATS
 from springcheck.cli import explain, main
 from springcheck.errors import SpringcheckError
 from springcheck.identify.meanings import MEANINGS
 from springcheck.physics import scenefile, terms
 from springcheck.studies.faults.seeded import Fault
 from springcheck.studies.faults.table import FAULTS
-from springcheck.thermal import THERMOSTATS
 
 
 @pytest.mark.parametrize("check", checks.ALL, ids=lambda check: check.name)

@@ -669,9 +669,3 @@ def test_energies_beyond_double_precision_are_drawn_without_a_warning() -> None:
     scene = scenefile.load_scene("multiple-time-steps")
     found = runs(scene, "own:velocity-verlet")
     assert of_runs(scene, found, found)
-
-
-def test_members_of_a_family_have_titles_of_their_own() -> None:
-    family = [looks.title(f"baoab-respa{count}") for count in (2, 3, 4)]
-    assert len({*family}) == 3
-    assert looks.title("boaob") == "BOAOB"

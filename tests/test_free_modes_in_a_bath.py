@@ -10,9 +10,9 @@ import pytest
 
 import springcheck
 from springcheck import driver
+from springcheck.bath.heat import bound_freedoms, heated_of
 from springcheck.physics.scene import Scene
 from springcheck.physics.scenefile import parse
-from springcheck.thermal.heat import bound_freedoms, heated_of
 
 THREE = """
 title = "three free masses, two springs"

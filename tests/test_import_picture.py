@@ -17,7 +17,7 @@ import house
 from house import HOME, imports, modules, room
 
 ROWS = [
-    "interrupts", "errors", "physics", "schemes", "thermal", "engines",
+    "interrupts", "errors", "physics", "schemes", "bath", "engines",
     "store", "formats", "text", "driver", "checks", "identify", "conformance",
     "doors", "figures", "plot", "studies", "cli", "api", "__main__",
 ]  # fmt: skip
@@ -100,8 +100,8 @@ def test_a_run_without_a_bath_imports_no_law_of_noise(tmp_path: Path) -> None:
     lines = ["run", "spring", "--steps", "5", "--method", "own:euler", "-o", str(tmp_path / "a.h5")]
     script = f"import sys\nfrom springcheck.cli import main\nmain({lines})\nprint(*sys.modules, sep='\\n')"
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-    loaded = {name for name in done.stdout.splitlines() if name.startswith("springcheck.thermal.")}
-    assert loaded == {f"springcheck.thermal.{name}" for name in ("catalogue", "chain", "decays")}
+    loaded = {name for name in done.stdout.splitlines() if name.startswith("springcheck.bath.")}
+    assert loaded == {f"springcheck.bath.{name}" for name in ("catalogue", "decays")}
 
 
 def test_the_keeper_alone_of_the_studies_knows_the_store() -> None:

@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 
 from springcheck import checks, driver, engines
+from springcheck.bath import THERMOSTATS
 from springcheck.engines import Engine, Label
 from springcheck.errors import MethodError, SpringcheckError
 from springcheck.physics.arrays import Floats
@@ -32,7 +33,6 @@ from springcheck.physics.scene import Scene
 from springcheck.physics.scenefile import load_scene
 from springcheck.physics.terms import Damping, Quartic, Spring, WallSpring
 from springcheck.physics.trajectory import Trajectory
-from springcheck.thermal import THERMOSTATS
 
 __all__ = ["Check", "assert_right", "checks_of", "parametrize_with_checks", "uneven_scenes"]
 

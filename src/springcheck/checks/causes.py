@@ -11,6 +11,9 @@ from math import comb
 
 import numpy as np
 
+from springcheck.bath import THERMOSTATS, chance
+from springcheck.bath.catalogue import ENERGY_LEFT
+from springcheck.bath.draws import Reading, law_of
 from springcheck.checks import driven, held, images, other, stages
 from springcheck.checks.case import Case
 from springcheck.checks.check import FALSE_ALARMS
@@ -19,9 +22,6 @@ from springcheck.checks.steps import STANDS_APART, seldom_off, step_defect
 from springcheck.checks.thermal import noise_direction, read_frames, reading, rows_a_step, thermostat
 from springcheck.physics.arrays import Floats
 from springcheck.text.wording import regularly
-from springcheck.thermal import THERMOSTATS, chance
-from springcheck.thermal.catalogue import ENERGY_LEFT
-from springcheck.thermal.draws import Reading, law_of
 
 STANDARD_ERRORS = 6.0
 """Standard errors by which a size differs from another: a chance of 2e-9 for normal numbers."""
@@ -103,7 +103,7 @@ def _off(case: Case, p: Floats | None = None) -> Floats:
         return np.asarray(np.max(off, axis=(0, 2)) / case.roundings, np.float64)
     bath, seen, every = thermostat(case), reading(case), 1
     if p is not None:
-        if bath.carried or bath.chain:
+        if bath.carried:
             # what these carry on is that of their own states
             return found + np.inf
         # each end beside its start, so that every other step is one of these

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from springcheck import schemes, thermal
+from springcheck import bath as baths
+from springcheck import schemes
+from springcheck.bath import THERMOSTATS
+from springcheck.bath.catalogue import PROJECT
 from springcheck.checks.case import Case
 from springcheck.checks.check import Finding, check, largest
 from springcheck.checks.requires import MAP, missing
@@ -13,8 +16,6 @@ from springcheck.physics.exact.closedform import PI
 from springcheck.physics.rods import START_TOLERANCE, Rods
 from springcheck.physics.trajectory import Limits
 from springcheck.text.wording import count
-from springcheck.thermal import THERMOSTATS
-from springcheck.thermal.catalogue import PROJECT
 
 
 def _rods(case: Case) -> Rods:
@@ -33,7 +34,7 @@ def rod_length(case: Case) -> Finding:
     rods, how = _rods(case), case.trajectory.arithmetic
     q = case.trajectory.q[1:].astype(np.longdouble)
     heated = case.law.has("random")
-    roundings = thermal.rounding.roundings_of(thermostat(case), case.judged) if heated else case.roundings
+    roundings = baths.rounding.roundings_of(thermostat(case), case.judged) if heated else case.roundings
     off = np.abs(rods.strain(q))
     half = how.recorded(case.judged.m, case.trajectory.step, rebuilt=False)[0]
     bound = roundings * how.state * (1 + rods.magnitude(q)) + how.lengths + rods.spans(half) / rods.length

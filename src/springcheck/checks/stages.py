@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from springcheck.bath import Thermostat
+from springcheck.bath.decays import Decay
 from springcheck.checks.case import Case
 from springcheck.checks.thermal import collisions, noise_direction, read_frames, reading, thermostat
-from springcheck.thermal import Thermostat
-from springcheck.thermal.decays import Decay
 
 ROUNDINGS_OF_A_SUM = 4
 """Rounding errors of draws, added up, by which a sum of draws departs from 0 at most."""

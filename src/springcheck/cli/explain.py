@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from springcheck import checks, engines, schemes
+from springcheck.bath import THERMOSTATS, Law
+from springcheck.bath.catalogue import Act
 from springcheck.checks.seeds import SEEDED
 from springcheck.errors import SpringcheckError
 from springcheck.physics import terms
@@ -19,8 +21,6 @@ from springcheck.schemes import Scheme
 from springcheck.studies.faults.seeded import Fault
 from springcheck.studies.faults.table import FAULTS
 from springcheck.text.wording import described
-from springcheck.thermal import THERMOSTATS, Law
-from springcheck.thermal.catalogue import Act
 
 if TYPE_CHECKING:
     from springcheck.identify.meanings import Meaning
@@ -224,11 +224,7 @@ def _thermostat(name: str) -> Iterator[str]:
     if scheme.carried:
         yield "  the first draw xi_1 of a step is the last of the step before"
     if scheme.rescales:
-        yield "No linear map: " + (
-            "the chain's own state is carried along those of the motion, and predicts each of them"
-            if scheme.chain
-            else "kinetic energies are noncentral chi-squared, whose ranks are judged"
-        )
+        yield "No linear map: kinetic energies are noncentral chi-squared, whose ranks are judged"
         return
     turn, x = SHOWN
     of = Law(scheme=scheme, h=turn, m=np.ones(1), k=np.ones(1), rate=x / turn, thermal=1.0)

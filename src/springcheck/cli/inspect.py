@@ -7,13 +7,13 @@ from collections.abc import Iterator
 from typing import Any
 
 from springcheck import engines, schemes, store
+from springcheck.bath import THERMOSTATS
 from springcheck.figures.views import Units, units, with_unit
 from springcheck.physics.trajectory import Trajectory
 from springcheck.studies import STUDIES, keeper
 from springcheck.studies.study import Study, StudyResult
 from springcheck.text.lines import Lines, TextTable, plain, table
 from springcheck.text.wording import ordinal
-from springcheck.thermal import THERMOSTATS
 
 
 def held(summary: store.Summary) -> Iterator[tuple[Study, StudyResult]]:

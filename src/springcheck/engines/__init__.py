@@ -17,6 +17,7 @@ from functools import cache, partial
 from typing import Any, TypeVar
 
 from springcheck import schemes
+from springcheck.bath import THERMOSTATS
 from springcheck.engines.contract import (
     ANY_POTENTIAL,
     BRAKES,
@@ -48,7 +49,6 @@ from springcheck.engines.registry import (
 from springcheck.errors import MOST_LIKELY, MethodError, nearest, told
 from springcheck.physics.arrays import Arithmetic, Floats
 from springcheck.physics.scene import Scene
-from springcheck.thermal import THERMOSTATS
 
 __all__ = [
     "ANY_POTENTIAL", "BRAKES", "UNNAMED", "DRIVEN", "EVERY_FORCE", "EVERY_POTENTIAL", "OURS", "Arithmetic",

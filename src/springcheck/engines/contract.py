@@ -54,9 +54,6 @@ DRIVEN = frozenset({"drive", "modulated-spring"})
 FIELD = frozenset({"magnetic"})
 """The term of a method whose force may turn velocities."""
 
-NO_NUMBERS = "none: a chain is deterministic"
-"""The generator of a thermostat whose bath is deterministic."""
-
 BRAKES = frozenset({"van-der-pol"})
 """The term of a method whose friction may depend on the position."""
 
@@ -161,7 +158,7 @@ class Engine:
     convention: Callable[[Method], str] = lambda method: "synchronised"
     """How the library stores velocities, as a phrase for the report."""
     thermostats: Mapping[str, Method] = field(default_factory=dict)
-    """Random methods by name, for scenes with a bath; their schemes are those of `springcheck.thermal`."""
+    """Random methods by name, for scenes with a bath; their schemes are those of `springcheck.bath`."""
     distribution: str = ""
     """Its library's name on the package index, or "" where it needs none."""
     module: str = ""

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from springcheck import formats, schemes, store
+from springcheck.bath import THERMOSTATS
 from springcheck.errors import IdentificationError, MethodError, SpringcheckError, StoreError
 from springcheck.formats import columns as columns_of
 from springcheck.identify.laws import COUPLED
@@ -23,7 +24,6 @@ from springcheck.physics import scenefile as scenes
 from springcheck.physics.arrays import Floats, Integers
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory
-from springcheck.thermal import THERMOSTATS
 
 MOST_FRAMES = 20_000
 """Most frames that are identified, from the first on: every step shows the scheme."""

@@ -59,7 +59,7 @@ class Scheme:
     convergence: Fraction | None = None
     """Power of the tolerance with which an adaptive solver's error falls, on a smooth motion."""
     thermostat: ClassVar[bool] = False
-    """Whether it has noise, and a step that `springcheck.thermal` carries out."""
+    """Whether it has noise, and a step that `springcheck.bath` carries out."""
     source: str = ""
     unnamed: bool = False
     """It stands for a step, fixed or not, whose scheme nobody has named."""

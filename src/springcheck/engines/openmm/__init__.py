@@ -9,7 +9,6 @@ from springcheck.engines.contract import (
     DRIVEN,
     EVERY_POTENTIAL,
     FIELD,
-    NO_NUMBERS,
     RODS,
     Engine,
     Need,
@@ -101,21 +100,8 @@ ENGINE = Engine(
             note="on GPU platforms it collides at most 2/pi as often as asked",
         ),
         _drawn(
-            "nose-hoover-bath", "nose-hoover-middle", "NoseHooverIntegrator, as it stores velocities",
-            generator=NO_NUMBERS, default=False,
-            note="it counts three degrees of freedom for each particle, whatever moves it",
-        ),
-        _drawn(
             "mts-langevin", "baoab", "MTSLangevinIntegrator, one group of forces once a step",
             default=False, rebuilds_velocity=False,
-        ),
-        *(
-            _drawn(
-                f"mts-langevin-{n}", f"baoab-respa{n}",
-                f"MTSLangevinIntegrator, fast springs {n} times a step", default=False,
-                rebuilds_velocity=False,
-            )
-            for n in (2, 3, 4)
         ),
     ),
     atlas=tuple(f"verlet@{place}" for place in ("CPU", "OpenCL-single", "OpenCL-mixed", "OpenCL-double")),

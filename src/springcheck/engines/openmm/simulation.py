@@ -65,7 +65,7 @@ SHIFTED = frozenset(
 """Methods whose stored velocity is half a kick behind the position, and is synchronised here."""
 
 
-FAST_STEPS = {"mts": 8} | {f"mts-langevin-{n}": n for n in (2, 3, 4)}
+FAST_STEPS = {"mts": 8}
 """Evaluations of the fast springs in a step, beside one of the others, by method."""
 
 CUSTOM_STAGES = {

@@ -6,6 +6,7 @@ scene's `include` or by `--method`.
 
 from __future__ import annotations
 
+from springcheck.bath import THERMOSTATS
 from springcheck.engines.contract import (
     BRAKES,
     DRIVEN,
@@ -13,7 +14,6 @@ from springcheck.engines.contract import (
     EVERY_KIND,
     EVERY_POTENTIAL,
     FIELD,
-    NO_NUMBERS,
     RODS,
     SPRINGS,
     Engine,
@@ -25,7 +25,6 @@ from springcheck.engines.contract import (
     thermostat,
 )
 from springcheck.schemes import ATTACHED, SCHEMES, Scheme
-from springcheck.thermal import THERMOSTATS
 
 NAMES = {"explicit-euler": "euler"}
 """Methods whose names differ from their scheme's."""
@@ -86,9 +85,9 @@ ENGINE = Engine(
     thermostats=named(
         *(
             thermostat(
-                one.name, one.name, one.title, "NumPy, PCG64" if one.draws else NO_NUMBERS,
+                one.name, one.name, one.title, "NumPy, PCG64",
                 EVERY_POTENTIAL | (RODS if one.held else frozenset()),
-                scripted=one.draws > 0, kinds=EVERY_KIND, default=one.name in BY_DEFAULT,
+                scripted=True, kinds=EVERY_KIND, default=one.name in BY_DEFAULT,
             )
             for one in THERMOSTATS.values()
         )

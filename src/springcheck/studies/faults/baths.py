@@ -10,6 +10,9 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from springcheck import checks
+from springcheck.bath import THERMOSTATS, Stepper
+from springcheck.bath.catalogue import Act
+from springcheck.bath.stepper import forces
 from springcheck.checks.seeds import SEEDED, Seeded
 from springcheck.errors import MethodError
 from springcheck.physics.arrays import Floats, Force
@@ -21,9 +24,6 @@ from springcheck.physics.terms import WallSpring
 from springcheck.physics.trajectory import Trajectory
 from springcheck.studies.faults.seeded import Case, Fault
 from springcheck.studies.faults.steppers import State, record
-from springcheck.thermal import THERMOSTATS, Stepper
-from springcheck.thermal.catalogue import Act
-from springcheck.thermal.stepper import forces
 
 Draws: TypeAlias = Callable[[Sequence[Floats]], Any]
 """Correct draws so far, each (n,), the last one due -> the draw that is used in place of the last."""
@@ -67,7 +67,6 @@ def played(
     stepper = Stepper(
         replace(of, uniform=claims.uniform), h=scene.step * h, m=scene.m * m, rate=scene.bath.friction * rate,
         thermal=scene.thermal * thermal, width=np.float64,
-        freedoms=claims.freedoms(scene.n, scene.particles),
         hold=hold or scene.system.rods,
     )  # fmt: skip
     # a scripted generator replaces every other

@@ -24,8 +24,8 @@ from springcheck.text.lines import Lines, Text, hanging, plain
 from springcheck.text.wording import count, few
 
 if TYPE_CHECKING:
+    from springcheck.bath.heat import Heated
     from springcheck.studies.run.drawable import Drawable
-    from springcheck.thermal.heat import Heated
 
 FAULT = "fault"
 """Engine name in the labels of engines broken on purpose."""

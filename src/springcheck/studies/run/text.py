@@ -21,7 +21,7 @@ from springcheck.text.lines import Lines, Row, Text, TextTable, plain, table
 from springcheck.text.wording import count, number, seconds
 
 if TYPE_CHECKING:
-    from springcheck.thermal.heat import Heated
+    from springcheck.bath.heat import Heated
 
 BELOW = "the exact solution is known no better than this, and the run is no further from it"
 

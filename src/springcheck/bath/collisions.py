@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from springcheck.bath import chance
+from springcheck.bath.catalogue import THERMOSTATS
+from springcheck.bath.laws import Law
+from springcheck.bath.likelihood import Candidate
+from springcheck.bath.residuals import regressed, together
 from springcheck.physics.arrays import Floats
-from springcheck.thermal import chance
-from springcheck.thermal.catalogue import THERMOSTATS
-from springcheck.thermal.laws import Law
-from springcheck.thermal.likelihood import Candidate
-from springcheck.thermal.residuals import regressed, together
 
 TRIPLES = 30000
 """Triples of frames that each give a map: of one that holds for every tenth frame 24 are expected."""

@@ -9,12 +9,12 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from springcheck import schemes
-from springcheck.thermal.catalogue import THERMOSTATS, Thermostat
+from springcheck.bath.catalogue import THERMOSTATS, Thermostat
 
 if TYPE_CHECKING:
-    from springcheck.thermal import chance, draws, jointly, rigid, rounding
-    from springcheck.thermal.laws import Law
-    from springcheck.thermal.stepper import Stepper
+    from springcheck.bath import chance, draws, jointly, rigid, rounding
+    from springcheck.bath.laws import Law
+    from springcheck.bath.stepper import Stepper
 
 __all__ = ["THERMOSTATS", "Law", "Stepper", "Thermostat", "chance", "draws", "jointly", "rigid", "rounding"]
 

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from springcheck.bath.catalogue import Thermostat
+from springcheck.bath.stepper import Met, Stepper, forces
 from springcheck.physics.arrays import Arithmetic, Extended, Force, Reals
 from springcheck.physics.scene import Scene
 from springcheck.physics.term import Term
-from springcheck.thermal.catalogue import Thermostat
-from springcheck.thermal.stepper import Met, Stepper, forces
 
 PER_ACT, IN_AND_OUT = 6, 4
 """Roundings of a stage at most (a force 4, its product and sum 2), and of the first and last state."""

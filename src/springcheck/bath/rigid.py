@@ -14,12 +14,12 @@ from typing import Any
 
 import numpy as np
 
+from springcheck.bath.catalogue import Thermostat
+from springcheck.bath.draws import Reading
+from springcheck.bath.rounding import one_rounding, roundings_of
+from springcheck.bath.stepper import Met, Stepper, forces
 from springcheck.physics.arrays import Arithmetic, Extended, Floats, Reals
 from springcheck.physics.scene import Scene
-from springcheck.thermal.catalogue import Thermostat
-from springcheck.thermal.draws import Reading
-from springcheck.thermal.rounding import one_rounding, roundings_of
-from springcheck.thermal.stepper import Met, Stepper, forces
 
 SMALL_DRAW = 1e-4
 """Step of the central difference in a draw, whose truncation error is its square, 1e-8."""

@@ -7,8 +7,8 @@ import math
 import numpy as np
 from numpy.polynomial.legendre import Legendre
 
+from springcheck.bath import chance
 from springcheck.physics.arrays import Floats
-from springcheck.thermal import chance
 
 FACTOR_LAGS = 20
 """Lags at which a factor of momenta that persists would show."""
