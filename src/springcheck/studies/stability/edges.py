@@ -73,7 +73,7 @@ def first_growth(maps: Maps, grid: Floats, rounding: float) -> float:
     infinity nowhere."""
 
     def wild(x: Floats) -> np.ndarray:
-        return grows(maps(x), rounding).any(axis=-1)
+        return np.asarray(grows(maps(x), rounding).any(axis=-1))
 
     found = wild(grid)
     before = grid[: int(np.argmax(found)) + 1] if found.any() else grid
