@@ -18,7 +18,7 @@ from springcheck.errors import MethodError
 from springcheck.physics.builders import spring as one_spring
 from springcheck.physics.scene import Scene
 from springcheck.physics.scenefile import load_scene
-from springcheck.physics.terms import Cosine, Damping, Spring, WallSpring
+from springcheck.physics.terms import Damping, Spring, WallSpring
 from springcheck.physics.trajectory import Trajectory
 
 Need = Callable[[str], None]
@@ -38,7 +38,7 @@ def failed(scene: Scene, made: Trajectory) -> list[str]:
 SCENES = ("spring", "spring-uneven", "chain", "anharmonic", "overdamped")
 
 
-@pytest.mark.campaign("label", "name")
+@pytest.mark.campaign
 @pytest.mark.parametrize("label", LABELS)
 @pytest.mark.parametrize("name", SCENES)
 def test_each_attachment_passes_every_verdict_of_its_scheme(label: str, name: str, need: Need) -> None:
@@ -193,25 +193,6 @@ def test_what_needs_an_extra_is_run_by_name_alone() -> None:
     default = {label.engine for label in engines.match(("*",))}
     assert not default & {*NAMES, "scipy"}
     assert {str(label) for label in engines.match(("mujoco:*",))} == {x for x in LABELS if "mujoco" in x}
-
-
-@pytest.mark.parametrize("label", ["mujoco:hinge"])
-def test_a_hinge_in_gravity_is_semi_implicit_euler_in_the_angle(
-    label: str, need: Callable[[str], None]
-) -> None:
-    need(label)
-    several = Scene(
-        m=[1.3, 0.7, 2.1], q=[0.1, 2.9, -1.2], p=[0.07, 0.4, 6.9], step=0.05, steps=300, kind="rotor",
-        terms=(Cosine(i=[0, 1, 2], depth=[2.3, 1.7, 7.9], wave=[1.0, 1.0, 1.0], at=[0.0, 0.3, -0.2]),),
-    )  # type: ignore[arg-type]  # fmt: skip
-    for scene in (several, load_scene("hinged-pendulum"), load_scene("torsion-pendulum")):
-        verdicts = checks.judge(scene, driver.run(scene, label))
-        assert [v.check for v in verdicts if v.passed is False] == []
-        assert "step-defect" in {v.check for v in verdicts if v.passed}
-    (term,) = several.terms
-    for wrong in ({"wave": np.array([1.0, 1.0, 2.0])}, {"depth": np.array([2.3, -1.7, 7.9])}):
-        with pytest.raises(MethodError, match="gravity makes one pendulum of a rotor, of wave 1"):
-            driver.run(replace(several, terms=(replace(term, **wrong),)), label)
 
 
 def test_lammps_that_loses_atoms_in_a_box_ends_the_run_in_a_line(

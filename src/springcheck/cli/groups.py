@@ -18,6 +18,7 @@ EXAMPLES: Mapping[str, Sequence[str]] = {
     "precision": ("spring --budget 20 --method own:rk4",),
     "stability": ("spring", "multiple-time-steps --method 'openmm:*'"),
     "extremes": ("--quick",),
+    "census": ("--method 'own:*' --against old.json",),
     "sampling": ("--method 'own:*' --method 'openmm:*'",),
     "inspect": ("spring.h5 --verdicts", "spring.h5 --trajectory own:euler --rows 5"),
     "plot": ("spring.h5 -o figures", "orbit.csv"),
@@ -28,15 +29,14 @@ EXAMPLES: Mapping[str, Sequence[str]] = {
     "judge": ("orbit.csv --scene spring --scheme velocity-verlet",),
     "check": ("spring.h5",),
     "export": ("spring.h5 own:euler out.h5md",),
-    "list": ("",),
+    "list": ("", "methods"),
     "doctor": ("",),
-    "completion": ("bash",),
 }
 """Examples of each command, without its name: the help prints them, and a test parses them."""
 
 
 GROUPS: Mapping[str, Sequence[str]] = {
-    "input": ("file", "files", "label", "word", "shell", "--trajectory", "--columns", "--from"),
+    "input": ("file", "files", "label", "word", "kind", "--trajectory", "--columns", "--from"),
     "scene": ("scene", "--scene", "--step", "--steps", "--set", "--temperature", "--friction", "--seed"),
     "methods": (
         "--method", "--all", "--engine", "--stepper", "--command", "--scheme", "--timeout", "--fault",

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import tomllib
 from argparse import Namespace
 from collections.abc import Iterator
 from typing import Any
 
 from springcheck import engines, schemes, store
+from springcheck.bath import THERMOSTATS
+from springcheck.errors import SpringcheckError
 from springcheck.figures.views import Units, units, with_unit
+from springcheck.physics.scenefile import left
 from springcheck.physics.trajectory import Trajectory
 from springcheck.studies import STUDIES, keeper
 from springcheck.studies.study import Study, StudyResult
 from springcheck.text.lines import Lines, TextTable, plain, table
 from springcheck.text.wording import ordinal
-from springcheck.thermal import THERMOSTATS
 
 
 def held(summary: store.Summary) -> Iterator[tuple[Study, StudyResult]]:
@@ -42,6 +45,7 @@ def lines(summary: store.Summary, options: Namespace) -> Lines:
         known = summary.runs[0].parameters
         out += [
             plain(f"  scene {known.get('scene_name')}, units {known.get('units')}"),
+            *_left(summary),
             plain(
                 f"  {known.get('finished')} on {known.get('host')}: {known.get('processor')}, "
                 f"{known.get('cores')} cores, {known.get('system')}"
@@ -57,6 +61,15 @@ def lines(summary: store.Summary, options: Namespace) -> Lines:
         said = study.lines(result, options, summary.path)
         out += [*([] if study.trajectories else [plain()]), *said]
     return out
+
+
+def _left(summary: store.Summary) -> Lines:
+    """What the scene of a store has and springcheck no longer has, in a line."""
+    try:
+        reason = left.refusal(tomllib.loads(store.scene_text(summary.path)))
+    except (ValueError, SpringcheckError):
+        return []
+    return [plain(f"  its scene cannot be run or judged here: {reason}", "bold red")] if reason else []
 
 
 def _asked_for(summary: store.Summary, options: Namespace) -> tuple[Trajectory | None, int]:
@@ -90,14 +103,10 @@ def _frames(run: Trajectory, stride: int, last: Trajectory, of: Units) -> Lines:
         title += f", the first {shown} of {n} particles"
     numbers = range(shown) if n > 1 else [""]
     names = [("t", of.t), *((f"{x}{i}", unit) for x, unit in (("q", of.q), ("p", of.p)) for i in numbers)]
-    if run.last_step is not None:
-        names.append(("last step", of.t))
     rows = [
-        [repr(float(x)) for x in (t, *q[:shown], *p[:shown], *h)]
+        [repr(float(x)) for x in (t, *q[:shown], *p[:shown])]
         for one in (run, last)
-        for t, q, p, *h in zip(
-            *(x for x in (one.t, one.q, one.p, one.last_step) if x is not None), strict=True
-        )
+        for t, q, p in zip(one.t, one.q, one.p, strict=True)
     ]
     if rows[-2:-1] == rows[-1:]:
         del rows[-1]
@@ -114,8 +123,7 @@ def document(summary: store.Summary, options: Namespace) -> dict[str, Any]:
         else:
             documents[study.name] = result.document()
     run, stride = _asked_for(summary, options)
-    more = {} if run is None or run.last_step is None else {"last_step": run.last_step}
-    shown = run and {"label": run.label, "stride": stride, "t": run.t, "q": run.q, "p": run.p, **more}
+    shown = run and {"label": run.label, "stride": stride, "t": run.t, "q": run.q, "p": run.p}
     return keeper.document(
         store=summary.path,
         bytes=summary.size,

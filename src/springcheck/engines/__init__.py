@@ -11,14 +11,12 @@ import importlib.util
 import os
 from collections.abc import Callable, Iterable
 from contextlib import suppress
-from dataclasses import replace
 from fnmatch import fnmatchcase
 from functools import cache, partial
 from typing import Any, TypeVar
 
-import numpy as np
-
 from springcheck import schemes
+from springcheck.bath import THERMOSTATS
 from springcheck.engines.contract import (
     ANY_POTENTIAL,
     BRAKES,
@@ -50,7 +48,6 @@ from springcheck.engines.registry import (
 from springcheck.errors import MOST_LIKELY, MethodError, nearest, told
 from springcheck.physics.arrays import Arithmetic, Floats
 from springcheck.physics.scene import Scene
-from springcheck.thermal import THERMOSTATS
 
 __all__ = [
     "ANY_POTENTIAL", "BRAKES", "UNNAMED", "DRIVEN", "EVERY_FORCE", "EVERY_POTENTIAL", "OURS", "Arithmetic",
@@ -148,14 +145,13 @@ def start(scene: Scene, label: Label, seed: Any = None) -> Simulation:
     return found
 
 
-def arithmetic(label: Label, units: str = "") -> Arithmetic:
-    """The rounding that the engine of a label declares, in units of a scene.  MethodError where its own code
-    fails."""
+def arithmetic(label: Label) -> Arithmetic:
+    """The rounding that the engine of a label declares.  MethodError where its own code fails."""
     driver = load(label.engine)
     found: object = guarded(label, driver.arithmetic, label, form="arithmetic(label)")
     if not isinstance(found, Arithmetic):
         raise MethodError(f"{label} failed: its arithmetic is of type {type(found).__name__}")
-    return replace(found, rates=found.rates * driver.picosecond) if units == "md" else found
+    return found
 
 
 def origin_of(label: Label) -> dict[str, str]:
@@ -179,7 +175,6 @@ class Started:
 
     def __init__(self, scene: Scene, label: Label, seed: Any = None) -> None:
         self.label, self.simulation = label, start(scene, label, seed)
-        self.tells_steps = hasattr(self.simulation, "last_steps")
 
     def advance(self, every: int, q: Floats, p: Floats) -> None:
         """Fill rows; `Stopped` passes through."""
@@ -195,14 +190,6 @@ class Started:
         """The largest |coordinate| along axes that the scene leaves out, where the engine looks at them."""
         seen = getattr(self.simulation, "off_axis", None) is not None
         return self._reported("off_axis", "a number", float) if seen else None
-
-    def last_steps(self, rows: int) -> Floats | None:
-        """Lengths (rows,) of the steps that ended at the rows filled last, where the engine chooses them."""
-        if not self.tells_steps:
-            return None
-        return self._reported(
-            "last_steps", f"{rows} lengths", lambda x: np.asarray(x, np.float64)[:rows].reshape(rows)
-        )
 
     def _reported(self, name: str, what: str, taken: Callable[[Any], T]) -> T:
         said: Any = guarded(self.label, lambda: getattr(self.simulation, name))
@@ -300,7 +287,7 @@ def match(patterns: Iterable[str], *, bath: bool | None = False, every: bool = F
     return tuple(chosen.values())
 
 
-PLURAL = {"particles": "particles", "circuit": "circuits", "rotor": "rotors"}
+PLURAL = {"particles": "particles", "circuit": "circuits"}
 
 
 def obstacle(scene: Scene, label: Label) -> str | None:
@@ -339,10 +326,6 @@ def refusal(scene: Scene, label: Label) -> str | None:
         return f"{who} moves {moved}, not {PLURAL[scene.kind]}"
     if scene.places is not None and not engine(label.engine).any_axis:
         return f"{engine(label.engine).title} is given particles along x here, and the scene has other axes"
-    if scene.system.rods:
-        longest = schemes.scheme(what.scheme).longest_drift
-        if held := scene.system.rods.too_fast(scene.q, scene.p, scene.step * longest):
-            return held
     if scene.box is not None and not engine(label.engine).periodic:
         return f"{engine(label.engine).title} is given no periodic box here"
     unknown = (term for term in scene.terms if not (term.kind == "potential" and ANY_POTENTIAL in what.terms))

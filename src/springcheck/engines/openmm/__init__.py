@@ -3,27 +3,20 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import Any
 
 from springcheck.engines.contract import (
     ANY_POTENTIAL,
     DRIVEN,
     EVERY_POTENTIAL,
     FIELD,
-    NO_NUMBERS,
-    RODS,
     Engine,
-    Label,
-    Method,
     Need,
-    Simulation,
     by_default,
     by_name,
     deferred,
     named,
     thermostat,
 )
-from springcheck.physics.scene import Scene
 
 _TERMS = EVERY_POTENTIAL - {ANY_POTENTIAL} | {"bond"}
 _DRIVEN = _TERMS | DRIVEN
@@ -32,17 +25,6 @@ _ON_A_LINE = _TERMS - {"morse"}
 """The terms that noise across the line does not bend: a bond of rest length 0 pulls along each axis alike."""
 
 _drawn = partial(thermostat, generator="OpenMM, SFMT", terms=_ON_A_LINE, rebuilds_velocity=True)
-
-_MODULE = deferred(f"{__name__}.simulation", "arithmetic", "convention")
-
-
-def _start(scene: Scene, method: Method, label: Label, step: float, **more: Any) -> Simulation:
-    if not method.adaptive:
-        return _MODULE["start"](scene, method, label, step, **more)  # type: ignore[no-any-return]
-    from springcheck.engines.openmm.variable import Variable
-
-    return Variable(scene, method, label, step)
-
 
 _GPU = ("OpenCL", "CUDA", "HIP")
 _PRECISIONS = ("", "-single", "-mixed", "-double")
@@ -79,24 +61,8 @@ ENGINE = Engine(
             "langevin", "langevin-middle", "LangevinIntegrator at T = 0, started and read synchronised",
             _DRIVEN | {"damping"}, Need.DAMPING, one_friction=True,
         ),
-        *(
-            by_default(
-                name, "velocity-verlet", f"VerletIntegrator, {tolerance}, started and read synchronised",
-                _TERMS | RODS, Need.RODS, rebuilds_velocity=True, default=name != "verlet-rods-8",
-            )
-            for name, tolerance in (
-                ("verlet-rods", "constraint tolerance 1e-13"),
-                ("verlet-rods-8", "constraint tolerance 1e-8"),
-                ("verlet-rods-as-it-is", "its own constraint tolerance 1e-5"),
-            )
-        ),
         by_name(
             "boris", "boris", "Boris' rotation by CustomIntegrator", (_DRIVEN - {"morse"}) | FIELD, Need.FIELD
-        ),
-        by_name(
-            "variable-verlet", "variable-verlet",
-            "VariableVerletIntegrator, stepTo each frame, its error tolerance that of the scene times its "
-            "amplitude", _TERMS, adaptive=True, rebuilds_velocity=True,
         ),
         by_name(
             "nose-hoover", "semi-implicit-euler",
@@ -105,11 +71,6 @@ ENGINE = Engine(
     ),
     thermostats=named(
         _drawn("langevin-middle-bath", "baoa", "LangevinMiddleIntegrator, as it stores velocities"),
-        _drawn(
-            "langevin-middle-rods", "baoa",
-            "LangevinMiddleIntegrator, constraint tolerance 1e-13, as it stores velocities",
-            terms=_ON_A_LINE | RODS, requires=frozenset({Need.RODS}),
-        ),
         _drawn(
             "langevin-middle-synchronised", "baoab",
             "LangevinMiddleIntegrator, half a kick added to what is read",
@@ -122,31 +83,13 @@ ENGINE = Engine(
             note="on GPU platforms it collides at most 2/pi as often as asked",
         ),
         _drawn(
-            "nose-hoover-bath", "nose-hoover-middle", "NoseHooverIntegrator, as it stores velocities",
-            generator=NO_NUMBERS, default=False,
-            note="it counts three degrees of freedom for each particle, whatever moves it",
-        ),
-        _drawn(
             "mts-langevin", "baoab", "MTSLangevinIntegrator, one group of forces once a step",
             default=False, rebuilds_velocity=False,
-        ),
-        *(
-            _drawn(
-                f"mts-langevin-{n}", f"baoab-respa{n}",
-                f"MTSLangevinIntegrator, fast springs {n} times a step", default=False,
-                rebuilds_velocity=False,
-            )
-            for n in (2, 3, 4)
-        ),
-        _drawn(
-            "variable-langevin", "baoa",
-            "VariableLangevinIntegrator, its longest step that of the scene, at a tolerance that allows it",
-            default=False,
         ),
     ),
     atlas=tuple(f"verlet@{place}" for place in ("CPU", "OpenCL-single", "OpenCL-mixed", "OpenCL-double")),
     any_axis=True,
     periodic=True,
     squares_lengths=True,
-    **_MODULE | {"start": _start},
+    **deferred(f"{__name__}.simulation", "arithmetic", "convention"),
 )  # fmt: skip

@@ -317,11 +317,8 @@ def repeat(path: Path, *, methods: Sequence[str] = (), progress: Progress | None
                 mine = replace(scene, quantities=quantities)
                 with journal.draft(name, mine) as draft:
                     told = bar.of(label, scene.steps)
-                    # fields that an older version did not store are no difference
-                    kept = 5 if "last_step" in known[name].kept else 4
-                    sink = lambda *frames, add=draft.append, kept=kept: add(*frames[:kept])  # noqa: E731
                     seed = _seed(path, name, before.get("origin.seed")) if scene.bath else None
-                    record = driver.play(mine, label, sink, progress=told, seed=seed)
+                    record = driver.play(mine, label, draft.append, progress=told, seed=seed)
                     digest = draft.finish(keeper.attributes(record))
                 source = journal.sources()[name]
                 found.append(
