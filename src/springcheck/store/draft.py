@@ -53,9 +53,9 @@ class Draft:
         self._running: list[Future[None]] = []
         self._stack = ExitStack()
 
-    def _lay_out(self, *, steps: bool) -> None:
-        self._steps, frames = steps, self.scene.frames
-        self._columns = layout.columns(self.label, self.scene, frames, steps=steps)
+    def _lay_out(self) -> None:
+        frames = self.scene.frames
+        self._columns = layout.columns(self.label, self.scene, frames)
         self._hash = {name: hashlib.sha256() for name in self._columns}
         widest = max(column.size for column in self._columns.values()) // frames
         self._length = max(1, min(frames, BUFFER // widest))
@@ -64,19 +64,16 @@ class Draft:
             for _ in range(2)
         )
 
-    def append(
-        self, t: Floats, q: Floats, p: Floats, energy: Floats | None = None, last_step: Floats | None = None
-    ) -> None:
-        """Append frames: t (f,), q and p (f, n), energy (f,) where the scene records energies, and last steps
-        (f,) where the solver reports them: for all frames, or for none.
+    def append(self, t: Floats, q: Floats, p: Floats, energy: Floats | None = None) -> None:
+        """Append frames: t (f,), q and p (f, n), and energy (f,) where the scene records energies.
 
         Quantities that the scene does not record are ignored.  Raises StoreError when the disk is full.
         """
         if not self.rows:
-            self._lay_out(steps=last_step is not None)
+            self._lay_out()
         f = len(t)
         given: dict[str, Floats] = {}
-        for name, values in zip(("time", *layout.QUANTITIES), (t, q, p, energy, last_step), strict=True):
+        for name, values in zip(("time", *layout.QUANTITIES), (t, q, p, energy), strict=True):
             if name in self._columns:
                 expected = (f, *self._columns[name].shape[1:])
                 if values is None or values.shape != expected:
@@ -123,7 +120,7 @@ class Draft:
         return digest
 
     def _create(self, frames: int) -> None:
-        self._columns = layout.columns(self.label, self.scene, frames, steps=self._steps)
+        self._columns = layout.columns(self.label, self.scene, frames)
         with layout.fresh(self._temporary, sum(column.size for column in self._columns.values())) as file:
             self._offsets = layout.skeleton(file, self.label, self.scene, self._columns)
         for name, offset in self._offsets.items():

@@ -4,8 +4,7 @@
 
     /h5md                      version, author, creator, modules/units
     /particles/<label>/        position and velocity (frames, n, 3), mass; scenes of particles only
-    /observables/<label>/      q, p (frames, n), energy (frames,), velocity: elements {step, time, value};
-                               last_step (frames,) of a solver that chooses its steps and tells them
+    /observables/<label>/      q, p (frames, n), energy (frames,), velocity: elements {step, time, value}
     /parameters/<label>        attributes: scene, method, versions, machine, outcome, digest
     /comparison /verdicts      tables of one column per dataset
     /plots                     NXentry of NXdata; root @default leads there
@@ -48,17 +47,15 @@ CHUNK = 1 << 20
 """Bytes of a chunk of an exported array."""
 
 RESERVED = ("h5md", "particles", "observables", "parameters", "comparison", "verdicts", "documents", "plots")
-QUANTITIES = ("q", "p", "energy", "last_step")
+QUANTITIES = ("q", "p", "energy")
 """Quantities of a trajectory that may be stored beside its times."""
 _STRING = h5py.string_dtype("utf-8")
 
 _MD = {
     "q": "nm", "p": "u nm ps-1", "energy": "kJ mol-1", "velocity": "nm ps-1", "time": "ps", "mass": "u",
-    "last_step": "ps",
 }  # fmt: skip
 _SI = {
     "q": "m", "p": "kg m s-1", "energy": "J", "velocity": "m s-1", "time": "s", "mass": "kg",
-    "last_step": "s",
 }  # fmt: skip
 _MD_ROTOR = {**_MD, "q": "rad", "p": "u nm2 ps-1", "velocity": "rad ps-1", "mass": "u nm2"}
 _SI_ROTOR = {**_SI, "q": "rad", "p": "kg m2 s-1", "velocity": "rad s-1", "mass": "kg m2"}
@@ -113,11 +110,10 @@ def shape(name: str, frames: int, n: int) -> tuple[int, ...]:
     return (frames, n) if name in ("q", "p") else (frames,)
 
 
-def columns(label: str, scene: Scene, frames: int, *, steps: bool = False) -> dict[str, Column]:
-    """The arrays that a trajectory of this scene is made of, by short name; `steps` adds the last ones."""
-    kept = [*scene.quantities, "last_step"] if steps else [*scene.quantities]
+def columns(label: str, scene: Scene, frames: int) -> dict[str, Column]:
+    """The arrays that a trajectory of this scene is made of, by short name."""
     base = f"/observables/{label}"
-    found = {x: Column(path=f"{base}/{x}/value", shape=shape(x, frames, scene.n)) for x in kept}
+    found = {x: Column(path=f"{base}/{x}/value", shape=shape(x, frames, scene.n)) for x in scene.quantities}
     if scene.kind == "particles" and np.any(scene.m != 1):
         found["velocity"] = Column(path=f"{base}/velocity/value", shape=found["p"].shape)
     found["time"] = Column(path=f"{base}/q/time", shape=(frames,))
