@@ -45,6 +45,10 @@ def test_the_exact_motion_has_the_digits_of_another_route(mu: float) -> None:
     scene = of(mu)
     brake = replace(scene.terms[1], c=[rows[0]["coefficient"]])  # type: ignore[type-var]
     scene = replace(scene, terms=(scene.terms[0], brake), step=rows[-1]["time"], steps=1)
+    if mu > 2e4:
+        # a rounding before a jump decides when it comes
+        assert "of the motion" in exact.no_reference(scene)
+        return
     assert scene.system.solution is not None
     for row in rows:
         # any step: the path is one for all times

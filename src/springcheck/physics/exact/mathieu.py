@@ -84,7 +84,9 @@ class ModulatedMotion(ClosedForm):
     def __init__(self, system: System[Any]) -> None:
         super().__init__(system)
         term = next(iter(system.terms), None)
-        self.need(isinstance(term, ModulatedSpring) and len(system.terms) == 1 and np.all(system.pulls() == 1))
+        self.need(
+            isinstance(term, ModulatedSpring) and len(system.terms) == 1 and np.all(system.pulls() == 1)
+        )
         assert isinstance(term, ModulatedSpring)
         found = wide([system.m, system.q, system.p])
         self.modes = [_Mode(found[:, i], row) for i, *row in sorted(term.rows())]

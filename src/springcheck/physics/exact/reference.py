@@ -6,8 +6,9 @@ series of the momenta just ends in rounding.  The stages are found by fixed-poin
 (Hairer, McLachlan & Razakarivony, BIT 48 (2008) 231), or by Newton's iteration where friction is stiff.
 States are sums with compensation.  Between the ends of steps the series gives every state.
 
-A second integration with fewer stages takes other steps, so that truncation and rounding differ.  The stated
-error is a multiple of the largest difference so far, plus the roundings that both share.
+A second integration with fewer stages takes other steps, so that truncation and rounding differ.  It starts
+a rounding away, because both round the argument of a force alike, which near an unstable rest decides the
+motion.  The stated error is a multiple of the largest difference so far, plus other roundings that both share.
 """
 
 from __future__ import annotations
@@ -143,9 +144,10 @@ class Path:
     `done` (j + 1,) are the ends of its steps, and `series` (j, s, n) the momenta within each.
     """
 
-    def __init__(self, system: System[Any], unit: float, stages: int) -> None:
+    def __init__(self, system: System[Any], unit: float, stages: int, nudge: float = 0.0) -> None:
         self.system, self.rule, self.stages = system, rule(stages), stages
         self.m, self.q, self.p = wide(system.m), wide(system.q), wide(system.p)
+        self.q = self.q * (1 + np.longdouble(nudge))
         self.q_rest, self.p_rest = np.zeros_like(self.q), np.zeros_like(self.p)
         self.unit, self.power, self.calls, self.patience = np.longdouble(unit), 0, 0, 0
         self.done, self.starts, self.series = [np.longdouble(0)], [self.q], list[Extended]()
@@ -292,7 +294,10 @@ class ReferenceMotion(ClosedForm):
         """Integrate up to a time in units of the step, and compare both integrations."""
         if sign not in self.paths:
             unit = sign * self.system.scene.step
-            self.paths[sign] = (Path(self.system, unit, STAGES), Path(self.system, unit, FEWER_STAGES))
+            self.paths[sign] = (
+                Path(self.system, unit, STAGES),
+                Path(self.system, unit, FEWER_STAGES, nudge=EPS),
+            )
         one, other = self.paths[sign]
         ends, dq, dp = self.known.get(sign, (np.zeros(1, np.longdouble), *[np.zeros((1, self.n))] * 2))
         if ends[-1] >= end:
