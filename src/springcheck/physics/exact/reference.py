@@ -8,7 +8,8 @@ States are sums with compensation.  Between the ends of steps the series gives e
 
 A second integration with fewer stages takes other steps, so that truncation and rounding differ.  It starts
 a rounding away, because both round the argument of a force alike, which near an unstable rest decides the
-motion.  The stated error is a multiple of the largest difference so far, plus other roundings that both share.
+motion.  The stated error is a multiple of the largest difference so far, plus other roundings that both
+share.
 """
 
 from __future__ import annotations
@@ -35,6 +36,8 @@ FELT_ROUNDING = 4 * EPS
 a force are the same in both integrations."""
 MOST_ERROR = 1e-3
 """The largest stated error of a reference, relative to the motion."""
+REST = 2.0**-32
+"""A smaller motion, relative to the positions or to the initial energy, counts as rest."""
 MOST_CORRECTIONS = 60
 MOST_CALLS = 200_000
 """Calls of the force in one integration, each at all stages: 15 s for a few particles."""
@@ -147,7 +150,9 @@ class Path:
     def __init__(self, system: System[Any], unit: float, stages: int, nudge: float = 0.0) -> None:
         self.system, self.rule, self.stages = system, rule(stages), stages
         self.m, self.q, self.p = wide(system.m), wide(system.q), wide(system.p)
-        self.q = self.q * (1 + np.longdouble(nudge))
+        # what rests exactly is not moved
+        moves = (self.p != 0) | (system.force(self.q, self.p) != 0)
+        self.q = self.q * (1 + np.where(moves, np.longdouble(nudge), 0))
         self.q_rest, self.p_rest = np.zeros_like(self.q), np.zeros_like(self.p)
         self.unit, self.power, self.calls, self.patience = np.longdouble(unit), 0, 0, 0
         self.done, self.starts, self.series = [np.longdouble(0)], [self.q], list[Extended]()
@@ -281,7 +286,11 @@ class ReferenceMotion(ClosedForm):
         """By direction in time: ends of steps (j,), and the largest errors of q and p up to these (j, n)."""
         self._reach(1, np.longdouble(system.scene.steps))
         _, *errors = self.known[1]
-        sizes = self.paths[1][0].most[4], self.paths[1][0].most[1]
+        most, amplitude = self.paths[1][0].most, REST * wide(system.amplitudes[1])
+        sizes = (
+            np.maximum(most[4], REST * most[0]),
+            np.maximum(most[1], np.append(amplitude, most[1])[: len(most[1])]),
+        )
         for error, size in zip(errors, sizes, strict=True):
             share = np.max(error[-1]) * FELT / (np.max(size[: self.n]) or 1)
             if not share <= MOST_ERROR:
