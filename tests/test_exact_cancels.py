@@ -1,6 +1,6 @@
 """Exact solutions where what decides a motion is small beside what it is taken of, against mpmath.
 
-A position far from 0, a rod slow beside its drift, an energy close to a barrier's: each lost digits that its
+A position far from 0, an energy close to a barrier's: each lost digits that its
 stated error did not count.
 """
 

@@ -1,6 +1,6 @@
 """Van der Pol's oscillator: the exact motion against 25 digits by another route, and every method's own step.
 
-The references are made by validation/van_der_pol.py: Gauss collocation in Lienard's plane in 60 digits, and
+The references were made without springcheck: Gauss collocation in Lienard's plane in 60 digits, and
 Taylor series up to mu = 30.
 """
 

@@ -371,7 +371,7 @@ class Verdict:
     sees: Limits = NOT_KNOWN
     """Smallest fault that the check would have detected in this run."""
     statistic: Any = field(default=None, compare=False, repr=False)
-    """Of a random verdict the statistic (`thermal.chance`) where it adds up over pieces of a run; it is in no
+    """Of a random verdict the statistic (`bath.evidence`) where it adds up over pieces of a run; it is in no
     document and no pickle."""
 
     @property
