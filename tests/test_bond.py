@@ -374,8 +374,6 @@ def test_a_file_of_points_in_space_is_judged_by_a_scene_in_a_plane(
     assert "is along axes that scene periodic-box leaves out" in capsys.readouterr().err
 
 
-
-
 @pytest.mark.parametrize("label", ["lammps:bond", "lammps:external"])
 def test_lammps_keeps_atoms_that_begin_far_apart(label: str, need: Any) -> None:
     """The margin of its box is a part of the box's first width, and was lost to rounding beyond 2**40."""
