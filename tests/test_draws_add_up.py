@@ -15,12 +15,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import bathed as baths
 from springcheck import checks
 from springcheck.bath import chance
 from springcheck.cli import main
 from springcheck.physics.trajectory import Trajectory, Verdict
-from springcheck.studies.faults import baths
-from springcheck.studies.faults.seeded import Fault
+from textbook import Fault
 
 BEYOND_ONE = 0.15865525393145707
 """Chance of a normal number above 1."""

@@ -9,7 +9,9 @@ import mpmath
 import numpy as np
 import pytest
 
+import fault_table as table
 import springcheck
+import textbook as steppers
 from springcheck import checks, engines, schemes
 from springcheck.doors import function
 from springcheck.engines.own.simulation import prepare
@@ -29,8 +31,7 @@ from springcheck.physics.terms import (
     Term,
     WallSpring,
 )
-from springcheck.studies.faults import measure, space, steppers, table
-from springcheck.studies.faults.seeded import Case
+from textbook import Case
 
 ONE = np.array([0])
 SCENES = ("driven-spring", "mathieu-stable", "mathieu-tongue")
@@ -276,7 +277,7 @@ def test_a_time_that_is_summed_up_is_no_shift() -> None:
 
 @pytest.mark.parametrize("fault", table.DRIVES, ids=lambda fault: fault.name)
 def test_a_drive_that_is_wrong_is_rejected_and_named(fault: Any) -> None:
-    scene = measure.scene(fault.scene)
+    scene = table.scene(fault.scene)
     assert MISPLACED[fault.name] in sentence(scene, fault.run(scene))
 
 
@@ -292,7 +293,7 @@ def test_another_scheme_is_not_taken_for_another_time(scheme: str, other: str, s
     scene = replace(scenes.load_scene("driven-spring"), steps=60)
     law = schemes.SCHEMES[scheme]
     if other == "late":
-        run = steppers.record(scene, law, space.clocked(Case(scene=scene, scheme=law, x=0.0), 1.0))
+        run = steppers.record(scene, law, table.clocked(Case(scene=scene, scheme=law, x=0.0), 1.0))
     else:
         run = steppers.record(scene, law, steppers.textbook(scene, schemes.SCHEMES[other]))
     why = sentence(scene, run)
@@ -304,7 +305,7 @@ def test_a_modulation_at_the_wrong_time_is_named_too(name: str) -> None:
     scene = replace(scenes.load_scene(name), steps=60)
     law = schemes.SCHEMES["rk4"]
     assert "the start of the step, held over it" in sentence(
-        scene, steppers.record(scene, law, space.clocked(Case(scene=scene, scheme=law, x=0.0), pace=0.0))
+        scene, steppers.record(scene, law, table.clocked(Case(scene=scene, scheme=law, x=0.0), pace=0.0))
     )
 
 
@@ -544,7 +545,7 @@ def test_a_driven_mode_that_neither_turns_nor_grows_has_no_closed_form_here() ->
 
 
 def test_the_check_of_the_drive_holds_its_tongue_where_the_spring_is_wrong() -> None:
-    scene = measure.scene("driven")
+    scene = table.scene("driven")
     wall = next(term for term in scene.terms if isinstance(term, WallSpring))
     stiffer = scene.derived(
         terms=tuple(replace(x, k=x.k * (1 + 1e-9)) if x is wall else x for x in scene.terms)

@@ -22,11 +22,8 @@ from springcheck.figures import charts, looks, overlay
 from springcheck.figures.charts import Bank, Chart, Curve, Naming, Rule, Scale, Tiles
 from springcheck.physics import exact
 from springcheck.physics import scenefile as scenes
-from springcheck.studies import STUDIES, keeper
+from springcheck.studies import STUDIES
 from springcheck.studies.extremes import measure as atlas
-from springcheck.studies.faults import measure as faults
-from springcheck.studies.faults.result import FaultReport
-from springcheck.studies.faults.table import FAULTS
 from springcheck.studies.run import measure
 from springcheck.studies.sampling import measure as sampling
 from springcheck.text.lines import Text, TextTable, plain, table
@@ -308,8 +305,7 @@ def test_a_long_run_is_thinned_and_says_so(tmp_path: Path) -> None:
 # studies
 
 
-NAMES = ("precision", "stability", "extremes", "faults", "sampling")
-FEW = tuple(fault for fault in FAULTS if fault.name in {"friction", "cut-off"})
+NAMES = ("precision", "stability", "extremes", "sampling")
 
 
 @pytest.fixture(scope="module")
@@ -329,11 +325,6 @@ def studies(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
             if name == "precision":
                 steady(patch)
             assert main([*call, "-o", str(folder / f"{name}.h5"), "--quiet"]) == 0
-    with keeper.kept(folder / "faults.h5", "faults") as kept:
-        found = tuple(
-            replace(faults.examine(fault, limits=False), limits={"step-defect": 5e-15}) for fault in FEW
-        )
-        kept.commit("faults", FaultReport(results=found).document())
     return {name: folder / f"{name}.h5" for name in NAMES}
 
 
@@ -357,7 +348,7 @@ def test_a_study_brings_its_charts_and_its_tables(studies: dict[str, Path], name
     assert all(
         attributes.get("scope") in {"row", "col", "rowgroup"} for tag, attributes in tags.tags if tag == "th"
     )
-    known = {"faults": "friction", "sampling": "own:baoab"}.get(name, "own:semi-implicit-euler")
+    known = {"sampling": "own:baoab"}.get(name, "own:semi-implicit-euler")
     assert known in {
         str(row[0]).strip() for table in tables for row in table.rows if not isinstance(row, Text)
     }
@@ -386,17 +377,6 @@ def test_every_cell_of_the_atlas_stands_in_its_map(studies: dict[str, Path]) -> 
         if kind >= 0
     }
     assert seen == placed
-
-
-def test_every_fault_stands_in_its_map(studies: dict[str, Path]) -> None:
-    (chart,) = _data(page.html(page.gather(studies["faults"])))["banks"]["faults-0"]["charts"]
-    assert chart["y"]["values"] == [fault.name for fault in FEW[::-1]]
-    for result, row in zip(
-        faults.stored(studies["faults"]).results[::-1], chart["tiles"]["rows"], strict=True
-    ):
-        kinds = [kind for count, kind in row for _ in range(count)]
-        seen = {check for check, kind in zip(chart["x"]["values"], kinds, strict=True) if kind == 0}
-        assert seen == set(result.rejected_by)
 
 
 def keeper_atlas(path: Path) -> list[Any]:

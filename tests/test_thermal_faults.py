@@ -10,26 +10,23 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
+import bathed as baths
 from clean import clean_bath
-from springcheck import checks, cli, driver, engines
+from fault_table import FAULTS, scene
+from springcheck import checks, driver, engines
 from springcheck.bath import THERMOSTATS, chance
+from springcheck.checks.seeds import SEEDED
 from springcheck.physics.trajectory import Verdict
-from springcheck.studies.faults import baths
-from springcheck.studies.faults.measure import probe, scene
-from springcheck.studies.faults.seeded import Case as Broken
-from springcheck.studies.faults.seeded import Fault
-from springcheck.studies.faults.table import FAULTS
-
-
-def test_there_are_forty_faults_of_thermostats_at_least() -> None:
-    assert sum(fault.random for fault in FAULTS) >= 45
+from textbook import Case as Broken
+from textbook import Fault
 
 
 @pytest.mark.parametrize("name", ["baoab", "obabo", "bbk", "gj-i-half", "lammps-langevin", "andersen"])
 def test_what_is_right_passes_here(name: str) -> None:
     right = Fault(name, "", (), baths.played, scheme=name, scene="bath")
-    passed = probe(right)
-    found = {check: passed(check, None) for check in baths.OF_THERMOSTATS}
+    verdicts = checks.judge(scene("bath"), right.run(scene("bath")))
+    subject = baths.subject(right, None)
+    found = {v.check: v.passed for v in (*verdicts, *(one(subject) for one in SEEDED))}
     assert [check for check, one in found.items() if one is False] == []
     assert sum(one is True for one in found.values()) >= 9
 
@@ -79,22 +76,6 @@ def test_the_largest_correlation_of_two_seeds_has_the_chance_of_its_null() -> No
     x = rng.standard_normal(400)
     assert chance.crossed(x[40:], x[:-40]) < 1e-12
     assert chance.crossed(x[:-40], x[40:]) < 1e-12
-
-
-def test_a_broken_thermostat_runs_among_the_others(
-    capsys: pytest.CaptureFixture[str], tmp_path: object
-) -> None:
-    out = ["-o", f"{tmp_path}/f.h5", "--force", "--method", "own:baoab"]
-    heat = ["--temperature", "300K", "--seed", "3", "--fault", "bath-step=1e-6"]
-    assert cli.main(["run", "spring", *heat, *out]) == 1
-    assert "noise-direction" in capsys.readouterr().out
-    for arguments, said in (
-        (["--fault", "bath-step"], "--fault bath-step: it needs a scene with a bath: --temperature"),
-        (["--fault", "mass", "--temperature", "300K"], "--fault mass: it needs a scene with no bath"),
-    ):
-        methods = out if "mass" in arguments else [*out[:3], "--method", "own:euler"]
-        assert cli.main(["run", "spring", *arguments, *methods]) == 2
-        assert said in " ".join(capsys.readouterr().err.split())
 
 
 @pytest.mark.parametrize(

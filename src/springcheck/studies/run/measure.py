@@ -149,7 +149,7 @@ def run(
         for one in wrong:
             if one.label not in resumed:
                 with journal.draft(one.label, scene) as draft:
-                    one.play(scene, draft, **seeds)
+                    one.play(scene, draft)
         names = (*(str(label) for label in labels), *(one.label for one in wrong))
         sources = journal.sources()
         report = judge(scene, path, {name: sources[name] for name in names}, left, resumed=resumed)
