@@ -346,22 +346,6 @@ def test_a_study_prints_the_limits_of_the_scene(name: str, method: str, said: st
     assert row["largest_step"] == pytest.approx(study.largest(study.limits[0]))
 
 
-def test_the_frequency_of_a_scene_in_a_field_is_said_to_be_that_without_it() -> None:
-    """With it the faster of two circles turns by 1.419."""
-    study = stability.record(scenes.load_scene("foucault"), None, ["own:euler"])
-    said = next(str(line) for line in STUDY.lines(study) if "fastest angular frequency" in str(line))
-    assert "of this scene, without its field: w = 1.30609" in said
-    text = "\n".join(str(line) for line in STUDY.lines(study) if isinstance(line, Text))
-    assert "no largest step is worked out with a magnetic field" in text
-    assert "anharmonic" not in text
-
-
-def test_a_charge_that_circles_is_not_said_to_be_at_rest() -> None:
-    study = stability.record(scenes.load_scene("magnetic"), None, ["own:rk4"])
-    said = "\n".join(str(line) for line in STUDY.lines(study) if isinstance(line, Text))
-    assert "oscillates but by its magnetic field, with which no largest step is worked out" in said
-
-
 def test_the_frequency_of_a_modulated_spring_with_friction_is_said_to_be_its_largest() -> None:
     """At its start the stiffness is 2.4335 (1 + 0.031 cos 1), by which w would be 1.11222."""
     term = ModulatedSpring(
@@ -427,12 +411,6 @@ def test_the_stiffest_state_of_an_anharmonic_motion_is_that_of_its_amplitude() -
     # k/2 A**2 + b/4 A**4 is the energy, and k + 3 b A**2 the curvature there
     square = (np.sqrt(k * k + 4 * b * energy) - k) / b
     assert fastest(scene) == pytest.approx(np.sqrt((k + 3 * b * square) / scene.m[0]), rel=1e-8)
-
-
-def test_a_method_that_needs_a_field_is_told_why_it_has_no_limit() -> None:
-    found = stability.record(scenes.load_scene("magnetic"), None, ["own:boris", "own:euler"])
-    why = "limits are measured on springs alone, without the magnetic field that it needs"
-    assert found.left_out == (LeftOut(method="own:boris", reason=why),)
 
 
 @pytest.mark.parametrize("bent", [False, True])

@@ -73,13 +73,8 @@ def along_axes(table: dict[str, Any]) -> dict[str, Any]:
         for row in table.get("bond", ())
     ]
     weights = [(number[row["particle"], row["axis"]], row["force"]) for row in table.get("weight", ())]
-    fields = []
-    for row in table.get("magnetic", ()):
-        plane = {"x": "yz", "y": "zx", "z": "xy"}[row.get("axis", "z")]
-        one, other = (number[row["particle"], axis] for axis in plane)
-        fields += [(one, other, row["strength"]), (other, one, -row["strength"])]
     made = {"particle": apart, "spring": springs, "rod": rods, "bond": bonds, "weight": weights}
-    return {**table, **made, "fields": fields}
+    return {**table, **made}
 
 
 class System:
@@ -144,8 +139,6 @@ class System:
                     force[i] -= sign * k * stretch
             for i, c in friction:
                 force[i] -= c * (order + 1) * u[i][order + 1]
-            for i, j, strength in self.table.get("fields", ()):
-                force[i] += mp.mpf(strength) * (order + 1) * u[j][order + 1]
             for law in laws:
                 law.add(u, order, force)
             for i in range(n):

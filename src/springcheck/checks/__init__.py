@@ -30,7 +30,6 @@ from springcheck.checks.motion import (
     angular_momentum,
     closed_form,
     frequency,
-    gyration,
     momentum,
     shadow_energy,
 )
@@ -54,7 +53,7 @@ __all__ = [
 
 CHECKS: tuple[Check, ...] = (
     start, times, grid, line, step_defect, arithmetic, closed_form, shadow_energy, frequency, momentum,
-    angular_momentum, rod_length, rod_velocity, turn, gyration, border, drive, energies, tolerance,
+    angular_momentum, rod_length, rod_velocity, turn, border, drive, energies, tolerance,
 )  # fmt: skip
 
 THOROUGH: tuple[Check, ...] = (
@@ -201,7 +200,6 @@ def not_exercised(scene: Scene) -> str:
         "constraints": bool(system.rods),
         "friction": bool(system.is_damped or scene.bath),
         "drives": system.is_driven,
-        "magnetic fields": "magnetic" in system.acting,
     }
     return f"Not exercised here: {', '.join(name for name, is_so in facts.items() if not is_so)}"
 

@@ -43,7 +43,7 @@ def of_step(
     # of a force that is coarser than the state, first the sizes that it has without its own error
     for way in [how] if how.force <= how.state else [replace(how, force=how.state, quantum=0.0), how]:
         size_q, size_p = schemes.magnitude_step(
-            case.scheme, q, p, h=run.step, m=m, rate=case.law.rate, turns=case.law.turns,
+            case.scheme, q, p, h=run.step, m=m, rate=case.law.rate,
             met=_evaluations(case, partial(_force, case, way, fine), places, recorded), hold=case.system.rods,
             loose=(0.0, 0.0) if paired else (how.lengths / once, how.rates / once),
         )  # fmt: skip
@@ -79,7 +79,7 @@ def of_recording(case: Claim, q: Reals, p: Reals, places: list[Reals] | None) ->
     off, none = (
         schemes.magnitude_step(
             case.scheme, q + np.copysign(part * half[0], q), p + np.copysign(part * half[1], p), h=run.step,
-            m=m, rate=case.law.rate, turns=case.law.turns, met=met, hold=case.system.rods,
+            m=m, rate=case.law.rate, met=met, hold=case.system.rods,
         )
         for part in (1, 0)
     )  # fmt: skip
@@ -94,7 +94,7 @@ def _evaluations(
     far, none = np.full(scene.n, scene.system.far, np.longdouble), np.zeros(scene.n, np.longdouble)
     pulls = scene.system.magnitude()(far, none) if case.trajectory.arithmetic.joints else 0.0
     joints = OF_LENGTH / np.longdouble(case.roundings) * pulls
-    acting = {"slow": scene.system.slow, "fast": scene.system.fast, "magnetic": sum(case.law.fields, ())}
+    acting = {"slow": scene.system.slow, "fast": scene.system.fast}
     found: list[Met] = []
     brakes = scene.system.brakes_by_place
     made: dict[tuple[str, float], Met] = {}

@@ -301,10 +301,8 @@ def fastest(case: Case) -> float:
     """Gershgorin's bound of the frequencies and rates met on the whole trajectory [1/T]."""
     q = case.trajectory.q
     steepest = np.max(case.system.gershgorin(q.astype(np.longdouble)) / case.judged.m)
-    turns = 0.0 if case.law.turns is None else np.max(np.atleast_2d(case.law.turns)[0])
-    if case.system.brakes_by_place:
-        turns = turns + float(np.max(np.abs(case.system.friction_at(q)[0])))
-    return float(np.sqrt(steepest) + np.max(case.system.friction_rates) + turns)
+    braked = np.max(np.abs(case.system.friction_at(q)[0])) if case.system.brakes_by_place else 0.0
+    return float(np.sqrt(steepest) + np.max(case.system.friction_rates) + float(braked))
 
 
 @check("arith", family="motion", requires=MAP | {"resolved"})

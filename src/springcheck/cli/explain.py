@@ -192,7 +192,7 @@ def scheme_lines(scheme: Scheme) -> Iterator[str]:
             area = "conformally symplectic: a step takes area by exp(-h c/m), without friction it keeps it"
         where = bounded or f"h omega up to {scheme.limit:.6g}"
         braked = scheme.braked_order
-        lower = f" ({braked} with friction or in a magnetic field)" if braked < scheme.order else ""
+        lower = f" ({braked} with friction)" if braked < scheme.order else ""
         yield f"Order {scheme.order}{lower}; {area}; bounded on a spring: {where}"
     if scheme.source:
         yield _line(f"Source: {scheme.source}")

@@ -8,6 +8,7 @@ from typing import Any
 
 from springcheck import engines, schemes, store
 from springcheck.figures.views import Units, units, with_unit
+from springcheck.physics import scenefile
 from springcheck.physics.trajectory import Trajectory
 from springcheck.studies import STUDIES, keeper
 from springcheck.studies.study import Study, StudyResult
@@ -31,8 +32,9 @@ def lines(summary: store.Summary, options: Namespace) -> Lines:
     """The store as text.  StoreError where it cannot be read or holds no such trajectory."""
     out: Lines = [plain(f"{summary.path}: {summary.size / 1e6:.3g} MB", "bold")]
     run, stride = _asked_for(summary, options)
+    gone = scenefile.gone_from(store.scene_text(summary.path)) if summary.runs else ""
     if run is not None:
-        of = units(keeper.stored_scene(summary.path))
+        of = Units() if gone else units(keeper.stored_scene(summary.path))
         out += _frames(run, stride, store.end(summary.path, run.label, 1), of)
         if not options.verdicts:
             return out
@@ -50,6 +52,7 @@ def lines(summary: store.Summary, options: Namespace) -> Lines:
                 f"  python {known.get('python')}, numpy {known.get('numpy')}, "
                 f"h5py {known.get('h5py')}, hdf5 {known.get('hdf5')}"
             ),
+            *([plain(f"  {gone}; its trajectories are read, not judged", "bold yellow")] if gone else []),
             _runs(summary),
         ]
     out += [plain(f"table {name}") for name in summary.tables]

@@ -20,20 +20,16 @@ class Need(Enum):
 
     DAMPING = "damping"
     FAST_SPRINGS = "springs marked fast"
-    FIELD = "a magnetic field"
     RODS = "rods"
 
     def met_by(self, scene: Scene) -> bool:
         """Whether the scene has it."""
-        if self in KEYS:
-            return any(term.key == KEYS[self] for term in scene.terms)
+        if self is Need.DAMPING:
+            return any(term.key == "damping" for term in scene.terms)
         if self is Need.RODS:
             return any(term.kind == "constraint" for term in scene.terms)
         return any(term.fast for term in scene.terms)
 
-
-KEYS = {Need.DAMPING: "damping", Need.FIELD: "magnetic"}
-"""Key of the term that a method needs, for each such need."""
 
 ANY_POTENTIAL = "any potential"
 """Among the terms of a method: it takes the force of every potential as a function."""
@@ -50,9 +46,6 @@ SPRINGS = frozenset({"wall-spring", "spring"})
 
 DRIVEN = frozenset({"drive", "modulated-spring"})
 """The terms of a method whose force may also depend on the time."""
-
-FIELD = frozenset({"magnetic"})
-"""The term of a method whose force may turn velocities."""
 
 NO_NUMBERS = "none: a chain is deterministic"
 """The generator of a thermostat whose bath is deterministic."""

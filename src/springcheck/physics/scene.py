@@ -198,11 +198,8 @@ def _terms(given: Any, n: int, places: Integers | None) -> tuple[Term, ...]:
         raise SceneError("terms: objects of springcheck.physics.terms are needed, such as WallSpring(...)")
     for term in given:
         term.check(n)
-        turns = term.kind == "magnetic"
         of = [np.arange(0) if places is None else places[index] for index in term.particles]
-        if turns and (places is None or np.any(np.diff([x // 3 for x in of], axis=0))):
-            raise SceneError(f"{term.key}: it turns velocities in the plane of two axes of one particle")
-        if not turns and len({tuple(x % 3) for x in of}) > 1:
+        if len({tuple(x % 3) for x in of}) > 1:
             raise SceneError(f"{term.key}: its rows join coordinates along different axes")
     return in_order(given)
 

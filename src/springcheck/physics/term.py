@@ -22,7 +22,7 @@ from springcheck.physics.arguments import of_kind
 from springcheck.physics.arrays import Floats, Integers, Reals, is_masked
 
 Where: TypeAlias = "slice | Integers"
-Origin: TypeAlias = Literal["potential", "friction", "magnetic", "drive", "constraint"]
+Origin: TypeAlias = Literal["potential", "friction", "drive", "constraint"]
 
 
 class Column(NamedTuple):
@@ -289,7 +289,7 @@ class LinearLaw:
 
 
 class WithoutPotential(Term):
-    """A term without potential energy: friction, a magnetic field, a driving force, a rod."""
+    """A term without potential energy: friction, a driving force, a rod."""
 
     potential: ClassVar[Any] = staticmethod(lambda u, *_: np.zeros_like(u))
     slope: ClassVar[Any] = potential

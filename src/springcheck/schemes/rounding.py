@@ -55,7 +55,6 @@ def magnitude_step(
     m: Reals,
     met: Iterable[Met],
     rate: Reals | None = None,
-    turns: Reals | None = None,
     hold: Rods | None = None,
     loose: tuple[float, float] = (0.0, 0.0),
 ) -> tuple[Reals, Reals]:
@@ -78,7 +77,7 @@ def magnitude_step(
                 last = here.magnitude(q, np.zeros_like(p) if kind.evaluates == "potential" else p)
                 last = last + here.joints
                 pull = here.pull
-            setting = Setting(m=m, rate=rate, force=last, turns=turns)
+            setting = Setting(m=m, rate=rate, force=last)
             part = number(c, np.float64) * wide
             q, p = kind.sizes(q, p, part, setting)
             if hold is not None:

@@ -8,7 +8,6 @@ from springcheck.engines.contract import (
     ANY_POTENTIAL,
     DRIVEN,
     EVERY_POTENTIAL,
-    FIELD,
     NO_NUMBERS,
     RODS,
     Engine,
@@ -73,9 +72,6 @@ ENGINE = Engine(
                 ("verlet-rods-8", "constraint tolerance 1e-8"),
                 ("verlet-rods-as-it-is", "its own constraint tolerance 1e-5"),
             )
-        ),
-        by_name(
-            "boris", "boris", "Boris' rotation by CustomIntegrator", (_DRIVEN - {"morse"}) | FIELD, Need.FIELD
         ),
         by_name(
             "nose-hoover", "semi-implicit-euler",

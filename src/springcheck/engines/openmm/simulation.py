@@ -71,12 +71,7 @@ FAST_STEPS = {"mts": 8} | {f"mts-langevin-{n}": n for n in (2, 3, 4)}
 CUSTOM_STAGES = {
     "euler": (["v0"], [("v0", "v"), ("v", "v + dt*(f/m)"), ("x", "x + dt*v0")]),
     "semi-implicit-euler": ([], [("v", "v + dt*(f/m)"), ("x", "x + dt*v")]),
-    "boris": (["turn", "half"], [
-        ("x", "x + 0.5*dt*v"), ("v", "v + 0.5*dt*f/m"),
-        ("half", "v + cross(v, turn)"), ("v", "v + cross(half, turn)*2/(1 + dot(turn, turn))"),
-        ("v", "v + 0.5*dt*f/m"), ("x", "x + 0.5*dt*v"),
-    ]),
-}  # fmt: skip
+}
 """Variables and stages of methods by a `CustomIntegrator`."""
 
 ATTENTIVE = 500
@@ -225,7 +220,7 @@ def _integrator(scene: Scene, name: str, step: float) -> mm.Integrator:
     integrator = mm.CustomIntegrator(step)
     if scene.system.is_driven:
         integrator.addGlobalVariable("done", 0)
-        integrator.addComputeGlobal("time", f"(done+{0.5 * (name == 'boris')})*({signed!r})")
+        integrator.addComputeGlobal("time", f"done*({signed!r})")
         integrator.addComputeGlobal("done", "done+1")
     own, stages = CUSTOM_STAGES[name]
     for variable in own:
@@ -233,18 +228,6 @@ def _integrator(scene: Scene, name: str, step: float) -> mm.Integrator:
     for variable, value in stages:
         integrator.addComputePerDof(variable, value)
     return integrator
-
-
-def _turns(scene: Scene, step: float, particles: int) -> list[mm.Vec3]:
-    """Half of what each field turns a velocity by in a step, about its own axis: (W h/2) along it."""
-    out = np.zeros((particles, 3))
-    assert scene.places is not None
-    for term in scene.terms:
-        for a, b, strength in term.rows() if term.key == "magnetic" else ():
-            (particle, one), (_, other) = (divmod(int(scene.places[x]), 3) for x in (a, b))
-            sign = 1 if (other - one) % 3 == 1 else -1
-            out[particle, 3 - one - other] += sign * strength * step / (2 * scene.m[a])
-    return [mm.Vec3(*row) for row in out.tolist()]
 
 
 def _context(system: mm.System, integrator: mm.Integrator, label: Label) -> mm.Context:
@@ -299,8 +282,6 @@ class _Context:
         else:
             self._integrator = _integrator(scene, method.name, step)
         self._context = _context(system, self._integrator, label)
-        if method.name == "boris":
-            self._integrator.setPerDofVariableByName("turn", _turns(scene, step, len(positions)))
         origins = origins + bonds.cells(scene, origins) * scene.periods
         self._origins = origins if np.any(origins) else None
         # what OpenMM computes: all but friction

@@ -12,19 +12,17 @@ from springcheck.engines.contract import (
     EVERY_FORCE,
     EVERY_KIND,
     EVERY_POTENTIAL,
-    FIELD,
     NO_NUMBERS,
     RODS,
     SPRINGS,
     Engine,
     Method,
     Need,
-    by_name,
     deferred,
     named,
     thermostat,
 )
-from springcheck.schemes import ATTACHED, SCHEMES, Scheme
+from springcheck.schemes import SCHEMES, Scheme
 from springcheck.thermal import THERMOSTATS
 
 NAMES = {"explicit-euler": "euler"}
@@ -52,8 +50,7 @@ def _terms(scheme: Scheme) -> frozenset[str]:
         return SPRINGS | BRAKES | {"damping"}
     # rods hold after every stage of a splitting
     rods = RODS if scheme.has("symplectic", "splitting") else frozenset()
-    # to kicks by all forces, and to a tableau, a field is a force like any other
-    return EVERY_FORCE | rods | (FIELD | BRAKES if scheme.has("plain") or scheme.b else frozenset())
+    return EVERY_FORCE | rods | (BRAKES if scheme.has("plain") or scheme.b else frozenset())
 
 
 def _method(scheme: Scheme) -> Method:
@@ -76,10 +73,7 @@ _SCHEMES = sorted(
 ENGINE = Engine(
     name="own",
     title="springcheck",
-    methods=named(
-        *map(_method, _SCHEMES),
-        by_name("boris", "boris", ATTACHED["boris"].title, EVERY_POTENTIAL | DRIVEN | FIELD, Need.FIELD),
-    ),
+    methods=named(*map(_method, _SCHEMES)),
     any_axis=True,
     periodic=True,
     convention=lambda method: "positions and momenta belong to the same time",

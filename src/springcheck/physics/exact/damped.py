@@ -1,12 +1,12 @@
-"""The exact solution of particles whose modes friction or a field couples, by the matrix exponential.
+"""The exact solution of particles whose modes friction couples, by the matrix exponential.
 
 In the modes of the springs alone, with the positions of each multiplied by its frequency w, the state z obeys
-z' = A z, A = [[0, W], [-W, -G]], G the friction between modes, and antisymmetric the field.  A + A^T is
--2 diag(0, G) without the field: the exponentials do not increase lengths, so that the error of a product of
-them grows with the number of factors and no faster.  For a free mode the time constant of A replaces w.
+z' = A z, A = [[0, W], [-W, -G]], G the friction between modes.  A + A^T is
+-2 diag(0, G): the exponentials do not increase lengths, so that the error of a product of them grows with the
+number of factors and no faster.  For a free mode the time constant of A replaces w.
 
 Constant forces on free modes have a solution of their own, to which z is added: a drift d with G d the
-force, such as a terminal velocity or that of crossed fields, which moves the centres of the other modes; and
+force, such as a terminal velocity, which moves the centres of the other modes; and
 a uniform acceleration of modes on which G does not act.
 """
 
@@ -21,7 +21,6 @@ from springcheck.physics.exact.closedform import ClosedForm, States
 from springcheck.physics.exact.linear import ROUNDINGS
 from springcheck.physics.exact.normal import normal_modes
 from springcheck.physics.system import System
-from springcheck.physics.terms import Magnetic
 
 WORST_DRIFT_CONDITION = 2.0**16
 """Largest condition of the matrix that a drift solves."""
@@ -43,24 +42,21 @@ MOST_STEP_DIGITS = 15
 
 
 class CoupledModes(ClosedForm):
-    """A whole linear scene whose friction or field couples modes: A takes z to z' (2n, 2n) [1/T], `scale`
+    """A whole linear scene whose friction couples modes: A takes z to z' (2n, 2n) [1/T], `scale`
     (n,) is z over positions, `rate` a bound of |A|, by rows or columns, and `free` the scale of free modes, 0
     where there are none; `away`, `drift` and `pull` (n,) of the solution by constant forces."""
 
     def __init__(self, system: System[Any]) -> None:
-        """For springs, friction and fields alone, without growing modes."""
+        """For springs and friction alone, without growing modes."""
         super().__init__(system)
-        plain, n = system.without("damping").without("magnetic"), system.n
+        plain, n = system.without("damping"), system.n
         self.need(plain.is_linear and n <= MOST_COUPLED_MODES)
-        self.need(all(term.kind in ("potential", "friction", "magnetic") for term in system.terms))
+        self.need(all(term.kind in ("potential", "friction") for term in system.terms))
         self.modes = modes = normal_modes(plain)
         held, unit = modes.w2 > 0, np.eye(n, dtype=np.longdouble)
         self.need(not np.any(modes.w2 < 0))
-        V, root_m = unit if modes.vectors is None else modes.vectors, modes.root_m
+        V = unit if modes.vectors is None else modes.vectors
         G = np.diag(system.friction_rates.astype(np.longdouble))
-        for term in system.terms:
-            if isinstance(term, Magnetic):
-                G = G - term.by_velocity(root_m * root_m) * (root_m / root_m[:, None])
         G = V.T @ G @ V
         w = np.sqrt(np.where(held, modes.w2, 0))
         self.free = np.longdouble(0) if np.all(held) else np.max(w) + np.max(np.sum(np.abs(G), axis=1))

@@ -102,16 +102,12 @@ def _solution(system: SolvedSystem[Any]) -> Solution | None:
 def _of_whole_scenes(system: SolvedSystem[Any]) -> Iterator[type[ClosedForm]]:
     """Closed forms of all particles together; those that the scene's terms exclude are not imported."""
     yield LinearMotion
-    if "magnetic" in system.acting:
-        from springcheck.physics.exact.gyration import Gyration
-
-        yield Gyration
-    elif system.is_driven:
+    if system.is_driven:
         from springcheck.physics.exact.mathieu import ModulatedMotion
         from springcheck.physics.exact.response import Response
 
         yield from (Response, ModulatedMotion)
-    if ("magnetic" in system.acting or system.is_damped) and not system.is_driven:
+    elif system.is_damped:
         from springcheck.physics.exact.damped import CoupledModes
 
         yield CoupledModes

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -88,6 +88,8 @@ def parse(text: str, *, name: str, where: str | None = None) -> Scene:
 
 def from_tables(data: Any, *, name: str, where: str) -> Scene:
     """The scene that the tables of a scene file describe.  Raises SceneError."""
+    if said := gone(data):
+        raise SceneError(f"{where}: {said}")
     for field, value in _numbers(data):
         if not math.isfinite(value):
             raise SceneError(f"{where}: {field} = {value}; a finite number is needed")
@@ -99,6 +101,19 @@ def from_tables(data: Any, *, name: str, where: str) -> Scene:
         return building.scene(table, name=name)
     except building.MistakeError as error:
         raise SceneError(f"{where}: {error}") from error
+
+
+def gone(names: Iterable[str]) -> str:
+    """Which of the tables of a scene are not part of springcheck any more, in a clause; "" for none."""
+    left = (
+        f"[{name}]: {tables.LEFT[name]} are not part of springcheck" for name in names if name in tables.LEFT
+    )
+    return next(left, "")
+
+
+def gone_from(text: str) -> str:
+    """As `gone`, of the text of a scene file, which need not be valid."""
+    return gone(re.findall(r"^\[+([\w-]+)", text, re.MULTILINE))
 
 
 def _unreadable(message: str, text: str) -> str:

@@ -95,14 +95,6 @@ class BondTable(SceneTable, frozen=True):
     rest: NonNegative = 0.0
 
 
-class MagneticTable(SceneTable, frozen=True):
-    """A magnetic field along `axis`, its strength charge times field [M/T]: force strength (v_y, -v_x)."""
-
-    particle: int
-    strength: float
-    axis: Axis = "z"
-
-
 class WaveTable(SceneTable, frozen=True):
     """One standing wave of a chain: mode number (1 is the slowest) and amplitude [L]."""
 
@@ -194,7 +186,6 @@ class SceneBase(SceneTable, frozen=True):
     spring: tuple[SpringTable, ...] = ()
     rod: tuple[RodTable, ...] = ()
     bond: tuple[BondTable, ...] = ()
-    magnetic: tuple[MagneticTable, ...] = ()
     box: BoxTable | None = None
     bath: BathTable | None = None
     methods: MethodsTable = MethodsTable()
@@ -230,13 +221,17 @@ def identifier(name: str) -> str:
     return name.replace("-", "_")
 
 
-OWN_TABLES = ("wall-spring", "spring", "magnetic", "wall-rod", "rod", "bond")
+OWN_TABLES = ("wall-spring", "spring", "wall-rod", "rod", "bond")
 """Keys of the terms with tables of their own."""
 
 
 def of_terms() -> tuple[Any, ...]:
     """Terms that are read by their columns alone."""
     return tuple(term for key, term in terms.known().items() if key not in OWN_TABLES)
+
+
+LEFT = {"magnetic": "magnetic fields"}
+"""Tables of scene files that are refused, and what they describe: no part of springcheck."""
 
 
 def scene_table() -> Any:

@@ -50,7 +50,6 @@ SCENES: Mapping[str, Callable[[], Scene]] = {
         terms=(Spring(a=np.arange(2), b=np.arange(2, 4), k=np.full(2, 2.9), rest=np.zeros(2)),), steps=200),
     "dumbbell": lambda: replace(load_scene("dumbbell"), steps=200),
     "triangle": lambda: replace(load_scene("rigid-triangle"), steps=40),
-    "field": lambda: replace(load_scene("foucault"), steps=200),
     "hot rod": lambda: replace(load_scene("bath-dumbbell"), steps=400),
     "bath": lambda: baths.springs(40),
     "wide bath": lambda: baths.springs(250),

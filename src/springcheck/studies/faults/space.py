@@ -1,5 +1,5 @@
-"""Faults along y and z and in a periodic box, to which a scene along x is blind; of drives at another time or
-with other parameters; and of magnetic fields, with Boris' rotation written out."""
+"""Faults along y and z and in a periodic box, to which a scene along x is blind; and of drives at
+another time or with other parameters."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ import numpy as np
 
 from springcheck.physics.arrays import Floats, Reals
 from springcheck.physics.scene import Scene
-from springcheck.physics.terms import Drive, Magnetic, Spring
+from springcheck.physics.terms import Drive, Spring
 from springcheck.physics.trajectory import Trajectory
 from springcheck.studies.faults.seeded import FRAME_CHECKS, Case, Fault, each, half_step, single
-from springcheck.studies.faults.steppers import State, Step, textbook
+from springcheck.studies.faults.steppers import Step, textbook
 
 
 def stiffer(c: Case, axis: str) -> Scene:
@@ -162,52 +162,4 @@ DRIVES = each(
     Fault("drive-in-cycles", "the angular frequency of the drive is taken for cycles in a unit of time",
           moves=lambda c: other(c.scene, lambda d: replace(d, frequency=d.frequency * (2 * np.pi)))),
     caught_by=(*FRAME_CHECKS, "drive"), scene="driven",
-)  # fmt: skip
-
-
-def cayley(t: float, v: complex) -> complex:
-    """Boris' rotation by -2 atan(t), without transcendental functions."""
-    return v * (1 - 1j * t) / (1 + 1j * t)
-
-
-def turning(
-    c: Case, i: int, q: Floats, p: Floats, turn: Callable[[float, complex], complex] = cayley, *,
-    first: float = 0.5, mass: bool = True,
-) -> State:  # fmt: skip
-    """Boris' scheme with another rotation, as a function of the tangent of half the angle and v_x + i v_y;
-    with another share of the kick before it; or with a field not divided by the mass."""
-    m, h = float(c.scene.m[0]), c.scene.step
-    term = next((term for term in c.scene.terms if isinstance(term, Magnetic)), None)
-    if term is None:
-        return c.right(i, q, p)
-    q = q + h / 2 * p / m
-    kick = h * c.scene.system.potential_force(q, p)
-    x, y = (p + first * kick) / m
-    v = turn(float(term.strength[0]) * h / 2 / (m if mass else 1), complex(x, y))
-    p = m * np.array([v.real, v.imag]) + (1 - first) * kick
-    return q + h / 2 * p / m, p
-
-
-FIELDS = each(
-    Fault("field-sign", "the field turns velocities the other way",
-          step=lambda c, i, q, p: turning(c, i, q, p, lambda t, v: cayley(-t, v))),
-    Fault("field-half-angle", "the field turns velocities by half of the angle",
-          step=lambda c, i, q, p: turning(c, i, q, p, lambda t, v: v * (1 - 1j * t) / abs(1 + 1j * t))),
-    Fault("field-exact-angle", "the field turns velocities by Omega h, not by 2 atan(Omega h/2)",
-          step=lambda c, i, q, p: turning(c, i, q, p, lambda t, v: v * np.exp(-2j * t))),
-    Fault("field-gains-speed", "the field is a force at the start of the step: the speed grows",
-          step=lambda c, i, q, p: turning(c, i, q, p, lambda t, v: v * (1 - 2j * t))),
-    Fault("field-loses-speed", "the second half of the rotation is left out, and its denominator is not",
-          step=lambda c, i, q, p: turning(c, i, q, p, lambda t, v: v / (1 + 1j * t))),
-    Fault("field-speed", "the rotation loses a part of the speed",
-          step=lambda c, i, q, p: turning(c, i, q, p, lambda t, v: cayley(t, v) * (1 - c.x)), size=1e-12),
-    Fault("field-strength", "the field is too strong",
-          step=lambda c, i, q, p: turning(c, i, q, p, lambda t, v: cayley(t * (1 + c.x), v)), size=1e-12),
-    Fault("field-over-mass", "the field is not divided by the mass",
-          step=lambda c, i, q, p: turning(c, i, q, p, mass=False)),
-    Fault("field-after-kick", "the whole kick comes before the rotation",
-          step=lambda c, i, q, p: turning(c, i, q, p, first=1.0)),
-    Fault("field-before-kick", "the whole kick comes after the rotation",
-          step=lambda c, i, q, p: turning(c, i, q, p, first=0.0)),
-    caught_by=("step-defect", "gyration"), scheme="boris", scene="field",
 )  # fmt: skip

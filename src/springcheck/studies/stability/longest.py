@@ -151,15 +151,11 @@ def fastest(scene: Scene) -> float:
 def linear(scene: Scene, scheme: Scheme) -> Linear | None:
     """The linearised motion that determines a scheme's stability on a scene.
 
-    None for more coupled particles than are examined, in a magnetic field, which is no stiffness, where
+    None for more coupled particles than are examined, where
     position-dependent friction acts on joined particles, and where a stiffness is modulated.
     """
     system = scene.system
-    if (
-        "magnetic" in system.acting
-        or is_modulated(scene)
-        or (system.brakes_by_place and not system.is_separate)
-    ):
+    if is_modulated(scene) or (system.brakes_by_place and not system.is_separate):
         return None
     if (scheme.has("mixes") and system.fast) or not (system.is_separate or system.has_one_friction_rate):
         if scene.n > MOST_COUPLED:
@@ -303,15 +299,12 @@ def too_long(name: str, scene: Scene) -> float | None:
 
 
 def resonating(name: str, scene: Scene) -> float | None:
-    """The factor by which a scheme's step multiplies the motion of modulated springs, on average, or of a
-    magnetic scene, if it grows where the exact solution stays bounded; else, of other scenes, and of a scheme
-    without stable steps None.
+    """The factor by which a scheme's step multiplies the motion of modulated springs, on average, if it grows
+    where the exact solution stays bounded; else, of other scenes, and of a scheme without stable steps None.
     """
     scheme = schemes.known().get(name)
     if scheme is None or scheme.has("random") or not scheme.has("one-step") or not limit_of(scheme):
         return None
-    if "magnetic" in scene.system.acting:
-        return _in_field(scheme, scene)
     mixed = scheme.has("mixes") and scene.system.fast
     about = _homogeneous(scene) if is_modulated(scene) and scene.n <= MOST_COUPLED and not mixed else None
     exactly = about and floquet(about.system)
@@ -363,27 +356,6 @@ def _homogeneous(scene: Scene) -> Scene | None:
         at=np.zeros(scene.n),
     )  # fmt: skip
     return scene.derived(terms=(one, *(x for x in scene.terms if x.key == "damping")))
-
-
-def _in_field(scheme: Scheme, scene: Scene) -> float | None:
-    """The spectral radius of a scheme's step in a magnetic field, if it grows and the exact solution does
-    not.  Kicks by the force of a field are explicit Euler's along p, and grow at every step."""
-    system, n = scene.system, scene.n
-    kicked = any(kind.evaluates in ("all", "slow") for kind in scheme.kinds)
-    bent = not all(x.is_linear or x.kind == "magnetic" for x in scene.terms)
-    if kicked or bent or n > MOST_COUPLED:
-        return None
-    if np.max(np.linalg.eigvals(system.jacobian(scene.q)).real) * abs(scene.step) > COUPLED_GROWTH:
-        return None
-    # differences from the step of the state 0, which constant forces move
-    q, p = np.split(np.eye(2 * n + 1, 2 * n, dtype=np.longdouble), 2, axis=1)
-    unit = scene.m / abs(scene.step)
-    with np.errstate(all="ignore"):
-        q, p = schemes.Law(scheme=scheme, scene=scene, h=scene.step).step(q, p * unit)
-        maps = np.concatenate([q, p / unit], axis=1)
-        values = np.linalg.eigvals((maps[:-1] - maps[-1]).astype(np.float64))
-    largest = float(np.max(np.abs(values)))
-    return largest if largest > 1 + COUPLED_GROWTH else None
 
 
 def _first(scheme: Scheme, of: Linear, scale: float) -> float:

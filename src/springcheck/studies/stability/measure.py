@@ -16,7 +16,7 @@ from typing import Unpack
 import numpy as np
 
 from springcheck import engines
-from springcheck.engines.contract import Label, Need
+from springcheck.engines.contract import Label
 from springcheck.errors import SceneError
 from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
@@ -63,8 +63,6 @@ def _measure(scene: Scene, labels: Sequence[Label], kept: Keeper) -> Stability:
             return "its scheme is not known; --scheme NAME states it, and its limit is then measured"
         if not claimed.has("one-step"):
             return "it has no fixed step and no limit"
-        if Need.FIELD in method.requires:
-            return "limits are measured on springs alone, without the magnetic field that it needs"
         if "wall-spring" not in method.terms:
             return "it moves no springs"
         scan = limits.FIRST_H_W, limits.LAST_H_W

@@ -190,20 +190,17 @@ class Stability(Studied):
 
 def _of_scene(study: Stability, largest_steps: Sequence[float]) -> Lines:
     """The scene's fastest motion, its step, and the methods for which it is too long."""
-    scene, w, field = study.scene, fastest(study.scene), "magnetic" in study.scene.system.acting
+    scene, w = study.scene, fastest(study.scene)
     if not w and not scene.system.is_damped:
         said = " at its start, which says nothing of where it goes"
-        if field:
-            said = " but by its magnetic field, with which no largest step is worked out"
-        elif scene.system.is_linear:
+        if scene.system.is_linear:
             said = ": no step is too long for its stability"
         return [plain(f"  nothing in this scene oscillates{said}")]
     most = ", its modulated springs at their stiffest" * is_modulated(scene)
     there = ", where its motion is stiffest" if has_true_motion(scene) else f", at its start{most}"
-    straight = scene.system.without("drive").without("magnetic").is_linear
+    straight = scene.system.without("drive").is_linear
     where = "" if straight else there
-    left = {"friction": scene.system.is_damped, "field": field}
-    where += "".join(f", without its {name}" for name, acts in left.items() if acts)
+    where += ", without its friction" * bool(scene.system.is_damped)
     here = f"its step h = {scene.step:g} makes h w = {abs(scene.step) * w:.4g}"
     out: Lines = [plain(f"  fastest angular frequency of this scene{where}: w = {w:.6g}; {here}")]
     h = abs(scene.step)
@@ -221,8 +218,6 @@ def _of_scene(study: Stability, largest_steps: Sequence[float]) -> Lines:
     if is_modulated(scene):
         said = "no largest step is known: one may resonate with the modulation below its limit on a spring"
         out.append(plain(f"  {said}", "dim"))
-    elif field:
-        out.append(plain("  no largest step is worked out with a magnetic field", "dim"))
     elif not straight:
         said = "limits of small oscillations there; an anharmonic motion may be lost below them"
         out.append(plain(f"  {said}", "dim"))
