@@ -263,7 +263,7 @@ def test_a_frame_that_is_there_twice_or_lost_is_named(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "words"), [("van-der-pol", "another number"), ("mathieu-stable", "drive is taken")]
+    ("name", "words"), [("van-der-pol", "another number"), ("driven-spring", "drive is taken")]
 )
 def test_noise_of_a_few_roundings_is_no_number_and_no_time(name: str, words: str) -> None:
     """A number that roundings of one sign would move as far explains nothing."""

@@ -16,7 +16,6 @@ from springcheck.physics import exact
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import (
     Damping,
-    ModulatedSpring,
     RadialSpring,
     Rod,
     Spring,
@@ -151,60 +150,6 @@ def test_friction_on_one_of_two_far_away() -> None:
         end = mp.expm(slow * exactly(t), method="taylor") * start
         # 10 times the stated error
         assert over_stated(scene, (end[0] + 10000, end[1] + 10000), (end[2], end[3])) < 0.5
-
-
-def a_period(w2: Any, depth: Any, turn: Any, phase: Any, t: Any) -> Any:
-    """What takes (u, v) of u'' = -w2 (1 + depth cos(turn t + phase)) u from 0 to t, by Taylor series."""
-    count, whole, order = 24, mp.eye(2), 40
-    h = t / count
-    for step in range(count):
-        angle, factor, waves = turn * h * step + phase, mp.mpf(1), []
-        for j in range(order):
-            waves.append(depth * factor * mp.cos(angle + j * mp.pi / 2) + (j == 0))
-            factor *= turn / (j + 1)
-        columns = []
-        for begin in ((mp.mpf(1), mp.mpf(0)), (mp.mpf(0), mp.mpf(1))):
-            u = list(begin)
-            for j in range(order):
-                u.append(-w2 * mp.fdot(waves[: j + 1], u[j::-1]) / ((j + 1) * (j + 2)))
-            columns.append((mp.polyval(u[::-1], h), mp.polyval([j * x for j, x in enumerate(u)][:0:-1], h)))
-        whole = mp.matrix(columns).T * whole
-    return whole
-
-
-@pytest.mark.parametrize(
-    ("m", "k", "depth", "turn", "phase", "t"),
-    [
-        (0.8776905761663266, 1004.9388042248519, 1.404363098136562, 36.13693690103395, -0.85, 16288.225),
-        (0.04983513166771155, 0.007263444067375739, 0.5956310852194608, 0.87260128794783, 0.74, 1304.4),
-        (74.4225865306145, 0.005097311933853181, 1.302278130856085, 0.011450520269350504, 2.9, 1.5e8),
-    ],
-)
-def test_a_modulated_spring_at_the_edge_of_a_resonance(
-    m: float, k: float, depth: float, turn: float, phase: float, t: float
-) -> None:
-    spring = ModulatedSpring(i=[0], k=[k], depth=[depth], frequency=[turn], phase=[phase], at=[0.0])
-    scene = Scene(m=[m], q=[0.7], p=[-0.4], terms=(spring,), step=t, steps=1)
-    with mp.workdps(40):
-        given = exactly(k) / exactly(m), exactly(depth), exactly(turn), exactly(phase)
-        whole = 2 * mp.pi / given[2]
-        n = int(exactly(t) / whole)
-        end = a_period(*given, exactly(t) - n * whole) * a_period(*given, whole) ** n
-        u, v = end * mp.matrix([exactly(0.7), exactly(-0.4) / exactly(m)])
-        # up to 12,000 stated errors
-        assert over_stated(scene, [u], [v * exactly(m)], part=1.0) < 0.5
-
-
-@pytest.mark.parametrize(("at", "q", "p", "t"), [(-1e5, -1e5 - 5e-6, 0.0, 0.4), (0.0, 0.7, -12.1, -0.007)])
-def test_a_modulated_spring_far_from_0_and_back_in_time(at: float, q: float, p: float, t: float) -> None:
-    m, k, depth, turn, phase = 2.7, 3.64, 0.3, 0.0156 if t < 0 else 2.6, 1.012
-    spring = ModulatedSpring(i=[0], k=[k], depth=[depth], frequency=[turn], phase=[phase], at=[at])
-    scene = Scene(m=[m], q=[q], p=[p], terms=(spring,), step=t, steps=1)
-    with mp.workdps(40):
-        end = a_period(exactly(k) / exactly(m), *map(exactly, (depth, turn, phase, t)))
-        u, v = end * mp.matrix([exactly(q) - exactly(at), exactly(p) / exactly(m)])
-        # the rounding of a far position was not counted, nor the whole period that times before 0 go back
-        assert over_stated(scene, [u + exactly(at)], [v * exactly(m)]) < 0.5
 
 
 @pytest.mark.parametrize(

@@ -83,14 +83,6 @@ def test_a_drive_of_which_no_scheme_is_told_is_one_for_each_unit_of_mass_too() -
     assert "about 0.43 cos(1.37 t + 0.63), the phase" in found.statement
 
 
-@pytest.mark.parametrize(("name", "frequency"), [("mathieu-stable", 1.3723), ("mathieu-tongue", 1.7706)])
-def test_a_modulated_stiffness_is_said_to_first_order(name: str, frequency: float) -> None:
-    why = said(scenes.load_scene(name), "own:velocity-verlet", mass=3.7, stiffness=2.9)
-    assert why.startswith("The stiffness changes in time, up and down")
-    assert "about as 1 + 0.3 cos(" in why
-    assert float(why.partition("cos(")[2].partition(" t")[0]) == pytest.approx(frequency, rel=1e-3)
-
-
 def test_a_drive_of_two_frequencies_is_given_no_scheme() -> None:
     scene = driven(damped=False)
     both: Any = Drive(i=ONE, amplitude=np.array([0.3]), frequency=np.array([7.1]), phase=np.array([0.2]))

@@ -298,18 +298,11 @@ def test_a_sweep_begins_just_below_the_limit_of_stability() -> None:
         assert 0.9 < known.angle / sweeps.coarsest(known, limit) <= 1
 
 
-@pytest.mark.parametrize("name", ["mathieu-stable", "anharmonic", "hinged-pendulum"])
+@pytest.mark.parametrize("name", ["anharmonic", "hinged-pendulum"])
 def test_the_frequency_is_the_largest_along_the_motion_as_in_the_study_of_stability(name: str) -> None:
     scene = scenes.load_scene(name)
     known = accuracy.truth(scene)
     assert known.w == longest.fastest(scene)
-    if name == "mathieu-stable":
-        (term,) = scene.terms
-        # at t = 0 the stiffness is a tenth of k, and half a turn later 1.9 k
-        slack = replace(term, depth=np.array([0.9]), phase=np.array([np.pi]))
-        known = accuracy.truth(replace(scene, terms=(slack,)))
-        assert known.w == pytest.approx(np.sqrt(2.9 * 1.9 / 3.7), rel=1e-12)
-        assert known.angle / sweeps.coarsest(known, 2.0) < 2
 
 
 def test_of_many_separate_particles_the_stiffest_moment_of_any_is_searched() -> None:

@@ -20,7 +20,6 @@ from springcheck import driver, engines, schemes
 from springcheck.physics import builders
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.arrays import Extended
-from springcheck.physics.driven import ModulatedSpring
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Damping, Quartic, Spring, WallSpring, Weight
 from springcheck.schemes import lookup
@@ -344,19 +343,6 @@ def test_a_study_prints_the_limits_of_the_scene(name: str, method: str, said: st
     assert "no step is too long" not in text
     (row,) = study.document()["methods"]
     assert row["largest_step"] == pytest.approx(study.largest(study.limits[0]))
-
-
-def test_the_frequency_of_a_modulated_spring_with_friction_is_said_to_be_its_largest() -> None:
-    """At its start the stiffness is 2.4335 (1 + 0.031 cos 1), by which w would be 1.11222."""
-    term = ModulatedSpring(
-        i=np.array([0]), k=np.array([2.4335]), depth=np.array([0.031]), frequency=np.array([1.1]),
-        phase=np.array([1.0]), at=np.array([0.0]),
-    )  # fmt: skip
-    still = builders.spring(m=2.0, k=2.4335, q=0.3, p=0.7)
-    scene = replace(still, terms=(term, Damping(i=[0], c=[0.2])))
-    study = stability.record(scene, None, ["own:velocity-verlet"])
-    said = next(str(line) for line in STUDY.lines(study) if "fastest angular frequency" in str(line))
-    assert "its modulated springs at their stiffest, without its friction: w = 1.12003" in said
 
 
 def test_a_method_that_cannot_serve_the_scene_has_no_largest_step_there(need: Need) -> None:

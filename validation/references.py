@@ -126,7 +126,7 @@ class System:
         laws: list[Any] = [_Quartic(row) for row in self.table.get("quartic", ())]
         laws += [_Cosine(row) for row in self.table.get("cosine", ())]
         laws += [_Morse(row) for row in self.table.get("morse", ())]
-        laws += [_Driven(row, t) for key in ("drive", "modulated-spring") for row in self.table.get(key, ())]
+        laws += [_Driven(row, t) for row in self.table.get("drive", ())]
         laws += [_Bond(row) for row in self.table.get("bond", ())]
         # from what all others do
         laws.append(_Rods(self.table.get("rod", ()), self.m))
@@ -228,22 +228,15 @@ class _Bond:
 
 
 class _Driven:
-    """A driving force, or a spring of modulated stiffness: the cosine by its own series about the time t."""
+    """A driving force: the cosine by its own series about the time t."""
 
     def __init__(self, row: dict[str, Any], t: Any) -> None:
         self.i, self.row = row["particle"], {name: mp.mpf(x) for name, x in row.items()}
         self.w, self.angle = self.row["frequency"], self.row["frequency"] * t + self.row.get("phase", 0)
-        self.x: list[Any] = []
-        self.k: list[Any] = []
 
     def add(self, u: Series, order: int, force: list[Any]) -> None:
         cosine = self.w**order * mp.cos(self.angle + order * mp.pi / 2) / mp.factorial(order)
-        if "amplitude" in self.row:
-            force[self.i] += self.row["amplitude"] * cosine
-            return
-        self.x.append(u[self.i][order] - (self.row.get("at", 0) if order == 0 else 0))
-        self.k.append(self.row["stiffness"] * ((order == 0) + self.row["depth"] * cosine))
-        force[self.i] -= _product(self.k, self.x, order)
+        force[self.i] += self.row["amplitude"] * cosine
 
 
 def signed(ends: list[int]) -> list[tuple[int, int]]:

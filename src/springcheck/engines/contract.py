@@ -44,8 +44,8 @@ RODS = frozenset({"wall-rod", "rod"})
 
 SPRINGS = frozenset({"wall-spring", "spring"})
 
-DRIVEN = frozenset({"drive", "modulated-spring"})
-"""The terms of a method whose force may also depend on the time."""
+DRIVEN = frozenset({"drive"})
+"""The term of a method whose force may also depend on the time."""
 
 NO_NUMBERS = "none: a chain is deterministic"
 """The generator of a thermostat whose bath is deterministic."""

@@ -327,7 +327,7 @@ class Limits:
     order: float | None = told("an order or exponent off by {:.1e}")
     """Absolute change of an order or an exponent."""
     amplitude: float | None = told("a drive's amplitude off by {:.1e}")
-    """Relative change of a drive's amplitude, or of the depth of a modulation: the largest such limit."""
+    """Relative change of a drive's amplitude: the largest such limit."""
     frequency: float | None = told("its frequency off by {:.1e}")
     """Relative change of the frequency of a drive."""
     phase: float | None = told("its phase off by {:.1e} rad")

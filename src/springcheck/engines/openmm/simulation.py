@@ -37,7 +37,7 @@ from springcheck.engines.openmm.rounding import CUSTOM, LENGTHS, arithmetic, siz
 from springcheck.engines.openmm.thermostats import thermostat
 from springcheck.errors import MethodError
 from springcheck.physics.arrays import Floats
-from springcheck.physics.driven import timed
+from springcheck.physics.driven import Drive, timed
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Morse, WallSpring
 
@@ -50,13 +50,6 @@ CUSTOM_TERMS: dict[str, tuple[str, tuple[str, ...]]] = {
 }
 """Energies as OpenMM reads them, and the parameters in them, the origin last.  No parameter is divided by or
 multiplied with another: GPU-type platforms keep them as float and do that in float, in every mode."""
-
-DRIVEN_ENERGY = {
-    "drive": ("-({amplitude!r})*cos(({frequency!r})*time+({phase!r}))*x", ()),
-    "modulated-spring": ("0.5*k*(1+({depth!r})*cos(({frequency!r})*time+({phase!r})))*(x-at)^2", ("k", "at")),
-}
-"""Energies of terms that depend on the time, as OpenMM reads them; the numbers written into an expression are
-kept as double by every platform."""
 
 SHIFTED = frozenset(
     {"verlet", "langevin-middle", "langevin", "langevin-middle-synchronised"}
@@ -141,8 +134,8 @@ def _system(scene: Scene, origins: Floats) -> tuple[mm.System, Floats]:
         if term.key in CUSTOM_TERMS and not isinstance(term, WallSpring):
             for force in _custom(scene, term, origins):
                 system.addForce(force)
-        elif term.key in DRIVEN_ENERGY:
-            for force in _driven(scene, term, origins):
+        elif isinstance(term, Drive):
+            for force in _driven(scene, term):
                 system.addForce(force)
     return system, np.concatenate([start, np.reshape(fixed, (-1, 3))])
 
@@ -175,20 +168,15 @@ def _custom(scene: Scene, term: Any, origins: Floats) -> Iterator[mm.Force]:
         yield force
 
 
-def _driven(scene: Scene, term: Any, origins: Floats) -> Iterator[mm.Force]:
-    """A drive, or a modulated spring, row by row, as energies of a particle and of the time."""
-    energy, names = DRIVEN_ENERGY[term.key]
-    places = scene.all_places
-    for i, *numbers in term.rows():
-        given = dict(zip((column.field for column in term.columns), numbers, strict=True))
-        particle, axis = divmod(int(places[i]), 3)
-        # a force that is constant in space does not depend on the origin of positions
-        wanted = energy.format(**given).replace("*x", f"*{'xyz'[axis]}").replace("(x-", f"({'xyz'[axis]}-")
-        force = mm.CustomExternalForce(wanted)
+def _driven(scene: Scene, term: Drive) -> Iterator[mm.Force]:
+    """A drive, row by row, as energies of a particle and of the time; every platform keeps the numbers that
+    are written into an expression as double."""
+    for i, amplitude, frequency, phase in term.rows():
+        particle, axis = divmod(int(scene.all_places[i]), 3)
+        wave = f"cos(({frequency!r})*time+({phase!r}))"
+        force = mm.CustomExternalForce(f"-({amplitude!r})*{wave}*{'xyz'[axis]}")
         force.addGlobalParameter("time", 0.0)
-        for name in names:
-            force.addPerParticleParameter(name)
-        force.addParticle(particle, [given[x] - (origins[i] if x == "at" else 0.0) for x in names])
+        force.addParticle(particle, [])
         yield force
 
 

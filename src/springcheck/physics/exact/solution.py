@@ -103,10 +103,9 @@ def _of_whole_scenes(system: SolvedSystem[Any]) -> Iterator[type[ClosedForm]]:
     """Closed forms of all particles together; those that the scene's terms exclude are not imported."""
     yield LinearMotion
     if system.is_driven:
-        from springcheck.physics.exact.mathieu import ModulatedMotion
         from springcheck.physics.exact.response import Response
 
-        yield from (Response, ModulatedMotion)
+        yield Response
     elif system.is_damped:
         from springcheck.physics.exact.damped import CoupledModes
 

@@ -230,7 +230,7 @@ def of_terms() -> tuple[Any, ...]:
     return tuple(term for key, term in terms.known().items() if key not in OWN_TABLES)
 
 
-LEFT = {"magnetic": "magnetic fields"}
+LEFT = {"magnetic": "magnetic fields", "modulated-spring": "springs of modulated stiffness"}
 """Tables of scene files that are refused, and what they describe: no part of springcheck."""
 
 

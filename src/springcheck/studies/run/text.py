@@ -37,21 +37,14 @@ def beyond(scene: Scene, runs: Sequence[MethodRun]) -> Lines:
         least = min((one.limit for one in ran if one.limit), default=np.inf)
         if h * np.sqrt(np.max(np.abs(system.modes.w2))) < least:
             return []
-    from springcheck.studies.stability.longest import resonating, too_long
+    from springcheck.studies.stability.longest import too_long
 
     out: Lines = []
     for scheme in dict.fromkeys(run.scheme for run in runs):
         title = schemes.title(scheme)
-        if (limit := too_long(scheme, scene)) is not None:
-            said = f"is beyond the limit of {title} here, {limit:.4g}"
-        elif (factor := resonating(scheme, scene)) is not None:
-            said = (
-                f"makes {title} grow by a factor of {factor:.4f} a step, and the exact solution stays bounded"
-            )
-            of = "period of the modulation" if system.is_driven else "periods of the field and the springs"
-            said += f"; take a step that is short beside the {of}"
-        else:
+        if (limit := too_long(scheme, scene)) is None:
             continue
+        said = f"is beyond the limit of {title} here, {limit:.4g}"
         names = ", ".join(run.method for run in runs if run.scheme == scheme)
         out.append(plain(f"h = {scene.step:g} {said}: {names}", "bold yellow"))
     return [plain(), *out] if out else []

@@ -2,16 +2,13 @@
 
 The map is that of the scene linearised where its motion is stiffest, with its friction, and with slow and
 fast springs separate for a scheme that treats them differently.  Uncoupled modes have a 2 x 2 matrix each;
-otherwise all eigenvalues are those of one 2n x 2n matrix.  A spring of modulated stiffness has no such map,
-and no longest step: a step may resonate with the modulation far below the limit on a spring as stiff, and be
-bounded again beyond it.  Of one step the product of many tells.
+otherwise all eigenvalues are those of one 2n x 2n matrix.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
@@ -19,11 +16,8 @@ from springcheck import schemes
 from springcheck.errors import SceneError
 from springcheck.physics import exact
 from springcheck.physics.arrays import ROUNDOFF, Extended, Floats, Force, Reals
-from springcheck.physics.driven import CLOCK, Drive, ModulatedSpring
-from springcheck.physics.exact.mathieu import floquet
 from springcheck.physics.scene import Scene
 from springcheck.physics.system import MOST_DENSE, System
-from springcheck.physics.terms import WallSpring, Weight
 from springcheck.schemes import Scheme
 from springcheck.studies.stability import propagators
 
@@ -56,10 +50,6 @@ known to the square root of the rounding only."""
 LEAST_DECAY = 2.0**-80
 """Relative decay below which a mode counts as undamped: the square of 2**12 roundings."""
 
-MODULATED_STEPS = 8192
-"""Steps whose product shows whether a scheme grows on modulated springs: by more than their number squared,
-as at an edge of stability the product grows with their number."""
-
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Linear:
@@ -77,21 +67,6 @@ class Linear:
         """Uncoupled modes (g,)."""
         a = np.asarray(w2, np.longdouble)[:, None, None]
         return cls(slow=a, fast=np.zeros_like(a), rate=np.asarray(rate, np.longdouble)[:, None])
-
-
-def is_modulated(scene: Scene) -> bool:
-    """Whether the stiffness of a spring is modulated."""
-    return any(isinstance(x, ModulatedSpring) for x in scene.terms)
-
-
-@lru_cache(maxsize=8)
-def _at_its_stiffest(scene: Scene) -> Scene:
-    """The scene with each spring of modulated stiffness at its largest stiffness."""
-    terms = tuple(
-        WallSpring(i=x.i, k=x.k + np.abs(x.k * x.depth), at=x.at) if isinstance(x, ModulatedSpring) else x
-        for x in scene.terms
-    )
-    return scene if terms == scene.terms else scene.derived(terms=terms)
 
 
 @lru_cache(maxsize=8)
@@ -138,10 +113,10 @@ def _scaled(system: System[Scene], q: Reals) -> Extended:
 def fastest(scene: Scene) -> float:
     """Largest angular frequency of a scene without its friction [1/T], 0 where nothing oscillates.
 
-    For an anharmonic scene, of small oscillations where it is `stiffest`; for a modulated spring, at its
-    largest stiffness.  SceneError where forces overflow there.
+    For an anharmonic scene, of small oscillations where it is `stiffest`.  SceneError where forces
+    overflow there.
     """
-    system = _at_its_stiffest(scene).system
+    system = scene.system
     largest = float(np.max(system.modes.w2)) if system.has_modes else _largest(system, stiffest(scene))
     if not np.isfinite(largest):
         raise SceneError(f"scene {scene.name}: its forces at the start are beyond the range of numbers")
@@ -151,11 +126,11 @@ def fastest(scene: Scene) -> float:
 def linear(scene: Scene, scheme: Scheme) -> Linear | None:
     """The linearised motion that determines a scheme's stability on a scene.
 
-    None for more coupled particles than are examined, where
-    position-dependent friction acts on joined particles, and where a stiffness is modulated.
+    None for more coupled particles than are examined, and where position-dependent friction acts on
+    joined particles.
     """
     system = scene.system
-    if is_modulated(scene) or (system.brakes_by_place and not system.is_separate):
+    if system.brakes_by_place and not system.is_separate:
         return None
     if (scheme.has("mixes") and system.fast) or not (system.is_separate or system.has_one_friction_rate):
         if scene.n > MOST_COUPLED:
@@ -258,9 +233,6 @@ def longest(scheme: Scheme, scene: Scene, limit: float | None = None) -> float:
     For a scheme of multiple time steps that is where its first resonance begins.  `limit` replaces the
     scheme's for an engine that departs from its map.
     """
-    if is_modulated(scene):
-        # two steps that are bounded on every spring may resonate if their springs are not equally stiff
-        return np.nan
     limit = limit_of(scheme) if limit is None else limit
     if not scheme.has("one-step") or np.isinf(limit):
         # a scheme that is bounded on every spring is bounded with friction too
@@ -296,66 +268,6 @@ def too_long(name: str, scene: Scene) -> float | None:
             return None
         limit = longest(scheme, scene)
     return limit if 0 < limit < h[0] else None
-
-
-def resonating(name: str, scene: Scene) -> float | None:
-    """The factor by which a scheme's step multiplies the motion of modulated springs, on average, if it grows
-    where the exact solution stays bounded; else, of other scenes, and of a scheme without stable steps None.
-    """
-    scheme = schemes.known().get(name)
-    if scheme is None or scheme.has("random") or not scheme.has("one-step") or not limit_of(scheme):
-        return None
-    mixed = scheme.has("mixes") and scene.system.fast
-    about = _homogeneous(scene) if is_modulated(scene) and scene.n <= MOST_COUPLED and not mixed else None
-    exactly = about and floquet(about.system)
-    if about is None or not exactly or exactly[0] > 1:
-        return None
-    n, unit = about.n, about.m * fastest(about)
-    q, p = np.zeros((2, 2, MODULATED_STEPS, n + 1), np.longdouble)
-    q[..., n], p[..., n] = scene.step * np.arange(MODULATED_STEPS), CLOCK
-    q[0, :, :n], p[1, :, :n] = 1, unit
-    with np.errstate(all="ignore"):
-        q, p = schemes.Law(scheme=scheme, scene=about.system.clocked, h=scene.step).step(q, p)
-        maps = np.stack([q[..., :n], p[..., :n] / unit]).transpose(2, 3, 0, 1)
-        for _ in range(3):
-            maps = maps[1::2] @ maps[::2]
-        product, grown, largest = np.eye(2), np.zeros(n), np.zeros(n)
-        for one in maps:
-            product = one @ product
-            size = np.max(np.abs(product), axis=(1, 2))
-            product, grown = product / size[:, None, None], grown + np.log(size)
-            largest = np.maximum(largest, grown)
-    most = float(np.max(largest))
-    return float(np.exp(most / MODULATED_STEPS)) if most > 2 * np.log(MODULATED_STEPS) else None
-
-
-def _homogeneous(scene: Scene) -> Scene | None:
-    """One modulated spring about 0 on each particle, of all springs that act on it: differences between two
-    motions of the scene, whatever else moves them.  None where terms bend or join particles, or where two
-    modulations act on one."""
-    plain, forces = (WallSpring, ModulatedSpring), (Drive, Weight)
-    if not all(isinstance(x, (*plain, *forces)) or x.key == "damping" for x in scene.terms):
-        return None
-    springs = [x for x in scene.terms if isinstance(x, plain)]
-    found: list[Any] = [None] * scene.n
-    k = np.zeros(scene.n)
-    for x in springs:
-        np.add.at(k, x.i, x.k)
-        for i, *row in x.rows() if isinstance(x, ModulatedSpring) else ():
-            if found[i] is not None:
-                return None
-            found[i] = row[:4]
-    known = [row for row in found if row is not None]
-    if np.any(k == 0):
-        return None
-    # a plain spring is one of no depth
-    rows = [row or (0.0, 0.0, *known[0][2:]) for row in found]
-    alone, depth, frequency, phase = np.transpose(rows)
-    one = ModulatedSpring(
-        i=np.arange(scene.n), k=k, depth=alone * depth / k, frequency=frequency, phase=phase,
-        at=np.zeros(scene.n),
-    )  # fmt: skip
-    return scene.derived(terms=(one, *(x for x in scene.terms if x.key == "damping")))
 
 
 def _first(scheme: Scheme, of: Linear, scale: float) -> float:

@@ -2,7 +2,7 @@
 
 Every method of fixed step has its limit on a spring measured (`limits`).  A scene with friction adds the
 region of stability of a damped spring (`regions`), one with springs marked fast the resonances of multiple
-time steps (`resonance`), a modulated spring the Floquet multipliers of methods (`multipliers`).
+time steps (`resonance`).
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from springcheck.physics.scene import Scene
 from springcheck.schemes import scheme
 from springcheck.studies import keeper
 from springcheck.studies.arguments import Progress
-from springcheck.studies.choose import LeftOut, sorted_out
+from springcheck.studies.choose import sorted_out
 from springcheck.studies.keeper import How, Keeper, each
-from springcheck.studies.stability import limits, multipliers, propagators, regions, resonance
+from springcheck.studies.stability import limits, propagators, regions, resonance
 from springcheck.studies.stability.longest import fastest
-from springcheck.studies.stability.result import LIMITS, MULTIPLIERS, REGIONS, RESONANCES, Stability
+from springcheck.studies.stability.result import LIMITS, REGIONS, RESONANCES, Stability
 
 
 def record(
@@ -72,24 +72,19 @@ def _measure(scene: Scene, labels: Sequence[Label], kept: Keeper) -> Stability:
     braked = [label for label in usable if "damping" in engines.method(label).terms]
     damped = braked if scene.system.is_damped else []
     resonant = [label for label in usable if resonance.serves(scene, label)]
-    modulated = [label for label in usable if multipliers.serves(scene, label)]
     plan = [
         each(usable, "limit of", partial(partial, limits.measure), LIMITS),
         each(damped, "region of", partial(partial, regions.measure), REGIONS),
         each(resonant, "resonances of", lambda label: partial(resonance.measure, scene, label), RESONANCES),
-        each(
-            modulated, "multiplier of", lambda label: partial(multipliers.measure, scene, label), MULTIPLIERS
-        ),
     ]
     found = iter(kept.results([piece for part in plan for piece in part]))
-    of_limits, of_regions, of_resonances, of_multipliers = ([next(found) for _ in part] for part in plan)
+    of_limits, of_regions, of_resonances = ([next(found) for _ in part] for part in plan)
     return Stability(
         scene=scene,
         limits=tuple(of_limits),
         regions=tuple(of_regions),
         resonances=tuple(of_resonances),
-        multipliers=tuple(x for x in of_multipliers if not x.why),
-        left_out=(*left_out, *(LeftOut(method=x.method, reason=x.why) for x in of_multipliers if x.why)),
+        left_out=tuple(left_out),
     )
 
 
@@ -108,6 +103,5 @@ def stored(kept: keeper.Kept) -> Stability:
         limits=kept.listed(LIMITS, "methods"),
         regions=kept.listed(REGIONS, "regions"),
         resonances=kept.listed(RESONANCES, "resonances"),
-        multipliers=kept.listed(MULTIPLIERS, "multipliers"),
         left_out=kept.left_out,
     )

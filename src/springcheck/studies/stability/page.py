@@ -11,7 +11,7 @@ from springcheck.figures.charts import Bank, Chart, Curve, Rule, Scale, Tiles
 from springcheck.figures.looks import scheme_of
 from springcheck.figures.naming import labelled
 from springcheck.studies.stability.limits import Limit
-from springcheck.studies.stability.longest import fastest, is_modulated
+from springcheck.studies.stability.longest import fastest
 from springcheck.studies.stability.regions import Region
 from springcheck.studies.stability.resonance import Resonance
 from springcheck.studies.stability.result import Stability
@@ -27,8 +27,7 @@ def banks(study: Stability) -> list[Bank]:
     """Charts of the limits, regions and resonances that were measured."""
     found = []
     if study.limits:
-        # no limit is one of a modulated spring
-        here = 0.0 if is_modulated(study.scene) else abs(study.scene.step) * fastest(study.scene)
+        here = abs(study.scene.step) * fastest(study.scene)
         found.append(
             Bank(name="stability-limits", title="Schemes (lines) and methods (marks)",
                  heading=_limits_said(study.limits), charts=[_limits(study.limits, here)])

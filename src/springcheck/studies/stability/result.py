@@ -12,14 +12,12 @@ import numpy as np
 from springcheck import engines, schemes
 from springcheck.errors import MethodError
 from springcheck.physics.exact import has_true_motion
-from springcheck.physics.exact.mathieu import floquet
 from springcheck.physics.scene import Scene
 from springcheck.studies.choose import LeftOut
 from springcheck.studies.keeper import document
 from springcheck.studies.stability import limits, propagators
 from springcheck.studies.stability.limits import Limit
-from springcheck.studies.stability.longest import fastest, is_modulated, longest
-from springcheck.studies.stability.multipliers import Multiplier
+from springcheck.studies.stability.longest import fastest, longest
 from springcheck.studies.stability.regions import Region
 from springcheck.studies.stability.resonance import Resonance
 from springcheck.studies.study import Studied
@@ -43,8 +41,6 @@ class Stability(Studied):
     limits: tuple[Limit, ...]
     regions: tuple[Region, ...]
     resonances: tuple[Resonance, ...]
-    multipliers: tuple[Multiplier, ...] = ()
-    """Floquet multipliers, where the stiffness of a spring is modulated."""
 
     def __repr__(self) -> str:
         said = f"{len(self.failures)} not where theory puts them" if self.failures else "as theory has them"
@@ -84,9 +80,6 @@ class Stability(Studied):
         out += [f"{x.method}: no point measured" for x in self.regions if x.unmeasured == x.points]
         apart = (y for y in self.resonances if y.bands != y.bands_predicted and not _apart(y) <= 1e-6)
         out += [f"{y.method}: bands {y.bands}, the exact map's {y.bands_predicted}" for y in apart]
-        strayed = (z for z in self.multipliers if not z.off <= z.bound)
-        said = "Floquet multiplier off by {:.1e} from its scheme's, allowed {:.1e}"
-        out += [f"{z.method}: {said.format(z.off, z.bound)}" for z in strayed]
         return out
 
     def refusal(self, found: Limit) -> str:
@@ -148,15 +141,6 @@ class Stability(Studied):
                 rows.append([plain(cell, "" if x.agrees else "bold red") for cell in cells])
             titles = ("method", "limit h w", "theory", "off", "growth above", "predicted", "largest h here")
             out += [table(titles, rows), plain()]
-        if self.multipliers and (exact := floquet(self.scene.system)):
-            grown, period, turned = exact
-            steps = self.multipliers[0].steps
-            by = f"{steps} x {period / steps:.6g}"
-            out.append(plain(f"Floquet multipliers of a period of the modulation, by {by}"))
-            found = [("exact motion", grown, turned, "")]
-            found += [(x.method, x.grown, x.turned, f"{x.off:.0e}") for x in self.multipliers]
-            turning = [(name, f"{x:.9f}", f"{y:.9f}", off) for name, x, y, off in found]
-            out += [table(("method", "grows by", "turns by", "off its scheme's"), turning), plain()]
         out += [plain(line) for line in self.sentences]
         refused = [LeftOut(method=x.method, reason=why) for x in self.limits if (why := self.refusal(x))]
         out += left_out(refused, "No largest step here by")
@@ -182,7 +166,6 @@ class Stability(Studied):
                 for x in self.regions
             ],
             resonances=[_named(x, "method", "bands", "bands_predicted") for x in self.resonances],
-            multipliers=self.multipliers,
             left_out=self.left_out,
             failures=self.failures,
         )  # fmt: skip
@@ -196,8 +179,7 @@ def _of_scene(study: Stability, largest_steps: Sequence[float]) -> Lines:
         if scene.system.is_linear:
             said = ": no step is too long for its stability"
         return [plain(f"  nothing in this scene oscillates{said}")]
-    most = ", its modulated springs at their stiffest" * is_modulated(scene)
-    there = ", where its motion is stiffest" if has_true_motion(scene) else f", at its start{most}"
+    there = ", where its motion is stiffest" if has_true_motion(scene) else ", at its start"
     straight = scene.system.without("drive").is_linear
     where = "" if straight else there
     where += ", without its friction" * bool(scene.system.is_damped)
@@ -209,16 +191,7 @@ def _of_scene(study: Stability, largest_steps: Sequence[float]) -> Lines:
         out.append(plain(f"  beyond the limit there: {', '.join(beyond)}", "bold yellow"))
     elif any(most >= h for most in largest_steps):
         out.append(plain("  within the limit of every method measured here"))
-    if modulated := floquet(scene.system):
-        grown, period, _ = modulated
-        changes = "grows" if grown > 1 else "decays"
-        bounded = "stays bounded" if grown == 1 else f"{changes} by a factor of {grown:.6g}"
-        said = f"the exact motion {bounded} (Floquet)"
-        out.append(plain(f"  in each period of its modulation, {period:.4g}, {said}"))
-    if is_modulated(scene):
-        said = "no largest step is known: one may resonate with the modulation below its limit on a spring"
-        out.append(plain(f"  {said}", "dim"))
-    elif not straight:
+    if not straight:
         said = "limits of small oscillations there; an anharmonic motion may be lost below them"
         out.append(plain(f"  {said}", "dim"))
     return out
@@ -274,5 +247,4 @@ RESONANCES: RecordForm[Resonance] = RecordForm(
     axes=("h_w",),
     auxiliary=("radius_predicted",),
 )
-MULTIPLIERS: RecordForm[Multiplier] = RecordForm(kind=Multiplier, beginning="stability/multipliers/")
 """Stored form of each kind of measurement: a table for each method."""
