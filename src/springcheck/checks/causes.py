@@ -11,7 +11,7 @@ from math import comb
 
 import numpy as np
 
-from springcheck.checks import driven, held, images, other, stages
+from springcheck.checks import driven, held, other, stages
 from springcheck.checks.case import Case
 from springcheck.checks.check import FALSE_ALARMS
 from springcheck.checks.requires import MAP, missing
@@ -77,7 +77,7 @@ def found(case: Case, shown: Callable[[int, bool], str] = lambda *_: "") -> str:
         ways += [stages.collided, _of_removal, stages.found]
         looks = [*looks, _of_reach, *[_of_state] * own, *[_of_size] * drawn]
     elif run.every == 1 and not missing(case, MAP):
-        ways = [_of_differences, driven.found, images.found, held.found, _of_removal, _of_factor]
+        ways = [_of_differences, driven.found, held.found, _of_removal, _of_factor]
         looks = [_of_numbers, *looks, _of_reach]
     vague = ""
     for way in ways + looks:

@@ -95,8 +95,6 @@ _ALL = (
     Requirement("unheld", "nothing that holds a particle", _unless(
         lambda x: all(term.bodies > 1 for term in x.scene.terms),
         "walls and fixed potentials take up momentum")),
-    Requirement("box", "a periodic box", _unless(
-        lambda x: x.scene.box is not None, "the scene has no periodic box")),
     Requirement("driven", "a force that depends on the time", _unless(
         lambda x: x.scene.system.is_driven, "no force depends on the time")),
     Requirement("rods", "rods", _unless(lambda x: x.scene.system.rods, "the scene has no rods"),

@@ -52,7 +52,7 @@ def of_step(
     # an engine may count positions from the rest points of springs, and so round those
     of_q, of_p = state * (size_q + case.origins), state * size_p
     if run.rebuilds_velocity and not how.keeps_displacement:
-        # as they are counted: from rest, or wrapped into a box
+        # as they are counted: from rest
         of_p = of_p + how.state * m * (np.abs(q) + size_q + 2 * case.origins) / h
     # a force, its product with the step, and a velocity may each underflow; a solver adds up n products
     lost = smallest * (1 + m + h * scene.system.pulls())
@@ -134,13 +134,10 @@ def _force(
     # each term on a particle after the first is added with a rounding of its own
     more = 1 + np.maximum(count - 1, 0) / np.longdouble(case.roundings)
     width = whole * how.force / np.longdouble(how.state) if how.force > how.state else 0.0
-    far = case.scene.periods
-    if how.from_start:
-        # roundings of the force at the start, and of its change with the displacement from there
-        far = far + np.abs(case.scene.q)
+    # roundings of the force at the start, and of its change with the displacement from there
+    far = np.abs(case.scene.q) if how.from_start else 0.0
 
     def force(q: Reals, p: Reals) -> Reals:
-        # the nearest image is the difference of positions that lie in the box
         sizes = plain(q + far, p)
         bound = sizes * more
         if width:

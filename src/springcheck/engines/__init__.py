@@ -332,8 +332,6 @@ def refusal(scene: Scene, label: Label) -> str | None:
         longest = schemes.scheme(what.scheme).longest_drift
         if held := scene.system.rods.too_fast(scene.q, scene.p, scene.step * longest):
             return held
-    if scene.box is not None and not engine(label.engine).periodic:
-        return f"{engine(label.engine).title} is given no periodic box here"
     unknown = (term for term in scene.terms if not (term.kind == "potential" and ANY_POTENTIAL in what.terms))
     missing = sorted({term.key for term in unknown} - what.terms)
     if missing:

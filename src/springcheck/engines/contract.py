@@ -172,8 +172,6 @@ class Engine:
     exponent range is left."""
     any_axis: bool = False
     """Whether it also moves particles along y and z: it then reads `Scene.where`."""
-    periodic: bool = False
-    """Whether it serves scenes in a periodic box, its positions counted on across the borders."""
 
     @property
     def install(self) -> str:

@@ -66,7 +66,7 @@ def springs_of(scene: Scene) -> Floats:
     forces act, or some join two coordinates."""
     system, kinds = scene.system, {term.kind for term in scene.terms}
     alone = system.is_linear and system.is_separate and kinds <= {"potential", "friction"}
-    if not alone or scene.bath or scene.box:
+    if not alone or scene.bath:
         return np.stack([scene.m, *np.full((2, scene.n), np.nan)])
     c = system.friction_rates * scene.m
     return np.stack([scene.m, system.hessian_diagonal(scene.q), c]).astype(np.float64)

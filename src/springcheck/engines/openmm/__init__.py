@@ -116,7 +116,6 @@ ENGINE = Engine(
     ),
     atlas=tuple(f"verlet@{place}" for place in ("CPU", "OpenCL-single", "OpenCL-mixed", "OpenCL-double")),
     any_axis=True,
-    periodic=True,
     squares_lengths=True,
     **deferred(f"{__name__}.simulation", "arithmetic", "convention"),
 )  # fmt: skip

@@ -89,21 +89,17 @@ def _system(scene: Scene, origins: Floats) -> tuple[mm.System, Floats]:
     """Particles, then one fixed anchor for each rest point of a term; positions (N, 3)."""
     system = mm.System()
     start = np.zeros((scene.particles, 3))
-    start.reshape(-1)[scene.where] = scene.q - origins - bonds.cells(scene, origins) * scene.periods
+    start.reshape(-1)[scene.where] = scene.q - origins
     for m in scene.masses.tolist():
         system.addParticle(m)
     fixed: list[Any] = []
     fast, slow = mm.HarmonicBondForce(), mm.HarmonicBondForce()
     fast.setForceGroup(1)
-    if scene.box is not None:
-        system.setDefaultPeriodicBoxVectors(*np.diag(scene.box).tolist())
-        for group in (fast, slow):
-            group.setUsesPeriodicBoundaryConditions(True)
     for term in scene.terms:
         try:
             joints = bonds.joints(scene, term, origins)
         except MethodError:
-            if scene.box is not None or not isinstance(term, WallSpring):
+            if not isinstance(term, WallSpring):
                 raise
             # different along its axes: no bond, but a potential of each coordinate
             for force in _custom(scene, term, origins):
@@ -270,7 +266,6 @@ class _Context:
         else:
             self._integrator = _integrator(scene, method.name, step)
         self._context = _context(system, self._integrator, label)
-        origins = origins + bonds.cells(scene, origins) * scene.periods
         self._origins = origins if np.any(origins) else None
         # what OpenMM computes: all but friction
         pull = scene.system.potential_force

@@ -75,7 +75,6 @@ ENGINE = Engine(
     title="springcheck",
     methods=named(*map(_method, _SCHEMES)),
     any_axis=True,
-    periodic=True,
     convention=lambda method: "positions and momenta belong to the same time",
     thermostats=named(
         *(

@@ -70,7 +70,7 @@ class _Bodies:
 
 FILE_PATHS = {
     "step": "time.step", "steps": "time.steps", "every": "record.every", "tolerance": "time.tolerance",
-    "quantities": "record.quantities", "include": "methods.include", "box": "box.lengths",
+    "quantities": "record.quantities", "include": "methods.include",
 }  # fmt: skip
 """Path in a scene file of each field of a scene, for messages."""
 
@@ -94,7 +94,7 @@ def scene(table: Any, *, name: str) -> Scene:
         found = Scene(
             m=bodies.m, q=bodies.q, p=bodies.p, places=bodies.places, terms=terms, step=time.step,
             steps=time.steps, every=table.record.every or time.every or 1,
-            box=table.box and table.box.lengths, bath=bath or None, tolerance=time.tolerance, units=units,
+            bath=bath or None, tolerance=time.tolerance, units=units,
             kind=kind, include=table.methods.include, quantities=table.record.quantities, name=name,
             title=table.title, source=table.source,
         )  # fmt: skip

@@ -126,12 +126,6 @@ class TimeTable(SceneTable, frozen=True):
     tolerance: Annotated[float, msgspec.Meta(gt=0, lt=1)] = 1e-12
 
 
-class BoxTable(SceneTable, frozen=True):
-    """A periodic box: its length [L], or one for each of x, y and z."""
-
-    lengths: Positive | Annotated[tuple[Positive, ...], msgspec.Meta(min_length=3, max_length=3)]
-
-
 class BathTable(SceneTable, frozen=True):
     """A heat bath: temperature [K, or kT where units are reduced], and its friction rate [1/T]."""
 
@@ -186,7 +180,6 @@ class SceneBase(SceneTable, frozen=True):
     spring: tuple[SpringTable, ...] = ()
     rod: tuple[RodTable, ...] = ()
     bond: tuple[BondTable, ...] = ()
-    box: BoxTable | None = None
     bath: BathTable | None = None
     methods: MethodsTable = MethodsTable()
     record: RecordTable = RecordTable()
@@ -230,7 +223,11 @@ def of_terms() -> tuple[Any, ...]:
     return tuple(term for key, term in terms.known().items() if key not in OWN_TABLES)
 
 
-LEFT = {"magnetic": "magnetic fields", "modulated-spring": "springs of modulated stiffness"}
+LEFT = {
+    "box": "periodic boxes",
+    "magnetic": "magnetic fields",
+    "modulated-spring": "springs of modulated stiffness",
+}
 """Tables of scene files that are refused, and what they describe: no part of springcheck."""
 
 

@@ -37,8 +37,6 @@ def text(system: System[Any]) -> str:
     for term in scene.terms:
         if not (is_chain and isinstance(term, WallSpring | Spring)):
             lines += _rows(scene, term)
-    if scene.box:
-        lines.append(_table("[box]", [("lengths", list(scene.box))]))
     if scene.bath:
         given = {"temperature": scene.bath.temperature, "friction": scene.bath.friction}
         lines.append(_table("[bath]", given.items()))

@@ -66,7 +66,7 @@ class Entry:
     thermostat: str = ""
     """Title of the thermostat's scheme; "" without a thermostat."""
     along: str = "x"
-    """Axes along which the engine moves particles, by its states, and whether it serves a periodic box."""
+    """Axes along which the engine moves particles, by its states."""
     constraint: str = ""
     """The rigid part, its turn per step and the error of its length; "" where nothing is rigid."""
     configurational: float = nan

@@ -123,8 +123,8 @@ def name(scene: Scene, found: Trajectory) -> str:
 
 
 def axes(label: Label) -> str:
-    """Axes along which a method moves particles, by the states of `orbit`, or of `rigid-triangle` for rods,
-    and whether it serves a periodic box."""
+    """Axes along which a method moves particles, by the states of `orbit`, or of `rigid-triangle` for
+    rods."""
     if is_hinge(label):
         return "an angle"
     scene = replace(load_scene("rigid-triangle" if is_rigid(label) else "orbit"), steps=60)
@@ -140,8 +140,7 @@ def axes(label: Label) -> str:
         alike = np.ptp(maps, axis=0).max() < (1e-4 if coarse else ALIKE_MAPS)
         # steps that depend on the forces are no linear map
         said += " alike" if alike else "" if engines.method(label).adaptive else " unlike"
-    boxed = engines.refusal(load_scene("periodic-box"), label)
-    return said if boxed else f"{said}; periodic box"
+    return said
 
 
 def constraint(label: Label) -> str:

@@ -1,5 +1,5 @@
-"""Faults along y and z and in a periodic box, to which a scene along x is blind; and of drives at
-another time or with other parameters."""
+"""Faults along y and z, to which a scene along x is blind; and of drives at another time or with other
+parameters."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from springcheck.physics.arrays import Floats, Reals
 from springcheck.physics.scene import Scene
-from springcheck.physics.terms import Drive, Spring
+from springcheck.physics.terms import Drive
 from springcheck.physics.trajectory import Trajectory
 from springcheck.studies.faults.seeded import FRAME_CHECKS, Case, Fault, each, half_step, single
 from springcheck.studies.faults.steppers import Step, textbook
@@ -88,51 +88,6 @@ _IN_SPACE = each(
 )  # fmt: skip
 AXES = tuple(one if "orientation" in one.caught_by else replace(one, scene="orbit") for one in _IN_SPACE)
 """Faults that only a rotation of the scene shows are on a line, the others on an orbit."""
-
-
-def crossed(scene: Scene, q: Reals) -> Reals:
-    """Number of borders of the box that positions (..., n) have crossed; 0 without a box."""
-    return np.zeros_like(q) if scene.box is None else np.floor(q / scene.periods)
-
-
-def imaged(c: Case, q: Reals, p: Reals, nearest: Callable[[Reals, Floats], Reals]) -> Reals:
-    """Force on bonds between wrapped positions, whose images are given by nearest(difference, box)."""
-    box, y = c.scene.periods, q.copy()
-    x = q - box * crossed(c.scene, q)
-    for term in c.scene.terms:
-        if isinstance(term, Spring) and c.scene.box:
-            y[..., term.b] = q[..., term.a] + nearest(x[..., term.b] - x[..., term.a], box[term.a])
-    return c.force(y, p)
-
-
-def swapped_images(c: Case, r: Trajectory) -> Trajectory:
-    """Positions of particles in a plane, unwrapped along each axis by the image counts of the other."""
-    if c.scene.box is None:
-        return r
-    count = crossed(c.scene, r.q)
-    count -= count[:1]
-    other = count.reshape(len(count), -1, 2)[..., ::-1].reshape(count.shape)
-    return replace(r, q=r.q + (other - count) * c.scene.periods)
-
-
-def late_images(c: Case, r: Trajectory) -> Trajectory:
-    """Positions unwrapped by the image counts of the frame before."""
-    count = crossed(c.scene, r.q)
-    return replace(r, q=r.q - np.diff(count, axis=0, prepend=count[:1]) * c.scene.periods)
-
-
-BOX = each(
-    Fault("far-image", "a bond across the border of a periodic box pulls the long way round",
-          force=lambda c, f, q, p: imaged(c, q, p, lambda d, box: d)),
-    Fault("image-to-the-right", "the image of a bond's end is the next one to the right, not the nearest",
-          force=lambda c, f, q, p: imaged(c, q, p, lambda d, box: d - box * np.floor(d / box))),
-    Fault("cubic-box", "images along y are as far apart as those along x",
-          force=lambda c, f, q, p: imaged(c, q, p, lambda d, box: d - box[0] * np.round(d / box[0]))),
-    Fault("swapped-images", "borders crossed along x are counted along y, and those along y along x",
-          reports=swapped_images),
-    Fault("late-image", "a border that is crossed is counted a frame later", reports=late_images),
-    caught_by=(*FRAME_CHECKS, "border"), scene="box",
-)  # fmt: skip
 
 
 def clocked(c: Case, late: float = 0.0, pace: float = 1.0) -> Step:

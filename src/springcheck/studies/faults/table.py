@@ -25,7 +25,7 @@ from springcheck.studies.faults.seeded import (
     shifted,
     single,
 )
-from springcheck.studies.faults.space import AXES, BOX, DRIVES
+from springcheck.studies.faults.space import AXES, DRIVES
 from springcheck.studies.faults.steppers import State, Step, energies, record, textbook, trajectory
 
 STEP = ("step-defect", "propagator")
@@ -289,6 +289,6 @@ ADAPTIVE = (
 )  # fmt: skip
 
 FAULTS: tuple[Fault, ...] = (
-    *PARAMETERS, *FORCES, *STEPS, *ARITHMETIC, *REPORTS, *AXES, *BOX, *DRIVES, *RIGID, *ADAPTIVE,
+    *PARAMETERS, *FORCES, *STEPS, *ARITHMETIC, *REPORTS, *AXES, *DRIVES, *RIGID, *ADAPTIVE,
     *OF_NOISE, *THERMAL_STEPS, *RODS_IN_BATHS,
 )  # fmt: skip
