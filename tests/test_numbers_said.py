@@ -76,8 +76,6 @@ def test_the_faults_are_as_many_as_are_said() -> None:
     words = {5: "five", 7: "seven", 8: "eight", 10: "ten"}
     for part, said in (
         (space.DRIVES, "unit or amplitude are {} faults"),
-        (space.FIELDS, "{} faults (the other sign"),
-        (space.BOX, "fail step-defect and closed-form, as do {} faults"),
         (heat.RODS_IN_BATHS, "{} faults (the last projection left out"),
     ):
         word = words[len(part)]
