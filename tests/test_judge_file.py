@@ -139,10 +139,10 @@ def test_what_does_not_apply_is_said_once_for_each_reason(
     np.savetxt(tmp_path / "a.txt", np.column_stack([run.t, run.q, run.p]), header="t q p", fmt="%.17g")
     assert main(["judge", str(tmp_path / "a.txt"), "--scene", "spring", "--scheme", "velocity-verlet"]) == 0
     said = capsys.readouterr().out.splitlines()
-    assert "Not applicable: rod-length, rod-velocity, turn: the scene has no rods" in said
+    assert "Not applicable: drive: no force depends on the time" in said
     rows = [line.split()[0] for line in said if " passed " in line]
     assert "step-defect" in rows
-    assert not {"rod-length", "drive"} & set(rows)
+    assert "drive" not in rows
     assert f"{len(rows) - 1} verdicts passed" in said[-1] or f"{len(rows)} verdicts passed" in said[-1]
 
 
@@ -318,7 +318,7 @@ def test_decimals_are_half_a_unit_off_however_small_a_number_is(tmp_path: Path, 
     assert failing(in_text(tmp_path / "a.csv", run, "%.10f", "%.9e", m), scene, scheme) == []
 
 
-@pytest.mark.parametrize("scheme", ["baoab", "gj-i", "nose-hoover"])
+@pytest.mark.parametrize("scheme", ["baoab", "gj-i"])
 def test_decimals_of_a_bath_are_half_a_unit_off(tmp_path: Path, scheme: str) -> None:
     scene = replace(scenefile.load_scene("bath-spring"), steps=100, every=1)
     run = driver.run(scene, f"own:{scheme}")

@@ -774,29 +774,3 @@ def test_a_study_is_drawn(studies: dict[str, Path], opened: Any, name: str) -> N
     said = chromium.run(f"document.querySelector('#{name}-0 .reading').textContent").strip()
     assert said
     assert chromium.said == []
-
-
-def test_a_file_that_is_dropped_is_named_and_goes_nowhere(
-    content: page.Content, opened: Any, spring: Path
-) -> None:
-    chromium = opened(content)
-    run = store.read(spring)["own:velocity-verlet"]
-    rows = [",".join(map(repr, map(float, row))) for row in zip(run.t, run.q[:, 0], run.p[:, 0], strict=True)]
-    said = 'document.getElementById("dropped").textContent'
-    for name, text, found in (
-        ("it's mine.csv", "\n".join(["t,q,v", *rows]), "Velocity Verlet, h ω = 0.1: all 201 frames are its"),
-        ("prime.csv", "\n".join(["t,x,x'", *rows]), "Velocity Verlet, h ω = 0.1: all 201 frames are its"),
-        ("few.csv", "t,q,v\n0,1,2", "Twelve or more rows"),
-    ):
-        script = (
-            "const kept = new DataTransfer();"
-            f"kept.items.add(new File([{json.dumps(text)}], {json.dumps(name)}));"
-            'document.getElementById("yours").dispatchEvent(new DragEvent("drop", {dataTransfer: kept}));'
-            "return new Promise((done) => setTimeout(done, 300));"
-        )
-        chromium.run(f"(() => {{ {script} }})()")
-        assert found in chromium.run(said)
-    ask = 'document.getElementById("ask").textContent'
-    assert chromium.run(ask) == "springcheck identify 'few.csv'"
-    assert chromium.asked == [chromium.run("location.href")]
-    assert chromium.said == []

@@ -64,7 +64,7 @@ LEFT_OUT_AT_START = {
 """What an engine cannot serve, and only finds out as it starts."""
 
 
-@pytest.mark.campaign("name", "label")
+@pytest.mark.campaign
 @pytest.mark.parametrize(("name", "label"), CASES, ids=[f"{name}-{label}" for name, label in CASES])
 def test_every_method_that_serves_a_scene_runs_it_and_passes(name: str, label: str, need: Need) -> None:
     need(label)
@@ -444,8 +444,8 @@ MISTAKES = {
         "[[capacitor]]\nloops = [0]\ncapacitance = 1.0\n",
         ("circuit", "[[inductor]]"),
     ),
-    "two kinds of things that move": ("[[rotor]]\ninertia = 1.0\n", ("[[particle]]", "[[rotor]]")),
-    "a kind that the tables deny": ('kind = "rotor"\n', ("kind = 'rotor'", "[[particle]]")),
+    "two kinds of things that move": ("[[inductor]]\ninductance = 1.0\n", ("[[particle]]", "[[inductor]]")),
+    "a kind that the tables deny": ('kind = "circuit"\n', ("kind = 'circuit'", "[[particle]]")),
     "a term that is not there": ("[[magnet]]\nparticle = 0\n", ("magnet", "quartic", "spring")),
 }
 

@@ -17,9 +17,8 @@ import numpy as np
 import pytest
 
 import springcheck
-import stiffness_costs
 from documented import words_of
-from springcheck import checks, engines
+from springcheck import checks
 from springcheck.physics import builders, exact
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.arrays import EPS, Floats
@@ -139,15 +138,6 @@ def test_the_longest_explicit_step_is_that_of_the_strongest_friction() -> None:
     # RK4 on the negative axis
     assert longest.longest(scheme("rk4"), scene) * rate == pytest.approx(2.785293563, rel=1e-4)
     assert longest.longest(scheme("implicit-euler"), scene) == np.inf
-
-
-def test_its_costs_are_a_family_of_stiffness(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(stiffness_costs, "OUTPUTS", 300)
-    fixed = stiffness_costs.measure(engines.parse("own:implicit-midpoint"), "van-der-pol", [1.0, 1e3])
-    assert [row.outcome for row in fixed] == ["complete", "complete"]
-    assert fixed[0].error < 1e-2 < fixed[1].error
-    explicit = stiffness_costs.measure(engines.parse("own:rk4"), "van-der-pol", [1e6])
-    assert explicit[0].outcome.startswith("not run")
 
 
 def test_the_derivatives_of_the_force_are_those_of_its_differences() -> None:

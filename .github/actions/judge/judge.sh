@@ -2,7 +2,7 @@
 set -uo pipefail
 out=springcheck-report
 mkdir -p "$out"
-reports=(--junit "$out/junit.xml" --badge "$out/badge.json" --summary "${GITHUB_STEP_SUMMARY:-$out/summary.md}")
+reports=(--junit "$out/junit.xml" --summary "${GITHUB_STEP_SUMMARY:-$out/summary.md}")
 read -r -a options <<< "${JUDGE_OPTIONS:-}"
 scheme=()
 [ -z "${JUDGE_SCHEME:-}" ] || scheme=(--scheme "$JUDGE_SCHEME")
@@ -26,7 +26,7 @@ if [ -n "${JUDGE_COMMAND:-}" ] && ! bash -c "$JUDGE_COMMAND"; then
 fi
 status=0
 if [ -n "${JUDGE_TRAJECTORY:-}" ]; then
-  # of a scene that is stated the judge knows what rods and a bath must do
+  # of a scene that is stated the judge knows what a bath must do
   verb=(identify "$JUDGE_TRAJECTORY")
   [ -z "${JUDGE_SCENE:-}" ] || verb=(judge "$JUDGE_TRAJECTORY" --scene "$JUDGE_SCENE")
   springcheck "${verb[@]}" ${scheme[@]+"${scheme[@]}"} ${options[@]+"${options[@]}"} "${reports[@]}" || status=$?

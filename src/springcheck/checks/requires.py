@@ -97,12 +97,6 @@ _ALL = (
         "walls and fixed potentials take up momentum")),
     Requirement("driven", "a force that depends on the time", _unless(
         lambda x: x.scene.system.is_driven, "no force depends on the time")),
-    Requirement("rods", "rods", _unless(lambda x: x.scene.system.rods, "the scene has no rods"),
-        special=True),
-    Requirement("turning", "rods on which nothing acts", _unless(
-        lambda x: x.scheme.stages and all(term.kind == "constraint" for term in x.scene.terms)
-        and exact.has_true_motion(x.scene),
-        "forces act on the ends of the rods, or they are no flat body that turns about an axis across it")),
     Requirement("alike", "two axes along which the same springs act", _unless(
         lambda x: bool(x.scene.system.alike), "no two axes are alike, about 0 and by linear springs")),
     Requirement("named", "a scheme that is named", _trait(
@@ -137,7 +131,7 @@ _ALL = (
     Requirement("symplectic", "a symplectic scheme", _trait(
         "symplectic", "{title} does not claim to be symplectic")),
     Requirement("reversible", "a scheme that undoes its steps", _unless(
-        lambda x: x.scheme.has("reversible") or (len(x.scheme.stages) == 2 and not x.scene.system.rods),
+        lambda x: x.scheme.has("reversible") or len(x.scheme.stages) == 2,
         "{title} is not its own adjoint: only another scheme undoes its steps")),
     Requirement("double", "double precision", _unless(
         lambda x: not x.trajectory.arithmetic.quantum and x.trajectory.arithmetic.is_double,

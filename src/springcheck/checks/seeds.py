@@ -9,18 +9,18 @@ from typing import Any
 
 import numpy as np
 
+from springcheck.bath import THERMOSTATS, Stepper, Thermostat, chance
+from springcheck.bath.catalogue import NO_NORMAL_NUMBERS
+from springcheck.bath.draws import LARGEST_DRAW, law_of, read
+from springcheck.bath.rounding import one_rounding, roundings_of
+from springcheck.bath.stepper import forces
 from springcheck.checks.case import Case, small_move
 from springcheck.checks.check import Chance, Finding, check
-from springcheck.checks.thermal import HIDDEN, NO_DRAWS, reading
+from springcheck.checks.thermal import HIDDEN, reading
 from springcheck.errors import MethodError
 from springcheck.physics.arrays import Extended, Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory
-from springcheck.thermal import THERMOSTATS, Stepper, Thermostat, chance
-from springcheck.thermal.catalogue import NO_NORMAL_NUMBERS
-from springcheck.thermal.draws import LARGEST_DRAW, law_of, read
-from springcheck.thermal.rounding import one_rounding, roundings_of
-from springcheck.thermal.stepper import Met, forces
 
 FEW = 8
 """Number of particles up to which each is perturbed by itself."""
@@ -71,18 +71,14 @@ class Seeded:
         """Bound on the rounding of a step from a frame (2, n); `factor` is a thermostat's on all momenta."""
         start = run.q[row].astype(np.longdouble), run.p[row].astype(np.longdouble)
         draws = [np.full(self.scene.n, LARGEST_DRAW)] * self.scheme.draws
-        met: list[Met] = []
-        if self.scene.system.rods:
-            none = [np.zeros(self.scene.n)] * self.scheme.draws
-            self.stepper(self.scene)(*start, forces(self.scheme, self.scene.system), none, met=met)
         of_q, of_p = one_rounding(
             self.scene, self.stepper(self.scene, absolute=True), start, draws, factor, run.arithmetic,
-            run.rebuilds_velocity, met,
+            run.rebuilds_velocity,
         )  # fmt: skip
         if self.scheme.rescales_after:
             # the kinetic energy that determines the factor has the roundings of all steps before it
             of_p = of_p + np.sqrt(self.scene.m * np.sum(of_p**2 / self.scene.m))
-        return roundings_of(self.scheme, self.scene) * np.stack([of_q, of_p])
+        return roundings_of(self.scheme) * np.stack([of_q, of_p])
 
 
 WITHIN = 1.0, "of what rounding allows"
@@ -133,8 +129,6 @@ def noise_size(subject: Seeded) -> Finding | str:
 
     Particles start at rest, or, where a factor acts on momenta, in motion that is scaled likewise.
     """
-    if subject.scene.system.rods:
-        return "a rod has its length, and no state is scaled"
     scheme, scene = subject.scheme, subject.scene if subject.scheme.rescales else subject.at_rest()
     if not scene.system.is_linear or np.any(scene.system.potential_force(0 * scene.q, 0 * scene.p)):
         return "a linear scene with its rest in 0 is needed"
@@ -143,9 +137,6 @@ def noise_size(subject: Seeded) -> Finding | str:
     collides = scheme.collides
     steps = COLLIDED if collides else 1
     one = subject.run(scene, steps)
-    least = scheme.chain.least if scheme.chain else 0.0
-    if least / 4 <= np.sum(one.p[-1] ** 2 / scene.m) / 2 < least:
-        return "its chain rests at this temperature, and not at four times as much"
     warmer = replace(scene.bath, temperature=4 * scene.bath.temperature)
     hot = replace(scene, q=2 * scene.q, p=2 * scene.p, bath=warmer)
     heavy = replace(scene.system.scaled(4.0), m=4 * scene.m, q=scene.q / 2, p=2 * scene.p)
@@ -153,7 +144,7 @@ def noise_size(subject: Seeded) -> Finding | str:
     for other, of_q, of_p in ((subject.run(hot, steps), 2.0, 2.0), (subject.run(heavy, steps), 0.5, 2.0)):
         expected = of_q * one.q[-1], of_p * one.p[-1]
         off.append(_off((other.q[-1], other.p[-1]), expected, allowed))
-    if scheme.draws and not np.any(one.p[-1]):
+    if not np.any(one.p[-1]):
         if collides:
             return f"no collision in {COLLIDED} steps"
         return Finding(np.inf, *WITHIN, "there is no noise")
@@ -211,7 +202,7 @@ class Script:
 def noise_matrix(subject: Seeded) -> Finding | str:
     """A scripted generator reads the noise itself: what each unit draw does in a step, to rounding."""
     scheme, scene = subject.scheme, subject.scene
-    if not scheme.draws or scheme.uniform or scheme.collides:
+    if scheme.uniform or scheme.collides:
         return NO_NORMAL_NUMBERS
     runs = [subject.run(scene, 1, Script(unit)) for unit in np.eye(scheme.draws)]
     off, pull = list[Any](), forces(scheme, scene.system)
@@ -237,8 +228,6 @@ def noise_matrix(subject: Seeded) -> Finding | str:
 def seed_kept(subject: Seeded) -> Finding | str:
     """Two runs of one seed are equal bit for bit, and another seed is another run."""
     steps = 20
-    if not subject.scheme.draws:
-        return NO_DRAWS
     if subject.scheme.collides:
         # two runs without a collision are equal whatever their seeds
         rare = law_of(subject.scheme, subject.scene).collision * subject.scene.n
@@ -261,8 +250,6 @@ def seeds_apart(subject: Seeded) -> Chance | str:
 
     All draws in a row are held against those of the next seed at every distance up to half of the run.
     """
-    if not subject.scheme.draws:
-        return NO_DRAWS
     if subject.scheme.collides:
         return "its draws come now and then"
     steps = min(200, subject.scene.steps)

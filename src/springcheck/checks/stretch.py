@@ -249,11 +249,10 @@ def _allowed(
     how = case.trajectory.arithmetic
     # a solver errs alike at every step, with its whole error in velocities that are rebuilt from positions
     alike = case.trajectory.rebuilds_velocity and case.law.has("implicit")
-    if not WIDE or how.quantum or how.lengths or how.stale or alike:
+    if not WIDE or how.quantum or how.stale or alike:
         return worst
     spread, beside = spread / case.roundings, last
-    # rods are iterated
-    if how.state == how.force == Arithmetic().state and random and not case.system.rods:
+    if how.state == how.force == Arithmetic().state and random:
         beside = np.minimum(spread, last)
     return np.asarray(np.minimum(worst, deviations * spread + beside))
 

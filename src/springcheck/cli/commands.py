@@ -242,7 +242,7 @@ def _list(options: Namespace) -> int:
     from springcheck.cli import listing
 
     found = listing.listing()
-    return output.answer(options, lambda: found, lambda: listing.lines(found))
+    return output.answer(options, lambda: found, lambda: listing.lines(found, options.kind))
 
 
 def _doctor(options: Namespace) -> int:
@@ -254,21 +254,15 @@ def _doctor(options: Namespace) -> int:
     return output.answer(options, lambda: found, lambda: doctor.lines(found), status)
 
 
-def _completion(options: Namespace) -> int:
-    from springcheck.cli import completing
-    from springcheck.studies import STUDIES
-
-    known = {one.name: one.arguments for one in STUDIES} | {one.name: one.arguments for one in COMMANDS}
-    print(completing.script(options.shell, known))
-    return 0
-
-
 FORMATS = (
     "H5MD, HDF5, NPY, .xlsx, NPZ, Parquet, Feather, MATLAB .mat, JSON, LAMMPS dump, LAMMPS log, DCD, GROMACS "
     ".xtc, .trr, .gro, Amber NetCDF, ASE .traj, extended .xyz, .xyz, Octave text, text tables; texts also "
     "gzipped"
 )
 """Formats that `springcheck.formats` reads, which is not imported for this text."""
+
+KINDS = ("scenes", "methods", "checks", "terms", "schemes")
+"""Pages of `springcheck list`, by the names in `springcheck.cli.listing`."""
 
 _FILE = argument("file", metavar="FILE")
 _GROUP = argument("--trajectory", metavar="LABEL", help="one trajectory or particle group of the file")
@@ -340,10 +334,11 @@ COMMANDS = (
     Command("export", "one trajectory as a file of its own, for other tools", _export, (
         _FILE, argument("label", metavar="LABEL"), argument("output", metavar="OUT.h5md"),
     )),
-    Command("list", "scenes, engines with their versions, checks", _list, (JSON, ENGINE)),
-    Command("doctor", "what this installation can do, and what is missing", _doctor, (JSON,)),
-    Command("completion", "a script that completes commands in your shell", _completion, (
-        argument("shell", choices=("bash", "zsh"), help="put its lines where your shell begins"),
+    Command("list", "scenes, methods, checks, terms and schemes", _list, (
+        argument("kind", nargs="?", choices=KINDS, help="one page of the list (default: an overview)"),
+        JSON,
+        ENGINE,
     )),
+    Command("doctor", "what this installation can do, and what is missing", _doctor, (JSON,)),
 )  # fmt: skip
 """Every command that is no study, in the order of `--help`."""

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+import tomllib
 from argparse import Namespace
 from collections.abc import Iterator
 from typing import Any
 
 from springcheck import engines, schemes, store
+from springcheck.bath import THERMOSTATS
+from springcheck.errors import SpringcheckError
 from springcheck.figures.views import Units, units, with_unit
-from springcheck.physics import scenefile
+from springcheck.physics.scenefile import left
 from springcheck.physics.trajectory import Trajectory
 from springcheck.studies import STUDIES, keeper
 from springcheck.studies.study import Study, StudyResult
 from springcheck.text.lines import Lines, TextTable, plain, table
 from springcheck.text.wording import ordinal
-from springcheck.thermal import THERMOSTATS
 
 
 def held(summary: store.Summary) -> Iterator[tuple[Study, StudyResult]]:
@@ -32,9 +34,8 @@ def lines(summary: store.Summary, options: Namespace) -> Lines:
     """The store as text.  StoreError where it cannot be read or holds no such trajectory."""
     out: Lines = [plain(f"{summary.path}: {summary.size / 1e6:.3g} MB", "bold")]
     run, stride = _asked_for(summary, options)
-    gone = scenefile.gone_from(store.scene_text(summary.path)) if summary.runs else ""
     if run is not None:
-        of = Units() if gone else units(keeper.stored_scene(summary.path))
+        of = Units() if _left(summary) else units(keeper.stored_scene(summary.path))
         out += _frames(run, stride, store.end(summary.path, run.label, 1), of)
         if not options.verdicts:
             return out
@@ -44,6 +45,7 @@ def lines(summary: store.Summary, options: Namespace) -> Lines:
         known = summary.runs[0].parameters
         out += [
             plain(f"  scene {known.get('scene_name')}, units {known.get('units')}"),
+            *_left(summary),
             plain(
                 f"  {known.get('finished')} on {known.get('host')}: {known.get('processor')}, "
                 f"{known.get('cores')} cores, {known.get('system')}"
@@ -52,7 +54,6 @@ def lines(summary: store.Summary, options: Namespace) -> Lines:
                 f"  python {known.get('python')}, numpy {known.get('numpy')}, "
                 f"h5py {known.get('h5py')}, hdf5 {known.get('hdf5')}"
             ),
-            *([plain(f"  {gone}; its trajectories are read, not judged", "bold yellow")] if gone else []),
             _runs(summary),
         ]
     out += [plain(f"table {name}") for name in summary.tables]
@@ -60,6 +61,15 @@ def lines(summary: store.Summary, options: Namespace) -> Lines:
         said = study.lines(result, options, summary.path)
         out += [*([] if study.trajectories else [plain()]), *said]
     return out
+
+
+def _left(summary: store.Summary) -> Lines:
+    """What the scene of a store has and springcheck no longer has, in a line."""
+    try:
+        reason = left.refusal(tomllib.loads(store.scene_text(summary.path)))
+    except (ValueError, SpringcheckError):
+        return []
+    return [plain(f"  its scene cannot be run or judged here: {reason}", "bold red")] if reason else []
 
 
 def _asked_for(summary: store.Summary, options: Namespace) -> tuple[Trajectory | None, int]:

@@ -20,14 +20,11 @@ class Need(Enum):
 
     DAMPING = "damping"
     FAST_SPRINGS = "springs marked fast"
-    RODS = "rods"
 
     def met_by(self, scene: Scene) -> bool:
         """Whether the scene has it."""
         if self is Need.DAMPING:
             return any(term.key == "damping" for term in scene.terms)
-        if self is Need.RODS:
-            return any(term.kind == "constraint" for term in scene.terms)
         return any(term.fast for term in scene.terms)
 
 
@@ -40,20 +37,15 @@ EVERY_POTENTIAL = frozenset({ANY_POTENTIAL, "wall-spring", "spring", "quartic", 
 EVERY_FORCE = EVERY_POTENTIAL | {"damping"}
 """The terms of a method whose force may also depend on the velocity."""
 
-RODS = frozenset({"wall-rod", "rod"})
-
 SPRINGS = frozenset({"wall-spring", "spring"})
 
 DRIVEN = frozenset({"drive"})
 """The term of a method whose force may also depend on the time."""
 
-NO_NUMBERS = "none: a chain is deterministic"
-"""The generator of a thermostat whose bath is deterministic."""
-
 BRAKES = frozenset({"van-der-pol"})
 """The term of a method whose friction may depend on the position."""
 
-EVERY_KIND = frozenset({"particles", "circuit", "rotor"})
+EVERY_KIND = frozenset({"particles", "circuit"})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,7 +65,7 @@ class Method:
     terms: frozenset[str] = SPRINGS
     """Keys of the terms that it can evaluate."""
     kinds: frozenset[str] = frozenset({"particles"})
-    """Kinds of scenes that it moves: particles, circuit, rotor."""
+    """Kinds of scenes that it moves: particles, circuit."""
     requires: frozenset[Need] = frozenset()
     rebuilds_velocity: bool = False
     """The velocity is a difference of positions over the step, which costs digits: eps q / h."""
@@ -149,12 +141,10 @@ class Engine:
     """Versions of the library and of its own dependencies, by name."""
     arithmetic: Callable[[Label], Arithmetic] = lambda label: Arithmetic()
     """How the library rounds: double precision throughout by default."""
-    picosecond: float = 1.0
-    """One in the unit of time in which its `arithmetic` states rates of scenes in units "md"."""
     convention: Callable[[Method], str] = lambda method: "synchronised"
     """How the library stores velocities, as a phrase for the report."""
     thermostats: Mapping[str, Method] = field(default_factory=dict)
-    """Random methods by name, for scenes with a bath; their schemes are those of `springcheck.thermal`."""
+    """Random methods by name, for scenes with a bath; their schemes are those of `springcheck.bath`."""
     distribution: str = ""
     """Its library's name on the package index, or "" where it needs none."""
     module: str = ""

@@ -19,10 +19,10 @@ from typing import NamedTuple
 
 import springcheck
 from springcheck import interrupts, schemes
+from springcheck.bath import THERMOSTATS
 from springcheck.engines.contract import ANY_POTENTIAL, Engine, Method, Stopped
 from springcheck.errors import MethodError, SpringcheckError, nearest, told
 from springcheck.physics import terms
-from springcheck.thermal import THERMOSTATS
 
 GROUP = "springcheck.engines"
 """The group of entry points by which the engines of other packages are found."""

@@ -35,8 +35,6 @@ class Scene(SceneFields):
     def __post_init__(self) -> None:
         for field, value in _checked(self):
             object.__setattr__(self, field, value)
-        if self.system.rods:
-            self.system.rods.check(self.q, self.p)
 
     def __repr__(self) -> str:
         terms = ", ".join(f"{len(term)} {term.key}" for term in self.terms) or "free"

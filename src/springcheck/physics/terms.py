@@ -16,12 +16,11 @@ from springcheck.physics import termcheck
 from springcheck.physics.arrays import Floats, Integers, Reals
 from springcheck.physics.driven import Drive
 from springcheck.physics.radial import RadialSpring
-from springcheck.physics.rods import Rod, WallRod
 from springcheck.physics.term import Column, LinearLaw, OnPairs, OnParticles, Origin, Term, WithoutPotential
 
 __all__ = [
     "Column", "Cosine", "Damping", "Drive", "Morse", "OnPairs", "OnParticles",
-    "Quartic", "RadialSpring", "Rod", "Spring", "Term", "VanDerPol", "WallRod", "WallSpring", "Weight",
+    "Quartic", "RadialSpring", "Spring", "Term", "VanDerPol", "WallSpring", "Weight",
     "known", "register",
 ]  # fmt: skip
 
@@ -239,7 +238,6 @@ class VanDerPol(WithoutPotential):
 _KNOWN: dict[str, type[Term]] = {
     term.key: term for term in (
         WallSpring, Spring, Quartic, Cosine, Weight, Morse, RadialSpring, Damping, VanDerPol, Drive,
-        WallRod, Rod,
     )
 }  # fmt: skip
 

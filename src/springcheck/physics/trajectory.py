@@ -175,8 +175,8 @@ class Trajectory:
 
     def at(self, rows: slice) -> Trajectory:
         """These frames alone."""
-        more = {} if self.energy is None else {"energy": self.energy[rows]}
-        return replace(self, t=self.t[rows], q=self.q[rows], p=self.p[rows], **more)
+        energy = None if self.energy is None else self.energy[rows]
+        return replace(self, t=self.t[rows], q=self.q[rows], p=self.p[rows], energy=energy)
 
     @typed
     def save(self, path: str | Path) -> Path:
@@ -370,7 +370,7 @@ class Verdict:
     sees: Limits = NOT_KNOWN
     """Smallest fault that the check would have detected in this run."""
     statistic: Any = field(default=None, compare=False, repr=False)
-    """Of a random verdict the statistic (`thermal.chance`) where it adds up over pieces of a run; it is in no
+    """Of a random verdict the statistic (`bath.evidence`) where it adds up over pieces of a run; it is in no
     document and no pickle."""
 
     @property

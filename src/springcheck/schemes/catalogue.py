@@ -59,7 +59,7 @@ class Scheme:
     convergence: Fraction | None = None
     """Power of the tolerance with which an adaptive solver's error falls, on a smooth motion."""
     thermostat: ClassVar[bool] = False
-    """Whether it has noise, and a step that `springcheck.thermal` carries out."""
+    """Whether it has noise, and a step that `springcheck.bath` carries out."""
     source: str = ""
     unnamed: bool = False
     """It stands for a step, fixed or not, whose scheme nobody has named."""
@@ -111,12 +111,6 @@ class Scheme:
             return False
         full = [row + (row[0] * 0,) * (s - len(row)) for row in self.a]
         return all(full[s - 1 - i][s - 1 - j] + full[i][j] == self.b[j] for i in range(s) for j in range(s))
-
-    @property
-    def longest_drift(self) -> float:
-        """The longest of its drifts, in steps; 1 where it has none."""
-        drifts = [c for kind, (_, c) in zip(self.kinds, self.stages, strict=True) if kind.drifts]
-        return max((abs(float(number(c, np.float64))) for c in drifts), default=1.0)
 
     @property
     def reach(self) -> int:

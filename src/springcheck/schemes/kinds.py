@@ -4,7 +4,7 @@ A row says what a stage does for the time x, its part of the step: to a state of
 of what is rounded (Higham, Accuracy and Stability of Numerical Algorithms, 3.3: a running error bound is the
 same calculation with every difference taken as a sum).  All else asks the row: `stepping` and `rounding`
 carry it out, `linear` makes matrices of it by unit states, `explain` prints its word.  Stages that draw
-random numbers are those of `springcheck.thermal`.
+random numbers are those of `springcheck.bath`.
 """
 
 from __future__ import annotations

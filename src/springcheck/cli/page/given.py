@@ -16,10 +16,6 @@ from springcheck import schemes
 from springcheck.errors import SpringcheckError
 from springcheck.figures import charts
 from springcheck.figures.charts import EXACTLY, Bank, Chart, Curve, Rule, Scale, numbers
-from springcheck.formats import columns
-from springcheck.identify.candidates import other_names
-from springcheck.identify.families import title
-from springcheck.identify.hypothesis import distinct
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import WallSpring
@@ -57,22 +53,7 @@ def to_scripts(scene: Scene | None, pieces: Sequence[Trajectory], wrong: Collect
         "laws": laws([*(piece.scheme for piece in pieces), *TRIED.values()]),
         "steps": scene.steps if scene else 0,
         "equal": scene is not None and scene.units == "reduced",
-        "columns": columns.NAMES,
-        "schemes": plain_schemes(),
     }
-
-
-def plain_schemes() -> list[dict[str, Any]]:
-    """One scheme for every undamped one-step map that `identify` distinguishes; its title names those of the
-    same map too."""
-    known, found = laws(schemes.SCHEMES), []
-    for name in (family.scheme for family in distinct(damped=False)):
-        # whoever drops a plain file did not ask for friction
-        names = [x for x in other_names(name, damped=False) if not x.endswith(" friction")]
-        others = ", ".join(map(schemes.title, names))
-        also = f" (on a spring the same map: {others})" if others else ""
-        found.append({"scheme": name, "title": title(name) + also, "law": known[name]})
-    return found
 
 
 def _live() -> Bank:
@@ -200,7 +181,7 @@ def bath(scene: Scene | None, ran: Collection[str]) -> dict[str, Any] | None:
     """Data of one particle on a spring in a bath, or None; the schemes `ran` are drawn at first."""
     if scene is None or scene.bath is None or scene.n != 1 or not scene.system.is_linear:
         return None
-    from springcheck.thermal import THERMOSTATS, Law
+    from springcheck.bath import THERMOSTATS, Law
 
     at = np.zeros(1)
     k, m, rate = float(scene.system.hessian_diagonal(at)[0]), float(scene.m[0]), scene.bath.friction

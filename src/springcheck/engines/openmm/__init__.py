@@ -8,8 +8,6 @@ from springcheck.engines.contract import (
     ANY_POTENTIAL,
     DRIVEN,
     EVERY_POTENTIAL,
-    NO_NUMBERS,
-    RODS,
     Engine,
     Need,
     by_default,
@@ -62,17 +60,6 @@ ENGINE = Engine(
             "langevin", "langevin-middle", "LangevinIntegrator at T = 0, started and read synchronised",
             _DRIVEN | {"damping"}, Need.DAMPING, one_friction=True,
         ),
-        *(
-            by_default(
-                name, "velocity-verlet", f"VerletIntegrator, {tolerance}, started and read synchronised",
-                _TERMS | RODS, Need.RODS, rebuilds_velocity=True, default=name != "verlet-rods-8",
-            )
-            for name, tolerance in (
-                ("verlet-rods", "constraint tolerance 1e-13"),
-                ("verlet-rods-8", "constraint tolerance 1e-8"),
-                ("verlet-rods-as-it-is", "its own constraint tolerance 1e-5"),
-            )
-        ),
         by_name(
             "nose-hoover", "semi-implicit-euler",
             "NoseHooverIntegrator without a thermostat, handed p0 as it is", _DRIVEN,
@@ -80,11 +67,6 @@ ENGINE = Engine(
     ),
     thermostats=named(
         _drawn("langevin-middle-bath", "baoa", "LangevinMiddleIntegrator, as it stores velocities"),
-        _drawn(
-            "langevin-middle-rods", "baoa",
-            "LangevinMiddleIntegrator, constraint tolerance 1e-13, as it stores velocities",
-            terms=_ON_A_LINE | RODS, requires=frozenset({Need.RODS}),
-        ),
         _drawn(
             "langevin-middle-synchronised", "baoab",
             "LangevinMiddleIntegrator, half a kick added to what is read",
@@ -97,21 +79,8 @@ ENGINE = Engine(
             note="on GPU platforms it collides at most 2/pi as often as asked",
         ),
         _drawn(
-            "nose-hoover-bath", "nose-hoover-middle", "NoseHooverIntegrator, as it stores velocities",
-            generator=NO_NUMBERS, default=False,
-            note="it counts three degrees of freedom for each particle, whatever moves it",
-        ),
-        _drawn(
             "mts-langevin", "baoab", "MTSLangevinIntegrator, one group of forces once a step",
             default=False, rebuilds_velocity=False,
-        ),
-        *(
-            _drawn(
-                f"mts-langevin-{n}", f"baoab-respa{n}",
-                f"MTSLangevinIntegrator, fast springs {n} times a step", default=False,
-                rebuilds_velocity=False,
-            )
-            for n in (2, 3, 4)
         ),
     ),
     atlas=tuple(f"verlet@{place}" for place in ("CPU", "OpenCL-single", "OpenCL-mixed", "OpenCL-double")),

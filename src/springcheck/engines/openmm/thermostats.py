@@ -1,8 +1,4 @@
-"""OpenMM's integrators with a heat bath.
-
-All but `DPDIntegrator`, which is no method: its noise is one number a pair, and its friction, 2 gamma
-(1 - r/cutoff)**2, follows the distance r, so that no matrices A and G are its law on a spring.
-"""
+"""OpenMM's integrators with a heat bath."""
 
 from __future__ import annotations
 
@@ -26,15 +22,10 @@ def thermostat(scene: Scene, name: str, step: float, seed: int, system: mm.Syste
         system.addForce(noise)
     elif name == "brownian":
         noise = made = mm.BrownianIntegrator(temperature, rate, step)
-    elif name == "nose-hoover-bath":
-        return mm.NoseHooverIntegrator(temperature, rate, step)
     elif name == "mts-langevin":
         noise = made = mm.MTSLangevinIntegrator(temperature, rate, step, [(0, 1)])
         for force in system.getForces():
             force.setForceGroup(0)
-    elif name.startswith("mts-langevin-"):
-        groups = [(0, 1), (1, int(name.rpartition("-")[2]))]
-        noise = made = mm.MTSLangevinIntegrator(temperature, rate, step, groups)
     else:
         kind = mm.LangevinIntegrator if name == "langevin-bath" else mm.LangevinMiddleIntegrator
         noise = made = kind(temperature, rate, step)

@@ -6,14 +6,13 @@ scene's `include` or by `--method`.
 
 from __future__ import annotations
 
+from springcheck.bath import THERMOSTATS
 from springcheck.engines.contract import (
     BRAKES,
     DRIVEN,
     EVERY_FORCE,
     EVERY_KIND,
     EVERY_POTENTIAL,
-    NO_NUMBERS,
-    RODS,
     SPRINGS,
     Engine,
     Method,
@@ -23,7 +22,6 @@ from springcheck.engines.contract import (
     thermostat,
 )
 from springcheck.schemes import SCHEMES, Scheme
-from springcheck.thermal import THERMOSTATS
 
 NAMES = {"explicit-euler": "euler"}
 """Methods whose names differ from their scheme's."""
@@ -48,9 +46,7 @@ def _requires(scheme: Scheme) -> frozenset[Need]:
 def _terms(scheme: Scheme) -> frozenset[str]:
     if scheme.has("implicit"):
         return SPRINGS | BRAKES | {"damping"}
-    # rods hold after every stage of a splitting
-    rods = RODS if scheme.has("symplectic", "splitting") else frozenset()
-    return EVERY_FORCE | rods | (BRAKES if scheme.has("plain") or scheme.b else frozenset())
+    return EVERY_FORCE | (BRAKES if scheme.has("plain") or scheme.b else frozenset())
 
 
 def _method(scheme: Scheme) -> Method:
@@ -79,9 +75,8 @@ ENGINE = Engine(
     thermostats=named(
         *(
             thermostat(
-                one.name, one.name, one.title, "NumPy, PCG64" if one.draws else NO_NUMBERS,
-                EVERY_POTENTIAL | (RODS if one.held else frozenset()),
-                scripted=one.draws > 0, kinds=EVERY_KIND, default=one.name in BY_DEFAULT,
+                one.name, one.name, one.title, "NumPy, PCG64", EVERY_POTENTIAL, scripted=True,
+                kinds=EVERY_KIND, default=one.name in BY_DEFAULT,
             )
             for one in THERMOSTATS.values()
         )

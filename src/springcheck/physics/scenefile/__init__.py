@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 import tomllib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ import msgspec
 
 from springcheck.errors import SceneError, nearest, plain
 from springcheck.physics.scene import Scene
-from springcheck.physics.scenefile import building, tables
+from springcheck.physics.scenefile import building, left, tables
 
 LONGEST_TEXT = 1 << 25
 """Most characters of a scene: parsing so many takes ten seconds and a gigabyte of memory."""
@@ -88,11 +88,11 @@ def parse(text: str, *, name: str, where: str | None = None) -> Scene:
 
 def from_tables(data: Any, *, name: str, where: str) -> Scene:
     """The scene that the tables of a scene file describe.  Raises SceneError."""
-    if said := gone(data):
-        raise SceneError(f"{where}: {said}")
     for field, value in _numbers(data):
         if not math.isfinite(value):
             raise SceneError(f"{where}: {field} = {value}; a finite number is needed")
+    if reason := left.refusal(data):
+        raise SceneError(f"{where}: {reason}")
     try:
         table = msgspec.convert(data, tables.scene_table(), strict=True)
     except msgspec.ValidationError as error:
@@ -101,19 +101,6 @@ def from_tables(data: Any, *, name: str, where: str) -> Scene:
         return building.scene(table, name=name)
     except building.MistakeError as error:
         raise SceneError(f"{where}: {error}") from error
-
-
-def gone(names: Iterable[str]) -> str:
-    """Which of the tables of a scene are not part of springcheck any more, in a clause; "" for none."""
-    left = (
-        f"[{name}]: {tables.LEFT[name]} are not part of springcheck" for name in names if name in tables.LEFT
-    )
-    return next(left, "")
-
-
-def gone_from(text: str) -> str:
-    """As `gone`, of the text of a scene file, which need not be valid."""
-    return gone(re.findall(r"^\[+([\w-]+)", text, re.MULTILINE))
 
 
 def _unreadable(message: str, text: str) -> str:

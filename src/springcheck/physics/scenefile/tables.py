@@ -34,14 +34,6 @@ class ParticleTable(SceneTable, frozen=True):
     axes: Annotated[str, msgspec.Meta(pattern="^[xyz]{1,3}$")] | None = None
 
 
-class RotorTable(SceneTable, frozen=True):
-    """A rotating body: inertia [M L2], angle [rad] and angular momentum [M L2/T] at the start."""
-
-    inertia: Positive
-    angle: float = 0.0
-    momentum: float = 0.0
-
-
 class InductorTable(SceneTable, frozen=True):
     """The inductor of a loop: inductance [H], circulated charge [C] and flux [Wb] at the start."""
 
@@ -77,14 +69,6 @@ class SpringTable(SceneTable, frozen=True):
     wall: float = 0.0
     fast: bool = False
     axis: Axis | None = None
-
-
-class RodTable(SceneTable, frozen=True):
-    """A rigid rod of a length [L], by default that at the start; a wall end is at `wall` [L]."""
-
-    ends: tuple[End, End]
-    length: Positive | None = None
-    wall: float | PerAxis = 0.0
 
 
 class BondTable(SceneTable, frozen=True):
@@ -156,7 +140,6 @@ class Body(NamedTuple):
 
 BODIES = {
     "particle": Body("particles", "particles", ("mass", "position", "momentum")),
-    "rotor": Body("rotor", "rotors", RotorTable.__struct_fields__),
     "inductor": Body("circuit", "inductors", InductorTable.__struct_fields__),
     "chain": Body("particles", "masses"),
 }
@@ -172,13 +155,11 @@ class SceneBase(SceneTable, frozen=True):
     units: Units | None = None
     kind: Kind | None = None
     particle: tuple[ParticleTable, ...] = ()
-    rotor: tuple[RotorTable, ...] = ()
     inductor: tuple[InductorTable, ...] = ()
     capacitor: tuple[CapacitorTable, ...] = ()
     resistor: tuple[ResistorTable, ...] = ()
     chain: ChainTable | None = None
     spring: tuple[SpringTable, ...] = ()
-    rod: tuple[RodTable, ...] = ()
     bond: tuple[BondTable, ...] = ()
     bath: BathTable | None = None
     methods: MethodsTable = MethodsTable()
@@ -214,21 +195,13 @@ def identifier(name: str) -> str:
     return name.replace("-", "_")
 
 
-OWN_TABLES = ("wall-spring", "spring", "wall-rod", "rod", "bond")
+OWN_TABLES = ("wall-spring", "spring", "bond")
 """Keys of the terms with tables of their own."""
 
 
 def of_terms() -> tuple[Any, ...]:
     """Terms that are read by their columns alone."""
     return tuple(term for key, term in terms.known().items() if key not in OWN_TABLES)
-
-
-LEFT = {
-    "box": "periodic boxes",
-    "magnetic": "magnetic fields",
-    "modulated-spring": "springs of modulated stiffness",
-}
-"""Tables of scene files that are refused, and what they describe: no part of springcheck."""
 
 
 def scene_table() -> Any:

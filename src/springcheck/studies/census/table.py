@@ -10,9 +10,8 @@ from typing import Any, TypeAlias
 from springcheck import engines, schemes
 from springcheck.errors import StoreError
 from springcheck.schemes.elsewhere import ELSEWHERE
-from springcheck.studies.census.rigid import NO_SCHEME
+from springcheck.studies.census.maps import NO_SCHEME
 from springcheck.text.wording import number
-from springcheck.thermal.catalogue import family_of, random_scheme
 
 Cells: TypeAlias = Mapping[str, Mapping[str, str]]
 """Version, and the text of each column, by method."""
@@ -24,8 +23,6 @@ def titles(names: str) -> str:
 
 
 def _title(name: str) -> str:
-    if family_of(name)[1]:
-        return random_scheme(name).title
     return getattr(ELSEWHERE.get(name), "title", schemes.title(name))
 
 
@@ -41,7 +38,6 @@ def amount(x: float | None, least: float, form: str = "+.3g") -> str:
 WATCHED: Mapping[str, tuple[str, Callable[[Mapping[str, Any]], str]]] = {
     "thermostat": ("thermostat", lambda x: x.get("thermostat") or "none"),
     "axes": ("axes", lambda x: x.get("along") or "x"),
-    "constraint": ("constraint", lambda x: x.get("constraint") or "none"),
     "scheme": ("scheme, from the states", lambda x: titles(x["found"])),
     "velocity": ("stored velocity", lambda x: _velocity(x["velocity_offset"])),
     "substeps": ("steps inside", lambda x: str(x["substeps"] or "-")),

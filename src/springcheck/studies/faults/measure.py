@@ -16,7 +16,6 @@ from springcheck.checks.seeds import SEEDED
 from springcheck.errors import SceneError, nearest
 from springcheck.physics.builders import spring
 from springcheck.physics.scene import Scene
-from springcheck.physics.scenefile import load_scene
 from springcheck.physics.terms import Drive, Spring
 from springcheck.studies import keeper
 from springcheck.studies.arguments import Progress
@@ -43,9 +42,6 @@ SCENES: Mapping[str, Callable[[], Scene]] = {
         m=np.array([1.3, 0.7, 2.1]), q=np.array([0.2, 1.0, 1.9]), p=np.array([0.4, -0.3, 0.5]), step=0.05,
         terms=(Spring(a=np.arange(2), b=np.arange(1, 3), k=np.array([1.1, 3.7]), rest=np.array([0.9, 1.2])),),
         steps=200),
-    "dumbbell": lambda: replace(load_scene("dumbbell"), steps=200),
-    "triangle": lambda: replace(load_scene("rigid-triangle"), steps=40),
-    "hot rod": lambda: replace(load_scene("bath-dumbbell"), steps=400),
     "bath": lambda: baths.springs(40),
     "wide bath": lambda: baths.springs(250),
 }  # fmt: skip
@@ -88,7 +84,7 @@ def probe(fault: Fault) -> Passed:
     @cache
     def subject(size: float | None) -> Any:
         if fault.random:
-            return baths.subject(fault, size, where if where.system.rods else None)
+            return baths.subject(fault, size)
         return checks.Bench(scene=where, label=fault.name, run=partial(fault.run, size=size))
 
     @cache

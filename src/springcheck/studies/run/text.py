@@ -18,10 +18,10 @@ from springcheck.physics.trajectory import Comparison, Verdict
 from springcheck.studies.run.tally import MethodRun
 from springcheck.studies.text import of_energy
 from springcheck.text.lines import Lines, Row, Text, TextTable, plain, table
-from springcheck.text.wording import count, number, seconds
+from springcheck.text.wording import number, rounded_down, seconds
 
 if TYPE_CHECKING:
-    from springcheck.thermal.heat import Heated
+    from springcheck.bath.heat import Heated
 
 BELOW = "the exact solution is known no better than this, and the run is no further from it"
 
@@ -44,7 +44,7 @@ def beyond(scene: Scene, runs: Sequence[MethodRun]) -> Lines:
         title = schemes.title(scheme)
         if (limit := too_long(scheme, scene)) is None:
             continue
-        said = f"is beyond the limit of {title} here, {limit:.4g}"
+        said = f"is beyond the limit of {title} here, {rounded_down(limit)}"
         names = ", ".join(run.method for run in runs if run.scheme == scheme)
         out.append(plain(f"h = {scene.step:g} {said}: {names}", "bold yellow"))
     return [plain(), *out] if out else []
@@ -116,8 +116,8 @@ def same_motions(found: Sequence[Same]) -> Lines:
     return out
 
 
-def temperatures(scene: Scene, found: Sequence[Heated]) -> Lines:
-    """Temperatures of runs in a bath, each beside the exact one of its scheme."""
+def temperatures(found: Sequence[Heated]) -> Lines:
+    """Temperatures of runs in a bath, each next to the exact one of its scheme."""
     if not found:
         return []
     rows: list[Row] = [
@@ -129,12 +129,9 @@ def temperatures(scene: Scene, found: Sequence[Heated]) -> Lines:
         for one in found
     ]  # fmt: skip
     titles = ("method", "configurational", "measured", "kinetic", "measured ")
-    of = ""
-    if scene.system.rods:
-        of = f", in {count(scene.system.rods.freedoms, 'degree')} of freedom"
     return [
         plain(),
-        plain(f"Temperatures over that of the bath{of}, exact for each scheme, and as measured:"),
+        plain("Temperatures over that of the bath, exact for each scheme, and as measured:"),
         table(titles, rows, left=("method",)),
     ]
 

@@ -13,6 +13,7 @@ from typing import Unpack
 import numpy as np
 
 from springcheck import driver, engines, schemes
+from springcheck.bath import THERMOSTATS, Law
 from springcheck.engines.contract import Label
 from springcheck.errors import MethodError
 from springcheck.physics.arrays import Floats
@@ -24,7 +25,6 @@ from springcheck.studies.census.baths import KT, MASS, STIFFNESS, springs, tempe
 from springcheck.studies.choose import choose
 from springcheck.studies.keeper import How, Keeper, each
 from springcheck.studies.sampling.result import SAMPLED, Sampled, Sampling
-from springcheck.thermal import THERMOSTATS, Law
 
 OMEGA = float(np.sqrt(STIFFNESS / MASS))
 
