@@ -188,7 +188,7 @@ def test_a_legend_has_one_entry_for_each_scheme() -> None:
 
 
 def test_a_legend_counts_every_method_of_a_curve_that_several_share() -> None:
-    mine = ["own:euler", "openmm:euler", "dart:force"]
+    mine = ["own:euler", "openmm:euler", "lammps:bond"]
     curve = Curve(name="own:euler and 2 more", group="explicit-euler", x=[0.0], y=[0.0], methods=mine)
     scale = Scale(name="x")
     figure = render.picture(Bank(title="", charts=[Chart(title="", x=scale, y=scale, curves=[curve])]))

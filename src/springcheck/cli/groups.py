@@ -36,10 +36,8 @@ EXAMPLES: Mapping[str, Sequence[str]] = {
 
 
 GROUPS: Mapping[str, Sequence[str]] = {
-    "input": ("file", "files", "label", "word", "kind", "--trajectory", "--columns", "--from",
-              "--against"),
-    "scene": ("scene", "--scene", "--step", "--steps", "--set", "--temperature", "--friction", "--seed",
-              "--thermostats"),
+    "input": ("file", "files", "label", "word", "kind", "--trajectory", "--columns", "--from"),
+    "scene": ("scene", "--scene", "--step", "--steps", "--set", "--temperature", "--friction", "--seed"),
     "methods": (
         "--method", "--all", "--engine", "--stepper", "--command", "--scheme", "--timeout", "--fault",
     ),

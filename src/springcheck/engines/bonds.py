@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
 from typing import TypeAlias
 
 import numpy as np
@@ -101,17 +100,6 @@ def _shorter(scene: Scene, term: Term, most: Floats, box: Floats) -> None:
     )
 
 
-@np.errstate(over="ignore")
-def within(label: Label, sizes: Iterable[tuple[float, str, float, float]]) -> None:
-    """MethodError where a number (least, its name, number, most) is none that an engine computes with."""
-    for lowest, what, size, highest in sizes:
-        if not lowest <= size <= highest:
-            raise MethodError(
-                f"{label}: a {what} of {size:.3g} is outside what it computes with, {lowest:.3g} to "
-                f"{highest:.3g}; the scene in other units, its numbers nearer to 1, is inside"
-            )
-
-
 def cells(scene: Scene, origins: Floats) -> Floats:
     """Periods of the box by which each position, counted from its origin, lies outside the box (n,)."""
     if scene.box is None:
@@ -196,22 +184,3 @@ def off_axis(positions: Floats, elsewhere: NDArray[np.bool_]) -> float:
     """Largest |position| along axes that are no coordinates of the scene, of positions (particles or more,
     3)."""
     return float(np.max(np.abs(positions.reshape(-1)[: len(elsewhere)][elsewhere]), initial=0.0))
-
-
-def walls(scene: Scene, label: Label) -> Iterator[tuple[int, float, float]]:
-    """Particle, stiffness [M/T2] and rest position [L] of each wall spring, for joints that have one spring.
-
-    Springs of stiffness 0 are left out: their joints would be rigid.  Raises MethodError where a particle has
-    two, or a stiffness is negative.
-    """
-    taken: set[int] = set()
-    for term in scene.terms:
-        if isinstance(term, WallSpring):
-            for i, k, at in term.rows():
-                if i in taken or k < 0:
-                    raise MethodError(
-                        f"{label}: a joint has one spring, of stiffness 0 or more; particle {i}"
-                    )
-                taken.add(i)
-                if k:
-                    yield i, k, at

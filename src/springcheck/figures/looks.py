@@ -83,8 +83,6 @@ LOOKS = {
     "scipy-radau": Look(_WINE, DASH_DOT),
     "scipy-bdf": Look(_BLACK, TWO_DOTS),
     "scipy-lsoda": Look(_BLACK, SPARSE),
-    "rebound-ias15": Look(_GREY, LONG),
-    "heyoka-taylor": Look(_GREY, DASHED),
     "adaptive": Look(_GREY, SOLID),
     "force-held-2": Look(_OLIVE, SOLID),
     "force-held-4": Look(_OLIVE, LONG),
@@ -119,13 +117,7 @@ MARKS = {
     "sundials": ("D", "\u25c7"),
     "scipy": ("v", "\u25bd"),
     "mujoco": ("<", "\u25c1"),
-    "pymunk": (">", "\u25b7"),
-    "rebound": ("*", "\u2606"),
-    "dart": ("p", "\u2b20"),
-    "box2d": ("h", "\u2b21"),
     "lammps": ("d", "\u25ca"),
-    "rapier": ("X", "\u2716"),
-    "drake": ("P", "\u271a"),
     "fault": ("H", "\u2b22"),
 }
 """Mark of each engine on a line, and the character that stands for it in a legend."""
