@@ -239,7 +239,7 @@ def test_a_dump_of_a_molecule_along_no_axis_is_judged_and_identified(
     run = driver.run(scene, "own:velocity-verlet")
     path = dump(tmp_path / "a.dump", run.q, run.p / scene.m, scene.masses)
     given = ["judge", str(path), "--scene", "diatomic", "--scheme", "velocity-verlet", "--step", "0.1"]
-    assert main(given) == 0
+    assert main([*given, "--verdicts"]) == 0
     assert "angular-momentum" in capsys.readouterr().out
     assert main([*given[:5], "semi-implicit-euler", *given[6:]]) == 1
     capsys.readouterr()
@@ -300,17 +300,9 @@ def test_a_file_of_points_in_space_is_judged_by_a_scene_in_a_plane(
     v[:] = 0
     q[:, scene.where], v[:, scene.where] = run.q, run.p / scene.m
     path = dump(tmp_path / "a.dump", q, v, scene.masses)
-    given = [
-        "judge",
-        str(path),
-        "--step",
-        "0.1",
-        "--scene",
-        str(tmp_path / "plane.toml"),
-        "--scheme",
-        "velocity-verlet",
-    ]
-    assert main(given) == 0
+    plane = ["--scene", str(tmp_path / "plane.toml"), "--scheme", "velocity-verlet"]
+    given = ["judge", str(path), "--step", "0.1", *plane]
+    assert main([*given, "--verdicts"]) == 0
     assert "angular-momentum" in capsys.readouterr().out
     v[50:, 1] += 1e-9
     dump(path, q, v, scene.masses)

@@ -36,7 +36,7 @@ from springcheck.checks.motion import (
 from springcheck.checks.record import energies, grid, line, start, times
 from springcheck.checks.requires import CONTRACTED, REQUIREMENTS
 from springcheck.checks.solver import tolerance, tolerance_bound
-from springcheck.checks.steps import BLIND, arithmetic, bridges, step_defect
+from springcheck.checks.steps import BLIND, arithmetic, bridges, seldom_off, step_defect
 from springcheck.errors import MethodError
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Limits, Trajectory, Verdict
@@ -45,7 +45,7 @@ from springcheck.text.wording import STATES_SHOW, count, few
 __all__ = [
     "ALL", "BLIND", "CHECKS", "CONTRACTED", "RANDOM", "SPECIAL", "STATES_SHOW", "TELLING", "THOROUGH",
     "Bench", "Case", "Check", "Run", "angular_momentum", "arithmetic", "bridges", "cause_of",
-    "closed_form", "energies", "experiments_of", "frequency", "judge", "judge_thoroughly",
+    "closed_form", "energies", "experiments_of", "first_off", "frequency", "judge", "judge_thoroughly",
     "momentum", "not_judged", "shadow_energy", "shared", "start", "status", "step_defect", "summary",
     "tolerance", "tolerance_bound", "worst",
 ]  # fmt: skip
@@ -124,6 +124,13 @@ def explained(
     said = causes.found(case, lambda first, few: shown(scene, run, first, few))
     why = f"{first.why}{STATES_SHOW}{said}" if said else first.why
     return [replace(v, why=why) if v is first else v for v in verdicts]
+
+
+def first_off(scene: Scene, run: Trajectory) -> int:
+    """The number of the first step of a run that is not the scheme's own; 0 where none is."""
+    case = Case(trajectory=run, scene=scene)
+    frame = seldom_off(case)[0]
+    return int(case.steps[frame - 1]) + 1 if frame else 0
 
 
 def cause_of(verdicts: Sequence[Verdict]) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TypeAlias
 
 import numpy as np
@@ -60,6 +61,17 @@ def gains_nothing(scene: Scene, *others: str) -> bool:
     """Whether nothing adds to the energy: all terms are springs, friction or of other keys, none negative."""
     known = {"wall-spring", "spring", "bond", "damping", *others}
     return all(t.key in known and np.all(getattr(t, t.columns[0].field) >= 0) for t in scene.terms)
+
+
+@np.errstate(over="ignore")
+def within(label: Label, sizes: Iterable[tuple[float, str, float, float]]) -> None:
+    """MethodError where a number (least, its name, number, most) is none that an engine computes with."""
+    for lowest, what, size, highest in sizes:
+        if not lowest <= size <= highest:
+            raise MethodError(
+                f"{label}: a {what} of {size:.3g} is outside what it computes with, {lowest:.3g} to "
+                f"{highest:.3g}; the scene in other units, its numbers nearer to 1, is inside"
+            )
 
 
 def rests(scene: Scene, label: Label) -> Floats:
