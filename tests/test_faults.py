@@ -25,8 +25,6 @@ Need = Callable[[str], None]
 RECORDED = {check.name for check in (*checks.CHECKS, *checks.RANDOM)}
 EXPERIMENTS = {check.name: check for check in (*checks.THOROUGH, *SEEDED)}
 BY_NAME = {fault.name: fault for fault in FAULTS}
-ON_LEAVE = {"gyration", "border"}
-"""Checks of subjects that are leaving."""
 
 
 def rejecting(fault: Fault) -> set[str]:
@@ -47,7 +45,7 @@ def test_a_fault_is_rejected_by_every_check_that_must_reject_it(fault: Fault) ->
 
 def test_every_check_has_a_fault_that_it_must_reject() -> None:
     named = {check for fault in FAULTS for check in fault.caught_by}
-    assert named == (RECORDED | set(EXPERIMENTS)) - ON_LEAVE
+    assert named == RECORDED | set(EXPERIMENTS)
     assert len(BY_NAME) == len(FAULTS)
 
 

@@ -41,7 +41,7 @@ GROUPS: Mapping[str, Sequence[str]] = {
         "--method", "--all", "--engine", "--stepper", "--command", "--scheme", "--timeout", "--fault",
     ),
     "known of the motion": ("--mass", "--stiffness", "--differences", "--arithmetic"),
-    "how much is measured": ("--thorough", "--budget", "--quick", "--workers", "--cluster"),
+    "how much is measured": ("--thorough", "--partial", "--budget", "--quick", "--workers", "--cluster"),
     "figures": ("--particle",),
     "output": ("output", "--output", "--force", "--json", "--quiet", "--verdicts", "--rows", "--points"),
     "continuous integration": tuple(f"--{name}" for name in REPORT_FORMS),
