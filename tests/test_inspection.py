@@ -403,7 +403,7 @@ def test_a_study_of_precision_that_lacks_a_table_is_refused(tmp_path: Path) -> N
     scene, path = scenes.load_scene("spring-uneven"), tmp_path / "study.h5"
     with store.open_new(path, "precision") as journal:
         journal.commit(scene, documents={"precision": '{"methods": [{"method": "own:euler"}]}'})
-    with pytest.raises(StoreError, match="lacks 'precision/own:euler'"):
+    with pytest.raises(StoreError, match="lacks 'metric'"):
         precision.stored(path)
 
 
