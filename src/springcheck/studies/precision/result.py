@@ -149,7 +149,7 @@ class PrecisionStudy(Studied):
     @property
     def _lowered(self) -> list[str]:
         """Methods with an order that friction in their kicks lowers."""
-        if not self.scene.system.is_damped:
+        if not any(term.kind == "friction" for term in self.scene.terms):
             return []
         known, fitted = schemes.known(), [x.method for x in self.measured if x.fit]
         found = [(label, known.get(scheme_of(label))) for label in fitted]

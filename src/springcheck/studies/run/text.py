@@ -12,7 +12,7 @@ import numpy as np
 
 from springcheck import checks, schemes
 from springcheck.checks.compare import Same
-from springcheck.physics.exact import has_true_motion
+from springcheck.physics.exact import no_reference
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Comparison, Verdict
 from springcheck.studies.run.tally import MethodRun
@@ -85,7 +85,7 @@ def methods(scene: Scene, runs: Sequence[MethodRun]) -> Lines:
         table(titles, rows, left=("method", "outcome")),
         plain(f"error: largest distance from the exact solution, over the {unit}", "dim"),
         *[plain(f"<: {BELOW}", "dim")] * any(run.error_below for run in runs),
-        *[plain("-: no exact solution of this scene is known here", "dim")] * (not has_true_motion(scene)),
+        *[plain(f"-: no reference solution, because {why}", "dim") for why in [no_reference(scene)] if why],
         plain(f"energy: {of_energy(scene)}", "dim"),
         *(
             plain(f"  {run.method}: {run.outcome} after step {run.steps}: {run.message}")
