@@ -37,20 +37,10 @@ class Act(NamedTuple):
 
     kind: Literal[
         "kick", "held", "drift", "exchange", "damp", "undamp", "noise", "jump",
-        "creep", "rebuild", "collide", "rescale", "scale", "shake", "project",
+        "creep", "rebuild", "collide", "rescale", "scale",
     ]  # fmt: skip
     part: Part = ONE
     draw: int = 0
-
-
-PROJECT = Act("project")
-
-
-def rigidly(acts: tuple[Act, ...]) -> tuple[Act, ...]:
-    """Stages of a splitting with rods, which hold after each: RATTLE's two halves after a drift, and the
-    second after what acts on momenta (Leimkuhler & Matthews, Proc. R. Soc. A 472 (2016) 20160138)."""
-    shaken = ((act, *([Act("shake", act.part)] if act.kind == "drift" else []), PROJECT) for act in acts)
-    return sum(shaken, ())
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,9 +64,6 @@ class Thermostat(Scheme):
     """Limit of gamma h, from which on the variance of its noise is negative."""
     cancels: int = 0
     """`Arithmetic.cancels` of its coefficients as they are published, in terms of 1 - c2."""
-    held: tuple[Act, ...] = ()
-    """Its stages where a scene has rods, with those that restore lengths after a drift and project momenta;
-    () where none are known."""
 
     @property
     def fresh(self) -> int:
@@ -96,11 +83,6 @@ class Thermostat(Scheme):
         return any(act.kind == "collide" for act in self.acts)
 
     @property
-    def kinetic_of_rods(self) -> bool:
-        """Whether a free rod moves at the temperature of the bath, to every order in the step: a drift keeps
-        speeds and phase-space volume, and all else acts on momenta across the rod alone."""
-        return self.held[-1:] == (PROJECT,) and all(act.kind != "jump" for act in self.acts)
-
     @property
     def rescales_after(self) -> bool:
         """Whether that factor comes after kicks and drifts."""
@@ -144,10 +126,8 @@ _SAID = {
 
 def _by_letters(letters: str) -> Thermostat:
     acts, middle = splitting(letters), letters == "BAOA"
-    # LF-middle projects before its drifts and restores lengths after: its draws are not projected
-    held = (acts[0], PROJECT, *acts[1:], Act("shake")) if middle else rigidly(acts)
     return Thermostat(
-        name=letters.lower(), title=f"{letters}: {_SAID[letters]}", acts=acts, held=held,
+        name=letters.lower(), title=f"{letters}: {_SAID[letters]}", acts=acts,
         draws=letters.count("O"), synchronised=not middle, source="Leimkuhler & Matthews 2013",
     )  # fmt: skip
 
@@ -197,18 +177,6 @@ _VEC_PUSH = (
     Act("damp", _of_x(0, HALF, Fraction(-1, 8))), Act("kick", _VEC_PART), Act("noise", _VEC_PART, 0),
     Act("noise", lambda x: -x / (4 * np.sqrt(3 * np.ones_like(x))), 1),
 )  # fmt: skip
-_VEC = (
-    (*_VEC_PUSH, Act("drift"), Act("jump", lambda x: 1 / (2 * np.sqrt(3 * np.ones_like(x))), 1)), _VEC_PUSH,
-)  # fmt: skip
-_LAMMPS = (
-    (
-        Act("damp", _of_x(0, 1)), Act("kick", HALF), Act("noise", HALF, 0), Act("undamp", _of_x(0, -HALF)),
-        Act("drift"),
-    ),
-    (Act("damp", _of_x(0, HALF)), Act("kick", HALF), Act("noise", HALF, 1)),
-)  # fmt: skip
-"""The stages up to the one that restores the rods' lengths, and those after it."""
-
 _VERLET = (Act("kick", HALF), Act("drift"), Act("kick", HALF))
 
 ENERGY_LEFT = Decay(lambda x: np.exp(-2 * x), lambda x: -np.expm1(-2 * x))
@@ -225,13 +193,20 @@ _OTHERS = (
     ),
     Thermostat(
         name="lammps-langevin", title="LAMMPS fix langevin with fix nve, friction of the half-step velocity",
-        acts=(*_LAMMPS[0], *_LAMMPS[1]), held=(*_LAMMPS[0], Act("shake"), *_LAMMPS[1], PROJECT),
+        acts=(
+            Act("damp", _of_x(0, 1)), Act("kick", HALF), Act("noise", HALF, 0),
+            Act("undamp", _of_x(0, -HALF)), Act("drift"), Act("damp", _of_x(0, HALF)), Act("kick", HALF),
+            Act("noise", HALF, 1),
+        ),
         draws=2, carried=1, uniform=True,
         source="Schneider & Stoll, Phys. Rev. B 17 (1978) 1302; as LAMMPS runs it",
     ),
     Thermostat(
         name="vanden-eijnden-ciccotti", title="Vanden-Eijnden & Ciccotti, eq. 23; ASE's Langevin",
-        acts=(*_VEC[0], *_VEC[1]), held=(*_VEC[0], Act("shake"), *_VEC[1], PROJECT),
+        acts=(
+            *_VEC_PUSH, Act("drift"), Act("jump", lambda x: 1 / (2 * np.sqrt(3 * np.ones_like(x))), 1),
+            *_VEC_PUSH,
+        ),
         draws=2, source="Vanden-Eijnden & Ciccotti 2006",
     ),
     Thermostat(

@@ -53,8 +53,6 @@ class Reading:
     """Largest change by a collision that is not noticed, in draws, (f-1, n)."""
     rescaled: Floats | None = None
     """Twice the kinetic energy over kT before and after one factor for all momenta, (2, f-1)."""
-    allowed: tuple[Extended, Extended] | None = None
-    """Running error bounds of a step of a scene with rods, of q and of p (f-1, n)."""
 
     @property
     def known(self) -> bool:
@@ -108,8 +106,8 @@ class _Reader:
         self.scheme, self.scene, self.how, self.rebuilt = scheme, scene, how, rebuilt
         self.stepper = Stepper.of(scheme, scene)
         self.sizer = Stepper.of(scheme, scene, absolute=True)
-        self._force = forces(scheme, scene.system)
-        self.roundings = roundings_of(scheme, scene)
+        self._force = forces(scene.system)
+        self.roundings = roundings_of(scheme)
         self.directions, self.of_q = (_NONE, False) if scheme.rescales else _directions(scheme, scene)
 
     def read(self, q: Floats, p: Floats) -> Reading:

@@ -10,7 +10,6 @@ import numpy as np
 from springcheck.bath.catalogue import THERMOSTATS
 from springcheck.bath.laws import Law
 from springcheck.physics.arrays import Floats, Reals
-from springcheck.physics.rods import Rods
 from springcheck.physics.scene import Scene
 from springcheck.physics.system import MOST_DENSE
 from springcheck.physics.trajectory import Trajectory
@@ -51,10 +50,9 @@ def heated_of(scene: Scene, pieces: Iterable[Trajectory]) -> Heated:
 
 def bound_freedoms(scene: Scene, q: Floats) -> int:
     """Coordinates less the directions in which no force changes, seen at frames q (f, n): the virial of these
-    is 0, and they have no configurational temperature.  0 with rods, along which forces do no virtual work
-    and are no part of the virial."""
+    is 0, and they have no configurational temperature."""
     system = scene.system
-    if system.rods or not any(term.kind == "potential" for term in scene.terms):
+    if not any(term.kind == "potential" for term in scene.terms):
         return 0
     if system.has_modes:
         return int(np.count_nonzero(system.modes.w2))
@@ -91,7 +89,7 @@ class Heat:
             return
         q, p = (x[some].astype(np.longdouble) for x in (piece.q, piece.p))
         with np.errstate(all="ignore"):
-            if scene.system.has_modes and not scene.system.rods:
+            if scene.system.has_modes:
                 y, v = scene.system.modes.about_centres(q, p)
                 of_q, of_p = scene.system.modes.w2 * y * y, v * v
             else:
@@ -104,9 +102,7 @@ class Heat:
         scene, system, bath = self._scene, self._scene.system, self._scene.bath
         assert bath is not None
         self._scheme, self._every, self._bound = piece.scheme, piece.every, bound_freedoms(scene, piece.q)
-        if system.rods:
-            self._from = round(self._settling(scene.p**2 / scene.m) / (bath.friction * piece.step))
-        elif law := self._law_of(piece):
+        if law := self._law_of(piece):
             left, modes = law.slowest, system.modes
             y, v = modes.about_centres(scene.q.astype(np.longdouble), scene.p.astype(np.longdouble))
             lasts = self._settling(modes.w2 * y * y + v * v)
@@ -134,8 +130,8 @@ class Heat:
 
     def line(self, method: str) -> Heated:
         """What was found."""
-        n, bound, rods = self._scene.n, self._bound, self._scene.system.rods
-        law, errors, freedoms = np.full((2, n), np.nan), np.full((2, n), np.nan), n
+        n, bound = self._scene.n, self._bound
+        law, errors = np.full((2, n), np.nan), np.full((2, n), np.nan)
         with np.errstate(all="ignore"):
             q, p = self._sums / (self._frames * self._scene.thermal)
             if self._law is not None:
@@ -145,22 +141,9 @@ class Heat:
         if bound < n:
             # of motion that nothing holds the law has no stationary state
             law[1] = error[1] = np.nan
-        if rods:
-            (law[1], error[1]), freedoms = self._of_rods(rods), rods.freedoms
         return Heated(
             method=method, scheme=self._scheme, configurational=float(np.sum(q)) / bound if bound else np.nan,
             configurational_error=float(error[0]), configurational_law=float(np.mean(law[0])),
-            kinetic=float(np.sum(p)) / freedoms, kinetic_error=float(error[1]),
+            kinetic=float(np.sum(p)) / n, kinetic_error=float(error[1]),
             kinetic_law=float(np.mean(law[1])),
         )  # fmt: skip
-
-    def _of_rods(self, rods: Rods) -> tuple[float, float]:
-        """The kinetic temperature of rods, 1 where they move freely, each by itself, and all that acts on
-        momenta acts across them; and the standard error of squares of momenta that forget by
-        exp(-friction h) a step."""
-        bath = self._scene.bath
-        assert bath is not None
-        free = not rods.share and all(term.kind == "constraint" for term in self._scene.terms)
-        square = np.exp(-2 * bath.friction * self._scene.step * self._every)
-        error = np.sqrt(2 * (1 + square) / ((1 - square) * max(self._frames, 2) * rods.freedoms))
-        return 1.0 if free and THERMOSTATS[self._scheme].kinetic_of_rods else np.nan, float(error)

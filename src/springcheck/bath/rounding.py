@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from springcheck.bath.catalogue import Thermostat
-from springcheck.bath.stepper import Met, Stepper, forces
+from springcheck.bath.stepper import Stepper, forces
 from springcheck.physics.arrays import Arithmetic, Extended, Force, Reals
 from springcheck.physics.scene import Scene
 from springcheck.physics.term import Term
@@ -21,24 +21,19 @@ SMALLEST = np.longdouble(np.finfo(np.float64).smallest_normal)
 """Loss of an operation to underflow: at rest at 0 nothing else rounds."""
 
 
-def roundings_of(scheme: Thermostat, scene: Scene) -> int:
-    """Roundings along one step; those of rods as `schemes.roundings` counts them."""
-    acts = scheme.held if scene.system.rods else scheme.acts
-    return IN_AND_OUT + sum({"shake": 12, "project": 8}.get(act.kind, PER_ACT) for act in acts)
+def roundings_of(scheme: Thermostat) -> int:
+    """Roundings along one step."""
+    return IN_AND_OUT + PER_ACT * len(scheme.acts)
 
 
 def one_rounding(
     scene: Scene, sizer: Stepper, start: tuple[Reals, Reals], draws: Sequence[Any], hit: Any,
-    how: Arithmetic, rebuilt: bool, met: list[Met] | None = None,
+    how: Arithmetic, rebuilt: bool,
 ) -> tuple[Extended, Extended]:  # fmt: skip
-    """One rounding of everything that a step of absolute values adds up, of q and of p (..., n).
-
-    `met` is what rods have met in the step itself.
-    """
+    """One rounding of everything that a step of absolute values adds up, of q and of p (..., n)."""
     assert scene.bath is not None
     size, unit, x = np.abs(start[0]), how.state, scene.bath.friction * abs(scene.step)
-    once, wide = unit * roundings_of(sizer.scheme, scene), how.force / unit * (how.force > unit)
-    loose = how.lengths / once, how.rates / once
+    once, wide = unit * roundings_of(sizer.scheme), how.force / unit * (how.force > unit)
     fine: list[Reals] = []
 
     def pull(terms: Sequence[Term], *, first: bool) -> Force:
@@ -57,8 +52,8 @@ def one_rounding(
 
     # the error of a coarse force is no size of the next: sizes without it come first
     for first in [True, False] if wide else [False]:
-        sizes = forces(sizer.scheme, scene.system, partial(pull, first=first))
-        q, p = sizer(size, np.abs(start[1]), sizes, draws, hit, met=met, loose=loose)
+        sizes = forces(scene.system, partial(pull, first=first))
+        q, p = sizer(size, np.abs(start[1]), sizes, draws, hit)
     if cancels := max(how.cancels, sizer.scheme.cancels):
         # coefficients of all that is added to q, and of p
         lost = max(x, 1 / x) ** cancels
@@ -69,11 +64,10 @@ def one_rounding(
     if np.any(half):
         # what decimals take off the state before, which the step carries on, and off this one
         near = None if scene.system.is_linear else start[0]
-        plain = forces(sizer.scheme, scene.system, lambda terms: scene.system.magnitude(near, terms))
+        plain = forces(scene.system, lambda terms: scene.system.magnitude(near, terms))
         off, none = (
-            np.stack(sizer(size + x[0], np.abs(start[1]) + x[1], plain, draws, hit, met=met))
-            for x in (half, 0 * half)
+            np.stack(sizer(size + x[0], np.abs(start[1]) + x[1], plain, draws, hit)) for x in (half, 0 * half)
         )
         written = half.reshape(2, *(1,) * (size.ndim - 1), -1)
-        carried = (written + off - none) / roundings_of(sizer.scheme, scene)
+        carried = (written + off - none) / roundings_of(sizer.scheme)
     return np.asarray(unit * q + SMALLEST + carried[0]), np.asarray(unit * p + SMALLEST + carried[1])

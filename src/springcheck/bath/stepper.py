@@ -3,27 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 
 from springcheck.bath.catalogue import Thermostat, value_of
 from springcheck.bath.decays import Decay
 from springcheck.physics.arrays import Force, Reals
-from springcheck.physics.rods import Rods
 from springcheck.physics.scene import Scene
 from springcheck.physics.system import System
 from springcheck.physics.term import Term
 
-Met: TypeAlias = tuple[Reals | None, Reals, Reals]
-"""What rods meet: where a drift began that they end, None where none did; and the state, its momenta not yet
-projected."""
 
-
-def forces(
-    scheme: Thermostat, system: System[Any], of: Callable[[Sequence[Term]], Force] | None = None
-) -> Any:
-    """What the stages of a scheme push by, as `of` makes it of terms."""
+def forces(system: System[Any], of: Callable[[Sequence[Term]], Force] | None = None) -> Force:
+    """The force of the potential terms of a system, as `of` makes it of terms."""
     of = of or system.force_of
     return of([term for term in system.terms if term.kind == "potential"])
 
@@ -31,9 +24,8 @@ def forces(
 class Stepper:
     """Steps of a random scheme: its coefficients are worked out once, in the width of its numbers.
 
-    `rate` is the friction rate gamma [1/T], > 0; `thermal` is kT [M L2/T2].  Rods `hold` where the scheme
-    says so.  With `absolute` every difference is a sum of sizes: a unit roundoff of these, times the
-    roundings of a step, bounds its rounding.
+    `rate` is the friction rate gamma [1/T], > 0; `thermal` is kT [M L2/T2].  With `absolute` every difference
+    is a sum of sizes: a unit roundoff of these, times the roundings of a step, bounds its rounding.
     """
 
     @classmethod
@@ -42,25 +34,23 @@ class Stepper:
         assert scene.bath is not None
         return cls(
             scheme, h=scene.step, m=scene.m, rate=scene.bath.friction, thermal=scene.thermal, width=width,
-            hold=scene.system.rods, **more,
+            **more,
         )  # fmt: skip
 
     def __init__(
         self, scheme: Thermostat, *, h: float, m: Reals, rate: Reals | float, thermal: float, width: Any,
-        absolute: bool = False, hold: Rods | None = None,
+        absolute: bool = False,
     ) -> None:  # fmt: skip
         self.scheme, self.h, self.m = scheme, width(h), np.asarray(m, width)
-        self._hold, acts = hold, scheme.held if hold else scheme.acts
         x = np.asarray(self.h * width(rate), width)
         self.collision = np.asarray(-np.expm1(-x), np.float64)[()]
         size = np.sqrt(self.m * width(thermal))
         shot = np.sqrt(2 * x) * size
         sizes = {"noise": shot, "jump": self.h * (shot / self.m), "drift": self.h, "creep": self.h * self.h}
-        sizes["shake"] = self.h
-        moves = [act.kind in ("drift", "jump", "creep") for act in acts]
+        moves = [act.kind in ("drift", "jump", "creep") for act in scheme.acts]
         self._moved = len(moves) - moves[::-1].index(True)
         self._acts, self._sign = [], 1 if absolute else -1
-        for kind, part, number in acts:
+        for kind, part, number in scheme.acts:
             c = value_of(part, x)
             lost = part.lost(x) if isinstance(part, Decay) else 1 - c
             noise = np.sqrt(lost * part.both(x)) * size if isinstance(part, Decay) else size
@@ -72,17 +62,14 @@ class Stepper:
 
     def __call__(
         self, q: Reals, p: Reals, force: Any, draws: Sequence[Any], hit: Any = None, end: Reals | None = None,
-        met: list[Met] | None = None, loose: tuple[float, float] = (0.0, 0.0),
     ) -> tuple[Reals, Reals]:  # fmt: skip
         """One step from (q, p), each (..., n), by what `forces` gives.
 
         `draws` are `scheme.draws` arrays of the shape of q; `hit` is the mask of collisions, or the factor
         of all momenta, otherwise computed from the draws.  A force after the last drift is evaluated at
-        `end`, if given: draws of other particles act there.  `met` collects the states at which rods
-        project; a step of absolute values reads them, with the tolerances `loose` of `Rods.sizes`.
+        `end`, if given: draws of other particles act there.
         """
-        m, h, last, q_old, held = self.m, self.h, p, q, q
-        way = iter(met or ())
+        m, h, last, q_old = self.m, self.h, p, q
         for i, (kind, c, noise, number) in enumerate(self._acts):
             if kind == "drift":
                 q = q + c * (p / m)
@@ -104,18 +91,6 @@ class Stepper:
                 q = q + c * force(q, np.zeros_like(p)) / m
             elif kind in ("rescale", "scale"):
                 p = p * (self._factor(p, c, noise, draws[number], kind == "rescale") if hit is None else hit)
-            elif kind in ("shake", "project"):
-                assert self._hold is not None
-                if self._sign > 0:
-                    ends = loose if i == len(self._acts) - 1 else (loose[0], 0.0)
-                    q, p = self._hold.sizes(*next(way), c, (q, p), ends)
-                    continue
-                if kind == "shake":
-                    q, p = self._hold.drifted(held, q, p, c)
-                if met is not None:
-                    met.append((held if kind == "shake" else None, q, p))
-                held = q
-                p = self._hold.projected(q, p) if kind == "project" else p
             elif kind == "rebuild":
                 p = m * ((q + self._sign * q_old) / h)
             else:
