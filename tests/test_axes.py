@@ -169,7 +169,7 @@ def test_mistakes_of_springs_in_the_plane_get_one_line(row: str, said: str) -> N
         ({"places": [0, 1, 3]}, "4"),
         ({"places": [0, 1, 6, 7]}, "need a coordinate each"),
         ({"m": [1.0, 2.0, 3.0, 3.0]}, "one mass"),
-        ({"kind": "rotor"}, "axes"),
+        ({"kind": "circuit", "units": "si"}, "axes"),
         ({"m": [3.7, 3.7, 1.3, 2.3], "places": [0, 1, 3, 8]}, "different axes"),
     ],
 )

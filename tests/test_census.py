@@ -24,7 +24,7 @@ from springcheck.errors import SpringcheckError, StoreError
 from springcheck.identify import identify
 from springcheck.physics.scenefile import load_scene
 from springcheck.physics.trajectory import Trajectory
-from springcheck.studies.census import baths, rigid, table
+from springcheck.studies.census import baths, maps, table
 from springcheck.studies.census import measure as census
 from springcheck.studies.census.limit import _of_states, first_limit
 from springcheck.studies.census.page import banks
@@ -88,9 +88,7 @@ def test_an_engine_that_is_not_what_it_is_declared_as_is_found_out(
 
 
 BROKEN = """
-from springcheck.engines import Engine, Method, Need, Stopped, named
-
-RIGID = {"terms": frozenset({"wall-spring", "rod"}), "requires": frozenset({Need.RODS})}
+from springcheck.engines import Engine, Method, Stopped, named
 
 class Run:
     force_calls = 0
@@ -105,7 +103,6 @@ ENGINE = Engine(
     name="broken", title="Broken", start=Run, version=lambda: {},
     any_axis=True,
     methods=named(
-        Method(name="stops-rods", scheme="velocity-verlet", about="", **RIGID),
         *(Method(name=x, scheme="velocity-verlet", about="") for x in ("stops", "escapes")),
     ),
     thermostats=named(
@@ -122,10 +119,9 @@ def test_an_engine_whose_first_step_fails_has_no_numbers_of_a_motion(
     arguments = ["--thermostats", "--engine", "broken.py", "--method", "broken:*"]
     assert main(["census", *arguments, "--json"]) == 1
     rows = {x["method"].partition(":")[2]: x for x in json.loads(capsys.readouterr().out)["entries"]}
-    assert set(rows) == {"stops-rods", "stops", "escapes", "stops-bath", "escapes-bath"}
-    assert rows["stops-rods"]["constraint"] == "rod: takes no step, length to rounding"
+    assert set(rows) == {"stops", "escapes", "stops-bath", "escapes-bath"}
     assert {x[key] for x in rows.values() for key in ("amplitude", "area", "trace", "kinetic")} == {None}
-    assert rows["stops-rods"]["along"] == rows["stops"]["along"] == "none"
+    assert rows["stops"]["along"] == "none"
     limits = [(rows[x]["limit"], rows[x]["bounded"]) for x in ("stops", "escapes")]
     assert limits == [(None, False), (0.0, False)]
     assert "1000 springs: stopped after step 0" in rows["stops-bath"]["note"]
@@ -365,7 +361,7 @@ def test_the_temperatures_of_a_row_are_shown_with_their_errors() -> None:
     (row,) = engines_table.rows(
         census.Census(entries=(census.entry(engines.parse(OWN[0])),), left_out=()).document()
     )
-    assert (row["thermostat"], row["constraint"], row["kinetic"]) == ("none", "none", "-")
+    assert (row["thermostat"], row["kinetic"]) == ("none", "-")
     document = census.Census(entries=(), left_out=()).document()
     document["entries"] = [{
         **vars_of(replace(census.entry(engines.parse(OWN[0])), thermostat="Andersen", configurational=1.1088,
@@ -375,29 +371,13 @@ def test_the_temperatures_of_a_row_are_shown_with_their_errors() -> None:
     assert (row["thermostat"], row["configurational"]) == ("Andersen", "1.1088 +- 0.0004")
 
 
-RIGID = {
-    "own:velocity-verlet": "asin(h w)",
-    "own:position-verlet": "2 asin(h w/2)",
-    "ase:rattle": "asin(h w)",
-}
-
-
-def test_what_holds_rods_says_by_its_states_how_it_turns_them() -> None:
-    for label, turn in (("own:velocity-verlet", "asin(h w)"), ("own:position-verlet", "2 asin(h w/2)")):
-        said = rigid.constraint(engines.parse(label))
-        assert said == f"rod: turns by {turn} a step to rounding, length to rounding"
-    assert rigid.constraint(engines.parse("own:euler")) == ""
-
-
 def test_the_axes_of_a_method_are_said_by_its_states(
     need: Callable[[str], None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    assert rigid.axes(engines.parse("own:rk4")) == "x, y and z alike; periodic box"
-    assert rigid.axes(engines.parse("scipy:radau")) == "x, y and z alike"
-    need("ase:rattle")
-    assert rigid.axes(engines.parse("ase:rattle")) == "x, y and z"
+    assert maps.axes(engines.parse("own:rk4")) == "x, y and z alike; periodic box"
+    assert maps.axes(engines.parse("scipy:radau")) == "x, y and z alike"
     need("pymunk:force")
-    assert rigid.axes(engines.parse("pymunk:force")) == "x"
+    assert maps.axes(engines.parse("pymunk:force")) == "x"
     right = driver.run
 
     def broken(scene: Any, label: Any) -> Any:
@@ -407,28 +387,7 @@ def test_the_axes_of_a_method_are_said_by_its_states(
         return replace(run, p=p)
 
     monkeypatch.setattr(driver, "run", broken)
-    assert rigid.axes(engines.parse("own:rk4")) == "x, y and z unlike; periodic box"
-
-
-def test_a_method_for_rods_is_named_with_its_mass_in_two_parts(need: Callable[[str], None]) -> None:
-    need("openmm:verlet-rods-as-it-is")
-    one = census.entry(engines.parse("openmm:verlet-rods-as-it-is"))
-    # one whose solver ends at 1e-5
-    said = "rod: turns by asin(h w) a step to 1e-07, length to 1e-07"
-    assert (one.found, one.constraint, one.agrees) == ("velocity-verlet", said, True)
-    assert one.limit == pytest.approx(2, abs=1e-4)
-
-
-def test_states_of_no_known_turn_and_of_no_scheme_are_said_to_be_such() -> None:
-    dumbbell, uneven = load_scene("dumbbell"), load_scene("spring-uneven")
-    run = driver.run(dumbbell, "own:velocity-verlet")
-    assert dumbbell.system.rods is not None
-    slow = replace(run, q=run.q[::3])
-    assert rigid._turn(slow, dumbbell.system.rods, dumbbell) == "turns by 3.0114 h w a step"
-    grown = driver.run(uneven, "own:velocity-verlet")
-    assert rigid.name(uneven, grown) == "velocity-verlet"
-    growth = 1.001 ** np.arange(len(grown.q))[:, None]
-    assert rigid.name(uneven, replace(grown, q=grown.q * growth, p=grown.p * growth)) == rigid.NO_SCHEME
+    assert maps.axes(engines.parse("own:rk4")) == "x, y and z unlike; periodic box"
 
 
 def test_a_thermostat_is_a_row_whose_temperatures_are_measured(capsys: pytest.CaptureFixture[str]) -> None:
@@ -470,21 +429,6 @@ def test_a_thermostat_under_a_wrong_name_is_found_out(monkeypatch: pytest.Monkey
     assert (found.claimed, found.found, found.agrees) == ("aboba", "baoa", False)
 
 
-@pytest.mark.parametrize("label", ["openmm:langevin-middle-rods", "lammps:rattle-langevin"])
-def test_a_thermostat_of_rods_is_read_by_the_centres_of_dumbbells(
-    label: str, need: Callable[[str], None]
-) -> None:
-    need(label)
-    row = baths.entry(engines.parse(label))
-    assert row.agrees
-    # BBK differs by how its draws are distributed, which the sum of two does not show
-    assert row.claimed in row.found.split(" or ")
-    assert (row.along, row.constraint) == ("x, y and z", "rod: length to rounding")
-    # a = (h w)**2 = 1/4, gamma h = 0.4
-    law = 0.8 / (0.8 - 0.25 / 4) if row.claimed == "lammps-langevin" else 1.0
-    assert abs(row.configurational - law) < 5 * row.configurational_error < 0.02
-
-
 def test_new_rows_of_the_table_stand_where_the_whole_table_has_them() -> None:
     old = [{"method": name, "found": "old"} for name in "bdz"]
     new = [{"method": name, "found": "new"} for name in "eba"]
@@ -493,22 +437,12 @@ def test_new_rows_of_the_table_stand_where_the_whole_table_has_them() -> None:
     assert [one["found"] for one in kept] == ["new", "new", "old", "new", "old"]
 
 
-@pytest.mark.parametrize("label", ["mujoco:hinge", "dart:hinge"])
-def test_a_hinge_is_named_on_springs_of_rotors(label: str, need: Callable[[str], None]) -> None:
-    need(label)
-    one = census.entry(engines.parse(label))
-    assert (one.found, one.constraint) == ("semi-implicit-euler", "hinge: turns by h w a step to rounding")
-    assert one.agrees
-
-
 def test_a_row_of_before_a_column_was_measured_has_its_default() -> None:
     one = census.entry(engines.parse(OWN[0]))
     kept = ENTRIES.table(one.method, one)
-    before = replace(
-        kept, attributes={k: v for k, v in kept.attributes.items() if k not in ("along", "constraint")}
-    )
+    before = replace(kept, attributes={k: v for k, v in kept.attributes.items() if k != "along"})
     read = ENTRIES.found(before)
-    assert (one.along, read.along, read.constraint) == ("x, y and z alike; periodic box", "x", "")
+    assert (one.along, read.along) == ("x, y and z alike; periodic box", "x")
     assert (read.digest, read.limit) == (one.digest, one.limit)
     with pytest.raises(KeyError):
         ENTRIES.found(replace(kept, attributes={k: v for k, v in kept.attributes.items() if k != "digest"}))

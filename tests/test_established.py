@@ -18,7 +18,7 @@ from springcheck.errors import MethodError
 from springcheck.physics.builders import spring as one_spring
 from springcheck.physics.scene import Scene
 from springcheck.physics.scenefile import load_scene
-from springcheck.physics.terms import Cosine, Damping, Spring, WallSpring
+from springcheck.physics.terms import Damping, Spring, WallSpring
 from springcheck.physics.trajectory import Trajectory
 from springcheck.studies.extremes import grid, running
 
@@ -292,25 +292,6 @@ def test_what_needs_an_extra_is_run_by_name_alone() -> None:
     assert {str(label) for label in engines.match(("mujoco:*",))} == {x for x in LABELS if "mujoco" in x}
 
 
-@pytest.mark.parametrize("label", ["mujoco:hinge", "dart:hinge"])
-def test_a_hinge_in_gravity_is_semi_implicit_euler_in_the_angle(
-    label: str, need: Callable[[str], None]
-) -> None:
-    need(label)
-    several = Scene(
-        m=[1.3, 0.7, 2.1], q=[0.1, 2.9, -1.2], p=[0.07, 0.4, 6.9], step=0.05, steps=300, kind="rotor",
-        terms=(Cosine(i=[0, 1, 2], depth=[2.3, 1.7, 7.9], wave=[1.0, 1.0, 1.0], at=[0.0, 0.3, -0.2]),),
-    )  # type: ignore[arg-type]  # fmt: skip
-    for scene in (several, load_scene("hinged-pendulum"), load_scene("torsion-pendulum")):
-        verdicts = checks.judge(scene, driver.run(scene, label))
-        assert [v.check for v in verdicts if v.passed is False] == []
-        assert "step-defect" in {v.check for v in verdicts if v.passed}
-    (term,) = several.terms
-    for wrong in ({"wave": np.array([1.0, 1.0, 2.0])}, {"depth": np.array([2.3, -1.7, 7.9])}):
-        with pytest.raises(MethodError, match="gravity makes one pendulum of a rotor, of wave 1"):
-            driver.run(replace(several, terms=(replace(term, **wrong),)), label)
-
-
 def test_chipmunks_spring_takes_no_negative_step_and_is_not_blamed_for_it(need: Need) -> None:
     need("pymunk:damped-spring")
     scene = replace(load_scene("spring-uneven"), step=-0.1)
@@ -319,10 +300,10 @@ def test_chipmunks_spring_takes_no_negative_step_and_is_not_blamed_for_it(need: 
     assert failed(scene, run(scene, "pymunk:force")) == []
 
 
-@pytest.mark.parametrize("method", ["force", "joint-spring", "hinge"])
+@pytest.mark.parametrize("method", ["force", "joint-spring"])
 def test_dart_takes_no_negative_step_and_is_not_blamed_for_it(method: str, need: Need) -> None:
     need(f"dart:{method}")
-    scene = replace(load_scene("torsion-pendulum" if method == "hinge" else "spring-uneven"), steps=20)
+    scene = replace(load_scene("spring-uneven"), steps=20)
     with pytest.raises(MethodError, match="DART takes no negative step"):
         driver.run(replace(scene, step=-scene.step), f"dart:{method}")
     mirror = [one for one in checks.THOROUGH if one.name == "mirror"]

@@ -447,8 +447,8 @@ MISTAKES = {
         "[[capacitor]]\nloops = [0]\ncapacitance = 1.0\n",
         ("circuit", "[[inductor]]"),
     ),
-    "two kinds of things that move": ("[[rotor]]\ninertia = 1.0\n", ("[[particle]]", "[[rotor]]")),
-    "a kind that the tables deny": ('kind = "rotor"\n', ("kind = 'rotor'", "[[particle]]")),
+    "two kinds of things that move": ("[[inductor]]\ninductance = 1.0\n", ("[[particle]]", "[[inductor]]")),
+    "a kind that the tables deny": ('kind = "circuit"\n', ("kind = 'circuit'", "[[particle]]")),
     "a term that is not there": ("[[magnet]]\nparticle = 0\n", ("magnet", "quartic", "spring")),
 }
 

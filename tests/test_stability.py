@@ -38,7 +38,6 @@ LABELS = [
     for label in engines.match(("*",))
     if schemes.scheme(engines.method(label).scheme).has("one-step")
     and "wall-spring" in engines.method(label).terms
-    and "rods" not in {x.value for x in engines.method(label).requires}
 ]
 SINGLE = ["openmm:verlet@OpenCL-single", "openmm:verlet@OpenCL-mixed", "openmm:verlet@OpenCL-double"]
 REFERENCE = Path(__file__).parents[1] / "data" / "reference" / "stiff" / "multiple-time-steps.json"
@@ -408,15 +407,15 @@ def test_a_method_that_refuses_springs_of_the_scan_is_left_out_with_its_reason(n
 
 def test_what_is_left_out_is_named_once() -> None:
     reasons = {
-        "own:rods": "own:rods: serves rods alone", "own:a": "no step", "own:b": "no step",
-        **dict.fromkeys(("own:c", "own:d"), "it is for scenes with rods"), "own:e": "it has no rod term",
+        "own:alone": "own:alone: serves fields alone", "own:a": "no step", "own:b": "no step",
+        **dict.fromkeys(("own:c", "own:d"), "it is for scenes with damping"), "own:e": "it has no bond term",
     }  # fmt: skip
     said = left_out([LeftOut(method=method, reason=reason) for method, reason in reasons.items()])
     assert [str(line) for line in said[1:]] == [
-        "Left out own:rods: serves rods alone",
+        "Left out own:alone: serves fields alone",
         "Left out own:a, own:b: no step",
-        "Left out own:c, own:d: each is for scenes with rods",
-        "Left out own:e: it has no rod term",
+        "Left out own:c, own:d: each is for scenes with damping",
+        "Left out own:e: it has no bond term",
     ]
 
 

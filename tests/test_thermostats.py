@@ -23,7 +23,6 @@ from springcheck.bath.heat import Heat
 from springcheck.bath.stepper import forces
 from springcheck.cli import file, main
 from springcheck.engines import Label
-from springcheck.engines.contract import Need
 from springcheck.engines.own import thermal as own_thermal
 from springcheck.errors import MethodError, SceneError, SpringcheckError
 from springcheck.physics import scenefile
@@ -40,9 +39,7 @@ LABELS = [
     f"{name}:{method}"
     for name in ("own", "openmm", "ase", "lammps")
     for method, declared in engines.engine(name).thermostats.items()
-    if Need.RODS not in declared.requires
 ]
-"""Those for rods have tests of their own."""
 
 
 def pair(steps: int = 400, step: float = 0.35) -> Scene:

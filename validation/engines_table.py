@@ -25,7 +25,7 @@ COLUMNS = {
     "method": "engine and attachment",
     "about": "what is called",
     "version": "version",
-    **{name: table.WATCHED[name][0] for name in ("thermostat", "axes", "constraint", "scheme")},
+    **{name: table.WATCHED[name][0] for name in ("thermostat", "axes", "scheme")},
     "claimed": "declared or documented as",
     **{
         name: table.WATCHED[name][0]

@@ -109,7 +109,7 @@ def play(
     began = perf_counter()
     simulation = engines.Started(ahead, label, seed)
     start_seconds = perf_counter() - began
-    how, origin = engines.arithmetic(label, scene.units), {**engines.origin_of(label), **origin}
+    how, origin = engines.arithmetic(label), {**engines.origin_of(label), **origin}
 
     rows = max(1, min(CHUNK // scene.n, scene.frames))
     piece = scene.every if method.adaptive else min(scene.every, PIECE, WORK // scene.n or 1)

@@ -284,13 +284,3 @@ def _whitened(x: Floats) -> Floats:
         out[i] = last
         below = 0.5 / size
     return out
-
-
-def normal_scores(x: Any) -> Floats:
-    """Uniform draws of variance 1 as the normal numbers of the same rank; beyond their range infinite."""
-    from scipy.special import ndtri
-
-    u = np.asarray(x, np.float64) / np.sqrt(12) + 0.5
-    # the ends of the range are known to a rounding
-    u = np.where((u <= 0) & (u > -1e-9), 1e-12, np.where((u >= 1) & (u < 1 + 1e-9), 1 - 1e-12, u))
-    return np.where((u > 0) & (u < 1), ndtri(np.clip(u, 1e-300, 1 - 2.0**-53)), np.inf)

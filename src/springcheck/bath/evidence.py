@@ -1,14 +1,14 @@
 """Statistical tests of draws: the size of the noise, independence, shape, repeated values, collisions.
 
-A draw is a number of mean 0 and variance 1 that is independent of everything before it.  Each test returns a
-`Statistic`: sums that add up over the pieces of a run, and the probability of sums so extreme if the draws are
-right.  That probability is exact, or an upper bound:
+A draw is a number of mean 0 and variance 1 that is independent of everything before it.  Each test returns
+a `Statistic`: sums that add up over the pieces of a run, and the probability of sums so extreme if the draws
+are right.  That probability is exact, or an upper bound:
 
 * size: the sum of squares is chi-squared; of uniform draws both tails are bounded (see `size`);
-* independence: a draw is symmetric about 0 whatever is known before it, so that exp(l S - l**2 V/2) is at most
-  1 in the mean for S = sum x y and V = sum (x y)**2, y known before x, however large the noise is (de la Pena,
-  Ann. Probab. 27 (1999) 537).  Averaged over l it exceeds 1/a with a probability of at most a (Robbins, Ann.
-  Math. Stat. 41 (1970) 1397);
+* independence: a draw is symmetric about 0 whatever is known before it.  Then exp(l S - l**2 V/2) is at most
+  1 in the mean for S = sum x y and V = sum (x y)**2, y known before x, however large the noise is (de la
+  Pena, Ann. Probab. 27 (1999) 537).  Averaged over l it exceeds 1/a with a probability of at most a (Robbins,
+  Ann. Math. Stat. 41 (1970) 1397);
 * shape: the same bound for Legendre polynomials of ranks, whose moment generating function is known;
 * ties: pairs of draws that are equal to rounding are Poisson distributed.
 
@@ -143,9 +143,7 @@ def known_before(x: Floats, state: Iterable[Known], *, between: bool = True) -> 
     return [*out, *state]
 
 
-def independence(
-    x: Floats, known: Iterable[Known], *, uniform: bool = False, drag: float = 0.0
-) -> Statistic:
+def independence(x: Floats, known: Iterable[Known], *, uniform: bool = False, drag: float = 0.0) -> Statistic:
     """Whether draws x (f, n), NaN where there is none, depend on what is known before them.
 
     `drag` is the correlation of draws with the momentum for each relative change of a friction.

@@ -36,7 +36,6 @@ from springcheck.checks.motion import (
 )
 from springcheck.checks.record import energies, grid, line, start, times
 from springcheck.checks.requires import CONTRACTED, REQUIREMENTS
-from springcheck.checks.rods import rod_length, rod_velocity, turn
 from springcheck.checks.solver import tolerance, tolerance_bound
 from springcheck.checks.steps import BLIND, arithmetic, border, bridges, step_defect
 from springcheck.errors import MethodError
@@ -54,7 +53,7 @@ __all__ = [
 
 CHECKS: tuple[Check, ...] = (
     start, times, grid, line, step_defect, arithmetic, closed_form, shadow_energy, frequency, momentum,
-    angular_momentum, rod_length, rod_velocity, turn, gyration, border, drive, energies, tolerance,
+    angular_momentum, gyration, border, drive, energies, tolerance,
 )  # fmt: skip
 
 THOROUGH: tuple[Check, ...] = (
@@ -65,7 +64,7 @@ THOROUGH: tuple[Check, ...] = (
 
 ALL: tuple[Check, ...] = (*CHECKS, *THOROUGH)
 
-RANDOM: tuple[Check, ...] = (start, times, grid, energies, *bath.DRAWN, rod_length, rod_velocity)
+RANDOM: tuple[Check, ...] = (start, times, grid, energies, *bath.DRAWN)
 """Checks of a thermostat's trajectory, to which no law of deterministic motion applies."""
 
 TELLING = frozenset(["identified", *(one.name for one in (*ALL, *bath.DRAWN) if one.telling)])
@@ -183,7 +182,7 @@ def judge(
 def not_exercised(scene: Scene) -> str:
     """Features of an engine that this scene does not exercise, so that a pass proves nothing of them.
 
-    Empty for circuits and rotors.
+    Empty for circuits.
     """
     if scene.kind != "particles":
         return ""
@@ -198,7 +197,6 @@ def not_exercised(scene: Scene) -> str:
     facts = {
         f"ax{'e' if len(missing) > 1 else 'i'}s {' and '.join(missing)}": not missing,
         "periodic boxes": bool(scene.box),
-        "constraints": bool(system.rods),
         "friction": bool(system.is_damped or scene.bath),
         "drives": system.is_driven,
         "magnetic fields": "magnetic" in system.acting,

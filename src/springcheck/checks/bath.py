@@ -1,4 +1,4 @@
-"""Checks of thermostats: map and direction of the noise to rounding, its size, shape and independence by chance.
+"""Checks of thermostats: map and direction of the noise to rounding; its size, shape, independence by chance.
 
 A draw is the random number that a state must have taken to follow from the one before it.
 """
@@ -147,7 +147,7 @@ def draws_shape(case: Case) -> Chance:
 
 @check("ties", family="noise", requires={"every-step"})
 def draws_differ(case: Case) -> Chance | str:
-    """No draw comes again: few values, a period, numbers that are cut off or used twice would show as ties."""
+    """No draw comes again: few values, a period, draws cut off or used twice would show as ties."""
     found = bath.evidence.ties(_finite_draws(case), reading(case).error)
     return Chance.of(found) if found else "rounding makes draws equal"
 

@@ -200,7 +200,7 @@ def momentum(case: Case) -> Finding | str:
     total = summed(run.p.astype(np.longdouble))
     steps, first = case.steps, case.scene.p.astype(np.longdouble)
     # at both ends of each stretch between frames, since the motion may grow along it
-    _, of_p = case.allowance_at(run.q, run.p, paired=True)
+    _, of_p = case.allowance_at(run.q, run.p)
     unit = np.maximum.accumulate(summed(of_p))[1:]
     if steps[0] != 0 and case.linear:
         unit = np.maximum(unit, summed(case.allowance_at(*case.envelope)[1]))
@@ -234,7 +234,7 @@ def angular_momentum(case: Case) -> Finding | str:
     # a step that is one linear map A on both axes changes the area that they span, summed over particles, by
     # det A, or not at all where A is symplectic: Hairer, Lubich & Wanner, chapter VI.2
     run, (steps, start) = case.trajectory, case.begun
-    noise = case.allowance_at(run.q, run.p, paired=True)
+    noise = case.allowance_at(run.q, run.p)
     parts = [_areas(case, pair, (run.q, run.p), start, noise, steps) for pair in case.scene.system.alike]
     off, unit, size = (np.concatenate(x) for x in zip(*parts, strict=True))
     limit = np.tile(case.roundings * np.maximum(steps[1:], 1).astype(np.float64), len(parts))

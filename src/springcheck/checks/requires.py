@@ -99,12 +99,6 @@ _ALL = (
         lambda x: x.scene.box is not None, "the scene has no periodic box")),
     Requirement("driven", "a force that depends on the time", _unless(
         lambda x: x.scene.system.is_driven, "no force depends on the time")),
-    Requirement("rods", "rods", _unless(lambda x: x.scene.system.rods, "the scene has no rods"),
-        special=True),
-    Requirement("turning", "rods on which nothing acts", _unless(
-        lambda x: x.scheme.stages and all(term.kind == "constraint" for term in x.scene.terms)
-        and exact.has_true_motion(x.scene),
-        "forces act on the ends of the rods, or they are no flat body that turns about an axis across it")),
     Requirement("gyration", "a field, and a stage of each step that turns by it", _unless(
         lambda x: x.law.fields and x.trajectory.every == 1
         and [kind.evaluates for kind in x.scheme.kinds].count("magnetic") == 1
@@ -145,7 +139,7 @@ _ALL = (
     Requirement("symplectic", "a symplectic scheme", _trait(
         "symplectic", "{title} does not claim to be symplectic")),
     Requirement("reversible", "a scheme that undoes its steps", _unless(
-        lambda x: x.scheme.has("reversible") or (len(x.scheme.stages) == 2 and not x.scene.system.rods),
+        lambda x: x.scheme.has("reversible") or len(x.scheme.stages) == 2,
         "{title} is not its own adjoint: only another scheme undoes its steps")),
     Requirement("double", "double precision", _unless(
         lambda x: not x.trajectory.arithmetic.quantum and x.trajectory.arithmetic.is_double,

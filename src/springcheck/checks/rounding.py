@@ -25,27 +25,25 @@ what is left beyond the rest length."""
 
 def of_step(
     case: Claim, q: Reals, p: Reals, places: list[Reals] | None, *,
-    smallest: np.longdouble = SMALLEST, recorded: bool = False, paired: bool = False,
+    smallest: np.longdouble = SMALLEST, recorded: bool = False,
 ) -> tuple[Extended, Extended]:  # fmt: skip
     """One rounding of everything that one step from states (..., n) adds up, (..., n) each.
 
     `places` are the positions at which the scheme evaluates the force on its way: a nonlinear force is
     bounded there, and so is the solution of an implicit stage.  `smallest` is the loss of an operation to
     underflow.  `recorded` says that the step starts and ends at recorded positions, which are not rounded
-    once more.  For `paired` see `Case.allowance_at`.
+    once more.
     """
     run, scene = case.trajectory, case.judged
     how = run.arithmetic
     q, p = q.astype(np.longdouble), p.astype(np.longdouble)
     h, m = np.longdouble(abs(run.step)), scene.m.astype(np.longdouble)
-    once = how.state * case.roundings
     fine: list[Reals] = []
     # of a force that is coarser than the state, first the sizes that it has without its own error
     for way in [how] if how.force <= how.state else [replace(how, force=how.state, quantum=0.0), how]:
         size_q, size_p = schemes.magnitude_step(
             case.scheme, q, p, h=run.step, m=m, rate=case.law.rate, turns=case.law.turns,
-            met=_evaluations(case, partial(_force, case, way, fine), places, recorded), hold=case.system.rods,
-            loose=(0.0, 0.0) if paired else (how.lengths / once, how.rates / once),
+            met=_evaluations(case, partial(_force, case, way, fine), places, recorded),
         )  # fmt: skip
     # the reference step rounds as well
     state = how.state + ROUNDOFF
@@ -79,7 +77,7 @@ def of_recording(case: Claim, q: Reals, p: Reals, places: list[Reals] | None) ->
     off, none = (
         schemes.magnitude_step(
             case.scheme, q + np.copysign(part * half[0], q), p + np.copysign(part * half[1], p), h=run.step,
-            m=m, rate=case.law.rate, turns=case.law.turns, met=met, hold=case.system.rods,
+            m=m, rate=case.law.rate, turns=case.law.turns, met=met,
         )
         for part in (1, 0)
     )  # fmt: skip

@@ -311,8 +311,7 @@ def fastest(case: Case) -> float:
 def arithmetic(case: Case) -> Finding | str:
     """The size of the step defect is that of the arithmetic the method says it has."""
     named = case.trajectory.arithmetic
-    # a tolerance of lengths is no rounding
-    plain = Arithmetic(lengths=named.lengths, rates=named.rates)
+    plain = Arithmetic()
     if named.is_double and named.force <= plain.force and not named.quantum:
         return "plain double precision: the step defect says it all"
     case = case.clocked

@@ -249,11 +249,11 @@ def _allowed(
     how = case.trajectory.arithmetic
     # a solver errs alike at every step, with its whole error in velocities that are rebuilt from positions
     alike = case.trajectory.rebuilds_velocity and case.law.has("implicit")
-    if not WIDE or how.quantum or how.lengths or how.stale or alike:
+    if not WIDE or how.quantum or how.stale or alike:
         return worst
     spread, beside = spread / case.roundings, last
-    # rods are iterated, and a rotation rounds a momentum many times
-    free = not case.system.rods and case.law.turns is None
+    # a rotation rounds a momentum many times
+    free = case.law.turns is None
     if how.state == how.force == Arithmetic().state and random and free:
         beside = np.minimum(spread, last)
     return np.asarray(np.minimum(worst, deviations * spread + beside))

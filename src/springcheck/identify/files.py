@@ -118,8 +118,6 @@ def of_arrays(name: str, found: formats.States) -> FileStates:
 
 def _ours(path: Path, runs: Sequence[store.Run], wanted: str | None) -> Iterator[FileStates]:
     scene = scenes.parse(store.scene_text(path), name=path.stem, where=f"{path} (scene)")
-    if scene.system.rods:
-        raise StoreError(f"{path}: its scene has rods, and schemes are told by springs; judge it instead")
     for run in runs:
         if wanted in (None, run.label):
             piece = next(store.windows(path, run.label, MOST_FRAMES))

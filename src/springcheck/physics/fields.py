@@ -13,7 +13,7 @@ from springcheck.physics.arrays import Floats, Integers, Reals
 from springcheck.physics.bath import Bath
 from springcheck.physics.term import FrozenArrays, Term
 
-Kind: TypeAlias = Literal["particles", "circuit", "rotor"]
+Kind: TypeAlias = Literal["particles", "circuit"]
 Units: TypeAlias = Literal["reduced", "md", "si"]
 Quantity: TypeAlias = Literal["q", "p", "energy"]
 

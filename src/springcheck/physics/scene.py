@@ -35,8 +35,6 @@ class Scene(SceneFields):
     def __post_init__(self) -> None:
         for field, value in _checked(self):
             object.__setattr__(self, field, value)
-        if self.system.rods:
-            self.system.rods.check(self.q, self.p)
         if not (longest := float(self.of_half_boxes(self.q))) < 1:
             raise SceneError(
                 f"box: at the start a spring is {longest:.3g} times as long as half of the box, and another "

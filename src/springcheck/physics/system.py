@@ -19,7 +19,6 @@ from springcheck.physics.arrays import WIDE, Extended, Floats, Force, Integers, 
 from springcheck.physics.driven import Drive, with_clock
 from springcheck.physics.fields import SceneFields
 from springcheck.physics.norm import SMALLEST_ENERGY, Norm, kinetic_energy
-from springcheck.physics.rods import Rods
 from springcheck.physics.term import Term
 from springcheck.physics.terms import Damping, Magnetic, VanDerPol
 
@@ -73,7 +72,7 @@ class System(Generic[Fields]):
     @cached_property
     def is_separate(self) -> bool:
         """Whether no term joins two particles: n independent systems side by side."""
-        return not self.rods and all(term.bodies == 1 for term in self.terms)
+        return all(term.bodies == 1 for term in self.terms)
 
     @cached_property
     def is_damped(self) -> bool:
@@ -128,12 +127,6 @@ class System(Generic[Fields]):
     free_groups = cached_property(graph.free_groups)
     is_uniform_chain = cached_property(graph.is_uniform_chain)
     rest_positions = cached_property(graph.rest_positions)
-
-    @cached_property
-    def rods(self) -> Rods | None:
-        """The rods of the scene, None where it has none."""
-        has_rods = any(term.kind == "constraint" for term in self.terms)
-        return Rods(self.m, self.scene.places, self.terms) if has_rods else None
 
     # forces
 

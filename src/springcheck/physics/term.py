@@ -22,7 +22,7 @@ from springcheck.physics.arguments import of_kind
 from springcheck.physics.arrays import Floats, Integers, Reals, is_masked
 
 Where: TypeAlias = "slice | Integers"
-Origin: TypeAlias = Literal["potential", "friction", "magnetic", "drive", "constraint"]
+Origin: TypeAlias = Literal["potential", "friction", "magnetic", "drive"]
 
 
 class Column(NamedTuple):
@@ -70,7 +70,7 @@ class Term(FrozenArrays):
     is_by_axes: ClassVar[bool] = True
     """Whether the rows of an object along several axes may have each its own parameters."""
     kind: ClassVar[Origin] = "potential"
-    """Origin of its force: a potential energy, the velocities, the time, or a constrained length."""
+    """Origin of its force: a potential energy, the velocities, or the time."""
     fast: bool = False
     """Whether a method of multiple time steps takes these rows in its short step."""
 
@@ -135,7 +135,7 @@ class Term(FrozenArrays):
 
     def objects(self, places: Integers) -> list[tuple[tuple[int, ...], int]]:
         """The particles of each row, and which of several objects between them it belongs to: in space a
-        spring, bond or rod has a row for each axis; `places` as in `Scene`."""
+        spring or bond has a row for each axis; `places` as in `Scene`."""
         met: Counter[tuple[int, ...]] = Counter()
         found = []
         for row in zip(*(places[index].tolist() for index in self.particles), strict=True):
@@ -289,7 +289,7 @@ class LinearLaw:
 
 
 class WithoutPotential(Term):
-    """A term without potential energy: friction, a magnetic field, a driving force, a rod."""
+    """A term without potential energy: friction, a magnetic field, a driving force."""
 
     potential: ClassVar[Any] = staticmethod(lambda u, *_: np.zeros_like(u))
     slope: ClassVar[Any] = potential

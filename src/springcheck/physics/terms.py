@@ -16,12 +16,11 @@ from springcheck.physics import termcheck
 from springcheck.physics.arrays import Floats, Integers, Reals
 from springcheck.physics.driven import Drive, ModulatedSpring
 from springcheck.physics.radial import RadialSpring
-from springcheck.physics.rods import Rod, WallRod
 from springcheck.physics.term import Column, LinearLaw, OnPairs, OnParticles, Origin, Term, WithoutPotential
 
 __all__ = [
     "Column", "Cosine", "Damping", "Drive", "Magnetic", "ModulatedSpring", "Morse", "OnPairs", "OnParticles",
-    "Quartic", "RadialSpring", "Rod", "Spring", "Term", "VanDerPol", "WallRod", "WallSpring", "Weight",
+    "Quartic", "RadialSpring", "Spring", "Term", "VanDerPol", "WallSpring", "Weight",
     "known", "register",
 ]  # fmt: skip
 
@@ -292,7 +291,7 @@ class Magnetic(WithoutPotential):
 _KNOWN: dict[str, type[Term]] = {
     term.key: term for term in (
         WallSpring, Spring, Quartic, Cosine, Weight, Morse, RadialSpring, Damping, VanDerPol, Magnetic, Drive,
-        ModulatedSpring, WallRod, Rod,
+        ModulatedSpring,
     )
 }  # fmt: skip
 

@@ -113,12 +113,6 @@ class Scheme:
         return all(full[s - 1 - i][s - 1 - j] + full[i][j] == self.b[j] for i in range(s) for j in range(s))
 
     @property
-    def longest_drift(self) -> float:
-        """The longest of its drifts, in steps; 1 where it has none."""
-        drifts = [c for kind, (_, c) in zip(self.kinds, self.stages, strict=True) if kind.drifts]
-        return max((abs(float(number(c, np.float64))) for c in drifts), default=1.0)
-
-    @property
     def reach(self) -> int:
         """How far a force propagates within its step: 0 to the momentum, 1 to the position, 2 to a later
         force."""

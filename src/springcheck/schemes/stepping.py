@@ -9,7 +9,6 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from springcheck.physics.arrays import Floats, Force, Reals
-from springcheck.physics.rods import Rods
 from springcheck.schemes.catalogue import Scheme, number
 from springcheck.schemes.kinds import Acting, Setting
 
@@ -42,7 +41,6 @@ def step(
     turns: Reals | None = None,
     met: list[Reals] | None = None,
     near: Reals | None = None,
-    hold: Rods | None = None,
 ) -> tuple[Reals, Reals]:
     """One step from (q, p), each (..., n), in the width of q.
 
@@ -54,8 +52,7 @@ def step(
     part them, and of magnetic fields, which turn velocities at the rates `turns` (n,).  `met` takes the
     position (..., n) of each evaluation of the force, in their order.  `near` (..., n) is where the step
     ends, as far as that is known: of several solutions of an implicit stage the one there is found; a force
-    after the last drift is taken there, at the position that an engine has rounded.  `hold` are the rods of a
-    scene, which hold after every stage of a splitting.
+    after the last drift is taken there, at the position that an engine has rounded.
     """
     width = q.dtype.type
     h, m = width(h), m.astype(width)
@@ -71,11 +68,7 @@ def step(
                     met.append(at)
                 last = acting(kind.evaluates, force, parts)(at, p)
             setting = Setting(m=m, rate=rate, force=last, turns=turns)
-            before, part = q, number(c, width) * h
-            q, p = kind.act(q, p, part, setting)
-            if hold is not None:
-                q, p = hold.drifted(before, q, p, part) if kind.drifts else (q, p)
-                p = hold.projected(q, p)
+            q, p = kind.act(q, p, number(c, width) * h, setting)
         return q, p
     if not scheme.b:
         raise ValueError(f"{scheme.name} has no step that a force alone defines")

@@ -57,8 +57,6 @@ _MD = {
 _SI = {
     "q": "m", "p": "kg m s-1", "energy": "J", "velocity": "m s-1", "time": "s", "mass": "kg",
 }  # fmt: skip
-_MD_ROTOR = {**_MD, "q": "rad", "p": "u nm2 ps-1", "velocity": "rad ps-1", "mass": "u nm2"}
-_SI_ROTOR = {**_SI, "q": "rad", "p": "kg m2 s-1", "velocity": "rad s-1", "mass": "kg m2"}
 _SI_CIRCUIT = {**_SI, "q": "C", "p": "Wb", "velocity": "A", "mass": "H"}
 _BARE = dict.fromkeys(_MD, "1")
 UnitsOf: TypeAlias = Mapping[str, str]
@@ -66,10 +64,8 @@ Axis: TypeAlias = Mapping[str, Any]
 """The datasets `time` and `step`, which all elements of a trajectory share."""
 UNITS: Mapping[tuple[str, str], UnitsOf] = {
     **dict.fromkeys([("particles", "md"), ("particles", "reduced")], _MD),
-    **dict.fromkeys([("rotor", "md"), ("rotor", "reduced")], _MD_ROTOR),
     **dict.fromkeys([("circuit", "md"), ("circuit", "reduced")], _BARE),
     ("particles", "si"): _SI,
-    ("rotor", "si"): _SI_ROTOR,
     ("circuit", "si"): _SI_CIRCUIT,
 }
 REDUCED = "reduced: the numbers carry no unit; nm, ps, u and kJ/mol stand for 1"

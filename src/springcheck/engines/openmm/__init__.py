@@ -9,7 +9,6 @@ from springcheck.engines.contract import (
     DRIVEN,
     EVERY_POTENTIAL,
     FIELD,
-    RODS,
     Engine,
     Need,
     by_default,
@@ -62,17 +61,6 @@ ENGINE = Engine(
             "langevin", "langevin-middle", "LangevinIntegrator at T = 0, started and read synchronised",
             _DRIVEN | {"damping"}, Need.DAMPING, one_friction=True,
         ),
-        *(
-            by_default(
-                name, "velocity-verlet", f"VerletIntegrator, {tolerance}, started and read synchronised",
-                _TERMS | RODS, Need.RODS, rebuilds_velocity=True, default=name != "verlet-rods-8",
-            )
-            for name, tolerance in (
-                ("verlet-rods", "constraint tolerance 1e-13"),
-                ("verlet-rods-8", "constraint tolerance 1e-8"),
-                ("verlet-rods-as-it-is", "its own constraint tolerance 1e-5"),
-            )
-        ),
         by_name(
             "boris", "boris", "Boris' rotation by CustomIntegrator", (_DRIVEN - {"morse"}) | FIELD, Need.FIELD
         ),
@@ -83,11 +71,6 @@ ENGINE = Engine(
     ),
     thermostats=named(
         _drawn("langevin-middle-bath", "baoa", "LangevinMiddleIntegrator, as it stores velocities"),
-        _drawn(
-            "langevin-middle-rods", "baoa",
-            "LangevinMiddleIntegrator, constraint tolerance 1e-13, as it stores velocities",
-            terms=_ON_A_LINE | RODS, requires=frozenset({Need.RODS}),
-        ),
         _drawn(
             "langevin-middle-synchronised", "baoab",
             "LangevinMiddleIntegrator, half a kick added to what is read",

@@ -33,7 +33,7 @@ import openmm as mm
 
 from springcheck.engines import bonds, quiet
 from springcheck.engines.contract import Label, Method, Stopped
-from springcheck.engines.openmm.rounding import CUSTOM, LENGTHS, arithmetic, sizes
+from springcheck.engines.openmm.rounding import CUSTOM, arithmetic, sizes
 from springcheck.engines.openmm.thermostats import thermostat
 from springcheck.errors import MethodError
 from springcheck.physics.arrays import Floats
@@ -58,10 +58,7 @@ DRIVEN_ENERGY = {
 """Energies of terms that depend on the time, as OpenMM reads them; the numbers written into an expression are
 kept as double by every platform."""
 
-SHIFTED = frozenset(
-    {"verlet", "langevin-middle", "langevin", "langevin-middle-synchronised"}
-    | {name for name in LENGTHS if name.startswith("verlet")}
-)
+SHIFTED = frozenset({"verlet", "langevin-middle", "langevin", "langevin-middle-synchronised"})
 """Methods whose stored velocity is half a kick behind the position, and is synchronised here."""
 
 
@@ -132,14 +129,6 @@ def _system(scene: Scene, origins: Floats) -> tuple[mm.System, Floats]:
     for group in (slow, fast):
         if group.getNumBonds():
             system.addForce(group)
-    for ends, length, point in scene.system.rods.joints() if scene.system.rods else ():
-        if np.any(origins):
-            raise MethodError(f"scene {scene.name!r}: a bond may turn over, beside which OpenMM has no rods")
-        if point is not None:
-            fixed.append(point)
-        system.addConstraint(
-            *ends, *([] if point is None else [system.addParticle(bonds.ANCHOR_MASS)]), length
-        )
     for term in scene.terms:
         if isinstance(term, Morse):
             _stays_right_way_round(scene, term)
@@ -211,10 +200,8 @@ def _stays_right_way_round(scene: Scene, term: Morse) -> None:
 
 def _integrator(scene: Scene, name: str, step: float) -> mm.Integrator:
     signed, step = step, abs(step)
-    if name in ("verlet", "leapfrog", *LENGTHS):
-        made = mm.VerletIntegrator(step)
-        made.setConstraintTolerance(LENGTHS.get(name, made.getConstraintTolerance()))
-        return made
+    if name in ("verlet", "leapfrog"):
+        return mm.VerletIntegrator(step)
     if name == "mts":
         return mm.MTSIntegrator(step, [(0, 1), (1, FAST_STEPS[name])])
     if name == "nose-hoover":
@@ -294,8 +281,6 @@ class _Context:
         system, positions = _system(scene, origins)
         if method.generator:
             self._integrator = thermostat(scene, method.name, step, seed, system)
-            if scene.system.rods:
-                self._integrator.setConstraintTolerance(LENGTHS[method.name])
         else:
             self._integrator = _integrator(scene, method.name, step)
         self._context = _context(system, self._integrator, label)
@@ -308,8 +293,6 @@ class _Context:
         self._force: Callable[..., Any] = lambda t, q, p: pull(q, p)
         if self._driven:
             self._force, _ = timed(scene.derived(terms=tuple(x for x in scene.terms if x.kind != "friction")))
-        # a thermostat's momenta are read as they are stored
-        self._rods = None if method.generator else scene.system.rods
         self._on_a_line = not method.generator
         self._each = 1 + FAST_STEPS.get(method.name, 0)
         self._half_kick = 0.5 * step if method.name in SHIFTED else 0.0
@@ -369,8 +352,6 @@ class _Context:
                     p[row] += self._half_kick * self._force(t, q[row], p[row])
             elif self._half_kick:
                 p += self._half_kick * self._force(0.0, q, p)
-            if self._rods and len(p):
-                p[:] = self._rods.projected(q, p)
 
 
 start = _Context

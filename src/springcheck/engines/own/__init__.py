@@ -14,7 +14,6 @@ from springcheck.engines.contract import (
     EVERY_KIND,
     EVERY_POTENTIAL,
     FIELD,
-    RODS,
     SPRINGS,
     Engine,
     Method,
@@ -49,10 +48,8 @@ def _requires(scheme: Scheme) -> frozenset[Need]:
 def _terms(scheme: Scheme) -> frozenset[str]:
     if scheme.has("implicit"):
         return SPRINGS | BRAKES | {"damping"}
-    # rods hold after every stage of a splitting
-    rods = RODS if scheme.has("symplectic", "splitting") else frozenset()
     # to kicks by all forces, and to a tableau, a field is a force like any other
-    return EVERY_FORCE | rods | (FIELD | BRAKES if scheme.has("plain") or scheme.b else frozenset())
+    return EVERY_FORCE | (FIELD | BRAKES if scheme.has("plain") or scheme.b else frozenset())
 
 
 def _method(scheme: Scheme) -> Method:
@@ -85,9 +82,8 @@ ENGINE = Engine(
     thermostats=named(
         *(
             thermostat(
-                one.name, one.name, one.title, "NumPy, PCG64",
-                EVERY_POTENTIAL | (RODS if one.held else frozenset()),
-                scripted=True, kinds=EVERY_KIND, default=one.name in BY_DEFAULT,
+                one.name, one.name, one.title, "NumPy, PCG64", EVERY_POTENTIAL, scripted=True,
+                kinds=EVERY_KIND, default=one.name in BY_DEFAULT,
             )
             for one in THERMOSTATS.values()
         )

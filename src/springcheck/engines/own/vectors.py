@@ -24,7 +24,7 @@ class Vectors:
         self._scheme, self._h, self._m = scheme, step, scene.m
         self._q, self._p = scene.q.astype(np.float64), scene.p.astype(np.float64)
         self._law = Law(scheme=scheme, scene=scene, h=step)
-        self._hold, self._rates = system.rods, self._law.rates()
+        self._rates = self._law.rates()
         moving = system.is_damped or bool(self._law.fields)
         self._force = kept(system.force, moving)
         self._parts = tuple(
@@ -42,7 +42,7 @@ class Vectors:
                     a, b = schemes.step(
                         self._scheme, self._q, self._p, h=self._h, m=self._m, force=self._force,
                         rate=self._rates, parts=self._parts, stiffness=self._law.stiffness,
-                        turns=self._law.turns, hold=self._hold,
+                        turns=self._law.turns,
                     )  # fmt: skip
                     self._q, self._p = np.asarray(a, np.float64), np.asarray(b, np.float64)
                 q[row], p[row] = self._q[: self._n], self._p[: self._n]

@@ -1,4 +1,4 @@
-"""Pendulums, librating and rotating, by Jacobi's elliptic functions; also on rods."""
+"""Pendulums, librating and rotating, by Jacobi's elliptic functions."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from springcheck.physics.exact.closedform import CANCELS, FORM_EPS, PI, ClosedFo
 from springcheck.physics.exact.digits import digits, exactly, extended, pi, sine_cosine
 from springcheck.physics.exact.elliptic import argument, jacobi, latency
 from springcheck.physics.system import System
-from springcheck.physics.terms import Cosine, Weight
+from springcheck.physics.terms import Cosine
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -112,69 +112,3 @@ class PendulumMotion(ClosedForm):
         force = swing.mass * swing.w**2 * np.minimum(size, swing.length)
         q = FORM_EPS * (np.abs(self.system.q[i]) + size + speed * time)
         return by_particle(i, q, FORM_EPS * (swing.mass * speed + force * time))
-
-
-class HangingRods(ClosedForm):
-    """Rods to fixed points in a plane with a weight on each: the angle from the weight is that of a pendulum,
-    w**2 = force / (mass length).  Unit vectors along the weight and across it are (c, 2)."""
-
-    key = "weight"
-    terms = frozenset({"weight", "wall-rod"})
-
-    def __init__(self, system: System[Any]) -> None:
-        """In extra digits: near the barrier the motion depends on the energy's small difference from it."""
-        super().__init__(system)
-        rods: Any = system.rods
-        self.need(rods and not rods.share and all(len(ends) == 1 for ends in rods.ends))
-        self.need(system.n == 2 * len(rods))
-        shape = (len(rods), 2)
-        with digits():
-            at, weight = exactly(np.zeros((2, system.n)))
-            for term in system.terms:
-                if isinstance(term, Weight):
-                    np.add.at(weight, term.i, exactly(term.force))
-                else:
-                    at[term.particles[0]] = exactly(getattr(term, term.origin))
-            given: Any = exactly(system.q) - at, exactly(system.p), weight, exactly(system.m)
-            (x, y), (u, v), (a, b), (m, _) = (rods.apart(of).reshape(shape).T for of in given)
-            square, force = x * x + y * y, a * a + b * b
-            self.need(np.all(force != 0))
-            both = np.sqrt(square * force)
-            low, side, area = x * a + y * b, a * y - b * x, x * v - y * u
-            # both - |low| without its cancellation
-            sum_, less = both + np.abs(low), side * side / (both + np.abs(low))
-            down, up = (np.where(here, sum_, less) for here in (low > 0, low <= 0))
-            sine, cosine = np.sqrt(up / (2 * both)), np.sqrt(down / (2 * both))
-            rest = 2 * m * square
-            parts = {
-                "length": np.sqrt(square), "mass": m, "w": np.sqrt(both / m / square),
-                "sine": np.where(side < 0, -sine, sine), "cosine": cosine,
-                "rate": area / np.sqrt(2 * rest * both),
-                "m1": (rest * down - area * area) / (2 * rest * both),
-            }  # fmt: skip
-            swing = {name: extended(values) for name, values in parts.items()}
-            size = np.sqrt(force)
-            self.start = extended(np.stack([x, y], axis=1)).ravel()
-            self.across = extended(np.stack([-b / size, a / size], axis=1))
-        half, m_ = np.arctan2(swing["sine"], swing["cosine"]), swing["sine"] ** 2 + swing["rate"] ** 2
-        self.down = np.stack([self.across[:, 1], -self.across[:, 0]], axis=1)
-        self.rods, self.swing = rods, _Swing(half=half, m=m_, **swing)
-
-    def at(self, t: Extended) -> States:
-        rods, swing = self.rods, self.swing
-        half, rate = swing.at(t)
-        sine, cosine = np.sin(2 * half)[..., None], np.cos(2 * half)[..., None]
-        speed = (swing.length * 2 * swing.w * rate)[..., None]
-        r = swing.length[:, None] * (cosine * self.down + sine * self.across)
-        v = speed * (cosine * self.across - sine * self.down)
-        rows = (*t.shape[:-1], -1)
-        q = self.system.q + rods.spread(r.reshape(rows) - self.start)
-        return wide(q), wide(rods.spread((swing.mass[:, None] * v).reshape(rows)))
-
-    def doubt(self, t: np.longdouble) -> States:
-        rods, swing = self.rods, self.swing
-        speed = 2 * swing.length * swing.w * np.sqrt(swing.m)
-        time = np.abs(t) + swing.latency
-        q = rods.spread(rods.each(swing.length + speed * time))
-        p = rods.spread(rods.each(swing.mass * (speed + swing.w**2 * swing.length * time)))
-        return wide(FORM_EPS * (np.abs(self.system.q) + q)), wide(FORM_EPS * p)

@@ -77,9 +77,6 @@ def _solution(system: SolvedSystem[Any]) -> Solution | None:
     groups: list[tuple[Integers, ClosedForm]] = []
     nothing = np.zeros(system.n, dtype=bool)
     acting = system.acting
-    if system.rods:
-        # a force along one axis of a rod affects all of its axes
-        acting = {key: system.rods.reach(here) for key, here in acting.items()}
     left = ~nothing
     with np.errstate(all="ignore"):
         for law in _of_groups(system):
@@ -115,10 +112,6 @@ def _of_whole_scenes(system: SolvedSystem[Any]) -> Iterator[type[ClosedForm]]:
         from springcheck.physics.exact.damped import CoupledModes
 
         yield CoupledModes
-    if system.rods:
-        from springcheck.physics.exact.lumped import LumpedMotion
-
-        yield LumpedMotion
 
 
 def _of_groups(system: SolvedSystem[Any]) -> Iterator[type[ClosedForm]]:
@@ -132,10 +125,7 @@ def _of_groups(system: SolvedSystem[Any]) -> Iterator[type[ClosedForm]]:
 
         yield SwingingMotion
     from springcheck.physics.exact.bond import MorseMotion
-    from springcheck.physics.exact.pendulum import HangingRods, PendulumMotion
+    from springcheck.physics.exact.pendulum import PendulumMotion
     from springcheck.physics.exact.quartic import QuarticMotion
-    from springcheck.physics.exact.turning import TurningRods, TurningWallRods
 
-    yield from (
-        QuarticMotion, PendulumMotion, MorseMotion, TurningRods, TurningWallRods, HangingRods, LinearMotion,
-    )  # fmt: skip
+    yield from (QuarticMotion, PendulumMotion, MorseMotion, LinearMotion)

@@ -34,14 +34,6 @@ class ParticleTable(SceneTable, frozen=True):
     axes: Annotated[str, msgspec.Meta(pattern="^[xyz]{1,3}$")] | None = None
 
 
-class RotorTable(SceneTable, frozen=True):
-    """A rotating body: inertia [M L2], angle [rad] and angular momentum [M L2/T] at the start."""
-
-    inertia: Positive
-    angle: float = 0.0
-    momentum: float = 0.0
-
-
 class InductorTable(SceneTable, frozen=True):
     """The inductor of a loop: inductance [H], circulated charge [C] and flux [Wb] at the start."""
 
@@ -77,14 +69,6 @@ class SpringTable(SceneTable, frozen=True):
     wall: float = 0.0
     fast: bool = False
     axis: Axis | None = None
-
-
-class RodTable(SceneTable, frozen=True):
-    """A rigid rod of a length [L], by default that at the start; a wall end is at `wall` [L]."""
-
-    ends: tuple[End, End]
-    length: Positive | None = None
-    wall: float | PerAxis = 0.0
 
 
 class BondTable(SceneTable, frozen=True):
@@ -170,7 +154,6 @@ class Body(NamedTuple):
 
 BODIES = {
     "particle": Body("particles", "particles", ("mass", "position", "momentum")),
-    "rotor": Body("rotor", "rotors", RotorTable.__struct_fields__),
     "inductor": Body("circuit", "inductors", InductorTable.__struct_fields__),
     "chain": Body("particles", "masses"),
 }
@@ -186,13 +169,11 @@ class SceneBase(SceneTable, frozen=True):
     units: Units | None = None
     kind: Kind | None = None
     particle: tuple[ParticleTable, ...] = ()
-    rotor: tuple[RotorTable, ...] = ()
     inductor: tuple[InductorTable, ...] = ()
     capacitor: tuple[CapacitorTable, ...] = ()
     resistor: tuple[ResistorTable, ...] = ()
     chain: ChainTable | None = None
     spring: tuple[SpringTable, ...] = ()
-    rod: tuple[RodTable, ...] = ()
     bond: tuple[BondTable, ...] = ()
     magnetic: tuple[MagneticTable, ...] = ()
     box: BoxTable | None = None
@@ -230,7 +211,7 @@ def identifier(name: str) -> str:
     return name.replace("-", "_")
 
 
-OWN_TABLES = ("wall-spring", "spring", "magnetic", "wall-rod", "rod", "bond")
+OWN_TABLES = ("wall-spring", "spring", "magnetic", "bond")
 """Keys of the terms with tables of their own."""
 
 

@@ -12,11 +12,10 @@ import numpy as np
 from springcheck.physics.arrays import Floats
 from springcheck.physics.fields import SceneFields
 from springcheck.physics.graph import standing
-from springcheck.physics.rods import Rods
 from springcheck.physics.scenefile.tables import BODIES
 from springcheck.physics.system import System
 from springcheck.physics.term import Term
-from springcheck.physics.terms import Damping, Magnetic, RadialSpring, Rod, Spring, WallRod, WallSpring
+from springcheck.physics.terms import Damping, Magnetic, RadialSpring, Spring, WallSpring
 
 MOST_WAVES = 64
 """Most standing waves by which the start of a chain is written."""
@@ -125,12 +124,6 @@ def _rows(scene: SceneFields, term: Term) -> Iterator[str]:
     elif isinstance(term, RadialSpring):
         for a, b, k, rest in {number: row for *row, number in term.rows()}.values():
             yield _table("[[bond]]", {"ends": _ends(scene, [a, b])[0], "stiffness": k, "rest": rest}.items())
-    elif isinstance(term, Rod | WallRod):
-        for particles, length, point in Rods(scene.m, scene.places, (term,)).joints():
-            places = scene.places
-            along = [0] if places is None else places[places // 3 == particles[0]] % 3
-            wall: dict[str, Any] = {} if point is None else {"wall": point[along].tolist()}
-            yield _table("[[rod]]", ({"ends": ["wall", *particles][-2:], "length": length} | wall).items())
     else:
         yield from _by_columns(scene, term)
 

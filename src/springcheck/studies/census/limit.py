@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from springcheck import driver
 from springcheck.engines.contract import Label
 from springcheck.errors import MethodError
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory
-from springcheck.studies.census import rigid
 
 FIRST_H_OMEGA, LAST_H_OMEGA, H_OMEGA_SPACING = 0.05, 4.0, 0.05
 """h omega of the first and the last run, and their spacing; no limit below the first is looked for."""
@@ -51,7 +51,7 @@ def first_limit(scene: Scene, label: Label) -> float:
     omega = float(np.sqrt(scene.system.hessian_diagonal(scene.q)[0] / scene.m[0]))
 
     def growth(h_omega: float) -> tuple[float, float]:
-        found = rigid.run(replace(small, step=h_omega / omega), label)
+        found = driver.run(replace(small, step=h_omega / omega), label)
         if found.outcome.step < LEAST_STEPS and found.outcome.status == "stopped":
             raise MethodError(found.outcome.message)
         return _growth(found)

@@ -12,7 +12,7 @@ from typing import Unpack
 
 import numpy as np
 
-from springcheck import engines, schemes
+from springcheck import driver, engines, schemes
 from springcheck.engines.contract import Label
 from springcheck.errors import IdentificationError, MethodError
 from springcheck.identify import Identification, identify
@@ -23,7 +23,7 @@ from springcheck.physics.trajectory import Trajectory
 from springcheck.schemes.elsewhere import ELSEWHERE
 from springcheck.studies import keeper
 from springcheck.studies.arguments import Progress
-from springcheck.studies.census import baths, rigid, table
+from springcheck.studies.census import baths, maps, table
 from springcheck.studies.census.limit import LEAST_STEPS, first_limit
 from springcheck.studies.census.result import ENTRIES, Census, Entry
 from springcheck.studies.choose import LeftOut, sorted_out
@@ -58,8 +58,8 @@ def _measure(labels: Sequence[Label], kept: Keeper) -> Census:
     scenes = load_scene(BLOG), load_scene(UNEVEN)
 
     def why(label: Label) -> str | None:
-        of = (baths.scene_of(label, 1, 1),) if engines.method(label).generator else scenes
-        reasons = [rigid.refusal(scene, label) for scene in of]
+        of = (baths.springs(1, 1),) if engines.method(label).generator else scenes
+        reasons = [engines.refusal(scene, label) for scene in of]
         return next(filter(None, reasons), None) or _absence(label)
 
     broken = [LeftOut(method=name, reason=reason) for name, reason in engines.unusable().items()]
@@ -77,7 +77,7 @@ def _timed(label: Label, one: Entry, kept: Keeper) -> Entry:
     """The entry with its seconds per step: the fastest repetition of a short run."""
     if not np.isnan(one.seconds):
         return one
-    runs = [rigid.run(load_scene(UNEVEN), label) for _ in range(REPEATS + 1)]
+    runs = [driver.run(load_scene(UNEVEN), label) for _ in range(REPEATS + 1)]
     timed = replace(one, seconds=min(run.timing.run for run in runs) / max(runs[0].outcome.step, 1))
     kept.keep(ENTRIES, str(label), timed)
     return timed
@@ -114,15 +114,14 @@ def entry(label: Label) -> Entry:
     if engines.method(label).generator:
         return baths.entry(label)
     blog, uneven = load_scene(BLOG), load_scene(UNEVEN)
-    orbit, run = rigid.run(blog, label), rigid.run(uneven, label)
+    orbit, run = driver.run(blog, label), driver.run(uneven, label)
     method = engines.method(label)
-    held = rigid.is_rigid(label)
-    found = None if method.adaptive or held else _identified(uneven, run)
+    found = None if method.adaptive else _identified(uneven, run)
     limit = np.nan if method.adaptive else first_limit(uneven, label)
     ended = orbit.outcome.status == "complete"
-    name = "adaptive" if method.adaptive else rigid.name(uneven, run) if held else _name(uneven, found)
+    name = "adaptive" if method.adaptive else _name(uneven, found)
     unmapped = method.adaptive or run.outcome.step < LEAST_STEPS
-    one_step = None if unmapped else rigid.fitted(run.q[:, 0], run.p[:, 0])
+    one_step = None if unmapped else maps.fitted(run.q[:, 0], run.p[:, 0])
     steps = max(run.outcome.step, 1)
     states = np.concatenate([orbit.q[:, 0], orbit.p[:, 0]])
     return Entry(
@@ -141,8 +140,7 @@ def entry(label: Label) -> Entry:
         precision=found.precision if found is not None and found.fits else run.arithmetic.name,
         limit=limit,
         bounded=bool(np.isinf(limit)),
-        along=rigid.axes(label),
-        constraint=rigid.constraint(label),
+        along=maps.axes(label),
         amplitude=float(np.hypot(orbit.q[-1, 0], orbit.p[-1, 0])) if ended else np.nan,
         force_calls=run.force_calls / steps,
         digest=hashlib.sha256(states.tobytes()).hexdigest()[:16],
@@ -175,7 +173,7 @@ def _name(scene: Scene, found: Identification | None) -> str:
             return found.scheme
     elif found is not None and found.verdict == "not told apart":
         return " or ".join(dict.fromkeys(x.scheme for x in found.candidates))
-    return _held(scene, found) or rigid.NO_SCHEME
+    return _held(scene, found) or maps.NO_SCHEME
 
 
 def _held(scene: Scene, found: Identification | None) -> str:

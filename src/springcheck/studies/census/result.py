@@ -67,8 +67,6 @@ class Entry:
     """Title of the thermostat's scheme; "" without a thermostat."""
     along: str = "x"
     """Axes along which the engine moves particles, by its states, and whether it serves a periodic box."""
-    constraint: str = ""
-    """The rigid part, its turn per step and the error of its length; "" where nothing is rigid."""
     configurational: float = nan
     """k <x**2>/kT where a thermostat is on."""
     configurational_error: float = nan

@@ -10,7 +10,7 @@ from typing import Any, TypeAlias
 from springcheck import engines, schemes
 from springcheck.errors import StoreError
 from springcheck.schemes.elsewhere import ELSEWHERE
-from springcheck.studies.census.rigid import NO_SCHEME
+from springcheck.studies.census.maps import NO_SCHEME
 from springcheck.text.wording import number
 
 Cells: TypeAlias = Mapping[str, Mapping[str, str]]
@@ -38,7 +38,6 @@ def amount(x: float | None, least: float, form: str = "+.3g") -> str:
 WATCHED: Mapping[str, tuple[str, Callable[[Mapping[str, Any]], str]]] = {
     "thermostat": ("thermostat", lambda x: x.get("thermostat") or "none"),
     "axes": ("axes", lambda x: x.get("along") or "x"),
-    "constraint": ("constraint", lambda x: x.get("constraint") or "none"),
     "scheme": ("scheme, from the states", lambda x: titles(x["found"])),
     "velocity": ("stored velocity", lambda x: _velocity(x["velocity_offset"])),
     "substeps": ("steps inside", lambda x: str(x["substeps"] or "-")),

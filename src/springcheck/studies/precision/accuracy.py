@@ -90,8 +90,7 @@ def truth(scene: Scene) -> Truth:
         )
     if not scene.system.norm.of:
         raise SceneError(f"scene {scene.name} rests in equilibrium: give a particle a position or a momentum")
-    rods = scene.system.rods
-    w = float(np.max(rods.rates(scene.q, scene.p))) if rods else fastest(scene)
+    w = fastest(scene)
     if not np.isfinite(w):
         raise SceneError(f"scene {scene.name}: its forces are beyond the range of numbers")
     system = scene.system

@@ -100,7 +100,7 @@ class Report(StudyResult):
             plain(),
             *text.methods(scene, self.runs),
             *text.same_motions(self.same),
-            *text.temperatures(scene, self.temperatures),
+            *text.temperatures(self.temperatures),
             *text.fractions(verdicts, "Is the engine right?  "),
             *text.failures(v for v in verdicts if v.method not in self.faults),
             *text.faults(self.faults, verdicts),

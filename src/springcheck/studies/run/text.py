@@ -18,7 +18,7 @@ from springcheck.physics.trajectory import Comparison, Verdict
 from springcheck.studies.run.tally import MethodRun
 from springcheck.studies.text import of_energy
 from springcheck.text.lines import Lines, Row, Text, TextTable, plain, table
-from springcheck.text.wording import count, number, seconds
+from springcheck.text.wording import number, seconds
 
 if TYPE_CHECKING:
     from springcheck.bath.heat import Heated
@@ -123,8 +123,8 @@ def same_motions(found: Sequence[Same]) -> Lines:
     return out
 
 
-def temperatures(scene: Scene, found: Sequence[Heated]) -> Lines:
-    """Temperatures of runs in a bath, each beside the exact one of its scheme."""
+def temperatures(found: Sequence[Heated]) -> Lines:
+    """Temperatures of runs in a bath, each next to the exact one of its scheme."""
     if not found:
         return []
     rows: list[Row] = [
@@ -136,12 +136,9 @@ def temperatures(scene: Scene, found: Sequence[Heated]) -> Lines:
         for one in found
     ]  # fmt: skip
     titles = ("method", "configurational", "measured", "kinetic", "measured ")
-    of = ""
-    if scene.system.rods:
-        of = f", in {count(scene.system.rods.freedoms, 'degree')} of freedom"
     return [
         plain(),
-        plain(f"Temperatures over that of the bath{of}, exact for each scheme, and as measured:"),
+        plain("Temperatures over that of the bath, exact for each scheme, and as measured:"),
         table(titles, rows, left=("method",)),
     ]
 

@@ -13,11 +13,8 @@ from functools import partial
 from pathlib import Path
 from typing import Unpack
 
-import numpy as np
-
 from springcheck import engines
 from springcheck.engines.contract import Label, Need
-from springcheck.errors import SceneError
 from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
 from springcheck.schemes import scheme
@@ -39,15 +36,8 @@ def record(
 
     Raises:
         MethodError: a label names nothing, or none of the methods can be measured.
-        SceneError: forces of the scene overflow at its start, or it has rods.
+        SceneError: forces of the scene overflow at its start.
     """
-    if rods := scene.system.rods:
-        rate = float(np.max(rods.rates(scene.q, scene.p)))
-        here = f", here h < {1 / rate:.6g} at the rate of the start" if rate else ""
-        raise SceneError(
-            f"scene {scene.name} has rods, and stability is a study of springs: a rod that turns freely has "
-            f"a step below h w = 1{here}, and none beyond"
-        )
     fastest(scene)
     labels = engines.match(methods or ("*",), every=bool(methods))
     return keeper.study("stability", path, labels, partial(_measure, scene, labels), scene=scene, **how)
