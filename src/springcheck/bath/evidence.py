@@ -37,6 +37,9 @@ FEW_TIMES = 30.0
 COARSEST = 2.0**-23
 """Chance that two right draws have the same size: uniform numbers of single precision have 24 bits."""
 
+LONG = 100
+"""Rows for each column from which on a column is scaled by its own size: few rows would change its shape."""
+
 MOST_HIDDEN = 0.01
 """Share of the draws that may be equal to rounding by chance; above, ties are not counted."""
 
@@ -143,6 +146,14 @@ def known_before(x: Floats, state: Iterable[Known], *, between: bool = True) -> 
     return [*out, *state]
 
 
+def scaled(x: Floats) -> Floats:
+    """Draws x (f, n) over their measured size: of each column where all are long, else of all together."""
+    squares, drawn = np.nan_to_num(x) ** 2, ~np.isnan(x)
+    axis = 0 if len(x) >= LONG * x.shape[1] else None
+    size = np.sqrt(np.sum(squares, axis=axis) / np.maximum(np.sum(drawn, axis=axis), 1))
+    return np.asarray(x / np.where(size > 0, size, 1.0))
+
+
 def independence(x: Floats, known: Iterable[Known], *, uniform: bool = False, drag: float = 0.0) -> Statistic:
     """Whether draws x (f, n), NaN where there is none, depend on what is known before them.
 
@@ -152,10 +163,8 @@ def independence(x: Floats, known: Iterable[Known], *, uniform: bool = False, dr
 
     known, drawn = list(known), ~np.isnan(x)
     names = [f"the size of draws with {y.what}" if y.of_sizes else f"draws with {y.what}" for y in known]
-    some = np.nan_to_num(x)
-    middle = UNIFORM_MEDIAN if uniform else NORMAL_MEDIAN
-    scale = math.sqrt(float(np.sum(some * some)) / max(int(np.count_nonzero(drawn)), 1))
-    sides = np.where(drawn, np.sign(np.abs(some) - middle * scale), 0.0)
+    some, middle = np.nan_to_num(x), UNIFORM_MEDIAN if uniform else NORMAL_MEDIAN
+    sides = np.where(drawn, np.sign(np.abs(scaled(x)) - middle), 0.0)
 
     def logs(S: Floats, V: Floats, counts: Floats) -> Floats:
         t = np.maximum(counts, 1) / FEW_TIMES
@@ -188,12 +197,11 @@ def independence(x: Floats, known: Iterable[Known], *, uniform: bool = False, dr
 
 
 def shape(x: Floats, *, uniform: bool = False) -> Statistic:
-    """The tails and the symmetry of draws x (...), whatever their size: the means of the Legendre polynomials
-    of degrees 3 and 4 of their ranks (Neyman's smooth test), which no single draw decides."""
+    """The tails and the symmetry of draws x (f, n), whatever their size: the means of the Legendre
+    polynomials of degrees 3 and 4 of their ranks (Neyman's smooth test), which no single draw decides."""
     from scipy.special import erf
 
-    some = x[~np.isnan(x)]
-    z = some / math.sqrt(max(float(np.mean(some * some)), 1e-300))
+    z = scaled(x)[~np.isnan(x)]
     ranks = np.clip(z / math.sqrt(3), -1, 1) if uniform else erf(z / math.sqrt(2))
     nodes, weights = leggauss(64)
 
@@ -210,7 +218,7 @@ def shape(x: Floats, *, uniform: bool = False) -> Statistic:
 
     moments = [float(np.sum(z**power)) for power in (3, 4)]
     sums = [float(np.sum(Legendre.basis(degree)(ranks))) for degree in (3, 4)]
-    return Statistic(sums=(*sums, *moments, len(some)), law=law)
+    return Statistic(sums=(*sums, *moments, len(z)), law=law)
 
 
 def ties(x: Floats, error: Floats) -> Statistic | None:

@@ -109,7 +109,7 @@ def draws_variance(case: Case) -> Chance:
     return Chance.of(bath.evidence.size(_draws(case), uniform=thermostat(case).uniform))
 
 
-@check("apart", family="noise", requires={"every-step"})
+@check("indep", family="noise", requires={"every-step"})
 def draws_independent(case: Case) -> Chance:
     """The draws depend on nothing before them: their mean is 0, whatever the draw, momentum and force before.
 
