@@ -37,7 +37,7 @@ FEW_TIMES = 30.0
 COARSEST = 2.0**-23
 """Chance that two right draws have the same size: uniform numbers of single precision have 24 bits."""
 
-LONG = 100
+LONG = 10
 """Rows for each column from which on a column is scaled by its own size: few rows would change its shape."""
 
 MOST_HIDDEN = 0.01
@@ -146,11 +146,15 @@ def known_before(x: Floats, state: Iterable[Known], *, between: bool = True) -> 
     return [*out, *state]
 
 
-def scaled(x: Floats) -> Floats:
+def scaled(x: Floats, uniform: bool) -> Floats:
     """Draws x (f, n) over their measured size: of each column where all are long, else of all together."""
-    squares, drawn = np.nan_to_num(x) ** 2, ~np.isnan(x)
+    some, drawn = np.nan_to_num(x), ~np.isnan(x)
     axis = 0 if len(x) >= LONG * x.shape[1] else None
-    size = np.sqrt(np.sum(squares, axis=axis) / np.maximum(np.sum(drawn, axis=axis), 1))
+    if uniform:
+        # the largest of n uniform numbers is known to 1/n
+        size = np.max(np.abs(some), axis=axis) / math.sqrt(3)
+    else:
+        size = np.sqrt(np.sum(some**2, axis=axis) / np.maximum(np.sum(drawn, axis=axis), 1))
     return np.asarray(x / np.where(size > 0, size, 1.0))
 
 
@@ -164,7 +168,7 @@ def independence(x: Floats, known: Iterable[Known], *, uniform: bool = False, dr
     known, drawn = list(known), ~np.isnan(x)
     names = [f"the size of draws with {y.what}" if y.of_sizes else f"draws with {y.what}" for y in known]
     some, middle = np.nan_to_num(x), UNIFORM_MEDIAN if uniform else NORMAL_MEDIAN
-    sides = np.where(drawn, np.sign(np.abs(scaled(x)) - middle), 0.0)
+    sides = np.where(drawn, np.sign(np.abs(scaled(x, uniform)) - middle), 0.0)
 
     def logs(S: Floats, V: Floats, counts: Floats) -> Floats:
         t = np.maximum(counts, 1) / FEW_TIMES
@@ -201,8 +205,8 @@ def shape(x: Floats, *, uniform: bool = False) -> Statistic:
     polynomials of degrees 3 and 4 of their ranks (Neyman's smooth test), which no single draw decides."""
     from scipy.special import erf
 
-    z = scaled(x)[~np.isnan(x)]
-    ranks = np.clip(z / math.sqrt(3), -1, 1) if uniform else erf(z / math.sqrt(2))
+    z = scaled(x, uniform)[~np.isnan(x)]
+    ranks = z / math.sqrt(3) if uniform else erf(z / math.sqrt(2))
     nodes, weights = leggauss(64)
 
     def law(third: float, fourth: float, *rest: float) -> tuple[float, str]:
