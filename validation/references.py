@@ -32,7 +32,7 @@ from arguments import script
 ROOT = Path(__file__).parents[1]
 FOLDER = ROOT / "data" / "reference" / "motion"
 ELSEWHERE = ("detest-b1", "stiff-spring", "two-scales", "multiple-time-steps", "overdamped", "van-der-pol")
-"""Scenes whose references are made by stiff_references.py and van_der_pol.py."""
+"""Scenes whose references are of another kind."""
 DIGITS = 25
 ORDER = 40
 

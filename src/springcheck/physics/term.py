@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from springcheck.errors import SceneError
 from springcheck.physics.arguments import of_kind
-from springcheck.physics.arrays import Floats, Integers, Reals, is_masked
+from springcheck.physics.arrays import Extended, Floats, Integers, Reals, is_masked
 
 Where: TypeAlias = "slice | Integers"
 Origin: TypeAlias = Literal["potential", "friction", "magnetic", "drive"]
@@ -153,6 +153,16 @@ class Term(FrozenArrays):
         return tuple(getattr(self, c.field) for c in self.columns if c.field != self.origin)
 
     @cached_property
+    def _wide(self) -> tuple[Extended, ...]:
+        return tuple(x.astype(np.longdouble) for x in self.parameters)
+
+    def law(self, name: str, u: Reals) -> Reals:
+        """The function of this name at elongations u (..., s), in extended precision where u is: a product of
+        two parameters would round to a double."""
+        parameters = self._wide if np.asarray(u).dtype == np.longdouble else self.parameters
+        return np.asarray(getattr(self, name)(u, *parameters))
+
+    @cached_property
     def _places(self) -> tuple[tuple[Where, bool], ...]:
         """Index of each end in an array of all particles, and whether it contains some particle twice."""
         return tuple(_place(index) for index in self.particles)
@@ -179,7 +189,7 @@ class Term(FrozenArrays):
 
     def energies(self, q: Reals) -> Reals:
         """Potential energy of each row at positions q (..., n) -> (..., s) [M L2/T2], 0 at its own rest."""
-        return np.asarray(self.potential(self.elongation(q), *self.parameters))
+        return self.law("potential", self.elongation(q))
 
     def energy(self, q: Reals) -> Reals:
         """Potential energy of states q (..., n) -> (...) [M L2/T2], 0 at the term's own rest."""
@@ -187,7 +197,7 @@ class Term(FrozenArrays):
 
     def pull(self, q: Reals) -> Reals:
         """Restoring force of each row at positions q (..., n) -> (..., s) [M L/T2]."""
-        return np.asarray(self.slope(self.elongation(q), *self.parameters))
+        return self.law("slope", self.elongation(q))
 
     def add_force(self, q: Reals, v: Reals, out: Reals) -> None:
         """Add the force at positions q and velocities v, each (..., n), to out (..., n) [M L/T2]."""
@@ -222,7 +232,7 @@ class Term(FrozenArrays):
 
     def curvature(self, q: Reals) -> Reals:
         """Second derivative of each row's energy by u, at q (..., n) -> (..., s) or (s,) [M/T2]."""
-        return np.asarray(self.second(self.elongation(q), *self.parameters))
+        return self.law("second", self.elongation(q))
 
     def elements(self, q: Reals) -> Iterator[tuple[Integers, Integers, Reals]]:
         """Rows, columns and values (..., s) that each pair of ends adds to the Hessian at q (..., n)."""

@@ -150,11 +150,12 @@ class Trajectory:
     def error(self) -> Floats:
         """Distance from the exact solution at each frame (f,), relative to the initial energy norm.
 
-        SpringcheckError where no closed form of the exact solution is known.
+        SpringcheckError where there is no reference solution.
         """
         scene = self._known
         if scene.system.solution is None:
-            raise SpringcheckError(f"scene {scene.name}: no closed form of its exact solution is known")
+            reason = scene.system.unsolved
+            raise SpringcheckError(f"scene {scene.name}: no reference solution, because {reason}")
         q, p = self._exact(scene)
         return scene.system.norm(self.q - q, self.p - p)
 

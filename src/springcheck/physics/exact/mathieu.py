@@ -11,12 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from springcheck.physics.arrays import Extended
+from springcheck.physics.arrays import EPS, Extended
 from springcheck.physics.driven import ModulatedSpring
-from springcheck.physics.exact.closedform import FORM_EPS, PI, ClosedForm, NoClosedFormError, States, wide
+from springcheck.physics.exact.closedform import PI, ClosedForm, NoClosedFormError, States, wide
 from springcheck.physics.exact.powers import propagate
 from springcheck.physics.system import System
 
+FORM_EPS = 64 * EPS
 TAYLOR_ORDER = 22
 """Order of the Taylor series: its next term is (1/2)**23/23!, 5e-30 of the first."""
 
@@ -83,7 +84,9 @@ class ModulatedMotion(ClosedForm):
     def __init__(self, system: System[Any]) -> None:
         super().__init__(system)
         term = next(iter(system.terms), None)
-        self.need(isinstance(term, ModulatedSpring) and len(system.terms) == 1 and self.one_each)
+        self.need(
+            isinstance(term, ModulatedSpring) and len(system.terms) == 1 and np.all(system.pulls() == 1)
+        )
         assert isinstance(term, ModulatedSpring)
         found = wide([system.m, system.q, system.p])
         self.modes = [_Mode(found[:, i], row) for i, *row in sorted(term.rows())]

@@ -80,13 +80,12 @@ def truth(scene: Scene) -> Truth:
     """Prepare the exact solution of a scene.
 
     Raises:
-        SceneError: no closed form of it is known, or the scene rests, so that errors have no unit.
+        SceneError: there is no reference solution, or the scene rests, so that errors have no unit.
     """
     if not exact.has_true_motion(scene):
         raise SceneError(
-            f"scene {scene.name}: no closed form of its exact solution is known, so none of its errors is; "
-            "a study of precision needs springs, or an anharmonic potential on each particle or pair by "
-            "itself without friction, and no bath"
+            f"scene {scene.name}: no reference solution, because {exact.no_reference(scene)}; without it no "
+            "error can be measured"
         )
     if not scene.system.norm.of:
         raise SceneError(f"scene {scene.name} rests in equilibrium: give a particle a position or a momentum")

@@ -12,13 +12,13 @@ import numpy as np
 
 from springcheck import checks, schemes
 from springcheck.checks.compare import Same
-from springcheck.physics.exact import has_true_motion
+from springcheck.physics.exact import no_reference
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Comparison, Verdict
 from springcheck.studies.run.tally import MethodRun
 from springcheck.studies.text import of_energy
 from springcheck.text.lines import Lines, Row, Text, TextTable, plain, table
-from springcheck.text.wording import number, seconds
+from springcheck.text.wording import number, rounded_down, seconds
 
 if TYPE_CHECKING:
     from springcheck.bath.heat import Heated
@@ -37,21 +37,14 @@ def beyond(scene: Scene, runs: Sequence[MethodRun]) -> Lines:
         least = min((one.limit for one in ran if one.limit), default=np.inf)
         if h * np.sqrt(np.max(np.abs(system.modes.w2))) < least:
             return []
-    from springcheck.studies.stability.longest import resonating, too_long
+    from springcheck.studies.stability.longest import too_long
 
     out: Lines = []
     for scheme in dict.fromkeys(run.scheme for run in runs):
         title = schemes.title(scheme)
-        if (limit := too_long(scheme, scene)) is not None:
-            said = f"is beyond the limit of {title} here, {limit:.4g}"
-        elif (factor := resonating(scheme, scene)) is not None:
-            said = (
-                f"makes {title} grow by a factor of {factor:.4f} a step, and the exact solution stays bounded"
-            )
-            of = "period of the modulation" if system.is_driven else "periods of the field and the springs"
-            said += f"; take a step that is short beside the {of}"
-        else:
+        if (limit := too_long(scheme, scene)) is None:
             continue
+        said = f"is beyond the limit of {title} here, {rounded_down(limit)}"
         names = ", ".join(run.method for run in runs if run.scheme == scheme)
         out.append(plain(f"h = {scene.step:g} {said}: {names}", "bold yellow"))
     return [plain(), *out] if out else []
@@ -92,7 +85,7 @@ def methods(scene: Scene, runs: Sequence[MethodRun]) -> Lines:
         table(titles, rows, left=("method", "outcome")),
         plain(f"error: largest distance from the exact solution, over the {unit}", "dim"),
         *[plain(f"<: {BELOW}", "dim")] * any(run.error_below for run in runs),
-        *[plain("-: no exact solution of this scene is known here", "dim")] * (not has_true_motion(scene)),
+        *[plain(f"-: no reference solution, because {why}", "dim") for why in [no_reference(scene)] if why],
         plain(f"energy: {of_energy(scene)}", "dim"),
         *(
             plain(f"  {run.method}: {run.outcome} after step {run.steps}: {run.message}")
