@@ -40,11 +40,11 @@ COARSEST = 2.0**-23
 LONG = 10
 """Rows for each column from which on a column is scaled by its own size: few rows would change its shape."""
 
+BLOCK = 20_000
+"""Draws among which ties are counted: among more, right ones in single precision have many."""
+
 MOST_HIDDEN = 0.01
 """Share of the draws that may be equal to rounding by chance; above, ties are not counted."""
-
-NORMAL_MEDIAN, UNIFORM_MEDIAN = 0.6744897501960817, math.sqrt(3) / 2
-"""Medians of the size of a draw."""
 
 STRENGTHS = (6.0, 12.0, 24.0, 48.0)
 """The l of `shape`, over the standard deviation of the sum."""
@@ -167,8 +167,9 @@ def independence(x: Floats, known: Iterable[Known], *, uniform: bool = False, dr
 
     known, drawn = list(known), ~np.isnan(x)
     names = [f"the size of draws with {y.what}" if y.of_sizes else f"draws with {y.what}" for y in known]
-    some, middle = np.nan_to_num(x), UNIFORM_MEDIAN if uniform else NORMAL_MEDIAN
-    sides = np.where(drawn, np.sign(np.abs(scaled(x, uniform)) - middle), 0.0)
+    some, sizes = np.nan_to_num(x), np.abs(x)
+    long = len(x) >= LONG * x.shape[1] and np.all(np.any(drawn, axis=0))
+    sides = np.where(drawn, np.sign(sizes - np.nanmedian(sizes, axis=0 if long else None)), 0.0)
 
     def logs(S: Floats, V: Floats, counts: Floats) -> Floats:
         t = np.maximum(counts, 1) / FEW_TIMES
@@ -226,29 +227,34 @@ def shape(x: Floats, *, uniform: bool = False) -> Statistic:
 
 
 def ties(x: Floats, error: Floats) -> Statistic | None:
-    """Draws x (...) whose sizes are equal to their rounding errors (...): of a generator with few values, one
-    that begins anew, of draws that are cut off or used twice.  None where rounding alone makes too many.
+    """Draws x (f, n) whose sizes are equal to their rounding errors (f, n), within blocks of rows: of a
+    generator with few values, one that begins anew, of draws that are cut off or used twice.  None where
+    rounding alone makes too many.
 
     Right draws are at least as fine as those of uniform numbers in single precision.
     """
     from scipy.special import gammainc
 
-    drawn = ~np.isnan(x)
-    order = np.argsort(np.abs(x[drawn]))
-    sizes, errors = np.abs(x[drawn])[order], error[drawn][order]
-    n, scale = len(sizes), math.sqrt(float(np.mean(sizes * sizes))) if len(sizes) else 1.0
-    # the squared density of the size of a normal number has the integral 1/pi**0.5; a uniform one's is larger
-    near = min(1.0, 4 * float(np.mean(errors)) / (math.sqrt(3) * max(scale, 1e-300))) if n else 0.0
-    expected = n * (n - 1) / 2 * (near + COARSEST)
-    if n < 2 or expected > MOST_HIDDEN * n + 1:
+    each, rows = [], max(BLOCK // x.shape[1], 1)
+    for first in range(0, len(x), rows):
+        drawn = ~np.isnan(x[first : first + rows])
+        sizes, errors = np.abs(x[first : first + rows][drawn]), error[first : first + rows][drawn]
+        order, n = np.argsort(sizes), len(sizes)
+        sizes, errors = sizes[order], errors[order]
+        scale = math.sqrt(float(np.mean(sizes * sizes))) if n else 0.0
+        # the squared density of the size of a normal number has the integral 1/pi**0.5, of a uniform one more
+        near = min(1.0, 4 / math.sqrt(3) * float(np.mean(errors)) / scale) if scale > 0 else 1.0
+        equal = int(np.count_nonzero(np.diff(sizes) <= errors[1:] + errors[:-1]))
+        each.append((equal, n * (n - 1) / 2 * (near + COARSEST), n))
+    sums = tuple(map(sum, zip(*each, strict=True)))
+    if sums[2] < 2 or sums[1] > MOST_HIDDEN * sums[2] + 1:
         return None
-    equal = int(np.count_nonzero(np.diff(sizes) <= errors[1:] + errors[:-1]))
 
     def law(equal: float, expected: float, n: float) -> tuple[float, str]:
         said = f"{n - equal:.0f} values among {n:.0f} draws"
         return float(gammainc(equal, expected)) if equal else 1.0, said
 
-    return Statistic(sums=(equal, expected, n), law=law)
+    return Statistic(sums=sums, law=law)
 
 
 def hits(hits: int, n: int, p: float) -> Statistic:

@@ -133,7 +133,7 @@ def draws_independent(case: Case) -> Chance:
     ]
     drag = 0.0 if scheme.rescales else bath.draws.drag_in_draws(scheme, scene)
     known = bath.evidence.known_before(x, known, between=not scheme.rescales)
-    return Chance.of(bath.evidence.independence(x, known, uniform=scheme.uniform, drag=drag))
+    return Chance.of(bath.evidence.independence(x, known, drag=drag))
 
 
 @check("shape", family="noise", requires={"every-step"})
