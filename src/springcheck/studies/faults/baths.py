@@ -40,12 +40,12 @@ def springs(n: int, *, name: str = "bath", steps: int = 1200) -> Scene:
     )  # fmt: skip
 
 
-def subject(fault: Fault, size: float | None, seed: int = 20261122) -> Seeded:
-    """A fault as subject of the experiments with seeds, on three springs."""
-    return Seeded(
-        scene=springs(3), label=fault.name, seed=seed,
-        play=partial(fault.run, size=size),
-    )  # fmt: skip
+def subject(
+    fault: Fault, size: float | None, scene: Scene | None = None, seed: int = 20261122
+) -> Seeded:  # fmt: skip
+    """A fault as subject of the experiments with seeds, on three springs or another scene."""
+    scene = scene or springs(3)
+    return Seeded(scene=scene, label=fault.name, seed=seed, play=partial(fault.run, size=size))
 
 
 def played(

@@ -97,7 +97,7 @@ def of_state(left: Floats, x: Floats, u: Floats) -> bool:
 
 def unlike_normal(x: Floats) -> str:
     """How draws (f,) of one size are not normal, in words; "" where none shows that they are not."""
-    unlike, words = shape(x).found
+    unlike, words = shape(x[:, None]).found
     if unlike > WHITE:
         return ""
     # the mean of a Legendre polynomial of degree d has the variance 1/(2 d + 1) over the draws

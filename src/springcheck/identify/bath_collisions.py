@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from springcheck.bath.catalogue import THERMOSTATS
 from springcheck.bath.laws import Law
-from springcheck.bath.likelihood import Candidate
-from springcheck.bath.residuals import neighbours, recurrence, regressed, together
+from springcheck.identify.bath_likelihood import Candidate
+from springcheck.identify.bath_residuals import neighbours, recurrence, regressed, together
 from springcheck.physics.arrays import Floats
 
 TRIPLES = 30000
