@@ -326,8 +326,6 @@ def refusal(scene: Scene, label: Label) -> str | None:
         return f"{who} moves {moved}, not {PLURAL[scene.kind]}"
     if scene.places is not None and not engine(label.engine).any_axis:
         return f"{engine(label.engine).title} is given particles along x here, and the scene has other axes"
-    if scene.box is not None and not engine(label.engine).periodic:
-        return f"{engine(label.engine).title} is given no periodic box here"
     unknown = (term for term in scene.terms if not (term.kind == "potential" and ANY_POTENTIAL in what.terms))
     missing = sorted({term.key for term in unknown} - what.terms)
     if missing:
