@@ -195,23 +195,6 @@ def test_what_needs_an_extra_is_run_by_name_alone() -> None:
     assert {str(label) for label in engines.match(("mujoco:*",))} == {x for x in LABELS if "mujoco" in x}
 
 
-def test_lammps_that_loses_atoms_in_a_box_ends_the_run_in_a_line(
-    need: Need, capfd: pytest.CaptureFixture[str]
-) -> None:
-    need("lammps:external")
-    pairs = Spring(a=np.array([0, 1]), b=np.array([1, 2]), k=np.array([7.4, 2.6]), rest=np.array([0.1, 0.8]))
-    scene = Scene(
-        name="box", m=[1.0, 1.0, 1.0], q=[0.0, 0.1, -0.1], p=[0.0, 0.0, 0.0], terms=(pairs,), box=(39.0,) * 3,
-        step=1.9, steps=60,
-    )  # fmt: skip
-    made = run(scene, "lammps:external")
-    assert made.outcome.status == "stopped"
-    assert made.outcome.message == "LAMMPS has lost atoms that moved by more than a box in a step"
-    (grid,) = (v for v in checks.judge(scene, made) if v.check == "grid")
-    assert grid.why.endswith("the engine says: LAMMPS has lost atoms that moved by more than a box in a step")
-    assert "Traceback" not in capfd.readouterr().err
-
-
 @pytest.mark.parametrize("rest", [-1.0, -0.5])
 def test_mujoco_takes_a_rest_length_below_0_for_what_it_is(rest: float, need: Need) -> None:
     """A length of -1 would stand for that of the start."""

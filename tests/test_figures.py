@@ -229,10 +229,6 @@ def test_a_free_pair_is_shown_by_its_bond_and_a_particle_where_it_is_asked_for()
         views(scene, 2)
 
 
-def test_two_axes_of_one_charge_are_no_bond() -> None:
-    assert [view.title for view in views(scenefile.load_scene("magnetic"))] == ["x", "y"]
-
-
 def test_what_grows_does_not_set_the_scale_and_what_is_large_does() -> None:
     t = np.linspace(0, 20, 400)
     truth = np.sin(t)

@@ -65,13 +65,8 @@ def along_axes(table: dict[str, Any]) -> dict[str, Any]:
         for row in table.get("bond", ())
     ]
     weights = [(number[row["particle"], row["axis"]], row["force"]) for row in table.get("weight", ())]
-    fields = []
-    for row in table.get("magnetic", ()):
-        plane = {"x": "yz", "y": "zx", "z": "xy"}[row.get("axis", "z")]
-        one, other = (number[row["particle"], axis] for axis in plane)
-        fields += [(one, other, row["strength"]), (other, one, -row["strength"])]
     made = {"particle": apart, "spring": springs, "bond": bonds, "weight": weights}
-    return {**table, **made, "fields": fields}
+    return {**table, **made}
 
 
 class System:
@@ -120,7 +115,7 @@ class System:
         laws: list[Any] = [_Quartic(row) for row in self.table.get("quartic", ())]
         laws += [_Cosine(row) for row in self.table.get("cosine", ())]
         laws += [_Morse(row) for row in self.table.get("morse", ())]
-        laws += [_Driven(row, t) for key in ("drive", "modulated-spring") for row in self.table.get(key, ())]
+        laws += [_Driven(row, t) for row in self.table.get("drive", ())]
         laws += [_Bond(row) for row in self.table.get("bond", ())]
         springs, friction = self.springs(), self.friction()
         for order in range(ORDER):
@@ -131,8 +126,6 @@ class System:
                     force[i] -= sign * k * stretch
             for i, c in friction:
                 force[i] -= c * (order + 1) * u[i][order + 1]
-            for i, j, strength in self.table.get("fields", ()):
-                force[i] += mp.mpf(strength) * (order + 1) * u[j][order + 1]
             for law in laws:
                 law.add(u, order, force)
             for i in range(n):
@@ -222,22 +215,15 @@ class _Bond:
 
 
 class _Driven:
-    """A driving force, or a spring of modulated stiffness: the cosine by its own series about the time t."""
+    """A driving force: the cosine by its own series about the time t."""
 
     def __init__(self, row: dict[str, Any], t: Any) -> None:
         self.i, self.row = row["particle"], {name: mp.mpf(x) for name, x in row.items()}
         self.w, self.angle = self.row["frequency"], self.row["frequency"] * t + self.row.get("phase", 0)
-        self.x: list[Any] = []
-        self.k: list[Any] = []
 
     def add(self, u: Series, order: int, force: list[Any]) -> None:
         cosine = self.w**order * mp.cos(self.angle + order * mp.pi / 2) / mp.factorial(order)
-        if "amplitude" in self.row:
-            force[self.i] += self.row["amplitude"] * cosine
-            return
-        self.x.append(u[self.i][order] - (self.row.get("at", 0) if order == 0 else 0))
-        self.k.append(self.row["stiffness"] * ((order == 0) + self.row["depth"] * cosine))
-        force[self.i] -= _product(self.k, self.x, order)
+        force[self.i] += self.row["amplitude"] * cosine
 
 
 def moved(system: System, start: Any, t: Any, pieces: int, state: tuple[list[Any], list[Any]]) -> Any:

@@ -21,7 +21,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from springcheck.checks import experiments, laws, thermal
+from springcheck.checks import bath, experiments, laws
 from springcheck.checks.bench import Bench, Run
 from springcheck.checks.case import Case
 from springcheck.checks.check import DECADES, Check, over_pieces, shared
@@ -30,14 +30,13 @@ from springcheck.checks.motion import (
     angular_momentum,
     closed_form,
     frequency,
-    gyration,
     momentum,
     shadow_energy,
 )
 from springcheck.checks.record import energies, grid, line, start, times
 from springcheck.checks.requires import CONTRACTED, REQUIREMENTS
 from springcheck.checks.solver import tolerance, tolerance_bound
-from springcheck.checks.steps import BLIND, arithmetic, border, bridges, seldom_off, step_defect
+from springcheck.checks.steps import BLIND, arithmetic, bridges, seldom_off, step_defect
 from springcheck.errors import MethodError
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Limits, Trajectory, Verdict
@@ -53,7 +52,7 @@ __all__ = [
 
 CHECKS: tuple[Check, ...] = (
     start, times, grid, line, step_defect, arithmetic, closed_form, shadow_energy, frequency, momentum,
-    angular_momentum, gyration, border, drive, energies, tolerance,
+    angular_momentum, drive, energies, tolerance,
 )  # fmt: skip
 
 THOROUGH: tuple[Check, ...] = (
@@ -64,10 +63,10 @@ THOROUGH: tuple[Check, ...] = (
 
 ALL: tuple[Check, ...] = (*CHECKS, *THOROUGH)
 
-RANDOM: tuple[Check, ...] = (start, times, grid, energies, *thermal.DRAWN)
+RANDOM: tuple[Check, ...] = (start, times, grid, energies, *bath.DRAWN)
 """Checks of a thermostat's trajectory, to which no law of deterministic motion applies."""
 
-TELLING = frozenset(["identified", *(one.name for one in (*ALL, *thermal.DRAWN) if one.telling)])
+TELLING = frozenset(["identified", *(one.name for one in (*ALL, *bath.DRAWN) if one.telling)])
 """Checks that distinguish the scheme that a method claims from others; `identified` is of a file's states."""
 
 SPECIAL = frozenset(one.name for one in CHECKS if any(REQUIREMENTS[x].special for x in one.requires))
@@ -203,10 +202,8 @@ def not_exercised(scene: Scene) -> str:
     missing = [axis for axis, number in zip("xyz", moved, strict=True) if not number]
     facts = {
         f"ax{'e' if len(missing) > 1 else 'i'}s {' and '.join(missing)}": not missing,
-        "periodic boxes": bool(scene.box),
         "friction": bool(system.is_damped or scene.bath),
         "drives": system.is_driven,
-        "magnetic fields": "magnetic" in system.acting,
     }
     return f"Not exercised here: {', '.join(name for name, is_so in facts.items() if not is_so)}"
 

@@ -45,7 +45,7 @@ from springcheck.engines.registry import (
     unusable,
     while_here,
 )  # fmt: skip
-from springcheck.errors import MOST_LIKELY, MethodError, nearest, told
+from springcheck.errors import MOST_LIKELY, EngineError, MethodError, nearest, told
 from springcheck.physics.arrays import Arithmetic, Floats
 from springcheck.physics.scene import Scene
 
@@ -90,7 +90,7 @@ def load(name: str) -> Engine:
         try:
             said = _imported(found.version)
         except ImportError as error:
-            raise MethodError(f"engine {name!r}, {found.title}, cannot be imported: {told(error)}") from error
+            raise EngineError(f"engine {name!r}, {found.title}, cannot be imported: {told(error)}") from error
     if not isinstance(said, dict):
         kind = type(said).__name__
         raise MethodError(f"engine {name!r}: its version() returned {kind}, not a dict of names and versions")
@@ -326,8 +326,6 @@ def refusal(scene: Scene, label: Label) -> str | None:
         return f"{who} moves {moved}, not {PLURAL[scene.kind]}"
     if scene.places is not None and not engine(label.engine).any_axis:
         return f"{engine(label.engine).title} is given particles along x here, and the scene has other axes"
-    if scene.box is not None and not engine(label.engine).periodic:
-        return f"{engine(label.engine).title} is given no periodic box here"
     unknown = (term for term in scene.terms if not (term.kind == "potential" and ANY_POTENTIAL in what.terms))
     missing = sorted({term.key for term in unknown} - what.terms)
     if missing:

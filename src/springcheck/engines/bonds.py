@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TypeAlias
 
 import numpy as np
@@ -46,13 +47,6 @@ def origins(scene: Scene, scheme_name: str) -> Floats:
         u = (scene.q[term.b] - scene.q[term.a]) * np.sign(term.rest)
         safe = (term.rest == 0) | ((u > 0) & (0.5 * term.k * term.rest**2 > 1.01 * energy[group[term.a]]))
         turning[group[term.a[~safe]]] = True
-    if scene.box is not None:
-        _within_half(scene, [t for t in of_length if isinstance(t, WallSpring | Spring)], energy[group])
-        reach = float(scene.system.energy(scene.q, scene.p)) * (2 + hw) / (2 - hw) if bounded else np.inf
-        # a single bond may have all of the energy
-        for one in (x for x in scene.terms if isinstance(x, RadialSpring)):
-            longest = one.rest + np.sqrt(2 * reach / np.abs(one.k))
-            _shorter(scene, one, longest, np.full(len(one), min(scene.box)))
     rest = scene.system.rest_positions if np.any(turning) else np.zeros(scene.n)
     others = (t for t in scene.terms if t.bodies == 2 and not isinstance(t, Spring))
     if rest is None or any(np.any(turning[group[t.particles[0]]]) for t in others):
@@ -69,42 +63,15 @@ def gains_nothing(scene: Scene, *others: str) -> bool:
     return all(t.key in known and np.all(getattr(t, t.columns[0].field) >= 0) for t in scene.terms)
 
 
-def _within_half(scene: Scene, springs: list[WallSpring | Spring], energy: Floats) -> None:
-    """MethodError where a spring may reach half of the box, by the energy at each particle (n,)."""
-    for term in springs:
-        first = term.particles[0]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            most = np.sqrt(2.02 * energy[first] / term.k)
-        most = most + (np.abs(term.rest) if isinstance(term, Spring) else 0.0)
-        _shorter(scene, term, most, scene.periods[first])
-
-
-def _shorter(scene: Scene, term: Term, most: Floats, box: Floats) -> None:
-    """MethodError where a row of a term, of length up to `most` (s,), reaches half of the box (s,)."""
-    short = most < box / 2
-    if np.all(short):
-        return
-    worst = int(np.argmax(np.where(short, 0.0, most / box)))
-    ends = [divmod(int(scene.all_places[of[worst]]), 3) for of in term.particles]
-    a, b = ends[0][0], ends[-1][0]
-    who = (
-        f"{term.key} of particles {a} and {b}" if len(ends) == 2 else f"spring from the wall to particle {a}"
-    )
-    axis = "every axis" if term.key == "bond" else "xyz"[ends[0][1]]
-    enough = f"a box of {2.02 * most[worst]:.3g} along {axis} is enough for it"
-    raise MethodError(
-        f"{scene.name}: the {who} may become as long as half of the box, {box[worst] / 2:.3g} "
-        f"along {axis}, and turn over; "
-        + (enough if np.isfinite(most[worst]) else "nothing bounds it with this method and step")
-        + "; own:velocity-verlet takes any length"
-    )
-
-
-def cells(scene: Scene, origins: Floats) -> Floats:
-    """Periods of the box by which each position, counted from its origin, lies outside the box (n,)."""
-    if scene.box is None:
-        return np.zeros(scene.n)
-    return np.asarray(np.floor((scene.q - origins) / scene.periods))
+@np.errstate(over="ignore")
+def within(label: Label, sizes: Iterable[tuple[float, str, float, float]]) -> None:
+    """MethodError where a number (least, its name, number, most) is none that an engine computes with."""
+    for lowest, what, size, highest in sizes:
+        if not lowest <= size <= highest:
+            raise MethodError(
+                f"{label}: a {what} of {size:.3g} is outside what it computes with, {lowest:.3g} to "
+                f"{highest:.3g}; the scene in other units, its numbers nearer to 1, is inside"
+            )
 
 
 def rests(scene: Scene, label: Label) -> Floats:

@@ -63,7 +63,6 @@ LOOKS = {
     "velocity-verlet": Look(_GREEN, LONG),
     "position-verlet": Look(_GREEN, DOTTED),
     "respa8": Look(_GREEN, DASH_DOT),
-    "boris": Look(_GREEN, DASHED),
     "langevin-middle": Look(_SKY, DASHED),
     "langevin-middle-early": Look(_SKY, DOTTED),
     "implicit-midpoint": Look(_SKY, SOLID),

@@ -79,14 +79,6 @@ class BondTable(SceneTable, frozen=True):
     rest: NonNegative = 0.0
 
 
-class MagneticTable(SceneTable, frozen=True):
-    """A magnetic field along `axis`, its strength charge times field [M/T]: force strength (v_y, -v_x)."""
-
-    particle: int
-    strength: float
-    axis: Axis = "z"
-
-
 class WaveTable(SceneTable, frozen=True):
     """One standing wave of a chain: mode number (1 is the slowest) and amplitude [L]."""
 
@@ -116,12 +108,6 @@ class TimeTable(SceneTable, frozen=True):
     steps: Count
     every: Count | None = None
     tolerance: Annotated[float, msgspec.Meta(gt=0, lt=1)] = 1e-12
-
-
-class BoxTable(SceneTable, frozen=True):
-    """A periodic box: its length [L], or one for each of x, y and z."""
-
-    lengths: Positive | Annotated[tuple[Positive, ...], msgspec.Meta(min_length=3, max_length=3)]
 
 
 class BathTable(SceneTable, frozen=True):
@@ -175,8 +161,6 @@ class SceneBase(SceneTable, frozen=True):
     chain: ChainTable | None = None
     spring: tuple[SpringTable, ...] = ()
     bond: tuple[BondTable, ...] = ()
-    magnetic: tuple[MagneticTable, ...] = ()
-    box: BoxTable | None = None
     bath: BathTable | None = None
     methods: MethodsTable = MethodsTable()
     record: RecordTable = RecordTable()
@@ -211,7 +195,7 @@ def identifier(name: str) -> str:
     return name.replace("-", "_")
 
 
-OWN_TABLES = ("wall-spring", "spring", "magnetic", "bond")
+OWN_TABLES = ("wall-spring", "spring", "bond")
 """Keys of the terms with tables of their own."""
 
 
