@@ -30,12 +30,7 @@ from springcheck.physics.bath import Bath
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Spring, WallSpring
 from springcheck.physics.trajectory import Trajectory, of_scene
-<<<<<<< HEAD
-=======
-from springcheck.studies.faults import baths
->>>>>>> main
 from springcheck.studies.run import measure
-from textbook import Fault
 
 LABELS = [
     f"{name}:{method}"

@@ -15,11 +15,7 @@ from springcheck.physics.scene import Scene
 
 if TYPE_CHECKING:
     from springcheck.studies.extremes.result import Atlas
-<<<<<<< HEAD
-=======
-    from springcheck.studies.faults.result import FaultReport
     from springcheck.studies.precision.longtime import LongTime
->>>>>>> main
     from springcheck.studies.precision.result import PrecisionStudy
     from springcheck.studies.sampling.result import Sampling
     from springcheck.studies.stability.result import Stability
