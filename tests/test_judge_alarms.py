@@ -12,6 +12,7 @@ import pytest
 
 import clean
 import springcheck
+import textbook as steppers
 from springcheck import checks, driver, engines, schemes
 from springcheck.physics import exact
 from springcheck.physics.arrays import Arithmetic, Floats
