@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import KW_ONLY, dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,8 +14,12 @@ from springcheck.errors import MethodError
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Outcome, Trajectory, of_scene
-from springcheck.studies.keeper import Draft, attributes
-from springcheck.studies.run.result import FAULT
+
+if TYPE_CHECKING:
+    from springcheck.studies.keeper import Draft
+
+FAULT = "fault"
+"""Engine name in the labels of engines broken on purpose."""
 
 MOST_NUMBERS = 10**7
 """Most steps times particles of a run with a fault: Python loops record it in memory."""
@@ -149,6 +153,8 @@ class Broken:
 
     def play(self, scene: Scene, draft: Draft) -> None:
         """Record it.  MethodError where it does not apply to the scene."""
+        from springcheck.studies.keeper import attributes
+
         option = f"--fault {self.fault.name}"
         if scene.bath is not None:
             raise MethodError(f"{option}: it needs a scene without a heat bath")

@@ -26,7 +26,8 @@ from springcheck.studies import keeper
 from springcheck.studies.arguments import Progress
 from springcheck.studies.choose import LeftOut, choose
 from springcheck.studies.run.changes import changed
-from springcheck.studies.run.result import FAULT, Repeat, Repeats, Report, Stored
+from springcheck.studies.run.faulty import FAULT
+from springcheck.studies.run.result import Repeat, Repeats, Report, Stored
 from springcheck.studies.run.tally import Tally, line
 
 if TYPE_CHECKING:
