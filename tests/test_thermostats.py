@@ -70,7 +70,7 @@ def test_a_thermostat_passes_its_checks_and_says_its_seed(label: str) -> None:
 def test_numbers_do_not_depend_on_how_many_steps_are_asked_for_at_once(name: str) -> None:
     scene, label = pair(steps=60), Label(engine="own", method=name)
     whole = driver.run(scene, label, seed=3)
-    simulation = engines.start(scene, label, 3)
+    simulation = engines.Started(scene, label, 3)
     q, p = np.empty((2, 60, 2))
     for row in range(0, 60, 4):
         simulation.advance(1, q[row : row + 4], p[row : row + 4])

@@ -112,7 +112,7 @@ def foreign(name: str, what: str, file: str = "") -> Iterator[None]:
     """
     before = interrupts.ended_by(name)
     if before:
-        raise MethodError(f"{what}: {before}")
+        raise EngineError(f"{what}: {before}")
     process = os.getpid()
     interrupts.calling(name)
     try:
