@@ -31,7 +31,6 @@ from springcheck.cli import listing
 from springcheck.engines.own import simulation
 from springcheck.errors import SpringcheckError
 from springcheck.physics import scenefile
-from springcheck.studies import workers
 from springcheck.studies.run import measure as session
 
 ROOT = Path(__file__).parents[1]
@@ -574,58 +573,6 @@ def test_a_signal_that_the_shell_has_ignored_stays_ignored() -> None:
         assert process.stdout.readline() == "ready\n"
         process.send_signal(signal.SIGINT)
         assert process.communicate(timeout=30)[0] == "went on\n"
-
-
-def doubled(number: int) -> int:
-    return 2 * number
-
-
-def failing() -> int:
-    raise SpringcheckError("a part went wrong")
-
-
-def test_workers_carry_out_every_part_once() -> None:
-    parts = [partial(doubled, i) for i in range(9)]
-    assert sorted(workers.carried_out(parts, 1)) == sorted(workers.carried_out(parts, 2))
-    with pytest.raises(SpringcheckError, match="a part went wrong"):
-        list(workers.carried_out([failing, *parts], 2))
-
-
-def test_a_worker_that_dies_is_an_error() -> None:
-    with pytest.raises(SpringcheckError, match="exit status 7"):
-        list(workers.carried_out([partial(os._exit, 7), partial(doubled, 1)], 2))
-
-
-def test_workers_of_a_program_without_a_file_are_refused_in_one_line() -> None:
-    """Each would run the program again, and end as it looks for the file "<stdin>"."""
-    code = (
-        "import operator\nfrom functools import partial\nfrom springcheck.studies import workers\n"
-        "from springcheck.errors import SpringcheckError\n"
-        "try:\n    list(workers.carried_out([partial(operator.add, 1, 2)] * 3, 2))\n"
-        "except SpringcheckError as error:\n    print(error)\n"
-    )
-    done = subprocess.run(
-        [sys.executable, "-"], input=code, capture_output=True, text=True, check=False, timeout=60
-    )
-    assert (done.returncode, done.stderr) == (0, "")
-    assert "need the program as a file, which <stdin> is not" in done.stdout
-
-
-@posix
-def test_a_worker_that_dies_before_it_reads_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Then the system resets the connection instead of closing it."""
-    monkeypatch.setattr(workers, "_work", os._exit)
-    with pytest.raises(SpringcheckError, match="a worker process has ended by itself"):
-        list(workers.carried_out([partial(len, "x" * 10**7)] * 2, 2))
-
-
-@posix
-def test_workers_end_when_they_are_left() -> None:
-    found = workers.carried_out([partial(time.sleep, 600), partial(doubled, 1), partial(doubled, 2)], 2)
-    next(found)
-    began = time.process_time()
-    found.close()
-    assert time.process_time() - began < 60
 
 
 LIMITED = {
