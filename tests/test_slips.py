@@ -357,7 +357,7 @@ def test_run_says_which_methods_its_step_is_too_long_for(
     main([*arguments, "--method", "own:implicit-euler", "-o", str(tmp_path / "a.h5")])
     said = capsys.readouterr().out
     assert "h = 0.347 is beyond the limit of r-RESPA" in said
-    assert " here, 0.3468: own:respa8" in said
+    assert " here, 0.34679839: own:respa8" in said
     main(["run", "spring", "--method", "own:euler", "-o", str(tmp_path / "b.h5")])
     assert "beyond" not in capsys.readouterr().out
 

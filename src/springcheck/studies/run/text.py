@@ -17,7 +17,7 @@ from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Comparison, Verdict
 from springcheck.studies.run.tally import MethodRun
 from springcheck.studies.text import of_energy
-from springcheck.text.lines import Lines, Row, Text, TextTable, plain, table
+from springcheck.text.lines import Lines, Row, Text, TextTable, hanging, plain, table
 from springcheck.text.wording import number, rounded_down, seconds
 
 if TYPE_CHECKING:
@@ -201,7 +201,7 @@ def sights(verdicts: Sequence[Verdict]) -> Lines:
             best, worst = (how(known, key=known.__getitem__) for how in (min, max))
             said = f"Smallest detectable {quantity} error: {known[best]:.1e} ({best})"
             said += f" to {known[worst]:.1e} ({worst})" if worst != best else ""
-            out.append(plain(said, "dim"))
+            out += hanging("", said)
     return out
 
 
