@@ -20,7 +20,7 @@ import numpy as np
 from springcheck.errors import StoreError
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
-from springcheck.store import access, digests, files, layout, seal
+from springcheck.store import access, apart, digests, files, layout, records
 from springcheck.store.access import Scalar
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ class Draft:
         self._text = scene.to_toml()
         if len(self._text) > access.LONGEST_TEXT:
             raise StoreError(
-                f"{path}: the scene's text has {len(self._text) / 1e6:.0f} MB, and stores keep "
+                f"{path}: the scene's text has {len(self._text) / 1e6:.0f} MB, and stores hold at most "
                 f"{access.LONGEST_TEXT / 1e6:.0f}: take fewer particles, or join alike ones to a [chain]"
             )
         self.path, self.label, self.scene, self.sequence, self.run = path, label, scene, sequence, run
@@ -120,6 +120,7 @@ class Draft:
                 self._shorten()
             digest = self._complete(attributes)
             files.put(self._temporary, self.path)
+            apart.know(self.path)
         return digest
 
     def _create(self, frames: int) -> None:
@@ -174,20 +175,18 @@ class Draft:
             self._create(self.rows)
             with long.open("rb") as source:
                 for name, column in self._columns.items():
-                    for block in seal.blocks(source, offsets[name], column.size):
+                    for block in digests.blocks(source, offsets[name], column.size):
                         self._put(name, memoryview(block))
             self._close()
 
     def _complete(self, attributes: Mapping[str, Scalar | None]) -> str:
         found = {name: total.hexdigest() for name, total in self._hash.items()}
         digest = digests.combined(found, self._columns)
-        now = datetime.now(UTC).isoformat(timespec="seconds")
         given = {name: value for name, value in attributes.items() if value is not None}
         text = 8 * sum(len(str(value)) for value in [*given.values(), self._text])
         with layout.reopened(self._temporary, text) as file:
             layout.begin(file)
-            layout.write_attributes(file, {"part": self.label})
-            parameters = file.create_group(f"parameters/{self.label}")
+            layout.write_attributes(file, {"run": self.run})
             known: dict[str, Scalar] = {
                 "scene": self._text,
                 "scene_name": self.scene.name,
@@ -198,17 +197,14 @@ class Draft:
                 **({} if self.scene.places is None else {"axes": layout.axes_of(self.scene)}),
                 "quantities": " ".join(n for n in layout.QUANTITIES if n in self._columns),
                 "sequence": self.sequence,
-                "finished": now,
+                "finished": datetime.now(UTC).isoformat(timespec="seconds"),
                 "sha256": digest,
             }
-            layout.write_attributes(parameters, {**layout.machine(), **given, **known})
+            parameters = file.create_group(f"parameters/{self.label}")
+            layout.write_attributes(parameters, {**records.machine(), **given, **known})
             for name, column in self._columns.items():
                 layout.write_attributes(file[column.path], {"sha256": found[name]})
-        extents = [
-            seal.Extent(name=column.path, offset=self._offsets[name], size=column.size, sha256=found[name])
-            for name, column in self._columns.items()
-        ]
-        seal.attach(self._temporary, extents, self.run)
+            digests.write(file)
         return digest
 
     def _close(self) -> None:
