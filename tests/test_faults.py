@@ -32,7 +32,7 @@ def result(fault: Fault) -> Result:
     return examine(fault, limits=False)
 
 
-@pytest.mark.campaign("fault.caught_by")
+@pytest.mark.campaign
 @pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.name)
 def test_a_fault_is_rejected_by_every_check_that_must_reject_it(fault: Fault) -> None:
     passed = trial.probe(fault)

@@ -322,27 +322,6 @@ def test_one_particle_is_drawn_beside_the_others_figures(
     assert "particles 0 to 2" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("fields", [("a",), ("a", "b")])
-def test_a_cell_of_an_ensemble_that_explodes_does_not_set_its_scale(fields: tuple[str, ...]) -> None:
-    from types import SimpleNamespace
-
-    from springcheck.studies.ensemble import page
-
-    x = np.arange(1.0, 7.0)
-    for error in ([1e-3, 1e-2, 0.1, 1.0, 1e107, 1e300], [-1.0, 0.0, 1e-9, 1.0, 1e107, 1e300]):
-        cells = {"max_error": np.array(error), **dict.fromkeys(fields, x)}
-        found: Any = SimpleNamespace(
-            fields=fields, grid=True, path=Path("a.h5"), scene=scenefile.load_scene("spring"),
-            tallies=[SimpleNamespace(method="own:euler")], of=lambda method, cells=cells: cells,
-        )  # fmt: skip
-        (bank,) = page.banks(found, quantity="max_error")
-        assert "Mass on a spring: largest error over a" in bank.heading
-        picture = render.picture(bank)
-        picture.draw_without_rendering()
-        limits = [axes.get_ylim()[1] for axes in picture.axes]
-        assert len(fields) == 2 or error[0] < 0 or max(limits) <= 1e3
-
-
 def test_a_coarse_atlas_has_no_gaps_between_its_cells() -> None:
     from springcheck.studies.extremes import page
 
@@ -690,9 +669,3 @@ def test_energies_beyond_double_precision_are_drawn_without_a_warning() -> None:
     scene = scenefile.load_scene("multiple-time-steps")
     found = runs(scene, "own:velocity-verlet")
     assert of_runs(scene, found, found)
-
-
-def test_members_of_a_family_have_titles_of_their_own() -> None:
-    family = [looks.title(f"baoab-respa{count}") for count in (2, 3, 4)]
-    assert len({*family}) == 3
-    assert looks.title("boaob") == "BOAOB"

@@ -38,7 +38,7 @@ NAMES = {"velocity-verlet": "velocity Verlet", "rk4": "classical Runge-Kutta (RK
          "position-verlet": "position Verlet"}  # fmt: skip
 
 
-@pytest.mark.campaign("name", "damped")
+@pytest.mark.campaign
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("damped", [True, False])
 def test_amplitude_frequency_phase_and_scheme_of_a_drive_are_said(name: str, damped: bool) -> None:

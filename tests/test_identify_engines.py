@@ -38,7 +38,7 @@ def run(scene: str, label: str, every: int, tolerance: float = 1e-12) -> tuple[T
     return made, identify(made.t, made.q, made.p, mass=chosen.m)
 
 
-@pytest.mark.campaign("precision", "method")
+@pytest.mark.campaign
 @pytest.mark.parametrize("precision", PRECISIONS)
 @pytest.mark.parametrize("method", SCHEMES_OF)
 def test_openmm_on_a_gpu_type_platform_is_named_with_its_arithmetic(

@@ -15,8 +15,7 @@ from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Quartic, Spring, WallSpring
 
 PLACE = {
-    "nose-hoover": "before", "nose-hoover-fourth": "before", "nose-hoover-middle": "amid", "bussi": "before",
-    "bussi-unsigned": "before", "bussi-after": "after",
+    "bussi": "before", "bussi-unsigned": "before", "bussi-after": "after",
 }  # fmt: skip
 
 
@@ -66,13 +65,13 @@ def test_draws_of_each_particle_are_no_factor(name: str, n: int, step: float) ->
 
 
 def test_two_baths_and_a_force_that_is_not_linear_are_none() -> None:
-    first, other = (driver.run(particles(1), "own:nose-hoover", seed=4), particles(2))
-    second = driver.run(replace(particles(1), q=np.array([0.7])), "own:nose-hoover", seed=4)
+    first, other = (driver.run(particles(1), "own:bussi", seed=4), particles(2))
+    second = driver.run(replace(particles(1), q=np.array([0.7])), "own:bussi", seed=4)
     q, v = (np.column_stack([getattr(x, y) for x in (first, second)]) for y in "qp")
     assert one_factor(other.step, q, v / 3.7) is None
     bent = Quartic(i=np.arange(2), b=np.array([1.5, 2.0]), at=np.zeros(2))
     scene = replace(other, terms=(*other.terms, bent))
-    run = driver.run(scene, "own:nose-hoover", seed=4)
+    run = driver.run(scene, "own:bussi", seed=4)
     assert one_factor(scene.step, run.q, run.p / scene.m) is None
     # two particles that move alike say no more than one
     assert one_factor(other.step, *(np.repeat(x, 2, axis=1) for x in (first.q, first.p / 3.7))) is None
@@ -80,14 +79,9 @@ def test_two_baths_and_a_force_that_is_not_linear_are_none() -> None:
 
 def test_identify_says_that_all_momenta_have_one_factor() -> None:
     scene = particles(3, steps=500)
-    chain = springcheck.identify(driver.run(scene, "own:nose-hoover", seed=4), mass=scene.m)
-    assert chain.statement.startswith("One factor a step multiplies the momenta of all 3 coordinates, before")
-    assert (chain.verdict, chain.fits, chain.candidates) == ("none", False, ())
     rescaled = springcheck.identify(driver.run(scene, "own:bussi", seed=4), mass=scene.m)
+    assert rescaled.statement.startswith("One factor a step multiplies the momenta of all 3 coordinates, bef")
     assert [x.scheme for x in rescaled.candidates] == ["bussi", "bussi-unsigned"]
-    alone = particles(1, steps=500)
-    found = springcheck.identify(driver.run(alone, "own:nose-hoover", seed=4), mass=alone.m)
-    assert "shows in two particles or more" in found.explanations[0].remedy
 
 
 @pytest.mark.parametrize("name", ["orbit", "periodic-box"])

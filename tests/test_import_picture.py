@@ -27,7 +27,7 @@ STUDIES = sorted(path.parent.name for path in HOME.glob("studies/*/__init__.py")
 HOMES = {
     "h5py": ("store",),
     "matplotlib": ("plot.py", "cli/drawing.py", "figures"),
-    "openmm": tuple(f"engines/openmm/{name}.py" for name in ("simulation", "thermostats", "variable")),
+    "openmm": tuple(f"engines/openmm/{name}.py" for name in ("simulation", "thermostats")),
     "ase": ("engines/ase/simulation.py", "formats/libraries.py"),
     "sksundae": ("engines/sundials/simulation.py",),
     "numba": ("engines/own",),
@@ -101,7 +101,7 @@ def test_a_run_without_a_bath_imports_no_law_of_noise(tmp_path: Path) -> None:
     script = f"import sys\nfrom springcheck.cli import main\nmain({lines})\nprint(*sys.modules, sep='\\n')"
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     loaded = {name for name in done.stdout.splitlines() if name.startswith("springcheck.thermal.")}
-    assert loaded == {f"springcheck.thermal.{name}" for name in ("catalogue", "chain", "decays")}
+    assert loaded == {f"springcheck.thermal.{name}" for name in ("catalogue", "decays")}
 
 
 def test_the_keeper_alone_of_the_studies_knows_the_store() -> None:

@@ -128,7 +128,7 @@ def test_an_engine_that_counts_displacements_from_the_start_says_so(name: str) -
     assert judged(share=1 + 1e-11) != []
 
 
-@pytest.mark.campaign("well", "name")
+@pytest.mark.campaign
 @pytest.mark.parametrize("name", FIXED)
 @pytest.mark.parametrize("well", WELLS)
 def test_a_force_between_the_recorded_states_is_weighed_where_the_scheme_takes_it(

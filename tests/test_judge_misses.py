@@ -282,7 +282,7 @@ def test_more_joined_particles_than_have_tangent_matrices_are_judged_by_tangent_
     assert exact < many < 4 * exact
 
 
-@pytest.mark.campaign("name", "every")
+@pytest.mark.campaign
 @EXTENDED
 @pytest.mark.parametrize("name", ["velocity-verlet", "rk4", "implicit-midpoint"])
 @pytest.mark.parametrize("every", [20, 700])
@@ -297,7 +297,7 @@ def test_a_step_is_judged_as_sharply_between_frames_far_apart_as_by_itself(name:
     assert failed(scene(2.9), plain(scene(2.9), name, scene(2.9 * (1 + 1.2e-14)))) != []
 
 
-@pytest.mark.campaign("name", "wander")
+@pytest.mark.campaign
 @pytest.mark.parametrize("name", ["semi-implicit-euler", "rk4", "implicit-euler"])
 @pytest.mark.parametrize("wander", [0.3, 3e-5, 1e-6])
 def test_roundings_to_one_side_at_every_step_are_no_fault(name: str, wander: float) -> None:

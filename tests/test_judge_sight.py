@@ -56,7 +56,7 @@ SCENES: dict[str, Scene] = {
 }  # fmt: skip
 
 
-@pytest.mark.campaign("where", "name")
+@pytest.mark.campaign
 @pytest.mark.parametrize("name", ["semi-implicit-euler", "velocity-verlet", "rk4", "implicit-euler"])
 @pytest.mark.parametrize("where", SCENES)
 def test_three_limits_fail_and_a_tenth_of_one_passes(where: str, name: str) -> None:

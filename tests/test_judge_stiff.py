@@ -69,7 +69,7 @@ FAULTS: dict[str, Callable[[Floats], list[float] | Floats]] = {
 }
 
 
-@pytest.mark.campaign("name", "ratio")
+@pytest.mark.campaign
 @pytest.mark.parametrize("name", forms.THETA)
 @pytest.mark.parametrize("ratio", [1e6, 1e7, 1e8, 1e9, 1e10])
 def test_the_momenta_of_a_stiff_pair_are_judged(name: str, ratio: float) -> None:
@@ -88,7 +88,7 @@ def test_the_momenta_of_a_stiff_pair_are_judged(name: str, ratio: float) -> None
         assert found.value > 1e3 * found.bound, fault
 
 
-@pytest.mark.campaign("name", "form")
+@pytest.mark.campaign
 @pytest.mark.parametrize("name", forms.THETA)
 @pytest.mark.parametrize("form", WRITTEN)
 def test_every_way_to_write_an_implicit_step_of_a_stiff_pair_passes(name: str, form: str) -> None:

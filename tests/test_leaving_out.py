@@ -100,7 +100,7 @@ def test_a_run_in_a_pipe_draws_no_text_and_a_small_one_imports_what_it_needs(
     # numpy.unique imports masked arrays, 8 ms
     assert not found & {"rich", "numpy.ma"}
     ours = {name.removeprefix("springcheck.") for name in found}
-    assert not ours & {"studies.ensemble.vary", "studies.tables", "studies.stability.longest", "identify"}
+    assert not ours & {"studies.tables", "studies.stability.longest", "identify"}
     assert "store.journal" in ours
 
 

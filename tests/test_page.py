@@ -308,7 +308,7 @@ def test_a_long_run_is_thinned_and_says_so(tmp_path: Path) -> None:
 # studies
 
 
-NAMES = ("precision", "stability", "extremes", "census", "ensemble", "faults", "sampling")
+NAMES = ("precision", "stability", "extremes", "census", "faults", "sampling")
 FEW = tuple(fault for fault in FAULTS if fault.name in {"friction", "cut-off"})
 
 
@@ -323,7 +323,6 @@ def studies(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
         "extremes": ["extremes", "--quick", "--method", "own:semi-implicit-euler"],
         "census": ["census", *methods],
         "sampling": ["sampling", "--method", "own:baoab"],
-        "ensemble": ["ensemble", "spring", "--vary", "time.step=0.01:1:5:log", *methods],
     }
     for name, call in calls.items():
         with pytest.MonkeyPatch.context() as patch:
@@ -484,9 +483,7 @@ def test_every_scheme_of_one_particle_is_computed_again(
     content = page.gather(tmp_path / "a.h5")
     found, said = _checked(opened(content))
     assert found == "equal", said
-    # the length of its steps is a rule's, and its error is not that of a tolerance
-    left = {x["label"] for x in content.data["runs"] if x["scheme"] == "variable-verlet"}
-    assert said.partition("not computed again here: ")[2] == ", ".join(left)
+    assert "not computed again" not in said
     # a shift of a thousandth is seen in every one of them, in most a far smaller one
     runs = json.loads(json.dumps(content.data["runs"]))
     for run in runs:
@@ -496,7 +493,7 @@ def test_every_scheme_of_one_particle_is_computed_again(
     unseen = {
         x["label"] for x in runs if not re.search(rf"{re.escape(x['label'])} (differs first|is not) ", said)
     }
-    assert unseen == left
+    assert not unseen
 
 
 def test_counts_and_verdicts_that_were_changed_are_told(
@@ -776,30 +773,4 @@ def test_a_study_is_drawn(studies: dict[str, Path], opened: Any, name: str) -> N
     chromium.key("ArrowRight")
     said = chromium.run(f"document.querySelector('#{name}-0 .reading').textContent").strip()
     assert said
-    assert chromium.said == []
-
-
-def test_a_file_that_is_dropped_is_named_and_goes_nowhere(
-    content: page.Content, opened: Any, spring: Path
-) -> None:
-    chromium = opened(content)
-    run = store.read(spring)["own:velocity-verlet"]
-    rows = [",".join(map(repr, map(float, row))) for row in zip(run.t, run.q[:, 0], run.p[:, 0], strict=True)]
-    said = 'document.getElementById("dropped").textContent'
-    for name, text, found in (
-        ("it's mine.csv", "\n".join(["t,q,v", *rows]), "Velocity Verlet, h ω = 0.1: all 201 frames are its"),
-        ("prime.csv", "\n".join(["t,x,x'", *rows]), "Velocity Verlet, h ω = 0.1: all 201 frames are its"),
-        ("few.csv", "t,q,v\n0,1,2", "Twelve or more rows"),
-    ):
-        script = (
-            "const kept = new DataTransfer();"
-            f"kept.items.add(new File([{json.dumps(text)}], {json.dumps(name)}));"
-            'document.getElementById("yours").dispatchEvent(new DragEvent("drop", {dataTransfer: kept}));'
-            "return new Promise((done) => setTimeout(done, 300));"
-        )
-        chromium.run(f"(() => {{ {script} }})()")
-        assert found in chromium.run(said)
-    ask = 'document.getElementById("ask").textContent'
-    assert chromium.run(ask) == "springcheck identify 'few.csv'"
-    assert chromium.asked == [chromium.run("location.href")]
     assert chromium.said == []

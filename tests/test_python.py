@@ -126,8 +126,6 @@ def test_messages_speak_of_arguments_and_not_of_options() -> None:
     with pytest.raises(StoreError, match=r"x\.h5 exists: force=True writes it anew, path= writes another"):
         springcheck.run("spring", "own:euler", path="x.h5")
     springcheck.run("spring", "own:euler", path="x.h5", force=True)
-    with pytest.raises(SpringcheckError, match="needs vary= FIELD=LOW:HIGH"):
-        springcheck.ensemble("spring", {})
 
 
 def test_a_method_that_is_not_one_is_answered_with_the_nearest() -> None:
@@ -161,14 +159,6 @@ def test_every_study_has_a_function_whose_result_shows_itself() -> None:
     assert limits.figures()
     census = shown(springcheck.census(two), "Census")
     assert list(census["found"]) == ["explicit-euler", "velocity-verlet"]
-    cells = springcheck.ensemble("spring", {"spring.0.stiffness": [1, 4], "time.step": "0.05:0.1:3"}, two)
-    table = shown(cells, "Ensemble")
-    assert len(table) == 12
-    wide = table[(table["method"] == two[1]) & (table["spring.0.stiffness"] == 4)]
-    # the same number of steps: error h**2 over a time that grows with h
-    small, large = (float(wide[wide["time.step"] == h]["max_error"].iloc[0]) for h in (0.05, 0.1))
-    assert 7 < large / small < 9
-    assert cells.figures()
     assert list(Path().iterdir()) == []
 
 
@@ -340,18 +330,12 @@ def test_wrong_arguments_are_answered_in_words() -> None:
         (lambda: springcheck.identify(""), "the path of a file is needed"),
         (lambda: springcheck.explain(5), "word = 5: a text"),
         (lambda: springcheck.compare(scene, 5), "a Trajectory is needed, not int"),
-        (lambda: springcheck.ensemble(scene, 5, "own:rk4"), "vary: a dict of fields and values is needed"),
         (lambda: springcheck.chain(3, k="x"), "k: real numbers"),
         (lambda: springcheck.chain(3, waves=5), "pairs of a mode and an amplitude are needed"),
         (lambda: springcheck.chain(3, waves=[1]), "pairs of a mode and an amplitude are needed"),
         (lambda: springcheck.simulate(scene, lambda q, p, h, force, mass: (q + 1j, p)), "real numbers"),
         (lambda: springcheck.precision(scene, "own:rk4", workers=0), "number of processes"),
         (lambda: springcheck.precision(scene, "own:rk4", budget="a"), "budget = 'a': a number"),
-        (lambda: springcheck.ensemble(scene, {"time.step": ["a"]}, "own:rk4"), "real numbers"),
-        (
-            lambda: springcheck.ensemble(scene, {"time.step": "1:2"}, samples=2, seed=-1),
-            "whole number, 0 or more",
-        ),
     ):
         with pytest.raises(SpringcheckError, match=words):
             call()

@@ -1,18 +1,16 @@
-"""Reference, help and completion say what the code knows."""
+"""Reference and help say what the code knows."""
 
 from __future__ import annotations
 
 import json
 import re
 import shlex
-import subprocess
 from pathlib import Path
 
 import pytest
 
 import reference
 from springcheck.cli import main
-from springcheck.physics import scenefile
 
 HOWTO = Path(__file__).parents[1] / "validation" / "howto.md"
 
@@ -36,29 +34,6 @@ def test_the_doctor_names_versions_arithmetic_and_what_is_missing(capsys: pytest
     said = capsys.readouterr().out
     assert said.count("  missing  ") == len(missing)
     assert "  ok       own" in said
-
-
-def completed(script: str, *words: str) -> set[str]:
-    """What bash offers for the last of these words."""
-    line = " ".join(f"'{word}'" for word in words)
-    ask = f"{script}\nCOMP_WORDS=({line}); COMP_CWORD={len(words) - 1}; _springcheck; echo ${{COMPREPLY[@]}}"
-    done = subprocess.run(["bash", "-c", ask], capture_output=True, text=True, check=True)
-    assert done.stderr == ""
-    return set(done.stdout.split())
-
-
-def test_bash_completes_commands_options_scenes_and_methods(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["completion", "bash"]) == 0
-    script = capsys.readouterr().out
-    assert completed(script, "springcheck", "prec") == {"precision"}
-    assert completed(script, "springcheck", "run", "spring") == {
-        name for name in scenefile.names() if name.startswith("spring")
-    }
-    assert completed(script, "springcheck", "run", "--tho") == {"--thorough"}
-    assert "own:verlet" not in completed(script, "springcheck", "run", "spring", "--method", "openmm:v")
-    assert "openmm:verlet" in completed(script, "springcheck", "run", "spring", "--method", "openmm:v")
-    assert main(["completion", "zsh"]) == 0
-    assert capsys.readouterr().out.startswith("autoload")
 
 
 def test_the_python_of_the_how_tos_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

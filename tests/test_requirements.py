@@ -94,7 +94,7 @@ def test_traits_are_those_of_the_textbooks() -> None:
         return {name for name, scheme in SCHEMES.items() if scheme.has(trait)}
 
     assert named("implicit") == {"implicit-euler", "implicit-midpoint", "trapezoidal"}
-    assert named("adaptive") == {"adams", "bdf", "ida", "variable-verlet"}
+    assert named("adaptive") == {"adams", "bdf", "ida"}
     assert named("flow") == {"exact"}
     assert named("mixes") == {"respa8"}
     assert named("friction") == {"langevin-middle", "langevin-middle-early"}

@@ -80,7 +80,7 @@ def test_right_engines_pass_every_check_of_a_dumbbell(label: str, need: Need) ->
     assert {v.check for v in thorough if v.passed} >= {"mirror", "repeatability"}
 
 
-@pytest.mark.campaign("label")
+@pytest.mark.campaign
 @pytest.mark.parametrize("label", RIGHT)
 def test_right_engines_pass_every_check_of_a_rigid_pendulum(label: str, need: Need) -> None:
     need(label)

@@ -65,8 +65,6 @@ def test_numbers_are_set_as_if_the_file_had_them() -> None:
         (["--fault", "kcal=2"], "no size"),
         (["--fault", "mass=-1"], "above 0"),
         (["--fault", "field-sign"], "nothing on scene spring shows it"),
-        (["--set", "time.step=1", "--vary", "time.step=1:2:3"], "goes with one SCENE"),
-        (["--temperature", "300", "--vary", "time.step=1:2:3"], "goes with one SCENE"),
         (["--set", "particle.-1.mass=2"], "has no such number"),
         (["--set", "...=2"], "has no such number"),
     ],

@@ -67,7 +67,7 @@ LEFT_OUT_AT_START = {
 """What an engine cannot serve, and only finds out as it starts."""
 
 
-@pytest.mark.campaign("name", "label")
+@pytest.mark.campaign
 @pytest.mark.parametrize(("name", "label"), CASES, ids=[f"{name}-{label}" for name, label in CASES])
 def test_every_method_that_serves_a_scene_runs_it_and_passes(name: str, label: str, need: Need) -> None:
     need(label)

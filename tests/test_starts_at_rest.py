@@ -103,19 +103,6 @@ def test_energies_are_relative_to_what_does_not_cancel_at_the_start(
         off = energies - energies[0]
         assert run.energy_drift == pytest.approx(off[np.argmax(np.abs(off))] / 0.637, rel=1e-9)
     assert "energy: (H - H0)/(initial T + |V|) where it is largest" in str(found)
-    cells = springcheck.ensemble(scene, {"time.step": [0.1]}, methods)
-    for run in found.runs:
-        assert cells.of(run.method)["energy_drift"] == pytest.approx([run.energy_drift], rel=1e-9)
-    assert "energy: (H - H0)/(initial T + |V|) where it is" in str(cells)
     axes = springcheck.plot.energy(found[methods[0]])
     assert np.max(np.abs(axes.lines[0].get_ydata())) == pytest.approx(abs(found.runs[0].energy_drift))
     assert axes.get_ylabel() == "(H - H0) / (initial T + |V|)"
-
-
-def test_errors_of_an_ensemble_from_rest_are_those_of_the_run(tmp_path: Path) -> None:
-    (tmp_path / "driven.toml").write_text('title = "From rest"\n' + SCENES["driven"] + TIME)
-    scene = springcheck.load_scene(tmp_path / "driven.toml")
-    (run,) = springcheck.run(scene, "own:velocity-verlet").runs
-    cells = springcheck.ensemble(scene, {"time.step": [scene.step]}, "own:velocity-verlet").of(run.method)
-    assert cells["max_error"] == pytest.approx([run.max_error], rel=1e-9)
-    assert cells["energy_drift"] == pytest.approx([run.energy_drift], rel=1e-9)

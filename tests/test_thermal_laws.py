@@ -19,10 +19,8 @@ from springcheck.thermal.decays import GJ
 
 LINEAR = [name for name, one in THERMOSTATS.items() if not one.rescales]
 
-SUBSTEPS = {"baoab-respa2": 2, "baoab-respa3": 3, "baoab-respa4": 4}
-
-NO_TABLE = ("vanden-eijnden-ciccotti", *SUBSTEPS)
-"""Those without covariances in the literature: their recurrences are held against their papers'."""
+NO_TABLE = ("vanden-eijnden-ciccotti",)
+"""That without covariances in the literature: their recurrences are held against their papers'."""
 
 SPRINGS = [(0.35, 3.7, 2.9, 0.8, 1.7), (0.11, 0.4, 31.0, 2.3, 0.02), (1.3, 5.0, 2.0, 0.05, 40.0)]
 """h, m, k, gamma, kT: none of them 1, which hides what is missing."""
@@ -122,16 +120,6 @@ def by_hand(
         rows = [x1, v1, 0 * x]
     elif name == "euler-maruyama":
         rows = [x + H * v, v + H * (F * x - g * v) + sigma * mp.sqrt(H) * one, 0 * x]
-    elif name in SUBSTEPS:
-        d, s = H / SUBSTEPS[name], mp.exp(-g * H / SUBSTEPS[name])
-        q, u = x, v + H / 2 * F * (1 - mp.mpf(FAST)) * x
-        for xi in draws[: SUBSTEPS[name]]:
-            u = u + d / 2 * F * mp.mpf(FAST) * q
-            q = q + d / 2 * u
-            u = s * u + mp.sqrt((1 - s * s) * T / M) * xi
-            q = q + d / 2 * u
-            u = u + d / 2 * F * mp.mpf(FAST) * q
-        rows = [q, u + H / 2 * F * (1 - mp.mpf(FAST)) * q, 0 * x]
     else:
         s = mp.exp(-g * H / 2)
         u = v + H / 2 * F * x
@@ -151,7 +139,7 @@ def by_hand(
 @pytest.mark.parametrize("spring", SPRINGS)
 @pytest.mark.parametrize(
     "name",
-    ["bbk", "lammps-langevin", "vanden-eijnden-ciccotti", "euler-maruyama", "boaob", *SUBSTEPS],
+    ["bbk", "lammps-langevin", "vanden-eijnden-ciccotti", "euler-maruyama", "boaob"],
 )
 def test_laws_agree_with_the_recurrences_of_the_papers(name: str, spring: tuple[float, ...]) -> None:
     mp.mp.dps = 40
@@ -187,10 +175,6 @@ def test_diffusion_is_that_of_the_table(name: str) -> None:
     found = law(name, h, m, 1.0, rate, thermal).diffusion[0]
     if name in {"baoab", "baoa", "aboba", "obabo", "oabao"} or name.startswith("andersen"):
         assert found == pytest.approx(x / 2 / math.tanh(x / 2), rel=1e-12)
-    elif name in SUBSTEPS:
-        # BAOAB at that part of the step
-        part = x / 2 / SUBSTEPS[name]
-        assert found == pytest.approx(part / math.tanh(part), rel=1e-12)
     elif name in {"aoboa", "boaob"}:
         # one kick of the bath between two flights, or flights with the half decayed velocity
         assert found == pytest.approx(

@@ -58,8 +58,6 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
             main(["stability", "overdamped", "--method", "own:implicit-euler", "--quiet", "-o", "s.h5"]) == 0
         )
         assert main(["extremes", "--quick", "--method", "own:implicit-euler", "--quiet", "-o", "x.h5"]) == 0
-        vary = ["--vary", "time.step=0.1,0.3", "--vary", "spring.0.stiffness=1:2:2"]
-        assert main(["ensemble", "spring", *vary, *own, "-o", "e.h5"]) == 0
     finally:
         os.chdir(before)
     return here
@@ -70,7 +68,6 @@ COMMANDS = [
     ["inspect", "run.h5", "--trajectory", "own:semi-implicit-euler", "--rows", "7"],
     ["inspect", "s.h5"],
     ["inspect", "x.h5"],
-    ["inspect", "e.h5"],
     ["identify", "run.h5"],
     ["list"],
 ]

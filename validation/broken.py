@@ -167,8 +167,6 @@ def scene(folder: Path, rng: random.Random) -> list[list[str]]:
     if how < 0.2:
         (folder / "x.csv").write_text(TABLE)
         return [["judge", "x.csv", "--scene", "s.toml", "--scheme", rng.choice(own).removeprefix("own:")]]
-    if how < 0.24:
-        return [["run", "s.toml", *named[:2], "--vary", f"time.step=1e-3:{rng.choice(NUMBERS)}:7"]]
     more = rng.choice([[], [], [], ["--json"], ["--verdicts"], ["--steps", rng.choice(NUMBERS)]])
     more += ["--thorough"] if rng.random() < 0.02 else []
     return [["run", "s.toml", *named, *more], ["show", "s.toml"]]
@@ -196,8 +194,6 @@ FITTING: dict[str, tuple[str, ...]] = {
     "set": ("spring.0.stiffness=2", "particle.0.mass=1e-300", "time.steps=3", "spring.7.stiffness=2",
         "title=x"),
     "fault": ("wrong-stiffness", "noise", "noise=1e-3", "noise=x", "none"),
-    "vary": ("spring.0.stiffness=1:2:3", "particle.0.mass=0:1:5", "time.step=1e-3:1e3:9999999", "a=1:2",
-        "time.step=1:2:3"),
     "columns": ("t,q,p", "t=a,q=b,v=c", "t", "x,y,z", "t,t,t"),
     "word": ("step-defect", "explicit-euler", "openmm:verlet", "noise", "stepdefect"),
     "budget": ("0.2", "0"),

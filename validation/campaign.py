@@ -8,7 +8,7 @@ with those that are not in it or that went wrong, and ends after so many `cases`
 its size).  The parts:
 
 * `scenes`: a shipped scene with numbers, words, lines or characters changed; to `run` and `show`, now and
-  then to `stability`, `precision`, `judge` or `run --vary`;
+  then to `stability`, `precision` or `judge`;
 * `mutated`: a store of ours or a file of another format, damaged; to every command that reads one;
 * `hostile`: a store that somebody made to do harm, of the kinds of `hostile.py`; to the same commands;
 * `arguments`: random command lines of all commands, most of which nearly fit;

@@ -13,7 +13,7 @@ Run:   python validation/census.py        (about a minute; with the extras `esta
                                            data/reference/engines.npz)
        python validation/census.py table  (and `validation/engines`, OpenMM by platform, in 20 minutes; writes
                                            validation/engines/engines.json, .csv, .html and .lock)
-       python validation/census.py table own:baoab-respa3 ...
+       python validation/census.py table own:baoab ...
                                           (these rows alone, the others kept as they are)
 """
 

@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from springcheck.api import (
         census,
         compare,
-        ensemble,
         exact,
         explain,
         extremes,
@@ -47,7 +46,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 __all__ = [
-    "Scene", "Trajectory", "Verdict", "__version__", "census", "chain", "compare", "ensemble", "exact",
+    "Scene", "Trajectory", "Verdict", "__version__", "census", "chain", "compare", "exact",
     "explain", "extremes", "faults", "identify", "judge", "load_scene", "methods", "plot", "precision",
     "read", "report", "run", "sampling", "simulate", "spring", "stability",
 ]  # fmt: skip

@@ -40,7 +40,7 @@ UNHEARD = 0.25
 UNTOUCHED = np.array(0x7FF8_0000_5C5C_5C5C).view(np.float64)
 """Fill value of rows before an engine writes them: a NaN that no arithmetic produces."""
 
-Sink: TypeAlias = Callable[[Floats, Floats, Floats, Floats | None, Floats | None], None]
+Sink: TypeAlias = Callable[[Floats, Floats, Floats, Floats | None], None]
 """Receives recorded frames: t (f,), q and p (f, n), energy and last steps (f,) or None.  The arrays are
 reused."""
 
@@ -118,8 +118,7 @@ def play(
     ready = min(rows, FIRST, WORK // (piece * scene.n) or 1) if whole else 1
     # an engine that fills nothing must not be taken for one that has
     q, p = np.full((2, rows, scene.n), UNTOUCHED)
-    first = np.zeros(1) if simulation.tells_steps else None
-    _hand_over(scene, sink, 0, scene.q[None], scene.p[None], first)
+    _hand_over(scene, sink, 0, scene.q[None], scene.p[None])
     run_seconds = 0.0
     outcome = Outcome(status="complete", step=scene.steps)
     frame, calls = 1, 0
@@ -135,7 +134,7 @@ def play(
             calls = before - (before - calls) * good // begun
         ready = min(rows, 4 * ready) if whole and seconds < QUICK else ready
         if good:
-            _hand_over(scene, sink, frame, q[:good], p[:good], simulation.last_steps(good))
+            _hand_over(scene, sink, frame, q[:good], p[:good])
         frame += good
         if ended.status != "complete":
             outcome = replace(ended, step=(frame - 1) * scene.every)
@@ -207,13 +206,13 @@ def _advance(
     return replace(outcome, step=good * every), begun, seconds
 
 
-def _hand_over(scene: Scene, sink: Sink, frame: int, q: Floats, p: Floats, last: Floats | None) -> None:
+def _hand_over(scene: Scene, sink: Sink, frame: int, q: Floats, p: Floats) -> None:
     t = np.arange(frame, frame + len(q), dtype=np.float64) * scene.every * scene.step
     energy = None
     if "energy" in scene.quantities:
         with np.errstate(over="ignore", invalid="ignore", under="ignore"):
             energy = np.asarray(scene.system.energy(q, p), dtype=np.float64)
-    sink(t, q, p, energy, last)
+    sink(t, q, p, energy)
 
 
 class Gather:
@@ -228,23 +227,18 @@ class Gather:
         self._frames = 0
         self._t = np.empty(scene.frames)
         self._q, self._p = np.empty((scene.frames, scene.n)), np.empty((scene.frames, scene.n))
-        self._more: dict[str, Any] = {}
+        self._energy = np.empty(scene.frames) if "energy" in scene.quantities else None
 
-    def __call__(
-        self, t: Floats, q: Floats, p: Floats, energy: Floats | None, last_step: Floats | None
-    ) -> None:
+    def __call__(self, t: Floats, q: Floats, p: Floats, energy: Floats | None) -> None:
         a, b = self._frames, self._frames + len(t)
         self._t[a:b], self._q[a:b], self._p[a:b] = t, q, p
-        for name, values in (("energy", energy), ("last_step", last_step)):
-            if values is not None:
-                if a == 0:
-                    self._more[name] = np.empty(len(self._t))
-                self._more[name][a:b] = values
+        if self._energy is not None:
+            self._energy[a:b] = energy
         self._frames = b
 
     def onto(self, run: Trajectory) -> Trajectory:
         """The run with these frames."""
-        return replace(run, t=self._t, q=self._q, p=self._p, **self._more).at(slice(self._frames))
+        return replace(run, t=self._t, q=self._q, p=self._p, energy=self._energy).at(slice(self._frames))
 
 
 def run(

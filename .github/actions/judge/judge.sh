@@ -2,7 +2,7 @@
 set -uo pipefail
 out=springcheck-report
 mkdir -p "$out"
-reports=(--junit "$out/junit.xml" --badge "$out/badge.json" --summary "${GITHUB_STEP_SUMMARY:-$out/summary.md}")
+reports=(--junit "$out/junit.xml" --summary "${GITHUB_STEP_SUMMARY:-$out/summary.md}")
 read -r -a options <<< "${JUDGE_OPTIONS:-}"
 scheme=()
 [ -z "${JUDGE_SCHEME:-}" ] || scheme=(--scheme "$JUDGE_SCHEME")

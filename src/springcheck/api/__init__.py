@@ -5,7 +5,6 @@ from springcheck.api.main import compare, exact, identify, judge, read, run, sim
 from springcheck.api.showing import Said, Shelf, Verdicts
 from springcheck.api.studies import (
     census,
-    ensemble,
     explain,
     extremes,
     faults,
@@ -17,7 +16,7 @@ from springcheck.api.studies import (
 )
 
 __all__ = [
-    "Said", "Shelf", "Verdicts", "census", "compare", "ensemble", "exact", "explain", "extremes", "faults",
+    "Said", "Shelf", "Verdicts", "census", "compare", "exact", "explain", "extremes", "faults",
     "identify", "judge", "methods", "precision", "read", "report", "run", "sampling", "simulate",
     "stability",
 ]  # fmt: skip

@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from springcheck.api.showing import Said, Shelf
 from springcheck.api.taking import Step, needed, path_of, scene_of, spoken, taken
 from springcheck.errors import SpringcheckError
-from springcheck.physics import scenefile
 from springcheck.physics.arguments import typed
-from springcheck.physics.arrays import reals
 from springcheck.physics.scene import Scene
 
 if TYPE_CHECKING:
     from springcheck.studies.census.result import Census
-    from springcheck.studies.ensemble.result import Ensemble
     from springcheck.studies.extremes.result import Atlas
     from springcheck.studies.faults.result import FaultReport
     from springcheck.studies.precision.result import PrecisionStudy
@@ -111,34 +108,6 @@ def sampling(
 
     with taken(methods, force, workers, path) as (named, how):
         return measure.record(path, named, **how)
-
-
-@typed
-def ensemble(
-    scene: Scene | str | Path, vary: Mapping[str, str | Sequence[float]],
-    methods: str | Step | Sequence[str | Step] = (), *, samples: int | None = None, seed: int = 0,
-    path: str | Path | None = None, force: bool = False, workers: int = 1,
-) -> Ensemble:  # fmt: skip
-    """Run one scene over many parameters: error, energy and end of each cell.
-
-    `vary` names fields of the scene file, each with its values or with ``"LOW:HIGH:COUNT"`` (followed by
-    ``":log"`` for logarithmic spacing): ``{"spring.0.stiffness": [1, 2, 4], "time.step": "0.01:0.1:8:log"}``.
-    With `samples` each is ``"LOW:HIGH"``, drawn uniformly from `seed`.
-    """
-    from springcheck.studies.ensemble import measure
-    from springcheck.studies.ensemble.vary import plan
-
-    found = scene_of(scene)
-    needed(vary, Mapping, "vary: a dict of fields and values")
-    several = {x: y if isinstance(y, str) else reals("vary", **{x: y})[0].ravel() for x, y in vary.items()}
-    given = [
-        f"{field}={values if isinstance(values, str) else ','.join(map(repr, values.tolist()))}"
-        for field, values in several.items()
-    ]
-    with taken(methods, force, workers, path) as (named, how):
-        text = found.to_toml() if isinstance(scene, Scene) else scenefile.text_of(scene)
-        cells = plan(given, samples, seed, text=text)
-        return measure.record(found, cells, path, named, **how)
 
 
 @typed

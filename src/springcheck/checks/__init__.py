@@ -4,7 +4,7 @@ A check examines a recorded trajectory, or a piece of one.  Bounds are formulas:
 step, times their growth under the map.  Values and bounds of the rounding checks are in units of one rounding
 of what was added up, so that "4.1 of 19" reads: four roundings were seen where nineteen take place.
 
-`record`, `steps`, `motion`, `solver` and `replayed` hold the checks of a trajectory, `experiments` and `laws`
+`record`, `steps`, `motion` and `solver` hold the checks of a trajectory, `experiments` and `laws`
 those that need runs of their own; `sight` derives the limit of detection of each, `drag` adds up what single
 steps hide.  A check is an object (see `Check`); the two lists here are the only ones.
 
@@ -35,7 +35,6 @@ from springcheck.checks.motion import (
     shadow_energy,
 )
 from springcheck.checks.record import energies, grid, line, start, times
-from springcheck.checks.replayed import energy_gain, replay
 from springcheck.checks.requires import CONTRACTED, REQUIREMENTS
 from springcheck.checks.rods import rod_length, rod_velocity, turn
 from springcheck.checks.solver import tolerance, tolerance_bound
@@ -55,8 +54,7 @@ __all__ = [
 
 CHECKS: tuple[Check, ...] = (
     start, times, grid, line, step_defect, arithmetic, closed_form, shadow_energy, frequency, momentum,
-    angular_momentum, rod_length, rod_velocity, turn, gyration, border, drive, energies, tolerance, replay,
-    energy_gain,
+    angular_momentum, rod_length, rod_velocity, turn, gyration, border, drive, energies, tolerance,
 )  # fmt: skip
 
 THOROUGH: tuple[Check, ...] = (

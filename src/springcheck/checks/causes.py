@@ -103,7 +103,7 @@ def _off(case: Case, p: Floats | None = None) -> Floats:
         return np.asarray(np.max(off, axis=(0, 2)) / case.roundings, np.float64)
     bath, seen, every = thermostat(case), reading(case), 1
     if p is not None:
-        if bath.carried or bath.chain:
+        if bath.carried:
             # what these carry on is that of their own states
             return found + np.inf
         # each end beside its start, so that every other step is one of these

@@ -120,9 +120,6 @@ _ALL = (
     Requirement("tolerance", "a tolerance", _unless(
         lambda x: not x.law.has("one-step") and x.trajectory.tolerance is not None,
         "a method of fixed step has no tolerance")),
-    Requirement("rule", "steps whose lengths follow a rule", _unless(
-        lambda x: x.scheme.rule is not None, "no rule is known that its steps follow"),
-        special=True),
     Requirement("convergence", "a known law of its tolerance", _unless(
         lambda x: x.scheme.convergence is not None, "no law is known for {title}")),
     Requirement("every-step", "every step recorded", _unless(

@@ -11,7 +11,7 @@ import numpy as np
 
 from springcheck.checks.case import Case, small_move
 from springcheck.checks.check import Chance, Finding, check
-from springcheck.checks.thermal import HIDDEN, NO_DRAWS, reading
+from springcheck.checks.thermal import HIDDEN, reading
 from springcheck.errors import MethodError
 from springcheck.physics.arrays import Extended, Floats
 from springcheck.physics.scene import Scene
@@ -143,9 +143,6 @@ def noise_size(subject: Seeded) -> Finding | str:
     collides = scheme.collides
     steps = COLLIDED if collides else 1
     one = subject.run(scene, steps)
-    least = scheme.chain.least if scheme.chain else 0.0
-    if least / 4 <= np.sum(one.p[-1] ** 2 / scene.m) / 2 < least:
-        return "its chain rests at this temperature, and not at four times as much"
     warmer = replace(scene.bath, temperature=4 * scene.bath.temperature)
     hot = replace(scene, q=2 * scene.q, p=2 * scene.p, bath=warmer)
     heavy = replace(scene.system.scaled(4.0), m=4 * scene.m, q=scene.q / 2, p=2 * scene.p)
@@ -153,7 +150,7 @@ def noise_size(subject: Seeded) -> Finding | str:
     for other, of_q, of_p in ((subject.run(hot, steps), 2.0, 2.0), (subject.run(heavy, steps), 0.5, 2.0)):
         expected = of_q * one.q[-1], of_p * one.p[-1]
         off.append(_off((other.q[-1], other.p[-1]), expected, allowed))
-    if scheme.draws and not np.any(one.p[-1]):
+    if not np.any(one.p[-1]):
         if collides:
             return f"no collision in {COLLIDED} steps"
         return Finding(np.inf, *WITHIN, "there is no noise")
@@ -211,7 +208,7 @@ class Script:
 def noise_matrix(subject: Seeded) -> Finding | str:
     """A scripted generator reads the noise itself: what each unit draw does in a step, to rounding."""
     scheme, scene = subject.scheme, subject.scene
-    if not scheme.draws or scheme.uniform or scheme.collides:
+    if scheme.uniform or scheme.collides:
         return NO_NORMAL_NUMBERS
     runs = [subject.run(scene, 1, Script(unit)) for unit in np.eye(scheme.draws)]
     off, pull = list[Any](), forces(scheme, scene.system)
@@ -237,8 +234,6 @@ def noise_matrix(subject: Seeded) -> Finding | str:
 def seed_kept(subject: Seeded) -> Finding | str:
     """Two runs of one seed are equal bit for bit, and another seed is another run."""
     steps = 20
-    if not subject.scheme.draws:
-        return NO_DRAWS
     if subject.scheme.collides:
         # two runs without a collision are equal whatever their seeds
         rare = law_of(subject.scheme, subject.scene).collision * subject.scene.n
@@ -261,8 +256,6 @@ def seeds_apart(subject: Seeded) -> Chance | str:
 
     All draws in a row are held against those of the next seed at every distance up to half of the run.
     """
-    if not subject.scheme.draws:
-        return NO_DRAWS
     if subject.scheme.collides:
         return "its draws come now and then"
     steps = min(200, subject.scene.steps)

@@ -12,7 +12,6 @@ from springcheck.checks.check import Finding, check
 from springcheck.checks.steps import fastest
 from springcheck.physics import exact
 from springcheck.physics.arrays import Extended, Floats
-from springcheck.schemes.variable import allowed, push_of, taken
 
 
 @check("toler", family="motion", requires={"tolerance", "two-frames", "solution"})
@@ -24,9 +23,7 @@ def tolerance(case: Case) -> Finding | str:
     # sizes of the exact solution: a diverging one would excuse itself
     true = replace(run, q=np.asarray(q, np.float64), p=np.asarray(p, np.float64))
     known = exact.uncertainty(case.scene, float(case.steps[-1]) * run.step)
-    begun, rebuilt, grown = _first_step(case), _rebuilt(case, true.q, true.p), flow_growth(case)
     bound = tolerance_bound(Case(trajectory=true, scene=case.scene)) + known
-    bound += (begun + rebuilt) * grown
     if not np.isfinite(bound) or not np.isfinite([q, p]).all():
         return "the exact flow leaves the range of numbers"
     moved = np.max(case.system.norm(q - case.scene.q, p - case.scene.p))
@@ -34,10 +31,7 @@ def tolerance(case: Case) -> Finding | str:
         return "standing still would pass: it allows all of the motion"
     why = (
         f"{run.tolerance:g} a step of every component, at most {most_steps(case):.0f} internal steps, "
-        f"each error enlarged by the exact flow at most {grown:.3g} times"
-        + (f", and {begun:.2g} of the first step, as its rule has it" if begun else "")
-        + (f"; {rebuilt:.2g} rounding of velocities rebuilt from positions" if rebuilt else "")
-        + _not_believed(case)
+        f"each error enlarged by the exact flow at most {flow_growth(case):.3g} times" + _not_believed(case)
     )
     sees = sight.of_exact(case, lambda change: case.system.norm(*change) / bound)
     return Finding(value, bound, "initial energy norms", why, sees)
@@ -74,48 +68,7 @@ def _radians(case: Case) -> float:
     return abs(float(case.trajectory.t[-1])) * fastest(case)
 
 
-def _first_step(case: Case) -> float:
-    """Error of the first step of a solver whose steps follow a rule, in initial energy norms: where no force
-    acts at the start, nothing makes that step short."""
-    if case.scheme.rule is None or case.steps[0] != 0:
-        return 0.0
-    run, scene = case.trajectory, case.judged
-    times = 0.0, float(case.steps[1] * run.step)
-    allow, start = allowed(case.scene), (run.q[0], run.p[0])
-    first = next(taken(case.scheme, scene, start, before=0.0, times=times, tolerance=allow), None)
-    if first is None:
-        return 0.0
-    q, p = exact.true_motion(case.scene, np.array([1]), first.h)
-    return float(case.system.norm(first.end[0] - q, first.end[1] - p)[0])
-
-
-def _rebuilt(case: Case, q: Floats, p: Floats) -> float:
-    """Accumulated rounding of velocities rebuilt from positions at every step, in initial energy norms.
-
-    A step of h leaves m eps |q|/h, which steps of nearly one length round to the same side.  The shortest is
-    what the rule allows where the acceleration along the motion (f, n) is largest, held up to a fifth below
-    that; after one cut short at a frame each is twice as long as the one before, which all together add 2/h.
-    """
-    run, scene, rule = case.trajectory, case.judged, case.scheme.rule
-    if rule is None or not run.rebuilds_velocity:
-        return 0.0
-    force = scene.system.force(q, p)
-    most = force[np.argmax(np.sum((force / scene.m) ** 2, axis=1))]
-    shortest = rule(float(push_of(scene, most)), 0.0, allowed(case.scene)) / HELD_BY_A_RULE
-    cut = 0.0 if run.last_step is None else float(np.sum(2 / run.last_step[run.last_step > 0]))
-    reach = 2 * np.max(np.abs(q), axis=0) + case.origins + 2 * case.scene.periods
-    each = run.arithmetic.state * scene.m * reach * (most_steps(case) / shortest + cut)
-    return float(case.system.norm(0 * reach, each))
-
-
-HELD_BY_A_RULE = 1.2
-"""Growth of a step below which a rule keeps the length of the step before."""
-
-
 def _believed(case: Case) -> float:
-    if case.scheme.rule is not None:
-        # the rule itself, of order 1, asks for that many
-        return np.inf
     frames = float(case.steps[-1]) / case.trajectory.every
     return max(A_FRAME * frames, A_RADIAN * _radians(case), STARTING)
 

@@ -23,10 +23,6 @@ if TYPE_CHECKING:
 
 HIDDEN = "the motion is so much larger than its noise that rounding hides the draws"
 
-NOT_SUMMED = "three draws or more of a step are told by linear forces alone, of 64 coordinates at most"
-
-NO_DRAWS = "it takes no draws: its bath is a chain"
-
 
 def reading(case: Case) -> Reading:
     """The draws behind the frames, as far as the frames determine them."""
@@ -67,18 +63,8 @@ def noise_direction(case: Case) -> Finding | str:
     """Each step is the scheme's own map and some draws: what no draw can explain is rounding.
 
     The draw follows from one number of the state, and predicts the other; a draw that acts in two steps
-    follows from each; a step without a collision has none.  A chain takes none at all: its own state, at rest
-    before the start, is carried along the states and predicts the next.  Any temperature, any potential.
+    follows from each; a step without a collision has none.  Any temperature, any potential.
     """
-    if THERMOSTATS[case.trajectory.scheme].chain:
-        if case.steps[0] != 0:
-            return "the state of its chain is known from the start alone"
-        scene, bath = case.scene, case.scene.bath
-        assert bath is not None
-        # of momenta, and of the links
-        squares = scene.thermal * min(np.min(scene.m), scene.thermal / bath.friction**2)
-        if not squares > thermal.rounding.SMALLEST / case.trajectory.arithmetic.unit:
-            return "squares of so small momenta underflow"
     found = reading(case)
     if found.across is None:
         return "fresh draws of a step reach every state: their covariance is judged"
@@ -88,9 +74,7 @@ def noise_direction(case: Case) -> Finding | str:
         run = case.trajectory
         liveliest = int(np.argmax(np.sum(np.square(run.p.astype(np.longdouble)) / case.judged.m, axis=1)))
         still = read_frames(case, *(np.repeat(x[liveliest][None], 4, axis=0) for x in (run.q, run.p))).across
-        # without draws a particle at rest stays there
-        least = -1.0 if thermostat(case).draws else 0.0
-        if still is not None and least < np.max(still) <= found.roundings:
+        if still is not None and np.max(still) <= found.roundings:
             return f"{STILL} any step"
     where = f"; first at step {case.steps[0] + int(off[0]) + 1}" if len(off) else ""
     if limit := small_move(case.trajectory) if where else "":
@@ -100,8 +84,6 @@ def noise_direction(case: Case) -> Finding | str:
         if found.hits is not None:
             # a collision explains any momentum
             worst[-1] = 1 / case.trajectory.arithmetic.unit
-    if (told := int(np.count_nonzero(worst != thermal.draws.UNTOLD))) < len(worst):
-        where = f", judged to step {told}, where these have grown to all of the chain{where}"
     why = f"roundings along one step of {case.scheme.title}; does not grow with the run{where}"
     return Finding(float(np.max(worst)), found.roundings, "roundings", why)
 
@@ -109,14 +91,11 @@ def noise_direction(case: Case) -> Finding | str:
 def _draws(case: Case) -> Floats:
     """Draws as standard normal numbers, NaN where a step had none.  MethodError where they are not known."""
     scheme = THERMOSTATS[case.trajectory.scheme]
-    if not scheme.draws:
-        raise MethodError(NO_DRAWS)
     if limit := small_move(case.trajectory) or case.once(too_strong):
         raise MethodError(limit)
     found = reading(case)
     if not found.known:
-        summed = case.judged.system.is_linear and case.scene.n <= thermal.jointly.MOST_JOINTLY
-        raise MethodError(HIDDEN if scheme.fresh < 3 or summed else NOT_SUMMED)
+        raise MethodError(HIDDEN)
     x = found.draws
     if scheme.uniform and not case.scene.system.rods:
         x = thermal.draws.normal_scores(x)

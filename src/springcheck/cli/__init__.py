@@ -147,7 +147,6 @@ def _study(study: Study, options: argparse.Namespace) -> int:
     doubts = output.doubts(source) if source else []
     with output.alone(), output.progress(study.name, quiet=options.quiet) as progress:
         found = study.perform(options, progress)
-    # of `run --vary` that of the ensemble
     shown = study_of(found)
     output.warn(str(source), doubts)
     trusted = {"not_trusted": doubts} if source else {}

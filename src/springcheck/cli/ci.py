@@ -1,11 +1,10 @@
-"""Reports for continuous integration: JUnit, a badge, and a summary in Markdown.
+"""Reports for continuous integration: JUnit, and a summary in Markdown.
 
-All three derive from the JSON document of a command, so that nothing is decided twice.
+Both derive from the JSON document of a command, so that nothing is decided twice.
 """
 
 from __future__ import annotations
 
-import json
 import re
 from argparse import Namespace
 from collections.abc import Iterator, Sequence
@@ -20,10 +19,7 @@ from springcheck.studies.arguments import REPORT_FORMS
 from springcheck.text.wording import STATES_SHOW, count
 
 HEAD = b"<?xml version='1.0' encoding='utf-8'?>\n<testsuites name=\"springcheck\""
-OURS = {"junit": HEAD, "badge": b'{"schemaVersion":'}
-"""First bytes of the files that are overwritten; a file with others is none of these reports, and stays."""
-
-COLOURS = {0: "brightgreen", 1: "red", 2: "lightgrey"}
+"""First bytes of a JUnit report; a file that begins otherwise is not overwritten."""
 
 WORDS = {0: "passed", 1: "failed", 2: "nothing judged"}
 
@@ -66,10 +62,9 @@ def check_paths(options: Namespace) -> None:
         taken = [*others, *(str(x) for key, x in given.items() if x and key != name)]
         if any(place.resolve() == Path(x).resolve() for x in taken):
             raise SpringcheckError(f"{said}: the command reads or writes that file otherwise; name another")
-        begins = OURS.get(name)
-        if begins and place.is_file() and place.stat().st_size:
+        if name == "junit" and place.is_file() and place.stat().st_size:
             with place.open("rb") as file:
-                if file.read(len(begins)) != begins:
+                if file.read(len(HEAD)) != HEAD:
                     raise SpringcheckError(f"{said}: it is there and no such report; name another")
 
 
@@ -182,15 +177,6 @@ def junit(command: str, found: Sequence[Case]) -> bytes:
     return body + b"\n"
 
 
-def badge(found: Sequence[Case], status: int) -> bytes:
-    """The JSON of a shields.io endpoint."""
-    wrong = sum(x.passed is False for x in found)
-    judged = sum(x.passed is not None for x in found)
-    message = f"{wrong} of {judged} failed" if wrong else f"{judged} passed" if not status else WORDS[status]
-    data = {"schemaVersion": 1, "label": "springcheck", "message": message, "color": COLOURS[status]}
-    return json.dumps(data, separators=(",", ":")).encode() + b"\n"
-
-
 def summary(command: str, found: Sequence[Case], status: int) -> str:
     """A summary in Markdown; its first sentence is the cause."""
     wrong = [x for x in found if x.passed is False or x.error]
@@ -216,8 +202,6 @@ def _text(text: str) -> str:
 def _write(options: Namespace, found: list[Case], status: int) -> None:
     if options.junit:
         _put(options.junit, junit(options.name, found))
-    if options.badge:
-        _put(options.badge, badge(found, status))
     if options.summary:
         text = summary(options.name, found, status).encode()
         where = Path(options.summary)

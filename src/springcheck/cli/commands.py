@@ -61,11 +61,8 @@ def _plot(options: Namespace) -> int:
     doubts = output.doubts(options.file) if ours else []
     with output.warned(options.file, doubts):
         if ours and options.trajectory is None:
-            chosen = {name: getattr(options, name) for name in ("particle", "quantity", "over")}
-            written, notes = drawing.draw(path, into, **chosen)
+            written, notes = drawing.draw(path, into, particle=options.particle)
         else:
-            if options.quantity or options.over:
-                raise SpringcheckError(f"{path}: --quantity and --over go with the store of an ensemble")
             which = {"columns": _columns(options), "step": options.step, "trajectory": options.trajectory}
             written, notes = drawing.draw_foreign(path, into, particle=options.particle, **which)
     if not options.quiet:
@@ -257,15 +254,6 @@ def _doctor(options: Namespace) -> int:
     return output.answer(options, lambda: found, lambda: doctor.lines(found), status)
 
 
-def _completion(options: Namespace) -> int:
-    from springcheck.cli import completing
-    from springcheck.studies import STUDIES
-
-    known = {one.name: one.arguments for one in STUDIES} | {one.name: one.arguments for one in COMMANDS}
-    print(completing.script(options.shell, known))
-    return 0
-
-
 FORMATS = (
     "H5MD, HDF5, NPY, .xlsx, NPZ, Parquet, Feather, MATLAB .mat, JSON, LAMMPS dump, LAMMPS log, DCD, GROMACS "
     ".xtc, .trr, .gro, Amber NetCDF, ASE .traj, extended .xyz, .xyz, Octave text, text tables; texts also "
@@ -292,11 +280,6 @@ COMMANDS = (
         argument("-o", "--output", metavar="FOLDER", help="default: figures/ and the store's name"),
         argument("--particle", type=int, metavar="I",
                  help="the motion of this particle alone, from 0 on (default: of all)"),
-        argument("--quantity", metavar="NAME",
-                  help="of an ensemble: max_error, energy_drift, q0, p0, steps or outcome "
-                  "(default: error and energy)"),
-        argument("--over", metavar="FIELD[,FIELD]",
-                  help="of an ensemble: over which of the fields that were varied"),
         _NAMES,
         _STEPS,
         _GROUP,
@@ -350,8 +333,5 @@ COMMANDS = (
     )),
     Command("list", "scenes, engines with their versions, checks", _list, (JSON, ENGINE)),
     Command("doctor", "what this installation can do, and what is missing", _doctor, (JSON,)),
-    Command("completion", "a script that completes commands in your shell", _completion, (
-        argument("shell", choices=("bash", "zsh"), help="put its lines where your shell begins"),
-    )),
 )  # fmt: skip
 """Every command that is no study, in the order of `--help`."""

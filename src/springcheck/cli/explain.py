@@ -43,7 +43,6 @@ WORDS = {
     "SHAKE": "impulses along rods as they lay before a drift bring their lengths back after it",
     "RATTLE": "SHAKE, and a step ends with momenta without their parts along rods: velocity Verlet with rods",
     "SETTLE": "the impulses of SHAKE and RATTLE for a rigid triangle, in closed form",
-    "ensemble": "many runs of a scene with numbers varied: `springcheck run SCENE --vary FIELD=A:B:N`",
 }
 """Terms of the field and of springcheck, each with its meaning."""
 
@@ -244,11 +243,7 @@ def _thermostat(name: str) -> Iterator[str]:
     if scheme.carried:
         yield "  the first draw xi_1 of a step is the last of the step before"
     if scheme.rescales:
-        yield "No linear map: " + (
-            "the chain's own state is carried along those of the motion, and predicts each of them"
-            if scheme.chain
-            else "kinetic energies are noncentral chi-squared, whose ranks are judged"
-        )
+        yield "No linear map: kinetic energies are noncentral chi-squared, whose ranks are judged"
         return
     turn, x = SHOWN
     of = Law(scheme=scheme, h=turn, m=np.ones(1), k=np.ones(1), rate=x / turn, thermal=1.0)

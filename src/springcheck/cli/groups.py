@@ -13,9 +13,7 @@ EXAMPLES: Mapping[str, Sequence[str]] = {
         "spring-uneven --method 'own:*' --step 0.05 --thorough",
         "spring --temperature 300K --seed 1",
         "spring --stepper mine.py:step",
-        "spring --vary time.step=0.01:1:40:log",
     ),
-    "ensemble": ("spring --vary time.step=0.01:1:40:log --method own:rk4",),
     "faults": ("", "-o faults.h5"),
     "precision": ("spring --budget 20 --method own:rk4",),
     "stability": ("spring", "multiple-time-steps --method 'openmm:*'"),
@@ -33,23 +31,21 @@ EXAMPLES: Mapping[str, Sequence[str]] = {
     "export": ("spring.h5 own:euler out.h5md",),
     "list": ("",),
     "doctor": ("",),
-    "completion": ("bash",),
 }
 """Examples of each command, without its name: the help prints them, and a test parses them."""
 
 
 GROUPS: Mapping[str, Sequence[str]] = {
-    "input": ("file", "files", "label", "word", "shell", "--trajectory", "--columns", "--from",
+    "input": ("file", "files", "label", "word", "--trajectory", "--columns", "--from",
               "--against"),
-    "scene": ("scene", "--scene", "--step", "--steps", "--set", "--temperature", "--friction",
+    "scene": ("scene", "--scene", "--step", "--steps", "--set", "--temperature", "--friction", "--seed",
               "--thermostats"),
-    "many runs": ("--vary", "--samples", "--seed"),
     "methods": (
         "--method", "--all", "--engine", "--stepper", "--command", "--scheme", "--timeout", "--fault",
     ),
     "known of the motion": ("--mass", "--stiffness", "--differences", "--arithmetic"),
     "how much is measured": ("--thorough", "--budget", "--quick", "--workers", "--cluster"),
-    "figures": ("--particle", "--quantity", "--over"),
+    "figures": ("--particle",),
     "output": ("output", "--output", "--force", "--json", "--quiet", "--verdicts", "--rows", "--points"),
     "continuous integration": tuple(f"--{name}" for name in REPORT_FORMS),
 }  # fmt: skip

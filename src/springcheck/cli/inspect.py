@@ -90,14 +90,10 @@ def _frames(run: Trajectory, stride: int, last: Trajectory, of: Units) -> Lines:
         title += f", the first {shown} of {n} particles"
     numbers = range(shown) if n > 1 else [""]
     names = [("t", of.t), *((f"{x}{i}", unit) for x, unit in (("q", of.q), ("p", of.p)) for i in numbers)]
-    if run.last_step is not None:
-        names.append(("last step", of.t))
     rows = [
-        [repr(float(x)) for x in (t, *q[:shown], *p[:shown], *h)]
+        [repr(float(x)) for x in (t, *q[:shown], *p[:shown])]
         for one in (run, last)
-        for t, q, p, *h in zip(
-            *(x for x in (one.t, one.q, one.p, one.last_step) if x is not None), strict=True
-        )
+        for t, q, p in zip(one.t, one.q, one.p, strict=True)
     ]
     if rows[-2:-1] == rows[-1:]:
         del rows[-1]
@@ -114,8 +110,7 @@ def document(summary: store.Summary, options: Namespace) -> dict[str, Any]:
         else:
             documents[study.name] = result.document()
     run, stride = _asked_for(summary, options)
-    more = {} if run is None or run.last_step is None else {"last_step": run.last_step}
-    shown = run and {"label": run.label, "stride": stride, "t": run.t, "q": run.q, "p": run.p, **more}
+    shown = run and {"label": run.label, "stride": stride, "t": run.t, "q": run.q, "p": run.p}
     return keeper.document(
         store=summary.path,
         bytes=summary.size,

@@ -16,8 +16,6 @@ from fnmatch import fnmatchcase
 from functools import cache, partial
 from typing import Any, TypeVar
 
-import numpy as np
-
 from springcheck import schemes
 from springcheck.engines.contract import (
     ANY_POTENTIAL,
@@ -179,7 +177,6 @@ class Started:
 
     def __init__(self, scene: Scene, label: Label, seed: Any = None) -> None:
         self.label, self.simulation = label, start(scene, label, seed)
-        self.tells_steps = hasattr(self.simulation, "last_steps")
 
     def advance(self, every: int, q: Floats, p: Floats) -> None:
         """Fill rows; `Stopped` passes through."""
@@ -195,14 +192,6 @@ class Started:
         """The largest |coordinate| along axes that the scene leaves out, where the engine looks at them."""
         seen = getattr(self.simulation, "off_axis", None) is not None
         return self._reported("off_axis", "a number", float) if seen else None
-
-    def last_steps(self, rows: int) -> Floats | None:
-        """Lengths (rows,) of the steps that ended at the rows filled last, where the engine chooses them."""
-        if not self.tells_steps:
-            return None
-        return self._reported(
-            "last_steps", f"{rows} lengths", lambda x: np.asarray(x, np.float64)[:rows].reshape(rows)
-        )
 
     def _reported(self, name: str, what: str, taken: Callable[[Any], T]) -> T:
         said: Any = guarded(self.label, lambda: getattr(self.simulation, name))

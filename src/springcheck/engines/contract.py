@@ -54,9 +54,6 @@ DRIVEN = frozenset({"drive", "modulated-spring"})
 FIELD = frozenset({"magnetic"})
 """The term of a method whose force may turn velocities."""
 
-NO_NUMBERS = "none: a chain is deterministic"
-"""The generator of a thermostat whose bath is deterministic."""
-
 BRAKES = frozenset({"van-der-pol"})
 """The term of a method whose friction may depend on the position."""
 
@@ -112,8 +109,7 @@ class Simulation(Protocol):
     """A started engine.  It advances and does nothing else: the driver records, times and judges.
 
     An engine in three dimensions may have an attribute `off_axis`, the largest |coordinate| that it has seen
-    along axes that the scene leaves out; one that chooses its steps by a rule an attribute `last_steps` (f,),
-    the lengths of those that ended at the rows which `advance` has filled last.
+    along axes that the scene leaves out.
     """
 
     @property

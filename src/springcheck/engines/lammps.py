@@ -24,7 +24,6 @@ from springcheck.engines import bonds
 from springcheck.engines.contract import (
     DRIVEN,
     EVERY_POTENTIAL,
-    NO_NUMBERS,
     RODS,
     SPRINGS,
     Engine,
@@ -297,8 +296,6 @@ def _thermostat(scene: Scene, method: Method, seed: int) -> list[str]:
     if method.name == "csvr":
         bath = f"fix bath mobile temp/csvr {heat} {time / 2!r} {seed}"
         return ["fix move mobile nve", bath, f"compute_modify bath_temp {none}"]
-    if method.name == "nvt":
-        return [f"fix move mobile nvt temp {heat} {time!r}", f"compute_modify move_temp {none}"]
     _, number, *half = method.scheme.split("-")
     more = ""
     if number == "vii":
@@ -373,7 +370,6 @@ ENGINE = Engine(
             terms=EVERY_POTENTIAL | RODS, requires=frozenset({Need.RODS}),
         ),
         _drawn("csvr", "bussi-after", "fix temp/csvr, fix nve, bond_style harmonic", default=False),
-        _drawn("nvt", "nose-hoover", "fix nvt, bond_style harmonic", generator=NO_NUMBERS, default=False),
         *(
             _drawn(
                 f"gjf-{i}{half}", f"gj-{number}{half}", f"fix gjf, method {i}, {said} velocity",

@@ -64,7 +64,6 @@ LOOKS = {
     "position-verlet": Look(_GREEN, DOTTED),
     "respa8": Look(_GREEN, DASH_DOT),
     "boris": Look(_GREEN, DASHED),
-    "variable-verlet": Look(_GREEN, TWO_DOTS),
     "langevin-middle": Look(_SKY, DASHED),
     "langevin-middle-early": Look(_SKY, DOTTED),
     "implicit-midpoint": Look(_SKY, SOLID),

@@ -25,7 +25,7 @@ from springcheck.identify.result import Identification, nothing
 from springcheck.identify.search import accounted
 from springcheck.identify.thermal import explained, of_bath
 from springcheck.identify.together import at_rest, distance, of_a_pair, of_rotation
-from springcheck.thermal.catalogue import random_scheme
+from springcheck.thermal import THERMOSTATS
 
 
 def identify_arrays(
@@ -80,7 +80,7 @@ def _of_states(
     bath = explained(found, t, q, p, v, mass, **stated)
     local = any(x.local for x in found.explanations)
     # of noise, where a mistake in the record explains the states, only counted collisions are as sharp
-    sharp = any(random_scheme(x.scheme).collides and np.all(np.isfinite(x.friction)) for x in bath.candidates)
+    sharp = any(THERMOSTATS[x.scheme].collides and np.all(np.isfinite(x.friction)) for x in bath.candidates)
     return bath if sharp or not local else found
 
 

@@ -8,8 +8,6 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
-from springcheck.thermal.catalogue import family_of
-
 if TYPE_CHECKING:
     from springcheck.identify.hypothesis import Match
     from springcheck.text.lines import Lines
@@ -117,17 +115,14 @@ class Identification:
 
     @property
     def choice(self) -> list[str]:
-        """Schemes of the candidates, each once with its numbers of steps: "rk4, 5 to 9 steps a frame".  Names
-        that differ in a number alone are joined."""
+        """Schemes of the candidates, each once with its numbers of steps: "rk4, 5 to 9 steps a frame"."""
         strides: dict[str, set[int]] = {}
         for x in self.candidates:
             strides.setdefault(x.scheme, set()).add(x.stride)
-        alike: dict[tuple[str, str], list[int]] = {}
-        for name, found in strides.items():
-            stem, number = family_of(name)
-            often = "" if found == {1} else f", {_ranges(sorted(found))} steps a frame"
-            alike.setdefault((stem, often), []).extend([number] if number else [])
-        return [f"{stem}{_ranges(sorted(counts))}{often}" for (stem, often), counts in alike.items()]
+        return [
+            name if often == {1} else f"{name}, {_ranges(sorted(often))} steps a frame"
+            for name, often in strides.items()
+        ]
 
     def noting(self, *more: str) -> Identification:
         """Copy with further remarks."""

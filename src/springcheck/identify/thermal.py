@@ -22,8 +22,7 @@ from springcheck.identify.hypothesis import ERRORS, SURE
 from springcheck.identify.result import Candidate, Explanation, Identification
 from springcheck.physics.arrays import Floats
 from springcheck.text.wording import either
-from springcheck.thermal.catalogue import THERMOSTATS, family_of, random_scheme
-from springcheck.thermal.likelihood import SUBSTEPS_TRIED
+from springcheck.thermal.catalogue import THERMOSTATS
 from springcheck.thermal.modes import FREE_OF_NOISE, modes
 from springcheck.thermal.residuals import FEWEST, is_of_digits
 from springcheck.thermal.states import Thermal, identify_thermal
@@ -103,7 +102,7 @@ def explained(
         return found
     place, misfit, factor = seen
     low, high = np.quantile(factor, [0.1, 0.9])
-    kept = tuple(x for x in found.candidates if random_scheme(x.scheme).rescales)
+    kept = tuple(x for x in found.candidates if THERMOSTATS[x.scheme].rescales)
     which = " or ".join(x.scheme for x in kept) or "a Nose-Hoover chain, or a thermostat that rescales"
     cause = (
         f"One factor a step multiplies the momenta of all {u.shape[1]} coordinates, {place}: {low:.3g} to "
@@ -295,13 +294,7 @@ def _statement(
         late = "" if THERMOSTATS[best].synchronised else "; its velocities are of another time"
         return f"{head}, {THERMOSTATS[best].title}{late}"
     if best:
-        alike: dict[str, list[str]] = {}
-        for name in strides:
-            alike.setdefault(family_of(name)[0], []).append(name)
-        which = [
-            _with_strides(_counts(names), tuple({s for name in names for s in strides[name]}))
-            for names in alike.values()
-        ]
+        which = [_with_strides(name, tuple(set(x))) for name, x in strides.items()]
         return f"{head}, {' or '.join(which)}{'' if found[0].known else ' or one that is not known here'}"
     if all(one.added for one in found):
         return (
@@ -309,14 +302,6 @@ def _statement(
             "random kicks without one, or a bath that hardly acts in so few frames"
         )
     return f"{head}, by no scheme known here, or of joined particles, or frames lie several steps apart"
-
-
-def _counts(names: list[str]) -> str:
-    """Name of schemes that differ in their number of substeps alone, with the range of that."""
-    if len(names) == 1:
-        return names[0]
-    (stem, _), counts = family_of(names[0]), sorted(family_of(x)[1] for x in names)
-    return f"{stem}{counts[0]} to {counts[-1]}{' or more' if counts[-1] == SUBSTEPS_TRIED[-1] else ''}"
 
 
 def _with_strides(name: str, strides: tuple[int, ...]) -> str:

@@ -60,9 +60,6 @@ class Trajectory:
     """Relative tolerance per step; None for a method of fixed step."""
     energy: Floats | None = None
     """Total energy of each frame, (f,) [M L2/T2]; None where the scene does not record it."""
-    last_step: Floats | None = None
-    """Length of the adaptive step that ended at each frame (f,) [T], in either direction of time, 0 at the
-    start; None for fixed steps, or where the solver reports none."""
     arithmetic: Arithmetic = field(default_factory=Arithmetic)
     rebuilds_velocity: bool = False
     off_axis: float | None = None
@@ -178,7 +175,7 @@ class Trajectory:
 
     def at(self, rows: slice) -> Trajectory:
         """These frames alone."""
-        more = {x: y[rows] for x in ("energy", "last_step") if (y := getattr(self, x)) is not None}
+        more = {} if self.energy is None else {"energy": self.energy[rows]}
         return replace(self, t=self.t[rows], q=self.q[rows], p=self.p[rows], **more)
 
     @typed

@@ -13,7 +13,6 @@ the splittings and the shadow energies; Butcher, Numerical Methods for Ordinary 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property, lru_cache
@@ -35,10 +34,6 @@ Trait: TypeAlias = Literal[
 implicit; its own adjoint (reversible); taking slow and fast springs at different times, so that no normal
 mode stays by itself (mixes); with a stage of friction alone; made of kicks by all forces and drifts alone
 (plain); random."""
-
-Rule: TypeAlias = Callable[[float, float, float], float]
-"""(root mean square of the accelerations over x, y and z of all particles [L/T2], length of the step before,
-0 at the start, tolerance [L]) -> length of the next step [T]."""
 
 ONE, HALF = Fraction(1), Fraction(1, 2)
 
@@ -63,10 +58,6 @@ class Scheme:
     flow: bool = False
     convergence: Fraction | None = None
     """Power of the tolerance with which an adaptive solver's error falls, on a smooth motion."""
-    steps_of: str = ""
-    """Name of the scheme whose steps a solver takes, with lengths of its own choice."""
-    rule: Rule | None = None
-    """The rule that chooses these lengths."""
     thermostat: ClassVar[bool] = False
     """Whether it has noise, and a step that `springcheck.thermal` carries out."""
     source: str = ""
@@ -199,18 +190,6 @@ def solver(name: str, title: str, source: str, convergence: Fraction | None = No
     )  # fmt: skip
 
 
-def _of_an_euler_step(push: float, before: float, tolerance: float) -> float:
-    """Step [T] over which Verlet's and explicit Euler's differ by the tolerance, at most twice the last step,
-    and that one where it would grow by less than a fifth."""
-    with np.errstate(all="ignore"):
-        new = float(np.sqrt(np.float64(tolerance) / push))
-    if before == 0:
-        return new
-    new = min(new, 2 * before)
-    # OpenMM has the factor in single precision
-    return before if before < new < float(np.float32(1.2)) * before else new
-
-
 _SUNDIALS = "Hindmarsh et al., ACM TOMS 31 (2005) 363"
 _HLW = "Hairer, Lubich & Wanner, I.1.2"
 _TUCKERMAN = "Tuckerman, Berne & Martyna, J. Chem. Phys. 97 (1992) 1990"
@@ -263,9 +242,6 @@ _ALL = (
            source="the solution of the equation of motion"),
     solver("adams", "CVODE Adams-Moulton, orders 1-12", _SUNDIALS, Fraction(12, 13)),
     solver("bdf", "CVODE BDF, orders 1-5", _SUNDIALS, Fraction(5, 6)),
-    Scheme(name="variable-verlet", title="velocity Verlet, each step as long as forces at its start allow",
-           order=2, limit=np.inf, symplectic=False, steps_of="velocity-verlet", rule=_of_an_euler_step,
-           source="OpenMM's VariableVerletIntegrator; Theory Manual, Integrators"),
     solver("ida", "IDA BDF, orders 1-5, of a circuit's equations", _SUNDIALS),
 )  # fmt: skip
 

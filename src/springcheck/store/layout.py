@@ -4,8 +4,7 @@
 
     /h5md                      version, author, creator, modules/units
     /particles/<label>/        position and velocity (frames, n, 3), mass, species; scenes of particles only
-    /observables/<label>/      q, p (frames, n), energy, error (frames,), velocity: {step, time, value};
-                               last_step (frames,) of a solver that chooses its steps and reports them
+    /observables/<label>/      q, p (frames, n), energy, error (frames,), velocity: {step, time, value}
     /observables/exact/        q, p (frames, n) of the exact solution, where it is known
     /parameters/<label>        attributes: scene, method, versions, machine, outcome, digest
     /comparison /verdicts      tables of one column per dataset
@@ -49,20 +48,15 @@ MARGIN = 1 << 16
 RESERVED = (
     "h5md", "particles", "observables", "parameters", "comparison", "verdicts", "documents", "digests", "plots"
 )  # fmt: skip
-QUANTITIES = ("q", "p", "energy", "last_step")
+QUANTITIES = ("q", "p", "energy")
 """Quantities of a trajectory that may be stored in addition to its times."""
 EXACT = "exact"
 """Name of the exact solution among the observables."""
 _STRING = h5py.string_dtype("utf-8")
 
-_MD = {
-    "q": "nm", "p": "u nm ps-1", "energy": "kJ mol-1", "velocity": "nm ps-1", "time": "ps", "mass": "u",
-    "last_step": "ps",
-}  # fmt: skip
-_SI = {
-    "q": "m", "p": "kg m s-1", "energy": "J", "velocity": "m s-1", "time": "s", "mass": "kg",
-    "last_step": "s",
-}  # fmt: skip
+_NAMES = "q", "p", "energy", "velocity", "time", "mass"
+_MD = dict(zip(_NAMES, ("nm", "u nm ps-1", "kJ mol-1", "nm ps-1", "ps", "u"), strict=True))
+_SI = dict(zip(_NAMES, ("m", "kg m s-1", "J", "m s-1", "s", "kg"), strict=True))
 _BARE = dict.fromkeys(_MD, "1")
 UnitsOf: TypeAlias = Mapping[str, str]
 Axis: TypeAlias = Mapping[str, Any]
@@ -113,11 +107,10 @@ def shape(name: str, frames: int, n: int) -> tuple[int, ...]:
     return (frames, n) if name in ("q", "p") else (frames,)
 
 
-def columns(label: str, scene: Scene, frames: int, *, steps: bool = False) -> dict[str, Column]:
-    """The arrays that a trajectory of this scene is made of, by short name; `steps` adds the last ones."""
-    stored = [*scene.quantities, "last_step"] if steps else [*scene.quantities]
+def columns(label: str, scene: Scene, frames: int) -> dict[str, Column]:
+    """The arrays that a trajectory of this scene is made of, by short name."""
     base = f"/observables/{label}"
-    found = {x: Column(path=f"{base}/{x}/value", shape=shape(x, frames, scene.n)) for x in stored}
+    found = {x: Column(path=f"{base}/{x}/value", shape=shape(x, frames, scene.n)) for x in scene.quantities}
     if scene.kind == "particles" and np.any(scene.m != 1):
         found["velocity"] = Column(path=f"{base}/velocity/value", shape=found["p"].shape)
     found["time"] = Column(path=f"{base}/q/time", shape=(frames,))

@@ -126,7 +126,6 @@ def trajectory(run: Run, arrays: Mapping[str, Floats], stride: int = 1) -> Traje
         q=arrays["q"],
         p=arrays["p"],
         energy=arrays.get("energy"),
-        last_step=arrays.get("last_step"),
         outcome=Outcome(**parts["outcome"]),
         timing=Timing(**parts["timing"]),
         arithmetic=Arithmetic(**parts["arithmetic"]),

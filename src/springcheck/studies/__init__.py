@@ -5,12 +5,11 @@ They measure how good a scheme is.  A study's own control may fail it; a large e
 
 from __future__ import annotations
 
-from springcheck.studies import census, ensemble, extremes, faults, precision, run, sampling, stability
+from springcheck.studies import census, extremes, faults, precision, run, sampling, stability
 from springcheck.studies.study import Study
 
 STUDIES: tuple[Study, ...] = (
     run.STUDY,
-    ensemble.STUDY,
     faults.STUDY,
     precision.STUDY,
     stability.STUDY,

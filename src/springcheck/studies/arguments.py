@@ -61,14 +61,13 @@ REPORTING = ("run", "judge", "identify")
 """Commands that judge something, and take these options."""
 REPORTS = (
     argument("--junit", metavar="FILE.xml", help="write a JUnit report, as every CI shows it"),
-    argument("--badge", metavar="FILE.json", help="write a badge, the JSON of a shields.io endpoint"),
     argument(
         "--summary", metavar="FILE.md", help="append a summary in Markdown, as for $GITHUB_STEP_SUMMARY"
     ),
 )
-REPORT_FORMS = ("junit", "badge", "summary")
+REPORT_FORMS = ("junit", "summary")
 
 
 def reported(options: Namespace) -> bool:
-    """Whether a command line asks for a JUnit report, a badge or a summary."""
+    """Whether a command line asks for a JUnit report or a summary."""
     return any(getattr(options, name, None) is not None for name in REPORT_FORMS)

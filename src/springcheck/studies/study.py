@@ -93,7 +93,7 @@ class Studied(StudyResult):
 
 
 def study_of(found: object) -> Study:
-    """The study that this is a result of; for `run --vary` the ensemble."""
+    """The study that this is a result of; by the package of its class."""
     study: Study = import_module(type(found).__module__.rpartition(".")[0]).STUDY
     return study
 

@@ -17,7 +17,6 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import cache
 from itertools import count
 from math import inf
 from typing import Any, ClassVar, Literal, NamedTuple, TypeAlias
@@ -25,7 +24,6 @@ from typing import Any, ClassVar, Literal, NamedTuple, TypeAlias
 import numpy as np
 
 from springcheck.schemes import Scheme
-from springcheck.thermal.chain import FOURTH, SIXTH, Chain
 from springcheck.thermal.decays import GJ, MOST_FRICTION, Decay, decay
 
 Part: TypeAlias = Fraction | Callable[[Any], Any]
@@ -38,8 +36,8 @@ class Act(NamedTuple):
     """One stage: its kind, its fraction of the step, and which draw of the step it takes."""
 
     kind: Literal[
-        "kick", "slow", "fast", "held", "drift", "exchange", "damp", "undamp", "noise", "jump",
-        "creep", "rebuild", "collide", "rescale", "scale", "chain", "shake", "project",
+        "kick", "held", "drift", "exchange", "damp", "undamp", "noise", "jump",
+        "creep", "rebuild", "collide", "rescale", "scale", "shake", "project",
     ]  # fmt: skip
     part: Part = ONE
     draw: int = 0
@@ -66,8 +64,6 @@ class Thermostat(Scheme):
     acts: tuple[Act, ...]
     draws: int = 1
     """Number of draws of each coordinate that act in a step, carried ones included."""
-    substeps: int = 1
-    """How often the fast terms act in a step; above 1 the slow and the fast ones act separately."""
     carried: int = 0
     """How many draws, the first ones, are the last ones of the step before."""
     uniform: bool = False
@@ -78,15 +74,9 @@ class Thermostat(Scheme):
     """Limit of gamma h, from which on the variance of its noise is negative."""
     cancels: int = 0
     """`Arithmetic.cancels` of its coefficients as they are published, in terms of 1 - c2."""
-    chain: Chain | None = None
-    """The bath of a scheme that takes no draws."""
     held: tuple[Act, ...] = ()
     """Its stages where a scene has rods, with those that restore lengths after a drift and project momenta;
     () where none are known."""
-
-    def freedoms(self, n: int, particles: int) -> int:
-        """Degrees of freedom that its chain counts, of n coordinates of so many particles."""
-        return 3 * particles if self.chain and self.chain.three_each else n
 
     @property
     def fresh(self) -> int:
@@ -106,11 +96,6 @@ class Thermostat(Scheme):
         return any(act.kind == "collide" for act in self.acts)
 
     @property
-    def splits(self) -> bool:
-        """Whether slow and fast terms kick separately."""
-        return self.substeps > 1
-
-    @property
     def kinetic_of_rods(self) -> bool:
         """Whether a free rod moves at the temperature of the bath, to every order in the step: a drift keeps
         speeds and phase-space volume, and all else acts on momenta across the rod alone."""
@@ -124,7 +109,7 @@ class Thermostat(Scheme):
     @property
     def rescales(self) -> bool:
         """Whether all momenta get one factor, of their kinetic energy and the draws of all: no linear map."""
-        return any(act.kind in ("rescale", "scale", "chain") for act in self.acts)
+        return any(act.kind in ("rescale", "scale") for act in self.acts)
 
 
 def value_of(part: Part, x: Any) -> Any:
@@ -164,24 +149,6 @@ def _by_letters(letters: str) -> Thermostat:
     return Thermostat(
         name=letters.lower(), title=f"{letters}: {_SAID[letters]}", acts=acts, held=held,
         draws=letters.count("O"), synchronised=not middle, source="Leimkuhler & Matthews 2013",
-    )  # fmt: skip
-
-
-BY_SUBSTEPS = "baoab-respa"
-
-
-@cache
-def by_groups(substeps: int) -> Thermostat:
-    """BAOAB of fast terms, so often between two half kicks of slow ones."""
-    share, slow = Fraction(1, 2 * substeps), Act("slow", HALF)
-    acts = [slow]
-    for j in range(substeps):
-        inner = Act("fast", share), Act("drift", share)
-        acts += [*inner, Act("exchange", decay(substeps), j), *inner[::-1]]
-    return Thermostat(
-        name=f"{BY_SUBSTEPS}{substeps}", title=f"BAOAB-RESPA: fast springs {substeps} times a step",
-        acts=(*acts, slow), draws=substeps, substeps=substeps,
-        source="Lagardere et al., J. Phys. Chem. Lett. 10 (2019) 2593",
     )  # fmt: skip
 
 
@@ -248,7 +215,6 @@ ENERGY_LEFT = Decay(lambda x: np.exp(-2 * x), lambda x: -np.expm1(-2 * x))
 """What a step of Bussi's thermostat leaves of a kinetic energy, which relaxes at twice a momentum's rate."""
 
 _OTHERS = (
-    *map(by_groups, (2, 3, 4)),
     Thermostat(
         name="bbk", title="BBK, each random force used in two half kicks",
         acts=(
@@ -307,22 +273,6 @@ _OTHERS = (
         name="bussi-after", title="velocity Verlet, then Bussi without the sign of the factor",
         acts=(*_VERLET, Act("scale", ENERGY_LEFT)), source="Bussi et al. 2007; as LAMMPS runs it",
     ),
-    Thermostat(
-        name="nose-hoover", title="Nose-Hoover chain of 3, half of it before and after velocity Verlet",
-        acts=(Act("chain", HALF), *_VERLET, Act("chain", HALF)), draws=0, chain=Chain(),
-        source="Martyna et al. 1996; LAMMPS' fix nvt",
-    ),
-    Thermostat(
-        name="nose-hoover-fourth", title="Nose-Hoover chain of 3 by fourth-order weights, 3 N freedoms",
-        acts=(Act("chain", HALF), *_VERLET, Act("chain", HALF)), draws=0,
-        chain=Chain(weights=FOURTH, three_each=True), source="Martyna et al. 1996; as ASE runs it",
-    ),
-    Thermostat(
-        name="nose-hoover-middle", title="Nose-Hoover chain of 3 amid the drift of leapfrog, 3 N freedoms",
-        acts=(Act("kick"), Act("drift", HALF), Act("chain"), Act("drift", HALF)), draws=0,
-        chain=Chain(weights=SIXTH, times=3, three_each=True, least=1e-8), synchronised=False,
-        source="Zhang et al. 2019; as OpenMM runs it",
-    ),
 )  # fmt: skip
 
 NO_NORMAL_NUMBERS = "it takes no generator of normal numbers"
@@ -333,14 +283,3 @@ _ON_SITE, _HALF_STEP = zip(*map(_gj, GJ), strict=True)
 THERMOSTATS: dict[str, Thermostat] = {
     one.name: one for one in (*map(_by_letters, _SAID), *_ON_SITE, *_HALF_STEP, *_OTHERS)
 }
-
-
-def family_of(name: str) -> tuple[str, int]:
-    """A name without its count of substeps, and that count, or 0."""
-    count = name.removeprefix(BY_SUBSTEPS)
-    return (name, 0) if count == name else (BY_SUBSTEPS, int(count))
-
-
-def random_scheme(name: str) -> Thermostat:
-    """The thermostat of this name, of the catalogue or with a count of substeps beyond it."""
-    return THERMOSTATS.get(name) or by_groups(family_of(name)[1])

@@ -14,20 +14,16 @@ from numpy.typing import NDArray
 
 from springcheck.physics.arrays import Arithmetic, Extended, Floats, Reals
 from springcheck.physics.scene import Scene
-from springcheck.thermal.catalogue import ENERGY_LEFT, Thermostat, value_of
-from springcheck.thermal.jointly import MOST_JOINTLY, independent_sums, jointly
+from springcheck.thermal.catalogue import ENERGY_LEFT, Thermostat
+from springcheck.thermal.jointly import jointly
 from springcheck.thermal.laws import Law
-from springcheck.thermal.rounding import SMALLEST, one_rounding, roundings_of
+from springcheck.thermal.rounding import one_rounding, roundings_of
 from springcheck.thermal.stepper import Stepper, forces
 
 HOTTEST = 1e4
 """Noncentrality of a chi-squared distribution up to which its rank is computed to all digits."""
 
 _NONE: Extended = np.empty((0, 0), np.longdouble)
-
-LOST, UNTOLD = 0.01, -1.0
-"""Error of a chain's state, relative to the usual one, from which on it predicts nothing; and what stands for
-the contradictions of the frames from there on."""
 
 SMALL_RATE = 1e-4
 """Relative change of a friction over which its effect is linear."""
@@ -75,13 +71,9 @@ def law_of(scheme: Thermostat, scene: Scene) -> Law:
     """The law of a scheme on each particle by itself, with its own curvature at the start."""
     assert scene.bath is not None
     q = scene.q.astype(np.longdouble)
-    all_k, fast = (
-        np.asarray(one.system.hessian_diagonal(q), np.longdouble)
-        for one in (scene, scene.derived(terms=scene.system.fast))
-    )
     return Law(
-        scheme=scheme, h=scene.step, m=scene.m, k=all_k, rate=scene.bath.friction, thermal=scene.thermal,
-        fast=fast,
+        scheme=scheme, h=scene.step, m=scene.m, rate=scene.bath.friction, thermal=scene.thermal,
+        k=np.asarray(scene.system.hessian_diagonal(q), np.longdouble),
     )  # fmt: skip
 
 
@@ -114,8 +106,7 @@ def read(
 class _Reader:
     def __init__(self, scheme: Thermostat, scene: Scene, how: Arithmetic, rebuilt: bool) -> None:
         self.scheme, self.scene, self.how, self.rebuilt = scheme, scene, how, rebuilt
-        real = np.float32 if how.force > how.state else np.float64
-        self.stepper = Stepper.of(scheme, scene, single=how.parameters == "single", real=real)
+        self.stepper = Stepper.of(scheme, scene)
         self.sizer = Stepper.of(scheme, scene, absolute=True)
         self._force = forces(scheme, scene.system)
         self.roundings = roundings_of(scheme, scene)
@@ -123,16 +114,11 @@ class _Reader:
 
     def read(self, q: Floats, p: Floats) -> Reading:
         z = q.astype(np.longdouble), p.astype(np.longdouble)
-        if self.scheme.chain:
-            return self._swung(*z)
         start, end = (z[0][:-1], z[1][:-1]), (z[0][1:], z[1][1:])
         if self.scheme.rescales:
             return self._rescaled(start, end)
         if self.scheme.collides:
             return self._collided(start, end)
-        if self.scheme.fresh > 2:
-            draws, unit = self._summed(start, end)
-            return self._reading(_in_rows(draws), None, _in_rows(unit))
         draws, across, unit, unseen = self._solved(start, end, hit=False)
         c = self.scheme.carried
         if draws.shape[0] == 1:
@@ -211,73 +197,11 @@ class _Reader:
         kinetic = np.concatenate([twice, factor**2 * twice], axis=-1).T / self.scene.thermal
         return replace(found, rescaled=np.asarray(kinetic, np.float64))
 
-    def _swung(self, q: Extended, p: Extended) -> Reading:
-        """A chain is at rest before the first frame, and each state tells how it swings on: it is carried
-        along the frames, and predicts the next one.
-
-        Roundings of the chain add up.  J, what a step makes of them, is found by moving the chain by ten
-        thousand of them; N errors e_i, each carried on by its own product of J, add up to at most
-        sqrt(N sum (J..J e_i)**2), whose sum of squares goes from step to step.  From where they are no longer
-        small, as of much friction, whose chain is chaotic, the frames after are not told.
-        """
-        chain, stepper, m, h = self.scheme.chain, self.stepper, self.scene.m, self.scene.step
-        assert chain is not None
-        M, about = chain.length, stepper.of_chain
-        x = np.asarray(h)
-        part = sum(float(value_of(act.part, x)) for act in self.scheme.acts if act.kind == "chain")
-        squares, across = np.zeros((M, M)), np.empty((len(q) - 1, len(m)))
-        state, usual = chain.start(), np.sqrt(about["Q"] * about["thermal"])
-        for i in range(len(q) - 1):
-            if M * i * np.max(np.diag(squares)) > LOST**2:
-                across[i:] = UNTOLD
-                break
-            moved = 1e4 * self.how.state * (usual + np.abs(state[:M]))
-            stepper.chain = np.repeat(state[:, None], M + 1, axis=1)
-            stepper.chain[range(M), range(1, M + 1)] += moved
-            both = np.stack(stepper(q[i], np.tile(p[i], (M + 1, 1)), self._force, []))
-            after, state = stepper.chain, stepper.chain[:, 0]
-            # (q or p, particle, link): what a change of a link moves
-            moves = ((both[:, 1:] - both[:, :1]) / moved[:, None]).transpose(0, 2, 1)
-            grown = np.max(np.abs(both[1, 0])) / max(float(np.max(np.abs(p[i]))), float(SMALLEST))
-            of = np.stack(self._allowed((q[i], p[i]), [], np.clip(grown, 1, 2)))
-            # in units of what a frame rounds to and of the usual link: squares of small ones underflow
-            moves = np.asarray((moves * usual) / of[:, :, None], np.float64)
-            hidden = 1 + np.sqrt(M * i * np.einsum("znj,jk,znk->zn", moves, squares, moves)) / self.roundings
-            off = np.abs(np.stack([q[i + 1], p[i + 1]]) - both[:, 0])
-            across[i] = np.max(off / (of * hidden), axis=0)
-            twice = np.sum(np.maximum(p[i] ** 2, both[1, 0] ** 2) / m)
-            new = self.how.state * chain.rounding(state, twice, part * h, **about)
-            # and those of the momenta that it begins from
-            new[0] += part * h * self.roundings * np.sum(2 * np.abs(both[1, 0]) * of[1] / m)
-            J = ((after[:M, 1:] - after[:M, :1]) / moved * usual / usual[:, None]).astype(np.float64)
-            squares = J @ squares @ J.T + np.diag((new / usual).astype(np.float64) ** 2)
-        none = np.empty((0, len(m)))
-        return self._reading(none, across, none)
-
     def _allowed(
         self, start: tuple[Extended, Extended], draws: Any, hit: Any = True
     ) -> tuple[Extended, Extended]:
         """One rounding of everything that a step adds up."""
         return one_rounding(self.scene, self.sizer, start, list(np.abs(draws)), hit, self.how, self.rebuilt)
-
-    def _summed(
-        self, start: tuple[Extended, Extended], end: tuple[Extended, Extended]
-    ) -> tuple[Extended, Extended]:
-        """Independent sums (2, f-1, n) of more draws a step than a state has numbers, and one rounding of
-        each."""
-        (f, n), r = start[0].shape, self.scheme.draws
-        if n > MOST_JOINTLY or not self.scene.system.is_linear:
-            # what a draw makes then depends on others
-            unknown = np.full((2, f, n), np.inf, np.longdouble)
-            return unknown, unknown
-        still, each = np.zeros((r * n, n), np.longdouble), np.eye(r * n, dtype=np.longdouble)
-        made = [
-            np.stack(self.stepper(still, still, self._force, list(of_each), False, still))
-            for of_each in (each.reshape(-1, r, n).transpose(1, 0, 2), np.zeros((r, r * n, n), np.longdouble))
-        ]
-        none = np.stack(self.stepper(*start, self._force, list(np.zeros((r, f, n))), False, end[0]))
-        J, left = made[0] - made[1], np.stack(end) - none
-        return independent_sums(J, left, lambda draws: np.stack(self._allowed(start, draws)))
 
     def _solved(
         self, start: tuple[Extended, Extended], end: tuple[Extended, Extended], *, hit: bool

@@ -12,7 +12,6 @@ from springcheck.physics.rods import Rods
 from springcheck.physics.scene import Scene
 from springcheck.physics.system import MOST_DENSE
 from springcheck.physics.trajectory import Trajectory
-from springcheck.thermal import draws
 from springcheck.thermal.catalogue import THERMOSTATS
 from springcheck.thermal.laws import Law
 
@@ -116,14 +115,10 @@ class Heat:
             self._law = None if law.scheme.collides and not system.is_separate else law
 
     def _law_of(self, piece: Trajectory) -> Law | None:
-        """The law of each mode, or of each particle where slow and fast terms act separately."""
+        """The law of each mode."""
         scene, system, scheme = self._scene, self._scene.system, THERMOSTATS.get(piece.scheme)
         if scheme is None or scheme.rescales or not system.has_modes or not np.all(system.modes.w2 >= 0):
             return None
-        if scheme.splits:
-            # modes of all terms are not those of the fast ones
-            apart = system.is_separate and self._bound == scene.n
-            return draws.law_of(scheme, scene.derived(step=piece.step)) if apart else None
         assert scene.bath is not None
         held = system.modes.w2[system.modes.w2 > 0]
         return Law(

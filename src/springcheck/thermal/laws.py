@@ -42,7 +42,7 @@ def _gaussian(S: Any) -> Any:
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Law:
     """A random scheme on n separate springs m, k (n,), at friction rate gamma [1/T], one or (n,) of them,
-    and thermal energy kT; `fast` (n,) of k are those of fast terms."""
+    and thermal energy kT."""
 
     scheme: Thermostat
     h: float
@@ -50,7 +50,6 @@ class Law:
     k: Reals
     rate: Reals | float
     thermal: float
-    fast: Reals | float = 0.0
 
     @property
     def collision(self) -> float:
@@ -73,10 +72,8 @@ class Law:
         stepper = Stepper(
             self.scheme, h=self.h, m=m, rate=self.rate, thermal=self.thermal, width=np.longdouble
         )
-        parts = {"slow": lambda q, p: (self.fast - k) * q, "fast": lambda q, p: -self.fast * q}
-        whole = parts if self.scheme.splits else lambda q, p: -k * q
         out = np.zeros((n, 2 + c, 2 + r), np.longdouble)
-        out[:, :2] = np.stack(stepper(q, p, whole, draws, hit), axis=0).transpose(2, 0, 1)
+        out[:, :2] = np.stack(stepper(q, p, lambda q, p: -k * q, draws, hit), axis=0).transpose(2, 0, 1)
         # the last draws of this step are the first of the next
         out[:, 2 + np.arange(c), 2 + r - c + np.arange(c)] = 1
         return out[:, :, : 2 + c], out[:, :, 2 + c :]
@@ -242,7 +239,7 @@ class Law:
         """
         # nothing depends on q itself: all is a map of (p, carried draws), in extended precision where next to
         # nothing is lost in a step
-        free = replace(self, k=np.zeros_like(self.m), fast=0.0)
+        free = replace(self, k=np.zeros_like(self.m))
         maps = [(chance, A[:, :, 1:], G) for chance, A, G in free._maps]
         mean = sum(chance * A for chance, A, _ in maps)
         noise = sum(chance * (G @ G.transpose(0, 2, 1)) for chance, _, G in maps)

@@ -10,13 +10,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from itertools import pairwise
 from math import inf, nan
 
 import numpy as np
 
 from springcheck.physics.arrays import Floats
-from springcheck.thermal.catalogue import THERMOSTATS, Thermostat, by_groups
+from springcheck.thermal.catalogue import THERMOSTATS, Thermostat
 from springcheck.thermal.laws import Law
 
 ODDS = float(np.log(1e6))
@@ -27,15 +26,6 @@ GAINED_BY_CHANCE = 26.0
 
 STEPS_A_FRAME = (2, 3, 4, 5, 6, 8)
 """Steps from frame to frame that are tried where they are not known."""
-
-SUBSTEPS_TRIED = (3, 4, 5, 8, 12)
-"""Substeps of fast terms that are tried where two may be too few: more than the last are all alike."""
-
-NO_RATE = 1e-300
-"""Stands for a friction or frequency of 0 in a starting point, so that it has a logarithm."""
-
-UNLIKE_A_FRAME = 0.2
-"""Nats a frame by which two substeps may be less likely than the best, for more of them to be tried."""
 
 EITHER_WAY = 0.5
 """Sine of the rotation between two frames, below which it is tried in both directions."""
@@ -62,8 +52,6 @@ class Candidate:
     thermal: float = nan
     """kT/m [L2/T2]."""
     thermal_error: float = nan
-    fast: float = 0.0
-    """Share of fast terms in omega**2."""
     nats: float = 0.0
     """Log-likelihood of the best candidate minus its own."""
     strides: tuple[int, ...] = (1,)
@@ -89,10 +77,9 @@ def likely_apart(q: Floats, v: Floats, h: float, *, white: bool = True) -> list[
     """
     found: list[Candidate] = []
     for scheme in THERMOSTATS.values():
-        if not scheme.rescales and scheme.substeps <= 2:
+        if not scheme.rescales:
             at_once = scheme.full_rank and white != bool(scheme.carried)
             found += _of_scheme(scheme, q, v, h, (1,) * at_once + STEPS_A_FRAME)
-    found += _of_more_substeps(found, q, v, h)
     kept: dict[str, Candidate] = {}
     for one in _compared(found, q, v):
         before = kept.get(one.scheme)
@@ -115,42 +102,14 @@ def _compared(found: list[Candidate], q: Floats, v: Floats, *, rank: int = 2) ->
     return sorted((replace(y, nats=y.nats - best) for y in found), key=lambda y: y.nats)
 
 
-def _of_more_substeps(found: list[Candidate], q: Floats, v: Floats, h: float) -> list[Candidate]:
-    """The candidates of two substeps, continued to more: each count starts from the fit of the one before,
-    and is the last where it is less likely, and by more than `ODDS` than the best.  Counts between two are
-    as likely as the likelier one, so that none of them is named unseen."""
-    best, out = min((y.nats for y in found), default=inf), []
-    far = best + UNLIKE_A_FRAME * len(q)
-    last = {y.strides[0]: y for y in found if y.scheme == by_groups(2).name and y.nats < far}
-    for before, count in pairwise((2, *SUBSTEPS_TRIED)):
-        shares = {s: np.clip(y.fast, 0.1, 0.9) for s, y in last.items()}
-        begins = [
-            [y.friction * h / s, (y.omega * h / s) ** 2, shares[s] / (1 - shares[s])] for s, y in last.items()
-        ]
-        starts = np.log(np.maximum(begins, NO_RATE))
-        more = _of_scheme(by_groups(count), q, v, h, tuple(last), starts=starts) if last else []
-        best = min([best, *(y.nats for y in more)])
-        for one in more:
-            likelier = min(one, last[one.strides[0]], key=lambda y: y.nats)
-            out += [replace(likelier, scheme=by_groups(c).name) for c in range(before + 1, count)]
-        out += more
-        last = {s: y for y in more for s in y.strides if y.nats <= max(last[s].nats, best + ODDS)}
-    return out
-
-
 def _of_scheme(
     scheme: Thermostat, q: Floats, v: Floats, h: float, strides: tuple[int, ...], turn: float | None = None,
-    starts: Floats | None = None,
 ) -> list[Candidate]:  # fmt: skip
     """Best candidate of a scheme at each stride, or from each start, with its log likelihood in nats."""
     moments, n = _moments(q, v * h)
     begins, every = _starts(_free(moments)[:, :2], strides, n)
-    if starts is not None:
-        begins, every = starts, np.array(strides)
-    elif turn is not None:
+    if turn is not None:
         begins = begins[:, :1]
-    elif scheme.splits:
-        begins = np.column_stack([begins, np.zeros(len(begins))])
     of = partial(_profile, scheme, moments, n, turn)
     with np.errstate(all="ignore"):
         at, nats, curved = _descend(of, begins, every)
@@ -170,17 +129,11 @@ def _of_scheme(
                 omega_error=0.0 if turn is not None else float(w * errors[1] / 2), friction=rate,
                 friction_error=float(rate * errors[0]), thermal=heat,
                 thermal_error=float(heat * errors[-1]),
-                fast=float(_share(at[i])) if at.shape[1] > 2 else 0.0,
                 # a change of the unit of velocity is no information
                 nats=float(nats[i] - n * np.log(h)), strides=(s,),
             )
         )  # fmt: skip
     return out
-
-
-def _share(at: Floats) -> Floats:
-    """Fast terms in all, of the last number of a scheme that takes them apart: log of fast over slow."""
-    return np.asarray(1 / (1 + np.exp(-at[..., -1])))
 
 
 def _profile(
@@ -191,7 +144,6 @@ def _profile(
     turns = np.full(len(at), turn) if turn is not None else np.exp(at[:, 1])
     law = Law(
         scheme=scheme, h=1.0, m=np.ones(len(at)), k=turns, rate=np.exp(at[:, 0]), thermal=1.0,
-        fast=_share(at) * turns if scheme.splits else 0.0,
     )  # fmt: skip
     B, Q = law.apart(every)
     unit = np.stack([np.ones(len(at)), every], axis=1)

@@ -16,7 +16,7 @@ import numpy as np
 
 from springcheck.physics.arrays import Floats
 from springcheck.thermal import residuals
-from springcheck.thermal.catalogue import random_scheme
+from springcheck.thermal.catalogue import THERMOSTATS
 from springcheck.thermal.collisions import between_collisions, changed, is_a_factor
 from springcheck.thermal.decays import GJ
 from springcheck.thermal.likelihood import ODDS, Candidate, likely, likely_apart
@@ -148,10 +148,10 @@ def _identified(q: Floats, v: Floats, h: float, beside: Floats | None, mixed: bo
     if coloured and not (all(is_white(x[i::2]) for x in left for i in (0, 1)) and added(2)):
         return None
     found = tuple(likely_apart(q, v, h, white=white))
-    if white and coloured and not any(random_scheme(one.scheme).carried for one in found):
+    if white and coloured and not any(THERMOSTATS[one.scheme].carried for one in found):
         return None
     # a factor of the momenta, of several steps, leaves what collisions do
-    a_factor = any(random_scheme(y.scheme).collides and y.strides != (1,) for y in found)
+    a_factor = any(THERMOSTATS[y.scheme].collides and y.strides != (1,) for y in found)
     return Thermal(
         candidates=found, draws=_shape(found, left[1], mixed),
         known=not (bent or a_factor) and white and not residuals.grows(left[1], x[:-1], x[1:]),
@@ -181,7 +181,7 @@ def _of_one(
     state = np.stack([(q[:-1] - q[0]) / np.std(q), v[:-1] / np.std(v), np.ones(len(v) - 1)], axis=1)
     if (after or ahead) and (counted := between_collisions(q, v, h)):
         # of several steps no combination is free of noise, and of a collision that ends a step another one
-        ends = (y for y in counted if after == (random_scheme(y.scheme).acts[-1].kind == "collide"))
+        ends = (y for y in counted if after == (THERMOSTATS[y.scheme].acts[-1].kind == "collide"))
         each = tuple(replace(y, strides=(1,)) for y in ends)
         before, made = acted(each[0].omega if each else 0.0)
         struck = np.abs(made - before) > close * np.std(v)
@@ -281,7 +281,7 @@ def _of_one(
 
 def _shape(found: Sequence[Candidate], left: Floats, mixed: bool) -> str:
     """How draws that a map has left are not normal; of collisions and factors it leaves more than draws."""
-    known = [random_scheme(x.scheme) for x in found]
+    known = [THERMOSTATS[x.scheme] for x in found]
     mixed = mixed or any(x.collides or x.rescales for x in known)
     return "" if mixed or not len(left) else unlike_normal(left)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -24,22 +23,17 @@ projected."""
 def forces(
     scheme: Thermostat, system: System[Any], of: Callable[[Sequence[Term]], Force] | None = None
 ) -> Any:
-    """What the stages of a scheme push by, as `of` makes it of terms: one force, or those of slow and fast
-    terms by these names."""
+    """What the stages of a scheme push by, as `of` makes it of terms."""
     of = of or system.force_of
-    if scheme.splits:
-        return {"slow": of(system.slow), "fast": of(system.fast)}
     return of([term for term in system.terms if term.kind == "potential"])
 
 
 class Stepper:
     """Steps of a random scheme: its coefficients are worked out once, in the width of its numbers.
 
-    `rate` is the friction rate gamma [1/T], > 0; `thermal` is kT [M L2/T2].  A chain swings on from step to
-    step, at rest before the first, beside so many `freedoms`, one for each mass by default; with `single` it
-    keeps its step and its rate so, and its weights are `real`.  Rods `hold` where the scheme says so.  With
-    `absolute` every difference is taken as a sum of sizes: a unit roundoff of these, times the roundings of a
-    step, bounds its rounding.
+    `rate` is the friction rate gamma [1/T], > 0; `thermal` is kT [M L2/T2].  Rods `hold` where the scheme
+    says so.  With `absolute` every difference is a sum of sizes: a unit roundoff of these, times the
+    roundings of a step, bounds its rounding.
     """
 
     @classmethod
@@ -48,23 +42,14 @@ class Stepper:
         assert scene.bath is not None
         return cls(
             scheme, h=scene.step, m=scene.m, rate=scene.bath.friction, thermal=scene.thermal, width=width,
-            freedoms=scheme.freedoms(scene.n, scene.particles), hold=scene.system.rods, **more,
+            hold=scene.system.rods, **more,
         )  # fmt: skip
 
     def __init__(
         self, scheme: Thermostat, *, h: float, m: Reals, rate: Reals | float, thermal: float, width: Any,
-        absolute: bool = False, freedoms: int = 0, hold: Rods | None = None, single: bool = False,
-        real: Any = np.float64,
+        absolute: bool = False, hold: Rods | None = None,
     ) -> None:  # fmt: skip
         self.scheme, self.h, self.m = scheme, width(h), np.asarray(m, width)
-        if scheme.chain:
-            kept, times = (np.float32, scheme.chain.times) if single else (width, 1)
-            chain = replace(scheme.chain, weights=tuple(map(float, map(real, scheme.chain.weights))))
-            # a part of the step, and the square of the rate, are rounded as those are
-            freedoms, self._clock = freedoms or self.m.size, width(kept(h) / kept(times)) * times
-            Q = scheme.chain.masses(freedoms, width(thermal), kept(rate))
-            self.of_chain = {"freedoms": freedoms, "thermal": width(thermal), "Q": Q}
-            self.chain, self._swing = chain.start().astype(width), chain.swing
         self._hold, acts = hold, scheme.held if hold else scheme.acts
         x = np.asarray(self.h * width(rate), width)
         self.collision = np.asarray(-np.expm1(-x), np.float64)[()]
@@ -101,10 +86,9 @@ class Stepper:
         for i, (kind, c, noise, number) in enumerate(self._acts):
             if kind == "drift":
                 q = q + c * (p / m)
-            elif kind in ("kick", "slow", "fast", "held"):
+            elif kind in ("kick", "held"):
                 if kind != "held":
-                    push = force if kind == "kick" else force[kind]
-                    last = push(q if end is None or i < self._moved else end, np.zeros_like(p))
+                    last = force(q if end is None or i < self._moved else end, np.zeros_like(p))
                 p = p + (c * h) * last
             elif kind == "exchange":
                 p = c * p + noise * draws[number]
@@ -118,11 +102,7 @@ class Stepper:
                 q = q + c * draws[number]
             elif kind == "creep":
                 q = q + c * force(q, np.zeros_like(p)) / m
-            elif kind == "chain" and hit is None:
-                twice = np.sum(p * p / m, axis=-1)
-                self.chain, factor = self._swing(self.chain, twice, c * self._clock, **self.of_chain)
-                p = p * np.expand_dims(factor, -1)
-            elif kind in ("rescale", "scale", "chain"):
+            elif kind in ("rescale", "scale"):
                 p = p * (self._factor(p, c, noise, draws[number], kind == "rescale") if hit is None else hit)
             elif kind in ("shake", "project"):
                 assert self._hold is not None

@@ -16,10 +16,6 @@ from springcheck import schemes
 from springcheck.errors import SpringcheckError
 from springcheck.figures import charts
 from springcheck.figures.charts import EXACTLY, Bank, Chart, Curve, Rule, Scale, numbers
-from springcheck.formats import columns
-from springcheck.identify.candidates import other_names
-from springcheck.identify.families import title
-from springcheck.identify.hypothesis import distinct
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import WallSpring
@@ -57,22 +53,7 @@ def to_scripts(scene: Scene | None, pieces: Sequence[Trajectory], wrong: Collect
         "laws": laws([*(piece.scheme for piece in pieces), *TRIED.values()]),
         "steps": scene.steps if scene else 0,
         "equal": scene is not None and scene.units == "reduced",
-        "columns": columns.NAMES,
-        "schemes": plain_schemes(),
     }
-
-
-def plain_schemes() -> list[dict[str, Any]]:
-    """One scheme for every undamped one-step map that `identify` distinguishes; its title names those of the
-    same map too."""
-    known, found = laws(schemes.SCHEMES), []
-    for name in (family.scheme for family in distinct(damped=False)):
-        # whoever drops a plain file did not ask for friction
-        names = [x for x in other_names(name, damped=False) if not x.endswith(" friction")]
-        others = ", ".join(map(schemes.title, names))
-        also = f" (on a spring the same map: {others})" if others else ""
-        found.append({"scheme": name, "title": title(name) + also, "law": known[name]})
-    return found
 
 
 def _live() -> Bank:
@@ -142,8 +123,6 @@ def laws(names: Iterable[str]) -> dict[str, Any]:
     """Schemes by name, as their stages or their tableau in doubles; "exact" for exact and adaptive ones."""
     known, found = schemes.known(), dict[str, Any]()
     for scheme in (known[name] for name in names if name in known):
-        if scheme.rule is not None:
-            continue  # its error is that of its rule, not of a tolerance of each step
         if scheme.has("flow") or scheme.has("adaptive"):
             found[scheme.name] = "exact"
         elif scheme.stages and {kind for kind, _ in scheme.stages} <= STAGES:

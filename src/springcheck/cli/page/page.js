@@ -151,7 +151,6 @@ function said(s) {
 
 selfCheck();
 live();
-drop();
 for (const [name, bank] of Object.entries(DATA.banks)) new Bank(by(name), bank);
 
 // a link to a fold opens it

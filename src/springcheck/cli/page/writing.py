@@ -24,7 +24,7 @@ from springcheck.text.wording import count, ordinal
 HERE = Path(__file__).parent
 MARK = '<meta name="generator" content="springcheck report">'
 """In the first lines of every report: no other file is replaced."""
-SCRIPTS = ("loops.js", "drawing.js", "charts.js", "files.js", "page.js")
+SCRIPTS = ("loops.js", "drawing.js", "charts.js", "page.js")
 """Scripts of the page, each after those that it needs."""
 DASHES = ("", "7 4", "2 3", "9 3 2 3", "14 4", "9 3 2 3 2 3", "2 6")
 """Dashes in the order of `looks.LINES`."""

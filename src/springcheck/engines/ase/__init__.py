@@ -6,7 +6,6 @@ from functools import partial
 
 from springcheck.engines.contract import (
     EVERY_POTENTIAL,
-    NO_NUMBERS,
     RODS,
     Engine,
     Need,
@@ -39,11 +38,6 @@ ENGINE = Engine(
         _drawn("langevin-baoab", "baoab", "ase.md.langevinbaoab.LangevinBAOAB"),
         _drawn("andersen", "andersen-after-kick", "ase.md.andersen.Andersen"),
         _drawn("bussi", "bussi-unsigned", "ase.md.bussi.Bussi", scripted=True, default=False),
-        _drawn(
-            "nose-hoover", "nose-hoover-fourth", "ase.md.nose_hoover_chain.NoseHooverChainNVT",
-            generator=NO_NUMBERS, rebuilds_velocity=False, default=False,
-            note="it counts three degrees of freedom for each atom, whatever is fixed of it",
-        ),
     ),
     any_axis=True,
     # of A sqrt(u/eV)

@@ -102,11 +102,6 @@ def _thermostat(
         fixed.reshape(-1)[scene.where] = False
         atoms.set_constraint([FixCartesian(i, mask=tuple(row)) for i, row in enumerate(fixed) if np.any(row)])
         return Bussi(atoms, taut=time / (2 * rate), **given)
-    if name == "nose-hoover":
-        from ase.md.nose_hoover_chain import NoseHooverChainNVT
-
-        del given["rng"]
-        return NoseHooverChainNVT(atoms, tdamp=time / rate, **given)
     from ase.md.langevinbaoab import LangevinBAOAB
 
     return LangevinBAOAB(atoms, T_tau=time / rate, **given)

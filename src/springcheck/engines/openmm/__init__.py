@@ -3,27 +3,21 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import Any
 
 from springcheck.engines.contract import (
     ANY_POTENTIAL,
     DRIVEN,
     EVERY_POTENTIAL,
     FIELD,
-    NO_NUMBERS,
     RODS,
     Engine,
-    Label,
-    Method,
     Need,
-    Simulation,
     by_default,
     by_name,
     deferred,
     named,
     thermostat,
 )
-from springcheck.physics.scene import Scene
 
 _TERMS = EVERY_POTENTIAL - {ANY_POTENTIAL} | {"bond"}
 _DRIVEN = _TERMS | DRIVEN
@@ -32,17 +26,6 @@ _ON_A_LINE = _TERMS - {"morse"}
 """The terms that noise across the line does not bend: a bond of rest length 0 pulls along each axis alike."""
 
 _drawn = partial(thermostat, generator="OpenMM, SFMT", terms=_ON_A_LINE, rebuilds_velocity=True)
-
-_MODULE = deferred(f"{__name__}.simulation", "arithmetic", "convention")
-
-
-def _start(scene: Scene, method: Method, label: Label, step: float, **more: Any) -> Simulation:
-    if not method.adaptive:
-        return _MODULE["start"](scene, method, label, step, **more)  # type: ignore[no-any-return]
-    from springcheck.engines.openmm.variable import Variable
-
-    return Variable(scene, method, label, step)
-
 
 _GPU = ("OpenCL", "CUDA", "HIP")
 _PRECISIONS = ("", "-single", "-mixed", "-double")
@@ -94,11 +77,6 @@ ENGINE = Engine(
             "boris", "boris", "Boris' rotation by CustomIntegrator", (_DRIVEN - {"morse"}) | FIELD, Need.FIELD
         ),
         by_name(
-            "variable-verlet", "variable-verlet",
-            "VariableVerletIntegrator, stepTo each frame, its error tolerance that of the scene times its "
-            "amplitude", _TERMS, adaptive=True, rebuilds_velocity=True,
-        ),
-        by_name(
             "nose-hoover", "semi-implicit-euler",
             "NoseHooverIntegrator without a thermostat, handed p0 as it is", _DRIVEN,
         ),
@@ -122,31 +100,13 @@ ENGINE = Engine(
             note="on GPU platforms it collides at most 2/pi as often as asked",
         ),
         _drawn(
-            "nose-hoover-bath", "nose-hoover-middle", "NoseHooverIntegrator, as it stores velocities",
-            generator=NO_NUMBERS, default=False,
-            note="it counts three degrees of freedom for each particle, whatever moves it",
-        ),
-        _drawn(
             "mts-langevin", "baoab", "MTSLangevinIntegrator, one group of forces once a step",
             default=False, rebuilds_velocity=False,
-        ),
-        *(
-            _drawn(
-                f"mts-langevin-{n}", f"baoab-respa{n}",
-                f"MTSLangevinIntegrator, fast springs {n} times a step", default=False,
-                rebuilds_velocity=False,
-            )
-            for n in (2, 3, 4)
-        ),
-        _drawn(
-            "variable-langevin", "baoa",
-            "VariableLangevinIntegrator, its longest step that of the scene, at a tolerance that allows it",
-            default=False,
         ),
     ),
     atlas=tuple(f"verlet@{place}" for place in ("CPU", "OpenCL-single", "OpenCL-mixed", "OpenCL-double")),
     any_axis=True,
     periodic=True,
     squares_lengths=True,
-    **_MODULE | {"start": _start},
+    **deferred(f"{__name__}.simulation", "arithmetic", "convention"),
 )  # fmt: skip

@@ -65,7 +65,7 @@ SHIFTED = frozenset(
 """Methods whose stored velocity is half a kick behind the position, and is synchronised here."""
 
 
-FAST_STEPS = {"mts": 8} | {f"mts-langevin-{n}": n for n in (2, 3, 4)}
+FAST_STEPS = {"mts": 8}
 """Evaluations of the fast springs in a step, beside one of the others, by method."""
 
 CUSTOM_STAGES = {
@@ -215,8 +215,6 @@ def _integrator(scene: Scene, name: str, step: float) -> mm.Integrator:
         made = mm.VerletIntegrator(step)
         made.setConstraintTolerance(LENGTHS.get(name, made.getConstraintTolerance()))
         return made
-    if name == "variable-verlet":
-        return mm.VariableVerletIntegrator(scene.tolerance)
     if name == "mts":
         return mm.MTSIntegrator(step, [(0, 1), (1, FAST_STEPS[name])])
     if name == "nose-hoover":
@@ -322,7 +320,7 @@ class _Context:
         with np.errstate(all="ignore"):
             started = (scene.p - self._half_kick * self._force(0.0, scene.q, scene.p)) / self._m
         velocities.reshape(-1)[scene.where] = started
-        if not method.generator and not method.adaptive:
+        if not method.generator:
             # whose numbers begin with its first step
             _warm_up(self._context, self._integrator, positions)
         if self._driven and method.name in CUSTOM:

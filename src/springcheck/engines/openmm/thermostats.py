@@ -1,8 +1,4 @@
-"""OpenMM's integrators with a heat bath.
-
-All but `DPDIntegrator`, which is no method: its noise is one number a pair, and its friction, 2 gamma
-(1 - r/cutoff)**2, follows the distance r, so that no matrices A and G are its law on a spring.
-"""
+"""OpenMM's integrators with a heat bath."""
 
 from __future__ import annotations
 
@@ -16,10 +12,6 @@ BOLTZMANN = 1.380649e-23 * 6.02214076e23 / 1000
 """kT of a kelvin [kJ/mol] as OpenMM has it."""
 
 
-LOOSE = 1e300
-"""A tolerance so large that it allows every step."""
-
-
 def thermostat(scene: Scene, name: str, step: float, seed: int, system: mm.System) -> mm.Integrator:
     """An integrator with noise of this seed, at the thermal energy of the scene."""
     assert scene.bath is not None
@@ -30,19 +22,10 @@ def thermostat(scene: Scene, name: str, step: float, seed: int, system: mm.Syste
         system.addForce(noise)
     elif name == "brownian":
         noise = made = mm.BrownianIntegrator(temperature, rate, step)
-    elif name == "nose-hoover-bath":
-        return mm.NoseHooverIntegrator(temperature, rate, step)
     elif name == "mts-langevin":
         noise = made = mm.MTSLangevinIntegrator(temperature, rate, step, [(0, 1)])
         for force in system.getForces():
             force.setForceGroup(0)
-    elif name.startswith("mts-langevin-"):
-        groups = [(0, 1), (1, int(name.rpartition("-")[2]))]
-        noise = made = mm.MTSLangevinIntegrator(temperature, rate, step, groups)
-    elif name == "variable-langevin":
-        noise = made = mm.VariableLangevinIntegrator(temperature, rate, LOOSE)
-        made.setStepSize(step)
-        made.setMaximumStepSize(step)
     else:
         kind = mm.LangevinIntegrator if name == "langevin-bath" else mm.LangevinMiddleIntegrator
         noise = made = kind(temperature, rate, step)

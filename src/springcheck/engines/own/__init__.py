@@ -13,7 +13,6 @@ from springcheck.engines.contract import (
     EVERY_KIND,
     EVERY_POTENTIAL,
     FIELD,
-    NO_NUMBERS,
     RODS,
     SPRINGS,
     Engine,
@@ -86,9 +85,9 @@ ENGINE = Engine(
     thermostats=named(
         *(
             thermostat(
-                one.name, one.name, one.title, "NumPy, PCG64" if one.draws else NO_NUMBERS,
+                one.name, one.name, one.title, "NumPy, PCG64",
                 EVERY_POTENTIAL | (RODS if one.held else frozenset()),
-                scripted=one.draws > 0, kinds=EVERY_KIND, default=one.name in BY_DEFAULT,
+                scripted=True, kinds=EVERY_KIND, default=one.name in BY_DEFAULT,
             )
             for one in THERMOSTATS.values()
         )

@@ -24,14 +24,12 @@ class Random:
         self._q, self._p = scene.q.astype(np.float64), scene.p.astype(np.float64)
         self._scheme = THERMOSTATS[scheme]
         self._step = Stepper.of(self._scheme, scene.derived(step=step), width=np.float64)
-        push = forces(self._scheme, scene.system)
-        named = isinstance(push, dict)
-        self._force = {x: self._counted(y) for x, y in push.items()} if named else self._counted(push)
+        self._force = self._counted(forces(self._scheme, scene.system))
         scripted = hasattr(seed, "standard_normal")
         self._rng = seed if scripted else np.random.Generator(np.random.PCG64(seed))
         # collisions take numbers of their own, far along the same sequence
         self._hits = self._rng if scripted else np.random.Generator(np.random.PCG64(seed).jumped())
-        self._ahead = 1 if scripted else max(1, MOST_DRAWS // (scene.n * max(1, self._scheme.draws)))
+        self._ahead = 1 if scripted else max(1, MOST_DRAWS // (scene.n * self._scheme.draws))
         self._carried = list(self._drawn(1, self._scheme.carried)[0])
 
     def _counted(self, force: Force) -> Force:

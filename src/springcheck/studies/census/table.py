@@ -12,7 +12,6 @@ from springcheck.errors import StoreError
 from springcheck.schemes.elsewhere import ELSEWHERE
 from springcheck.studies.census.rigid import NO_SCHEME
 from springcheck.text.wording import number
-from springcheck.thermal.catalogue import family_of, random_scheme
 
 Cells: TypeAlias = Mapping[str, Mapping[str, str]]
 """Version, and the text of each column, by method."""
@@ -24,8 +23,6 @@ def titles(names: str) -> str:
 
 
 def _title(name: str) -> str:
-    if family_of(name)[1]:
-        return random_scheme(name).title
     return getattr(ELSEWHERE.get(name), "title", schemes.title(name))
 
 

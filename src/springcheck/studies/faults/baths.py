@@ -67,7 +67,6 @@ def played(
     stepper = Stepper(
         replace(of, uniform=claims.uniform), h=scene.step * h, m=scene.m * m, rate=scene.bath.friction * rate,
         thermal=scene.thermal * thermal, width=np.float64,
-        freedoms=claims.freedoms(scene.n, scene.particles),
         hold=hold or scene.system.rods,
     )  # fmt: skip
     # a scripted generator replaces every other

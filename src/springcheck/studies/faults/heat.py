@@ -56,11 +56,6 @@ OF_NOISE = each(
           lambda c: played(c, lambda right: -right[-2] if len(right) % 2 == 0 else right[-1])),
     Fault("coloured", "a part of each draw is that of the step before", _LAG, size=0.1, make=lambda c: played(
         c, lambda right: (right[-1] + c.x * right[-2]) / np.sqrt(1 + c.x * c.x) if right[1:] else right[-1])),
-    Fault("chain-temperature", "the chain's temperature is too high", _DIRECTION,
-          lambda c: played(c, thermal=1 + c.x), scheme="nose-hoover", size=1e-12),
-    Fault("chain-time", "the chain's frequency is 2 pi over its time, not 1 over it", _DIRECTION,
-          lambda c: played(c, rate=2 * np.pi), scheme="nose-hoover"),
-    _runs("nose-hoover-fourth", "nose-hoover", _DIRECTION),
     Fault("restart-64", "the generator begins anew every 64 steps", _REPEAT,
           lambda c: played(c, lambda right: right[(len(right) - 1) % 64])),
     Fault("restart-500", "the generator begins anew every 500 steps", _REPEAT,

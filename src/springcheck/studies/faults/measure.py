@@ -37,7 +37,6 @@ DRIVE = Drive(i=np.array([0]), amplitude=np.array([0.43]), frequency=np.array([0
 SCENES: Mapping[str, Callable[[], Scene]] = {
     "spring": alone,
     "long spring": partial(alone, steps=2100),
-    "varying steps": partial(alone, steps=60, tolerance=1e-3),
     "orbit": partial(alone, q=[0.3, -0.5, 0.8], p=[0.7, 1.1, -0.4], places=np.arange(3)),
     "driven": lambda: replace(one := alone(c=0.11), terms=(*one.terms, DRIVE)),
     "chain": lambda: Scene(

@@ -27,7 +27,6 @@ from springcheck.studies.faults.seeded import (
 )
 from springcheck.studies.faults.space import AXES, BOX, DRIVES, FIELDS
 from springcheck.studies.faults.steppers import State, Step, energies, record, textbook, trajectory
-from springcheck.studies.faults.varying import VARYING
 
 STEP = ("step-defect", "propagator")
 MOTION = ("step-defect", "closed-form", "frequency", "propagator")
@@ -291,5 +290,5 @@ ADAPTIVE = (
 
 FAULTS: tuple[Fault, ...] = (
     *PARAMETERS, *FORCES, *STEPS, *ARITHMETIC, *REPORTS, *AXES, *BOX, *DRIVES, *RIGID, *FIELDS, *ADAPTIVE,
-    *VARYING, *OF_NOISE, *THERMAL_STEPS, *RODS_IN_BATHS,
+    *OF_NOISE, *THERMAL_STEPS, *RODS_IN_BATHS,
 )  # fmt: skip

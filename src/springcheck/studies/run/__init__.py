@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from springcheck.studies import team
 from springcheck.studies.arguments import SCENE, argument, repeatable, store_arguments
-from springcheck.studies.ensemble import VARY
 from springcheck.studies.study import Study
 
 _SCENE = argument(*SCENE[0], **SCENE[1], nargs="?")
@@ -34,8 +32,7 @@ STUDY = Study(
         argument(
             "--from", dest="source", metavar="FILE", help="run a store's trajectories again and compare"
         ),
-        *VARY,
-        *team.arguments(),
+        argument("--seed", type=int, metavar="S", help="of random methods (default: drawn)"),
         argument("--verdicts", action="store_true", help="print every verdict with its reason"),
         argument(
             "--thorough", action="store_true", help="add the experiments: order, reversal, rounding"

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+import re
 import tomllib
 from argparse import Namespace
+from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
-from springcheck.errors import SpringcheckError
+from springcheck.errors import SpringcheckError, nearest
 from springcheck.physics import builders, scenefile
 from springcheck.physics.bath import KELVIN, Bath
 from springcheck.physics.scene import Scene
@@ -27,21 +30,54 @@ def changed(options: Namespace) -> Scene:
     ]
     if not named:
         return bathed(scene, options)
-    # imported here: few runs change anything
-    from springcheck.studies.ensemble.vary import Varied, fields
-
-    given: dict[str, float] = {}
+    tables, given = tomllib.loads(text or scene.to_toml()), dict[str, float]()
     for option, field, value in named:
-        if "." not in field and (
-            whole := [x for x in fields(tomllib.loads(text)) if x.endswith(f".{field}")]
-        ):
+        if "." not in field and (whole := [x for x in _fields(tables) if x.endswith(f".{field}")]):
             raise SpringcheckError(f"{option}: which one? {' or '.join(whole)}")
         if field in given:
             raise SpringcheckError(f"{field} is set twice")
         given[field] = _number(option, field, str(value))
-    found = Varied(scene, text, option="--set").whole(given, ", ".join(option for option, *_ in named))
+        _put(tables, field, given[field], scene.name)
+    where = ", ".join(option for option, *_ in named)
+    found = scenefile.from_tables(tables, name=scene.name, where=where)
     said = ", ".join(f"{field} = {value:g}" for field, value in given.items())
     return bathed(replace(found, title=f"{scene.title}, with {said}"), options)
+
+
+def _put(tables: Any, field: str, value: float, scene: str) -> None:
+    """Set a number in the tables of a scene file.  SpringcheckError where it has no such number."""
+    found = tables
+    try:
+        *parts, last = re.findall(r"[^.\[\]]+", field)
+        for part in parts:
+            found = found[_key(found, part)]
+        key = _key(found, last)
+        before = found.get(key) if isinstance(found, dict) else found[key]
+        if isinstance(before, dict | list | str) or not isinstance(found, dict | list):
+            raise KeyError
+    except (KeyError, IndexError, ValueError, TypeError):
+        raise SpringcheckError(
+            f"--set {field}: scene {scene} has no such number{nearest(field, _fields(tables))}; "
+            "fields are named as in its file, such as spring.0.stiffness or time.step"
+        ) from None
+    is_count = isinstance(before, int) and not isinstance(before, bool) and value.is_integer()
+    found[key] = int(value) if is_count else value
+
+
+def _key(table: Any, part: str) -> Any:
+    """Key of this name in a table, or index into a list; ValueError for an index out of range or negative."""
+    return range(len(table)).index(int(part)) if isinstance(table, list) else part
+
+
+def _fields(tables: Mapping[str, Any]) -> list[str]:
+    """Names of the fields of a scene file, as --set takes them."""
+    return [
+        f"{name}.{i}.{field}" if isinstance(table, list) else f"{name}.{field}"
+        for name, table in tables.items()
+        for i, row in enumerate(table if isinstance(table, list) else [table])
+        if isinstance(row, dict)
+        for field in row
+    ]
 
 
 def _number(option: str, field: str, value: str) -> float:

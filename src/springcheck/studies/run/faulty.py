@@ -56,7 +56,7 @@ class Broken:
             where = f"`springcheck faults` judges it on a scene of its own ({self.fault.scene})"
             raise MethodError(f"{option}: nothing on scene {scene.name} shows it; {where}")
         energy = made.energy if "energy" in scene.quantities else None
-        draft.append(made.t, made.q, made.p, energy, made.last_step)
+        draft.append(made.t, made.q, made.p, energy)
         origin = {"engine": "broken on purpose", "method": self.about, "velocity": "as it says"}
         draft.finish(attributes(replace(made, origin=origin)))
 

@@ -30,7 +30,6 @@ from springcheck.studies.run.result import FAULT, Repeat, Repeats, Report, Store
 from springcheck.studies.run.tally import Tally, line
 
 if TYPE_CHECKING:
-    from springcheck.studies.ensemble.result import Ensemble
     from springcheck.studies.run.faulty import Broken
 
 RUN_BYTES, MORE_BYTES = 2300, 700
@@ -54,23 +53,15 @@ LONG_PIECE = PIECE_NUMBERS // 4
 seconds in all."""
 
 
-def perform(options: Namespace, progress: Progress | None) -> Report | Repeats | Ensemble:
+def perform(options: Namespace, progress: Progress | None) -> Report | Repeats:
     """Carry out `springcheck run`."""
     if (options.scene is None) == (options.source is None):
         raise SpringcheckError(
             "run needs a SCENE, or --from FILE, and not both; `springcheck list` shows scenes"
         )
-    if not options.vary and (options.samples is not None or options.workers > 1 or options.cluster):
-        raise SpringcheckError("--samples, --workers and --cluster go with --vary")
-    if options.vary and (options.source is not None or options.thorough or options.verdicts):
-        raise SpringcheckError("--from, --thorough and --verdicts do not go with --vary")
     changes = options.set or {options.step, options.steps, options.temperature, options.friction} != {None}
-    if (changes or options.fault) and (options.vary or options.source is not None):
+    if (changes or options.fault) and options.source is not None:
         raise SpringcheckError("--fault and what changes a scene, as --set or --step, goes with one SCENE")
-    if options.vary:
-        from springcheck.studies.ensemble import measure as ensemble
-
-        return ensemble.perform(options, progress)
     if options.source is not None:
         return Repeats(repeats=tuple(repeat(Path(options.source), methods=options.method, progress=progress)))
     scene = changed(options)
@@ -116,7 +107,7 @@ def run(
     path = Path(path)
     if seed is not None and not scene.bath:
         raise SpringcheckError(
-            "--seed goes with --vary, or with a scene that has a bath, which --temperature gives; at 0 K "
+            "--seed goes with a scene that has a bath, which --temperature gives; at 0 K "
             "there is none, and nothing is drawn"
         )
     seeds = {"seed": driver.checked_seed(seed)} if scene.bath else {}
@@ -326,11 +317,8 @@ def repeat(path: Path, *, methods: Sequence[str] = (), progress: Progress | None
                 mine = replace(scene, quantities=quantities)
                 with journal.draft(name, mine) as draft:
                     told = bar.of(label, scene.steps)
-                    # fields that an older version did not store are no difference
-                    kept = 5 if "last_step" in known[name].kept else 4
-                    sink = lambda *frames, add=draft.append, kept=kept: add(*frames[:kept])  # noqa: E731
                     seed = _seed(path, name, before.get("origin.seed")) if scene.bath else None
-                    record = driver.play(mine, label, sink, progress=told, seed=seed)
+                    record = driver.play(mine, label, draft.append, progress=told, seed=seed)
                     digest = draft.finish(keeper.attributes(record))
                 source = journal.sources()[name]
                 found.append(
