@@ -17,7 +17,7 @@ import house
 from house import HOME, imports, modules, room
 
 ROWS = [
-    "interrupts", "errors", "physics", "schemes", "thermal", "engines",
+    "interrupts", "processes", "errors", "physics", "schemes", "thermal", "engines",
     "store", "formats", "text", "driver", "checks", "identify", "conformance",
     "doors", "figures", "plot", "studies", "cli", "api", "__main__",
 ]  # fmt: skip

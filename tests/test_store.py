@@ -107,12 +107,11 @@ def test_only_what_the_scene_asks_for_is_stored(tmp_path: Path, kept: tuple[str,
     assert store.check(tmp_path / "s.h5") == []
 
 
-@pytest.mark.parametrize("kind", ["circuit", "rotor"])
-def test_charges_and_angles_are_no_positions(tmp_path: Path, kind: str) -> None:
-    written(tmp_path / "s.h5", scene(kind=kind, units="si"))
+def test_charges_are_no_positions(tmp_path: Path) -> None:
+    written(tmp_path / "s.h5", scene(kind="circuit", units="si"))
     with h5py.File(tmp_path / "s.h5") as file:
         assert "particles" not in file
-        assert file["observables/own:euler/q/value"].attrs["unit"] == {"circuit": "C", "rotor": "rad"}[kind]
+        assert file["observables/own:euler/q/value"].attrs["unit"] == "C"
 
 
 def test_positions_and_velocities_cost_no_bytes_and_have_the_right_units(tmp_path: Path) -> None:
@@ -292,14 +291,12 @@ def test_a_store_of_studies_alone_needs_no_trajectory(tmp_path: Path) -> None:
     assert store.check(tmp_path / "s.h5") == []
 
 
-def test_tables_and_pieces_without_rows_are_stored(tmp_path: Path) -> None:
+def test_tables_without_rows_are_stored(tmp_path: Path) -> None:
     """Pairs and vectors of a result that has none are columns of shape (0, 2)."""
     path = tmp_path / "s.h5"
     columns = {"number": np.empty(0), "pair": np.empty((0, 2))}
     with store.open_new(path, "nothing") as journal:
         journal.add(store.Table(name="of/none", columns=columns))
-        for piece in ("joined/1", "joined/2"):
-            journal.add(store.Table(name=piece, columns=columns), rows=True)
         journal.commit()
     assert store.check(path) == []
     for table in store.tables_of(path).values():

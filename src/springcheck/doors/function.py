@@ -76,7 +76,7 @@ def _module(name: str) -> ModuleType:
     here = str(Path.cwd())
     sys.path.insert(0, here)
     try:
-        with engines.foreign(name, f"module {name!r} cannot be imported"):
+        with engines.foreign(f"module {name!r} cannot be imported"):
             return _imported(name)
     finally:
         sys.path.remove(here)

@@ -5,8 +5,8 @@ Writing: ``with open_new(path, command) as journal`` and `Journal`.  Reading: `r
 """
 
 from springcheck.errors import StoreError, StoreWarning
-from springcheck.store.collection import Solution
 from springcheck.store.checking import Damage, check, doubts
+from springcheck.store.collection import Solution
 from springcheck.store.draft import Draft
 from springcheck.store.exporting import export
 from springcheck.store.files import need_space
@@ -33,8 +33,8 @@ from springcheck.store.records import Run, attributes, machine
 from springcheck.store.tables import Table
 
 __all__ = [
-    "Draft", "Damage", "Journal", "Run", "Solution", "StoreError", "StoreWarning", "Summary", "Table", "attributes",
-    "check", "comparison", "decoded", "digest", "document", "doubts", "end", "export", "machine",
-    "need_space", "open_new", "read", "read_one", "scene_text", "size", "sources", "strided",
+    "Draft", "Damage", "Journal", "Run", "Solution", "StoreError", "StoreWarning", "Summary", "Table",
+    "attributes", "check", "comparison", "decoded", "digest", "document", "doubts", "end", "export",
+    "machine", "need_space", "open_new", "read", "read_one", "scene_text", "size", "sources", "strided",
     "summary", "tables_of", "verdicts", "windows",
 ]  # fmt: skip

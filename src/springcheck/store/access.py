@@ -36,6 +36,7 @@ MOST_DIMENSIONS = 4
 EXPANSION = 1100
 """Ratio of sizes beyond what deflate can reach (1032): an array that claims more is damaged."""
 
+_PLAIN = {h5py.h5t.INTEGER, h5py.h5t.FLOAT, h5py.h5t.STRING, h5py.h5t.ENUM}
 _FILTERS = {h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FLETCHER32, 32000}
 """Built into h5py; 32000 is its LZF."""
 
@@ -168,11 +169,13 @@ def dataset_at(file: Any, path: str, *, packed: bool = False) -> Any:
         for name, source in how.views:
             if name != ".":
                 raise refuse(node, f"shows another file, {name}: what other files hold is not read")
-            if storage(dataset_at(node.file, source, packed=True)).layout == VIRTUAL:
+            # what is missing is shown as the fill value
+            shown = find(node.file, source) and dataset_at(node.file, source, packed=True)
+            if shown is not None and storage(shown).layout == VIRTUAL:
                 raise refuse(node, "shows a view of a view: only plain arrays are read")
-    elif how.layout == CHUNKED and (stored > size or claimed > EXPANSION * stored):
-        raise refuse(node, f"claims {claimed} bytes, more than the file holds")
-    elif how.layout == CONTIGUOUS and claimed and not 0 <= (node.id.get_offset() or -1) <= size - claimed:
+    there = node.id.get_offset() if how.layout == CONTIGUOUS else 0
+    too_much = claimed > EXPANSION * stored if how.layout == CHUNKED else claimed and there is None
+    if how.layout != VIRTUAL and (too_much or stored > size or (there or 0) + stored > size):
         raise refuse(node, f"claims {claimed} bytes, more than the file holds")
     return node
 
@@ -285,9 +288,11 @@ def attribute(node: Any, name: str) -> Any:
 
 def _value(node: Any, name: bytes) -> Any:
     known = h5py.h5a.open(node.id, name)
-    kind, memory = _types(known.get_type().encode())
+    of = known.get_type()
+    # of references libhdf5 cannot decode the type again
+    kind, memory = _types(of.encode()) if of.get_class() in _PLAIN else (None, None)
     if known.shape is None or memory is None:
-        return f"<{kind}>"
+        return f"<{kind or 'reference'}>"
     if known.get_storage_size() > LONGEST_TEXT:
         raise refuse(node, f"has an attribute of more than {LONGEST_TEXT >> 20} MiB")
     values = np.empty(known.shape, kind)

@@ -16,7 +16,7 @@ from importlib import import_module
 from pathlib import Path
 
 from springcheck.errors import StoreError
-from springcheck.interrupts import called
+from springcheck.processes import called
 from springcheck.store import files
 
 LIMIT, LONGEST, SPEED = 8.0, 20.0, 1e8
@@ -88,7 +88,7 @@ def read(module: str, function: str, path: Path, *words: str) -> bytes:
     command = [sys.executable, "-P", "-c", begin, *limits, module, function, str(path), *words]
     try:
         # on a busy machine it waits longer than it works, and work is what is limited
-        done = called(command, 6 * limit, env={**os.environ, **threads, "PYTHONPATH": paths})
+        done = called(command, 6 * limit, most=MEMORY, env={**os.environ, **threads, "PYTHONPATH": paths})
     except subprocess.TimeoutExpired:
         raise EndedError("does not end") from None
     except OSError as error:

@@ -11,7 +11,7 @@ import h5py
 
 from springcheck.errors import StoreError
 from springcheck.physics.arrays import Floats
-from springcheck.store import access, digests, files, layout, tables
+from springcheck.store import access, digests, layout, tables
 from springcheck.store.access import Scalar
 from springcheck.store.tables import Table
 
@@ -35,7 +35,9 @@ def is_ours(file: Any) -> None:
     marked = access.attribute(file, "format")
     if marked not in (layout.FORMAT, *layout.OLDER):
         older = isinstance(marked, str) and marked.startswith("springcheck store ")
-        why = f"another springcheck wrote it ({marked})" if older else "it is HDF5, but no store of springcheck"
+        why = (
+            f"another springcheck wrote it ({marked})" if older else "it is HDF5, but no store of springcheck"
+        )
         raise StoreError(f"cannot read {file.filename}: {why}")
 
 
@@ -143,7 +145,9 @@ def _plots(file: Any) -> None:
     if not observables and drawn is None:
         return
     plots = file.create_group("plots")
-    runs = {label: file[f"parameters/{label}"].attrs.get("sequence", 0) for label in file.get("parameters", ())}
+    runs = {
+        label: file[f"parameters/{label}"].attrs.get("sequence", 0) for label in file.get("parameters", ())
+    }
     order = {label: observables[label] for label in sorted(runs, key=lambda label: runs[label])}
     made = [name for name in ("q", "p", "energy") if _plot(order, plots, name)]
     if drawn is not None and not made:

@@ -72,7 +72,7 @@ def combined(digests: Mapping[str, str], arrays: Mapping[str, Any]) -> str:
 def contents(file: Any) -> tuple[dict[str, str], list[Extent]]:
     """sha256 of every object of a file by its path, and its recorded arrays.
 
-    StoreError where one is not as ours are, or where the arrays claim the same bytes twice.
+    An object that is refused has none.  StoreError where arrays claim the same bytes twice.
     """
     found = {"/": _sha256(file, b"")}
     extents: list[Extent] = []
@@ -82,7 +82,10 @@ def contents(file: Any) -> tuple[dict[str, str], list[Extent]]:
             continue
         # times and steps are one array under many names
         if at not in known:
-            known[at] = _of(file, place, file[place] if node is None else node, extents)
+            try:
+                known[at] = _of(file, place, file[place] if node is None else node, extents)
+            except StoreError as error:
+                known[at] = f"none: {error}"
         found[f"/{place}"] = known[at]
     end = 0
     for one in sorted(extents, key=lambda one: one.offset):

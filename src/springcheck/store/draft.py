@@ -1,6 +1,7 @@
 """A streaming writer of one trajectory: any length in bounded memory.
 
-The arrays are laid out in an HDF5 file first and then filled past libhdf5, at their offsets.  A run that stops early is laid out again at the length that it reached.
+The arrays are laid out in an HDF5 file first and then filled past libhdf5, at their offsets.  A run that
+stops early is laid out again at the length that it reached.
 """
 
 from __future__ import annotations

@@ -8,13 +8,14 @@ import os
 import re
 import shutil
 import sys
+import warnings
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any, BinaryIO
 
 from springcheck import interrupts
-from springcheck.errors import StoreError
+from springcheck.errors import StoreError, StoreWarning
 
 JOURNAL = ".parts"
 """Ending of the folder of a store that is being written."""
@@ -223,4 +224,6 @@ def _locked(file: BinaryIO) -> bool:
     except OSError as error:
         if error.errno not in UNSUPPORTED:
             raise
+        said = f"{file.name}: this file system has no locks; let no second program write the store"
+        warnings.warn(said, StoreWarning, stacklevel=5)
     return True

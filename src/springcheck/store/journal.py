@@ -34,6 +34,7 @@ _NAMES = re.compile(rf"lock|command|collection\.new|(run|table)-.*\.h5|{files.TE
 _WORK = "springcheck", "collection", "run", "table"
 """Beginnings of the names of all of them but the lock and the claim."""
 
+
 def open_new(path: str | Path, command: str, *, force: bool = False) -> Journal:
     """Start to write a store, or resume one that the same command left unfinished.
 
@@ -83,14 +84,18 @@ def _is_free(parts: Path) -> bool:
         return True
     if parts.is_symlink() or not parts.is_dir():
         return False
-    entries = [*parts.iterdir()]
-    # without a claim a kill or a loss of power has left it at the very beginning or end
-    return any(entry.name == "command" for entry in entries) or all(
-        entry.name == "lock"
-        or files.TEMPORARY.fullmatch(entry.name)
-        or (_NAMES.fullmatch(entry.name) and files.is_plain(entry) and _is_store(entry))
-        for entry in entries
-    )
+    with contextlib.suppress(StoreError):
+        # without a claim a kill or a loss of power has left it at the very beginning or end
+        return claim(parts) is not None or all(map(_is_mine, parts.iterdir()))
+    return False
+
+
+def _is_mine(entry: Path) -> bool:
+    """Whether a file is recognisably one of a journal: an empty lock, a temporary file, or a store."""
+    if entry.name == "lock":
+        return files.is_plain(entry) and entry.stat().st_size == 0
+    known = _NAMES.fullmatch(entry.name) and files.is_plain(entry)
+    return bool(known) and (files.TEMPORARY.fullmatch(entry.name) is not None or _is_store(entry))
 
 
 def _is_store(path: Path) -> bool:

@@ -46,7 +46,8 @@ MARGIN = 1 << 16
 """Bytes reserved beyond the arrays, for groups and attributes."""
 
 RESERVED = (
-    "h5md", "particles", "observables", "parameters", "comparison", "verdicts", "documents", "digests", "plots"
+    "h5md", "particles", "observables", "parameters", "comparison", "verdicts", "documents", "digests",
+    "plots",
 )  # fmt: skip
 QUANTITIES = ("q", "p", "energy")
 """Quantities of a trajectory that may be stored in addition to its times."""

@@ -161,6 +161,11 @@ class Summary:
     tables: tuple[str, ...]
     documents: tuple[str, ...]
 
+    @property
+    def listed(self) -> bool:
+        """Whether it lists digests of all its objects: an older store has only those of arrays."""
+        return self.root.get("format") not in layout.OLDER
+
 
 def summary(path: str | Path) -> Summary:
     """Contents of a store, at a cost that does not grow with its length."""

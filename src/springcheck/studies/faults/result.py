@@ -92,4 +92,4 @@ class FaultReport(Studied):
         )
 
 
-RESULTS: Documents[Result] = Documents(kind=Result, beginning="faults/results/", named="", joined=True)
+RESULTS: Documents[Result] = Documents(kind=Result, beginning="faults/results/", named="")

@@ -135,12 +135,12 @@ def _errors_first(scene: Scene, sweeps: list[Sweep], kept: Keeper, budget: float
     spent = 0.0
     parts = [partial(errors_ahead, scene, sweep.label, sweep.points, share) for sweep in left]
     with closing(kept.carried_out(parts)) as measured:
-        for j, points, by in measured:
+        for j, points in measured:
             sweep = left[j]
             sweep.ahead.update({x.place: x for x in points})
             spent += sum(point.spent_seconds for point in points) / kept.team.workers
             both, took = [*sweep.points, *points], before + spent
-            kept.keep(points_of(scene), str(sweep.label), both, by, study_seconds=took)
+            kept.keep(points_of(scene), str(sweep.label), both, study_seconds=took)
             if kept.progress:
                 kept.progress(min(before + spent, budget), budget, f"{sweep.label}, errors")
     return spent
