@@ -268,7 +268,8 @@ def test_a_program_that_was_called_ends_with_all_that_it_has_started(deaf: bool)
     words = ["sh", "-c", "sleep 60 & kill -TERM $PPID; wait"]
     body = f"processes.called({words}, 60)"
     if deaf:
-        body = f"interrupts.GRACE = 0.1\n    def deaf(*_, **__):{DEAF.replace(chr(10) + '    ', chr(10) + '        ')}"
+        never = DEAF.replace("\n    ", "\n        ")
+        body = f"interrupts.GRACE = 0.1\n    def deaf(*_, **__):{never}"
         body += f"\n    import subprocess; subprocess.Popen.wait = deaf; processes.called({words}, 60)"
     with begun([sys.executable, "-c", SCRIPT.format(body=body)], start_new_session=True) as process:
         out, err = process.communicate(timeout=30)

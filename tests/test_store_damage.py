@@ -39,6 +39,7 @@ READERS: list[Callable[[Path], object]] = [
     lambda path: store.strided(path, LABELS[0], 7),
 ]
 BASE = f"/observables/{LABELS[0]}"
+MASS = f"/particles/{LABELS[0]}/mass"
 here = pytest.mark.usefixtures("tried_here")
 
 

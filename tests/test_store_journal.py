@@ -214,7 +214,7 @@ def test_a_number_of_a_part_that_changed_is_measured_again(tmp_path: Path) -> No
     _flip(part)
     with (
         pytest.warns(StoreWarning, match="was damaged and is removed"),
-        store.open_new(path, "run") as journal,
+        store.open_new(path, "run") as writer,
     ):
         assert not writer.finished()
 

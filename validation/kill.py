@@ -4,10 +4,11 @@
 
 A writer stores trajectories and tables, with a commit at the end, and reports each as soon as it is stored.
 It is killed (SIGKILL) at a random moment of a part or of the commit, 200 times over; then before every third
-of the system calls on files that a round makes (all of them with 600 kills).  After each kill everything reported must be there with its digest, and every file must pass
-`check`.  Then the commands themselves, `run`, `precision`, `stability` and `extremes`, killed at random
-moments a quarter as often and started again until they end: every trajectory, table and point that one of
-them had finished must be in the store at the end, bit for bit, so none is lost and none measured twice.
+of the system calls on files that a round makes (all of them with 600 kills).  After each kill everything
+reported must be there with its digest, and every file must pass `check`.  Then the commands themselves,
+`run`, `precision`, `stability` and `extremes`, killed at random moments a quarter as often and started again
+until they end: every trajectory, table and point that one of them had finished must be in the store at the
+end, bit for bit, so none is lost and none measured twice.
 Then: a full disk at forty sizes, a reader that holds the file open through a commit, and two writers.
 
 Kills show that no order of operations loses anything; that fsync reaches the disk is the system's word.
