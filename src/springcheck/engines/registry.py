@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import os
+import sys
 from collections.abc import Iterator, Mapping, Set
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -107,8 +108,9 @@ def _loaded(name: str, place: str) -> Engine | str:
 
 @contextmanager
 def foreign(what: str, file: str = "") -> Iterator[None]:
-    """Run foreign code: whatever it raises becomes a MethodError "`what`: why"."""
-    process = os.getpid()
+    """Run foreign code: whatever it raises becomes a MethodError "`what`: why", and `os._exit` raises."""
+    process, leave = os.getpid(), os._exit
+    os._exit = sys.exit
     try:
         yield
     except (SpringcheckError, Stopped, KeyboardInterrupt):
@@ -116,6 +118,7 @@ def foreign(what: str, file: str = "") -> Iterator[None]:
     except BaseException as error:
         raise MethodError(f"{what}: {told(error, file)}") from error
     finally:
+        os._exit = leave
         if os.getpid() != process:
             # a fork within foreign code is not the program
             os._exit(1)
