@@ -12,7 +12,7 @@ HOME = Path(springcheck.__file__).parent
 BUDGETS = {
     ("physics",): 6949,
     ("schemes",): 1708,
-    ("thermal",): 3288,
+    ("bath",): 1900,
     ("engines/own",): 1591,
     ("engines/openmm", "engines/ase", "engines/sundials"): 1284,
     ("engines",): 2836,

@@ -14,10 +14,10 @@ import pytest
 
 from clean import clean_bath
 from springcheck import checks, driver, engines
+from springcheck.bath import THERMOSTATS, Stepper
+from springcheck.bath.draws import read
 from springcheck.studies.faults import baths
 from springcheck.studies.faults.seeded import Fault
-from springcheck.thermal import THERMOSTATS, Stepper
-from springcheck.thermal.draws import read
 
 
 @pytest.mark.parametrize("n", [1, 2, 7])

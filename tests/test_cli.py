@@ -139,19 +139,27 @@ def test_plot_draws_four_pictures_twice(capsys: pytest.CaptureFixture[str]) -> N
     for more in (
         ["--step", "0.1"],
         ["--trajectory", "own:nothing"],
-        ["--trajectory", "own:euler", "--over", "h"],
     ):
         assert main(["plot", "spring.h5", *more]) == 2
 
 
-def test_list_names_every_scene_engine_and_check(capsys: pytest.CaptureFixture[str]) -> None:
+def test_list_has_a_page_for_each_kind(capsys: pytest.CaptureFixture[str]) -> None:
+    names = {
+        "scenes": scenes.names(),
+        "methods": ("own:euler", "openmm:verlet", "sundials:bdf"),
+        "checks": [check.name for check in (*checks.ALL, *checks.RANDOM)],
+        "terms": ("spring", "wall-spring"),
+        "schemes": ("velocity-verlet", "rk4"),
+    }
     assert main(["list"]) == 0
-    text = capsys.readouterr().out
-    for word in (*scenes.names(), "own:euler", "openmm:verlet", "sundials:bdf", "step-defect"):
-        assert word in text
-    assert max(map(len, text.splitlines())) <= 80
-    for check in (*checks.ALL, *checks.RANDOM):
-        assert f"{check.sentence} Applies to: {check.needs}." in " ".join(text.split())
+    overview = capsys.readouterr().out
+    assert len(overview.splitlines()) <= 24
+    for kind, known in names.items():
+        assert f"springcheck list {kind}" in overview
+        assert main(["list", kind]) == 0
+        page = capsys.readouterr().out
+        assert max(map(len, page.splitlines())) <= 80
+        assert set(known) <= set(page.split())
     assert main(["list", "--json"]) == 0
     assert {scene["name"] for scene in document(capsys)["scenes"]} == set(scenes.names())
 

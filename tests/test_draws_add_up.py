@@ -16,11 +16,11 @@ import numpy as np
 import pytest
 
 from springcheck import checks
+from springcheck.bath import chance
 from springcheck.cli import main
 from springcheck.physics.trajectory import Trajectory, Verdict
 from springcheck.studies.faults import baths
 from springcheck.studies.faults.seeded import Fault
-from springcheck.thermal import chance
 
 BEYOND_ONE = 0.15865525393145707
 """Chance of a normal number above 1."""

@@ -209,7 +209,7 @@ def test_a_bond_beside_a_spring_that_may_turn_over_is_refused(label: str, need: 
 def test_noise_across_the_line_turns_a_bond(need: Need) -> None:
     need("openmm:langevin-middle-bath")
     scene = pair(BOND, bath="[bath]\ntemperature = 0.3\nfriction = 0.7")
-    with pytest.raises(MethodError, match="turns a rod or bond"):
+    with pytest.raises(MethodError, match="turns a bond"):
         springcheck.simulate(scene, "openmm:langevin-middle-bath", seed=3)
     # ASE's noise is across it too, and its forces are those of the line
     need("ase:langevin-baoab")

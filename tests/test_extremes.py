@@ -30,9 +30,7 @@ Need = Callable[[str], None]
 METHODS = [
     str(label)
     for label in engines.match(("*",))
-    if "particles" in engines.method(label).kinds
-    and not engines.method(label).adaptive
-    and "rods" not in {x.value for x in engines.method(label).requires}
+    if "particles" in engines.method(label).kinds and not engines.method(label).adaptive
 ]
 GPU = [
     *(f"openmm:verlet@OpenCL-{precision}" for precision in ("single", "mixed")),

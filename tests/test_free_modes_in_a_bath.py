@@ -10,9 +10,9 @@ import pytest
 
 import springcheck
 from springcheck import driver
+from springcheck.bath.heat import bound_freedoms, heated_of
 from springcheck.physics.scene import Scene
 from springcheck.physics.scenefile import parse
-from springcheck.thermal.heat import bound_freedoms, heated_of
 
 THREE = """
 title = "three free masses, two springs"
@@ -49,7 +49,7 @@ def test_two_springs_between_three_free_masses_have_two_bound_modes_with_a_law()
 @pytest.mark.parametrize(
     ("name", "bound"),
     [("ch-bond", 1), ("morse-bond", 1), ("diatomic", 3), ("bath-well", 1), ("bath-free", 0), ("chain", 3),
-     ("bath-dumbbell", 0), ("orbit", 3)],
+     ("orbit", 3)],
 )  # fmt: skip
 def test_what_nothing_holds_is_not_counted(name: str, bound: int) -> None:
     scene = springcheck.load_scene(name)

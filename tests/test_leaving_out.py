@@ -130,7 +130,7 @@ def test_energies_are_stored_only_where_they_are_asked_for(tmp_path: Path) -> No
     assert not any("energy" in path for path in without)
 
 
-@pytest.mark.parametrize(("name", "n"), [("carbon-monoxide", 2), ("lc-circuit", 1), ("torsion-pendulum", 1)])
+@pytest.mark.parametrize(("name", "n"), [("carbon-monoxide", 2), ("lc-circuit", 1)])
 def test_neither_y_nor_z_is_stored_and_no_velocity_of_what_is_no_particle(
     name: str, n: int, tmp_path: Path
 ) -> None:

@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from springcheck.bath import THERMOSTATS, Law
 from springcheck.identify import identify_stepper
-from springcheck.thermal import THERMOSTATS, Law
 
 LESSON = Path(__file__).parents[1] / "validation" / "lesson"
 

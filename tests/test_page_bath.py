@@ -9,12 +9,12 @@ from typing import Any
 import pytest
 
 from browser import Browser
+from springcheck.bath.heat import heated_of
 from springcheck.cli import page
 from springcheck.cli.page.given import bath
 from springcheck.physics import scenefile as scenes
 from springcheck.studies import keeper
 from springcheck.studies.run import measure
-from springcheck.thermal.heat import heated_of
 
 METHODS = ("own:baoab", "own:obabo", "own:andersen")
 

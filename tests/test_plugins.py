@@ -70,7 +70,7 @@ def test_an_installed_package_is_found_run_stored_and_still_readable_when_it_is_
     installed: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     site = str(shutil.copytree(installed, tmp_path / "site"))
-    listed = springcheck(tmp_path, "list", path=site).stdout
+    listed = springcheck(tmp_path, "list", "methods", path=site).stdout
     assert "PEFRL in NumPy 1.2.3, from springcheck-pefrl 1.2.3" in listed
     run = springcheck(
         tmp_path, "run", "spring-uneven", "--method", "pefrl:*", "--thorough", "--json", path=site
@@ -130,7 +130,7 @@ def test_a_file_is_an_engine_for_one_call_and_runs_beside_the_others(
         "own:euler",
         "pefrl:pefrl",
     ]
-    assert main(["list", "--engine", file]) == 0
+    assert main(["list", "methods", "--engine", file]) == 0
     assert file in capsys.readouterr().out, "a path stays in one piece"
 
 

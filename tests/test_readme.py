@@ -81,5 +81,9 @@ def test_what_a_document_names_is_there(document: Path) -> None:
         assert (document.parent / link).exists(), link
 
 
-def test_the_readme_is_short() -> None:
-    assert len(README.splitlines()) <= 170
+@pytest.mark.parametrize(
+    ("document", "most"),
+    [("README.md", 900), ("validation/README.md", 1500), (".github/CHANGELOG.md", 300)],
+)
+def test_a_document_ends(document: str, most: int) -> None:
+    assert len((ROOT / document).read_text(encoding="utf-8").split()) <= most

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from springcheck import engines
+from springcheck.bath import THERMOSTATS
 from springcheck.cli import main
 from springcheck.engines.own import thermal
 from springcheck.studies.sampling import measure, page
 from springcheck.studies.sampling.result import Sampling
-from springcheck.thermal import THERMOSTATS
 
 
 @pytest.fixture(autouse=True)

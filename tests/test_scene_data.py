@@ -247,7 +247,8 @@ def test_the_digest_changes_with_every_number_and_with_no_word() -> None:
     changes: list[dict[str, Any]] = [
         {"m": [1.3, 0.8]}, {"q": [0.1, np.nextafter(0.2, 1)]}, {"p": [0.3, 0.5]}, {"step": -0.1},
         {"steps": 15},
-        {"every": 1}, {"tolerance": 1e-9}, {"units": "md"}, {"kind": "rotor"}, {"quantities": ("q", "p")},
+        {"every": 1}, {"tolerance": 1e-9}, {"units": "md"}, {"kind": "circuit", "units": "si"},
+        {"quantities": ("q", "p")},
         {"terms": ()}, {"terms": (replace(scene.terms[0], fast=True),)},  # type: ignore[type-var]
         {"terms": (replace(scene.terms[0], at=[0.4, 0.0]),)},  # type: ignore[type-var]
     ]  # fmt: skip
@@ -309,7 +310,7 @@ def made(draw: st.DrawFn) -> Scene:
     step = draw(FLOATS.filter(lambda x: x != 0))
     steps = every * draw(st.integers(1, 2**40))
     assume(np.isfinite(step * steps))
-    kind = draw(st.sampled_from(["particles", "rotor", "circuit"]))
+    kind = draw(st.sampled_from(["particles", "circuit"]))
     return Scene(
         name="made",
         title=draw(TEXT),

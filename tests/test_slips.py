@@ -123,7 +123,6 @@ def test_numbers_names_and_options_that_serve_nothing(
         ("run spring --method own:eular", "did you mean own:euler?"),
         ("run spring --method own:euler-cromer", "did you mean own:semi-implicit-euler?"),
         ("run spring --method own:rk2", "did you mean own:rk2-midpoint or own:rk2-heun?"),
-        ("explain forward-euler", "did you mean explicit-euler?"),
         # adaptive: no relation of rk4
         ("run spring --method own:rk45", "did you mean scipy:rk45?"),
         ("run spring --method own:adams", "did you mean sundials:adams?"),

@@ -1,6 +1,6 @@
 """The stiff scenes against references made by another route: matrix exponentials in mpmath.
 
-The references carry 30 digits (validation/stiff_references.py).  The bound is rounding in extended
+The references carry 30 digits.  The bound is rounding in extended
 precision, with what makes it larger: phases and exponents are known to EPS of themselves; near critical
 damping the distance of the two roots is known to EPS w**2 only, which costs the exponent squared; and a
 stiff mode sees the rounding of its vector times w q, even where it is at rest.

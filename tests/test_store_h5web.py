@@ -19,8 +19,6 @@ from h5grove.content import get_content_from_file
 from springcheck import driver, engines, store
 from springcheck.physics import scenefile as scenes
 from springcheck.physics.trajectory import Comparison
-from springcheck.studies.stability import regions
-from springcheck.studies.stability.result import REGIONS
 from stores import LABELS, scene, trajectory, written
 
 OPTIONS: dict[str, Any] = {"swmr": True, "locking": False}
@@ -170,19 +168,6 @@ def test_a_store_with_nothing_to_draw_promises_no_plot(tmp_path: Path) -> None:
         journal.commit()
     assert "default" not in _grove(tmp_path / "s.h5", "/")[1]
     assert "/plots" not in _everything(tmp_path / "s.h5")
-
-
-def test_a_region_of_stability_lies_on_even_axes(tmp_path: Path) -> None:
-    region = regions.measure(engines.parse("own:euler"), points=20)
-    with store.open_new(tmp_path / "s.h5", "stability") as journal:
-        journal.add(REGIONS.table(region.method, region))
-        journal.commit()
-    image = drawn(tmp_path / "s.h5")
-    assert np.array_equal(image.signal, region.radius)
-    assert image.labels == ["log10_damping_ratio", "log10_h_w", "radius"]
-    for axis, wanted in zip(image.axes, (region.damping_ratio, region.h_w), strict=True):
-        assert axis is not None
-        np.testing.assert_allclose(10**axis, wanted, rtol=1e-14)
 
 
 def test_h5web_draws_a_run_of_the_real_spring(tmp_path: Path) -> None:

@@ -82,13 +82,12 @@ def test_an_exported_trajectory_is_a_store_of_its_own_and_is_never_overwritten(t
         ("chain", "openmm:verlet", "velocity-verlet"),
         ("spring-uneven", "sundials:adams", "adams"),
         ("spring-uneven", "own:rk4", "rk4"),
-        ("dumbbell", "openmm:verlet-rods-as-it-is", "velocity-verlet"),
     ],
 )
 def test_an_exported_trajectory_is_judged_as_in_its_store(
     tmp_path: Path, name: str, label: str, scheme: str, need: Callable[[str], None]
 ) -> None:
-    """A right engine that rebuilds its velocities, has a tolerance, or holds rods to one, failed on it."""
+    """A right engine that rebuilds its velocities, or has a tolerance, failed on it."""
     need(label)
     springcheck.run(name, label, path=tmp_path / "s.h5")
     store.export(tmp_path / "s.h5", label, tmp_path / "out.h5md")

@@ -24,8 +24,8 @@ from springcheck.studies.extremes import measure as extremes
 from springcheck.studies.precision import measure as precision
 from springcheck.studies.precision.fits import POINTS, points_of
 from springcheck.studies.run import measure as session
-from springcheck.studies.stability import limits
 from springcheck.studies.stability import measure as stability
+from springcheck.studies.stability.result import Limit
 from stores import raising
 
 pytestmark = pytest.mark.usefixtures("steady_clock")
@@ -158,9 +158,9 @@ def test_an_interrupted_study_says_that_the_same_command_goes_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     measured: list[Label] = []
-    measure = limits.measure
+    measure = stability.measure
 
-    def interrupted(label: Label) -> limits.Limit:
+    def interrupted(label: Label) -> Limit:
         if len(measured) == 2:
             raise KeyboardInterrupt
         measured.append(label)
@@ -169,7 +169,7 @@ def test_an_interrupted_study_says_that_the_same_command_goes_on(
     methods = [x for name in OWN for x in ("--method", name)]
     arguments = ["stability", "spring-uneven", *methods, "-o", str(tmp_path / "study.h5")]
     with monkeypatch.context() as patch:
-        patch.setattr(limits, "measure", interrupted)
+        patch.setattr(stability, "measure", interrupted)
         assert cli.main(arguments) == interrupts.STATUS
     assert capsys.readouterr().err == (
         "springcheck: interrupted; what was finished is kept, the same command goes on\n"
@@ -178,7 +178,7 @@ def test_an_interrupted_study_says_that_the_same_command_goes_on(
         assert cli.main([command, str(tmp_path / "study.h5")]) == 2
         assert "yet: give the command that writes it again, it goes on" in capsys.readouterr().err
     again: list[Label] = []
-    monkeypatch.setattr(limits, "measure", lambda label: (again.append(label), measure(label))[1])
+    monkeypatch.setattr(stability, "measure", lambda label: (again.append(label), measure(label))[1])
     assert cli.main(arguments) == 0
     assert len(measured) == 2
     assert again

@@ -12,13 +12,13 @@ import pytest
 
 from clean import clean_bath
 from springcheck import checks, cli, driver, engines
+from springcheck.bath import THERMOSTATS, chance
 from springcheck.physics.trajectory import Verdict
 from springcheck.studies.faults import baths
 from springcheck.studies.faults.measure import probe, scene
 from springcheck.studies.faults.seeded import Case as Broken
 from springcheck.studies.faults.seeded import Fault
 from springcheck.studies.faults.table import FAULTS
-from springcheck.thermal import THERMOSTATS, chance
 
 
 def test_there_are_forty_faults_of_thermostats_at_least() -> None:

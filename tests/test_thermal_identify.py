@@ -13,6 +13,10 @@ import pytest
 
 import springcheck
 from springcheck import driver
+from springcheck.bath import THERMOSTATS, Law
+from springcheck.bath.collisions import between_collisions
+from springcheck.bath.likelihood import likely_apart
+from springcheck.bath.states import Thermal, identify_thermal
 from springcheck.cli import main
 from springcheck.identify import identify
 from springcheck.identify.clock import clock_of
@@ -21,10 +25,6 @@ from springcheck.physics import scenefile
 from springcheck.physics.bath import Bath
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Spring, WallSpring
-from springcheck.thermal import THERMOSTATS, Law
-from springcheck.thermal.collisions import between_collisions
-from springcheck.thermal.likelihood import likely_apart
-from springcheck.thermal.states import Thermal, identify_thermal
 
 M, K, RATE, THERMAL = 3.7, 2.9, 0.8, 1.7
 OMEGA = np.sqrt(K / M)

@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 from documented import words_of
-from springcheck.thermal import THERMOSTATS, Law, Stepper
-from springcheck.thermal.decays import GJ
+from springcheck.bath import THERMOSTATS, Law, Stepper
+from springcheck.bath.decays import GJ
 
 LINEAR = [name for name, one in THERMOSTATS.items() if not one.rescales]
 

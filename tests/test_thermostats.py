@@ -18,9 +18,11 @@ import pytest
 
 import springcheck
 from springcheck import checks, driver, engines
+from springcheck.bath import THERMOSTATS, Stepper, chance
+from springcheck.bath.heat import Heat
+from springcheck.bath.stepper import forces
 from springcheck.cli import file, main
 from springcheck.engines import Label
-from springcheck.engines.contract import Need
 from springcheck.engines.own import thermal as own_thermal
 from springcheck.errors import MethodError, SceneError, SpringcheckError
 from springcheck.physics import scenefile
@@ -32,17 +34,12 @@ from springcheck.physics.trajectory import Trajectory, of_scene
 from springcheck.studies.faults import baths
 from springcheck.studies.faults.seeded import Fault
 from springcheck.studies.run import measure
-from springcheck.thermal import THERMOSTATS, Stepper, chance
-from springcheck.thermal.heat import Heat
-from springcheck.thermal.stepper import forces
 
 LABELS = [
     f"{name}:{method}"
     for name in ("own", "openmm", "ase", "lammps")
     for method, declared in engines.engine(name).thermostats.items()
-    if Need.RODS not in declared.requires
 ]
-"""Those for rods have tests of their own."""
 
 
 def pair(steps: int = 400, step: float = 0.35) -> Scene:
@@ -500,7 +497,7 @@ def test_a_bath_is_read_back_as_it_was_written(name: str) -> None:
 
 @pytest.mark.parametrize("letters", ["BAOAB", "BAOA", "ABOBA", "OBABO", "OABAO", "AOBOA", "BOAOB"])
 def test_map_and_noise_of_letters_are_those_of_the_stages_multiplied_by_hand(letters: str) -> None:
-    from springcheck.thermal import Law
+    from springcheck.bath import Law
 
     h, m, k, rate, thermal = 0.35, 3.7, 2.9, 0.8, 1.7
     a, columns = np.eye(2), []

@@ -1,6 +1,6 @@
 """Van der Pol's oscillator: the exact motion against 25 digits by another route, and every method's own step.
 
-The references are made by validation/van_der_pol.py: Gauss collocation in Lienard's plane in 60 digits, and
+The references were made without springcheck: Gauss collocation in Lienard's plane in 60 digits, and
 Taylor series up to mu = 30.
 """
 
@@ -12,20 +12,16 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import mpmath as mp
 import numpy as np
 import pytest
 
 import springcheck
-import stiffness_costs
-from documented import words_of
-from springcheck import checks, engines
+from springcheck import checks
 from springcheck.physics import builders, exact
 from springcheck.physics import scenefile as scenes
-from springcheck.physics.arrays import EPS, Floats
-from springcheck.physics.exact import relaxation
+from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
-from springcheck.physics.terms import Damping, Spring, VanDerPol, WallSpring
+from springcheck.physics.terms import VanDerPol, WallSpring
 from springcheck.schemes import scheme
 from springcheck.studies.stability import longest
 
@@ -48,6 +44,10 @@ def test_the_exact_motion_has_the_digits_of_another_route(mu: float) -> None:
     scene = of(mu)
     brake = replace(scene.terms[1], c=[rows[0]["coefficient"]])  # type: ignore[type-var]
     scene = replace(scene, terms=(scene.terms[0], brake), step=rows[-1]["time"], steps=1)
+    if mu > 2e4:
+        # a rounding before a jump decides when it comes
+        assert "of the motion" in exact.no_reference(scene)
+        return
     assert scene.system.solution is not None
     for row in rows:
         # any step: the path is one for all times
@@ -141,15 +141,6 @@ def test_the_longest_explicit_step_is_that_of_the_strongest_friction() -> None:
     assert longest.longest(scheme("implicit-euler"), scene) == np.inf
 
 
-def test_its_costs_are_a_family_of_stiffness(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(stiffness_costs, "OUTPUTS", 300)
-    fixed = stiffness_costs.measure(engines.parse("own:implicit-midpoint"), "van-der-pol", [1.0, 1e3])
-    assert [row.outcome for row in fixed] == ["complete", "complete"]
-    assert fixed[0].error < 1e-2 < fixed[1].error
-    explicit = stiffness_costs.measure(engines.parse("own:rk4"), "van-der-pol", [1e6])
-    assert explicit[0].outcome.startswith("not run")
-
-
 def test_the_derivatives_of_the_force_are_those_of_its_differences() -> None:
     scene = of(5.0)
     q, p, e = np.array([0.93]), np.array([0.41]), 1e-6
@@ -165,20 +156,6 @@ def test_a_scene_with_it_is_written_and_read_back_the_same() -> None:
     assert "van-der-pol" in scene.system.acting
     assert scene.system.is_damped
     assert not scene.system.is_linear
-
-
-def test_backwards_in_time_and_joined_to_others_nothing_is_claimed_that_is_not_known() -> None:
-    assert not exact.has_true_motion(of(2.0, step=-0.1, steps=10))
-    brake = VanDerPol(i=[0, 1], c=[0.6, 0.9], width=[0.8, 0.5], at=[0.1, 0.0])
-    joined = Scene(
-        m=[1.3, 0.7], q=[0.4, -0.3], p=[0.1, 0.2], step=0.05, steps=60,
-        terms=(Spring(a=[0], b=[1], k=[2.9], rest=[0.0]), brake, Damping(i=[0], c=[0.2])),
-    )  # fmt: skip
-    assert not exact.has_true_motion(joined)
-    assert np.isnan(longest.longest(scheme("rk4"), joined))
-    for label in ("own:implicit-midpoint", "own:rk4"):
-        found = {v.check: v for v in checks.judge(joined, springcheck.simulate(joined, label))}
-        assert found["step-defect"].passed is True
 
 
 @pytest.mark.parametrize("every", [1, 7])
@@ -205,52 +182,3 @@ def test_a_jump_in_which_the_implicit_equation_divides_by_almost_nothing_keeps_i
     found = {v.check: v for v in checks.judge(scene, springcheck.simulate(scene, label))}
     assert found["step-defect"].passed is True
     assert found["step-defect"].value < 6
-
-
-def test_the_nodes_of_a_step_are_real_where_close_zeros_of_a_series_come_out_in_pairs(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """Eigenvalues of a matrix that is not symmetric may: those of 16 nodes did on one machine in two."""
-    of = np.linalg.eigvals
-    monkeypatch.setattr(np.linalg, "eigvals", lambda matrix: of(matrix) + 1e-13j * np.eye(1, len(matrix))[0])
-    rule = relaxation._rule.__wrapped__()
-    x = 2 * rule.nodes - 1
-    s = relaxation.RADAU_STAGES
-    with mp.workdps(40):
-        for node in x:
-            at = mp.mpf(float(node)) + mp.mpf(float(node - np.longdouble(float(node))))
-            off = mp.legendre(s, at) - mp.legendre(s - 1, at)
-            slope = mp.diff(lambda y: mp.legendre(s, y) - mp.legendre(s - 1, y), at)
-            assert abs(off / slope) < 4 * EPS
-    assert np.all(np.diff(x) > 0)
-
-
-@pytest.mark.parametrize(
-    ("mu", "start", "end"), [(2e4, 1.001, 0.1), (2.6e4, 1.0001, 0.065), (1e6, 1.001, 0.002)]
-)
-def test_near_the_jump_no_error_is_larger_than_stated(mu: float, start: float, end: float) -> None:
-    # there the brake is nearly 0, and a rounding of u is a large part of it
-    scene = of(mu, m=np.ones(1), q=np.array([start]), p=np.zeros(1), step=end, steps=1)
-    spring, brake = scene.terms
-    spring = replace(spring, k=np.ones(1))  # type: ignore[type-var]
-    brake = replace(brake, c=np.array([mu]), width=np.ones(1))  # type: ignore[type-var]
-    scene = replace(scene, terms=(spring, brake))
-    assert scene.system.solution is not None
-    stated = scene.system.solution.doubt(end)
-    with mp.workdps(30):
-        path = mp.odefun(
-            lambda t, y: [y[1], mu * (1 - y[0] ** 2) * y[1] - y[0]], 0, [mp.mpf(start), mp.mpf(0)]
-        )
-        for time in (end / 2, 0.9 * end, end):
-            known = path(time)
-            for found, exactly, bound in zip(
-                exact.true_motion(scene, np.array([1]), time), known, stated, strict=True
-            ):
-                high = float(found[0, 0])
-                off = abs(mp.mpf(high) + mp.mpf(float(found[0, 0] - np.longdouble(high))) - exactly)
-                assert off <= mp.mpf(float(bound[0]))
-
-
-def test_the_faults_of_its_friction_are_as_many_as_are_said() -> None:
-    assert len(FAULTS) == 6
-    assert "and the six faults of such a friction are rejected" in words_of("validation/README.md")

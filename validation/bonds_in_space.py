@@ -27,12 +27,13 @@ Exit status 0 while the claim holds, 1 otherwise.
 
 from __future__ import annotations
 
+import subprocess
+import tempfile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-import gromacs
 from arguments import arguments, script
 from documents import told
 from springcheck.physics import scenefile
@@ -67,6 +68,52 @@ def _start(scene: Scene) -> tuple[Any, Any, Any, float, float]:
     bond: Any = scene.terms[0]
     q, v = scene.q.reshape(-1, 3), (scene.p / scene.m).reshape(-1, 3)
     return scene.masses, q, v, float(bond.k[0]), float(bond.rest[0])
+
+
+GROMACS = """integrator = {integrator}
+dt = {step!r}
+nsteps = {steps}
+nstxout = 1
+nstvout = 1
+nstcalcenergy = 1
+comm-mode = none
+cutoff-scheme = verlet
+verlet-buffer-tolerance = -1
+rlist = 1.2
+"""
+
+
+def gromacs(scene: Scene, path: Path, name: str) -> None:
+    """A trajectory of every step, in the precision of the file's name."""
+    masses, q, v, k, rest = _start(scene)
+    rows = [
+        f"{1:5d}{'M':<5s}{f'A{i + 1}':>5s}{i + 1:5d}" + "".join(f"{x:25.17f}" for x in q[i])
+        + "".join(f"{x:25.18f}" for x in v[i])
+        for i in (0, 1)
+    ]  # fmt: skip
+    m = masses.tolist()
+    topology = [
+        "[ defaults ]", "1 1 no 1.0 1.0",
+        "[ atomtypes ]", *(f"T{i} 0 {m[i]!r} 0.0 A 0.0 0.0" for i in (0, 1)),
+        "[ moleculetype ]", "M 3", "[ atoms ]",
+        *(f"{i + 1} T{i} 1 M A{i} {i + 1} 0.0 {m[i]!r}" for i in (0, 1)),
+        # type 6: harmonic, and no chemical bond that excludes others
+        "[ bonds ]", f"1 2 6 {rest!r} {k!r}", "[ exclusions ]", "1 2", "2 1",
+        "[ system ]", "one", "[ molecules ]", "M 1", "",
+    ]  # fmt: skip
+    program, integrator = "gmx" if "single" in name else "gmx_d", "md-vv" if "md-vv" in name else "md"
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place)
+        (folder / "x.top").write_text("\n".join(topology))
+        (folder / "x.gro").write_text("\n".join(["start", "2", *rows, "20.0 20.0 20.0", ""]))
+        settings = GROMACS.format(integrator=integrator, step=scene.step, steps=scene.steps)
+        (folder / "x.mdp").write_text(settings)
+        for command in (
+            f"{program} grompp -f x.mdp -c x.gro -p x.top -o x.tpr -maxwarn 5",
+            f"{program} mdrun -s x.tpr -o x.trr -nt 1",
+        ):
+            subprocess.run(command.split(), cwd=folder, check=True, capture_output=True)
+        path.write_bytes((folder / "x.trr").read_bytes())
 
 
 def lammps(scene: Scene, path: Path) -> None:
@@ -121,11 +168,7 @@ def write(name: str) -> None:
     """Run the program of a file."""
     scene, path = scenefile.load_scene(scene_of(name)), FOLDER / name
     if name.startswith("gromacs"):
-        bond: Any = scene.terms[0]
-        # type 6: harmonic, and no chemical bond that excludes others
-        held = ["[ bonds ]", f"1 2 6 {float(bond.rest[0])!r} {float(bond.k[0])!r}"]
-        program = "gmx" if "single" in name else "gmx_d"
-        gromacs.run(scene, held, path, program=program, integrator="md-vv" if "md-vv" in name else "md")
+        gromacs(scene, path, name)
     else:
         (lammps if name.startswith("lammps") else mujoco)(scene, path)
 

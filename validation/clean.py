@@ -12,6 +12,7 @@ from functools import partial
 import numpy as np
 
 from springcheck import checks, driver, engines, schemes
+from springcheck.bath import THERMOSTATS
 from springcheck.checks import Check, Run
 from springcheck.checks.seeds import SEEDED
 from springcheck.errors import MethodError
@@ -22,7 +23,6 @@ from springcheck.physics.terms import Spring, Term, WallSpring
 from springcheck.physics.trajectory import Trajectory, Verdict
 from springcheck.studies.faults import baths, measure, steppers
 from springcheck.studies.faults.seeded import Fault
-from springcheck.thermal import THERMOSTATS
 
 CLEAN = 320
 """Random scenes for the plain engine; each meets one scheme."""

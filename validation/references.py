@@ -7,8 +7,8 @@ Command: python validation/references.py            (compares springcheck with d
          python validation/references.py --write    (makes data/reference/motion/ anew, 3 minutes)
 
 Expected: one line a scene, its largest error relative to the largest position and momentum, below 1e-16;
-4e-14 for the long chain, whose start is rounded to doubles before it moves, 4e-16 for the rod on a line,
-whose two masses become one double, and 5e-15 for the diatomic, whose start in doubles turns a little.
+4e-14 for the long chain, whose start is rounded to doubles before it moves, and 5e-15 for the diatomic, whose
+start in doubles turns a little.
 
 The references are made without springcheck: a scene file is read as TOML, every float in it stands for
 its double, and q and p are carried from step to step by power series in time.  Each is made twice, with
@@ -21,7 +21,6 @@ from __future__ import annotations
 import argparse
 import json
 import tomllib
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +32,7 @@ from arguments import script
 ROOT = Path(__file__).parents[1]
 FOLDER = ROOT / "data" / "reference" / "motion"
 ELSEWHERE = ("detest-b1", "stiff-spring", "two-scales", "multiple-time-steps", "overdamped", "van-der-pol")
-"""Scenes whose references are made by stiff_references.py and van_der_pol.py."""
+"""Scenes whose references are of another kind."""
 DIGITS = 25
 ORDER = 40
 
@@ -47,10 +46,7 @@ def along_axes(table: dict[str, Any]) -> dict[str, Any]:
     """The same scene file with a particle of one axis for each axis of each: springs act on each alike."""
     rows = table.get("particle", ())
     if not any(isinstance(row.get("position"), list) for row in rows):
-        lines = [
-            [([i for i in row["ends"] if i != "wall"], row.get("wall", 0.0))] for row in table.get("rod", ())
-        ]
-        return {**table, "rod": lines}
+        return table
     apart: list[dict[str, Any]] = []
     number: dict[tuple[int, str], int] = {}
     for i, row in enumerate(rows):
@@ -64,22 +60,13 @@ def along_axes(table: dict[str, Any]) -> dict[str, Any]:
             ends = [end if end == "wall" else number[end, axis] for end in row["ends"]]
             springs.append({**row, "ends": ends})
     axes = "xyz"[: len(rows[0]["position"])]
-    rods = [
-        [([number[i, axis] for i in row["ends"] if i != "wall"], row.get("wall", [0.0] * 3)[j])
-         for j, axis in enumerate(axes)] for row in table.get("rod", ())
-    ]  # fmt: skip
     bonds = [
         {**row, "axes": [[number[i, axis] for i in row["ends"]] for axis in axes]}
         for row in table.get("bond", ())
     ]
     weights = [(number[row["particle"], row["axis"]], row["force"]) for row in table.get("weight", ())]
-    fields = []
-    for row in table.get("magnetic", ()):
-        plane = {"x": "yz", "y": "zx", "z": "xy"}[row.get("axis", "z")]
-        one, other = (number[row["particle"], axis] for axis in plane)
-        fields += [(one, other, row["strength"]), (other, one, -row["strength"])]
-    made = {"particle": apart, "spring": springs, "rod": rods, "bond": bonds, "weight": weights}
-    return {**table, **made, "fields": fields}
+    made = {"particle": apart, "spring": springs, "bond": bonds, "weight": weights}
+    return {**table, **made}
 
 
 class System:
@@ -87,19 +74,16 @@ class System:
 
     def __init__(self, table: dict[str, Any]) -> None:
         table = along_axes(table)
-        rows = table.get("particle") or table.get("rotor") or table["inductor"]
+        rows = table.get("particle") or table["inductor"]
         names = {
             "particle": ("mass", "position", "momentum"),
-            "rotor": ("inertia", "angle", "momentum"),
             "inductor": ("inductance", "charge", "flux"),
-        }[next(name for name in ("particle", "rotor", "inductor") if name in table)]
+        }[next(name for name in ("particle", "inductor") if name in table)]
         self.m, self.q, self.p = ([mp.mpf(row.get(name, 0)) for row in rows] for name in names)
         self.table = table
         self.weights = [mp.mpf(0)] * len(self.m)
         for i, force in table.get("weight", ()):
             self.weights[i] += mp.mpf(force)
-        self.rods = _Rods(table.get("rod", ()), self.m)
-        self.rods.take_off(self.q, self.p)
 
     def springs(self) -> list[tuple[list[tuple[int, int]], Any, Any]]:
         """((particle, sign) of each end, stiffness, rest) with elongation sum of sign * q - rest."""
@@ -131,10 +115,8 @@ class System:
         laws: list[Any] = [_Quartic(row) for row in self.table.get("quartic", ())]
         laws += [_Cosine(row) for row in self.table.get("cosine", ())]
         laws += [_Morse(row) for row in self.table.get("morse", ())]
-        laws += [_Driven(row, t) for key in ("drive", "modulated-spring") for row in self.table.get(key, ())]
+        laws += [_Driven(row, t) for row in self.table.get("drive", ())]
         laws += [_Bond(row) for row in self.table.get("bond", ())]
-        # from what all others do
-        laws.append(_Rods(self.table.get("rod", ()), self.m))
         springs, friction = self.springs(), self.friction()
         for order in range(ORDER):
             force = [mp.mpf(0)] * n if order else list(self.weights)
@@ -144,8 +126,6 @@ class System:
                     force[i] -= sign * k * stretch
             for i, c in friction:
                 force[i] -= c * (order + 1) * u[i][order + 1]
-            for i, j, strength in self.table.get("fields", ()):
-                force[i] += mp.mpf(strength) * (order + 1) * u[j][order + 1]
             for law in laws:
                 law.add(u, order, force)
             for i in range(n):
@@ -235,104 +215,15 @@ class _Bond:
 
 
 class _Driven:
-    """A driving force, or a spring of modulated stiffness: the cosine by its own series about the time t."""
+    """A driving force: the cosine by its own series about the time t."""
 
     def __init__(self, row: dict[str, Any], t: Any) -> None:
         self.i, self.row = row["particle"], {name: mp.mpf(x) for name, x in row.items()}
         self.w, self.angle = self.row["frequency"], self.row["frequency"] * t + self.row.get("phase", 0)
-        self.x: list[Any] = []
-        self.k: list[Any] = []
 
     def add(self, u: Series, order: int, force: list[Any]) -> None:
         cosine = self.w**order * mp.cos(self.angle + order * mp.pi / 2) / mp.factorial(order)
-        if "amplitude" in self.row:
-            force[self.i] += self.row["amplitude"] * cosine
-            return
-        self.x.append(u[self.i][order] - (self.row.get("at", 0) if order == 0 else 0))
-        self.k.append(self.row["stiffness"] * ((order == 0) + self.row["depth"] * cosine))
-        force[self.i] -= _product(self.k, self.x, order)
-
-
-def signed(ends: list[int]) -> list[tuple[int, int]]:
-    """What a push along a rod does to its ends: it moves them apart."""
-    return list(zip((1, -1), ends[::-1], strict=False))
-
-
-def way(x: list[Any], ends: list[int]) -> Any:
-    """From one end of a rod to the other, or from a fixed point, along an axis."""
-    return x[ends[-1]] - (x[ends[0]] if len(ends) == 2 else 0)
-
-
-class _Rods:
-    """All rods together, between two particles or from a fixed point: their multipliers from r r = l**2,
-    differentiated twice.  Each is a list of its ends and of the fixed point, by axes."""
-
-    def __init__(self, rods: Sequence[list[Any]], m: list[Any]) -> None:
-        self.rods, self.m = rods, m
-        self.k: list[list[Any]] = [[] for _ in rods]
-
-    def joined(self, r: list[list[Any]]) -> Any:
-        """How a push along each rod (row) of ways r moves all along theirs."""
-        matrix = mp.matrix(len(self.rods))
-        for c, one in enumerate(self.rods):
-            for d, other in enumerate(self.rods):
-                for j, ((here, _), (there, _)) in enumerate(zip(one, other, strict=True)):
-                    both = [(s, o, i) for s, i in signed(here) for o, k in signed(there) if i == k]
-                    matrix[c, d] += r[c][j] * r[d][j] * mp.fsum(s * o / self.m[i] for s, o, i in both)
-        return matrix
-
-    def ways(self, x: list[Any]) -> list[list[Any]]:
-        """From one end of each rod to the other, by axes."""
-        return [[way(x, ends) for ends, _ in axes] for axes in self.rods]
-
-    def push(self, out: list[Any], along: list[list[Any]]) -> None:
-        """Add to each end what pushes along the axes of every rod do."""
-        for axes, row in zip(self.rods, along, strict=True):
-            for (ends, _), x in zip(axes, row, strict=True):
-                for sign, i in signed(ends):
-                    out[i] += sign * x
-
-    def take_off(self, q: list[Any], p: list[Any]) -> None:
-        """Take off the momenta what moves ends apart, which doubles leave of them."""
-        if not self.rods:
-            return
-        r = [
-            [way(q, ends) - (mp.mpf(at) if len(ends) == 1 else 0) for ends, at in axes] for axes in self.rods
-        ]
-        speed = [x / m for x, m in zip(p, self.m, strict=True)]
-        v = self.ways(speed)
-        along = [mp.fsum(x * y for x, y in zip(a, b, strict=True)) for a, b in zip(r, v, strict=True)]
-        k = mp.lu_solve(self.joined(r), mp.matrix(along))
-        self.push(p, [[-k[c] * x for x in row] for c, row in enumerate(r)])
-
-    def add(self, u: Series, order: int, force: list[Any]) -> None:
-        if not self.rods:
-            return
-        r = [
-            [[way([x[j] for x in u], ends) for j in range(order + 2)] for ends, _ in axes]
-            for axes in self.rods
-        ]
-        for row, axes in zip(r, self.rods, strict=True):
-            for x, (ends, at) in zip(row, axes, strict=True):
-                x[0] -= mp.mpf(at) if len(ends) == 1 else 0
-        # the multipliers of this order are still 0
-        for k in self.k:
-            k.append(mp.mpf(0))
-        self.push(force, [[_product(self.k[c], x, order) for x in row] for c, row in enumerate(r)])
-        faster = [f / m for f, m in zip(force, self.m, strict=True)]
-        lacks = []
-        for row, axes in zip(r, self.rods, strict=True):
-            total = mp.mpf(0)
-            for x, (ends, _) in zip(row, axes, strict=True):
-                v = [(j + 1) * x[j + 1] for j in range(order + 1)]
-                a = [(j + 1) * (j + 2) * x[j + 2] for j in range(order)] + [way(faster, ends)]
-                total += _product(v, v, order) + _product(x, a, order)
-            lacks.append(-total)
-        start = [[x[0] for x in row] for row in r]
-        found = mp.lu_solve(self.joined(start), mp.matrix(lacks))
-        for c, k in enumerate(self.k):
-            k[-1] = found[c]
-        self.push(force, [[found[c] * x for x in row] for c, row in enumerate(start)])
+        force[self.i] += self.row["amplitude"] * cosine
 
 
 def moved(system: System, start: Any, t: Any, pieces: int, state: tuple[list[Any], list[Any]]) -> Any:

@@ -35,13 +35,13 @@ import springcheck
 from arguments import arguments, script
 from clean import clean_bath
 from springcheck import checks, driver, engines
+from springcheck.bath import THERMOSTATS
 from springcheck.engines.contract import Label
 from springcheck.errors import SpringcheckError
 from springcheck.identify.thermal import of_bath
 from springcheck.physics.bath import Bath
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Spring, WallSpring
-from springcheck.thermal import THERMOSTATS
 
 HERE = Path(__file__).parents[1] / "data" / "reference" / "thermostats"
 EVERY = 50

@@ -39,12 +39,12 @@ import numpy as np
 import springcheck
 from arguments import arguments, script
 from springcheck import checks, driver, engines
+from springcheck.bath import THERMOSTATS, Law
+from springcheck.bath.states import identify_thermal
 from springcheck.engines.contract import Label
 from springcheck.physics.bath import Bath
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import WallSpring
-from springcheck.thermal import THERMOSTATS, Law
-from springcheck.thermal.states import identify_thermal
 
 H, M, K, RATE, THERMAL = 0.35, 3.7, 2.9, 0.8, 1.7
 MANY_DRAWS = 200_000_000

@@ -13,14 +13,14 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 from springcheck import engines
+from springcheck.bath import THERMOSTATS
+from springcheck.bath.catalogue import NO_NORMAL_NUMBERS
 from springcheck.engines.contract import Label, Simulation, Stopped
 from springcheck.errors import MethodError
 from springcheck.physics import memory
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Outcome, Timing, Trajectory
-from springcheck.thermal import THERMOSTATS
-from springcheck.thermal.catalogue import NO_NORMAL_NUMBERS
 
 CHUNK = 1 << 16
 """Numbers per array and chunk: 512 KiB, which stays in the cache."""
@@ -109,7 +109,7 @@ def play(
     began = perf_counter()
     simulation = engines.Started(ahead, label, seed)
     start_seconds = perf_counter() - began
-    how, origin = engines.arithmetic(label, scene.units), {**engines.origin_of(label), **origin}
+    how, origin = engines.arithmetic(label), {**engines.origin_of(label), **origin}
 
     rows = max(1, min(CHUNK // scene.n, scene.frames))
     piece = scene.every if method.adaptive else min(scene.every, PIECE, WORK // scene.n or 1)

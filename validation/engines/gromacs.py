@@ -1,4 +1,4 @@
-"""GROMACS, by its files and `gmx`: position restraints for springs; md, md-vv and sd; LINCS and SHAKE."""
+"""GROMACS, by its files and `gmx`: position restraints for springs; md, md-vv and sd."""
 
 import tempfile
 from pathlib import Path
@@ -8,7 +8,7 @@ import numpy as np
 from springs import SPRINGS, Batch, called, placed
 
 from springcheck.engines import Engine, named
-from springcheck.engines.contract import Need, by_name, thermostat
+from springcheck.engines.contract import by_name, thermostat
 from springcheck.formats.molecular import read_trr
 from springcheck.physics.arrays import Arithmetic
 
@@ -19,7 +19,6 @@ INPUT = (
     "verlet-buffer-tolerance = -1; rlist = 1; rcoulomb = 1; rvdw = 1; comm-mode = none; "
 )
 TOPOLOGY = "[ defaults ]\n1 1 no 1 1\n[ atomtypes ]\nX 1 1 0 A 0 0\n"
-HELD = {"lincs": "lincs-order = 8; lincs-iter = 4; lincs-warnangle = 90", "shake": "shake-tol = 1e-6"}
 
 
 def shift(scene: Any) -> float:
@@ -28,9 +27,9 @@ def shift(scene: Any) -> float:
 
 
 def files(folder: Path, scene: Any, name: str, step: float, steps: int, seed: int) -> None:
-    """What gmx reads: each particle of a scene without rods is a molecule, all of one with rods are one."""
+    """What gmx reads: each particle is a molecule."""
     x, v, pull, at = placed(scene)
-    m, integrator = scene.masses, name.removesuffix("-lincs").removesuffix("-shake")
+    m = scene.masses
     if name == "md-vv-avek":
         v += step / 2 * pull / m[:, None] * (x - at)
     for file, place in (("start", x + shift(scene)), ("walls", at + shift(scene))):
@@ -39,25 +38,18 @@ def files(folder: Path, scene: Any, name: str, step: float, steps: int, seed: in
         (folder / f"{file}.gro").write_text("\n".join(["springs", str(len(m)), *rows, " 30 30 30", ""]))
     parts = [("atoms", f"X 1 M X {{n}} 0 {a!r}") for a in m.tolist()]
     held = [("position_restraints", f"1 {a!r} {b!r} {c!r}") for a, b, c in pull.tolist()]
-    rods = [] if scene.system.rods is None else list(scene.system.rods.joints())
-    of = [[*range(len(m))]] if rods else [[i] for i in range(len(m))]
-    kinds = []
-    for those in of:
-        text = ""
-        for lines in (parts, held):
-            each = (f"{n + 1} {lines[i][1].format(n=n + 1)}\n" for n, i in enumerate(those))
-            text += f"[ {lines[0][0]} ]\n{''.join(each)}"
-        kinds.append(text + "".join(f"[ constraints ]\n{a + 1} {b + 1} 1 {d!r}\n" for (a, b), d, _ in rods))
+    kinds = [
+        "".join(f"[ {lines[i][0]} ]\n1 {lines[i][1].format(n=1)}\n" for lines in (parts, held))
+        for i in range(len(m))
+    ]
     known = list(dict.fromkeys(kinds))
     text = TOPOLOGY + "".join(f"[ moleculetype ]\nM{i} 1\n{kind}" for i, kind in enumerate(known))
     text += "[ system ]\nsprings\n[ molecules ]\n" + "".join(f"M{known.index(one)} 1\n" for one in kinds)
     (folder / "in.top").write_text(text)
-    options = INPUT.format(integrator=integrator, step=step, steps=steps)
-    if integrator == "sd":
+    options = INPUT.format(integrator=name, step=step, steps=steps)
+    if name == "sd":
         options += f"tc-grps = System; tau-t = {1 / scene.bath.friction!r}; ld-seed = {seed}; "
         options += f"ref-t = {scene.thermal / BOLTZMANN!r}"
-    if rods:
-        options += f"constraint-algorithm = {name.rpartition('-')[2]}; " + HELD[name.rpartition("-")[2]]
     (folder / "in.mdp").write_text(options.replace("; ", "\n") + "\n")
 
 
@@ -78,7 +70,7 @@ def start(scene: Any, method: Any, label: Any, step: float, seed: int = 1) -> Ba
 
 LATE = "the velocities of its files, also of the start, are those of half a step before: documented"
 AVEK = "it takes the velocities of its start for those of half a step before: upstream/gromacs_avek.md"
-MD, VERLET, RODS = "semi-implicit-euler", "velocity-verlet", SPRINGS | {"rod"}
+MD, VERLET = "semi-implicit-euler", "velocity-verlet"
 ENGINE = Engine(
     name="gromacs", title="GROMACS", module="struct", start=start, any_axis=True,
     version=lambda: {"gromacs": called("gmx --version", ".").partition("GROMACS version:")[2].split()[0]},
@@ -86,10 +78,6 @@ ENGINE = Engine(
         by_name("md", MD, "integrator = md, position restraints", SPRINGS, note=LATE),
         by_name("md-vv", VERLET, "integrator = md-vv, position restraints", SPRINGS),
         by_name("md-vv-avek", VERLET, "md-vv-avek, started half a kick back", SPRINGS, note=AVEK),
-        by_name("md-lincs", MD, "md, LINCS of order 8, 4 iterations", RODS, Need.RODS, note=LATE),
-        by_name("md-shake", MD, "md, SHAKE, tolerance 1e-6", RODS, Need.RODS, note=LATE),
-        by_name("md-vv-lincs", VERLET, "md-vv, LINCS of order 8, 4 iterations", RODS, Need.RODS),
-        by_name("md-vv-shake", VERLET, "md-vv, SHAKE, tolerance 1e-6", RODS, Need.RODS),
     ),
     thermostats=named(thermostat("sd", "baoa", "integrator = sd", "ThreeFry", SPRINGS, note=LATE)),
     # in a bath positions are rounded with the shift, at 8

@@ -26,7 +26,7 @@ if [ -n "${JUDGE_COMMAND:-}" ] && ! bash -c "$JUDGE_COMMAND"; then
 fi
 status=0
 if [ -n "${JUDGE_TRAJECTORY:-}" ]; then
-  # of a scene that is stated the judge knows what rods and a bath must do
+  # of a scene that is stated the judge knows what a bath must do
   verb=(identify "$JUDGE_TRAJECTORY")
   [ -z "${JUDGE_SCENE:-}" ] || verb=(judge "$JUDGE_TRAJECTORY" --scene "$JUDGE_SCENE")
   springcheck "${verb[@]}" ${scheme[@]+"${scheme[@]}"} ${options[@]+"${options[@]}"} "${reports[@]}" || status=$?

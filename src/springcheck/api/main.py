@@ -206,11 +206,12 @@ def identify(
 def exact(scene: Scene | str | Path) -> Trajectory:
     """The exact solution at the frames of a scene, rounded to double precision.
 
-    Raises SpringcheckError where no closed form is known.
+    Raises SpringcheckError where there is no reference solution.
     """
     found = scene_of(scene)
     if not solutions.has_true_motion(found):
-        raise SpringcheckError(f"scene {found.name}: no closed form of its exact solution is known")
+        reason = solutions.no_reference(found)
+        raise SpringcheckError(f"scene {found.name}: no reference solution, because {reason}")
     steps = np.arange(found.frames, dtype=np.int64) * found.every
     q, p = (np.asarray(x, np.float64) for x in solutions.true_motion(found, steps, found.step))
     return of_scene(found, q, p, label="exact", scheme="exact")

@@ -151,18 +151,17 @@ class Case(Claim):
         return self.allowance_at(self.trajectory.q[:-1], self.trajectory.p[:-1])
 
     def allowance_at(
-        self, q: Reals, p: Reals, *, smallest: np.longdouble = rounding.SMALLEST, paired: bool = False
+        self, q: Reals, p: Reals, *, smallest: np.longdouble = rounding.SMALLEST
     ) -> tuple[Extended, Extended]:
         """One rounding of everything that one step from states (..., n) adds up, (..., n) each.
 
-        `smallest` is the loss of an operation to underflow.  `paired` leaves out the tolerance of rods, whose
-        impulses cancel in pairs and exert no torque, however large they are.
+        `smallest` is the loss of an operation to underflow.
         """
         places: list[Reals] | None = [] if self.placed else None
         if self.placed:
             self.step(q.astype(np.longdouble), p.astype(np.longdouble), met=places)
         with np.errstate(all="ignore"):
-            one = rounding.of_step(self, q, p, places, smallest=smallest, paired=paired)
+            one = rounding.of_step(self, q, p, places, smallest=smallest)
             written = rounding.of_recording(self, q, p, places)
             return one[0] + written[0] / self.roundings, one[1] + written[1] / self.roundings
 

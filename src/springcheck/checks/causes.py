@@ -1,6 +1,6 @@
-"""Causes that states with rods, or in a bath, show where they are not the scheme's.
+"""Causes that states show where they are not the scheme's.
 
-What holds rods is in `held`.  The effect of a bath is in the draws that the states imply, and in their size.
+The effect of a bath is in the draws that the states imply, and in their size.
 """
 
 from __future__ import annotations
@@ -11,7 +11,10 @@ from math import comb
 
 import numpy as np
 
-from springcheck.checks import driven, held, images, other, stages
+from springcheck.bath import THERMOSTATS, chance
+from springcheck.bath.catalogue import ENERGY_LEFT
+from springcheck.bath.draws import Reading, law_of
+from springcheck.checks import driven, other, stages
 from springcheck.checks.case import Case
 from springcheck.checks.check import FALSE_ALARMS
 from springcheck.checks.requires import MAP, missing
@@ -19,9 +22,6 @@ from springcheck.checks.steps import STANDS_APART, seldom_off, step_defect
 from springcheck.checks.thermal import noise_direction, read_frames, reading, rows_a_step, thermostat
 from springcheck.physics.arrays import Floats
 from springcheck.text.wording import regularly
-from springcheck.thermal import THERMOSTATS, chance
-from springcheck.thermal.catalogue import ENERGY_LEFT
-from springcheck.thermal.draws import Reading, law_of
 
 STANDARD_ERRORS = 6.0
 """Standard errors by which a size differs from another: a chance of 2e-9 for normal numbers."""
@@ -71,13 +71,11 @@ def found(case: Case, shown: Callable[[int, bool], str] = lambda *_: "") -> str:
     if run.every == 1 and random:
         # of draws that are read by the map of another scheme the size says nothing
         drawn = _told(reading(case)) and noise_direction(case).passed is not False
-        # of rods each is a combination of those of all coordinates
-        own = drawn and system.rods is None
-        ways = [*[_of_no_noise] * own, _of_bath, *[stages.balanced] * own]
+        ways = [*[_of_no_noise] * drawn, _of_bath, *[stages.balanced] * drawn]
         ways += [stages.collided, _of_removal, stages.found]
-        looks = [*looks, _of_reach, *[_of_state] * own, *[_of_size] * drawn]
+        looks = [*looks, _of_reach, *[_of_state, _of_size] * drawn]
     elif run.every == 1 and not missing(case, MAP):
-        ways = [_of_differences, driven.found, images.found, held.found, _of_removal, _of_factor]
+        ways = [_of_differences, driven.found, _of_removal, _of_factor]
         looks = [_of_numbers, *looks, _of_reach]
     vague = ""
     for way in ways + looks:
@@ -150,9 +148,8 @@ def _of_factor(case: Case) -> str:
     made = np.concatenate([run.q[1:], run.p[1:]], axis=1)
     off = np.abs(made - ends) / unit
     # of one freedom any change of a momentum is a factor
-    free = case.system.rods.freedoms if case.system.rods else n
     for what, kept, of, freedoms in (
-        ("momenta", slice(n), slice(n, None), free), ("positions and momenta", [], slice(None), 2 * free),
+        ("momenta", slice(n), slice(n, None), n), ("positions and momenta", [], slice(None), 2 * n),
     ):  # fmt: skip
         x, y = ends[:, of] / unit[:, of], made[:, of] / unit[:, of]
         factor = np.sum(x * y, axis=1) / np.sum(x * x, axis=1)
@@ -206,7 +203,7 @@ def _of_numbers(case: Case) -> str:
 
 def _of_differences(case: Case) -> str:
     """Velocities that are differences of the positions, where every step is right to what those keep."""
-    run, m, held = case.trajectory, case.judged.m, case.system.rods
+    run, m = case.trajectory, case.judged.m
     declared = replace(case, trajectory=replace(run, rebuilds_velocity=True))
     if run.rebuilds_velocity or step_defect(case).passed:
         return ""
@@ -214,8 +211,6 @@ def _of_differences(case: Case) -> str:
         q, p = (x[1 : len(x) - n + 1] for x in (run.q, run.p))
         made = m * (run.q[n:] - run.q[:-n]) / (n * run.step)
         right, size = made + kick * run.step * case.system.force(q, p), np.abs(p) + np.abs(made)
-        if held:
-            right, size = held.projected(q, right), np.max(size, axis=1, keepdims=True)
         # and those of their own decimals: what has finer ones than the positions was not made of them
         half = run.arithmetic.recorded(m, n * run.step, False)[1]
         off = (np.abs(p - right) - half) / (DIFFERENCE_ROUNDINGS * run.arithmetic.state)
@@ -224,14 +219,6 @@ def _of_differences(case: Case) -> str:
                 f"velocities are differences of the positions{more}, which keep eps q/h of them, and each "
                 f"step is right to that: {DECLARE_DIFFERENCES}"
             )
-    # what SHAKE adds to velocities, as a difference, rounds at each step by itself; a wrong force does not
-    off = (run.p[1:] - case.next_states[1]) / m
-    again = abs(np.sum(off[1:] * off[:-1])) / np.sum(off * off) * np.sqrt(len(off))
-    if held and again <= STANDARD_ERRORS < np.sqrt(len(off)) and step_defect(declared).passed:
-        return (
-            "what rods change of velocities rounds as differences of positions do, by eps q/h, and each step "
-            f"is right to that: {DECLARE_DIFFERENCES}"
-        )
     return ""
 
 

@@ -15,7 +15,7 @@ from springcheck.physics.trajectory import NOT_KNOWN, Limits, Verdict
 from springcheck.text.wording import described
 
 if TYPE_CHECKING:
-    from springcheck.thermal.chance import Statistic
+    from springcheck.bath.chance import Statistic
 
 BEYOND = 2.0**511
 """Stands for values that fail and are not finite, or larger, so that a verdict and its ratio are finite."""

@@ -52,7 +52,7 @@ class Kind:
     off: Floats
     """How far the steps of each row's coordinates are off at most (s,), in bounds."""
     objects: list[Rows]
-    """Rows that have one number: of a particle, or of a spring, bond or rod, along all axes."""
+    """Rows that have one number: of a particle, or of a spring or bond, along all axes."""
     alone: Sequence[Rows] = ()
     """Single rows of them, where they may have each its own."""
     size: float = 0.0
@@ -151,7 +151,7 @@ def _fits(case: Case, other: Case) -> bool:
 
 
 def _exchanged(case: Case) -> Iterator[tuple[str, Case]]:
-    """Cases in which two particles have exchanged their masses, or two springs, bonds or rods a number."""
+    """Cases in which two particles have exchanged their masses, or two springs or bonds a number."""
     for kind in _kinds(case):
         for (one, mine), (two, its) in combinations(kind.farthest(kind.objects), 2):
             swapped = kind.numbers.copy()

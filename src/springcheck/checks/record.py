@@ -72,7 +72,6 @@ MOST_DECLARED = {
     "force": (2.0**-8, "8 bits, those of bfloat16, are the fewest of any format"),
     "quantum": (2.0**-32, "the unit of 64-bit fixed point, half of it behind the point"),
     "excess": (2.0**-31, "2**32 for 2**32 - 1 in 64-bit fixed point"),
-    "lengths": (1e-4, "the tolerance of SHAKE in GROMACS and in LAMMPS' manual"),
     "cancels": (2, "a difference of 1 and what is itself taken from a difference"),
 }
 """The coarsest arithmetic that an engine may declare, and why: bounds follow from it, and a coarser one would
@@ -87,9 +86,6 @@ def beyond(run: Trajectory) -> list[str]:
     how, most_declared = run.arithmetic, MOST_DECLARED
     if run.rebuilds_velocity and not how.keeps_displacement:
         most_declared = most_declared | {"state": MOST_REBUILT}
-    if how.rates and run.step:
-        most, why = MOST_DECLARED["lengths"]
-        most_declared = most_declared | {"rates": (most / abs(run.step), f"over one step, {why}")}
     return [
         f"the engine declares {name} = {value:.3g} of its arithmetic, and at most {most:.3g} is taken: {why}"
         for name, (most, why) in most_declared.items()
@@ -99,11 +95,8 @@ def beyond(run: Trajectory) -> list[str]:
 
 
 def _gives_up(case: Case) -> bool:
-    """Whether the engine may give up, and says why: a solver that cannot hold its tolerance, of a step or of
-    the lengths of rods, whose iteration need not converge where rods are coupled."""
+    """Whether the engine may give up, and says why: a solver that cannot meet its tolerance of a step."""
     outcome, solves = case.trajectory.outcome, not case.law.has("one-step")
-    if case.scene.system.rods:
-        solves = solves or case.trajectory.arithmetic.lengths > 0
     return solves and outcome.status == "stopped" and bool(outcome.message)
 
 

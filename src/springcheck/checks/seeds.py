@@ -9,6 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from springcheck.bath import THERMOSTATS, Stepper, Thermostat, chance
+from springcheck.bath.catalogue import NO_NORMAL_NUMBERS
+from springcheck.bath.draws import LARGEST_DRAW, law_of, read
+from springcheck.bath.rounding import one_rounding, roundings_of
+from springcheck.bath.stepper import forces
 from springcheck.checks.case import Case, small_move
 from springcheck.checks.check import Chance, Finding, check
 from springcheck.checks.thermal import HIDDEN, reading
@@ -16,11 +21,6 @@ from springcheck.errors import MethodError
 from springcheck.physics.arrays import Extended, Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory
-from springcheck.thermal import THERMOSTATS, Stepper, Thermostat, chance
-from springcheck.thermal.catalogue import NO_NORMAL_NUMBERS
-from springcheck.thermal.draws import LARGEST_DRAW, law_of, read
-from springcheck.thermal.rounding import one_rounding, roundings_of
-from springcheck.thermal.stepper import Met, forces
 
 FEW = 8
 """Number of particles up to which each is perturbed by itself."""
@@ -71,18 +71,14 @@ class Seeded:
         """Bound on the rounding of a step from a frame (2, n); `factor` is a thermostat's on all momenta."""
         start = run.q[row].astype(np.longdouble), run.p[row].astype(np.longdouble)
         draws = [np.full(self.scene.n, LARGEST_DRAW)] * self.scheme.draws
-        met: list[Met] = []
-        if self.scene.system.rods:
-            none = [np.zeros(self.scene.n)] * self.scheme.draws
-            self.stepper(self.scene)(*start, forces(self.scheme, self.scene.system), none, met=met)
         of_q, of_p = one_rounding(
             self.scene, self.stepper(self.scene, absolute=True), start, draws, factor, run.arithmetic,
-            run.rebuilds_velocity, met,
+            run.rebuilds_velocity,
         )  # fmt: skip
         if self.scheme.rescales_after:
             # the kinetic energy that determines the factor has the roundings of all steps before it
             of_p = of_p + np.sqrt(self.scene.m * np.sum(of_p**2 / self.scene.m))
-        return roundings_of(self.scheme, self.scene) * np.stack([of_q, of_p])
+        return roundings_of(self.scheme) * np.stack([of_q, of_p])
 
 
 WITHIN = 1.0, "of what rounding allows"
@@ -133,8 +129,6 @@ def noise_size(subject: Seeded) -> Finding | str:
 
     Particles start at rest, or, where a factor acts on momenta, in motion that is scaled likewise.
     """
-    if subject.scene.system.rods:
-        return "a rod has its length, and no state is scaled"
     scheme, scene = subject.scheme, subject.scene if subject.scheme.rescales else subject.at_rest()
     if not scene.system.is_linear or np.any(scene.system.potential_force(0 * scene.q, 0 * scene.p)):
         return "a linear scene with its rest in 0 is needed"

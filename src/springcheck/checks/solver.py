@@ -114,8 +114,6 @@ def flow_growth(case: Case) -> float:
         return float(np.exp(turn) * max(turn, 1.0))
     if duration == 0:
         return 1.0
-    if scene.system.solution and (grown := scene.system.solution.growth):
-        return grown
     maps = _flow_maps(case, duration)
     if maps is None:
         return 1.0 + fastest(case) * duration / 2
@@ -145,16 +143,19 @@ def _flow_maps(case: Case, duration: float) -> Floats | None:
     # separate particles are all pushed at once
     pushes = np.eye(2)[..., None] * unit if separate else np.eye(2 * n).reshape(2 * n, 2, n) * unit
     h = duration / TIMES
-    steps = np.arange(TIMES + 1)
+    moved = np.asarray(np.stack([scene.q, scene.p]) + np.stack([pushes, -pushes], axis=1), np.float64)
+    # copies side by side, all integrated at once
+    q, p = np.moveaxis(moved, 2, 0).reshape(2, -1, n)
+    copies = replace(scene.system.tiled(len(q)), q=q.ravel(), p=p.ravel(), steps=TIMES, every=1, step=h)
+    if not exact.has_true_motion(copies):
+        return None
+    found = np.stack(exact.true_motion(copies, np.arange(TIMES + 1), h), axis=1)
+    found = found.reshape(TIMES + 1, 2, len(pushes), 2, n)
     columns: list[Extended] = []
-    for push in pushes:
-        moved = [np.asarray([scene.q, scene.p] + sign * push, np.float64) for sign in (1, -1)]
-        scenes = [replace(scene, q=q, p=p) for q, p in moved]
-        if not all(map(exact.has_true_motion, scenes)):
-            return None
-        one, other = (np.stack(exact.true_motion(start, steps, h), axis=1) for start in scenes)
+    for j in range(len(pushes)):
+        one, other = found[:, :, j, 0], found[:, :, j, 1]
         # by the actual difference of the doubles
-        change = (moved[0] - moved[1]) / unit
+        change = (moved[j, 0] - moved[j, 1]) / unit
         columns.append((one - other) / (unit * np.sum(change, axis=0 if separate else None)))
     # (d, f, 2, n): which column, time, q or p, particle
     table = np.stack(columns).astype(np.float64)

@@ -9,17 +9,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from springcheck import thermal
+from springcheck import bath
+from springcheck.bath import THERMOSTATS, Thermostat
 from springcheck.checks.case import Case, small_move, too_strong
 from springcheck.checks.check import Chance, Finding, check
 from springcheck.checks.steps import STILL
 from springcheck.errors import MethodError
 from springcheck.physics.arrays import Floats
 from springcheck.text.wording import count
-from springcheck.thermal import THERMOSTATS, Thermostat
 
 if TYPE_CHECKING:
-    from springcheck.thermal.draws import Reading
+    from springcheck.bath.draws import Reading
 
 HIDDEN = "the motion is so much larger than its noise that rounding hides the draws"
 
@@ -30,11 +30,8 @@ def reading(case: Case) -> Reading:
 
 
 def thermostat(case: Case) -> Thermostat:
-    """The thermostat of a case.  MethodError where it is not known how it holds rods."""
-    scheme = THERMOSTATS[case.trajectory.scheme]
-    if case.judged.system.rods and not scheme.held:
-        raise MethodError(f"no stages of {scheme.title} with rods are known")
-    return scheme
+    """The thermostat of a case."""
+    return THERMOSTATS[case.trajectory.scheme]
 
 
 def _reading(case: Case) -> Reading:
@@ -44,8 +41,8 @@ def _reading(case: Case) -> Reading:
 def read_frames(case: Case, q: Floats, p: Floats, *, scheme: Thermostat | None = None) -> Reading:
     """The draws behind other frames q, p (f, n) of the case's scene, by its scheme or another."""
     run, scheme = case.trajectory, scheme or thermostat(case)
-    by = thermal.rigid.read if case.judged.system.rods else thermal.draws.read
-    return by(scheme, case.judged, q, p, how=run.arithmetic, rebuilt=run.rebuilds_velocity)
+    how, rebuilt = run.arithmetic, run.rebuilds_velocity
+    return bath.draws.read(scheme, case.judged, q, p, how=how, rebuilt=rebuilt)
 
 
 def _unread(case: Case) -> int:
@@ -97,8 +94,8 @@ def _draws(case: Case) -> Floats:
     if not found.known:
         raise MethodError(HIDDEN)
     x = found.draws
-    if scheme.uniform and not case.scene.system.rods:
-        x = thermal.draws.normal_scores(x)
+    if scheme.uniform:
+        x = bath.draws.normal_scores(x)
     if np.count_nonzero(~np.isnan(x)) < 2:
         raise MethodError("there were no draws")
     return x
@@ -113,25 +110,23 @@ def _drawn(case: Case) -> Floats:
 @check("mean", family="noise", requires={"every-step"})
 def draws_mean(case: Case) -> Chance:
     """The draws have mean 0, all along the run."""
-    return Chance.of(thermal.chance.steady(thermal.chance.mean(x := _drawn(case)), x))
+    return Chance.of(bath.chance.steady(bath.chance.mean(x := _drawn(case)), x))
 
 
 @check("var", family="noise", requires={"every-step"})
 def draws_variance(case: Case) -> Chance:
     """The draws have variance 1 all along the run: their size is that of temperature, masses and friction."""
     x = _drawn(case)
-    return Chance.of(thermal.chance.steady(thermal.chance.variance(x), thermal.chance.normal_sizes(x)))
+    return Chance.of(bath.chance.steady(bath.chance.variance(x), bath.chance.normal_sizes(x)))
 
 
 @check("shape", family="noise", requires={"every-step"})
-def draws_shape(case: Case) -> Chance | str:
+def draws_shape(case: Case) -> Chance:
     """The draws have the tails and the symmetry of their distribution, as fourth and third moment show.
 
     Judged by these Legendre polynomials of their ranks, which no single draw decides.
     """
-    if case.scene.system.rods and THERMOSTATS[case.trajectory.scheme].uniform:
-        return "a rod mixes uniform draws of its ends, and the tails of such sums are others"
-    return Chance.of(thermal.chance.shape(_drawn(case)))
+    return Chance.of(bath.chance.shape(_drawn(case)))
 
 
 @check("largest", family="noise", requires={"every-step"})
@@ -144,13 +139,13 @@ def draws_largest(case: Case) -> Chance | str:
         return "uniform draws have a largest size"
     x, read = _drawn(case), reading(case)
     error = read.error if read.hits is None else read.error[read.hits][:, None]
-    return Chance.of(thermal.chance.largest(x, error))
+    return Chance.of(bath.chance.largest(x, error))
 
 
 @check("lag 1", family="noise", requires={"every-step"})
 def draws_neighbours(case: Case) -> Chance:
     """The draws of one step say nothing of those of the next."""
-    return Chance.of(thermal.chance.neighbours(_drawn(case)))
+    return Chance.of(bath.chance.neighbours(_drawn(case)))
 
 
 @check("repeat", family="noise", requires={"every-step"})
@@ -158,7 +153,7 @@ def draws_repeat(case: Case) -> Chance | str:
     """The draws of one step do not come again, nor opposite, any number of steps later."""
     if len(case.trajectory.t) < 1010:
         return "fewer than a thousand steps"
-    found, words = thermal.chance.repeats(x := _drawn(case))
+    found, words = bath.chance.repeats(x := _drawn(case))
     return Chance(found, f"{words}, of {count(x.size, 'draw')}")
 
 
@@ -170,18 +165,16 @@ def draws_particles(case: Case) -> Chance | str:
     x = _draws(case)
     if not np.any(np.count_nonzero(~np.isnan(x), axis=1) > 1):
         return "no step has draws of two particles"
-    return Chance(*thermal.chance.pairs(x))
+    return Chance(*bath.chance.pairs(x))
 
 
 @check("state", family="noise", requires={"every-step"})
-def draws_state(case: Case) -> Chance | str:
+def draws_state(case: Case) -> Chance:
     """The draws of a step and their sizes say nothing of the state before: drag, forces, noise are right.
 
     A drag that is not that of the noise, a wrong force, or noise by place leaves a part of it in each draw.
     """
     x, hits = _draws(case), reading(case).hits
-    if case.scene.system.rods:
-        return "a rod turns the draws of its ends"
     scene, unread = case.judged, _unread(case)
     q, p = (y[unread:-1] for y in (case.trajectory.q, case.trajectory.p))
     known = [p / np.sqrt(scene.m * scene.thermal)]
@@ -197,8 +190,8 @@ def draws_state(case: Case) -> Chance | str:
     x = x.reshape(len(q), -1, x.shape[1]).transpose(1, 0, 2)
     if hits is not None:
         x, y = np.where(hits, x, 0), np.where(hits, y, 0)
-    drag = 0.0 if thermostat(case).rescales else thermal.draws.drag_in_draws(thermostat(case), scene)
-    return Chance.of(thermal.chance.foretold(x, y, drag))
+    drag = 0.0 if thermostat(case).rescales else bath.draws.drag_in_draws(thermostat(case), scene)
+    return Chance.of(bath.chance.foretold(x, y, drag))
 
 
 @check("hits", family="noise", requires={"every-step"})
@@ -211,12 +204,12 @@ def collisions(case: Case) -> Chance | str:
         return "the axes of one particle may collide together"
     if limit := small_move(case.trajectory) or case.once(too_strong):
         return limit
-    p = thermal.draws.law_of(THERMOSTATS[case.trajectory.scheme], case.judged).collision
+    p = bath.draws.law_of(THERMOSTATS[case.trajectory.scheme], case.judged).collision
     hits, n = int(np.count_nonzero(found.hits)), found.hits.size
     # a collision that changes less than a rounding is not seen
     if found.missed is None or not p * np.sum(np.minimum(found.missed, 1)) <= 0.05 * np.sqrt(n * p):
         return HIDDEN
-    return Chance.of(thermal.chance.count(hits, n, p))
+    return Chance.of(bath.chance.count(hits, n, p))
 
 
 DRAWN = (

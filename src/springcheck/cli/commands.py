@@ -208,12 +208,13 @@ def _judge(options: Namespace) -> int:
     from springcheck.cli import file
 
     doubts = output.doubts(options.file) if formats.is_hdf5(Path(options.file)) else []
-    names = ("scene", "scheme", "step", "trajectory", "differences", "arithmetic")
+    names = ("scene", "scheme", "step", "trajectory", "differences", "arithmetic", "partial")
     given = {x: getattr(options, x) for x in names}
     found = file.judge(Path(options.file), columns=_columns(options), **given)
     output.warn(options.file, doubts)
     status = found.status or int(bool(doubts))
-    return output.answer(options, lambda: {**found.document(), "not_trusted": doubts}, found.lines, status)
+    lines = partial(found.lines, verdicts=options.verdicts)
+    return output.answer(options, lambda: {**found.document(), "not_trusted": doubts}, lines, status)
 
 
 def _check(options: Namespace) -> int:
@@ -243,7 +244,7 @@ def _list(options: Namespace) -> int:
     from springcheck.cli import listing
 
     found = listing.listing()
-    return output.answer(options, lambda: found, lambda: listing.lines(found))
+    return output.answer(options, lambda: found, lambda: listing.lines(found, options.kind))
 
 
 def _doctor(options: Namespace) -> int:
@@ -261,6 +262,9 @@ FORMATS = (
     "gzipped"
 )
 """Formats that `springcheck.formats` reads, which is not imported for this text."""
+
+KINDS = ("scenes", "methods", "checks", "terms", "schemes")
+"""Pages of `springcheck list`, by the names in `springcheck.cli.listing`."""
 
 _FILE = argument("file", metavar="FILE")
 _GROUP = argument("--trajectory", metavar="LABEL", help="one trajectory or particle group of the file")
@@ -326,13 +330,19 @@ COMMANDS = (
                  help="its velocities are differences of positions, which keep eps q/h of them"),
         argument("--arithmetic", metavar="LABEL",
                  help="it rounds as this method does: openmm:verlet@CUDA-mixed (default: in double)"),
+        argument("--partial", action="store_true", help="let a file pass that covers a part of the scene"),
+        argument("--verdicts", action="store_true", help="print every check with its reason"),
         JSON,
     )),
     Command("check", "is a store whole: digests, completeness, structure", _check, (_FILE,)),
     Command("export", "one trajectory as a file of its own, for other tools", _export, (
         _FILE, argument("label", metavar="LABEL"), argument("output", metavar="OUT.h5md"),
     )),
-    Command("list", "scenes, engines with their versions, checks", _list, (JSON, ENGINE)),
+    Command("list", "scenes, methods, checks, terms and schemes", _list, (
+        argument("kind", nargs="?", choices=KINDS, help="one page of the list (default: an overview)"),
+        JSON,
+        ENGINE,
+    )),
     Command("doctor", "what this installation can do, and what is missing", _doctor, (JSON,)),
 )  # fmt: skip
 """Every command that is no study, in the order of `--help`."""

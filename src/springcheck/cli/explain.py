@@ -1,5 +1,5 @@
 """`springcheck explain`: a check, a scheme, a method, a fault or a finding in words, from the objects
-themselves.  The faults that a check rejects, and its detection limits, are measured on request."""
+themselves."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from springcheck import checks, engines, schemes
+from springcheck.bath import THERMOSTATS, Law
+from springcheck.bath.catalogue import Act
 from springcheck.checks.seeds import SEEDED
 from springcheck.errors import SpringcheckError
 from springcheck.physics import terms
@@ -19,45 +21,51 @@ from springcheck.schemes import Scheme
 from springcheck.studies.faults.seeded import Fault
 from springcheck.studies.faults.table import FAULTS
 from springcheck.text.wording import described
-from springcheck.thermal import THERMOSTATS, Law
-from springcheck.thermal.catalogue import Act
 
 if TYPE_CHECKING:
     from springcheck.identify.meanings import Meaning
 
 WORDS = {
-    "scene": "a system, its start, its time grid, and what is recorded: a TOML file or a `Scene`",
-    "engine, method": "who runs, and what it can run; a label names both: `openmm:verlet`",
+    "scene": "a system, its initial state, its time grid and what is recorded: a TOML file or a `Scene`",
+    "engine, method": "an engine is a program that integrates; a method is one of its integrators. A label "
+    "names both: `openmm:verlet`",
     "scheme": "the mathematics of a method: its one-step map",
-    "one-step map": "what takes the state (q, p) at t to the state at t + h; on a spring a 2 x 2 matrix",
-    "step defect": "distance of a recorded step from the scheme's own step, evaluated in extended precision",
-    "shadow energy": "the quantity near the energy that a symplectic scheme keeps exactly",
-    "closed form": "the scheme's own motion after n steps, by formula",
-    "verdict": "one number against one bound, with the bound's reason",
-    "h omega": "the step in units of the fastest oscillation, the number that stability depends on",
-    "study": "many runs and what they say together: precision, stability, extremes, faults",
-    "rounding": "what a result lacks because numbers have 53 bits: half an ulp for each operation",
-    "ulp": "unit in the last place: the distance of neighbouring numbers, 2**-52 of one between 1 and 2",
-    "energy norm": "the size of a difference of states: the root of its energy, over that of the start or, "
-    "of a start without any, of what it may gain",
-    "SHAKE": "impulses along rods as they lay before a drift bring their lengths back after it",
-    "RATTLE": "SHAKE, and a step ends with momenta without their parts along rods: velocity Verlet with rods",
-    "SETTLE": "the impulses of SHAKE and RATTLE for a rigid triangle, in closed form",
+    "one-step map": "the map from the state (q, p) at t to the state at t + h; on a spring a 2 x 2 matrix",
+    "kick, drift": "a kick changes the momentum by h F(q), a drift the position by h p/m. Schemes named "
+    "kick-drift, drift-kick or kick-drift-kick are made of these, in this order",
+    "symplectic": "a step that preserves areas in phase space (q, p). On a spring its energy error stays "
+    "bounded for all times, as long as h omega is below its stability limit",
+    "energy drift": "the steady growth or loss of the total energy. A symplectic scheme has none beyond "
+    "rounding; explicit Euler gains (h omega)**2 of the energy per step, RK4 loses (h omega)**6/72",
+    "order": "the power of the step h with which the error falls: halving h divides the error of a scheme of "
+    "order 2 by 4",
+    "step defect": "the distance between a recorded step and the scheme's own step from the same state, "
+    "evaluated in extended precision",
+    "shadow energy": "a quantity close to the energy that a symplectic scheme conserves exactly on a spring",
+    "closed form": "the scheme's own motion after n steps, by a formula",
+    "detection limit": "the smallest relative error of a parameter that a check would have reported",
+    "verdict": "one number, its bound, and the reason for the bound",
+    "h omega": "the step times the highest angular frequency: the number on which stability depends",
+    "study": "many runs and a table of what they show: precision, stability, extremes, sampling",
+    "rounding": "the error of one operation in floating point: at most half an ulp of its result",
+    "ulp": "unit in the last place: the distance between neighbouring numbers, 2**-52 of one between 1 and 2",
+    "energy norm": "the size of a difference of two states: the square root of its energy, relative to the "
+    "initial energy",
 }
 """Terms of the field and of springcheck, each with its meaning."""
 
 
 def word(name: str) -> tuple[str, str] | None:
-    """A term and its meaning, by its name or the beginning of it; None for an unknown one."""
+    """A term and its meaning, by its name or its first word; None for an unknown one."""
     asked = _bare(name)
     for known, meaning in WORDS.items():
-        if asked and asked in (*map(_bare, (known, *known.split(", "))), _bare(known).split()[0].rstrip(",")):
+        if asked and asked in (_bare(known), *map(_bare, known.split(", ")), _bare(known).split()[0]):
             return known, meaning
     return None
 
 
 def _bare(name: str) -> str:
-    return name.lower().replace("-", " ").replace("_", " ").strip()
+    return " ".join(name.lower().replace("-", " ").replace("_", " ").replace(",", " ").split())
 
 
 def lines(name: str) -> Iterator[str]:
@@ -76,7 +84,7 @@ def lines(name: str) -> Iterator[str]:
     parts = [_fault(fault) for fault in FAULTS if fault.name == name]
     # tables head their columns by the short names of checks
     asked = [check for check in _CHECKS.values() if name in (check.name, check.short)]
-    parts[:0] = [chain(check_lines(check), _seen(check)) for check in asked]
+    parts[:0] = [check_lines(check) for check in asked]
     parts += [meaning_lines(MEANINGS[name])] if name in MEANINGS else []
     parts += [iter([_line(f"{name}, a term: {described(of_terms[name])}")])] if name in of_terms else []
     if said := word(name):
@@ -89,14 +97,16 @@ def lines(name: str) -> Iterator[str]:
     # engines that are not asked for have schemes of their own
     if name in schemes.known():
         return scheme_lines(schemes.scheme(name))
+    if meant := schemes.textbook(name):
+        return chain(*(chain(scheme_lines(schemes.scheme(one)), [""]) for one in meant))
     others = (*_CHECKS, *methods, *(fault.name for fault in FAULTS), *MEANINGS, *of_terms, *WORDS)
     near = schemes.meant(name, others)
     every = (
-        f"; `springcheck list` names checks and methods, `springcheck faults` faults; terms are "
-        f"{', '.join(of_terms)}; words are {', '.join(WORDS)}"
+        "; `springcheck list` shows the methods, checks, terms and schemes. Words that are explained: "
+        f"{', '.join(WORDS)}"
     )
     raise SpringcheckError(
-        f"{name!r} is no check, scheme, method, fault, finding, term or word{near or every}"
+        f"{name!r} is not the name of a check, scheme, method, fault, finding, term or word{near or every}"
     )
 
 
@@ -119,39 +129,10 @@ def check_lines(check: Any) -> Iterator[str]:
         yield _line(f"Must reject, and is held to it: {', '.join(names)}")
 
 
-def _seen(check: Any) -> Iterator[str]:
-    """The faults that a check of recorded states passes, measured now where it is not held to reject them."""
-    from springcheck.studies.faults import measure
-
-    if check.name not in measure.RECORDED:
-        return
-    rest = [fault for fault in FAULTS if check.name not in fault.caught_by]
-    passed = [fault.name for fault in rest if measure.probe(fault)(check.name, fault.size)]
-    if passed:
-        yield _line(f"Does not see, at the sizes of `springcheck faults`: {', '.join(passed)}")
-
-
 def _fault(fault: Fault) -> Iterator[str]:
-    from springcheck.studies.faults import measure
-
     yield f"{fault.name}: {fault.about}"
-    yield _line(
-        f"A fault: {fault.scheme} on a {fault.scene}, broken on purpose"
-        + ("" if fault.size is None else f"; its size in the table is {fault.size:.0e}")
-    )
-    passed_by = measure.probe(fault)
-    verdicts = {name: passed_by(name, fault.size) for name in measure.RECORDED}
-    yield _line(f"Must be rejected by: {', '.join(fault.caught_by)}")
-    seen = [name for name, passed in verdicts.items() if passed is False]
-    yield _line(f"Recorded states are rejected by: {', '.join(seen) or 'none'}")
-    passing = [name for name, passed in verdicts.items() if passed]
-    yield _line(f"and passed by: {', '.join(passing) or 'none'}")
-    if fault.size is not None and seen:
-        sizes = {name: measure.smallest(passed_by, name, fault.size) for name in seen}
-        limits = {name: size for name, size in sizes.items() if size is not None}
-        if limits:
-            name = min(limits, key=lambda one: limits[one])
-            yield f"Smallest size that is seen on this {fault.scene}: {limits[name]:.1e}, by {name}"
+    size = "" if fault.size is None else f", size {fault.size:.0e}"
+    yield _line(f"A deliberate fault in {fault.scheme}{size}. Rejected by: {', '.join(fault.caught_by)}")
 
 
 def meaning_lines(meaning: Meaning) -> Iterator[str]:
@@ -192,7 +173,7 @@ def scheme_lines(scheme: Scheme) -> Iterator[str]:
             area = "conformally symplectic: a step takes area by exp(-h c/m), without friction it keeps it"
         where = bounded or f"h omega up to {scheme.limit:.6g}"
         braked = scheme.braked_order
-        lower = f" ({braked} with friction or in a magnetic field)" if braked < scheme.order else ""
+        lower = f" ({braked} with friction)" if braked < scheme.order else ""
         yield f"Order {scheme.order}{lower}; {area}; bounded on a spring: {where}"
     if scheme.source:
         yield _line(f"Source: {scheme.source}")
@@ -236,10 +217,6 @@ def _thermostat(name: str) -> Iterator[str]:
         yield f"  {_act(act, scheme.draws)}"
     if any(callable(act.part) for act in scheme.acts):
         yield f"  with the numbers of x = gamma h = {SHOWN[1]}"
-    if scheme.held:
-        letters = {"kick": "B", "drift": "A", "exchange": "O"}
-        held = ", ".join(letters.get(act.kind, act.kind) for act in scheme.held)
-        yield f"  with rods: {held} (shake brings back lengths, project what moves ends apart)"
     if scheme.carried:
         yield "  the first draw xi_1 of a step is the last of the step before"
     if scheme.rescales:

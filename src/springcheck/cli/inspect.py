@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import tomllib
 from argparse import Namespace
 from collections.abc import Iterator
 from typing import Any
 
 from springcheck import engines, schemes, store
+from springcheck.bath import THERMOSTATS
+from springcheck.errors import SpringcheckError
 from springcheck.figures.views import Units, units, with_unit
+from springcheck.physics.scenefile import left
 from springcheck.physics.trajectory import Trajectory
 from springcheck.studies import STUDIES, keeper
 from springcheck.studies.study import Study, StudyResult
 from springcheck.text.lines import Lines, TextTable, plain, table
 from springcheck.text.wording import ordinal
-from springcheck.thermal import THERMOSTATS
 
 
 def held(summary: store.Summary) -> Iterator[tuple[Study, StudyResult]]:
@@ -32,7 +35,7 @@ def lines(summary: store.Summary, options: Namespace) -> Lines:
     out: Lines = [plain(f"{summary.path}: {summary.size / 1e6:.3g} MB", "bold")]
     run, stride = _asked_for(summary, options)
     if run is not None:
-        of = units(keeper.stored_scene(summary.path))
+        of = Units() if _left(summary) else units(keeper.stored_scene(summary.path))
         out += _frames(run, stride, store.end(summary.path, run.label, 1), of)
         if not options.verdicts:
             return out
@@ -42,6 +45,7 @@ def lines(summary: store.Summary, options: Namespace) -> Lines:
         known = summary.runs[0].parameters
         out += [
             plain(f"  scene {known.get('scene_name')}, units {known.get('units')}"),
+            *_left(summary),
             plain(
                 f"  {known.get('finished')} on {known.get('host')}: {known.get('processor')}, "
                 f"{known.get('cores')} cores, {known.get('system')}"
@@ -57,6 +61,15 @@ def lines(summary: store.Summary, options: Namespace) -> Lines:
         said = study.lines(result, options, summary.path)
         out += [*([] if study.trajectories else [plain()]), *said]
     return out
+
+
+def _left(summary: store.Summary) -> Lines:
+    """What the scene of a store has and springcheck no longer has, in a line."""
+    try:
+        reason = left.refusal(tomllib.loads(store.scene_text(summary.path)))
+    except (ValueError, SpringcheckError):
+        return []
+    return [plain(f"  its scene cannot be run or judged here: {reason}", "bold red")] if reason else []
 
 
 def _asked_for(summary: store.Summary, options: Namespace) -> tuple[Trajectory | None, int]:

@@ -1,20 +1,24 @@
-"""Lists of the scenes, engines and checks, as found in their folders."""
+"""`springcheck list`: what there is, in one screen; each kind of thing on a page of its own."""
 
 from __future__ import annotations
 
 import textwrap
 import tomllib
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from springcheck import checks, engines, schemes
 from springcheck.checks.seeds import SEEDED
 from springcheck.physics import scenefile as scenes
+from springcheck.physics import terms
 from springcheck.physics.scene import Scene
 from springcheck.text.lines import Lines, plain
+from springcheck.text.wording import count
 
 
 def listing() -> dict[str, Any]:
-    """Scenes, engines with versions or the reason of their absence, and checks, as plain data."""
+    """Scenes, engines (with version, or why they are absent), checks, terms and schemes, as plain data."""
+    every = dict.fromkeys((*checks.ALL, *checks.RANDOM, *SEEDED))
     return {
         # a shipped scene is valid: its title is read without building the scene
         "scenes": [
@@ -23,8 +27,14 @@ def listing() -> dict[str, Any]:
         "engines": [_engine(name) for name in engines.names()],
         "unusable_engines": engines.unusable(),
         "checks": [
-            {"name": check.name, "sentence": check.sentence, "applies_to": check.needs}
-            for check in dict.fromkeys((*checks.ALL, *checks.RANDOM, *SEEDED))
+            {"name": check.name, "sentence": check.sentence, "applies_to": check.needs} for check in every
+        ],
+        "terms": [
+            {"name": name, "formula": term.formula, "columns": [x.name for x in term.columns]}
+            for name, term in terms.known().items()
+        ],
+        "schemes": [
+            {"name": one.name, "title": one.title, "order": one.order} for one in schemes.known().values()
         ],
     }
 
@@ -62,14 +72,29 @@ def methods(scene: Scene | None) -> list[dict[str, Any]]:
     return rows
 
 
-def lines(found: dict[str, Any]) -> Lines:
-    """The list as text of 80 columns."""
-    out = ["Scenes"]
-    width = max(len(scene["name"]) for scene in found["scenes"])
-    for scene in found["scenes"]:
-        out += _entry(scene["name"], width, scene["title"])
-    out.append("Engines and methods")
-    for engine in found["engines"]:
+def _overview(found: dict[str, Any]) -> list[str]:
+    here = [one for one in found["engines"] if not one["absence"]]
+    installed = ", ".join(f"{one['title']} {one['version']}".strip() for one in here)
+    sizes = {
+        "scenes": count(len(found["scenes"]), "scene"),
+        "methods": f"{sum(len(one['methods']) for one in here)} methods of {count(len(here), 'engine')}",
+        "checks": count(len(found["checks"]), "check"),
+        "terms": f"{count(len(found['terms']), 'term')} of scene files",
+        "schemes": count(len(found["schemes"]), "scheme"),
+    }
+    out = [f"  springcheck list {kind:9}{words}" for kind, words in sizes.items()]
+    out += ["", *_entry("Installed:", 10, installed)]
+    absent = [one["name"] for one in found["engines"] if one["absence"]]
+    if absent:
+        out += _entry("Missing:", 10, f"{', '.join(absent)} (springcheck doctor says how to install them)")
+    for reason in found["unusable_engines"].values():
+        out += _entry("Unusable:", 10, reason)
+    return [*out, "", "  springcheck explain NAME tells what any of these is."]
+
+
+def _methods(found: dict[str, Any]) -> list[str]:
+    out = []
+    for engine in sorted(found["engines"], key=lambda one: one["absence"] is not None):
         here = f"{engine['title']} {engine['version']}".strip()
         out += _entry(f"{engine['absence'] or here}, from {engine['origin']}", 0, "")
         for method in engine["methods"]:
@@ -78,10 +103,33 @@ def lines(found: dict[str, Any]) -> Lines:
             out += _entry("  platforms", 28, "as METHOD@PLATFORM: " + ", ".join(engine["platforms"]))
     for reason in found["unusable_engines"].values():
         out += _entry(reason, 0, "")
-    out.append("Checks")
-    for check in found["checks"]:
-        out += _entry(check["name"], 16, f"{check['sentence']} Applies to: {check['applies_to']}.")
-    return list(map(plain, out))
+    return out
+
+
+def _table(kind: str, words: Callable[[Mapping[str, Any]], str]) -> Callable[[dict[str, Any]], list[str]]:
+    def page(found: dict[str, Any]) -> list[str]:
+        rows = found[kind]
+        width = max(len(row["name"]) for row in rows)
+        return [line for row in rows for line in _entry(row["name"], width, words(row))]
+
+    return page
+
+
+PAGES: Mapping[str, Callable[[dict[str, Any]], list[str]]] = {
+    "scenes": _table("scenes", lambda row: str(row["title"])),
+    "methods": _methods,
+    "checks": _table("checks", lambda row: f"{row['sentence']} Applies to: {row['applies_to']}."),
+    "terms": _table("terms", lambda row: f"V = {row['formula']}"),
+    "schemes": _table(
+        "schemes", lambda row: row["title"] + (f", order {row['order']}" if row["order"] else "")
+    ),
+}
+"""Pages of the list, in the order of the overview."""
+
+
+def lines(found: dict[str, Any], kind: str | None = None) -> Lines:
+    """One page of the list, or the overview, as text of 80 columns."""
+    return list(map(plain, (PAGES[kind] if kind else _overview)(found)))
 
 
 def _entry(name: str, width: int, words: str) -> list[str]:

@@ -11,12 +11,12 @@ import importlib.util
 import os
 from collections.abc import Callable, Iterable
 from contextlib import suppress
-from dataclasses import replace
 from fnmatch import fnmatchcase
 from functools import cache, partial
 from typing import Any, TypeVar
 
 from springcheck import schemes
+from springcheck.bath import THERMOSTATS
 from springcheck.engines.contract import (
     ANY_POTENTIAL,
     BRAKES,
@@ -48,7 +48,6 @@ from springcheck.engines.registry import (
 from springcheck.errors import MOST_LIKELY, MethodError, nearest, told
 from springcheck.physics.arrays import Arithmetic, Floats
 from springcheck.physics.scene import Scene
-from springcheck.thermal import THERMOSTATS
 
 __all__ = [
     "ANY_POTENTIAL", "BRAKES", "UNNAMED", "DRIVEN", "EVERY_FORCE", "EVERY_POTENTIAL", "OURS", "Arithmetic",
@@ -146,14 +145,13 @@ def start(scene: Scene, label: Label, seed: Any = None) -> Simulation:
     return found
 
 
-def arithmetic(label: Label, units: str = "") -> Arithmetic:
-    """The rounding that the engine of a label declares, in units of a scene.  MethodError where its own code
-    fails."""
+def arithmetic(label: Label) -> Arithmetic:
+    """The rounding that the engine of a label declares.  MethodError where its own code fails."""
     driver = load(label.engine)
     found: object = guarded(label, driver.arithmetic, label, form="arithmetic(label)")
     if not isinstance(found, Arithmetic):
         raise MethodError(f"{label} failed: its arithmetic is of type {type(found).__name__}")
-    return replace(found, rates=found.rates * driver.picosecond) if units == "md" else found
+    return found
 
 
 def origin_of(label: Label) -> dict[str, str]:
@@ -289,7 +287,7 @@ def match(patterns: Iterable[str], *, bath: bool | None = False, every: bool = F
     return tuple(chosen.values())
 
 
-PLURAL = {"particles": "particles", "circuit": "circuits", "rotor": "rotors"}
+PLURAL = {"particles": "particles", "circuit": "circuits"}
 
 
 def obstacle(scene: Scene, label: Label) -> str | None:
@@ -328,12 +326,6 @@ def refusal(scene: Scene, label: Label) -> str | None:
         return f"{who} moves {moved}, not {PLURAL[scene.kind]}"
     if scene.places is not None and not engine(label.engine).any_axis:
         return f"{engine(label.engine).title} is given particles along x here, and the scene has other axes"
-    if scene.system.rods:
-        longest = schemes.scheme(what.scheme).longest_drift
-        if held := scene.system.rods.too_fast(scene.q, scene.p, scene.step * longest):
-            return held
-    if scene.box is not None and not engine(label.engine).periodic:
-        return f"{engine(label.engine).title} is given no periodic box here"
     unknown = (term for term in scene.terms if not (term.kind == "potential" and ANY_POTENTIAL in what.terms))
     missing = sorted({term.key for term in unknown} - what.terms)
     if missing:

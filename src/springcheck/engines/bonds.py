@@ -2,28 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from springcheck.engines.contract import Label, Stopped
+from springcheck.engines.contract import Label
 from springcheck.errors import MethodError
 from springcheck.physics import graph
 from springcheck.physics.arrays import Floats, Integers
-from springcheck.physics.rods import Rods
 from springcheck.physics.scene import Scene
 from springcheck.physics.term import Term
-from springcheck.physics.terms import Cosine, Morse, RadialSpring, Spring, WallSpring
+from springcheck.physics.terms import Morse, RadialSpring, Spring, WallSpring
 from springcheck.schemes import scheme
-
-ANCHOR_MASS = 2.0**100
-"""Mass of a particle that stands for the fixed end of a rod, since no massless particle can have one [u]."""
-
-
-Joint: TypeAlias = tuple[tuple[int, ...], float, Floats | None]
-"""A rod: its particles, its length, and where a fixed end stands."""
 
 Tie: TypeAlias = tuple[tuple[int, ...], float, float, tuple[float, ...] | None]
 """A spring: its particle or both, k [M/T2], rest length [L], and where the wall of one stands [L]."""
@@ -55,13 +47,6 @@ def origins(scene: Scene, scheme_name: str) -> Floats:
         u = (scene.q[term.b] - scene.q[term.a]) * np.sign(term.rest)
         safe = (term.rest == 0) | ((u > 0) & (0.5 * term.k * term.rest**2 > 1.01 * energy[group[term.a]]))
         turning[group[term.a[~safe]]] = True
-    if scene.box is not None:
-        _within_half(scene, [t for t in of_length if isinstance(t, WallSpring | Spring)], energy[group])
-        reach = float(scene.system.energy(scene.q, scene.p)) * (2 + hw) / (2 - hw) if bounded else np.inf
-        # a single bond may have all of the energy
-        for one in (x for x in scene.terms if isinstance(x, RadialSpring)):
-            longest = one.rest + np.sqrt(2 * reach / np.abs(one.k))
-            _shorter(scene, one, longest, np.full(len(one), min(scene.box)))
     rest = scene.system.rest_positions if np.any(turning) else np.zeros(scene.n)
     others = (t for t in scene.terms if t.bodies == 2 and not isinstance(t, Spring))
     if rest is None or any(np.any(turning[group[t.particles[0]]]) for t in others):
@@ -78,56 +63,6 @@ def gains_nothing(scene: Scene, *others: str) -> bool:
     return all(t.key in known and np.all(getattr(t, t.columns[0].field) >= 0) for t in scene.terms)
 
 
-def _within_half(scene: Scene, springs: list[WallSpring | Spring], energy: Floats) -> None:
-    """MethodError where a spring may reach half of the box, by the energy at each particle (n,)."""
-    for term in springs:
-        first = term.particles[0]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            most = np.sqrt(2.02 * energy[first] / term.k)
-        most = most + (np.abs(term.rest) if isinstance(term, Spring) else 0.0)
-        _shorter(scene, term, most, scene.periods[first])
-
-
-def _shorter(scene: Scene, term: Term, most: Floats, box: Floats) -> None:
-    """MethodError where a row of a term, of length up to `most` (s,), reaches half of the box (s,)."""
-    short = most < box / 2
-    if np.all(short):
-        return
-    worst = int(np.argmax(np.where(short, 0.0, most / box)))
-    ends = [divmod(int(scene.all_places[of[worst]]), 3) for of in term.particles]
-    a, b = ends[0][0], ends[-1][0]
-    who = (
-        f"{term.key} of particles {a} and {b}" if len(ends) == 2 else f"spring from the wall to particle {a}"
-    )
-    axis = "every axis" if term.key == "bond" else "xyz"[ends[0][1]]
-    enough = f"a box of {2.02 * most[worst]:.3g} along {axis} is enough for it"
-    raise MethodError(
-        f"{scene.name}: the {who} may become as long as half of the box, {box[worst] / 2:.3g} "
-        f"along {axis}, and turn over; "
-        + (enough if np.isfinite(most[worst]) else "nothing bounds it with this method and step")
-        + "; own:velocity-verlet takes any length"
-    )
-
-
-LOST = 16.0
-"""Lengths of a rod by which a push moves its ends where no step exists: one that restores its length moves
-them by h w of it, below 1, and what 16 leaves has lost 4 bits more."""
-
-
-def without_push(rods: Rods, q: Floats, p: Floats, reach: Floats, row: int) -> Floats:
-    """Momenta p (n,) without the half of the next step's push along rods that SHAKE leaves in them.
-
-    `reach` is 2h/m, by which that half moves the ends in the next step.  Raises Stopped where no
-    such step exists: the search for the push has then cancelled the digits of the momenta.
-    """
-    projected = rods.projected(q, p)
-    if np.all(np.isfinite(p)) and np.any(rods.strain(q + reach * (p - projected)) > LOST):
-        raise Stopped(
-            row, "no push along its rods leads to the next step, and momenta have lost their digits"
-        )
-    return np.asarray(projected, np.float64)
-
-
 @np.errstate(over="ignore")
 def within(label: Label, sizes: Iterable[tuple[float, str, float, float]]) -> None:
     """MethodError where a number (least, its name, number, most) is none that an engine computes with."""
@@ -139,20 +74,17 @@ def within(label: Label, sizes: Iterable[tuple[float, str, float, float]]) -> No
             )
 
 
-def cells(scene: Scene, origins: Floats) -> Floats:
-    """Periods of the box by which each position, counted from its origin, lies outside the box (n,)."""
-    if scene.box is None:
-        return np.zeros(scene.n)
-    return np.asarray(np.floor((scene.q - origins) / scene.periods))
-
-
 def rests(scene: Scene, label: Label) -> Floats:
     """Origin of each particle for which every bond has rest length 0, (n,) [L].
 
     Such a bond pulls along each axis by itself, independent of noise across the line.  MethodError where
-    springs have no common rest, or that noise turns a rod or bond.
+    springs have no common rest, or that noise turns a bond.
     """
-    in_all_of_space(scene, label, scene.system.rods or any(isinstance(t, RadialSpring) for t in scene.terms))
+    if scene.n < 3 * scene.particles and any(isinstance(term, RadialSpring) for term in scene.terms):
+        raise MethodError(
+            f"{label}: its noise acts along x, y and z, and turns a bond; the scene's particles move "
+            f"along {' and '.join(scene.axes)}"
+        )
     pairs = [term for term in scene.terms if isinstance(term, Spring)]
     found = scene.system.rest_positions
     if found is None or any(np.any(lengths(term, found)) for term in pairs):
@@ -210,42 +142,6 @@ def joints(scene: Scene, term: Term, origins: Floats) -> list[Tie]:
     return found
 
 
-def in_all_of_space(scene: Scene, label: Label, turned: object) -> None:
-    """MethodError where noise along an axis that the scene leaves out would rotate a rod or bond that way."""
-    if turned and scene.n < 3 * scene.particles:
-        raise MethodError(
-            f"{label}: its noise acts along x, y and z, and turns a rod or bond; the scene's particles move "
-            f"along {' and '.join(scene.axes)}"
-        )
-
-
-def rods(joined: list[Joint], anchors: int) -> Iterator[Bond]:
-    """Rods as bonds without a force, except the third of a triangle; anchors are numbered from here on."""
-    closing = {tuple(sorted(ends)) for ends, *_ in triangles(joined)}
-    for ends, length, point in joined:
-        if point is not None:
-            yield anchors, ends[0], 0.0, length, tuple(point.tolist())
-            anchors += 1
-        elif tuple(sorted(ends)) not in closing:
-            yield ends[0], ends[1], 0.0, length, None
-
-
-def triangles(joined: list[Joint]) -> Iterator[tuple[tuple[int, ...], int, float]]:
-    """The third rod of each triangle as its ends, the particle across it, and the angle there [rad]."""
-    length = {frozenset(ends): x for ends, x, _ in joined}
-    for ends, x, _ in joined:
-        for top in range(min(ends)) if len(ends) == 2 else ():
-            one, other = (length.get(frozenset((top, end))) for end in ends)
-            if one and other:
-                yield ends, top, float(np.arccos((one * one + other * other - x * x) / (2 * one * other)))
-
-
-def beside_triangle(joined: list[Joint]) -> bool:
-    """Whether a particle of a triangle has another rod."""
-    met = [i for ends, *_ in joined for i in ends]
-    return any(met.count(i) > 2 for ends, top, _ in triangles(joined) for i in (*ends, top))
-
-
 def lengths(term: Spring, origins: Floats) -> Floats:
     """Rest lengths of bonds between coordinates that are counted from these origins [L]."""
     return np.asarray(np.abs(term.rest - (origins[term.b] - origins[term.a])))
@@ -255,42 +151,3 @@ def off_axis(positions: Floats, elsewhere: NDArray[np.bool_]) -> float:
     """Largest |position| along axes that are no coordinates of the scene, of positions (particles or more,
     3)."""
     return float(np.max(np.abs(positions.reshape(-1)[: len(elsewhere)][elsewhere]), initial=0.0))
-
-
-def hinges(scene: Scene, label: Label) -> Iterator[tuple[int, float, tuple[float, float, float], float]]:
-    """Rotors as bodies on hinges along z, in a gravity of 1 along x: number, mass, centre of mass, and moment
-    of inertia about that.  Half of the rotor's inertia is that of the mass in its centre.
-
-    Raises MethodError where a potential is no pendulum's, or a rotor has two.
-    """
-    depth, at = np.zeros((2, scene.n))
-    for term in scene.terms:
-        if isinstance(term, Cosine):
-            twice = np.any(depth[term.i]) or len(set(term.i.tolist())) < len(term)
-            if twice or np.any((term.wave != 1) | (term.depth < 0)):
-                raise MethodError(f"{label}: gravity makes one pendulum of a rotor, of wave 1")
-            depth[term.i], at[term.i] = term.depth, term.at
-    rotors = zip(scene.m.tolist(), depth.tolist(), at.tolist(), strict=True)
-    for i, (inertia, pull, angle) in enumerate(rotors):
-        away = inertia / (2 * pull) if pull else 0.0
-        mass = pull / away if pull else 1.0
-        yield i, mass, (away * np.cos(angle), -away * np.sin(angle), 0.0), inertia / 2 if pull else inertia
-
-
-def walls(scene: Scene, label: Label) -> Iterator[tuple[int, float, float]]:
-    """Particle, stiffness [M/T2] and rest position [L] of each wall spring, for joints that have one spring.
-
-    Springs of stiffness 0 are left out: their joints would be rigid.  Raises MethodError where a particle has
-    two, or a stiffness is negative.
-    """
-    taken: set[int] = set()
-    for term in scene.terms:
-        if isinstance(term, WallSpring):
-            for i, k, at in term.rows():
-                if i in taken or k < 0:
-                    raise MethodError(
-                        f"{label}: a joint has one spring, of stiffness 0 or more; particle {i}"
-                    )
-                taken.add(i)
-                if k:
-                    yield i, k, at

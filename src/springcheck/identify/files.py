@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from springcheck import formats, schemes, store
+from springcheck.bath import THERMOSTATS
 from springcheck.errors import IdentificationError, MethodError, SpringcheckError, StoreError
 from springcheck.formats import columns as columns_of
 from springcheck.identify.laws import COUPLED
@@ -23,7 +24,6 @@ from springcheck.physics import scenefile as scenes
 from springcheck.physics.arrays import Floats, Integers
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory
-from springcheck.thermal import THERMOSTATS
 
 MOST_FRAMES = 20_000
 """Most frames that are identified, from the first on: every step shows the scheme."""
@@ -118,8 +118,6 @@ def of_arrays(name: str, found: formats.States) -> FileStates:
 
 def _ours(path: Path, runs: Sequence[store.Run], wanted: str | None) -> Iterator[FileStates]:
     scene = scenes.parse(store.scene_text(path), name=path.stem, where=f"{path} (scene)")
-    if scene.system.rods:
-        raise StoreError(f"{path}: its scene has rods, and schemes are told by springs; judge it instead")
     for run in runs:
         if wanted in (None, run.label):
             piece = next(store.windows(path, run.label, MOST_FRAMES))

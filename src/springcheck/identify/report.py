@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from springcheck.bath import THERMOSTATS
 from springcheck.errors import IdentificationError
 from springcheck.identify.candidates import either_way
 from springcheck.identify.compare import nearest
@@ -25,7 +26,6 @@ from springcheck.identify.result import Identification, nothing
 from springcheck.identify.search import accounted
 from springcheck.identify.thermal import explained, of_bath
 from springcheck.identify.together import at_rest, distance, of_a_pair, of_rotation
-from springcheck.thermal import THERMOSTATS
 
 
 def identify_arrays(

@@ -1,4 +1,4 @@
-"""Identification of thermostats: `springcheck.thermal` finds random ones, a factor of all momenta the others.
+"""Identification of thermostats: `springcheck.bath` finds random ones, a factor of all momenta the others.
 
 A Nose-Hoover chain, or a thermostat that rescales, multiplies all momenta by one factor in each step.  Of one
 particle any factor may be.  Of several, b + F c is what the factor acts on, or has made, of each, with
@@ -15,6 +15,10 @@ from typing import Any
 
 import numpy as np
 
+from springcheck.bath.catalogue import THERMOSTATS
+from springcheck.bath.modes import FREE_OF_NOISE, modes
+from springcheck.bath.residuals import FEWEST, is_of_digits
+from springcheck.bath.states import Thermal, identify_thermal
 from springcheck.errors import IdentificationError
 from springcheck.identify.clock import clock_of
 from springcheck.identify.evidence import AGREES
@@ -22,10 +26,6 @@ from springcheck.identify.hypothesis import ERRORS, SURE
 from springcheck.identify.result import Candidate, Explanation, Identification
 from springcheck.physics.arrays import Floats
 from springcheck.text.wording import either
-from springcheck.thermal.catalogue import THERMOSTATS
-from springcheck.thermal.modes import FREE_OF_NOISE, modes
-from springcheck.thermal.residuals import FEWEST, is_of_digits
-from springcheck.thermal.states import Thermal, identify_thermal
 
 MOST = 8
 """Most oscillators in a bath that are identified."""

@@ -92,10 +92,6 @@ class Arithmetic:
     """Relative excess of every force."""
     stale: float = told("forces kept within {:.2g}", 0.0)
     """Largest displacement since a force was computed for which the engine reuses it [L]."""
-    lengths: float = told("lengths of rods kept to {:.2g}", 0.0)
-    """Relative tolerance of the lengths of rods, where that is coarser than rounding."""
-    rates: float = told("rates of these lengths kept to {:.2g} per unit of time", 0.0)
-    """The same of their relative rates of change, at which momenta are projected [1/T]."""
     cancels: int = told("coefficients of the bath from 1 - exp(-friction h) as a difference", 0)
     """Power of 1/x, x = gamma h, or of x above 1, in the relative rounding of a thermostat's coefficients,
     from 1 - c with a rounded c."""

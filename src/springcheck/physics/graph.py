@@ -41,8 +41,8 @@ def free_groups(system: Any) -> tuple[Integers, ...]:
 
 
 def _holds(term: Term) -> Any:
-    """Which rows of a term constrain their ends: by a stiffness, or as a rod."""
-    return (term.rigidity > 0) | (term.kind == "constraint")
+    """Which rows of a term have a stiffness."""
+    return term.rigidity > 0
 
 
 def lowest_joined(n: int, terms: Sequence[Term]) -> Integers:
@@ -96,14 +96,11 @@ def rest_positions(system: Any) -> Floats | None:
 def alike(system: Any) -> tuple[tuple[Integers, Integers], ...]:
     """Coordinates, by particle, along each pair of axes on which all terms act alike.
 
-    Linear terms, rods and bonds that act on both alike and rest in 0 conserve the angular momentum about 0 in
+    Linear terms and bonds that act on both alike and rest in 0 conserve the angular momentum about 0 in
     their plane.
     """
     places, parts = system.scene.places, system.terms
-    kept = (
-        (x.is_linear and not isinstance(x, Weight)) or x.kind == "constraint" or isinstance(x, RadialSpring)
-        for x in parts
-    )
+    kept = ((x.is_linear and not isinstance(x, Weight)) or isinstance(x, RadialSpring) for x in parts)
     if places is None or not all(kept) or any(x.origin and np.any(getattr(x, x.origin)) for x in parts):
         return ()
     found = []

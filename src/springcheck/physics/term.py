@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 
 from springcheck.errors import SceneError
 from springcheck.physics.arguments import of_kind
-from springcheck.physics.arrays import Floats, Integers, Reals, is_masked
+from springcheck.physics.arrays import Extended, Floats, Integers, Reals, is_masked
 
 Where: TypeAlias = "slice | Integers"
-Origin: TypeAlias = Literal["potential", "friction", "magnetic", "drive", "constraint"]
+Origin: TypeAlias = Literal["potential", "friction", "drive"]
 
 
 class Column(NamedTuple):
@@ -70,7 +70,7 @@ class Term(FrozenArrays):
     is_by_axes: ClassVar[bool] = True
     """Whether the rows of an object along several axes may have each its own parameters."""
     kind: ClassVar[Origin] = "potential"
-    """Origin of its force: a potential energy, the velocities, the time, or a constrained length."""
+    """Origin of its force: a potential energy, the velocities, or the time."""
     fast: bool = False
     """Whether a method of multiple time steps takes these rows in its short step."""
 
@@ -135,7 +135,7 @@ class Term(FrozenArrays):
 
     def objects(self, places: Integers) -> list[tuple[tuple[int, ...], int]]:
         """The particles of each row, and which of several objects between them it belongs to: in space a
-        spring, bond or rod has a row for each axis; `places` as in `Scene`."""
+        spring or bond has a row for each axis; `places` as in `Scene`."""
         met: Counter[tuple[int, ...]] = Counter()
         found = []
         for row in zip(*(places[index].tolist() for index in self.particles), strict=True):
@@ -151,6 +151,16 @@ class Term(FrozenArrays):
     def parameters(self) -> tuple[Floats, ...]:
         """Arguments of the law's functions after u, each (s,)."""
         return tuple(getattr(self, c.field) for c in self.columns if c.field != self.origin)
+
+    @cached_property
+    def _wide(self) -> tuple[Extended, ...]:
+        return tuple(x.astype(np.longdouble) for x in self.parameters)
+
+    def law(self, name: str, u: Reals) -> Reals:
+        """The function of this name at elongations u (..., s), in extended precision where u is: a product of
+        two parameters would round to a double."""
+        parameters = self._wide if np.asarray(u).dtype == np.longdouble else self.parameters
+        return np.asarray(getattr(self, name)(u, *parameters))
 
     @cached_property
     def _places(self) -> tuple[tuple[Where, bool], ...]:
@@ -179,7 +189,7 @@ class Term(FrozenArrays):
 
     def energies(self, q: Reals) -> Reals:
         """Potential energy of each row at positions q (..., n) -> (..., s) [M L2/T2], 0 at its own rest."""
-        return np.asarray(self.potential(self.elongation(q), *self.parameters))
+        return self.law("potential", self.elongation(q))
 
     def energy(self, q: Reals) -> Reals:
         """Potential energy of states q (..., n) -> (...) [M L2/T2], 0 at the term's own rest."""
@@ -187,7 +197,7 @@ class Term(FrozenArrays):
 
     def pull(self, q: Reals) -> Reals:
         """Restoring force of each row at positions q (..., n) -> (..., s) [M L/T2]."""
-        return np.asarray(self.slope(self.elongation(q), *self.parameters))
+        return self.law("slope", self.elongation(q))
 
     def add_force(self, q: Reals, v: Reals, out: Reals) -> None:
         """Add the force at positions q and velocities v, each (..., n), to out (..., n) [M L/T2]."""
@@ -222,7 +232,7 @@ class Term(FrozenArrays):
 
     def curvature(self, q: Reals) -> Reals:
         """Second derivative of each row's energy by u, at q (..., n) -> (..., s) or (s,) [M/T2]."""
-        return np.asarray(self.second(self.elongation(q), *self.parameters))
+        return self.law("second", self.elongation(q))
 
     def elements(self, q: Reals) -> Iterator[tuple[Integers, Integers, Reals]]:
         """Rows, columns and values (..., s) that each pair of ends adds to the Hessian at q (..., n)."""
@@ -289,7 +299,7 @@ class LinearLaw:
 
 
 class WithoutPotential(Term):
-    """A term without potential energy: friction, a magnetic field, a driving force, a rod."""
+    """A term without potential energy: friction, a driving force."""
 
     potential: ClassVar[Any] = staticmethod(lambda u, *_: np.zeros_like(u))
     slope: ClassVar[Any] = potential

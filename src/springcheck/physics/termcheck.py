@@ -20,7 +20,7 @@ FORMULA_ROUNDINGS = 32
 
 
 RESERVED_WORDS = (
-    "particle", "rotor", "inductor", "capacitor", "resistor", "chain", "ends", "fast", "title", "source",
+    "particle", "inductor", "capacitor", "resistor", "chain", "ends", "fast", "title", "source",
     "units", "kind", "time", "methods", "record",
 )  # fmt: skip
 """Words of a scene file that no term may take."""

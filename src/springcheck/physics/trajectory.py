@@ -150,11 +150,12 @@ class Trajectory:
     def error(self) -> Floats:
         """Distance from the exact solution at each frame (f,), relative to the initial energy norm.
 
-        SpringcheckError where no closed form of the exact solution is known.
+        SpringcheckError where there is no reference solution.
         """
         scene = self._known
         if scene.system.solution is None:
-            raise SpringcheckError(f"scene {scene.name}: no closed form of its exact solution is known")
+            reason = scene.system.unsolved
+            raise SpringcheckError(f"scene {scene.name}: no reference solution, because {reason}")
         q, p = self._exact(scene)
         return scene.system.norm(self.q - q, self.p - p)
 
@@ -175,8 +176,8 @@ class Trajectory:
 
     def at(self, rows: slice) -> Trajectory:
         """These frames alone."""
-        more = {} if self.energy is None else {"energy": self.energy[rows]}
-        return replace(self, t=self.t[rows], q=self.q[rows], p=self.p[rows], **more)
+        energy = None if self.energy is None else self.energy[rows]
+        return replace(self, t=self.t[rows], q=self.q[rows], p=self.p[rows], energy=energy)
 
     @typed
     def save(self, path: str | Path) -> Path:
@@ -327,7 +328,7 @@ class Limits:
     order: float | None = told("an order or exponent off by {:.1e}")
     """Absolute change of an order or an exponent."""
     amplitude: float | None = told("a drive's amplitude off by {:.1e}")
-    """Relative change of a drive's amplitude, or of the depth of a modulation: the largest such limit."""
+    """Relative change of a drive's amplitude: the largest such limit."""
     frequency: float | None = told("its frequency off by {:.1e}")
     """Relative change of the frequency of a drive."""
     phase: float | None = told("its phase off by {:.1e} rad")
@@ -370,7 +371,7 @@ class Verdict:
     sees: Limits = NOT_KNOWN
     """Smallest fault that the check would have detected in this run."""
     statistic: Any = field(default=None, compare=False, repr=False)
-    """Of a random verdict the statistic (`thermal.chance`) where it adds up over pieces of a run; it is in no
+    """Of a random verdict the statistic (`bath.evidence`) where it adds up over pieces of a run; it is in no
     document and no pickle."""
 
     @property

@@ -59,7 +59,7 @@ class Scheme:
     convergence: Fraction | None = None
     """Power of the tolerance with which an adaptive solver's error falls, on a smooth motion."""
     thermostat: ClassVar[bool] = False
-    """Whether it has noise, and a step that `springcheck.thermal` carries out."""
+    """Whether it has noise, and a step that `springcheck.bath` carries out."""
     source: str = ""
     unnamed: bool = False
     """It stands for a step, fixed or not, whose scheme nobody has named."""
@@ -111,12 +111,6 @@ class Scheme:
             return False
         full = [row + (row[0] * 0,) * (s - len(row)) for row in self.a]
         return all(full[s - 1 - i][s - 1 - j] + full[i][j] == self.b[j] for i in range(s) for j in range(s))
-
-    @property
-    def longest_drift(self) -> float:
-        """The longest of its drifts, in steps; 1 where it has none."""
-        drifts = [c for kind, (_, c) in zip(self.kinds, self.stages, strict=True) if kind.drifts]
-        return max((abs(float(number(c, np.float64))) for c in drifts), default=1.0)
 
     @property
     def reach(self) -> int:
@@ -277,12 +271,6 @@ _ATTACHED = (
         "MuJoCo documentation, Computation, Numerical integration: (M + h D) v' = M v + h F",
         symplectic=False,
     ),
-    splitting(
-        "boris", "Boris: half drift, half kick, turn, half kick, half drift", 2, 2.0,
-        (("drift", HALF), ("pull", HALF), ("gyrate", ONE), ("pull", HALF), ("drift", HALF)),
-        "Boris, Proc. Fourth Conf. Numerical Simulation of Plasmas (1970) 3; Qin et al., Phys. Plasmas 20 "
-        "(2013) 084503: it keeps volume and is not symplectic", symplectic=False,
-    ),
     Scheme(
         name="implicit-euler-4", title="implicit Euler, four substeps", order=1, limit=float("inf"),
         symplectic=False, b=(Fraction(1, 4),) * 4,
@@ -293,8 +281,8 @@ _ATTACHED = (
 
 ATTACHED: dict[str, Scheme] = {scheme.name: scheme for scheme in _ATTACHED}
 """Schemes that follow from how a spring is attached to an engine, beside those that people choose: a force
-that is set once and held over substeps, friction that is taken implicitly where the force is not, a spring
-that is solved for in every substep; and Boris' rotation, which is position Verlet without a field."""
+that is set once and held over substeps, friction that is taken implicitly where the force is not, or a spring
+that is solved for in every substep."""
 
 UNKNOWN = Scheme(
     name="unknown",

@@ -14,7 +14,6 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 
 from springcheck.physics.arrays import Extended, Force, Reals
-from springcheck.physics.rods import Rods
 from springcheck.physics.scene import Scene
 from springcheck.physics.term import Term
 from springcheck.schemes.catalogue import Scheme
@@ -55,7 +54,7 @@ class Law:
     @property
     def roundings(self) -> int:
         """Roundings along one step."""
-        return roundings(self.scheme, rigid=bool(self.scene.system.rods))
+        return roundings(self.scheme)
 
     @cached_property
     def rate(self) -> Extended | None:
@@ -80,19 +79,6 @@ class Law:
             return rate, bent, lost
 
         return at
-
-    @cached_property
-    def fields(self) -> tuple[tuple[Term, ...], ...]:
-        """The magnetic fields in a row of their own, none where there is none."""
-        found = tuple(term for term in self.scene.terms if term.kind == "magnetic")
-        return (found,) if found else ()
-
-    @cached_property
-    def turns(self) -> Reals | None:
-        """The rates at which magnetic fields turn velocities [1/T], as `Magnetic.turns`; None where there is
-        none."""
-        found: list[Any] = [term for row in self.fields for term in row]
-        return found[0].turns(self.scene.m, self.scene.all_places) if found else None
 
     @cached_property
     def stiffness(self) -> Any:
@@ -126,13 +112,11 @@ class Law:
             h=self.h,
             m=self.scene.m,
             force=forces(self.scene.terms),
-            parts=tuple(forces(part) for part in (system.slow, system.fast, *self.fields)),
-            turns=self.turns,
+            parts=(forces(system.slow), forces(system.fast)),
             stiffness=slope if slope and callable(self.stiffness) else self.stiffness,
             rate=self.rates(varied=varied),
             met=met,
             near=near,
-            hold=Variation(system.rods) if system.rods and varied else system.rods,
         )
 
     @cached_property
@@ -140,31 +124,3 @@ class Law:
         """One-step matrices A (n, 2, 2) of the modes, on (y, v).  For scenes that have the trait "modes"."""
         one, modes = np.ones(1, dtype=np.longdouble), self.scene.system.modes
         return matrix(self.scheme, h=self.h, m=one, k=modes.w2, c=modes.rate)
-
-
-class Variation(Rods):
-    """The rods on states (1 + d, ..., n): the first is a motion, the others are changes of it.
-
-    The change of a multiplier follows from the length that stays (implicit differentiation).
-    """
-
-    def __init__(self, rods: Rods) -> None:
-        self.__dict__.update(rods.__dict__)
-
-    def drifted(self, before: Reals, q: Reals, p: Reals, x: Any) -> tuple[Reals, Reals]:
-        """As of `Rods`."""
-        m, r, dr = self.m.astype(q.dtype), self.ways(before[0]), self.apart(before[1:])
-        k = self.multiplier(r, self.ways(q[0]))
-        push, turned = self._push(k, r), self._push(k, dr)
-        s = self.ways(q[0] + push / m)
-        lacks = self.dot(s, self.apart(q[1:] + turned / m))
-        whole = np.concatenate([push[None], turned - self._push(self.solve(s, r, lacks), r)])
-        return q + whole / m, p + whole / x
-
-    def projected(self, q: Reals, p: Reals) -> Reals:
-        """As of `Rods`."""
-        m, r, dr = self.m.astype(q.dtype), self.ways(q[0]), self.apart(q[1:])
-        k = self._along(r, p[0])
-        first, change = p[0] - self._push(k, r), p[1:] - self._push(k, dr)
-        lacks = self.dot(r, self.apart(change / m)) + self.dot(dr, self.apart(first / m))
-        return np.concatenate([first[None], change - self._push(self.solve(r, r, lacks), r)])

@@ -10,7 +10,6 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from springcheck.physics.arrays import Force, Reals
-from springcheck.physics.rods import Rods
 from springcheck.schemes.catalogue import Scheme, number
 from springcheck.schemes.kinds import Setting
 from springcheck.schemes.stepping import sparse_solver, weighted_sum
@@ -55,40 +54,24 @@ def magnitude_step(
     m: Reals,
     met: Iterable[Met],
     rate: Reals | None = None,
-    turns: Reals | None = None,
-    hold: Rods | None = None,
-    loose: tuple[float, float] = (0.0, 0.0),
 ) -> tuple[Reals, Reals]:
     """Running error bound of `step` from (q, p): the same step with every difference taken as a sum.
 
-    `met` has one entry for each evaluation of the force, in their order.  Rods `hold` after every stage of
-    the step itself, to the tolerances `loose` of their lengths, and of their rates [1/T] at its
-    end, in roundings.
+    `met` has one entry for each evaluation of the force, in their order.
     """
-    start = way = q, p
-    pull: Reals | None = None
+    start = q, p
     # in extended precision: the square of a step may leave the range of a double
     q, p, wide = np.abs(q), np.abs(p), np.longdouble(h)
     each = iter(met)
     if scheme.stages:
         last = np.zeros_like(p)
-        for left, kind, (_, c) in zip(range(-len(scheme.kinds), 0), scheme.kinds, scheme.stages, strict=True):
+        for kind, (_, c) in zip(scheme.kinds, scheme.stages, strict=True):
             if kind.evaluates:
                 here = next(each)
                 last = here.magnitude(q, np.zeros_like(p) if kind.evaluates == "potential" else p)
                 last = last + here.joints
-                pull = here.pull
-            setting = Setting(m=m, rate=rate, force=last, turns=turns)
-            part = number(c, np.float64) * wide
-            q, p = kind.sizes(q, p, part, setting)
-            if hold is not None:
-                # friction turns no rod by more than a part of what the step does
-                before, act = way[0], replace(setting, rate=None, force=0 * p if pull is None else pull)
-                way = kind.act(*way, part, act)
-                way = hold.drifted(before, *way, part) if kind.drifts else way
-                ends = loose if left == -1 else (loose[0], 0.0)
-                q, p = hold.sizes(before if kind.drifts else None, *way, part, (q, p), ends)
-                way = way[0], hold.projected(*way)
+            setting = Setting(m=m, rate=rate, force=last)
+            q, p = kind.sizes(q, p, number(c, np.float64) * wide, setting)
         return q, p
     return _tableau(scheme, start, each, h=wide, m=m, rate=rate)
 
@@ -226,13 +209,8 @@ def _product(matrix: Reals, x: Reals) -> Reals:
     return np.asarray(np.sum(np.where(np.isnan(terms), 0, terms), axis=-1))
 
 
-def roundings(scheme: Scheme, *, rigid: bool = False) -> int:
-    """Roundings on the longest path through one step: of a force 4, a kick 2, a drift 3, in and out 4.
-
-    With rods also those of the multiplier, its product and sum after a drift 12, and of what is taken off the
-    momenta after every stage 8.
-    """
+def roundings(scheme: Scheme) -> int:
+    """Roundings on the longest path through one step: of a force 4, a kick 2, a drift 3, in and out 4."""
     if scheme.stages:
-        held = sum(8 + 12 * kind.drifts for kind in scheme.kinds) if rigid else 0
-        return 4 + held + sum(kind.roundings for kind in scheme.kinds)
+        return 4 + sum(kind.roundings for kind in scheme.kinds)
     return 4 + sum(6 + 3 + 2 * len(row) for row in scheme.a) + 2 * len(scheme.b)

@@ -19,7 +19,7 @@ import numpy as np
 import springcheck
 from springcheck.errors import StoreError
 from springcheck.physics.arrays import Arithmetic, Floats
-from springcheck.physics.fields import Kind, Units
+from springcheck.physics.fields import Units
 from springcheck.physics.trajectory import Outcome, Timing, Trajectory
 from springcheck.store.access import Scalar
 from springcheck.store.layout import QUANTITIES
@@ -44,7 +44,7 @@ class Run:
     scene: str
     scene_name: Name = ""
     units: Units
-    kind: Kind
+    kind: Name
     frames: Size
     particles: Size
     """Number of coordinates: of particles, where each moves along one axis."""
@@ -72,8 +72,6 @@ class Run:
     parameter_precision: Annotated[Literal["double", "single"], "arithmetic.parameters"] = _DOUBLE.parameters
     force_excess: Annotated[float, "arithmetic.excess"] = _DOUBLE.excess
     forces_kept_within: Annotated[float, "arithmetic.stale"] = _DOUBLE.stale
-    rod_tolerance: Annotated[float, "arithmetic.lengths"] = 0.0
-    rod_rate_tolerance: Annotated[float, "arithmetic.rates"] = 0.0
     bath_cancels: Annotated[int, "arithmetic.cancels"] = 0
     keeps_displacement: Annotated[bool, "arithmetic.keeps_displacement"] = False
     counts_from_start: Annotated[bool, "arithmetic.from_start"] = False

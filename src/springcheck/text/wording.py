@@ -8,6 +8,7 @@ import math
 import sys
 import textwrap
 from collections.abc import Sequence
+from decimal import ROUND_FLOOR, Context, Decimal
 from itertools import pairwise
 from typing import Any, cast
 
@@ -75,3 +76,11 @@ def duration(value: float) -> str:
         if value >= size:
             return f"{value / size:.2g} {unit}"
     return seconds(value)
+
+
+def rounded_down(x: float, digits: int = 8) -> str:
+    """A positive number with so many digits, never above it: the printed limit of a step is a safe one."""
+    if not 0 < x < math.inf:
+        return f"{x:g}"
+    down = Decimal(x).normalize(Context(prec=digits, rounding=ROUND_FLOOR))
+    return f"{down:f}" if 1e-5 < x < 1e8 else f"{down:e}"

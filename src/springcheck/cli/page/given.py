@@ -181,7 +181,7 @@ def bath(scene: Scene | None, ran: Collection[str]) -> dict[str, Any] | None:
     """Data of one particle on a spring in a bath, or None; the schemes `ran` are drawn at first."""
     if scene is None or scene.bath is None or scene.n != 1 or not scene.system.is_linear:
         return None
-    from springcheck.thermal import THERMOSTATS, Law
+    from springcheck.bath import THERMOSTATS, Law
 
     at = np.zeros(1)
     k, m, rate = float(scene.system.hessian_diagonal(at)[0]), float(scene.m[0]), scene.bath.friction

@@ -8,7 +8,6 @@ so the motion cannot depend on the rounding of the mole.
 
 from __future__ import annotations
 
-import itertools
 import warnings
 from typing import Any, ClassVar
 
@@ -16,11 +15,10 @@ import ase.units
 import numpy as np
 from ase import Atoms
 from ase.calculators.calculator import Calculator, all_changes
-from ase.constraints import FixBondLengths
 from ase.md.verlet import VelocityVerlet
 
-from springcheck.engines.bonds import ANCHOR_MASS, in_all_of_space, off_axis
-from springcheck.engines.contract import Label, Method, Stopped
+from springcheck.engines.bonds import off_axis
+from springcheck.engines.contract import Label, Method
 from springcheck.physics.arrays import Arithmetic, Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.system import System
@@ -35,10 +33,8 @@ def version() -> dict[str, str]:
 
 
 def arithmetic(label: Label) -> Arithmetic:
-    """NumPy's double precision; `compare_atoms` treats positions within 1e-15 of each other as equal, and
-    `FixBondLengths` has one tolerance for relative lengths and, in ASE's units, for their rates."""
-    rods = 1e-13 if label.method in ("rattle", "langevin-rods") else 0.0
-    return Arithmetic(stale=1e-15, lengths=rods, rates=rods)
+    """NumPy's double precision; `compare_atoms` treats positions within 1e-15 of each other as equal."""
+    return Arithmetic(stale=1e-15)
 
 
 class Springs(Calculator):  # type: ignore[misc]
@@ -85,7 +81,7 @@ def _thermostat(
     rng = seed if hasattr(seed, "standard_normal") else np.random.default_rng(seed)
     rate = scene.bath.friction
     given: dict[str, Any] = {"timestep": step * time, "temperature_K": energy / ase.units.kB, "rng": rng}
-    if name.startswith("langevin") and name != "langevin-baoab":
+    if name == "langevin":
         from ase.md.langevin import Langevin
 
         return Langevin(atoms, friction=rate / time, fixcm=False, **given)
@@ -112,22 +108,14 @@ class _Dynamics:
 
     def __init__(self, scene: Scene, method: Method, label: Label, step: float, seed: Any = None) -> None:
         length, time = (NANOMETRE, PICOSECOND) if scene.units == "md" else (1.0, 1.0)
-        rods = list(scene.system.rods.joints()) if scene.system.rods else []
-        # a fixed end is an atom so heavy that nothing moves it
-        fixed = [point for _, _, point in rods if point is not None]
-        positions, momenta = np.zeros((2, scene.particles + len(fixed), 3))
+        positions, momenta = np.zeros((2, scene.particles, 3))
         positions.reshape(-1)[scene.where] = scene.q * length
         momenta.reshape(-1)[scene.where] = scene.p * (length / time)
-        positions[scene.particles :] = np.reshape(fixed, (-1, 3)) * length
-        masses = [*scene.masses, *[ANCHOR_MASS] * len(fixed)]
-        self._atoms = Atoms(numbers=[0] * len(masses), positions=positions, masses=masses, momenta=momenta)
-        if rods:
-            anchor = itertools.count(scene.particles)
-            pairs = [ends if len(ends) == 2 else (next(anchor), *ends) for ends, _, _ in rods]
-            self._atoms.set_constraint(FixBondLengths(pairs, bondlengths=[x * length for _, x, _ in rods]))
+        self._atoms = Atoms(
+            numbers=[0] * scene.particles, positions=positions, masses=scene.masses, momenta=momenta
+        )
         self._atoms.calc = Springs(scene.system, length, time)
         if method.generator:
-            in_all_of_space(scene, label, rods)
             energy = scene.thermal * (length / time) ** 2
             self._dynamics = _thermostat(method.name, self._atoms, scene, step, time, energy, seed)
         else:
@@ -149,12 +137,8 @@ class _Dynamics:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)
             for row in range(len(q)):
-                try:
-                    self._steps += every
-                    run(every)
-                except RuntimeError as error:
-                    # lengths of constraints that its iteration does not reach
-                    raise Stopped(row, str(error)) from error
+                self._steps += every
+                run(every)
                 q[row] = atoms.arrays["positions"].reshape(-1)[self._where] / self._length
                 p[row] = atoms.arrays["momenta"].reshape(-1)[self._where] / self._momentum
         if self._on_a_line:

@@ -8,8 +8,6 @@ from springcheck.engines.contract import (
     ANY_POTENTIAL,
     DRIVEN,
     EVERY_POTENTIAL,
-    FIELD,
-    RODS,
     Engine,
     Need,
     by_default,
@@ -62,20 +60,6 @@ ENGINE = Engine(
             "langevin", "langevin-middle", "LangevinIntegrator at T = 0, started and read synchronised",
             _DRIVEN | {"damping"}, Need.DAMPING, one_friction=True,
         ),
-        *(
-            by_default(
-                name, "velocity-verlet", f"VerletIntegrator, {tolerance}, started and read synchronised",
-                _TERMS | RODS, Need.RODS, rebuilds_velocity=True, default=name != "verlet-rods-8",
-            )
-            for name, tolerance in (
-                ("verlet-rods", "constraint tolerance 1e-13"),
-                ("verlet-rods-8", "constraint tolerance 1e-8"),
-                ("verlet-rods-as-it-is", "its own constraint tolerance 1e-5"),
-            )
-        ),
-        by_name(
-            "boris", "boris", "Boris' rotation by CustomIntegrator", (_DRIVEN - {"morse"}) | FIELD, Need.FIELD
-        ),
         by_name(
             "nose-hoover", "semi-implicit-euler",
             "NoseHooverIntegrator without a thermostat, handed p0 as it is", _DRIVEN,
@@ -83,11 +67,6 @@ ENGINE = Engine(
     ),
     thermostats=named(
         _drawn("langevin-middle-bath", "baoa", "LangevinMiddleIntegrator, as it stores velocities"),
-        _drawn(
-            "langevin-middle-rods", "baoa",
-            "LangevinMiddleIntegrator, constraint tolerance 1e-13, as it stores velocities",
-            terms=_ON_A_LINE | RODS, requires=frozenset({Need.RODS}),
-        ),
         _drawn(
             "langevin-middle-synchronised", "baoab",
             "LangevinMiddleIntegrator, half a kick added to what is read",
@@ -106,7 +85,6 @@ ENGINE = Engine(
     ),
     atlas=tuple(f"verlet@{place}" for place in ("CPU", "OpenCL-single", "OpenCL-mixed", "OpenCL-double")),
     any_axis=True,
-    periodic=True,
     squares_lengths=True,
     **deferred(f"{__name__}.simulation", "arithmetic", "convention"),
 )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Rounding of OpenMM on each platform, and its tolerance of constrained lengths."""
+"""Rounding of OpenMM on each platform."""
 
 from __future__ import annotations
 
@@ -30,26 +30,13 @@ _PRECISIONS = {
 "mixed" keeps positions as a float and a float of correction, together 48 bits.  The velocity is the
 displacement of the step times 1/h, so it does not lose the digits of x' - x as on Reference."""
 
-CUSTOM = ("euler", "semi-implicit-euler", "mts", "boris")
+CUSTOM = ("euler", "semi-implicit-euler", "mts")
 """Methods that OpenMM's CustomIntegrator carries out; MTSIntegrator and MTSLangevinIntegrator are such."""
 
 CUSTOM_EXCESS = 2.0**-32
 """On GPU-type platforms CustomIntegrator turns fixed-point forces back by 1/0xFFFFFFFF, which is
 1/(2**32 - 1), where every other integrator divides by 2**32 (`forceScale` in customIntegratorPerDof.cc):
 its forces are too large by 2.3e-10."""
-
-LENGTHS = {
-    "verlet-rods": 1e-13,
-    "verlet-rods-8": 1e-8,
-    "verlet-rods-as-it-is": 1e-5,
-    "langevin-middle-rods": 1e-13,
-}
-"""Relative tolerance of constraints by method; that of `verlet-rods-as-it-is` is the library's own."""
-
-SHAKE = 2.0**-24
-"""GPU-type platforms keep SHAKE's squared lengths and inverse masses in single precision in every mode
-(`params` in `IntegrationUtilities.cpp`).  Rounded masses make a free molecule's momentum fluctuate: that is
-no tolerance, and fails."""
 
 
 def sizes(scene: Scene, step: float, how: Arithmetic) -> Iterator[tuple[float, str, float, float]]:
@@ -76,8 +63,6 @@ def sizes(scene: Scene, step: float, how: Arithmetic) -> Iterator[tuple[float, s
 def arithmetic(label: Label) -> Arithmetic:
     """Reference is double; CPU takes Reference's code for bonds; GPU-type platforms default to single."""
     if label.platform in ("", "Reference", "CPU"):
-        return Arithmetic(lengths=LENGTHS.get(label.method, 0.0))
+        return Arithmetic()
     found = _PRECISIONS[label.precision or "single"]
-    if label.method in LENGTHS:
-        found = replace(found, lengths=max(LENGTHS[label.method], SHAKE))
     return replace(found, excess=CUSTOM_EXCESS) if label.method.partition("-langevin")[0] in CUSTOM else found

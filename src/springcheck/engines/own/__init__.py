@@ -6,25 +6,22 @@ scene's `include` or by `--method`.
 
 from __future__ import annotations
 
+from springcheck.bath import THERMOSTATS
 from springcheck.engines.contract import (
     BRAKES,
     DRIVEN,
     EVERY_FORCE,
     EVERY_KIND,
     EVERY_POTENTIAL,
-    FIELD,
-    RODS,
     SPRINGS,
     Engine,
     Method,
     Need,
-    by_name,
     deferred,
     named,
     thermostat,
 )
-from springcheck.schemes import ATTACHED, SCHEMES, Scheme
-from springcheck.thermal import THERMOSTATS
+from springcheck.schemes import SCHEMES, Scheme
 
 NAMES = {"explicit-euler": "euler"}
 """Methods whose names differ from their scheme's."""
@@ -49,10 +46,7 @@ def _requires(scheme: Scheme) -> frozenset[Need]:
 def _terms(scheme: Scheme) -> frozenset[str]:
     if scheme.has("implicit"):
         return SPRINGS | BRAKES | {"damping"}
-    # rods hold after every stage of a splitting
-    rods = RODS if scheme.has("symplectic", "splitting") else frozenset()
-    # to kicks by all forces, and to a tableau, a field is a force like any other
-    return EVERY_FORCE | rods | (FIELD | BRAKES if scheme.has("plain") or scheme.b else frozenset())
+    return EVERY_FORCE | (BRAKES if scheme.has("plain") or scheme.b else frozenset())
 
 
 def _method(scheme: Scheme) -> Method:
@@ -75,19 +69,14 @@ _SCHEMES = sorted(
 ENGINE = Engine(
     name="own",
     title="springcheck",
-    methods=named(
-        *map(_method, _SCHEMES),
-        by_name("boris", "boris", ATTACHED["boris"].title, EVERY_POTENTIAL | DRIVEN | FIELD, Need.FIELD),
-    ),
+    methods=named(*map(_method, _SCHEMES)),
     any_axis=True,
-    periodic=True,
     convention=lambda method: "positions and momenta belong to the same time",
     thermostats=named(
         *(
             thermostat(
-                one.name, one.name, one.title, "NumPy, PCG64",
-                EVERY_POTENTIAL | (RODS if one.held else frozenset()),
-                scripted=True, kinds=EVERY_KIND, default=one.name in BY_DEFAULT,
+                one.name, one.name, one.title, "NumPy, PCG64", EVERY_POTENTIAL, scripted=True,
+                kinds=EVERY_KIND, default=one.name in BY_DEFAULT,
             )
             for one in THERMOSTATS.values()
         )

@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from springcheck.bath import THERMOSTATS, Stepper
+from springcheck.bath.stepper import forces
 from springcheck.engines.own.vectors import kept
 from springcheck.physics.arrays import Floats, Force, Reals
 from springcheck.physics.scene import Scene
-from springcheck.thermal import THERMOSTATS, Stepper
-from springcheck.thermal.stepper import forces
 
 MOST_DRAWS = 1 << 16
 """Draws that are made at once: each step takes its own in the order of the steps, however many at once."""

@@ -1,23 +1,16 @@
-"""The base class of all closed forms of a motion."""
+"""The base class of all solutions of a motion."""
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, Self, TypeAlias
+from typing import Any, Self, TypeAlias
 
 import numpy as np
 
-from springcheck.physics.arrays import EPS, Extended, Integers
+from springcheck.physics.arrays import Extended
 from springcheck.physics.system import System
 
 States: TypeAlias = tuple[Extended, Extended]
 PI = 4 * np.arctan(np.longdouble(1))
-
-CANCELS = 16
-"""Least cancellation, summands over sum, for which sums are computed in more digits."""
-
-FORM_EPS = 64 * EPS
-"""Error bound of a closed form, relative to each size that it consists of; `validation/exact_check.py` finds
-at most a tenth of it."""
 
 
 class NoClosedFormError(ValueError):
@@ -25,17 +18,8 @@ class NoClosedFormError(ValueError):
 
 
 class ClosedForm:
-    """The exact motion of a system.
-
-    Its constructor computes the constants of the motion once, or raises NoClosedFormError.  For a part of a
-    scene it serves the particles on which a term `key` acts, and no terms but `terms`; one without `terms`
-    serves a whole scene.
-    """
-
-    key: ClassVar[str] = ""
-    terms: ClassVar[frozenset[str]] = frozenset()
-    growth: float | None = None
-    """The largest derivative of the flow between two times, in the energy norm; None where unknown."""
+    """The motion of a system.  Its constructor computes the constants of the motion once, or raises
+    NoClosedFormError."""
 
     def __init__(self, system: System[Any]) -> None:
         self.system = system
@@ -53,13 +37,8 @@ class ClosedForm:
         except NoClosedFormError:
             return None
 
-    @property
-    def one_each(self) -> bool:
-        """Whether exactly one term acts on each particle."""
-        return bool(np.all(self.system.pulls() == 1))
-
     def at(self, t: Extended) -> States:
-        """Exact q and p (f, n) at times t (f, 1) [T]."""
+        """q and p (f, n) at times t (f, 1) [T]."""
         raise NotImplementedError
 
     def doubt(self, t: np.longdouble) -> States:
@@ -70,9 +49,3 @@ class ClosedForm:
 def wide(x: Any) -> Extended:
     """Doubles in extended precision."""
     return np.asarray(x, np.longdouble)
-
-
-def by_particle(index: Integers, *rows: Any) -> States:
-    """Positions and momenta (..., n) of the particles of these numbers (n,), in the order of the scene."""
-    q, p = (np.take(x, np.argsort(index), axis=-1) for x in rows)
-    return q, p

@@ -7,11 +7,9 @@ for extended precision.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from decimal import Context, Decimal, localcontext
-from functools import cache
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -23,13 +21,10 @@ Wide: TypeAlias = NDArray[np.object_]
 """An array of Decimal numbers."""
 
 DIGITS = 420
-"""Digits for sums of products of doubles that differ by 300 decades, and for pi beside the largest angle."""
+"""Digits for sums of products of doubles that differ by 300 decades."""
 
 FEWER_DIGITS = 57
 """Digits where all numbers are within 17 decades of the largest: three words of libmpdec."""
-
-PI_ROUNDS = 4
-"""Rounds that take pi from a double, 1.2e-16 off, to 3e-49, 5e-147, 1e-440, and to rounding."""
 
 
 @contextmanager
@@ -52,48 +47,9 @@ def exactly(x: Any) -> Wide:
     return out
 
 
-def summed(values: Wide, index: Any, shape: Any) -> Wide:
-    """Sums of the values with each index, of this shape; 0 where there are none."""
-    out = exactly(np.zeros(shape))
-    np.add.at(out, index, values)
-    return out
-
-
 def extended(x: Wide) -> Extended:
     """Rounded to extended precision."""
     return np.array([np.longdouble(f"{value:.30e}") for value in x.flat], np.longdouble).reshape(x.shape)
-
-
-@cache
-def pi() -> Decimal:
-    """The zero of the sine: x + sin x has a sixth of the cube of the error of x."""
-    x = Decimal(math.pi)
-    with digits(DIGITS + 10):
-        for _ in range(PI_ROUNDS):
-            x += _series(x, even=False)
-    return x
-
-
-def sine_cosine(x: Decimal) -> tuple[Decimal, Decimal]:
-    """Sine and cosine of an angle of size 2 or less, to a relative accuracy of `FEWER_DIGITS` digits."""
-    with digits(FEWER_DIGITS):
-        away = pi() / 2 - abs(x)
-        if abs(away) < abs(x):
-            # near a quarter turn the cosine is as small as the remaining angle
-            return _series(away, even=True).copy_sign(x), _series(away, even=False)
-        return _series(x, even=False), _series(x, even=True)
-
-
-def _series(x: Decimal, *, even: bool) -> Decimal:
-    """Cosine (even) or sine of a small angle."""
-    term = total = Decimal(1) if even else x
-    k = 0 if even else 1
-    while True:
-        term *= -x * x / ((k + 1) * (k + 2))
-        k += 2
-        if total + term == total:
-            return total
-        total += term
 
 
 def eigen(symmetric: Wide, count: int = FEWER_DIGITS) -> tuple[Wide, Wide]:

@@ -1,15 +1,11 @@
-"""The exact solution of a system: normal modes, and closed forms of independent groups.
+"""The solution of a system: normal modes and their response to drives, or a reference that is integrated.
 
-Each closed form serves single particles in a potential, or pairs on a bond, without other interaction, all at
-once, at times t (f, 1).  Near a separatrix the motion depends on the difference of the energy from the
-barrier, and at the start on the distance from its top.  Where these cancel they are computed in more digits
-(`digits`), and no later step loses any, so that every motion is known to a few roundings of its size and
-time, near a barrier as elsewhere.
+Particles without interaction are independent.  Those on which only linear terms act move in normal modes; the
+others are integrated together.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -20,12 +16,13 @@ from springcheck.physics.arrays import Extended, Integers
 from springcheck.physics.exact.closedform import ClosedForm
 from springcheck.physics.exact.linear import LinearMotion
 from springcheck.physics.exact.normal import Modes, normal_modes
+from springcheck.physics.graph import lowest_joined
 from springcheck.physics.system import Fields, System
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Solution:
-    """The exact motion of n particles, in independent groups (s,)."""
+    """The motion of n particles, in independent groups (s,)."""
 
     n: int
     groups: tuple[tuple[Integers, ClosedForm], ...]
@@ -47,95 +44,64 @@ class Solution:
         # infinite where the motion itself is; never NaN
         return np.nan_to_num(q, nan=np.inf, posinf=np.inf), np.nan_to_num(p, nan=np.inf, posinf=np.inf)
 
-    @property
-    def growth(self) -> float | None:
-        """The largest derivative of the flow between two times, in the energy norm; None where some closed
-        form has no bound."""
-        each = [motion.growth for _, motion in self.groups]
-        return None if None in each else max(x for x in each if x is not None)
-
 
 class SolvedSystem(System[Fields]):
-    """The facts of one scene, with its normal modes and its exact motion."""
+    """The facts of one scene, with its normal modes and its solution."""
 
     @cached_property
     def modes(self) -> Modes:
         """Normal modes.  ValueError where there are none (see `has_modes`)."""
         return normal_modes(self)
 
-    @cached_property
+    @property
     def solution(self) -> Solution | None:
-        """The exact (analytic) solution, None where no closed form is known, or where a bath acts."""
-        return None if self.scene.bath else _solution(self)
+        """The analytic or reference solution, None where there is none (see `unsolved`)."""
+        found = self._solved
+        return None if isinstance(found, str) else found
+
+    @property
+    def unsolved(self) -> str:
+        """Why there is no solution; empty where there is one."""
+        return self._solved if isinstance(self._solved, str) else ""
+
+    @cached_property
+    def _solved(self) -> Solution | str:
+        if self.scene.bath:
+            return "a bath moves it at random"
+        from springcheck.physics.exact.reference import NoReferenceError, reference
+
+        groups: list[tuple[Integers, ClosedForm]] = []
+        with np.errstate(all="ignore"):
+            left = np.ones(self.n, dtype=bool)
+            for chosen in _linear(self):
+                part = self if len(chosen) == self.n else self.beside(self.part(chosen))
+                if motion := _closed_form(part):
+                    groups.append((chosen, motion))
+                    left[chosen] = False
+            if np.any(left):
+                chosen = np.flatnonzero(left)
+                part = self if np.all(left) else self.beside(self.part(chosen))
+                try:
+                    groups.append((chosen, reference(part)))
+                except NoReferenceError as error:
+                    return str(error)
+        return Solution(n=self.n, groups=tuple(groups))
 
 
-def _solution(system: SolvedSystem[Any]) -> Solution | None:
-    """Solution of a system, None where some particles have no closed form here."""
-    for law in _of_whole_scenes(system):
-        if motion := law.of(system):
-            return Solution(n=system.n, groups=((np.arange(system.n), motion),))
-    groups: list[tuple[Integers, ClosedForm]] = []
-    nothing = np.zeros(system.n, dtype=bool)
-    acting = system.acting
-    if system.rods:
-        # a force along one axis of a rod affects all of its axes
-        acting = {key: system.rods.reach(here) for key, here in acting.items()}
-    left = ~nothing
-    with np.errstate(all="ignore"):
-        for law in _of_groups(system):
-            others = (here for key, here in acting.items() if key not in law.terms)
-            other = np.any([nothing, *others], axis=0)
-            mine = left if law is LinearMotion else acting.get(law.key, nothing) & ~other
-            chosen = np.flatnonzero(mine)
-            if len(chosen):
-                if any(np.any(mine[x.particles[0]] != mine[x.particles[-1]]) for x in system.terms):
-                    # another term acts on the other end of a pair
-                    return None
-                motion = law.of(system.beside(system.part(chosen)))
-                if motion is None:
-                    return None
-                groups.append((chosen, motion))
-                left[chosen] = False
-    return Solution(n=system.n, groups=tuple(groups))
+def _linear(system: System[Any]) -> list[Integers]:
+    """The particles (s,) on which only linear terms and drives act, also through others."""
+    group, bent = lowest_joined(system.n, system.terms), np.zeros(system.n, dtype=bool)
+    for term in system.terms:
+        if not term.is_linear and term.key != "drive":
+            for index in term.particles:
+                bent[group[index]] = True
+    chosen = np.flatnonzero(~bent[group])
+    return [chosen] if len(chosen) else []
 
 
-def _of_whole_scenes(system: SolvedSystem[Any]) -> Iterator[type[ClosedForm]]:
-    """Closed forms of all particles together; those that the scene's terms exclude are not imported."""
-    yield LinearMotion
-    if "magnetic" in system.acting:
-        from springcheck.physics.exact.gyration import Gyration
+def _closed_form(system: System[Any]) -> ClosedForm | None:
+    if not system.is_driven:
+        return LinearMotion.of(system)
+    from springcheck.physics.exact.response import Response
 
-        yield Gyration
-    elif system.is_driven:
-        from springcheck.physics.exact.mathieu import ModulatedMotion
-        from springcheck.physics.exact.response import Response
-
-        yield from (Response, ModulatedMotion)
-    if ("magnetic" in system.acting or system.is_damped) and not system.is_driven:
-        from springcheck.physics.exact.damped import CoupledModes
-
-        yield CoupledModes
-    if system.rods:
-        from springcheck.physics.exact.lumped import LumpedMotion
-
-        yield LumpedMotion
-
-
-def _of_groups(system: SolvedSystem[Any]) -> Iterator[type[ClosedForm]]:
-    """Closed forms of independent particles, and last that of normal modes for the rest."""
-    if system.brakes_by_place:
-        from springcheck.physics.exact.relaxation import VanDerPolMotion
-
-        yield VanDerPolMotion
-    if "bond" in system.acting:
-        from springcheck.physics.exact.swinging import SwingingMotion
-
-        yield SwingingMotion
-    from springcheck.physics.exact.bond import MorseMotion
-    from springcheck.physics.exact.pendulum import HangingRods, PendulumMotion
-    from springcheck.physics.exact.quartic import QuarticMotion
-    from springcheck.physics.exact.turning import TurningRods, TurningWallRods
-
-    yield from (
-        QuarticMotion, PendulumMotion, MorseMotion, TurningRods, TurningWallRods, HangingRods, LinearMotion,
-    )  # fmt: skip
+    return Response.of(system)

@@ -14,7 +14,7 @@ import msgspec
 
 from springcheck.errors import SceneError, nearest, plain
 from springcheck.physics.scene import Scene
-from springcheck.physics.scenefile import building, tables
+from springcheck.physics.scenefile import building, left, tables
 
 LONGEST_TEXT = 1 << 25
 """Most characters of a scene: parsing so many takes ten seconds and a gigabyte of memory."""
@@ -91,6 +91,8 @@ def from_tables(data: Any, *, name: str, where: str) -> Scene:
     for field, value in _numbers(data):
         if not math.isfinite(value):
             raise SceneError(f"{where}: {field} = {value}; a finite number is needed")
+    if reason := left.refusal(data):
+        raise SceneError(f"{where}: {reason}")
     try:
         table = msgspec.convert(data, tables.scene_table(), strict=True)
     except msgspec.ValidationError as error:

@@ -19,7 +19,7 @@ from springcheck.physics.fields import Units
 from springcheck.physics.scene import Scene
 from springcheck.physics.scenefile import tables
 from springcheck.physics.term import Column, Term
-from springcheck.physics.terms import Damping, Magnetic, RadialSpring, Rod, Spring, WallRod, WallSpring
+from springcheck.physics.terms import Damping, RadialSpring, Spring, WallSpring
 
 
 class MistakeError(ValueError):
@@ -70,7 +70,7 @@ class _Bodies:
 
 FILE_PATHS = {
     "step": "time.step", "steps": "time.steps", "every": "record.every", "tolerance": "time.tolerance",
-    "quantities": "record.quantities", "include": "methods.include", "box": "box.lengths",
+    "quantities": "record.quantities", "include": "methods.include",
 }  # fmt: skip
 """Path in a scene file of each field of a scene, for messages."""
 
@@ -85,7 +85,7 @@ def scene(table: Any, *, name: str) -> Scene:
     if table.kind not in (None, kind):
         raise MistakeError(
             f"kind = {table.kind!r}, but what moves is given by [[{bodies.name}]]: "
-            "particles come as [[particle]] or [chain], rotors as [[rotor]], circuits as [[inductor]]"
+            "particles come as [[particle]] or [chain], circuits as [[inductor]]"
         )
     units: Units = table.units or ("si" if kind == "circuit" else "reduced")
     terms = tuple(_terms(table, bodies))
@@ -94,7 +94,7 @@ def scene(table: Any, *, name: str) -> Scene:
         found = Scene(
             m=bodies.m, q=bodies.q, p=bodies.p, places=bodies.places, terms=terms, step=time.step,
             steps=time.steps, every=table.record.every or time.every or 1,
-            box=table.box and table.box.lengths, bath=bath or None, tolerance=time.tolerance, units=units,
+            bath=bath or None, tolerance=time.tolerance, units=units,
             kind=kind, include=table.methods.include, quantities=table.record.quantities, name=name,
             title=table.title, source=table.source,
         )  # fmt: skip
@@ -109,9 +109,7 @@ def scene(table: Any, *, name: str) -> Scene:
 def _bodies(table: Any) -> _Bodies:
     given = [name for name in tables.BODIES if getattr(table, name)]
     if not given:
-        raise MistakeError(
-            "nothing moves: a scene needs [[particle]], or [[rotor]], or [[inductor]], or [chain]"
-        )
+        raise MistakeError("nothing moves: a scene needs [[particle]], or [[inductor]], or [chain]")
     if len(given) > 1:
         raise MistakeError(f"[[{given[0]}]] and [[{given[1]}]] are both given; a scene has one kind of them")
     name = given[0]
@@ -175,9 +173,7 @@ def _terms(table: Any, bodies: _Bodies) -> Iterator[Term]:
     rows = itertools.chain(
         _springs(table.spring, bodies),
         *(_by_columns(x, getattr(table, tables.identifier(x.key)), bodies) for x in tables.of_terms()),
-        _rods(table.rod, bodies),
         _bonds(table.bond, bodies),
-        _magnetic(table.magnetic, bodies),
         _circuit(table, bodies),
     )
     found: dict[tuple[type[Term], bool], list[tuple[float, ...]]] = {}
@@ -195,7 +191,7 @@ _Rows: TypeAlias = Iterator[tuple[type[Term], bool, tuple[float, ...]]]
 
 def _springs(springs: Sequence[Any], bodies: _Bodies) -> _Rows:
     for j, spring in enumerate(springs):
-        numbers = _loose_ends("spring", j, spring, bodies, "moves")
+        numbers = _loose_ends(j, spring, bodies)
         rest = spring.rest
         if len(numbers) == 1:
             rest = spring.wall + rest if spring.ends[0] == "wall" else spring.wall - rest
@@ -205,35 +201,16 @@ def _springs(springs: Sequence[Any], bodies: _Bodies) -> _Rows:
             yield WallSpring if len(at) == 1 else Spring, spring.fast, (*at, spring.stiffness, rest)
 
 
-def _rods(rods: Sequence[Any], bodies: _Bodies) -> _Rows:
-    """A row for each axis of the ends of a rod, with its length at the start where none is given."""
-    for j, rod in enumerate(rods):
-        if bodies.name not in ("particle", "chain"):
-            raise MistakeError(f"rod[{j}]: a rod joins particles")
-        numbers = _loose_ends("rod", j, rod, bodies, "holds")
-        ends = bodies.along(f"rod[{j}].ends", None, *numbers)
-        wall = rod.wall if isinstance(rod.wall, tuple) else (rod.wall,) * (1 if rod.wall else len(ends))
-        if len(wall) != len(ends):
-            raise MistakeError(f"rod[{j}].wall: {len(ends)} for its axes are needed, not {len(wall)}")
-        one, other = np.transpose(ends)[[0, -1]]
-        way = bodies.q[other] - (wall if len(numbers) == 1 else bodies.q[one])
-        length = rod.length or float(np.hypot.reduce(way))
-        if length == 0:
-            raise MistakeError(f"rod[{j}]: its ends are at one place, and a rod has a length")
-        for at, x in zip(ends, wall, strict=True):
-            yield (WallRod, False, (*at, length, x)) if len(at) == 1 else (Rod, False, (*at, length))
-
-
-def _loose_ends(kind: str, j: int, row: Any, bodies: _Bodies, does: str) -> list[int]:
-    """The ends of a spring or rod that are no wall, one or two bodies.  MistakeError."""
-    field = f"{kind}[{j}].ends"
+def _loose_ends(j: int, row: Any, bodies: _Bodies) -> list[int]:
+    """The ends of a spring that are no wall, one or two bodies.  MistakeError."""
+    field = f"spring[{j}].ends"
     numbers = [bodies.number(end, field) for end in row.ends if end != "wall"]
     if not numbers:
-        raise MistakeError(f"{field}: a {kind} between two walls {does} nothing")
+        raise MistakeError(f"{field}: a spring between two walls moves nothing")
     if len(numbers) == 2:
         _two_ends(numbers[0], numbers[1], field)
         if row.wall:
-            raise MistakeError(f"{kind}[{j}].wall is given, but no end of it is a wall")
+            raise MistakeError(f"spring[{j}].wall is given, but no end of it is a wall")
     return numbers
 
 
@@ -246,19 +223,6 @@ def _bonds(bonds: Sequence[Any], bodies: _Bodies) -> _Rows:
         _two_ends(one, other, f"bond[{j}].ends")
         for at in bodies.along(f"bond[{j}].ends", None, one, other):
             yield RadialSpring, False, (*at, bond.stiffness, bond.rest, j)
-
-
-def _magnetic(rows: Sequence[Any], bodies: _Bodies) -> _Rows:
-    """The plane perpendicular to each field, its two axes in cyclic order."""
-    for j, row in enumerate(rows):
-        field = f"magnetic[{j}].particle"
-        plane = {"x": "yz", "y": "zx", "z": "xy"}[row.axis]
-        if not set(plane) <= set(bodies.axes[bodies.number(row.particle, field)]):
-            raise MistakeError(
-                f"{field}: a field along {row.axis} needs a particle along {plane[0]} and {plane[1]}"
-            )
-        (one,), (other,) = (bodies.along(field, axis, row.particle) for axis in plane)
-        yield Magnetic, False, (*one, *other, row.strength)
 
 
 def _one_axis(row: str, places: Mapping[str, float], ends: Sequence[tuple[int, ...]]) -> None:

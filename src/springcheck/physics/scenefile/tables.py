@@ -34,14 +34,6 @@ class ParticleTable(SceneTable, frozen=True):
     axes: Annotated[str, msgspec.Meta(pattern="^[xyz]{1,3}$")] | None = None
 
 
-class RotorTable(SceneTable, frozen=True):
-    """A rotating body: inertia [M L2], angle [rad] and angular momentum [M L2/T] at the start."""
-
-    inertia: Positive
-    angle: float = 0.0
-    momentum: float = 0.0
-
-
 class InductorTable(SceneTable, frozen=True):
     """The inductor of a loop: inductance [H], circulated charge [C] and flux [Wb] at the start."""
 
@@ -79,28 +71,12 @@ class SpringTable(SceneTable, frozen=True):
     axis: Axis | None = None
 
 
-class RodTable(SceneTable, frozen=True):
-    """A rigid rod of a length [L], by default that at the start; a wall end is at `wall` [L]."""
-
-    ends: tuple[End, End]
-    length: Positive | None = None
-    wall: float | PerAxis = 0.0
-
-
 class BondTable(SceneTable, frozen=True):
     """A bond of two particles in any direction: k/2 (length - rest)**2, k [M/T2], rest [L]."""
 
     ends: tuple[int, int]
     stiffness: float
     rest: NonNegative = 0.0
-
-
-class MagneticTable(SceneTable, frozen=True):
-    """A magnetic field along `axis`, its strength charge times field [M/T]: force strength (v_y, -v_x)."""
-
-    particle: int
-    strength: float
-    axis: Axis = "z"
 
 
 class WaveTable(SceneTable, frozen=True):
@@ -134,12 +110,6 @@ class TimeTable(SceneTable, frozen=True):
     tolerance: Annotated[float, msgspec.Meta(gt=0, lt=1)] = 1e-12
 
 
-class BoxTable(SceneTable, frozen=True):
-    """A periodic box: its length [L], or one for each of x, y and z."""
-
-    lengths: Positive | Annotated[tuple[Positive, ...], msgspec.Meta(min_length=3, max_length=3)]
-
-
 class BathTable(SceneTable, frozen=True):
     """A heat bath: temperature [K, or kT where units are reduced], and its friction rate [1/T]."""
 
@@ -170,7 +140,6 @@ class Body(NamedTuple):
 
 BODIES = {
     "particle": Body("particles", "particles", ("mass", "position", "momentum")),
-    "rotor": Body("rotor", "rotors", RotorTable.__struct_fields__),
     "inductor": Body("circuit", "inductors", InductorTable.__struct_fields__),
     "chain": Body("particles", "masses"),
 }
@@ -186,16 +155,12 @@ class SceneBase(SceneTable, frozen=True):
     units: Units | None = None
     kind: Kind | None = None
     particle: tuple[ParticleTable, ...] = ()
-    rotor: tuple[RotorTable, ...] = ()
     inductor: tuple[InductorTable, ...] = ()
     capacitor: tuple[CapacitorTable, ...] = ()
     resistor: tuple[ResistorTable, ...] = ()
     chain: ChainTable | None = None
     spring: tuple[SpringTable, ...] = ()
-    rod: tuple[RodTable, ...] = ()
     bond: tuple[BondTable, ...] = ()
-    magnetic: tuple[MagneticTable, ...] = ()
-    box: BoxTable | None = None
     bath: BathTable | None = None
     methods: MethodsTable = MethodsTable()
     record: RecordTable = RecordTable()
@@ -230,7 +195,7 @@ def identifier(name: str) -> str:
     return name.replace("-", "_")
 
 
-OWN_TABLES = ("wall-spring", "spring", "magnetic", "wall-rod", "rod", "bond")
+OWN_TABLES = ("wall-spring", "spring", "bond")
 """Keys of the terms with tables of their own."""
 
 

@@ -12,11 +12,10 @@ import numpy as np
 from springcheck.physics.arrays import Floats
 from springcheck.physics.fields import SceneFields
 from springcheck.physics.graph import standing
-from springcheck.physics.rods import Rods
 from springcheck.physics.scenefile.tables import BODIES
 from springcheck.physics.system import System
 from springcheck.physics.term import Term
-from springcheck.physics.terms import Damping, Magnetic, RadialSpring, Rod, Spring, WallRod, WallSpring
+from springcheck.physics.terms import Damping, RadialSpring, Spring, WallSpring
 
 MOST_WAVES = 64
 """Most standing waves by which the start of a chain is written."""
@@ -37,8 +36,6 @@ def text(system: System[Any]) -> str:
     for term in scene.terms:
         if not (is_chain and isinstance(term, WallSpring | Spring)):
             lines += _rows(scene, term)
-    if scene.box:
-        lines.append(_table("[box]", [("lengths", list(scene.box))]))
     if scene.bath:
         given = {"temperature": scene.bath.temperature, "friction": scene.bath.friction}
         lines.append(_table("[bath]", given.items()))
@@ -115,22 +112,9 @@ def _rows(scene: SceneFields, term: Term) -> Iterator[str]:
             # the name of its origin: wall or rest
             row |= {term.columns[1].name: rest} if rest else {}
             yield _table("[[spring]]", (row | ({"fast": True} if term.fast else {})).items())
-    elif isinstance(term, Magnetic):
-        assert scene.places is not None
-        for a, b, strength in term.rows():
-            (particle, one), (_, other) = (divmod(int(scene.places[x]), 3) for x in (a, b))
-            sign = 1.0 if (other - one) % 3 == 1 else -1.0
-            row = {"particle": particle, "strength": sign * strength, "axis": "xyz"[3 - one - other]}
-            yield _table("[[magnetic]]", row.items())
     elif isinstance(term, RadialSpring):
         for a, b, k, rest in {number: row for *row, number in term.rows()}.values():
             yield _table("[[bond]]", {"ends": _ends(scene, [a, b])[0], "stiffness": k, "rest": rest}.items())
-    elif isinstance(term, Rod | WallRod):
-        for particles, length, point in Rods(scene.m, scene.places, (term,)).joints():
-            places = scene.places
-            along = [0] if places is None else places[places // 3 == particles[0]] % 3
-            wall: dict[str, Any] = {} if point is None else {"wall": point[along].tolist()}
-            yield _table("[[rod]]", ({"ends": ["wall", *particles][-2:], "length": length} | wall).items())
     else:
         yield from _by_columns(scene, term)
 

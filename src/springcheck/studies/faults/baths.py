@@ -10,20 +10,18 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from springcheck import checks
+from springcheck.bath import THERMOSTATS, Stepper
+from springcheck.bath.catalogue import Act
+from springcheck.bath.stepper import forces
 from springcheck.checks.seeds import SEEDED, Seeded
-from springcheck.errors import MethodError
 from springcheck.physics.arrays import Floats, Force
 from springcheck.physics.bath import Bath
-from springcheck.physics.rods import Rods
 from springcheck.physics.scene import Scene
 from springcheck.physics.term import Term
 from springcheck.physics.terms import WallSpring
 from springcheck.physics.trajectory import Trajectory
 from springcheck.studies.faults.seeded import Case, Fault
 from springcheck.studies.faults.steppers import State, record
-from springcheck.thermal import THERMOSTATS, Stepper
-from springcheck.thermal.catalogue import Act
-from springcheck.thermal.stepper import forces
 
 Draws: TypeAlias = Callable[[Sequence[Floats]], Any]
 """Correct draws so far, each (n,), the last one due -> the draw that is used in place of the last."""
@@ -42,32 +40,29 @@ def springs(n: int, *, name: str = "bath", steps: int = 1200) -> Scene:
     )  # fmt: skip
 
 
-def subject(fault: Fault, size: float | None, scene: Scene | None = None, seed: int = 20261122) -> Seeded:
-    """A fault as subject of the experiments with seeds, on three springs or another scene."""
+def subject(fault: Fault, size: float | None, seed: int = 20261122) -> Seeded:
+    """A fault as subject of the experiments with seeds, on three springs."""
     return Seeded(
-        scene=scene or springs(3), label=fault.name, seed=seed,
+        scene=springs(3), label=fault.name, seed=seed,
         play=partial(fault.run, size=size),
     )  # fmt: skip
 
 
 def played(
     c: Case, draws: Draws = lambda right: right[-1], *, runs: str | Sequence[Act] = "",
-    seed: Callable[[Any], Any] = lambda seed: seed, hold: Rods | None = None, h: float = 1.0,
+    seed: Callable[[Any], Any] = lambda seed: seed, h: float = 1.0,
     m: Floats | float = 1.0, k: float = 1.0, rate: float = 1.0, thermal: float = 1.0, collision: float = 1.0,
 ) -> Trajectory:  # fmt: skip
-    """A thermostat with other draws, another scheme (by name, or by its stages), another seed, other rods, or
+    """A thermostat with other draws, another scheme (by name, or by its stages), another seed, or
     other parameters: factors of the step, masses, forces, friction, kT and the probability of a collision."""
     scene, claims = c.scene, THERMOSTATS[c.scheme.name]
     assert scene.bath is not None
     of = THERMOSTATS[runs or claims.name] if isinstance(runs, str) else replace(
-        claims, acts=tuple(act for act in runs if act.kind not in ("shake", "project")), held=tuple(runs)
+        claims, acts=tuple(runs)
     )  # fmt: skip
-    if scene.system.rods and not of.held:
-        raise MethodError(f"no stages of {of.title} with rods are known")
     stepper = Stepper(
         replace(of, uniform=claims.uniform), h=scene.step * h, m=scene.m * m, rate=scene.bath.friction * rate,
         thermal=scene.thermal * thermal, width=np.float64,
-        hold=hold or scene.system.rods,
     )  # fmt: skip
     # a scripted generator replaces every other
     source = c.seed if hasattr(c.seed, "standard_normal") else seed(c.seed)

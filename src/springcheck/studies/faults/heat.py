@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from springcheck.bath import THERMOSTATS
+from springcheck.bath.catalogue import HALF, ONE, Act
 from springcheck.studies.faults.baths import Each, by, forgetting, heavy, of_rank, played, row
-from springcheck.studies.faults.rigid import Late, alike, solved
 from springcheck.studies.faults.seeded import Fault, each
-from springcheck.thermal import THERMOSTATS
-from springcheck.thermal.catalogue import HALF, ONE, PROJECT, Act
 
 _DIRECTION, _MATRIX, _MAP = ("noise-direction",), ("noise-matrix",), ("noise-map",)
 _VARIANCE, _SHAPE, _SCALE = ("draws-variance",), ("draws-shape",), ("draws-variance", "noise-size")
@@ -116,30 +115,4 @@ THERMAL_STEPS = each(
     Fault("bath-masses", "all masses of the step are 1", _DIRECTION,
           lambda c: played(c, m=1 / c.scene.m)),
     scheme="baoab", scene="bath",
-)  # fmt: skip
-
-_BAOAB, _BAOA, _LAMMPS, _VEC = (
-    THERMOSTATS[name].held for name in ("baoab", "baoa", "lammps-langevin", "vanden-eijnden-ciccotti")
-)
-
-
-RODS_IN_BATHS = each(
-    Fault("hot-rod-not-projected", "momenta along a rod in a bath are left as its last drift leaves them",
-          ("rod-velocity",), lambda c: played(c, runs=tuple(act for act in _BAOAB if act != PROJECT))),
-    Fault("hot-rod-held-once", "lengths are brought back after both halves of the drift, not after each",
-          make=lambda c: played(c, runs=(*_BAOAB[:3], _BAOAB[5], _BAOAB[2], Act("shake"), *_BAOAB[-3:]))),
-    Fault("hot-rod-after-drift", "a rod in a bath pushes along where it lies after the drift",
-          make=lambda c: played(c, hold=solved(c, Late))),
-    Fault("hot-rod-masses-alike", "a rod in a bath takes the masses of its ends for equal",
-          make=lambda c: played(c, hold=solved(c, masses=alike))),
-    Fault("hot-rod-length", "a rod in a bath is too long", ("rod-length",),
-          lambda c: played(c, hold=solved(c, longer=c.x)), size=1e-10),
-    Fault("hot-rod-draws-projected", "momenta along a rod are taken off amid its drift",
-          make=lambda c: played(c, runs=(*_BAOA[:4], PROJECT, *_BAOA[4:])), scheme="baoa"),
-    Fault("hot-rod-friction-on-site", "friction of the velocity on site, not of the half step before",
-          make=lambda c: played(c, runs=(_LAMMPS[6], *_LAMMPS[1:3], *_LAMMPS[4:])), scheme="lammps-langevin"),
-    Fault("hot-rod-jump-not-held", "noise of positions is added after lengths are brought back",
-          ("rod-length",), lambda c: played(c, runs=(*_VEC[:5], _VEC[6], _VEC[5], *_VEC[7:])),
-          scheme="vanden-eijnden-ciccotti"),
-    caught_by=_DIRECTION, scheme="baoab", scene="hot rod",
 )  # fmt: skip

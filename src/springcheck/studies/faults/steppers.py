@@ -12,7 +12,6 @@ import numpy as np
 
 from springcheck import schemes
 from springcheck.physics.arrays import Arithmetic, Floats, Force
-from springcheck.physics.rods import Rods
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Outcome, Trajectory, of_scene
 
@@ -31,10 +30,9 @@ def textbook(
     *,
     force: Force | None = None,
     clock: Clock | None = None,
-    hold: Rods | None = None,
 ) -> Step:
-    """The scheme's own step in double precision, with the scene's force or another, a clock for a drive, or
-    other rods than the scene's."""
+    """The scheme's own step in double precision, with the scene's force or another, and a clock for a
+    drive."""
     n, scene = scene.n, scene.system.clocked
     law, m, h = schemes.Law(scheme=scheme, scene=scene, h=scene.step), scene.m, scene.step
 
@@ -44,7 +42,7 @@ def textbook(
             q, p = np.append(q, time), np.append(p, pace * scene.p[n])
         a, b = schemes.step(
             scheme, q, p, h=h, m=m, force=force or scene.system.force, stiffness=law.stiffness,
-            parts=scene.system.parts, rate=law.rate, hold=hold or scene.system.rods,
+            parts=scene.system.parts, rate=law.rate,
         )  # fmt: skip
         return np.asarray(a[:n], np.float64), np.asarray(b[:n], np.float64)
 

@@ -13,8 +13,7 @@ from springcheck import schemes
 from springcheck.physics import exact
 from springcheck.physics.arrays import Arithmetic, Floats, Reals
 from springcheck.physics.trajectory import Outcome, Trajectory
-from springcheck.studies.faults.heat import OF_NOISE, RODS_IN_BATHS, THERMAL_STEPS
-from springcheck.studies.faults.rigid import RIGID
+from springcheck.studies.faults.heat import OF_NOISE, THERMAL_STEPS
 from springcheck.studies.faults.seeded import (
     FRAME_CHECKS,
     Case,
@@ -25,7 +24,7 @@ from springcheck.studies.faults.seeded import (
     shifted,
     single,
 )
-from springcheck.studies.faults.space import AXES, BOX, DRIVES, FIELDS
+from springcheck.studies.faults.space import AXES, DRIVES
 from springcheck.studies.faults.steppers import State, Step, energies, record, textbook, trajectory
 
 STEP = ("step-defect", "propagator")
@@ -289,6 +288,6 @@ ADAPTIVE = (
 )  # fmt: skip
 
 FAULTS: tuple[Fault, ...] = (
-    *PARAMETERS, *FORCES, *STEPS, *ARITHMETIC, *REPORTS, *AXES, *BOX, *DRIVES, *RIGID, *FIELDS, *ADAPTIVE,
-    *OF_NOISE, *THERMAL_STEPS, *RODS_IN_BATHS,
+    *PARAMETERS, *FORCES, *STEPS, *ARITHMETIC, *REPORTS, *AXES, *DRIVES, *ADAPTIVE,
+    *OF_NOISE, *THERMAL_STEPS,
 )  # fmt: skip

@@ -80,22 +80,20 @@ def truth(scene: Scene) -> Truth:
     """Prepare the exact solution of a scene.
 
     Raises:
-        SceneError: no closed form of it is known, or the scene rests, so that errors have no unit.
+        SceneError: there is no reference solution, or the scene rests, so that errors have no unit.
     """
     if not exact.has_true_motion(scene):
         raise SceneError(
-            f"scene {scene.name}: no closed form of its exact solution is known, so none of its errors is; "
-            "a study of precision needs springs, or an anharmonic potential on each particle or pair by "
-            "itself without friction, and no bath"
+            f"scene {scene.name}: no reference solution, because {exact.no_reference(scene)}; without it no "
+            "error can be measured"
         )
     if not scene.system.norm.of:
         raise SceneError(f"scene {scene.name} rests in equilibrium: give a particle a position or a momentum")
-    rods = scene.system.rods
-    w = float(np.max(rods.rates(scene.q, scene.p))) if rods else fastest(scene)
+    w = fastest(scene)
     if not np.isfinite(w):
         raise SceneError(f"scene {scene.name}: its forces are beyond the range of numbers")
     system = scene.system
-    joined = "magnetic" in system.acting or (system.is_damped and not system.has_modes)
+    joined = system.is_damped and not system.has_modes
     springs = tuple(term for term in scene.terms if isinstance(term, WallSpring | Spring) and not joined)
     rate = system.modes.rate if system.is_damped and not joined else np.zeros(scene.n, np.longdouble)
     return Truth(scene=scene, turning=replace(scene, terms=springs).system.modes, rate=rate, w=w)

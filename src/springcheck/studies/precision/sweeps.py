@@ -77,9 +77,6 @@ def begin(scene: Scene, label: Label, known: Truth) -> Sweep:
     method = engines.method(label)
     plain = replace(scene, quantities=("q", "p"))
     limit = schemes.scheme(method.scheme).limit
-    if scene.system.rods:
-        # at h w = 1 the two solutions for a rod coincide, and near it iterations do not converge
-        limit = min(limit, 0.9 / schemes.scheme(method.scheme).longest_drift)
     sweep = Sweep(
         label=label,
         scenes=by_tolerance(plain) if method.adaptive else by_step(plain, limit, known),

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from springcheck.bath.heat import Heated, heated_of
 from springcheck.checks.compare import EXACT
 from springcheck.figures import chain, energies, looks, portraits
 from springcheck.figures.charts import Bank, Chart, Curve, Rule, Scale
@@ -20,7 +21,6 @@ from springcheck.physics.trajectory import Trajectory
 from springcheck.studies import keeper
 from springcheck.studies.run.drawable import Drawable
 from springcheck.studies.run.result import Report, Stored
-from springcheck.thermal.heat import Heated, heated_of
 
 POSITIONS_IN_BATH = 4
 """Most schemes in a bath whose positions are drawn: more would hide one another."""

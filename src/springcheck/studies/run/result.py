@@ -24,8 +24,8 @@ from springcheck.text.lines import Lines, Text, hanging, plain
 from springcheck.text.wording import count, few
 
 if TYPE_CHECKING:
+    from springcheck.bath.heat import Heated
     from springcheck.studies.run.drawable import Drawable
-    from springcheck.thermal.heat import Heated
 
 FAULT = "fault"
 """Engine name in the labels of engines broken on purpose."""
@@ -100,7 +100,7 @@ class Report(StudyResult):
             plain(),
             *text.methods(scene, self.runs),
             *text.same_motions(self.same),
-            *text.temperatures(scene, self.temperatures),
+            *text.temperatures(self.temperatures),
             *text.fractions(verdicts, "Is the engine right?  "),
             *text.failures(v for v in verdicts if v.method not in self.faults),
             *text.faults(self.faults, verdicts),

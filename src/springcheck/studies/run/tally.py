@@ -16,7 +16,7 @@ from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory
 
 if TYPE_CHECKING:
-    from springcheck.thermal.heat import Heat
+    from springcheck.bath.heat import Heat
 
 FAINTEST_ENERGY = np.finfo(np.float64).tiny / np.finfo(np.float64).eps
 """Scale of energies below which they are subnormal in double precision and lose digits."""
@@ -52,7 +52,7 @@ class Tally:
         self._norm = scene.system.norm
         self.heat: Heat | None = None
         if scene.bath:
-            from springcheck.thermal.heat import Heat
+            from springcheck.bath.heat import Heat
 
             self.heat = Heat(scene)
         self._known = exact.has_true_motion(scene)

@@ -12,16 +12,16 @@ import numpy as np
 
 from springcheck import checks, schemes
 from springcheck.checks.compare import Same
-from springcheck.physics.exact import has_true_motion
+from springcheck.physics.exact import no_reference
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Comparison, Verdict
 from springcheck.studies.run.tally import MethodRun
 from springcheck.studies.text import of_energy
 from springcheck.text.lines import Lines, Row, Text, TextTable, plain, table
-from springcheck.text.wording import count, number, seconds
+from springcheck.text.wording import number, rounded_down, seconds
 
 if TYPE_CHECKING:
-    from springcheck.thermal.heat import Heated
+    from springcheck.bath.heat import Heated
 
 BELOW = "the exact solution is known no better than this, and the run is no further from it"
 
@@ -37,21 +37,14 @@ def beyond(scene: Scene, runs: Sequence[MethodRun]) -> Lines:
         least = min((one.limit for one in ran if one.limit), default=np.inf)
         if h * np.sqrt(np.max(np.abs(system.modes.w2))) < least:
             return []
-    from springcheck.studies.stability.longest import resonating, too_long
+    from springcheck.studies.stability.longest import too_long
 
     out: Lines = []
     for scheme in dict.fromkeys(run.scheme for run in runs):
         title = schemes.title(scheme)
-        if (limit := too_long(scheme, scene)) is not None:
-            said = f"is beyond the limit of {title} here, {limit:.4g}"
-        elif (factor := resonating(scheme, scene)) is not None:
-            said = (
-                f"makes {title} grow by a factor of {factor:.4f} a step, and the exact solution stays bounded"
-            )
-            of = "period of the modulation" if system.is_driven else "periods of the field and the springs"
-            said += f"; take a step that is short beside the {of}"
-        else:
+        if (limit := too_long(scheme, scene)) is None:
             continue
+        said = f"is beyond the limit of {title} here, {rounded_down(limit)}"
         names = ", ".join(run.method for run in runs if run.scheme == scheme)
         out.append(plain(f"h = {scene.step:g} {said}: {names}", "bold yellow"))
     return [plain(), *out] if out else []
@@ -92,7 +85,7 @@ def methods(scene: Scene, runs: Sequence[MethodRun]) -> Lines:
         table(titles, rows, left=("method", "outcome")),
         plain(f"error: largest distance from the exact solution, over the {unit}", "dim"),
         *[plain(f"<: {BELOW}", "dim")] * any(run.error_below for run in runs),
-        *[plain("-: no exact solution of this scene is known here", "dim")] * (not has_true_motion(scene)),
+        *[plain(f"-: no reference solution, because {why}", "dim") for why in [no_reference(scene)] if why],
         plain(f"energy: {of_energy(scene)}", "dim"),
         *(
             plain(f"  {run.method}: {run.outcome} after step {run.steps}: {run.message}")
@@ -123,8 +116,8 @@ def same_motions(found: Sequence[Same]) -> Lines:
     return out
 
 
-def temperatures(scene: Scene, found: Sequence[Heated]) -> Lines:
-    """Temperatures of runs in a bath, each beside the exact one of its scheme."""
+def temperatures(found: Sequence[Heated]) -> Lines:
+    """Temperatures of runs in a bath, each next to the exact one of its scheme."""
     if not found:
         return []
     rows: list[Row] = [
@@ -136,12 +129,9 @@ def temperatures(scene: Scene, found: Sequence[Heated]) -> Lines:
         for one in found
     ]  # fmt: skip
     titles = ("method", "configurational", "measured", "kinetic", "measured ")
-    of = ""
-    if scene.system.rods:
-        of = f", in {count(scene.system.rods.freedoms, 'degree')} of freedom"
     return [
         plain(),
-        plain(f"Temperatures over that of the bath{of}, exact for each scheme, and as measured:"),
+        plain("Temperatures over that of the bath, exact for each scheme, and as measured:"),
         table(titles, rows, left=("method",)),
     ]
 

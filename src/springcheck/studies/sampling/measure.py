@@ -13,6 +13,7 @@ from typing import Unpack
 import numpy as np
 
 from springcheck import driver, engines, schemes
+from springcheck.bath import THERMOSTATS, Law
 from springcheck.engines.contract import Label
 from springcheck.errors import MethodError
 from springcheck.physics.arrays import Floats
@@ -20,11 +21,10 @@ from springcheck.physics.bath import Bath
 from springcheck.physics.scene import Scene
 from springcheck.studies import keeper
 from springcheck.studies.arguments import Progress
-from springcheck.studies.census.baths import KT, MASS, STIFFNESS, springs, temperatures
 from springcheck.studies.choose import choose
 from springcheck.studies.keeper import How, Keeper, each
 from springcheck.studies.sampling.result import SAMPLED, Sampled, Sampling
-from springcheck.thermal import THERMOSTATS, Law
+from springcheck.studies.sampling.springs import KT, MASS, STIFFNESS, springs, temperatures
 
 OMEGA = float(np.sqrt(STIFFNESS / MASS))
 

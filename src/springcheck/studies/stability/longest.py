@@ -1,17 +1,14 @@
-"""The longest step at which a scheme stays bounded on a scene, from the spectral radius of its one-step map.
+"""The longest step at which a scheme stays bounded on a scene: the spectral radius of its one-step map.
 
 The map is that of the scene linearised where its motion is stiffest, with its friction, and with slow and
 fast springs separate for a scheme that treats them differently.  Uncoupled modes have a 2 x 2 matrix each;
-otherwise all eigenvalues are those of one 2n x 2n matrix.  A spring of modulated stiffness has no such map,
-and no longest step: a step may resonate with the modulation far below the limit on a spring as stiff, and be
-bounded again beyond it.  Of one step the product of many tells.
+otherwise all eigenvalues are those of one 2n x 2n matrix.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
-from typing import Any
+from functools import lru_cache, partial
 
 import numpy as np
 
@@ -19,46 +16,24 @@ from springcheck import schemes
 from springcheck.errors import SceneError
 from springcheck.physics import exact
 from springcheck.physics.arrays import ROUNDOFF, Extended, Floats, Force, Reals
-from springcheck.physics.driven import CLOCK, Drive, ModulatedSpring
-from springcheck.physics.exact.mathieu import floquet
 from springcheck.physics.scene import Scene
 from springcheck.physics.system import MOST_DENSE, System
-from springcheck.physics.terms import WallSpring, Weight
 from springcheck.schemes import Scheme
-from springcheck.studies.stability import propagators
+from springcheck.studies.stability.edges import COUPLED_GROWTH, first_growth, grows
 
-FIRST_STEP, LAST_STEP = 1e-9, 1e6
-"""Steps between which a limit is searched, in units of the fastest angular frequency or friction rate."""
+FIRST_STEP, LAST_STEP, SCANNED_STEPS = 1e-9, 1e6, 2048
+"""Range of the scan, in units of the fastest angular frequency or friction rate, and its steps: as many
+again are evenly spaced up to the scheme's limit."""
 
-SCANNED_STEPS = 4096
-"""Steps of the first scan, 1.008 from one to the next."""
-
-REFINED_STEPS = 256
-"""Steps of each refinement of the bracket."""
-
-SAMPLED_STATES = 512
-"""States of an anharmonic motion among which the stiffest is searched."""
-
-REFINEMENT = 64
-"""States in place of each interval about the stiffest, twice: the error of a maximum falls with the square of
-the interval, from 1e-5 of it to 1e-12."""
+SAMPLED_STATES, REFINEMENT = 512, 64
+"""States of an anharmonic motion among which the stiffest is searched, and those in place of each interval
+about it, twice: the error of a maximum falls with the square of the interval, from 1e-5 of it to 1e-12."""
 
 MOST_MODES = 64
 """Modes of a long chain that are examined: the fastest, the slowest, and some between."""
 
 MOST_COUPLED = 16
-"""Most particles whose modes a scheme or friction couples: a scan has SCANNED_STEPS matrices of 2n x 2n."""
-
-COUPLED_GROWTH = 1e-7
-"""Growth per step from which coupled modes count as growing: nearly equal eigenvalues of their matrix are
-known to the square root of the rounding only."""
-
-LEAST_DECAY = 2.0**-80
-"""Relative decay below which a mode counts as undamped: the square of 2**12 roundings."""
-
-MODULATED_STEPS = 8192
-"""Steps whose product shows whether a scheme grows on modulated springs: by more than their number squared,
-as at an edge of stability the product grows with their number."""
+"""Most particles whose modes a scheme or friction couples: a scan has thousands of 2n x 2n matrices."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -78,20 +53,10 @@ class Linear:
         a = np.asarray(w2, np.longdouble)[:, None, None]
         return cls(slow=a, fast=np.zeros_like(a), rate=np.asarray(rate, np.longdouble)[:, None])
 
-
-def is_modulated(scene: Scene) -> bool:
-    """Whether the stiffness of a spring is modulated."""
-    return any(isinstance(x, ModulatedSpring) for x in scene.terms)
-
-
-@lru_cache(maxsize=8)
-def _at_its_stiffest(scene: Scene) -> Scene:
-    """The scene with each spring of modulated stiffness at its largest stiffness."""
-    terms = tuple(
-        WallSpring(i=x.i, k=x.k + np.abs(x.k * x.depth), at=x.at) if isinstance(x, ModulatedSpring) else x
-        for x in scene.terms
-    )
-    return scene if terms == scene.terms else scene.derived(terms=terms)
+    @property
+    def w2(self) -> Floats:
+        """Squares of the angular frequencies without friction (g, n) [1/T2]."""
+        return np.asarray(np.linalg.eigvalsh(np.asarray(self.slow + self.fast, np.float64)))
 
 
 @lru_cache(maxsize=8)
@@ -136,12 +101,9 @@ def _scaled(system: System[Scene], q: Reals) -> Extended:
 
 @np.errstate(over="ignore", invalid="ignore")
 def fastest(scene: Scene) -> float:
-    """Largest angular frequency of a scene without its friction [1/T], 0 where nothing oscillates.
-
-    For an anharmonic scene, of small oscillations where it is `stiffest`; for a modulated spring, at its
-    largest stiffness.  SceneError where forces overflow there.
-    """
-    system = _at_its_stiffest(scene).system
+    """Largest angular frequency of a scene without its friction [1/T], 0 where nothing oscillates: of an
+    anharmonic scene that of small oscillations where it is `stiffest`.  SceneError where forces overflow."""
+    system = scene.system
     largest = float(np.max(system.modes.w2)) if system.has_modes else _largest(system, stiffest(scene))
     if not np.isfinite(largest):
         raise SceneError(f"scene {scene.name}: its forces at the start are beyond the range of numbers")
@@ -151,28 +113,20 @@ def fastest(scene: Scene) -> float:
 def linear(scene: Scene, scheme: Scheme) -> Linear | None:
     """The linearised motion that determines a scheme's stability on a scene.
 
-    None for more coupled particles than are examined, in a magnetic field, which is no stiffness, where
-    position-dependent friction acts on joined particles, and where a stiffness is modulated.
+    None for more coupled particles than are examined, and where position-dependent friction acts on joined
+    particles.
     """
-    system = scene.system
-    if (
-        "magnetic" in system.acting
-        or is_modulated(scene)
-        or (system.brakes_by_place and not system.is_separate)
-    ):
+    system, here = scene.system, stiffest(scene)
+    if system.brakes_by_place and not system.is_separate:
         return None
     if (scheme.has("mixes") and system.fast) or not (system.is_separate or system.has_one_friction_rate):
         if scene.n > MOST_COUPLED:
             return None
-        at = stiffest(scene).astype(np.longdouble)
-        parts = [
-            _scaled(System(scene.derived(terms=tuple(x for x in terms if x.kind == "potential"))), at)[None]
+        slow, fast = (
+            _scaled(System(scene.derived(terms=tuple(x for x in terms if x.kind == "potential"))), here)[None]
             for terms in (system.slow, system.fast)
-        ]
-        squares, turned = np.linalg.eigh(np.asarray(parts[0][0] + parts[1][0], np.float64))
-        if scheme.b and squares[0] >= -COUPLED_GROWTH * squares[-1]:
-            return _oscillators(squares, turned, np.asarray(system.friction_rates, np.float64))
-        return Linear(slow=parts[0], fast=parts[1], rate=system.friction_rates[None])
+        )
+        return Linear(slow=slow, fast=fast, rate=system.friction_rates[None])
     if system.has_modes:
         modes, rate = system.modes, system.modes.rate
         # no np.unique, which imports masked arrays
@@ -180,33 +134,12 @@ def linear(scene: Scene, scheme: Scheme) -> Linear | None:
         # independent particles have a friction each
         some = np.append(some, [np.argmax(rate), np.argmin(np.where(rate > 0, rate, np.inf))])
         return Linear.of_modes(modes.w2[some], rate[some])
-    here = stiffest(scene)
     if system.is_separate:
         return Linear.of_modes(system.hessian_diagonal(here) / system.m, system.friction_at(here)[0])
     w2 = np.array([_largest(system, here)])
     if scene.n <= MOST_DENSE:
         w2 = np.linalg.eigvalsh(_scaled(system, here).astype(np.float64))
     return Linear.of_modes(w2, np.broadcast_to(system.friction_rates[:1], w2.shape))
-
-
-def _oscillators(w2: Floats, modes: Floats, rate: Floats) -> Linear:
-    """Oscillators with the eigenvalues of modes that friction couples: a Runge-Kutta step needs no more.
-
-    In the modes the motion is a skew matrix minus C, so that an eigenvector (u, v) decays at the rate v* C
-    v/(u* u + v* v), which is accurate even beside large frequencies.
-    """
-    w, c = np.diag(np.sqrt(np.maximum(w2, 0))), modes.T @ (rate[:, None] * modes)
-    values, vectors = np.linalg.eig(np.block([[np.zeros_like(w), w], [-w, -c]]))
-    size, v = np.abs(vectors) ** 2, vectors[len(w) :]
-    decay = np.real(np.sum(v.conj() * (c @ v), axis=0)) / size.sum(axis=0)
-    # a vector is off by some roundings, so that an undamped one has a decay of their square
-    decay = np.where(decay > LEAST_DECAY * np.max(rate), decay, 0.0)
-    turns, alone = values.imag > 0, np.sort(decay[values.imag == 0])
-    one, other = alone[::2], alone[1::2]
-    return Linear.of_modes(
-        np.append(decay[turns] ** 2 + values.imag[turns] ** 2, one * other),
-        np.append(2 * decay[turns], one + other),
-    )
 
 
 def maps(scheme: Scheme, of: Linear, h: Floats) -> Extended:
@@ -229,23 +162,6 @@ def maps(scheme: Scheme, of: Linear, h: Floats) -> Extended:
     return np.swapaxes(np.concatenate([q, p], axis=-1), -1, -2)
 
 
-def eigenvalues(maps: Extended) -> np.ndarray:
-    """Eigenvalues (..., 2n) of maps, NaN of those that are not finite."""
-    finite = np.asarray(np.isfinite(maps).all(axis=(-1, -2)))
-    values = np.linalg.eigvals(np.where(finite[..., None, None], maps, 0).astype(np.float64))
-    return np.where(finite[..., None], values, np.nan)
-
-
-def grows(scheme: Scheme, of: Linear, h: Floats) -> np.ndarray:
-    """Whether a step of h (j,) [T] makes some mode grow; modes on a barrier (A < 0) grow anyway."""
-    found = maps(scheme, of, h)
-    if of.rate.shape[1] == 1:
-        wild = ~propagators.bounded(found.reshape(-1, 2, 2), 64 * ROUNDOFF).reshape(found.shape[:2])
-        return np.asarray(np.any(wild & ((of.slow + of.fast)[:, 0, 0] >= 0), axis=-1))
-    largest = np.max(np.abs(eigenvalues(found)), axis=-1)
-    return np.asarray(np.any(~(largest <= 1 + COUPLED_GROWTH), axis=-1))
-
-
 @lru_cache(maxsize=64)
 def limit_of(scheme: Scheme) -> float:
     """The largest h w of a scheme on a spring: by the catalogue, or for another scheme by its own map, as it
@@ -256,35 +172,45 @@ def limit_of(scheme: Scheme) -> float:
     return _first(scheme, Linear.of_modes(np.ones(1), np.zeros(1)), 1.0)
 
 
+@lru_cache(maxsize=64)
 def longest(scheme: Scheme, scene: Scene, limit: float | None = None) -> float:
     """The largest h [T] up to which every step is bounded: 0 none is, infinity all are, NaN unknown.
 
     For a scheme of multiple time steps that is where its first resonance begins.  `limit` replaces the
-    scheme's for an engine that departs from its map.
+    scheme's for an engine that departs from its map, on undamped modes.
     """
-    if is_modulated(scene):
-        # two steps that are bounded on every spring may resonate if their springs are not equally stiff
-        return np.nan
-    limit = limit_of(scheme) if limit is None else limit
-    if not scheme.has("one-step") or np.isinf(limit):
+    own = limit_of(scheme)
+    if not scheme.has("one-step") or (np.isinf(own) and limit is None):
         # a scheme that is bounded on every spring is bounded with friction too
         return np.inf
     of = linear(scene, scheme)
     if of is None:
         return np.nan
-    w2, known = np.linalg.eigvalsh(np.asarray(of.slow + of.fast, np.float64)), np.inf
+    w2, known = of.w2, np.inf
     if scheme.has("mixes") or w2.shape[1] > 1:
-        if np.min(w2) < -COUPLED_GROWTH * np.max(np.abs(w2)):
+        if limit is not None or np.min(w2) < -COUPLED_GROWTH * np.max(np.abs(w2)):
             return np.nan
     else:
         alone = (w2[:, 0] > 0) & (of.rate[:, 0] == 0)
         if np.any(alone):
-            # without friction the catalogue's limit has more digits than a scan
-            known = limit / float(np.sqrt(np.max(w2[alone])))
-        of = Linear(slow=of.slow[~alone], fast=of.fast[~alone], rate=of.rate[~alone])
-        w2 = w2[~alone]
+            # without friction the limit on a spring has more digits than a scan
+            known = (own if limit is None else limit) / float(np.sqrt(np.max(w2[alone])))
+        # modes on a barrier (A < 0) grow anyway
+        rest = ~alone & (w2[:, 0] >= 0)
+        of = Linear(slow=of.slow[rest], fast=of.fast[rest], rate=of.rate[rest])
+        w2 = w2[rest]
+        if limit is not None and np.any(of.rate):
+            return np.nan
     scale = max(float(np.sqrt(np.max(w2, initial=0.0))), float(np.max(of.rate, initial=0.0)))
     return min(known, _first(scheme, of, scale)) if scale else known
+
+
+def _first(scheme: Scheme, of: Linear, scale: float) -> float:
+    grid = np.geomspace(FIRST_STEP, LAST_STEP, SCANNED_STEPS)
+    if 0 < scheme.limit < np.inf:
+        # resonances may be narrow
+        grid = np.sort(np.append(grid, np.linspace(0, scheme.limit, SCANNED_STEPS + 1)[1:]))
+    return first_growth(partial(maps, scheme, of), grid / scale, 64 * ROUNDOFF)
 
 
 def too_long(name: str, scene: Scene) -> float | None:
@@ -296,105 +222,12 @@ def too_long(name: str, scene: Scene) -> float | None:
     h = np.array([abs(scene.step)])
     with np.errstate(all="ignore"):
         of = None if np.isinf(limit_of(scheme)) else linear(scene, scheme)
-        if of is None or not np.isfinite(of.slow + of.fast).all() or not grows(scheme, of, h)[0]:
+        if of is None or not np.isfinite(of.slow + of.fast).all():
+            return None
+        growing = grows(maps(scheme, of, h), 64 * ROUNDOFF)[0]
+        if of.rate.shape[1] == 1:
+            growing = growing & ((of.slow + of.fast)[:, 0, 0] >= 0)
+        if not np.any(growing):
             return None
         limit = longest(scheme, scene)
     return limit if 0 < limit < h[0] else None
-
-
-def resonating(name: str, scene: Scene) -> float | None:
-    """The factor by which a scheme's step multiplies the motion of modulated springs, on average, or of a
-    magnetic scene, if it grows where the exact solution stays bounded; else, of other scenes, and of a scheme
-    without stable steps None.
-    """
-    scheme = schemes.known().get(name)
-    if scheme is None or scheme.has("random") or not scheme.has("one-step") or not limit_of(scheme):
-        return None
-    if "magnetic" in scene.system.acting:
-        return _in_field(scheme, scene)
-    mixed = scheme.has("mixes") and scene.system.fast
-    about = _homogeneous(scene) if is_modulated(scene) and scene.n <= MOST_COUPLED and not mixed else None
-    exactly = about and floquet(about.system)
-    if about is None or not exactly or exactly[0] > 1:
-        return None
-    n, unit = about.n, about.m * fastest(about)
-    q, p = np.zeros((2, 2, MODULATED_STEPS, n + 1), np.longdouble)
-    q[..., n], p[..., n] = scene.step * np.arange(MODULATED_STEPS), CLOCK
-    q[0, :, :n], p[1, :, :n] = 1, unit
-    with np.errstate(all="ignore"):
-        q, p = schemes.Law(scheme=scheme, scene=about.system.clocked, h=scene.step).step(q, p)
-        maps = np.stack([q[..., :n], p[..., :n] / unit]).transpose(2, 3, 0, 1)
-        for _ in range(3):
-            maps = maps[1::2] @ maps[::2]
-        product, grown, largest = np.eye(2), np.zeros(n), np.zeros(n)
-        for one in maps:
-            product = one @ product
-            size = np.max(np.abs(product), axis=(1, 2))
-            product, grown = product / size[:, None, None], grown + np.log(size)
-            largest = np.maximum(largest, grown)
-    most = float(np.max(largest))
-    return float(np.exp(most / MODULATED_STEPS)) if most > 2 * np.log(MODULATED_STEPS) else None
-
-
-def _homogeneous(scene: Scene) -> Scene | None:
-    """One modulated spring about 0 on each particle, of all springs that act on it: differences between two
-    motions of the scene, whatever else moves them.  None where terms bend or join particles, or where two
-    modulations act on one."""
-    plain, forces = (WallSpring, ModulatedSpring), (Drive, Weight)
-    if not all(isinstance(x, (*plain, *forces)) or x.key == "damping" for x in scene.terms):
-        return None
-    springs = [x for x in scene.terms if isinstance(x, plain)]
-    found: list[Any] = [None] * scene.n
-    k = np.zeros(scene.n)
-    for x in springs:
-        np.add.at(k, x.i, x.k)
-        for i, *row in x.rows() if isinstance(x, ModulatedSpring) else ():
-            if found[i] is not None:
-                return None
-            found[i] = row[:4]
-    known = [row for row in found if row is not None]
-    if np.any(k == 0):
-        return None
-    # a plain spring is one of no depth
-    rows = [row or (0.0, 0.0, *known[0][2:]) for row in found]
-    alone, depth, frequency, phase = np.transpose(rows)
-    one = ModulatedSpring(
-        i=np.arange(scene.n), k=k, depth=alone * depth / k, frequency=frequency, phase=phase,
-        at=np.zeros(scene.n),
-    )  # fmt: skip
-    return scene.derived(terms=(one, *(x for x in scene.terms if x.key == "damping")))
-
-
-def _in_field(scheme: Scheme, scene: Scene) -> float | None:
-    """The spectral radius of a scheme's step in a magnetic field, if it grows and the exact solution does
-    not.  Kicks by the force of a field are explicit Euler's along p, and grow at every step."""
-    system, n = scene.system, scene.n
-    kicked = any(kind.evaluates in ("all", "slow") for kind in scheme.kinds)
-    bent = not all(x.is_linear or x.kind == "magnetic" for x in scene.terms)
-    if kicked or bent or n > MOST_COUPLED:
-        return None
-    if np.max(np.linalg.eigvals(system.jacobian(scene.q)).real) * abs(scene.step) > COUPLED_GROWTH:
-        return None
-    # differences from the step of the state 0, which constant forces move
-    q, p = np.split(np.eye(2 * n + 1, 2 * n, dtype=np.longdouble), 2, axis=1)
-    unit = scene.m / abs(scene.step)
-    with np.errstate(all="ignore"):
-        q, p = schemes.Law(scheme=scheme, scene=scene, h=scene.step).step(q, p * unit)
-        maps = np.concatenate([q, p / unit], axis=1)
-        values = np.linalg.eigvals((maps[:-1] - maps[-1]).astype(np.float64))
-    largest = float(np.max(np.abs(values)))
-    return largest if largest > 1 + COUPLED_GROWTH else None
-
-
-def _first(scheme: Scheme, of: Linear, scale: float) -> float:
-    """The first growing step of a scan, to a part in 1e10."""
-    h = np.geomspace(FIRST_STEP, LAST_STEP, SCANNED_STEPS) / scale
-    if scheme.has("mixes"):
-        # a resonance may be narrow: equal spacing up to the limit of the fast springs alone, and where
-        # eigenvalues meet
-        even = np.linspace(0, scheme.limit, SCANNED_STEPS + 1)[1:] / scale
-        with np.errstate(all="ignore"):
-            met = propagators.meetings(lambda h: eigenvalues(maps(scheme, of, h))[:, 0], even)
-        h = np.append(np.sort(np.append(even, met)), h[h > even[-1]])
-    with np.errstate(all="ignore"):
-        return propagators.first(lambda h: (grows(scheme, of, h), h), h, REFINED_STEPS, 6)

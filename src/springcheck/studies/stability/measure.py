@@ -1,8 +1,7 @@
-"""Limits of stability, measured on the engines' own propagators and compared with theory.
+"""Limits of stability: the largest h w of a method on a spring, measured on its engine's own one-step map.
 
-Every method of fixed step has its limit on a spring measured (`limits`).  A scene with friction adds the
-region of stability of a damped spring (`regions`), one with springs marked fast the resonances of multiple
-time steps (`resonance`), a modulated spring the Floquet multipliers of methods (`multipliers`).
+A limit is compared with that of the scheme's exact map, found by the same search, and with the limit that the
+scheme states.  The largest step on a scene follows from the scheme's map on the linearised scene (`longest`).
 """
 
 from __future__ import annotations
@@ -16,18 +15,26 @@ from typing import Unpack
 import numpy as np
 
 from springcheck import engines
-from springcheck.engines.contract import Label, Need
-from springcheck.errors import SceneError
+from springcheck.engines.contract import Label
+from springcheck.errors import MethodError
 from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
-from springcheck.schemes import scheme
 from springcheck.studies import keeper
 from springcheck.studies.arguments import Progress
-from springcheck.studies.choose import LeftOut, sorted_out
+from springcheck.studies.choose import sorted_out
 from springcheck.studies.keeper import How, Keeper, each
-from springcheck.studies.stability import limits, multipliers, propagators, regions, resonance
+from springcheck.studies.stability import propagators
+from springcheck.studies.stability.edges import first_growth, radius
 from springcheck.studies.stability.longest import fastest
-from springcheck.studies.stability.result import LIMITS, MULTIPLIERS, REGIONS, RESONANCES, Stability
+from springcheck.studies.stability.result import AGREED, LIMITS, Limit, Stability
+
+GRID = np.geomspace(1e-9, 1e6, 4096)
+"""h w of the scan, in a ratio of 1.008."""
+
+BLURRED = 16
+"""Factor on the rounding in a second search.  Growth beyond a limit is of some power n of the distance, so
+that rounding hides a distance r**(1/n), which changes by 16**(1/n) - 1 of itself, at least a quarter up to n
+= 12."""
 
 
 def record(
@@ -35,19 +42,9 @@ def record(
 ) -> Stability:
     """Measure the methods that these labels or globs name (all when none is given).
 
-    A store has tables under /stability, and the document (see `keeper.kept`).
-
-    Raises:
-        MethodError: a label names nothing, or none of the methods can be measured.
-        SceneError: forces of the scene overflow at its start, or it has rods.
+    Raises MethodError: a label names nothing, or none of the methods can be measured.  SceneError: forces of
+    the scene overflow at its start.
     """
-    if rods := scene.system.rods:
-        rate = float(np.max(rods.rates(scene.q, scene.p)))
-        here = f", here h < {1 / rate:.6g} at the rate of the start" if rate else ""
-        raise SceneError(
-            f"scene {scene.name} has rods, and stability is a study of springs: a rod that turns freely has "
-            f"a step below h w = 1{here}, and none beyond"
-        )
     fastest(scene)
     labels = engines.match(methods or ("*",), every=bool(methods))
     return keeper.study("stability", path, labels, partial(_measure, scene, labels), scene=scene, **how)
@@ -55,44 +52,46 @@ def record(
 
 def _measure(scene: Scene, labels: Sequence[Label], kept: Keeper) -> Stability:
     def why(label: Label) -> str | None:
-        method = engines.method(label)
+        claimed = propagators.scheme_of(label)
         if absent := engines.absence(label.engine):
             return absent
-        claimed = scheme(method.scheme)
         if not claimed.has("named"):
             return "its scheme is not known; --scheme NAME states it, and its limit is then measured"
         if not claimed.has("one-step"):
             return "it has no fixed step and no limit"
-        if Need.FIELD in method.requires:
-            return "limits are measured on springs alone, without the magnetic field that it needs"
-        if "wall-spring" not in method.terms:
+        if "wall-spring" not in engines.method(label).terms:
             return "it moves no springs"
-        scan = limits.FIRST_H_W, limits.LAST_H_W
-        return propagators.absence(label, *scan) or propagators.unstarted(scene, label)
+        try:
+            if engines.refusal(scene, label) is None:
+                engines.Started(scene, label)
+        except MethodError as error:
+            return str(error)
+        return propagators.absence(label, GRID[0], GRID[-1])
 
     usable, left_out = sorted_out(labels, why, "has a limit to measure")
-    braked = [label for label in usable if "damping" in engines.method(label).terms]
-    damped = braked if scene.system.is_damped else []
-    resonant = [label for label in usable if resonance.serves(scene, label)]
-    modulated = [label for label in usable if multipliers.serves(scene, label)]
-    plan = [
-        each(usable, "limit of", partial(partial, limits.measure), LIMITS),
-        each(damped, "region of", partial(partial, regions.measure), REGIONS),
-        each(resonant, "resonances of", lambda label: partial(resonance.measure, scene, label), RESONANCES),
-        each(
-            modulated, "multiplier of", lambda label: partial(multipliers.measure, scene, label), MULTIPLIERS
-        ),
-    ]
-    found = iter(kept.results([piece for part in plan for piece in part]))
-    of_limits, of_regions, of_resonances, of_multipliers = ([next(found) for _ in part] for part in plan)
-    return Stability(
-        scene=scene,
-        limits=tuple(of_limits),
-        regions=tuple(of_regions),
-        resonances=tuple(of_resonances),
-        multipliers=tuple(x for x in of_multipliers if not x.why),
-        left_out=(*left_out, *(LeftOut(method=x.method, reason=x.why) for x in of_multipliers if x.why)),
+    pieces = each(usable, "limit of", partial(partial, measure), LIMITS)
+    return Stability(scene=scene, limits=tuple(kept.results(pieces)), left_out=tuple(left_out))
+
+
+def measure(label: Label) -> Limit:
+    """Measure the limit of a method, and find that of its scheme's map at the engine's rounding."""
+    scheme, rounding = propagators.scheme_of(label), propagators.noise(label)
+    limit = first_growth(partial(propagators.measured, label), GRID, rounding)
+    exact, blurred = (
+        first_growth(partial(propagators.theory, label), GRID, times * rounding) for times in (1, BLURRED)
     )
+    # where rounding hides growth the limit moves with it, by less than this where the stated one is right
+    hidden = 0.0 if exact == blurred else 4 * min(abs(exact - blurred), abs(exact - scheme.limit))
+    centre = scheme.limit if 0 < scheme.limit < np.inf else 2.0
+    turn = np.sort(np.append(np.geomspace(centre / 20, 5 * centre, 40), centre))
+    of_engine, of_scheme = (
+        radius(maps(label, turn), rounding)[0][:, 0] for maps in (propagators.measured, propagators.theory)
+    )
+    return Limit(
+        method=str(label), scheme=scheme.title, limit=limit, theory=scheme.limit, exact=exact,
+        bound=max(hidden, (AGREED + 4 * rounding) * (exact if np.isfinite(exact) else 1.0)), h_w=turn,
+        radius=of_engine, radius_predicted=of_scheme,
+    )  # fmt: skip
 
 
 def perform(options: Namespace, progress: Progress | None) -> Stability:
@@ -105,11 +104,5 @@ def perform(options: Namespace, progress: Progress | None) -> Stability:
 @keeper.restoring("stability")
 def stored(kept: keeper.Kept) -> Stability:
     """The study that `record` has saved.  StoreError where the file holds none."""
-    return Stability(
-        scene=keeper.stored_scene(kept.path),
-        limits=kept.listed(LIMITS, "methods"),
-        regions=kept.listed(REGIONS, "regions"),
-        resonances=kept.listed(RESONANCES, "resonances"),
-        multipliers=kept.listed(MULTIPLIERS, "multipliers"),
-        left_out=kept.left_out,
-    )
+    scene, found = keeper.stored_scene(kept.path), kept.listed(LIMITS, "methods")
+    return Stability(scene=scene, limits=found, left_out=kept.left_out)

@@ -1,0 +1,381 @@
+"""The reference solution of a smooth scene: integrated in extended precision, twice, with a stated error.
+
+Collocation at the nodes of Radau IIA, of order 39 with 20 stages (Hairer & Wanner, Solving ODEs II, IV.8).
+A step is the step of the scene times a power of 2, so that no time is rounded, and as long as the Legendre
+series of the momenta just ends in rounding.  The stages are found by fixed-point iteration until rounding
+(Hairer, McLachlan & Razakarivony, BIT 48 (2008) 231), or by Newton's iteration where friction is stiff.
+States are sums with compensation.  Between the ends of steps the series gives every state.
+
+A second integration with fewer stages takes other steps, so that truncation and rounding differ.  It starts
+a rounding away, because both round the argument of a force alike, which near an unstable rest decides the
+motion.  The stated error is a multiple of the largest difference so far, plus other roundings that both
+share.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from springcheck.physics.arrays import EPS, Extended, Floats, by_identity
+from springcheck.physics.exact.closedform import ClosedForm, States, wide
+from springcheck.physics.exact.digits import digits, exactly, extended
+from springcheck.physics.system import System
+
+STAGES, FEWER_STAGES = 20, 16
+"""Stages of the integration that counts, and of the one that it is compared with."""
+NOISE = 32
+"""Largest share of the last two Legendre coefficients of a step, in units of rounding."""
+FELT = 8
+"""The stated error in units of the largest difference of both integrations."""
+FELT_ROUNDING = 4 * EPS
+"""The least stated error, relative to the largest size so far and to the time: roundings of the constants of
+a force are the same in both integrations."""
+MOST_ERROR = 1e-3
+"""The largest stated error of a reference, relative to the motion."""
+REST = 2.0**-32
+"""A smaller motion, relative to the positions or to the initial energy, counts as rest."""
+MOST_CORRECTIONS = 60
+MOST_CALLS = 200_000
+"""Calls of the force in one integration, each at all stages: 15 s for a few particles."""
+MOST_NUMBERS = 10_000_000
+"""Most calls times coordinates, which takes as long for many."""
+TRIAL_CALLS = 1_000
+"""Calls after which the number for the whole motion is estimated."""
+UNEVEN = 4
+"""Factor by which a motion may need fewer calls than estimated."""
+SHORTEST, LONGEST = -40, 16
+"""Powers of 2 of the shortest and of the longest step, in steps of the scene."""
+PATIENCE = 8
+"""Steps after a rejected one before a longer one is tried again."""
+STIFF = 4.0
+"""Friction rate times step from which Newton's iteration is used."""
+MOST_STIFF = 32
+"""Most coordinates for which it is."""
+PLACES = 8
+"""Points of each step at which both integrations are compared."""
+BLOCK = 256
+"""Steps that are compared at a time."""
+RULE_DIGITS = 50
+
+
+class NoReferenceError(ValueError):
+    """A motion that cannot be integrated here; the message says why."""
+
+
+@by_identity
+class Rule(NamedTuple):
+    """Nodes c (s,) on [0, 1]; A and A A (s, s), their last rows as a sum of two numbers (2, s); and the
+    matrix from values at the nodes to Legendre coefficients (s, s)."""
+
+    c: Extended
+    a: Extended
+    aa: Extended
+    end: Extended
+    end_twice: Extended
+    series: Extended
+
+
+def _legendre(x: Any, count: int) -> Any:
+    """P_0 to P_(count - 1) at x (r,) -> (r, count), in the arithmetic of x."""
+    found = [x * 0 + 1, x]
+    for j in range(1, count - 1):
+        found.append(((2 * j + 1) * x * found[j] - j * found[j - 1]) / (j + 1))
+    return np.stack(found[:count], axis=-1)
+
+
+def _integrals(x: Any, count: int) -> Any:
+    """Their integrals from -1 to x, halved for a step of length 1 (r, count)."""
+    p = _legendre(x, count + 1)
+    each = [(p[:, j + 1] - p[:, j - 1]) / (2 * (2 * j + 1)) for j in range(1, count)]
+    return np.stack([(x + 1) / 2, *each], axis=-1)
+
+
+def _parts(x: Any) -> Extended:
+    """Decimal numbers as a sum of two extended ones (2, ...)."""
+    high = extended(x)
+    return np.stack([high, extended(x - exactly(high))])
+
+
+@cache
+def rule(s: int) -> Rule:
+    """Radau IIA with s stages, computed in decimals."""
+    with digits(RULE_DIGITS):
+        # all nodes but the last are zeros of a Jacobi polynomial: eigenvalues of a symmetric matrix
+        k = np.arange(s - 1)
+        jacobi = np.diag(-1 / ((2 * k + 1) * (2 * k + 3)))
+        jacobi += np.diag((np.sqrt(k * (k + 1)) / (2 * k + 1))[1:], -1)
+        x = exactly(np.append(np.linalg.eigvalsh(jacobi), 1.0))
+        for _ in range(3):
+            y = x[:-1]
+            p = _legendre(y, s + 1)
+            # (x**2 - 1) P_n' = n (x P_n - P_(n-1))
+            one, other = (n * (y * p[:, n] - p[:, n - 1]) / (y * y - 1) for n in (s, s - 1))
+            x[:-1] = y - (p[:, s] - p[:, s - 1]) / (one - other)
+        p = _legendre(x, s)
+        series = exactly(np.linalg.inv(p.astype(np.float64)))
+        for _ in range(3):
+            series = series @ (2 * exactly(np.eye(s)) - p @ series)
+        a = _integrals(x, s) @ series
+        twice = a @ a
+        return Rule(
+            extended((1 + x) / 2), extended(a), extended(twice), _parts(a[-1]), _parts(twice[-1]),
+            extended(series),
+        )  # fmt: skip
+
+
+@cache
+def _onward(s: int, powers: int) -> Extended:
+    """Matrix (s, s) from the series of a step to values at the nodes of the next, 2**powers as long."""
+    return wide(_legendre(1 + 2 * rule(s).c * np.longdouble(2.0) ** powers, s))
+
+
+def _added(total: Extended, rest: Extended, change: Extended) -> tuple[Extended, Extended]:
+    """A sum and its rounding error (Knuth's two-sum), which is added the next time."""
+    change = change + rest
+    new = total + change
+    part = new - total
+    return new, (total - (new - part)) + (change - part)
+
+
+class Path:
+    """One integration of a scene's system from its start, in units of a step (which may be negative).
+
+    `done` (j + 1,) are the ends of its steps, and `series` (j, s, n) the momenta within each.
+    """
+
+    def __init__(self, system: System[Any], unit: float, stages: int, nudge: float = 0.0) -> None:
+        self.system, self.rule, self.stages = system, rule(stages), stages
+        self.m, self.q, self.p = wide(system.m), wide(system.q), wide(system.p)
+        # what rests exactly is not moved
+        moves = (self.p != 0) | (system.force(self.q, self.p) != 0)
+        self.q = self.q * (1 + np.where(moves, np.longdouble(nudge), 0))
+        self.q_rest, self.p_rest = np.zeros_like(self.q), np.zeros_like(self.p)
+        self.unit, self.power, self.calls, self.patience = np.longdouble(unit), 0, 0, 0
+        self.done, self.starts, self.series = [np.longdouble(0)], [self.q], list[Extended]()
+        self.powers = list[int]()
+        self.most = [np.abs(self.q), np.abs(self.p), *np.abs([self.p / self.m, 0 * self.q, 0 * self.q])]
+        """The largest |q|, |p|, |q'|, |p'| and |q - q(0)| so far (n,)."""
+
+    def _guess(self, power: int) -> Extended:
+        """Momenta at the nodes of the next step."""
+        if self.powers and power <= self.powers[-1] + 1:
+            return _onward(self.stages, power - self.powers[-1]) @ self.series[-1]
+        return np.tile(self.p, (self.stages, 1))
+
+    def _noise(self, h: Any, q: Extended, p: Extended) -> Extended:
+        """Rounding of the momenta of a step (n,)."""
+        force = self.system.magnitude(near=q)(np.abs(q), np.abs(p))
+        return wide(EPS * (np.max(np.abs(p), axis=0) + np.abs(h) * np.max(force, axis=0)))
+
+    def _stages(self, power: int) -> tuple[Extended, Extended, Extended, bool] | None:
+        """Momenta and forces at the nodes (s, n), the rounding of momenta (n,), and whether they are found by
+        Newton's iteration; None where it does not converge."""
+        h, of, m = self.unit * np.longdouble(2.0) ** power, self.rule, self.m
+        p, last, noise = self._guess(power), np.inf, None
+        rate = np.max(np.abs(self.system.friction_at(self.q)[0])) if self.system.is_damped else 0
+        stiff = bool(np.abs(h) * rate > STIFF) and len(m) <= MOST_STIFF
+        a, drift = h * of.a, self.q + np.multiply.outer(h * of.c, self.p / m)
+        twice = h * h * of.aa
+        q = self.q + (a @ p) / m
+        for _ in range(MOST_CORRECTIONS):
+            force = self.system.force(q, p)
+            self.calls += 1
+            if noise is None:
+                noise = self._noise(h, q, p)
+                safe = np.where(noise > 0, noise, 1)
+            found = self.p + a @ force
+            if stiff:
+                found = p - self._newton(np.asarray(a, np.float64), q, p, p - found)
+            off = float(np.max(np.abs(found - p) / safe))
+            p, q = found, self.q + (a @ found) / m if stiff else drift + (twice @ force) / m
+            if not np.isfinite(off) or off > 2 * max(last, NOISE) * (1e3 if stiff else 1):
+                return None
+            # an iteration that ends too early would drift like a systematic error
+            if off == 0 or (off <= NOISE and off >= last / 2):
+                return p, force, noise, stiff
+            last = off
+        return None
+
+    def _newton(self, a: Floats, q: Extended, p: Extended, residual: Extended) -> Extended:
+        """Newton's change of the momenta p (s, n) for a residual (s, n)."""
+        n, s, system = len(self.m), self.stages, self.system
+        rate, bend = system.friction_at(q)
+        unit = np.eye(n)
+        by_q = -np.asarray(system.hessian(q) + (bend * p)[..., None] * unit, np.float64)
+        by_p = -np.asarray(rate[..., None] * unit, np.float64)
+        matrix = np.einsum("ij,jab->iajb", a, by_p)
+        matrix += np.einsum("ik,kab,kj,b->iajb", a, by_q, a, np.asarray(1 / self.m, np.float64))
+        size = np.max(np.abs(residual)) or np.longdouble(1)
+        right = np.asarray(residual / size, np.float64).ravel()
+        try:
+            change = np.linalg.solve(np.eye(s * n) - matrix.reshape(s * n, s * n), right)
+        except np.linalg.LinAlgError:
+            return np.full_like(residual, np.nan)
+        return wide(change.reshape(s, n)) * size
+
+    def extend(self, end: Any) -> None:
+        """Integrate up to a time in units of the step.  Raises NoReferenceError."""
+        limit = min(MOST_CALLS, MOST_NUMBERS // len(self.m))
+        while self.done[-1] < end:
+            done = max(float(self.done[-1]), 2.0**SHORTEST)
+            if self.power < SHORTEST:
+                t = f"{done * float(self.unit):.6g}"
+                raise NoReferenceError(f"its motion or a force is singular at t = {t}, or not smooth")
+            expected = self.calls * float(end) / done
+            if self.calls > (TRIAL_CALLS if expected > UNEVEN * limit else limit):
+                raise NoReferenceError(
+                    f"it needs about {expected:.1g} calls of the force, and at most {limit} are made"
+                )
+            self._step()
+
+    def _step(self) -> None:
+        met, of, power = self._stages(self.power), self.rule, self.power
+        if met is not None:
+            p, force, noise, stiff = met
+            series = wide(of.series @ p)
+            tail = np.max(np.abs(series[-2:]) / np.where(noise > 0, noise, 1))
+        if met is None or not tail <= NOISE:
+            self.power, self.patience = power - 1, PATIENCE
+            return
+        h = self.unit * np.longdouble(2.0) ** power
+        if stiff:
+            change = h * (of.end[0] @ p + of.end[1] @ p) / self.m
+            self.p, self.p_rest = p[-1], 0 * self.p
+        else:
+            change = h * h * (of.end_twice[1] @ force + of.end_twice[0] @ force)
+            change = (h * self.p + (h * self.p_rest + change)) / self.m
+            self.p, self.p_rest = _added(self.p, self.p_rest, h * (of.end[1] @ force + of.end[0] @ force))
+        self.q, self.q_rest = _added(self.q, self.q_rest, change)
+        most = (self.q, p, p / self.m, force, self.q - self.starts[0])
+        self.most = [np.maximum(x, np.max(np.abs(y), axis=0)) for x, y in zip(self.most, most, strict=True)]
+        self.series.append(series)
+        self.starts.append(self.q)
+        self.powers.append(power)
+        self.done.append(self.done[-1] + np.longdouble(2.0) ** power)
+        self.patience -= 1
+        if tail <= 1 and power < LONGEST and self.patience < 0:
+            self.power += 1
+
+    def at(self, times: Extended) -> States:
+        """q and p (f, n) at times (f,) in units of the step, from 0 to the end; NaN beyond."""
+        j = np.clip(np.searchsorted(np.array(self.done), times) - 1, 0, len(self.powers) - 1)
+        length = np.longdouble(2.0) ** np.array(self.powers)[j]
+        x = 2 * (times - np.array(self.done)[j]) / length - 1
+        x = np.where((x >= -1) & (x <= 1), x, np.nan)
+        series, h = np.stack(self.series)[j], (self.unit * length)[:, None]
+        q = np.einsum("fs,fsn->fn", _integrals(x, self.stages), series)
+        p = np.einsum("fs,fsn->fn", _legendre(x, self.stages), series)
+        return np.stack(self.starts)[j] + h * q / self.m, p
+
+
+class ReferenceMotion(ClosedForm):
+    """The motion of a whole system by integration, with its stated error.
+
+    Raises NoReferenceError where the motion of its scene needs too many calls, or is singular.
+    """
+
+    def __init__(self, system: System[Any]) -> None:
+        self.n = system.n
+        super().__init__(system.beside(system.clocked))
+        self.paths: dict[int, tuple[Path, Path]] = {}
+        self.known: dict[int, tuple[Extended, Extended, Extended]] = {}
+        """By direction in time: ends of steps (j,), and the largest errors of q and p up to these (j, n)."""
+        self._reach(1, np.longdouble(system.scene.steps))
+        _, *errors = self.known[1]
+        most, amplitude = self.paths[1][0].most, REST * wide(system.amplitudes[1])
+        sizes = (
+            np.maximum(most[4], REST * most[0]),
+            np.maximum(most[1], np.append(amplitude, most[1])[: len(most[1])]),
+        )
+        for error, size in zip(errors, sizes, strict=True):
+            share = np.max(error[-1]) * FELT / (np.max(size[: self.n]) or 1)
+            if not share <= MOST_ERROR:
+                raise NoReferenceError(
+                    f"the error of its reference solution reaches {share:.1g} of the motion"
+                )
+
+    @np.errstate(all="ignore")
+    def _reach(self, sign: int, end: Any) -> None:
+        """Integrate up to a time in units of the step, and compare both integrations."""
+        if sign not in self.paths:
+            unit = sign * self.system.scene.step
+            self.paths[sign] = (
+                Path(self.system, unit, STAGES),
+                Path(self.system, unit, FEWER_STAGES, nudge=EPS),
+            )
+        one, other = self.paths[sign]
+        ends, dq, dp = self.known.get(sign, (np.zeros(1, np.longdouble), *[np.zeros((1, self.n))] * 2))
+        if ends[-1] >= end:
+            return
+        for path in (one, other):
+            path.extend(end)
+        done = np.array(one.done)
+        inside = np.arange(1, PLACES + 1) / np.longdouble(PLACES)
+        for j in range(len(ends) - 1, len(done) - 1, BLOCK):
+            some = done[j : j + BLOCK + 1]
+            places = (some[:-1, None] + np.diff(some)[:, None] * inside).ravel()
+            # the other one may end a little earlier
+            places = np.minimum(places, other.done[-1])
+            both = zip(one.at(places), other.at(places), strict=True)
+            apart = [np.abs(x - y)[:, : self.n].reshape(-1, PLACES, self.n).max(axis=1) for x, y in both]
+            dq, dp = (np.concatenate([x, y]) for x, y in zip((dq, dp), apart, strict=True))
+        dq, dp = (np.maximum.accumulate(x, axis=0) for x in (dq, dp))
+        self.known[sign] = done, dq, dp
+
+    def at(self, t: Extended) -> States:
+        """NaN at times that are not reached."""
+        times = t[:, 0] / np.longdouble(self.system.scene.step)
+        q, p = np.full((2, len(t), self.n), np.nan, np.longdouble)
+        for sign, mine in ((1, times >= 0), (-1, times < 0)):
+            if np.any(mine):
+                with contextlib.suppress(NoReferenceError):
+                    self._reach(sign, np.max(np.abs(times[mine])))
+                path = self.paths[sign][0]
+                if path.powers:
+                    q[mine], p[mine] = (x[:, : self.n] for x in path.at(np.abs(times[mine])))
+        start = times == 0
+        q[start], p[start] = self.system.q[: self.n], self.system.p[: self.n]
+        return q, p
+
+    @np.errstate(all="ignore")
+    def doubt(self, t: np.longdouble) -> States:
+        times = t / np.longdouble(self.system.scene.step)
+        sign, times = (1 if times >= 0 else -1), np.abs(times)
+        try:
+            self._reach(sign, times)
+        except NoReferenceError:
+            q, p = np.full((2, self.n), np.inf, np.longdouble)
+            return q, p
+        ends, dq, dp = self.known[sign]
+        j = int(np.searchsorted(ends, times))
+        q, p, v, force, _ = (x[: self.n] for x in self.paths[sign][0].most)
+        return (
+            wide(FELT * dq[j] + FELT_ROUNDING * (q + np.abs(t) * v)),
+            wide(FELT * dp[j] + FELT_ROUNDING * (p + np.abs(t) * force)),
+        )
+
+
+MOST_STORED = 32
+_STORED: dict[str, ReferenceMotion | str] = {}
+"""The latest references, or why there is none, by the digests of their scenes."""
+
+
+def reference(system: System[Any]) -> ReferenceMotion:
+    """The motion of a whole system.  Raises NoReferenceError."""
+    key = system.scene.digest
+    found = _STORED.pop(key, None)
+    if found is None:
+        try:
+            found = ReferenceMotion(system)
+        except NoReferenceError as error:
+            found = str(error)
+    _STORED[key] = found
+    while len(_STORED) > MOST_STORED:
+        del _STORED[next(iter(_STORED))]
+    if isinstance(found, str):
+        raise NoReferenceError(found)
+    return found
