@@ -342,7 +342,7 @@ def test_the_claim_of_a_journal_that_cannot_be_read_is_told(tmp_path: Path) -> N
     claim = folder_of(path) / "command"
     assert json.loads(claim.read_bytes())["command"] == "run"
     claim.write_bytes(b"{")
-    with pytest.raises(StoreError, match="stands where the journal goes"):
+    with pytest.raises(StoreError, match="stands where its journal goes"):
         store.open_new(path, "run")
 
 

@@ -107,7 +107,7 @@ def _loaded(name: str, place: str) -> Engine | str:
 def foreign(what: str, file: str = "") -> Iterator[None]:
     """Run foreign code: whatever it raises becomes a MethodError "`what`: why", and `os._exit` raises."""
     process, leave = os.getpid(), os._exit
-    os._exit = sys.exit
+    os._exit = sys.exit  # type: ignore[assignment]
     try:
         yield
     except (SpringcheckError, Stopped, KeyboardInterrupt):

@@ -23,6 +23,8 @@ MOST_OBJECTS = 64 * access.MOST_MEMBERS
 DEEPEST = 10
 BLOCK = 1 << 20
 """Bytes that are hashed at a time."""
+HOLES = 64
+"""Largest ratio of the bytes that arrays claim to those that their file takes on the disk."""
 _SCALES = {"CLASS", "NAME", "REFERENCE_LIST", "DIMENSION_LIST"}
 """Attributes of dimension scales: addresses in the file, which a copy changes."""
 
@@ -92,6 +94,10 @@ def contents(file: Any) -> tuple[dict[str, str], list[Extent]]:
         if one.offset < end:
             raise StoreError(f"cannot read {file.filename}: {one.name} overlaps another array")
         end = one.offset + one.size
+    # a file of holes would be hashed for hours
+    blocks = getattr(Path(file.filename).stat(), "st_blocks", end) if file.mode == "r" else end
+    if end > HOLES * 512 * blocks:
+        raise StoreError(f"cannot read {file.filename}: its arrays are holes, which take no room on the disk")
     return found, extents
 
 
