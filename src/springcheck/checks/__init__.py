@@ -21,7 +21,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from springcheck.checks import experiments, laws, thermal
+from springcheck.checks import bath, experiments, laws
 from springcheck.checks.bench import Bench, Run
 from springcheck.checks.case import Case
 from springcheck.checks.check import DECADES, Check, over_pieces, shared
@@ -34,7 +34,7 @@ from springcheck.checks.motion import (
     shadow_energy,
 )
 from springcheck.checks.record import energies, grid, line, start, times
-from springcheck.checks.requires import CONTRACTED, REQUIREMENTS
+from springcheck.checks.requires import CONTRACTED
 from springcheck.checks.solver import tolerance, tolerance_bound
 from springcheck.checks.steps import BLIND, arithmetic, bridges, seldom_off, step_defect
 from springcheck.errors import MethodError
@@ -43,7 +43,7 @@ from springcheck.physics.trajectory import Limits, Trajectory, Verdict
 from springcheck.text.wording import STATES_SHOW, count, few
 
 __all__ = [
-    "ALL", "BLIND", "CHECKS", "CONTRACTED", "RANDOM", "SPECIAL", "STATES_SHOW", "TELLING", "THOROUGH",
+    "ALL", "BLIND", "CHECKS", "CONTRACTED", "RANDOM", "STATES_SHOW", "TELLING", "THOROUGH",
     "Bench", "Case", "Check", "Run", "angular_momentum", "arithmetic", "bridges", "cause_of",
     "closed_form", "energies", "experiments_of", "first_off", "frequency", "judge", "judge_thoroughly",
     "momentum", "not_judged", "shadow_energy", "shared", "start", "status", "step_defect", "summary",
@@ -63,14 +63,11 @@ THOROUGH: tuple[Check, ...] = (
 
 ALL: tuple[Check, ...] = (*CHECKS, *THOROUGH)
 
-RANDOM: tuple[Check, ...] = (start, times, grid, energies, *thermal.DRAWN)
+RANDOM: tuple[Check, ...] = (start, times, grid, energies, *bath.DRAWN)
 """Checks of a thermostat's trajectory, to which no law of deterministic motion applies."""
 
-TELLING = frozenset(["identified", *(one.name for one in (*ALL, *thermal.DRAWN) if one.telling)])
+TELLING = frozenset(["identified", *(one.name for one in (*ALL, *bath.DRAWN) if one.telling)])
 """Checks that distinguish the scheme that a method claims from others; `identified` is of a file's states."""
-
-SPECIAL = frozenset(one.name for one in CHECKS if any(REQUIREMENTS[x].special for x in one.requires))
-"""Checks that apply to few runs."""
 
 MOST_NAMED = 8
 """Most methods or checks that a summary names."""

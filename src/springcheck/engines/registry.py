@@ -22,7 +22,8 @@ import springcheck
 from springcheck import schemes
 from springcheck.bath import THERMOSTATS
 from springcheck.engines.contract import ANY_POTENTIAL, Engine, Method, Stopped
-from springcheck.errors import MethodError, SpringcheckError, nearest, told
+from springcheck.engines.restored import restored
+from springcheck.errors import EngineError, MethodError, SpringcheckError, nearest, told
 from springcheck.physics import terms
 
 GROUP = "springcheck.engines"
@@ -105,15 +106,16 @@ def _loaded(name: str, place: str) -> Engine | str:
 
 @contextmanager
 def foreign(what: str, file: str = "") -> Iterator[None]:
-    """Run foreign code: whatever it raises becomes a MethodError "`what`: why", and `os._exit` raises."""
+    """Run foreign code: whatever it raises becomes an EngineError "`what`: why", and `os._exit` raises."""
     process, leave = os.getpid(), os._exit
     os._exit = sys.exit  # type: ignore[assignment]
     try:
-        yield
+        with restored():
+            yield
     except (SpringcheckError, Stopped, KeyboardInterrupt):
         raise
     except BaseException as error:
-        raise MethodError(f"{what}: {told(error, file)}") from error
+        raise EngineError(f"{what}: {told(error, file)}") from error
     finally:
         os._exit = leave
         if os.getpid() != process:

@@ -119,7 +119,7 @@ def _claimed(path: Path, parts: Path, command: str, *, force: bool) -> str:
             _remove(parts, "springcheck", "collection")
             _look_at_parts(parts, known.run)
             return known.run
-        if not force and not known.failed:
+        if not force:
             raise StoreError(
                 f"{parts} holds finished work of another command, or of other versions of what it runs: "
                 "give that command again to complete it, or --force to discard it"
@@ -244,13 +244,6 @@ class Journal:
 
     def _part(self, kind: str, name: str) -> Path:
         return self.folder / f"{kind}-{quote(name, safe='@-._')}.h5"
-
-    def fail(self) -> None:
-        """Note that a method of this command failed.  The same command resumes what is finished; any other,
-        such as the corrected one, may replace it."""
-        if known := claim(self.folder):
-            with files.told(self.folder, "write"):
-                msgspec.structs.replace(known, failed=True).write(self.folder)
 
     def close(self) -> None:
         """Release the lock; what is finished stays for the next writer."""

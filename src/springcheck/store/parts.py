@@ -19,13 +19,12 @@ TRIAL = "springcheck.store.checking"
 
 
 class Claim(msgspec.Struct, frozen=True, kw_only=True):
-    """Claim on a journal: run id and command, whether --force began it, and whether a method failed."""
+    """Claim on a journal: run id and command, and whether --force began it."""
 
     format: Literal["springcheck journal 2"] = "springcheck journal 2"
     run: str
     command: str
     forced: bool
-    failed: bool = False
 
     def write(self, folder: Path) -> None:
         """Put it into the journal."""
