@@ -633,7 +633,6 @@ LIMITED = {
     "run --from": ("run", "--from", "input.h5"),
     "stability": ("stability", "spring-uneven", "--method", "own:*euler"),
     "extremes": ("extremes", "--quick", "--method", "own:euler"),
-    "faults": ("faults",),
     "plot": ("plot", "input.h5", "-o", "figures"),
     "identify": ("identify", "input.h5"),
 }

@@ -248,7 +248,10 @@ def _curve(axes: Axes, curve: Curve, number: int, most: int, chart: Chart) -> No
     drawn: dict[str, Any] = {"color": look.color, "label": curve.name, "zorder": 2 + 1.2 * high}
     if curve.band is not None:
         low, top = (_drawable(one, scales[1]) for one in curve.band)
-        axes.fill_between(x, low, top, color=look.color, alpha=0.2, linewidth=0)
+        if curve.line:
+            axes.fill_between(x, low, top, color=look.color, alpha=0.2, linewidth=0)
+        else:
+            axes.vlines(x, low, top, color=look.color, linewidth=1)
     if curve.dots and not curve.over:
         axes.plot(x, y, ".", markersize=3 + 2 * high, **drawn)
         if curve.line:

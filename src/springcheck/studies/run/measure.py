@@ -18,7 +18,7 @@ import numpy as np
 from springcheck import checks, driver, engines, interrupts
 from springcheck.checks import compare
 from springcheck.engines.contract import Label
-from springcheck.errors import MethodError, SpringcheckError, StoreError
+from springcheck.errors import EngineError, MethodError, SpringcheckError, StoreError
 from springcheck.physics import exact, memory
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import NOT_KNOWN, Comparison, Trajectory, Verdict
@@ -26,7 +26,8 @@ from springcheck.studies import keeper
 from springcheck.studies.arguments import Progress
 from springcheck.studies.choose import LeftOut, choose
 from springcheck.studies.run.changes import changed
-from springcheck.studies.run.result import FAULT, Repeat, Repeats, Report, Stored
+from springcheck.studies.run.faulty import FAULT
+from springcheck.studies.run.result import Repeat, Repeats, Report, Stored
 from springcheck.studies.run.tally import Tally, line
 
 if TYPE_CHECKING:
@@ -101,8 +102,8 @@ def run(
     `thorough` adds the experiments, whose runs are not stored; `faults` adds engines broken on purpose, as
     NAME or NAME=SIZE; `seed` is that of the random methods, drawn by default. Raises SpringcheckError for all
     errors that a user can correct; finished work then stays in the journal, and an existing file is
-    unchanged.  So it is where a method that was requested fails beside others: their report lists it under
-    `broke`.
+    unchanged.  A method that fails next to others is listed under `broke` of their report, which is stored:
+    one that was requested, or one of an engine of springcheck that is installed.
     """
     path = Path(path)
     if seed is not None and not scene.bath:
@@ -112,6 +113,8 @@ def run(
         )
     seeds = {"seed": driver.checked_seed(seed)} if scene.bath else {}
     labels, left, others = choose(scene, methods)
+    globs = [one for one in methods if one != engines.UNNAMED]
+    requested = engines.match(globs, bath=scene.bath is not None, every=True)
     wrong: list[Broken] = []
     if faults:
         from springcheck.studies.run.faulty import broken
@@ -142,14 +145,17 @@ def run(
                 if len(labels) == 1:
                     raise
                 labels.remove(label)
-                if str(label) in methods:
+                fails = isinstance(error, EngineError) and (
+                    label in requested or engines.origin(label.engine).package == engines.OURS
+                )
+                if fails or str(label) in methods:
                     broke[str(label)] = str(error)
                 else:
                     left.append(LeftOut(method=str(label), reason=str(error)))
         for one in wrong:
             if one.label not in resumed:
                 with journal.draft(one.label, scene) as draft:
-                    one.play(scene, draft, **seeds)
+                    one.play(scene, draft)
         names = (*(str(label) for label in labels), *(one.label for one in wrong))
         sources = journal.sources()
         report = judge(scene, path, {name: sources[name] for name in names}, left, resumed=resumed)
@@ -161,9 +167,7 @@ def run(
                 more = checks.judge_thoroughly(scene, str(label), driver.run, tried, progress=told, **seeds)
                 report = replace(report, verdicts=(*report.verdicts, *more))
         report = replace(report, verdicts=tuple(checks.shared(report.verdicts)))
-        if broke:
-            journal.fail()
-            return replace(report, broke=broke)
+        report = replace(report, broke=broke)
         journal.commit(scene, comparison=report.comparison, verdicts=report.verdicts)
     return report
 
