@@ -67,7 +67,7 @@ def _usable(engine: engines.Engine) -> Iterator[str]:
     for place in engine.platforms if method else ():
         if "-" not in place:
             try:
-                engines.start(scene, engines.parse(f"{engine.name}:{method}@{place}"))
+                engines.Started(scene, engines.parse(f"{engine.name}:{method}@{place}"))
             except MethodError:
                 continue
             yield place

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 PIPE_WIDTH = 1 << 16
 """Width of output that is not a terminal's: its reader wraps long lines."""
 
-SCHEMAS = {"faults": 2, "stability": 2}
+SCHEMAS = {"stability": 2}
 """Versions of JSON documents, 1 of the others: raised where a name is removed or changes its meaning, and not
 where one is added."""
 

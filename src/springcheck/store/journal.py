@@ -17,8 +17,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from urllib.parse import quote
 
-import msgspec
-
 from springcheck import interrupts
 from springcheck.errors import StoreError, StoreWarning, plain
 from springcheck.physics.scene import Scene

@@ -27,7 +27,8 @@ from springcheck.studies import keeper
 from springcheck.studies.arguments import Progress
 from springcheck.studies.choose import LeftOut, choose
 from springcheck.studies.run.changes import changed
-from springcheck.studies.run.result import FAULT, Repeat, Repeats, Report, Stored
+from springcheck.studies.run.faulty import FAULT
+from springcheck.studies.run.result import Repeat, Repeats, Report, Stored
 from springcheck.studies.run.tally import Tally, line
 
 if TYPE_CHECKING:
@@ -158,7 +159,7 @@ def run(
         for one in wrong:
             if one.label not in resumed:
                 with journal.draft(one.label, scene) as draft:
-                    one.play(scene, draft, **seeds)
+                    one.play(scene, draft)
         names = (*(str(label) for label in labels), *(one.label for one in wrong))
         sources = journal.finished()
         gathered = _Exact(scene, names)
