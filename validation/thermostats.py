@@ -162,7 +162,7 @@ def figure() -> None:
 
     here = [label for label in METHODS if not engines.absence(label.partition(":")[0])]
     with style():
-        drawn = springcheck.sampling(here).figures()["sampling-temperatures"]
+        drawn = springcheck.sampling(here).figures()["sampling"]
         drawn.savefig(FIGURE, dpi=110)
     print(f"  {FIGURE.name} written")
 

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from springcheck import interrupts
 from springcheck.errors import SpringcheckError, plain
 from springcheck.store import files
 from springcheck.studies.arguments import REPORT_FORMS
@@ -212,7 +211,7 @@ def _write(options: Namespace, found: list[Case], status: int) -> None:
     if options.summary:
         text = summary(options.name, found, status).encode()
         where = Path(options.summary)
-        with files.told(where, "write"), interrupts.held(), where.open("ab") as file:
+        with files.told(where, "write"), where.open("ab") as file:
             file.write(text)
 
 
