@@ -86,6 +86,8 @@ class Rude:
         self._q, self._p = scene.q.copy(), scene.p.copy()
         with pytest.raises(ValueError, match="read-only"):
             scene.q[0] = 0.0
+        with pytest.raises(ValueError, match="WRITEABLE"):
+            scene.q.setflags(write=True)
         with pytest.raises(ValueError, match="read-only"):
             scene.terms[0].arrays["k"][0] = 0.0
         self._change()

@@ -202,7 +202,8 @@ def not_exercised(scene: Scene) -> str:
         "friction": bool(system.is_damped or scene.bath),
         "drives": system.is_driven,
     }
-    return f"Not exercised here: {', '.join(name for name, is_so in facts.items() if not is_so)}"
+    names = [name for name, is_so in facts.items() if not is_so]
+    return f"Not exercised here: {', '.join(names)}" if names else ""
 
 
 def worst(pieces: Sequence[Sequence[Verdict]]) -> list[Verdict]:
