@@ -10,7 +10,9 @@ import mpmath
 import numpy as np
 import pytest
 
+import fault_table as table
 import springcheck
+import textbook as steppers
 from springcheck import checks, engines, schemes
 from springcheck.cli import file
 from springcheck.doors import function
@@ -29,8 +31,7 @@ from springcheck.physics.terms import (
     Term,
     WallSpring,
 )
-from springcheck.studies.faults import measure, space, steppers, table
-from springcheck.studies.faults.seeded import Case
+from textbook import Case
 
 ONE = np.array([0])
 OWN = [f"own:{'euler' if x.name == 'explicit-euler' else x.name}" for x in schemes.SCHEMES.values()
@@ -283,7 +284,7 @@ def test_a_file_of_a_clock_that_adds_up_its_steps_is_judged_at_its_times(tmp_pat
 
 @pytest.mark.parametrize("fault", table.DRIVES, ids=lambda fault: fault.name)
 def test_a_drive_that_is_wrong_is_rejected_and_named(fault: Any) -> None:
-    scene = measure.scene(fault.scene)
+    scene = table.scene(fault.scene)
     assert MISPLACED[fault.name] in sentence(scene, fault.run(scene))
 
 
@@ -299,7 +300,7 @@ def test_another_scheme_is_not_taken_for_another_time(scheme: str, other: str, s
     scene = replace(scenes.load_scene("driven-spring"), steps=60)
     law = schemes.SCHEMES[scheme]
     if other == "late":
-        run = steppers.record(scene, law, space.clocked(Case(scene=scene, scheme=law, x=0.0), 1.0))
+        run = steppers.record(scene, law, table.clocked(Case(scene=scene, scheme=law, x=0.0), 1.0))
     else:
         run = steppers.record(scene, law, steppers.textbook(scene, schemes.SCHEMES[other]))
     why = sentence(scene, run)
@@ -515,7 +516,7 @@ def test_a_driven_mode_that_neither_turns_nor_grows_has_no_closed_form_here() ->
 
 
 def test_the_check_of_the_drive_holds_its_tongue_where_the_spring_is_wrong() -> None:
-    scene = measure.scene("driven")
+    scene = table.scene("driven")
     wall = next(term for term in scene.terms if isinstance(term, WallSpring))
     stiffer = scene.derived(
         terms=tuple(replace(x, k=x.k * (1 + 1e-9)) if x is wall else x for x in scene.terms)

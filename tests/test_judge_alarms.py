@@ -12,13 +12,13 @@ import pytest
 
 import clean
 import springcheck
+import textbook as steppers
 from springcheck import checks, driver, engines, schemes
 from springcheck.physics import exact
 from springcheck.physics.arrays import Arithmetic, Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Cosine, Damping, Morse, Quartic, Spring, Term, WallSpring
 from springcheck.physics.trajectory import Trajectory, Verdict
-from springcheck.studies.faults import steppers
 
 FIXED = [
     n for n, s in schemes.SCHEMES.items() if s.has("one-step") and not s.has("flow") and not s.has("mixes")
