@@ -86,7 +86,7 @@ def load(name: str) -> Engine:
     reason = absence(name)
     if reason:
         raise MethodError(reason)
-    with foreign(name, f"engine {name!r}: its version() failed"):
+    with foreign(f"engine {name!r}: its version() failed"):
         try:
             said = _imported(found.version)
         except ImportError as error:
@@ -109,7 +109,7 @@ def guarded(label: Label, call: Callable[..., T], *arguments: object, form: str 
     So does the way in which the engine has ended an earlier process of this command (see `foreign`).  `form`
     is the call as the contract writes it, for the message where a function takes other arguments.
     """
-    with foreign(str(label), f"{label} failed", origin(label.engine).package):
+    with foreign(f"{label} failed", origin(label.engine).package):
         try:
             return call(*arguments)
         except TypeError as error:

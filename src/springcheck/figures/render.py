@@ -33,7 +33,7 @@ from springcheck.figures.charts import (
 from springcheck.physics.arrays import Floats
 
 TILES_SHADED = {
-    "good": "#9ecae1", "wild": "#fee391", "limit": "#d94801", "refused": "#bdbdbd", "wrong": "#000000",
+    "good": "#9ecae1", "wild": "#fee391", "limit": "#8c6bb1", "refused": "#bdbdbd", "wrong": "#dd0033",
     "s0": "#fff7d6", "s1": "#fee08b", "s2": "#fdb863", "s3": "#f08a4b", "s4": "#cf4e4e", "s5": "#96295f",
     "s6": "#4b1250",
 }  # fmt: skip
