@@ -17,8 +17,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
-import numpy as np
-
 from springcheck import __version__
 from springcheck.errors import SpringcheckError
 from springcheck.studies.arguments import Argument, argument
@@ -128,6 +126,9 @@ class Cluster:
 
 
 def _versions() -> dict[str, str]:
+    """Versions that numbers depend on, of this process."""
+    import numpy as np
+
     return {"springcheck": __version__, "numpy": np.__version__, "python": sys.version.split()[0]}
 
 
