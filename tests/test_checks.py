@@ -283,4 +283,4 @@ def test_no_list_beside_the_declarations_names_a_check() -> None:
     studies = (Path(checks.__file__).parents[1] / "studies").rglob("*.py")
     text = "".join(path.read_text() for path in studies if path.parent.name != "faults")
     assert [one.name for one in checks.ALL if "-" in one.name and f'"{one.name}"' in text] == []
-    assert sorted(checks.SPECIAL & checks.TELLING) == ["gyration", "turn"]
+    assert sorted(checks.SPECIAL & checks.TELLING) == ["turn"]

@@ -17,13 +17,11 @@ from springcheck.engines.own.vectors import Vectors
 from springcheck.errors import MethodError, SceneError
 from springcheck.physics import exact
 from springcheck.physics import scenefile as scenes
-from springcheck.physics.exact.mathieu import floquet
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import (
     Cosine,
     Damping,
     Drive,
-    ModulatedSpring,
     Quartic,
     Spring,
     Term,
@@ -33,7 +31,6 @@ from springcheck.studies.faults import measure, space, steppers, table
 from springcheck.studies.faults.seeded import Case
 
 ONE = np.array([0])
-SCENES = ("driven-spring", "mathieu-stable", "mathieu-tongue")
 OWN = [f"own:{'euler' if x.name == 'explicit-euler' else x.name}" for x in schemes.SCHEMES.values()
        if x.has("one-step") and not x.has("mixes") and not x.has("friction")]  # fmt: skip
 
@@ -129,9 +126,8 @@ def test_a_free_particle_feels_the_drive_at_the_abscissae_of_the_scheme(label: s
 
 
 @pytest.mark.parametrize("label", OWN)
-@pytest.mark.parametrize("name", SCENES)
-def test_every_own_method_takes_a_driven_scene_to_rounding(name: str, label: str) -> None:
-    scene = replace(scenes.load_scene(name), steps=60)
+def test_every_own_method_takes_a_driven_scene_to_rounding(label: str) -> None:
+    scene = replace(scenes.load_scene("driven-spring"), steps=60)
     verdicts = {v.check: v for v in checks.judge(scene, springcheck.simulate(scene, label))}
     assert verdicts["step-defect"].passed is True
     assert not [v.check for v in verdicts.values() if v.passed is False]
@@ -148,7 +144,7 @@ def beside(name: str) -> Scene:
         "ring": (Spring(a=i, b=np.roll(i, 1), k=0.7 + 0.1 * i, rest=0.3 - 0.2 * i), drives, brake),
         "well": (
             Quartic(i=i, b=0.4 + 0.1 * i, at=0.1 * i), Cosine(i=i, depth=0.3 + 0.0 * i, wave=1.3, at=0.2),
-            drives, brake, ModulatedSpring(i=i, k=0.2 * i, depth=0.4, frequency=2.1, phase=0.1, at=0.3),
+            drives, brake,
         ),
     }  # fmt: skip
     q, p = np.cos(1.0 + i), np.sin(2.0 * i)
@@ -157,10 +153,10 @@ def beside(name: str) -> Scene:
     )
 
 
-@pytest.mark.parametrize("name", [*SCENES, "chain", "ring", "well"])
+@pytest.mark.parametrize("name", ["driven-spring", "chain", "ring", "well"])
 @pytest.mark.parametrize("label", OWN)
 def test_the_loops_move_a_driven_scene_to_the_bit_as_numpy_does(name: str, label: str) -> None:
-    scene = beside(name) if name not in SCENES else replace(scenes.load_scene(name), steps=40)
+    scene = replace(scenes.load_scene(name), steps=40) if name == "driven-spring" else beside(name)
     scheme = schemes.scheme(engines.method(engines.parse(label)).scheme)
     if scheme.has("implicit"):
         assert isinstance(prepare(scene, scheme, scene.step)._how, Vectors)
@@ -178,9 +174,8 @@ def test_the_loops_move_a_driven_scene_to_the_bit_as_numpy_does(name: str, label
     assert np.array_equal(states[1], states[2])
 
 
-@pytest.mark.parametrize("name", SCENES)
-def test_frames_several_steps_apart_are_judged_too(name: str) -> None:
-    scene = replace(scenes.load_scene(name), steps=70, every=7)
+def test_frames_several_steps_apart_are_judged_too() -> None:
+    scene = replace(scenes.load_scene("driven-spring"), steps=70, every=7)
     for label in ("own:velocity-verlet", "own:rk4", "own:implicit-midpoint"):
         run = springcheck.simulate(scene, label)
         found = checks.judge(scene, run)
@@ -189,52 +184,9 @@ def test_frames_several_steps_apart_are_judged_too(name: str) -> None:
         assert any(v.passed is False for v in checks.judge(scene, later) if v.check == "step-defect")
 
 
-def multiplier(scene: Scene, label: str, steps: int) -> complex:
-    """Floquet multiplier of largest size of a method, whose steps divide the period of the modulation."""
-    period = 2 * np.pi / scene.terms[0].frequency[0]  # type: ignore[attr-defined]
-    scene = replace(scene, step=period / steps, steps=steps, every=steps)
-    ends = []
-    for q, p in ((1.0, 0.0), (0.0, 1.0)):
-        run = springcheck.simulate(replace(scene, q=[q], p=[p]), label)
-        ends.append([run.q[-1, 0], run.p[-1, 0]])
-    return complex(max(np.linalg.eigvals(np.array(ends)), key=abs))
-
-
-@pytest.mark.parametrize("name", ["mathieu-stable", "mathieu-tongue"])
-def test_the_floquet_multiplier_is_that_of_mathieus_functions(name: str) -> None:
-    """By Taylor series in 20 digits, and by the characteristic exponent of Hill's determinant."""
-    scene = scenes.load_scene(name)
-    term = scene.terms[0]
-    assert isinstance(term, ModulatedSpring)
-    w2, depth, drive = (float(x) for x in (term.k[0] / scene.m[0], term.depth[0], term.frequency[0]))
-    # Mathieu's own form y'' + (a - 2 r cos 2x) y = 0, x = W t/2; the shift of the phase is no matter
-    a, r = 4 * w2 / drive**2, -2 * w2 * depth / drive**2
-    # Hill's determinant, Whittaker & Watson 19.42: sin(pi nu/2)^2 = D(0) sin(pi sqrt(a)/2)^2, 2 nu a period
-    orders = 2.0 * np.arange(-60, 61)
-    hill = np.eye(121) + np.diag(r / (orders[:-1] ** 2 - a), 1) + np.diag(r / (orders[1:] ** 2 - a), -1)
-    square = np.linalg.det(hill) * np.sin(np.pi * np.sqrt(a) / 2) ** 2
-    # cos(pi nu) = 1 - 2 sin(pi nu/2)^2 is half of the trace over a period pi of x
-    half = 1 - 2 * square
-    with mpmath.workdps(20):
-
-        def slope(t: Any, y: Any) -> list[Any]:
-            return [y[1], -(a - 2 * r * mpmath.cos(2 * t)) * y[0]]
-
-        ends = [mpmath.odefun(slope, 0, start, tol=1e-12)(mpmath.pi) for start in ([1, 0], [0, 1])]
-        trace = float((ends[0][0] + ends[1][1]) / 2)
-    # what rows beyond the N-th add to the determinant falls as r^2/N^3
-    assert half == pytest.approx(trace, abs=r * r / 60**3)
-    size = abs(trace) + np.sqrt(max(trace * trace - 1, 0.0))
-    assert (size > 1.1) == (name == "mathieu-tongue")
-    found = multiplier(scene, "own:yoshida4", 256)
-    assert found.real == pytest.approx(-size if size > 1 else trace, abs=3e-6)
-    assert abs(found) == pytest.approx(max(size, 1.0), abs=3e-6)
-
-
 def test_a_scene_file_of_a_drive_reads_back_the_same() -> None:
-    for name in SCENES:
-        scene = scenes.load_scene(name)
-        assert scenes.parse(scene.to_toml(), name=name).digest == scene.digest
+    scene = scenes.load_scene("driven-spring")
+    assert scenes.parse(scene.to_toml(), name=scene.name).digest == scene.digest
 
 
 def test_a_drive_needs_finite_numbers() -> None:
@@ -299,15 +251,6 @@ def test_another_scheme_is_not_taken_for_another_time(scheme: str, other: str, s
     assert (said in why) if said else ("What the states show: the drive" not in why)
 
 
-@pytest.mark.parametrize("name", ["mathieu-stable", "mathieu-tongue"])
-def test_a_modulation_at_the_wrong_time_is_named_too(name: str) -> None:
-    scene = replace(scenes.load_scene(name), steps=60)
-    law = schemes.SCHEMES["rk4"]
-    assert "the start of the step, held over it" in sentence(
-        scene, steppers.record(scene, law, space.clocked(Case(scene=scene, scheme=law, x=0.0), pace=0.0))
-    )
-
-
 def ours(q: Any, p: Any, h: float, force: Any, mass: Any) -> tuple[Any, Any]:
     p = p + h / 2 * force(q, p)
     q = q + h * p / mass
@@ -321,7 +264,8 @@ def forgetful(q: Any, p: Any, h: float, force: Any, mass: Any) -> tuple[Any, Any
 
 
 def test_a_function_is_told_the_time_and_judged_by_where_it_takes_it() -> None:
-    scene = replace(scenes.load_scene("mathieu-stable"), steps=60)
+    scene = replace(scenes.load_scene("driven-spring"), steps=60)
+    scene = scene.system.without("damping").scene
     engines.bring(function.engine([f"{__name__}:ours", f"{__name__}:forgetful"]), "here")
     right, wrong = (springcheck.simulate(scene, f"stepper:{name}") for name in ("ours", "forgetful"))
     assert right.scheme == wrong.scheme == "velocity-verlet"
@@ -330,10 +274,9 @@ def test_a_function_is_told_the_time_and_judged_by_where_it_takes_it() -> None:
 
 
 @pytest.mark.parametrize("label", ["scipy:radau", "scipy:dop853", "sundials:adams", "sundials:bdf"])
-@pytest.mark.parametrize("name", SCENES)
-def test_solvers_with_a_time_of_their_own_keep_their_tolerance(name: str, label: str, need: Any) -> None:
+def test_solvers_with_a_time_of_their_own_keep_their_tolerance(label: str, need: Any) -> None:
     need(label)
-    scene = replace(scenes.load_scene(name), steps=100, tolerance=1e-9)
+    scene = replace(scenes.load_scene("driven-spring"), steps=100, tolerance=1e-9)
     found = {v.check: v for v in checks.judge(scene, springcheck.simulate(scene, label))}
     assert found["tolerance"].passed is True
 
@@ -347,11 +290,11 @@ def uneven() -> Scene:
     )  # fmt: skip
 
 
-MODULATED = ("openmm:verlet", "openmm:leapfrog", "openmm:euler", "openmm:semi-implicit-euler",
-             "openmm:nose-hoover", "lammps:external")  # fmt: skip
-
-
-@pytest.mark.parametrize("label", [*MODULATED, "lammps:bond"])
+@pytest.mark.parametrize(
+    "label",
+    ["openmm:verlet", "openmm:leapfrog", "openmm:euler", "openmm:semi-implicit-euler", "openmm:nose-hoover",
+     "lammps:external", "lammps:bond"],
+)  # fmt: skip
 @pytest.mark.parametrize("step", [0.1, -0.07])
 def test_engines_take_drives_where_their_schemes_do(label: str, step: float, need: Any) -> None:
     need(label)
@@ -359,13 +302,6 @@ def test_engines_take_drives_where_their_schemes_do(label: str, step: float, nee
     verdicts = {v.check: v for v in checks.judge(scene, springcheck.simulate(scene, label))}
     assert verdicts["step-defect"].passed is True
     assert not [v.check for v in verdicts.values() if v.passed is False]
-
-
-@pytest.mark.parametrize("label", MODULATED)
-def test_engines_take_modulations_where_their_schemes_do(label: str, need: Any) -> None:
-    need(label)
-    scene = replace(scenes.load_scene("mathieu-tongue"), steps=60)
-    assert not [v for v in checks.judge(scene, springcheck.simulate(scene, label)) if v.passed is False]
 
 
 def test_a_driven_particle_with_friction_is_moved_by_langevin_dynamics_at_no_temperature(need: Any) -> None:
@@ -409,24 +345,6 @@ def test_openmm_with_its_time_held_over_a_step_of_four_stages_is_told(need: Any)
     assert "the start of the step, held over it, where classical Runge-Kutta (RK4) takes it at" in sentence(
         scene, run
     )
-
-
-@pytest.mark.parametrize(("name", "grown"), [("mathieu-tongue", True), ("mathieu-stable", False)])
-def test_a_study_of_stability_says_how_the_exact_motion_grows_in_a_period(name: str, grown: bool) -> None:
-    scene = scenes.load_scene(name)
-    found = floquet(scene.system)
-    assert found is not None
-    factor, period, _ = found
-    many = exact.true_motion(scene, np.array([0, 40, 41]), period)[0][:, 0]
-    if grown:
-        # far from the start only the growing solution is left
-        assert abs(many[2] / many[1]) == pytest.approx(factor, rel=1e-6)
-        # to first order in the depth of 0.3: exp(e w T/4)
-        assert factor == pytest.approx(np.exp(0.3 * np.sqrt(2.9 / 3.7) / 4 * period), rel=0.02)
-    else:
-        assert factor == 1
-    assert floquet(scenes.load_scene("driven-spring").system) is None
-    assert "(Floquet)" in str(springcheck.stability(scene, "own:rk4"))
 
 
 HALF_A_TURN = (3.7 * ((2 - 1e-12) / 0.1) ** 2, 0.0, 31.41592, 0.1)
@@ -479,11 +397,9 @@ def rest(scene: Scene, law: schemes.Scheme) -> Any:
 
 
 def off(scene: Scene, name: str, x: float, row: int) -> Scene:
-    """The scene with one number of one row of its drive, or modulated spring, off by x as `Limits` counts."""
+    """The scene with one number of one row of its drive off by x as `Limits` counts."""
     (term,) = (one for one in scene.terms if one.kind == "drive")
-    field = {"amplitude": "amplitude" if isinstance(term, Drive) else "depth", "late": "phase"}.get(
-        name, name
-    )
+    field = "phase" if name == "late" else name
     values = getattr(term, field).copy()
     how = {"phase": 1.0, "late": float(term.frequency[row]) * scene.step}  # type: ignore[attr-defined]
     values[row] += x * how.get(name, values[row])
@@ -492,7 +408,7 @@ def off(scene: Scene, name: str, x: float, row: int) -> Scene:
 
 
 @pytest.mark.campaign
-@pytest.mark.parametrize("which", ["driven-spring", "uneven", "mathieu-tongue"])
+@pytest.mark.parametrize("which", ["driven-spring", "uneven"])
 @pytest.mark.parametrize("law", ["semi-implicit-euler", "velocity-verlet", "rk4"])
 def test_what_would_be_seen_of_a_drive_is_seen_at_twice_its_size(which: str, law: str) -> None:
     scene = replace(uneven() if which == "uneven" else scenes.load_scene(which), every=1, steps=100)
@@ -501,7 +417,7 @@ def test_what_would_be_seen_of_a_drive_is_seen_at_twice_its_size(which: str, law
     right = {v.check: v for v in checks.judge(scene, rest(scene, scheme))}
     told = 0
     for check in ("step-defect", "closed-form"):
-        assert right[check].passed is (None if check == "closed-form" and which == "mathieu-tongue" else True)
+        assert right[check].passed is True
         for name in ("amplitude", "frequency", "phase", "late"):
             limit = getattr(right[check].sees, name)
             if limit is None:
@@ -512,7 +428,7 @@ def test_what_would_be_seen_of_a_drive_is_seen_at_twice_its_size(which: str, law
             assert not any(found), (check, name, limit)
             # of several drives the limit is that of the one that shows least
             assert any(by(check, scene, off(scene, name, limit / 10, row), scheme) for row in each)
-    assert told == (4 if which == "mathieu-tongue" else 8)
+    assert told == 8
 
 
 def by(check: str, scene: Scene, other: Scene, scheme: schemes.Scheme) -> bool | None:
@@ -598,7 +514,6 @@ def test_an_axis_that_is_none_is_answered_with_those_that_are(table: str) -> Non
         scenes.parse(f"title = 'a'\n{given}[time]\nstep = 0.1\nsteps = 20\n", name="a")
 
 
-@pytest.mark.parametrize("name", ["driven-spring", "mathieu-stable"])
 @pytest.mark.parametrize(
     ("late", "said"),
     [
@@ -606,9 +521,9 @@ def test_an_axis_that_is_none_is_answered_with_those_that_are(table: str) -> Non
         (0.3, "from step 37 on the drive is taken 0.3 steps later"),
     ],
 )
-def test_a_drive_that_another_time_moves_from_some_step_on_is_told(name: str, late: float, said: str) -> None:
+def test_a_drive_that_another_time_moves_from_some_step_on_is_told(late: float, said: str) -> None:
     """As a program that is restarted from a frame, and counts its steps from there."""
-    scene = replace(scenes.load_scene(name), steps=80)
+    scene = replace(scenes.load_scene("driven-spring"), steps=80)
     right = springcheck.simulate(scene, "own:velocity-verlet")
     drive = next(x for x in scene.terms if x.kind == "drive")
     phase = drive.phase + drive.frequency * scene.step * (37 + late)  # type: ignore[attr-defined]

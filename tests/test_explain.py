@@ -33,7 +33,7 @@ def test_a_scheme_says_its_step_and_source(name: str) -> None:
     assert scheme.source in " ".join(" ".join(said).split())
 
 
-def test_a_title_that_the_census_prints_is_a_name_too() -> None:
+def test_the_title_of_a_scheme_is_a_name_too() -> None:
     assert len(schemes.known()) > 30
     for scheme in schemes.known().values():
         assert next(iter(explain.lines(scheme.title))) == f"{scheme.name}: {scheme.title}"

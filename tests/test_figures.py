@@ -188,7 +188,7 @@ def test_a_legend_has_one_entry_for_each_scheme() -> None:
 
 
 def test_a_legend_counts_every_method_of_a_curve_that_several_share() -> None:
-    mine = ["own:euler", "openmm:euler", "dart:force"]
+    mine = ["own:euler", "openmm:euler", "lammps:bond"]
     curve = Curve(name="own:euler and 2 more", group="explicit-euler", x=[0.0], y=[0.0], methods=mine)
     scale = Scale(name="x")
     figure = render.picture(Bank(title="", charts=[Chart(title="", x=scale, y=scale, curves=[curve])]))
@@ -227,10 +227,6 @@ def test_a_free_pair_is_shown_by_its_bond_and_a_particle_where_it_is_asked_for()
     assert one.pick(q, p) == (scene.q[1], scene.p[1])
     with pytest.raises(SpringcheckError, match="--particle 2: scene carbon-monoxide has particles 0 to 1"):
         views(scene, 2)
-
-
-def test_two_axes_of_one_charge_are_no_bond() -> None:
-    assert [view.title for view in views(scenefile.load_scene("magnetic"))] == ["x", "y"]
 
 
 def test_what_grows_does_not_set_the_scale_and_what_is_large_does() -> None:

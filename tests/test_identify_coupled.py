@@ -98,7 +98,6 @@ def test_a_boris_run_in_few_digits_is_one_with_the_digits_that_it_shows(form: st
     """The angle is 2 atan(0.035)."""
     found = identified(boris(0.7, 1.3), form)
     assert f"turns by {turned}" in found.statement
-    assert "strength over mass 0.7, stiffness over mass 1" in found.statement
     assert "central force" in found.statement
     assert not np.isfinite(found.omega).any()
 

@@ -83,35 +83,11 @@ def test_a_drive_of_which_no_scheme_is_told_is_one_for_each_unit_of_mass_too() -
     assert "about 0.43 cos(1.37 t + 0.63), the phase" in found.statement
 
 
-@pytest.mark.parametrize(("name", "frequency"), [("mathieu-stable", 1.3723), ("mathieu-tongue", 1.7706)])
-def test_a_modulated_stiffness_is_said_to_first_order(name: str, frequency: float) -> None:
-    why = said(scenes.load_scene(name), "own:velocity-verlet", mass=3.7, stiffness=2.9)
-    assert why.startswith("The stiffness changes in time, up and down")
-    assert "about as 1 + 0.3 cos(" in why
-    assert float(why.partition("cos(")[2].partition(" t")[0]) == pytest.approx(frequency, rel=1e-3)
-
-
 def test_a_drive_of_two_frequencies_is_given_no_scheme() -> None:
     scene = driven(damped=False)
     both: Any = Drive(i=ONE, amplitude=np.array([0.3]), frequency=np.array([7.1]), phase=np.array([0.2]))
     why = said(replace(scene, terms=(*scene.terms, both)), "own:velocity-verlet", mass=3.7, stiffness=2.9)
     assert " by " not in why.partition("each frame")[2]
-
-
-@pytest.mark.parametrize(("name", "label"), [("boris", "own:boris"), ("rk4", "own:rk4")])
-def test_a_spring_in_a_field_is_told_by_the_turn_of_its_velocity(name: str, label: str) -> None:
-    scene = scenes.load_scene("foucault")
-    why = said(scene, label, mass=1.7, stiffness=2.9)
-    angle = float(why.partition("turns by ")[2].partition(" in")[0])
-    assert angle == pytest.approx(-2 * np.arctan(0.37 / 1.7 * 0.1 / 2), rel=1e-4)
-    assert ("strength over mass 0.217647059, stiffness over mass 1.70588235" in why) == (name == "boris")
-
-
-def test_a_charge_in_a_field_alone_is_told_as_a_rotation() -> None:
-    run = springcheck.simulate(scenes.load_scene("magnetic"), "own:boris")
-    found = springcheck.identify(run.t, run.q, run.p, mass=1.7)
-    assert found.scheme is None
-    assert "as of a charge in a magnetic field (Boris)" in found.statement
 
 
 def test_springs_that_couple_two_axes_are_no_field() -> None:
@@ -125,11 +101,6 @@ def test_springs_that_couple_two_axes_are_no_field() -> None:
 @pytest.mark.parametrize(
     ("name", "label", "says"),
     [
-        ("magnetic", "own:euler", "turns and grows"),
-        ("magnetic", "own:semi-implicit-euler", "turns and grows by +0.00911 in each frame: a rotation"),
-        ("foucault", "own:euler", "a magnetic field across the plane"),
-        ("foucault", "own:semi-implicit-euler", "a magnetic field across the plane"),
-        ("foucault", "own:rk4", "a magnetic field across the plane"),
         ("two-scales", "own:semi-implicit-euler", "Semi-implicit Euler, kick-drift"),
     ],
 )

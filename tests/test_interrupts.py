@@ -716,23 +716,3 @@ def test_an_object_that_an_interrupt_left_half_made_is_not_mentioned() -> None:
     assert said("os.kill(os.getpid(), signal.SIGINT)") == "springcheck: interrupted\n"
     # its own mistakes are
     assert "AttributeError" in said("raise ValueError")
-
-
-@posix
-def test_ctrl_c_works_after_rebound_has_run() -> None:
-    """`integrate` leaves a handler in C behind that counts signals and forgets them."""
-    pytest.importorskip("rebound")
-    code = (
-        "import os, signal, springcheck\n"
-        "springcheck.simulate(springcheck.load_scene('spring'), 'rebound:ias15')\n"
-        "try:\n"
-        "    os.kill(os.getpid(), signal.SIGINT)\n"
-        "    sum(range(1000))\n"
-        "except KeyboardInterrupt:\n"
-        "    print('heard')\n"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", "import signal; signal.signal(2, signal.default_int_handler)\n" + code],
-        capture_output=True, text=True, check=False, timeout=60,
-    )  # fmt: skip
-    assert done.stdout == "heard\n", done.stderr

@@ -202,7 +202,6 @@ def test_a_note_names_the_columns_that_are_rounded(tmp_path: Path, forms: tuple[
         ("langevin-middle", "position-verlet"),
         ("langevin-middle-early", "semi-implicit-euler-drift-kick"),
         ("respa8", "position-verlet"),
-        ("boris", "velocity-verlet"),
         ("force-held-4", "semi-implicit-euler"),
         ("semi-implicit-euler-implicit-friction", "semi-implicit-euler-drift-kick"),
         ("exact", "velocity-verlet"),

@@ -16,6 +16,9 @@ PARTICLE = "[[particle]]\nmass = 1.0\nposition = [1.0, 0.0]\n"
 TIME = "[time]\nstep = 0.1\nsteps = 3\n"
 
 LEFT = {
+    "box": (PARTICLE + "[box]\nlengths = 4.1\n", "periodic boxes"),
+    "magnetic": (PARTICLE + "[[magnetic]]\nparticle = 0\nstrength = 0.7\n", "magnetic fields"),
+    "modulated-spring": (PARTICLE + "[[modulated-spring]]\nparticle = 0\n", "springs of modulated stiffness"),
     "rod": (PARTICLE + '[[rod]]\nends = ["wall", 0]\n', "constraints"),
     "rotor": ("[[rotor]]\ninertia = 1.0\n", "rotors"),
 }
@@ -44,6 +47,7 @@ def test_a_store_with_what_left_is_inspected_and_checked_and_says_so(
     said = capsys.readouterr().out
     assert f"{name}: {LEFT[name][1]}" in said
     assert "own:" in said
+    assert main(["inspect", store, "--trajectory", "own:velocity-verlet"]) == 0
     assert main(["check", store]) == 0
     assert main(["report", store, "-o", "page.html"]) == 2
     assert LEFT[name][1] in capsys.readouterr().err

@@ -308,7 +308,7 @@ def test_a_long_run_is_thinned_and_says_so(tmp_path: Path) -> None:
 # studies
 
 
-NAMES = ("precision", "stability", "extremes", "census", "faults", "sampling")
+NAMES = ("precision", "stability", "extremes", "faults", "sampling")
 FEW = tuple(fault for fault in FAULTS if fault.name in {"friction", "cut-off"})
 
 
@@ -321,7 +321,6 @@ def studies(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
         "precision": ["precision", "spring", "--budget", "0.4", *methods],
         "stability": ["stability", "rlc-circuit", *methods[2:]],
         "extremes": ["extremes", "--quick", "--method", "own:semi-implicit-euler"],
-        "census": ["census", *methods],
         "sampling": ["sampling", "--method", "own:baoab"],
     }
     for name, call in calls.items():
@@ -365,13 +364,6 @@ def test_a_study_brings_its_charts_and_its_tables(studies: dict[str, Path], name
 
 
 def test_charts_hold_the_stored_doubles(studies: dict[str, Path]) -> None:
-    data = _data(page.html(page.gather(studies["census"])))["banks"]["census-0"]
-    tables = dict(store.tables_of(studies["census"]))
-    curve = next(x for x in data["charts"][0]["curves"] if x["name"] == "own:euler")
-    for name in ("q", "p"):
-        kept = np.asarray(tables["census/own:euler"].columns[name], np.float64)
-        x = {"q": "x", "p": "y"}[name]
-        assert np.array(curve[x], np.float64).tobytes() == kept.tobytes()
     points = store.tables_of(studies["precision"])["precision/own:euler"].columns["max_error"]
     data = _data(page.html(page.gather(studies["precision"])))["banks"]["precision-0"]
     drawn_errors = next(x["y"] for x in data["charts"][0]["curves"] if x["name"] == "own:euler")

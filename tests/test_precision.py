@@ -240,13 +240,12 @@ def test_the_phase_error_of_a_damped_spring_is_that_of_its_eigenvalues_while_it_
     assert point.accuracy.phase_error == pytest.approx(ahead * lasts, rel=0.05)
 
 
-@pytest.mark.parametrize("name", ["foucault", "a damped pair", "an overdamped spring"])
+@pytest.mark.parametrize("name", ["a damped pair", "an overdamped spring"])
 def test_there_is_no_phase_where_springs_alone_have_no_say(name: str) -> None:
-    """Friction or a field couples their modes; what is overdamped does not turn."""
+    """Friction couples their modes; what is overdamped does not turn."""
     pair = builders.chain(2, np.array([2.3, 0.9]), 3.1, q=np.array([0.3, 0.1]), step=0.1, steps=40)
     two = replace(pair, terms=(*pair.terms, Damping(i=np.arange(2), c=np.array([0.35, 1.9]))))
-    scene = {"a damped pair": two, "an overdamped spring": damped(20.0, 40)}.get(name)
-    scene = scene or replace(scenes.load_scene(name), steps=40)
+    scene = {"a damped pair": two, "an overdamped spring": damped(20.0, 40)}[name]
     (point,) = measure(scene, "own:rk4", [80])
     assert point.accuracy is not None
     assert point.accuracy.phase_error is None
@@ -299,18 +298,11 @@ def test_a_sweep_begins_just_below_the_limit_of_stability() -> None:
         assert 0.9 < known.angle / sweeps.coarsest(known, limit) <= 1
 
 
-@pytest.mark.parametrize("name", ["mathieu-stable", "anharmonic", "pendulum"])
+@pytest.mark.parametrize("name", ["anharmonic", "pendulum"])
 def test_the_frequency_is_the_largest_along_the_motion_as_in_the_study_of_stability(name: str) -> None:
     scene = scenes.load_scene(name)
     known = accuracy.truth(scene)
     assert known.w == longest.fastest(scene)
-    if name == "mathieu-stable":
-        (term,) = scene.terms
-        # at t = 0 the stiffness is a tenth of k, and half a turn later 1.9 k
-        slack = replace(term, depth=np.array([0.9]), phase=np.array([np.pi]))
-        known = accuracy.truth(replace(scene, terms=(slack,)))
-        assert known.w == pytest.approx(np.sqrt(2.9 * 1.9 / 3.7), rel=1e-12)
-        assert known.angle / sweeps.coarsest(known, 2.0) < 2
 
 
 def test_of_many_separate_particles_the_stiffest_moment_of_any_is_searched() -> None:
@@ -492,7 +484,7 @@ def test_a_fit_finds_the_order_of_a_power_law(order: float) -> None:
     assert fit.constant == pytest.approx(0.01, rel=1e-12)
 
 
-@pytest.mark.parametrize(("scene", "lowered"), [("driven-spring", 1), ("magnetic", 1), ("spring", 0)])
+@pytest.mark.parametrize(("scene", "lowered"), [("driven-spring", 1), ("spring", 0)])
 def test_an_order_that_friction_lowers_is_explained(scene: str, lowered: int) -> None:
     """Velocity Verlet has order 1 where forces depend on velocities, and RK4 order 4 anywhere."""
     methods = tuple(

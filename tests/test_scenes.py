@@ -59,9 +59,6 @@ CASES = [
 
 LEFT_OUT_AT_START = {
     ("detest-b1", "openmm:langevin-middle"): "one friction rate",
-    # it spirals out, in the end of any box
-    ("periodic-box", "openmm:euler"): "half of the box",
-    ("diatomic", "openmm:euler"): "half of the box",
 }
 """What an engine cannot serve, and only finds out as it starts."""
 

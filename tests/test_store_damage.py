@@ -337,22 +337,15 @@ def test_a_fixed_interval_and_velocities_at_fewer_steps_are_understood(tmp_path:
 
 
 @pytest.mark.usefixtures("tried_here")
-@pytest.mark.parametrize("edges", ["vector", "matrix", "vectors", "matrices"])
-def test_images_are_put_back_by_the_edges_of_the_box(tmp_path: Path, edges: str) -> None:
-    """They were left out, and positions taken for those within the box."""
-    rng = np.random.default_rng(4)
-    image, q = rng.integers(-2, 3, (5, 4, 3)), rng.random((5, 4, 3))
-    box = np.array([3.0, 5.0, 7.0]) if "vec" in edges else np.array([[3, 0, 0], [1, 5, 0], [0.5, 2, 7.0]])
-    whole = q + np.einsum("fni,ij->fnj", image, np.diag(box) if box.ndim == 1 else box)
-    path = h5md(tmp_path / "a.h5", position=q)
+def test_positions_wrapped_into_a_box_are_refused(tmp_path: Path) -> None:
+    """Images that are all 0 wrap nothing."""
+    path = h5md(tmp_path / "a.h5", position=np.random.default_rng(4).random((5, 4, 3)))
     with h5py.File(path, "r+") as file:
-        file["particles/all/image/value"] = image
-        moving = edges in ("vectors", "matrices")
-        file["particles/all/box/edges" + "/value" * moving] = np.stack([box] * 5) if moving else box
-    assert hdf5.read_hdf5(path)["all"].q == pytest.approx(whole.reshape(5, 12), rel=1e-15)
+        file["particles/all/image/value"] = np.zeros((5, 4, 3), int)
+    assert np.all(hdf5.read_hdf5(path)["all"].q < 1)
     with h5py.File(path, "r+") as file:
-        del file["particles/all/box"]
-    with pytest.raises(StoreError, match="does not count borders"):
+        file["particles/all/image/value"][3, 2, 1] = -1
+    with pytest.raises(StoreError, match="wrapped into a box"):
         hdf5.read_hdf5(path)
 
 

@@ -46,16 +46,6 @@ def test_mdanalysis_opens_an_exported_trajectory_with_its_units_and_times(tmp_pa
         assert frame.dimensions is None
 
 
-def test_mdanalysis_has_the_box_of_an_exported_trajectory(tmp_path: Path) -> None:
-    """It was left out: positions beyond the borders stood in no box."""
-    springcheck.run("periodic-box", "own:velocity-verlet", path=tmp_path / "s.h5")
-    store.export(tmp_path / "s.h5", "own:velocity-verlet", tmp_path / "out.h5md")
-    universe = MDAnalysis.Universe.empty(3, trajectory=False)
-    universe.load_new(str(tmp_path / "out.h5md"))
-    for frame in universe.trajectory[::100]:
-        assert np.allclose(frame.dimensions, [41, 33, 57, 90, 90, 90], rtol=1e-6)
-
-
 def test_an_exported_trajectory_is_a_store_of_its_own_and_is_never_overwritten(tmp_path: Path) -> None:
     """Its energies, its momenta and what its engine declares were left out."""
     s = scene()

@@ -9,14 +9,11 @@ from argparse import Namespace
 from collections import Counter
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from springcheck import store
 from springcheck.cli import main, output
 from springcheck.physics import scenefile
-from springcheck.studies.census import result as census_result
-from springcheck.studies.choose import LeftOut
 from springcheck.studies.faults import measure as faults
 from springcheck.studies.faults import result as faults_result
 from springcheck.studies.faults.table import FAULTS
@@ -139,26 +136,6 @@ def test_every_word_of_the_faults_is_on_every_terminal(monkeypatch: Patch, capsy
         for j, fault in enumerate(FAULTS)
     )
     on_terminals(faults_result.FaultReport(results=results).lines(), monkeypatch, capsys)
-
-
-def test_every_word_of_a_census_is_on_every_terminal(monkeypatch: Patch, capsys: Captured) -> None:
-    nothing = np.zeros(3)
-    entries = tuple(
-        census_result.Entry(
-            method=f"openmm:semi-implicit-euler{j}", about="a method", note="", limit=2.0, bounded=False,
-            version="8", claimed="velocity-verlet",
-            found="semi-implicit-euler", agrees=j > 0, substeps=1, velocity_offset=-0.5, area=1e-9,
-            friction=-1e-5, precision="single", amplitude=1.0001, force_calls=1.0, seconds=1e-6,
-            digest="same", q=nothing, p=nothing,
-        )
-        for j in range(4)
-    )  # fmt: skip
-    left = (LeftOut(method="dart:joint-spring", reason="its library cannot be loaded here"),)
-    on_terminals(
-        census_result.Census(entries=entries, left_out=left, resumed=1).lines(),
-        monkeypatch,
-        capsys,
-    )
 
 
 def rendered(made: TextTable, width: int) -> list[str]:

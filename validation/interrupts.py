@@ -76,8 +76,6 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "extremes": ("extremes", "--quick"),
     "faults": ("faults",),
     "extremes --workers": ("extremes", "--quick", "--method", "own:*euler", "--workers", "2"),
-    "census --workers": ("census", "--method", "own:*euler", "--workers", "2"),
-    "census": ("census",),
     "inspect": ("inspect", "input.h5", "--verdicts"),
     "plot": ("plot", "input.h5", "-o", "figures"),
     "identify": ("identify", "input.h5"),

@@ -21,7 +21,6 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from springcheck import plot
     from springcheck.api import (
-        census,
         compare,
         exact,
         explain,
@@ -46,7 +45,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 __all__ = [
-    "Scene", "Trajectory", "Verdict", "__version__", "census", "chain", "compare", "exact",
+    "Scene", "Trajectory", "Verdict", "__version__", "chain", "compare", "exact",
     "explain", "extremes", "faults", "identify", "judge", "load_scene", "methods", "plot", "precision",
     "read", "report", "run", "sampling", "simulate", "spring", "stability",
 ]  # fmt: skip

@@ -4,7 +4,6 @@ need."""
 from springcheck.api.main import compare, exact, identify, judge, read, run, simulate
 from springcheck.api.showing import Said, Shelf, Verdicts
 from springcheck.api.studies import (
-    census,
     explain,
     extremes,
     faults,
@@ -16,7 +15,7 @@ from springcheck.api.studies import (
 )
 
 __all__ = [
-    "Said", "Shelf", "Verdicts", "census", "compare", "exact", "explain", "extremes", "faults",
+    "Said", "Shelf", "Verdicts", "compare", "exact", "explain", "extremes", "faults",
     "identify", "judge", "methods", "precision", "read", "report", "run", "sampling", "simulate",
     "stability",
 ]  # fmt: skip

@@ -14,7 +14,6 @@ from springcheck.physics.arguments import typed
 from springcheck.physics.scene import Scene
 
 if TYPE_CHECKING:
-    from springcheck.studies.census.result import Census
     from springcheck.studies.extremes.result import Atlas
     from springcheck.studies.faults.result import FaultReport
     from springcheck.studies.precision.result import PrecisionStudy
@@ -80,22 +79,6 @@ def faults(*, path: str | Path | None = None, force: bool = False, workers: int 
 
     with taken((), force, workers, path) as (_, how):
         return measure.record(path, **how)
-
-
-@typed
-def census(
-    methods: str | Step | Sequence[str | Step] = (), *, thermostats: bool = False,
-    path: str | Path | None = None, force: bool = False, workers: int = 1,
-) -> Census:  # fmt: skip
-    """Identify the integrator that every installed engine really runs, by its states; `methods` are labels or
-    globs.
-
-    With `thermostats` globs match those too, on springs in a bath.
-    """
-    from springcheck.studies.census import measure
-
-    with taken(methods, force, workers, path) as (named, how):
-        return measure.record(path, named, thermostats=thermostats, **how)
 
 
 @typed

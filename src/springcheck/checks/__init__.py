@@ -30,14 +30,13 @@ from springcheck.checks.motion import (
     angular_momentum,
     closed_form,
     frequency,
-    gyration,
     momentum,
     shadow_energy,
 )
 from springcheck.checks.record import energies, grid, line, start, times
 from springcheck.checks.requires import CONTRACTED, REQUIREMENTS
 from springcheck.checks.solver import tolerance, tolerance_bound
-from springcheck.checks.steps import BLIND, arithmetic, border, bridges, step_defect
+from springcheck.checks.steps import BLIND, arithmetic, bridges, seldom_off, step_defect
 from springcheck.errors import MethodError
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Limits, Trajectory, Verdict
@@ -46,14 +45,14 @@ from springcheck.text.wording import STATES_SHOW, count, few
 __all__ = [
     "ALL", "BLIND", "CHECKS", "CONTRACTED", "RANDOM", "SPECIAL", "STATES_SHOW", "TELLING", "THOROUGH",
     "Bench", "Case", "Check", "Run", "angular_momentum", "arithmetic", "bridges", "cause_of",
-    "closed_form", "energies", "experiments_of", "frequency", "judge", "judge_thoroughly",
+    "closed_form", "energies", "experiments_of", "first_off", "frequency", "judge", "judge_thoroughly",
     "momentum", "not_judged", "shadow_energy", "shared", "start", "status", "step_defect", "summary",
     "tolerance", "tolerance_bound", "worst",
 ]  # fmt: skip
 
 CHECKS: tuple[Check, ...] = (
     start, times, grid, line, step_defect, arithmetic, closed_form, shadow_energy, frequency, momentum,
-    angular_momentum, gyration, border, drive, energies, tolerance,
+    angular_momentum, drive, energies, tolerance,
 )  # fmt: skip
 
 THOROUGH: tuple[Check, ...] = (
@@ -127,6 +126,13 @@ def explained(
     return [replace(v, why=why) if v is first else v for v in verdicts]
 
 
+def first_off(scene: Scene, run: Trajectory) -> int:
+    """The number of the first step of a run that is not the scheme's own; 0 where none is."""
+    case = Case(trajectory=run, scene=scene)
+    frame = seldom_off(case)[0]
+    return int(case.steps[frame - 1]) + 1 if frame else 0
+
+
 def cause_of(verdicts: Sequence[Verdict]) -> str:
     """What the states show to be the cause of a failure; "" where that is unknown, or nothing failed."""
     return next((v.why.partition(STATES_SHOW)[2] for v in verdicts if STATES_SHOW in v.why), "")
@@ -196,10 +202,8 @@ def not_exercised(scene: Scene) -> str:
     missing = [axis for axis, number in zip("xyz", moved, strict=True) if not number]
     facts = {
         f"ax{'e' if len(missing) > 1 else 'i'}s {' and '.join(missing)}": not missing,
-        "periodic boxes": bool(scene.box),
         "friction": bool(system.is_damped or scene.bath),
         "drives": system.is_driven,
-        "magnetic fields": "magnetic" in system.acting,
     }
     return f"Not exercised here: {', '.join(name for name, is_so in facts.items() if not is_so)}"
 

@@ -14,7 +14,7 @@ import numpy as np
 from springcheck.bath import THERMOSTATS, chance
 from springcheck.bath.catalogue import ENERGY_LEFT
 from springcheck.bath.draws import Reading, law_of
-from springcheck.checks import driven, images, other, stages
+from springcheck.checks import driven, other, stages
 from springcheck.checks.case import Case
 from springcheck.checks.check import FALSE_ALARMS
 from springcheck.checks.requires import MAP, missing
@@ -75,7 +75,7 @@ def found(case: Case, shown: Callable[[int, bool], str] = lambda *_: "") -> str:
         ways += [stages.collided, _of_removal, stages.found]
         looks = [*looks, _of_reach, *[_of_state, _of_size] * drawn]
     elif run.every == 1 and not missing(case, MAP):
-        ways = [_of_differences, driven.found, images.found, _of_removal, _of_factor]
+        ways = [_of_differences, driven.found, _of_removal, _of_factor]
         looks = [_of_numbers, *looks, _of_reach]
     vague = ""
     for way in ways + looks:

@@ -65,8 +65,8 @@ class Claim:
     @cached_property
     def origins(self) -> Floats:
         """Largest distance from 0 of a point from which an engine may count positions (n,) [L]: where springs
-        between particles have their rest lengths, the nearest place to which a term ties a particle, the
-        start where the engine says so, and a border of the box."""
+        between particles have their rest lengths, the nearest place to which a term ties a particle, and the
+        start where the engine says so."""
         rest = self.system.rest_positions
         zero, sites = np.zeros(self.scene.n), np.full(self.scene.n, np.inf)
         for term in self.judged.terms:
@@ -74,7 +74,7 @@ class Claim:
                 np.minimum.at(sites, term.particles[0], np.abs(term.elongation(zero)))
         tied = np.maximum(0.0 if rest is None else np.abs(rest), np.where(np.isinf(sites), 0.0, sites))
         start = np.abs(self.scene.q) if self.trajectory.arithmetic.from_start else 0.0
-        return np.asarray(np.maximum(tied, start) + self.scene.periods)
+        return np.asarray(np.maximum(tied, start))
 
     @property
     def roundings(self) -> int:

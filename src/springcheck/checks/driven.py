@@ -150,7 +150,7 @@ OTHER_DRIVES: tuple[tuple[str, str, Callable[[Any, Any], Any]], ...] = (
      "frequency", lambda x, m: x / (2 * np.pi)),
     ("the amplitude of the drive is divided by the mass", "amplitude", lambda x, m: x / m),
 )  # fmt: skip
-"""Faults of a drive: words, field, its value by the mass; a modulated spring's amplitude is its depth."""
+"""Faults of a drive: words, field, its value by the mass."""
 
 
 def _other_drives(scene: Scene) -> Iterator[tuple[str, Scene]]:
@@ -159,6 +159,5 @@ def _other_drives(scene: Scene) -> Iterator[tuple[str, Scene]]:
         terms: list[Any] = list(scene.terms)
         for number, term in enumerate(terms):
             if term.kind == "drive":
-                field = name if name in term.arrays else "depth"
-                terms[number] = replace(term, **{field: change(term.arrays[field], scene.m[term.i])})
+                terms[number] = replace(term, **{name: change(term.arrays[name], scene.m[term.i])})
         yield words, scene.derived(terms=tuple(terms))

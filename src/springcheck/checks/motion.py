@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -267,44 +265,3 @@ def _areas(
     each = np.abs(q[:, x]) * dp[:, y] + np.abs(p[:, y]) * dq[:, x] + np.abs(q[:, y]) * dp[:, x]
     unit = np.maximum.accumulate(np.sum(each + np.abs(p[:, x]) * dq[:, y], axis=1))
     return np.abs(found - expected)[1:], unit[1:], np.abs(expected)[1:]
-
-
-@check("gyro", family="motion", requires=MAP | {"gyration"})
-def gyration(case: Case) -> Finding | str:
-    """A magnetic field turns velocities by 2 atan(h W/2) a step, W its angular frequency, and keeps their
-    size."""
-    # what a step does before the turn is done from its start, and what it does after the turn is undone from
-    # its end: between both lies the turn alone
-    timed, scheme, n = case.clocked, case.scheme, case.scene.n
-    at = [kind.evaluates for kind in scheme.kinds].index("magnetic")
-    undone = tuple((name, -Fraction(c)) for name, c in reversed(scheme.stages[at + 1 :]))
-    q, p = (x.astype(np.longdouble) for x in (timed.trajectory.q, timed.trajectory.p))
-    parts = (replace(scheme, stages=scheme.stages[:at]), q[:-1], p[:-1]), (
-        replace(scheme, stages=undone), q[1:], p[1:])  # fmt: skip
-    met, left = (replace(timed.law, scheme=part).step(*state)[1] for part, *state in parts)
-    of_q, of_p = (one[:, :n] for one in timed.allowance)
-    of_p = of_p + abs(case.trajectory.step) * case.system.rigidity * of_q
-    rows = [(a, b, w / case.judged.m[a]) for term in case.law.fields[0] for a, b, w in term.rows()]
-    a, b = (np.array([row[i] for row in rows]) for i in (0, 1))
-    half = np.array([row[2] for row in rows], np.longdouble) * case.trajectory.step / 2
-    before, after = met[:, a] + 1j * met[:, b], left[:, a] + 1j * left[:, b]
-    # (1 - i t)/(1 + i t) turns by -2 atan(t), without functions
-    off, unit = np.abs(after - before * (1 - 1j * half) / (1 + 1j * half)), of_p[:, a] + of_p[:, b]
-    seen, limit = off / unit, case.roundings * unit / np.abs(before)
-    ratio, right = after / before, 2 * np.arctan(half)
-    # a step longer by x turns by sin(2 atan(h W/2)) x more, where there is a field
-    felt = np.sin(right) != 0
-    longer = np.min(limit[:, felt] / np.abs(np.sin(right[felt])), initial=np.inf)
-    worst = largest(seen)
-    if seen[worst] <= case.roundings and not np.any(limit < 1):
-        return "rounding may be as large as the velocity"
-    by, right = ratio[worst], right[worst[1]]
-    did = (
-        f"turns by {-np.angle(by):.9g}, off by {-np.angle(by) - right:.1e} from 2 atan(h W/2), where h W is "
-        f"{2 * half[worst[1]]:.9g}, and changes the speed by {np.abs(by) - 1:.1e} of it"
-        if before[worst]
-        else "makes a velocity out of none"
-    )
-    why = f"roundings along one step of {scheme.title}; step {int(case.steps[worst[0] + 1])} {did}"
-    sees = Limits(step=None if np.isinf(longer) else float(longer))
-    return Finding(seen[worst], case.roundings, "roundings", why, sees)

@@ -98,18 +98,10 @@ _ALL = (
     Requirement("energies", "energies that are asked for", _unless(
         lambda case: case.trajectory.energy is not None, "the scene keeps no energies")),
     Requirement("unheld", "nothing that holds a particle", _unless(
-        lambda x: all(term.bodies > 1 and term.kind != "magnetic" for term in x.scene.terms),
-        "walls, fixed potentials and fields take up momentum")),
-    Requirement("box", "a periodic box", _unless(
-        lambda x: x.scene.box is not None, "the scene has no periodic box")),
+        lambda x: all(term.bodies > 1 for term in x.scene.terms),
+        "walls and fixed potentials take up momentum")),
     Requirement("driven", "a force that depends on the time", _unless(
         lambda x: x.scene.system.is_driven, "no force depends on the time")),
-    Requirement("gyration", "a field, and a stage of each step that turns by it", _unless(
-        lambda x: x.law.fields and x.trajectory.every == 1
-        and [kind.evaluates for kind in x.scheme.kinds].count("magnetic") == 1
-        and not np.any(np.bincount(np.concatenate([i for y in x.law.fields[0] for i in y.particles])) > 1),
-        "no field turns velocities by a stage of every step recorded, or several fields act on one axis"),
-        special=True),
     Requirement("alike", "two axes along which the same springs act", _unless(
         lambda x: bool(x.scene.system.alike), "no two axes are alike, about 0 and by linear springs")),
     Requirement("named", "a scheme that is named", _trait(
@@ -128,9 +120,9 @@ _ALL = (
     Requirement("two-frames", "two frames", _unless(
         lambda case: len(case.trajectory.t) > 1, "there is no second frame")),
     Requirement("solution", "a reference solution", _unsolved),
-    Requirement("autonomous", "forces that do not depend on the time, and no magnetic field", _unless(
-        lambda x: not x.scene.system.is_driven and "magnetic" not in x.scene.system.acting,
-        "a force depends on the time, or a magnetic field turns with it: going back meets another one")),
+    Requirement("autonomous", "forces that do not depend on the time", _unless(
+        lambda x: not x.scene.system.is_driven,
+        "a force depends on the time: going back meets another one")),
     Requirement("undamped", "no friction", _trait(
         "undamped", "friction contracts area and lets a phase decay, and going back does not undo it")),
     Requirement("one-area", "modes that lose area at one rate", _unless(
@@ -149,13 +141,13 @@ _ALL = (
         lambda x: not x.trajectory.arithmetic.quantum and x.trajectory.arithmetic.is_double,
         "the rounding of its forces hides that of its steps")),
     Requirement("linear", "a linear scene", _trait(
-        "linear", "an anharmonic or driven step, or one in a field, is no matrix; step-defect judges it")),
+        "linear", "an anharmonic or driven step is no matrix; step-defect judges it")),
     Requirement("unmixed", "springs that act at one time", _unless(
         lambda x: not x.law.has("mixes"),
         "slow and fast springs act at different times: no normal mode stays by itself")),
     Requirement("modes", "normal modes", _unless(
         lambda x: x.scene.system.has_modes,
-        "no closed form of the discrete motion: the scene is anharmonic or driven or in a field, or friction "
+        "no closed form of the discrete motion: the scene is anharmonic or driven, or friction "
         f"couples its modes, or more than {MOST_JOINED} particles are joined")),
     Requirement("few", f"{LARGEST} particles at most", _unless(
         lambda x: x.scene.n <= LARGEST, f"of more than {LARGEST} particles the step defect says as much")),

@@ -42,7 +42,7 @@ def of_step(
     # of a force that is coarser than the state, first the sizes that it has without its own error
     for way in [how] if how.force <= how.state else [replace(how, force=how.state, quantum=0.0), how]:
         size_q, size_p = schemes.magnitude_step(
-            case.scheme, q, p, h=run.step, m=m, rate=case.law.rate, turns=case.law.turns,
+            case.scheme, q, p, h=run.step, m=m, rate=case.law.rate,
             met=_evaluations(case, partial(_force, case, way, fine), places, recorded),
         )  # fmt: skip
     # the reference step rounds as well
@@ -50,7 +50,7 @@ def of_step(
     # an engine may count positions from the rest points of springs, and so round those
     of_q, of_p = state * (size_q + case.origins), state * size_p
     if run.rebuilds_velocity and not how.keeps_displacement:
-        # as they are counted: from rest, or wrapped into a box
+        # as they are counted: from rest
         of_p = of_p + how.state * m * (np.abs(q) + size_q + 2 * case.origins) / h
     # a force, its product with the step, and a velocity may each underflow; a solver adds up n products
     lost = smallest * (1 + m + h * scene.system.pulls())
@@ -77,7 +77,7 @@ def of_recording(case: Claim, q: Reals, p: Reals, places: list[Reals] | None) ->
     off, none = (
         schemes.magnitude_step(
             case.scheme, q + np.copysign(part * half[0], q), p + np.copysign(part * half[1], p), h=run.step,
-            m=m, rate=case.law.rate, turns=case.law.turns, met=met,
+            m=m, rate=case.law.rate, met=met,
         )
         for part in (1, 0)
     )  # fmt: skip
@@ -92,7 +92,7 @@ def _evaluations(
     far, none = np.full(scene.n, scene.system.far, np.longdouble), np.zeros(scene.n, np.longdouble)
     pulls = scene.system.magnitude()(far, none) if case.trajectory.arithmetic.joints else 0.0
     joints = OF_LENGTH / np.longdouble(case.roundings) * pulls
-    acting = {"slow": scene.system.slow, "fast": scene.system.fast, "magnetic": sum(case.law.fields, ())}
+    acting = {"slow": scene.system.slow, "fast": scene.system.fast}
     found: list[Met] = []
     brakes = scene.system.brakes_by_place
     made: dict[tuple[str, float], Met] = {}
@@ -132,13 +132,10 @@ def _force(
     # each term on a particle after the first is added with a rounding of its own
     more = 1 + np.maximum(count - 1, 0) / np.longdouble(case.roundings)
     width = whole * how.force / np.longdouble(how.state) if how.force > how.state else 0.0
-    far = case.scene.periods
-    if how.from_start:
-        # roundings of the force at the start, and of its change with the displacement from there
-        far = far + np.abs(case.scene.q)
+    # roundings of the force at the start, and of its change with the displacement from there
+    far = np.abs(case.scene.q) if how.from_start else 0.0
 
     def force(q: Reals, p: Reals) -> Reals:
-        # the nearest image is the difference of positions that lie in the box
         sizes = plain(q + far, p)
         bound = sizes * more
         if width:

@@ -14,7 +14,6 @@ from springcheck.checks.check import Finding, check
 from springcheck.checks.drag import drag
 from springcheck.checks.requires import CLOSED, MAP, missing
 from springcheck.checks.stretch import Stretch, known
-from springcheck.physics import exact
 from springcheck.physics.arrays import Arithmetic, Floats, Integers, Reals
 from springcheck.physics.trajectory import Limits
 from springcheck.text.wording import count, few, regularly
@@ -68,41 +67,6 @@ def _step_defect(case: Case) -> Finding | str:
     why += f"; as the engine declares: {run.arithmetic}" if str(run.arithmetic) else ""
     why += _blind(case, told, passed=bool(value <= most))
     return Finding(value, most, "roundings", why + hidden, sees)
-
-
-@check("border", family="motion", requires=MAP | {"box", "resolved"}, telling=False)
-def border(case: Case) -> Finding | str:
-    """Steps across a border of the box, of a particle or of a bond, are as good as those within it."""
-    run, box = case.trajectory, case.scene.periods
-    if exact.has_true_motion(case.scene):
-        spans = case.scene.of_half_boxes(exact.true_motion(case.scene, case.steps, run.step)[0])
-        if not (longest := float(np.max(spans))) < 1:
-            why = (
-                f"by the exact solution first after step {case.steps[int(np.argmax(~(spans < 1)))]} a spring "
-                "is as long as half of the box, and another image of its end is nearer; take a longer box"
-            )
-            return Finding(longest, float(np.nextafter(1, 0)), "of half of the box", why)
-    seen = _in_roundings(case, run.q[1:], run.p[1:])
-    image = np.floor(run.q / box)
-    moved = (image[1:] != image[:-1]) | (np.abs(np.diff(run.q, axis=0)) > box / 2)
-    apart = np.zeros(len(run.q), np.bool_)
-    for term in case.scene.terms:
-        if term.bodies == 2:
-            a, b = term.particles
-            apart |= np.any(image[:, a] != image[:, b], axis=1)
-    across = np.any(moved, axis=1) | apart[1:] | apart[:-1]
-    bound, told = _allowed(case)
-    off, across, within = ~(seen <= bound), across & told, ~across & told
-    if not np.any(across):
-        return "nothing crosses a border of the box in this run, and no bond lies across one"
-    if np.any(off & within):
-        return "steps within the box are off as well, which has another cause"
-    worst = int(np.argmax(np.where(across, np.where(np.isfinite(seen), seen / bound, np.inf), -1)))
-    why = (
-        f"roundings along one step, however many borders it crosses: {np.count_nonzero(across)} of "
-        f"{count(len(across), 'pair')} of frames lie across one"
-    )
-    return Finding(seen[worst], bound[worst], "roundings", why + _where(case, off & across))
 
 
 def _allowed(case: Case) -> tuple[Floats, NDArray[np.bool_]]:
@@ -301,10 +265,8 @@ def fastest(case: Case) -> float:
     """Gershgorin's bound of the frequencies and rates met on the whole trajectory [1/T]."""
     q = case.trajectory.q
     steepest = np.max(case.system.gershgorin(q.astype(np.longdouble)) / case.judged.m)
-    turns = 0.0 if case.law.turns is None else np.max(np.atleast_2d(case.law.turns)[0])
-    if case.system.brakes_by_place:
-        turns = turns + float(np.max(np.abs(case.system.friction_at(q)[0])))
-    return float(np.sqrt(steepest) + np.max(case.system.friction_rates) + turns)
+    braked = np.max(np.abs(case.system.friction_at(q)[0])) if case.system.brakes_by_place else 0.0
+    return float(np.sqrt(steepest) + np.max(case.system.friction_rates) + float(braked))
 
 
 @check("arith", family="motion", requires=MAP | {"resolved"})

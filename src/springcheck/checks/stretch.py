@@ -252,9 +252,7 @@ def _allowed(
     if not WIDE or how.quantum or how.stale or alike:
         return worst
     spread, beside = spread / case.roundings, last
-    # a rotation rounds a momentum many times
-    free = case.law.turns is None
-    if how.state == how.force == Arithmetic().state and random and free:
+    if how.state == how.force == Arithmetic().state and random:
         beside = np.minimum(spread, last)
     return np.asarray(np.minimum(worst, deviations * spread + beside))
 
@@ -306,8 +304,8 @@ def _varied(case: Claim, q: Extended, p: Extended) -> tuple[Extended, Extended]:
     def forces(terms: Iterable[Term]) -> Force:
         terms = tuple(terms)
         whole = system.force_of(terms)
-        # friction, and a magnetic field, are linear in p, and so their own change where the motion is
-        brakes = system.force_of(term for term in terms if term.kind in ("friction", "magnetic"))
+        # friction is linear in p, and so its own change where the motion is
+        brakes = system.force_of(term for term in terms if term.kind == "friction")
 
         def force(q: Reals, p: Reals) -> Reals:
             change = brakes(np.broadcast_to(q[0], q[1:].shape), p[1:])

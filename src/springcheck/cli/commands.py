@@ -208,12 +208,13 @@ def _judge(options: Namespace) -> int:
     from springcheck.cli import file
 
     doubts = output.doubts(options.file) if formats.is_hdf5(Path(options.file)) else []
-    names = ("scene", "scheme", "step", "trajectory", "differences", "arithmetic")
+    names = ("scene", "scheme", "step", "trajectory", "differences", "arithmetic", "partial")
     given = {x: getattr(options, x) for x in names}
     found = file.judge(Path(options.file), columns=_columns(options), **given)
     output.warn(options.file, doubts)
     status = found.status or int(bool(doubts))
-    return output.answer(options, lambda: {**found.document(), "not_trusted": doubts}, found.lines, status)
+    lines = partial(found.lines, verdicts=options.verdicts)
+    return output.answer(options, lambda: {**found.document(), "not_trusted": doubts}, lines, status)
 
 
 def _check(options: Namespace) -> int:
@@ -328,6 +329,8 @@ COMMANDS = (
                  help="its velocities are differences of positions, which keep eps q/h of them"),
         argument("--arithmetic", metavar="LABEL",
                  help="it rounds as this method does: openmm:verlet@CUDA-mixed (default: in double)"),
+        argument("--partial", action="store_true", help="let a file pass that covers a part of the scene"),
+        argument("--verdicts", action="store_true", help="print every check with its reason"),
         JSON,
     )),
     Command("check", "is a store whole: digests, completeness, structure", _check, (_FILE,)),

@@ -23,14 +23,15 @@ from springcheck.physics.scenefile import load_scene
 from springcheck.physics.trajectory import Outcome, Trajectory, Verdict
 from springcheck.studies import choose, keeper
 from springcheck.studies.text import left_out
-from springcheck.text.lines import Lines, plain, table
+from springcheck.text.lines import Lines, Text, plain, table
 from springcheck.text.wording import count
 
 TIMES = "times were taken as whole numbers of steps from the first frame on"
 NOT_DOUBLE = "(single|mixed|fixed-point force) arithmetic explains every step"
+CLOCK = 2.0**-53
+"""Roundoff of a clock."""
 SMALLEST_SINGLE = 2.0**-126
 """Smallest normal number of single precision."""
-NOT_JUDGED = "not judged: nothing that applies to these states could tell the scheme from another"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -41,12 +42,21 @@ class Judgement:
     scene: str
     scheme: str
     frames: int
+    steps: int
+    """Steps that the file covers."""
+    of_steps: int
+    """Steps of the scene."""
     notes: tuple[str, ...]
     verdicts: tuple[Verdict, ...]
+    first_off: int = 0
+    """The first step that is not the scheme's own; 0 where none is, or it is not known."""
+    partial: bool = True
+    """Whether a file that covers a part of the scene may pass."""
 
     @property
     def status(self) -> int:
-        return checks.status(self.verdicts)
+        found = checks.status(self.verdicts)
+        return found or 2 * (not self.partial and self.steps < self.of_steps)
 
     @property
     def not_judged(self) -> bool:
@@ -56,10 +66,57 @@ class Judgement:
     def document(self) -> dict[str, Any]:
         names = ("check", "value", "bound", "unit", "passed", "why", "sees")
         own = {x: getattr(self, x) for x in ("scene", "scheme", "frames", "notes", "not_judged")}
+        own |= {"judged_steps": self.steps, "scene_steps": self.of_steps}
         verdicts = [{name: getattr(v, name) for name in names} for v in self.verdicts]
         return keeper.document(file=self.path, **own, verdicts=verdicts)
 
-    def lines(self) -> Lines:
+    def lines(self, *, verdicts: bool = False) -> Lines:
+        """The answer in the first line, then what failed; every verdict with its reason on request."""
+        failed = [v for v in self.verdicts if v.passed is False]
+        frames = count(self.frames, "frame")
+        out = [self._answer(), plain(f"{self.path}: {frames} of {self.scene}, {self._share()}", "dim")]
+        if failed:
+            cause, _, remedy = checks.cause_of(self.verdicts).partition(". What to do: ")
+            out += [plain(f"Diagnosis: {cause[:1].upper()}{cause[1:].rstrip('.')}.")] if cause else []
+            out += [plain(f"Do: {remedy[:1].upper()}{remedy[1:].rstrip('.')}.")] if remedy else []
+        out += [plain(f"Note: {note}", "dim") for note in self.notes]
+        if verdicts:
+            return [*out, plain(), *self._in_full()]
+        if failed:
+            rows = [(v.check, f"{v.value:.3g}", f"{v.bound:.3g}", v.unit) for v in failed]
+            out += [
+                plain(),
+                table(("failed check", "value", "bound", "unit"), rows, left=("failed check", "unit")),
+            ]
+            out += [plain(), plain("--verdicts shows every check with its reason.", "dim")]
+        return out
+
+    def _answer(self) -> Text:
+        title = schemes.title(self.scheme)
+        if self.status == 1:
+            since = f", from step {self.first_off:,}" if self.first_off else ""
+            return plain(f"FAILED: not {title}{since}.", "bold red")
+        if self.not_judged:
+            return plain(
+                f"NOT JUDGED: no check that applies can tell {title} from other schemes.", "bold yellow"
+            )
+        if self.status == 2:
+            return plain(
+                f"NOT PASSED: it is {title} as far as it goes, {self._share()}; --partial accepts that.",
+                "bold yellow",
+            )
+        passed = [v for v in self.verdicts if v.passed]
+        sees = [x for v in passed if (x := v.sees.stiffness) is not None]
+        seen = f"; smallest detectable stiffness error {min(sees):.1e}" if sees else ""
+        return plain(f"PASSED: {title}, by {count(len(passed), 'check')}{seen}.", "bold green")
+
+    def _share(self) -> str:
+        """How much of the scene was judged."""
+        if self.steps == self.of_steps:
+            return f"all {self.of_steps:,} steps"
+        return f"{self.steps:,} of {self.of_steps:,} steps"
+
+    def _in_full(self) -> Lines:
         told = {True: plain("passed"), False: plain("FAILED", "bold red")}
         titles = ("check", "verdict", "value", "why")
         rows = [
@@ -68,18 +125,7 @@ class Judgement:
             if v.passed is not None
         ]
         others = [choose.LeftOut(method=v.check, reason=v.reason) for v in self.verdicts if v.passed is None]
-        frames, scheme = count(self.frames, "frame"), schemes.title(self.scheme)
-        head = f"{self.path}: {frames} of {self.scene}, judged as {scheme}"
-        return [
-            plain(head, "bold"),
-            *(plain(f"  {note}") for note in self.notes),
-            plain(),
-            table(titles, rows, left=titles[:3], prose="why"),
-            *left_out(others, "Not applicable:"),
-            *([plain(NOT_JUDGED, "bold yellow")] if self.not_judged else ()),
-            plain(),
-            plain(checks.summary(self.verdicts), ("bold green", "bold red", "bold yellow")[self.status]),
-        ]
+        return [table(titles, rows, left=titles[:3], prose="why"), *left_out(others, "Not applicable:")]
 
 
 def judge(
@@ -92,10 +138,14 @@ def judge(
     trajectory: str | None = None,
     differences: bool = False,
     arithmetic: str | None = None,
+    partial: bool = True,
 ) -> Judgement:
-    """Verdicts on the trajectory of a file; `differences` says that its velocities are those of positions,
-    which keep eps q/h of them, and `arithmetic` names a method whose program rounds like its own.  Raises
-    SpringcheckError where it is unreadable or not of the scene."""
+    """Verdicts on the trajectory of a file.
+
+    `differences` says that its velocities are differences of positions, which round by eps q/h;
+    `arithmetic` names a method whose program rounds as that of the file; without `partial` a file that covers
+    a part of the scene's steps does not pass.  SpringcheckError where it is unreadable or not of the scene.
+    """
     found = load_scene(scene) if isinstance(scene, str) else scene
     if scheme not in schemes.known():
         engines.names()  # those that are not asked for have schemes of their own
@@ -118,9 +168,11 @@ def judge(
         verdicts.append(shown.other_scheme(judged, run, states))
     if arithmetic is None and re.search(NOT_DOUBLE, checks.cause_of(verdicts)):
         notes += ("of a program that computes so: --arithmetic, as --arithmetic openmm:verlet@CUDA-mixed",)
+    wrong = any(v.passed is False and v.check in checks.TELLING for v in verdicts)
     return Judgement(
         path=path, scene=found.name, scheme=known.name, frames=len(run.t), notes=notes,
-        verdicts=tuple(verdicts),
+        verdicts=tuple(verdicts), steps=judged.steps, of_steps=found.steps, partial=partial,
+        first_off=checks.first_off(judged, run) if wrong else 0,
     )  # fmt: skip
 
 
@@ -133,10 +185,15 @@ def states_in(
         name: moving(path, x) for name, x in found.items()
     }
     if label is None and len(found) == 1:
-        return next(iter(found.values()))
+        label = next(iter(found))
     if label not in found:
         raise StoreError(
             f"{path}: trajectories: {len(found)}; choose one by --trajectory: {', '.join(found)}"
+        )
+    apart = float(np.diff(found[label].t[:2])[0]) if len(found[label].t) > 1 else 0.0
+    if step and abs(apart / step - round(apart / step)) > 1e-6:
+        raise StoreError(
+            f"{path}: --step {step:g} contradicts its times, which are {apart:.6g} apart; leave --step out"
         )
     return found[label]
 
@@ -173,8 +230,6 @@ def as_trajectory(
     _begins(path, states, of, scheme, every, notes, taken)
     _digits(states, notes)
     steps = (len(q) - 1) * every
-    if steps != scene.steps:
-        notes.append(f"ends after step {steps:,}, the scene after {scene.steps:,}")
     if every != scene.every:
         notes.append(f"frames are {count(every, 'step')} apart, {scene.every} in the scene")
     if (steps, every) != (scene.steps, scene.every):
@@ -283,7 +338,8 @@ def _times(
     t = np.arange(len(states.t), dtype=np.float64) * max(every, 1) * scene.step
     off = np.abs(states.t - states.t[0] - t)
     # of times with fixed decimals the last digit does not grow with them
-    allowed = 1e-9 * np.abs(t + scene.step) + 2 * states.roundoff * np.abs(states.t)
+    # a clock that adds up its steps is off by one rounding of the time at each
+    allowed = (2 * states.roundoff + CLOCK * (every * np.arange(len(t)) + 4)) * np.abs(states.t)
     allowed += storage(states.t).quantum(states.t)
     if every < 1 or np.any(off > allowed):
         row = int(np.argmax(off > allowed))

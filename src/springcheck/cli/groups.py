@@ -36,15 +36,13 @@ EXAMPLES: Mapping[str, Sequence[str]] = {
 
 
 GROUPS: Mapping[str, Sequence[str]] = {
-    "input": ("file", "files", "label", "word", "kind", "--trajectory", "--columns", "--from",
-              "--against"),
-    "scene": ("scene", "--scene", "--step", "--steps", "--set", "--temperature", "--friction", "--seed",
-              "--thermostats"),
+    "input": ("file", "files", "label", "word", "kind", "--trajectory", "--columns", "--from"),
+    "scene": ("scene", "--scene", "--step", "--steps", "--set", "--temperature", "--friction", "--seed"),
     "methods": (
         "--method", "--all", "--engine", "--stepper", "--command", "--scheme", "--timeout", "--fault",
     ),
     "known of the motion": ("--mass", "--stiffness", "--differences", "--arithmetic"),
-    "how much is measured": ("--thorough", "--budget", "--quick", "--workers", "--cluster"),
+    "how much is measured": ("--thorough", "--partial", "--budget", "--quick", "--workers", "--cluster"),
     "figures": ("--particle",),
     "output": ("output", "--output", "--force", "--json", "--quiet", "--verdicts", "--rows", "--points"),
     "continuous integration": tuple(f"--{name}" for name in REPORT_FORMS),

@@ -35,7 +35,7 @@ def lines(summary: store.Summary, options: Namespace) -> Lines:
     out: Lines = [plain(f"{summary.path}: {summary.size / 1e6:.3g} MB", "bold")]
     run, stride = _asked_for(summary, options)
     if run is not None:
-        of = units(keeper.stored_scene(summary.path))
+        of = Units() if _left(summary) else units(keeper.stored_scene(summary.path))
         out += _frames(run, stride, store.end(summary.path, run.label, 1), of)
         if not options.verdicts:
             return out

@@ -190,7 +190,5 @@ def _largest(scene: Scene, q: Floats, p: Floats) -> str:
     sizes = [scene.system.norm(q - scene.q, none), scene.system.norm(none, p - scene.p)]
     name, x, own = parts[int(np.argmax(sizes))]
     i = int(np.argmax(np.abs(x - own)))
-    boxes = (q - scene.q) / np.where(scene.periods, scene.periods, np.inf)
-    whole = name == "q" and np.all(np.abs(boxes - np.rint(boxes)) <= CLOSE_STATE) and np.any(np.rint(boxes))
-    todo = "unwrap its positions across the borders of the box" if whole else "give a scene that starts so"
-    return f"{name}[{i}] is {x[i]:.15g} there, and {own[i]:.15g} in the scene; {todo}"
+    values = f"{x[i]:.15g} there, and {own[i]:.15g} in the scene"
+    return f"{name}[{i}] is {values}; give a scene that starts so"

@@ -132,7 +132,6 @@ def engine(specs: Sequence[Spec], stated: Callable[[str], str] = lambda name: ""
         version=dict,
         convention=lambda method: "as the function returns them",
         any_axis=True,
-        periodic=True,
     )
 
 

@@ -329,8 +329,6 @@ def refusal(scene: Scene, label: Label) -> str | None:
         return f"{who} moves {moved}, not {PLURAL[scene.kind]}"
     if scene.places is not None and not engine(label.engine).any_axis:
         return f"{engine(label.engine).title} is given particles along x here, and the scene has other axes"
-    if scene.box is not None and not engine(label.engine).periodic:
-        return f"{engine(label.engine).title} is given no periodic box here"
     whole = ANY_POTENTIAL in what.terms, ANY_DISTANCE in what.terms
     unknown = (
         term for term in scene.terms

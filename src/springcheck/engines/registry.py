@@ -28,10 +28,7 @@ GROUP = "springcheck.engines"
 """The group of entry points by which the engines of other packages are found."""
 
 OURS = "springcheck"
-MODULES = (
-    "own", "ase", "box2d", "dart", "drake", "heyoka", "lammps", "mujoco", "openmm", "pymunk", "rapier",
-    "rebound", "scipy", "sundials",
-)  # fmt: skip
+MODULES = ("own", "ase", "lammps", "mujoco", "openmm", "scipy", "sundials")
 """Our engines, each the ENGINE of the module beside this one."""
 
 

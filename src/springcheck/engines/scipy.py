@@ -16,7 +16,6 @@ from springcheck.engines.contract import (
     DRIVEN,
     EVERY_FORCE,
     EVERY_KIND,
-    FIELD,
     Engine,
     Label,
     Method,
@@ -106,7 +105,7 @@ ENGINE = Engine(
         *(
             by_name(
                 name, f"scipy-{name}", f"scipy.integrate.{its_class}, as solve_ivp steps it",
-                EVERY_FORCE | DRIVEN | FIELD | BRAKES, adaptive=True, kinds=EVERY_KIND,
+                EVERY_FORCE | DRIVEN | BRAKES, adaptive=True, kinds=EVERY_KIND,
             )
             for name, (its_class, *_) in SOLVERS.items()
         )

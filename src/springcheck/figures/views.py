@@ -130,7 +130,7 @@ def views(scene: Scene, particle: int | None = None) -> list[View]:
                 f"--particle {particle}: scene {scene.name} has particles 0 to {scene.n - 1}"
             )
         return [_single(scene, particle)]
-    # two particles that are bound to each other and to nothing else; a magnetic field joins axes of one
+    # two particles that are bound to each other and to nothing else
     if scene.n == scene.particles == 2 and scene.terms and all(term.bodies == 2 for term in scene.terms):
         return [_bond(scene)]
     return [_single(scene, i) for i in range(scene.n if scene.n <= MOST_PANELS else 1)]

@@ -152,7 +152,7 @@ def _states(path: Path, group: Any, name: str, most: int | None) -> States | Non
             raise StoreError(f"{path}: no position and velocity of {name} belong to the same step")
     rows, rows_v = rows[:most], rows_v[:most]
     values = [_rows(x, chosen) for x, chosen in zip(data, (rows, rows_v), strict=False)]
-    values[0] = values[0] + _crossed(path, group, q.shape, rows)
+    _not_wrapped(path, group, q.shape[0], rows)
     if (order := _order(path, group, q.shape, rows)) is not None:
         values = [np.take_along_axis(x, order[:, :, None], axis=1) for x in values]
     mass, mass_unit = _mass(path, group, q.shape[1])
@@ -186,15 +186,11 @@ def _beside(path: Path, group: Any, element: str, frames: int, rows: Any) -> Any
     return _rows(dataset, rows)
 
 
-def _crossed(path: Path, group: Any, shape: tuple[int, ...], rows: Any) -> Any:
-    """What wrapping took off positions: images times the box's edges, a matrix of rows if triclinic."""
-    image = _beside(path, group, "image", shape[0], rows)
-    if image is None or not np.any(image):
-        return 0.0
-    edges = _beside(path, group, "box/edges", shape[0], rows)
-    if edges is None or image.shape[1:] != shape[1:] or edges.shape[1:] not in ((d := shape[2:]), (*d, *d)):
-        raise StoreError(f"{path}: image of {group.name} does not count borders of its positions' box/edges")
-    return image @ edges if edges.ndim == 3 else image * edges[:, None]
+def _not_wrapped(path: Path, group: Any, frames: int, rows: Any) -> None:
+    """StoreError where images say that positions were wrapped into a box."""
+    image = _beside(path, group, "image", frames, rows)
+    if image is not None and np.any(image):
+        raise StoreError(f"{path}: positions of {group.name} are wrapped into a box; write them unwrapped")
 
 
 def _order(path: Path, group: Any, shape: tuple[int, ...], rows: Any) -> Any:

@@ -87,7 +87,6 @@ def read_lammps(path: Path, columns: list[str], step: float | None) -> States:
     first: list[list[str]] = []
     names: list[str] = []
     n: int | None = None
-    boxes: list[list[float]] = []
     with _frames(path, "LAMMPS dump") as lines:
         for line in lines:
             # before the number of the step, as `dump_modify units yes time yes` asks for them
@@ -100,16 +99,10 @@ def read_lammps(path: Path, columns: list[str], step: float | None) -> States:
             if not item.startswith("ITEM: TIMESTEP"):
                 raise lines.wrong("ITEM: TIMESTEP is expected")
             steps.append(int(next(lines)))
-            item, announced, edges = next(lines), 0, 3 * [0.0]
-            tilted, around = False, 3 * [""]
+            item, announced = next(lines), 0
             while not item.startswith("ITEM: ATOMS"):
                 if item.startswith("ITEM: NUMBER OF ATOMS"):
                     announced = n = _atoms(next(lines), lines, n)
-                elif item.startswith("ITEM: BOX BOUNDS"):
-                    bounds = [[float(x) for x in next(lines).split()] for _ in range(3)]
-                    tilted = any(len(x) > 2 for x in bounds)
-                    around = item.split()[-3:]
-                    edges = [x[1] - x[0] for x in bounds]
                 item = next(lines)
             if not announced:
                 raise lines.wrong("ITEM: NUMBER OF ATOMS is missing before it")
@@ -117,20 +110,12 @@ def read_lammps(path: Path, columns: list[str], step: float | None) -> States:
             if names and list(wanted) != names:
                 raise lines.wrong("its columns change")
             names = list(wanted)
-            wrapped = "x" in item.split()[2:] and "xu" not in item.split()[2:]
-            if wrapped and tilted:
-                raise lines.wrong("its box is tilted; dump xu yu zu in place of x y z")
-            # where borders are counted, or an axis has no box, nothing is unwrapped here
-            counted = "ix" in wanted or not wrapped
-            boxes.append([0.0 if counted or way != "pp" else x for x, way in zip(edges, around, strict=True)])
             for _ in range(announced):
                 cells = next(lines).split()
                 row = [cells[i] for i in wanted.values()]
                 values = [float(cell) for cell in row]
-                if "ix" in wanted:
-                    at = names.index("ix")
-                    turns = zip(values[:3], values[at : at + 3], edges, strict=True)
-                    values[:3] = [x + count * edge for x, count, edge in turns]
+                if "ix" in wanted and any(values[-3:]):
+                    raise lines.wrong("positions are wrapped into a box; dump xu yu zu in place of x y z")
                 numbers.extend(values)
                 if len(first) < SHOWN:
                     first.append(row[:6])
@@ -142,24 +127,12 @@ def read_lammps(path: Path, columns: list[str], step: float | None) -> States:
         if np.any(others := np.any(ids != ids[0], axis=1)):
             raise StoreError(f"{path}: frame {np.argmax(others)} has other atoms than the first, by their id")
     q, v = table[:, :, :3], table[:, :, 3:6]
-    if np.any(boxes):
-        q = q + _crossed(q, np.array(boxes))
     mass = table[0, :, names.index("mass")] if "mass" in names else None
     # LAMMPS writes 6 digits unless dump_modify asks for more
     known = step is None and len(clock) == len(steps)
     when = np.array(clock) if known else times(path, steps, step)
     told = roundoff(first, range(6)), fixed(first, range(3), range(3, 6))
     return of_frames(path, when, q, v, mass, *told)
-
-
-def _crossed(q: Floats, boxes: Floats) -> Floats:
-    """What wrapping took off positions q (f, n, 3) at borders of periodic boxes (f, 3), 0 along axes without:
-    from frame to frame an atom is where its nearest image was."""
-    edges = boxes[1:, None, :]
-    with np.errstate(invalid="ignore", divide="ignore"):
-        crossed = np.where(edges > 0, np.round(np.diff(q, axis=0) / edges), 0)
-    counted = np.concatenate([np.zeros_like(q[:1]), -np.cumsum(crossed, axis=0)])
-    return np.asarray(counted * boxes[:, None, :])
 
 
 def _wanted(path: Path, names: list[str]) -> dict[str, int]:

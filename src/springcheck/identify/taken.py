@@ -49,7 +49,7 @@ def takers(
 
 def is_step_of(scheme: Scheme, names: Iterable[str], scene: Scene, run: Trajectory) -> bool:
     """Whether the scheme's steps from the first frames are those of one of `names` on this scene, to
-    rounding, as of Boris' rotation and position Verlet where no field turns velocities."""
+    rounding, as of multiple time steps and velocity Verlet where no spring is fast."""
     start = [x[:STEPS].astype(np.longdouble) for x in (run.q, run.p)]
     one_step = [x for name in names if (x := SCHEMES.get(name)) and x.has("one-step")]
     if not scheme.has("one-step"):
@@ -66,7 +66,7 @@ def springs_of(scene: Scene) -> Floats:
     forces act, or some join two coordinates."""
     system, kinds = scene.system, {term.kind for term in scene.terms}
     alone = system.is_linear and system.is_separate and kinds <= {"potential", "friction"}
-    if not alone or scene.bath or scene.box:
+    if not alone or scene.bath:
         return np.stack([scene.m, *np.full((2, scene.n), np.nan)])
     c = system.friction_rates * scene.m
     return np.stack([scene.m, system.hessian_diagonal(scene.q), c]).astype(np.float64)
@@ -132,10 +132,9 @@ def seen_to_take(scene: Scene, run: Trajectory, about: int) -> str:
     if system.is_driven:
         t = run.t[frames, None]
         q, p = np.hstack([q, t]), np.hstack([p, np.full_like(t, CLOCK)])
-    # without what they take apart such schemes are others: Boris' rotation position Verlet
+    # without what they take apart such schemes are others
     idle = {"mixes"} if not any(term.fast for term in scene.terms) else set[str]()
     idle |= {"friction"} if not system.is_damped or system.brakes_by_place else set()
-    idle |= {"magnetic"} if "magnetic" not in system.acting else set()
     found: tuple[str, ...] = ()
     for known in (SCHEMES, ATTACHED):
         here = {x: {*y.traits, *(kind.evaluates for kind in y.kinds)} for x, y in known.items()}

@@ -8,7 +8,6 @@ from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from springcheck.identify.evidence import LEFT_BY_ROUNDING
 from springcheck.identify.fit import CERTAIN
@@ -129,9 +128,8 @@ def of_rotation(record: Record, found: Identification) -> Identification:
     i, j, factor, error = pair
     grows = abs(abs(factor) - 1) > LEFT_BY_ROUNDING * ROUNDING + error
     how = f"turns and grows by {abs(factor) - 1:+.3g} in each frame" if grows else "only turns"
-    field = "" if grows else " (Boris)"
     return found.doubted(
-        f"{ONLY_TURNS}{i} and {j} {how}: a rotation, as of a charge in a magnetic field{field}, or a "
+        f"{ONLY_TURNS}{i} and {j} {how}: a rotation, as of a charge in a magnetic field, or a "
         f"circular orbit on springs: {found.statement}",
         "what would tell: the stiffness, or an orbit that is no circle",
     )
@@ -162,9 +160,6 @@ LEFT = 1e-9
 
 KEPT = 1e-4
 """Distance of the determinant from 1 up to which its phase is given in full."""
-
-BORIS_AGREES = 1e-10
-"""Difference of the entries up to which the map is Boris', relative to the largest."""
 
 
 def of_plane(record: Record) -> Explanation | None:
@@ -207,7 +202,6 @@ def _of_two(record: Record, i: int, j: int) -> tuple[float, Explanation | None]:
     scale = size[:, None] / size
     entries = np.asarray(rows[:2].T * scale, np.complex128)
     error = SURE * np.sqrt(np.mean(left**2, axis=0))[:, None] * spread * scale
-    interval = abs(float(record.interval))
     det = complex(np.linalg.det(entries))
     angle, open_to = cmath.phase(det), float(np.sum(np.abs(entries[::-1, ::-1]) * error))
     if abs(angle) < LEFT + open_to:
@@ -221,26 +215,10 @@ def _of_two(record: Record, i: int, j: int) -> tuple[float, Explanation | None]:
     )
     # to few digits any central force that is nearly linear turns its ellipse at a constant rate
     cause += "" if record.fine else ", or a central force that is not quite linear"
-    half = math.tan(-angle / 2)
-    turn = cmath.exp(1j * angle)
-    stiff = (-2 * entries[1, 0] / (1 + turn)).real
-    boris = _boris(stiff, turn)
-    if np.all(np.abs(boris - entries) <= BORIS_AGREES * np.max(np.abs(entries)) + error):
-        cause += (
-            f". By Boris, if every step was recorded: strength over mass "
-            f"{_known(2 * half / interval, open_to / interval)}, stiffness over mass "
-            f"{_known(stiff / interval**2, float(error[1, 0]) / interval**2)}"
-        )
-    remedy = "judge it against a scene with [[magnetic]]"
+    remedy = "such a scene is not part of springcheck"
     return gain, Explanation(cause, remedy, float(np.max(left)), local=True)
 
 
 def _known(x: float, error: float) -> str:
     """A number to the digits that its error leaves, nine at most."""
     return f"{x:.{max(1, min(9, math.floor(math.log10(abs(x) / max(error, 1e-300)))))}g}" if x else "0"
-
-
-def _boris(stiff: float, turn: complex) -> NDArray[np.complex128]:
-    """Map of Boris' scheme on (z, z' h), by (h w)**2 and the factor exp(-2 i atan(W h/2)) of the velocity."""
-    drift, kick = np.array([[1, 0.5], [0, 1]]), np.array([[1, 0], [-stiff / 2, 1]])
-    return np.asarray(drift @ kick @ np.diag([1, turn]) @ kick @ drift, np.complex128)

@@ -9,7 +9,7 @@ from typing import Any, Literal, Self, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from springcheck.physics.arrays import Floats, Integers, Reals
+from springcheck.physics.arrays import Floats, Integers
 from springcheck.physics.bath import Bath
 from springcheck.physics.term import FrozenArrays, Term
 
@@ -38,9 +38,6 @@ class SceneFields(FrozenArrays):
     steps: int
     every: int = 1
     """Number of steps between recorded frames; it divides `steps`."""
-    box: tuple[float, float, float] | None = None
-    """Lengths of a periodic box along x, y and z [L], in which every spring joins the nearest images of its
-    ends; None without one.  Positions are unwrapped across its borders, so that no motion changes."""
     bath: Bath | None = None
     """The heat bath, which random methods require; None where the motion is deterministic."""
     tolerance: float = 1e-12
@@ -106,24 +103,6 @@ class SceneFields(FrozenArrays):
         left = np.ones(3 * self.particles, dtype=bool)
         left[self.where] = False
         return left
-
-    @property
-    def periods(self) -> Floats:
-        """The length of the box along the axis of each coordinate, 0 without a box (n,) [L]."""
-        if self.box is None:
-            return np.zeros(self.n)
-        return np.array(self.box)[self.all_places % 3]
-
-    def of_half_boxes(self, q: Reals) -> Floats:
-        """Length of the longest spring at positions q (..., n), in halves of the box: from 1 on another image
-        of its end is nearer.  0 without a box (...,)."""
-        found = np.zeros(q.shape[:-1])
-        for term in self.terms if self.box is not None else ():
-            if term.kind == "potential":
-                way = term.stretch(q) if term.bodies == 2 else term.elongation(q)
-                half = self.periods[term.particles[0]] / 2
-                found = np.maximum(found, np.max(np.abs(way) / half, axis=-1, initial=0.0))
-        return found
 
     @property
     def frames(self) -> int:

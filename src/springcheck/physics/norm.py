@@ -24,9 +24,8 @@ class Norm:
     """The size of a difference between states, relative to the initial energy norm.
 
     The square root of the sum of dp**2 / 2m and of |k| du**2 / 2 over the rows of all terms, u their
-    elongation and |k| their absolute curvature at rest, the largest over all times where it changes in time,
-    divided by that of the kinetic plus the absolute potential energy of the start, a modulated spring's
-    without its modulation, or where that is 0 of the energy that it may gain (`System.gained`), or 1.
+    elongation and |k| their absolute curvature at rest, divided by that of the kinetic plus the absolute
+    potential energy of the start, or where that is 0 of the energy that it may gain (`System.gained`), or 1.
     For one spring it is the distance in the phase plane in units of the amplitude.  A free group's
     position has no potential energy: counted instead is the kinetic energy that moves its centre by the
     difference within the duration of the run.

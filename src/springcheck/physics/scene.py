@@ -38,11 +38,6 @@ class Scene(SceneFields):
             object.__setattr__(self, field, value)
         for term in (x for x in self.terms if isinstance(x, Distances)):
             term.check_start(self.q)
-        if not (longest := float(self.of_half_boxes(self.q))) < 1:
-            raise SceneError(
-                f"box: at the start a spring is {longest:.3g} times as long as half of the box, and another "
-                "image of its end is nearer; give positions of images that are near, or a longer box"
-            )
 
     def __repr__(self) -> str:
         terms = ", ".join(f"{len(term)} {term.key}" for term in self.terms) or "free"
@@ -65,8 +60,6 @@ class Scene(SceneFields):
         total.update(repr(known).encode())
         if self.places is not None:
             total.update(self.places.astype("<i8").tobytes())
-        if self.box:
-            total.update(repr(("box", *self.box)).encode())
         if self.bath:
             total.update(repr(self.bath).encode())
         for values in (self.m, self.q, self.p):
@@ -112,7 +105,6 @@ def _checked(scene: Scene) -> Iterator[tuple[str, Any]]:
     yield "places", places
     terms = _terms(scene.terms, n, places)
     yield "terms", terms
-    yield "box", _box(scene, terms)
     steps, every = _whole(scene.steps, "steps"), _whole(scene.every, "every")
     if steps > MOST_STEPS:
         raise SceneError(f"steps = {steps}: at most 2**53 = {MOST_STEPS} can be told apart in t = i h")
@@ -172,38 +164,13 @@ def _places(scene: Scene) -> Integers | None:
     return None if np.array_equal(places, 3 * np.arange(n)) else places
 
 
-def _box(scene: Scene, terms: tuple[Term, ...]) -> tuple[float, ...] | None:
-    """The three lengths of the box.  SceneError where anything but springs acts in it."""
-    if scene.box is None:
-        return None
-    try:
-        lengths = tuple(np.atleast_1d(np.asarray(scene.box, np.float64)).tolist())
-    except (TypeError, ValueError, OverflowError):
-        lengths = ()
-    if len(lengths) not in (1, 3) or not all(isinstance(x, float) and 0 < x < math.inf for x in lengths):
-        raise SceneError(f"box = {scene.box!r}: a length > 0, or three of them, is needed")
-    if scene.kind != "particles" or scene.bath is not None:
-        raise SceneError("box: it is for particles, without a bath")
-    for term in terms:
-        if term.key not in BOXED:
-            raise SceneError(f"box: a {term.key} has no nearest image; {', '.join(BOXED)} have")
-    return lengths * (3 // len(lengths))
-
-
-BOXED = ("wall-spring", "spring", "bond", "damping")
-"""Keys of the terms that may act in a box."""
-
-
 def _terms(given: Any, n: int, places: Integers | None) -> tuple[Term, ...]:
     if not isinstance(given, tuple | list) or not all(isinstance(term, Term) for term in given):
         raise SceneError("terms: objects of springcheck.physics.terms are needed, such as WallSpring(...)")
     for term in given:
         term.check(n)
-        turns = term.kind == "magnetic"
         of = [np.arange(0) if places is None else places[index] for index in term.particles]
-        if turns and (places is None or np.any(np.diff([x // 3 for x in of], axis=0))):
-            raise SceneError(f"{term.key}: it turns velocities in the plane of two axes of one particle")
-        if not turns and len({tuple(x % 3) for x in of}) > 1:
+        if len({tuple(x % 3) for x in of}) > 1:
             raise SceneError(f"{term.key}: its rows join coordinates along different axes")
     return in_order(given)
 

@@ -20,7 +20,7 @@ from springcheck.physics.driven import Drive, with_clock
 from springcheck.physics.fields import SceneFields
 from springcheck.physics.norm import SMALLEST_ENERGY, Norm, kinetic_energy
 from springcheck.physics.term import Term
-from springcheck.physics.terms import Damping, Magnetic, VanDerPol
+from springcheck.physics.terms import Damping, VanDerPol
 
 Fields = TypeVar("Fields", bound=SceneFields)
 
@@ -162,7 +162,7 @@ class System(Generic[Fields]):
 
     def _sum(self, parts: Sequence[Term], added: Sequence[Callable[[Reals, Reals, Reals], None]]) -> Force:
         """Sum of these functions of (q, v, out), one for each term, as a function of (q, p)."""
-        needs_velocity = any(term.kind in ("friction", "magnetic") for term in parts)
+        needs_velocity = any(term.kind == "friction" for term in parts)
 
         def total(q: Reals, p: Reals) -> Reals:
             # for one state zeros is four times as fast; zeros_like keeps the memory order of several
@@ -243,12 +243,11 @@ class System(Generic[Fields]):
     def jacobian(self, q: Floats, p: Floats | None = None) -> Floats:
         """Derivatives of (p/m, force) by (q, p) at q, p (n,) -> (2n, 2n), double precision."""
         upper = np.hstack([np.zeros((self.n, self.n)), np.diag(1 / self.m)])
-        turned = (x.by_velocity(self.m) for x in self.terms if isinstance(x, Magnetic))
         bent, rate = self.hessian(q), self.friction_rates
         if self.brakes_by_place and p is not None:
             rate, bend = self.friction_at(q)
             bent = bent + np.diag(bend * p)
-        lower = np.hstack([-bent, sum(turned, -np.diag(rate))])
+        lower = np.hstack([-bent, -np.diag(rate)])
         return np.vstack([upper, lower]).astype(np.float64)
 
     def curvatures(self, q: Reals) -> Any:

@@ -22,7 +22,7 @@ from springcheck.physics.arguments import of_kind
 from springcheck.physics.arrays import Extended, Floats, Integers, Reals, is_masked
 
 Where: TypeAlias = "slice | Integers"
-Origin: TypeAlias = Literal["potential", "friction", "magnetic", "drive"]
+Origin: TypeAlias = Literal["potential", "friction", "drive"]
 
 
 class Column(NamedTuple):
@@ -309,7 +309,7 @@ class LinearLaw:
 
 
 class WithoutPotential(Term):
-    """A term without potential energy: friction, a magnetic field, a driving force."""
+    """A term without potential energy: friction, a driving force."""
 
     potential: ClassVar[Any] = staticmethod(lambda u, *_: np.zeros_like(u))
     slope: ClassVar[Any] = potential

@@ -22,13 +22,13 @@ from springcheck.physics.distance import (
     RadialMorse,
     RadialSpring,
 )
-from springcheck.physics.driven import Drive, ModulatedSpring
+from springcheck.physics.driven import Drive
 from springcheck.physics.term import Column, LinearLaw, OnPairs, OnParticles, Origin, Term, WithoutPotential
 
 __all__ = [
-    "Column", "Cosine", "Damping", "Distances", "Drive", "Kepler", "LennardJones", "Magnetic",
-    "ModulatedSpring", "Morse", "OnDistances", "OnPairs", "OnParticles", "Quartic", "RadialMorse",
-    "RadialSpring", "Spring", "Term", "VanDerPol", "WallSpring", "Weight", "known", "register",
+    "Column", "Cosine", "Damping", "Distances", "Drive", "Kepler", "LennardJones", "Morse", "OnDistances",
+    "OnPairs", "OnParticles", "Quartic", "RadialMorse", "RadialSpring", "Spring", "Term", "VanDerPol",
+    "WallSpring", "Weight", "known", "register",
 ]  # fmt: skip
 
 
@@ -242,63 +242,10 @@ class VanDerPol(WithoutPotential):
         return self.c * (1 + 3 * x * x) * np.abs(np.take(v, self.i, axis=-1))
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Magnetic(WithoutPotential):
-    """A force strength (v_b, -v_a) in the plane of the coordinates a and b of one particle.
-
-    strength [M/T]: charge times field, along z where a is x and b is y; for Coriolis' force 2 m Omega.  It
-    does no work.
-    """
-
-    key: ClassVar[str] = "magnetic"
-    formula: ClassVar[str] = "force strength (v_y, -v_x)"
-    columns: ClassVar[tuple[Column, ...]] = (Column("strength", "strength", single=False),)
-    ends: ClassVar[tuple[str, ...]] = ("a", "b")
-    kind: ClassVar[Origin] = "magnetic"
-    a: Integers
-    b: Integers
-    strength: Floats
-
-    def add_force(self, q: Reals, v: Reals, out: Reals) -> None:
-        one, other = (np.take(v, index, axis=-1) for index in self.particles)
-        self._add(out, self.strength * other, -self.strength * one)
-
-    def add_rounding(self, q: Reals, v: Reals, out: Reals, near: Reals | None, exact: bool) -> None:
-        one, other = (np.abs(np.take(v, index, axis=-1) * self.strength) for index in self.particles)
-        self._add(out, other, one)
-
-    def _add(self, out: Reals, *pushes: Reals) -> None:
-        for index, push in zip(self.particles, pushes, strict=True):
-            where: Any = (..., index)
-            np.add.at(out, where, push)
-
-    def by_velocity(self, m: Reals) -> Reals:
-        """Derivatives of the force by the momenta (n, n) [1/T], as wide as the masses."""
-        out = np.zeros((len(m), len(m)), m.dtype)
-        np.add.at(out, (self.a, self.b), self.strength / m[self.b])
-        np.subtract.at(out, (self.b, self.a), self.strength / m[self.a])
-        return out
-
-    def turns(self, m: Floats, places: Integers) -> Floats:
-        """Angular frequency at which the field alone rotates the velocity of each coordinate (n,) [1/T]; of a
-        field along no axis (3, n), with its direction and the number of the particle."""
-        out, field, of = np.zeros(len(m)), np.zeros((np.max(places) // 3 + 1, 3)), places // 3
-        for index in (self.a, self.b):
-            np.add.at(out, index, np.abs(self.strength) / m[index])
-        one, other = places[self.a] % 3, places[self.b] % 3
-        sign = np.where((other - one) % 3 == 1, 1, -1)
-        np.add.at(field, (of[self.a], 3 - one - other), sign * self.strength / m[self.a])
-        if np.all(np.count_nonzero(field, axis=1) <= 1):
-            return out
-        size = np.sqrt(np.sum(field * field, axis=1, keepdims=True))
-        way = np.where(size > 0, field / np.where(size > 0, size, 1), 0)
-        return np.stack([size[of, 0], way[of, places % 3], of])
-
-
 _KNOWN: dict[str, type[Term]] = {
     term.key: term for term in (
-        WallSpring, Spring, Quartic, Cosine, Weight, Morse, RadialSpring, Damping, VanDerPol, Magnetic, Drive,
-        ModulatedSpring, RadialSpring.to_points, *(
+        WallSpring, Spring, Quartic, Cosine, Weight, Morse, RadialSpring, Damping, VanDerPol, Drive,
+        RadialSpring.to_points, *(
             each for pair in (Kepler, LennardJones, RadialMorse) for each in (pair, pair.to_points)
         ),
     )

@@ -176,8 +176,8 @@ class Trajectory:
 
     def at(self, rows: slice) -> Trajectory:
         """These frames alone."""
-        more = {} if self.energy is None else {"energy": self.energy[rows]}
-        return replace(self, t=self.t[rows], q=self.q[rows], p=self.p[rows], **more)
+        energy = None if self.energy is None else self.energy[rows]
+        return replace(self, t=self.t[rows], q=self.q[rows], p=self.p[rows], energy=energy)
 
     @typed
     def save(self, path: str | Path) -> Path:
@@ -328,7 +328,7 @@ class Limits:
     order: float | None = told("an order or exponent off by {:.1e}")
     """Absolute change of an order or an exponent."""
     amplitude: float | None = told("a drive's amplitude off by {:.1e}")
-    """Relative change of a drive's amplitude, or of the depth of a modulation: the largest such limit."""
+    """Relative change of a drive's amplitude: the largest such limit."""
     frequency: float | None = told("its frequency off by {:.1e}")
     """Relative change of the frequency of a drive."""
     phase: float | None = told("its phase off by {:.1e} rad")

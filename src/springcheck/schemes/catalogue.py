@@ -271,12 +271,6 @@ _ATTACHED = (
         "MuJoCo documentation, Computation, Numerical integration: (M + h D) v' = M v + h F",
         symplectic=False,
     ),
-    splitting(
-        "boris", "Boris: half drift, half kick, turn, half kick, half drift", 2, 2.0,
-        (("drift", HALF), ("pull", HALF), ("gyrate", ONE), ("pull", HALF), ("drift", HALF)),
-        "Boris, Proc. Fourth Conf. Numerical Simulation of Plasmas (1970) 3; Qin et al., Phys. Plasmas 20 "
-        "(2013) 084503: it keeps volume and is not symplectic", symplectic=False,
-    ),
     Scheme(
         name="implicit-euler-4", title="implicit Euler, four substeps", order=1, limit=float("inf"),
         symplectic=False, b=(Fraction(1, 4),) * 4,
@@ -287,8 +281,8 @@ _ATTACHED = (
 
 ATTACHED: dict[str, Scheme] = {scheme.name: scheme for scheme in _ATTACHED}
 """Schemes that follow from how a spring is attached to an engine, beside those that people choose: a force
-that is set once and held over substeps, friction that is taken implicitly where the force is not, a spring
-that is solved for in every substep; and Boris' rotation, which is position Verlet without a field."""
+that is set once and held over substeps, friction that is taken implicitly where the force is not, or a spring
+that is solved for in every substep."""
 
 UNKNOWN = Scheme(
     name="unknown",

@@ -17,9 +17,8 @@ import numpy as np
 
 from springcheck.physics.arrays import Reals
 
-Acting: TypeAlias = Literal["", "all", "potential", "slow", "fast", "magnetic"]
-"""The terms whose force a stage evaluates: none, all, those of the potential, the slow or the fast springs,
-or magnetic fields alone."""
+Acting: TypeAlias = Literal["", "all", "potential", "slow", "fast"]
+"""The terms whose force a stage evaluates: none, all, the potential, the slow or the fast springs."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -30,9 +29,6 @@ class Setting:
     m: Reals
     rate: Reals | None
     force: Reals
-    turns: Reals | None = None
-    """Angular frequencies (n,) at which magnetic fields turn the velocities; None where there is no field; of
-    fields along no axis their directions too, as `Magnetic.turns`."""
 
 
 Effect: TypeAlias = Callable[[Reals, Reals, Any, Setting], tuple[Reals, Reals]]
@@ -107,34 +103,6 @@ def _implicit_friction_sizes(q: Reals, p: Reals, x: Any, at: Setting) -> tuple[R
     return q, p * (1 + np.abs(y)) / np.abs(1 + y)
 
 
-def _gyrate(q: Reals, p: Reals, x: Any, at: Setting) -> tuple[Reals, Reals]:
-    """P - p = x F((P + p)/2), a rotation by 2 atan(x W/2): with T p = x F(p)/2 and T**2 = -(x W/2)**2 on what
-    of p is not along the field."""
-    if at.turns is None:
-        return q, p
-    rate, along = _along(at.turns, p)
-    square = (x * rate / 2) ** 2
-    return q, p + (x * at.force - 2 * square * (p - along)) / (1 + square)
-
-
-def _gyrate_sizes(q: Reals, p: Reals, x: Any, at: Setting) -> tuple[Reals, Reals]:
-    if at.turns is None:
-        return q, p
-    rate, along = _along(np.abs(at.turns), p)
-    square = (x * rate / 2) ** 2
-    # of a direction that is rounded, and of two products and sums with it
-    return q, p + (np.abs(x) * at.force + 2 * square * (p + 2 * along)) / (1 + square)
-
-
-def _along(turns: Reals, p: Reals) -> tuple[Reals, Any]:
-    """Rates (n,) of turning by the field, and the momenta (..., n) along it."""
-    if turns.ndim == 1:
-        return turns, 0
-    rate, way, of = turns
-    sums = np.add.reduceat(way * p, np.flatnonzero(np.diff(of, prepend=-1)), axis=-1)
-    return rate, way * np.take(sums, of.astype(np.int64), axis=-1)
-
-
 _ALL = (
     StageKind(name="kick", word="p = p + {c}F", act=_kick, sizes=_kick_sizes, roundings=6,
               evaluates="all", kicks=True),
@@ -153,9 +121,6 @@ _ALL = (
     # the sum, and the quotient
     StageKind(name="implicit-friction", word="p = p / (1 + {c}c/m)", act=_implicit_friction,
               sizes=_implicit_friction_sizes, roundings=3, friction=True),
-    # force 4, square 4, and one each: its product, difference, sum 1 + square, quotient and sum
-    StageKind(name="gyrate", word="p turned by 2 atan({c}B/2m) about the magnetic field", act=_gyrate,
-              sizes=_gyrate_sizes, roundings=13, evaluates="magnetic"),
 )  # fmt: skip
 
 KINDS: dict[str, StageKind] = {kind.name: kind for kind in _ALL}

@@ -81,19 +81,6 @@ class Law:
         return at
 
     @cached_property
-    def fields(self) -> tuple[tuple[Term, ...], ...]:
-        """The magnetic fields in a row of their own, none where there is none."""
-        found = tuple(term for term in self.scene.terms if term.kind == "magnetic")
-        return (found,) if found else ()
-
-    @cached_property
-    def turns(self) -> Reals | None:
-        """The rates at which magnetic fields turn velocities [1/T], as `Magnetic.turns`; None where there is
-        none."""
-        found: list[Any] = [term for row in self.fields for term in row]
-        return found[0].turns(self.scene.m, self.scene.all_places) if found else None
-
-    @cached_property
     def stiffness(self) -> Any:
         """Second derivatives as an implicit step takes them: see `schemes.step`."""
         if not self.scheme.has("implicit"):
@@ -125,8 +112,7 @@ class Law:
             h=self.h,
             m=self.scene.m,
             force=forces(self.scene.terms),
-            parts=tuple(forces(part) for part in (system.slow, system.fast, *self.fields)),
-            turns=self.turns,
+            parts=(forces(system.slow), forces(system.fast)),
             stiffness=slope if slope and callable(self.stiffness) else self.stiffness,
             rate=self.rates(varied=varied),
             met=met,

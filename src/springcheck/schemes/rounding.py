@@ -54,7 +54,6 @@ def magnitude_step(
     m: Reals,
     met: Iterable[Met],
     rate: Reals | None = None,
-    turns: Reals | None = None,
 ) -> tuple[Reals, Reals]:
     """Running error bound of `step` from (q, p): the same step with every difference taken as a sum.
 
@@ -71,7 +70,7 @@ def magnitude_step(
                 here = next(each)
                 last = here.magnitude(q, np.zeros_like(p) if kind.evaluates == "potential" else p)
                 last = last + here.joints
-            setting = Setting(m=m, rate=rate, force=last, turns=turns)
+            setting = Setting(m=m, rate=rate, force=last)
             q, p = kind.sizes(q, p, number(c, np.float64) * wide, setting)
         return q, p
     return _tableau(scheme, start, each, h=wide, m=m, rate=rate)

@@ -37,8 +37,7 @@ def step(
     force: Force,
     stiffness: Reals | Slope | None = None,
     rate: Rate | None = None,
-    parts: tuple[Force, ...] | None = None,
-    turns: Reals | None = None,
+    parts: tuple[Force, Force] | None = None,
     met: list[Reals] | None = None,
     near: Reals | None = None,
 ) -> tuple[Reals, Reals]:
@@ -49,10 +48,10 @@ def step(
     enough, because it only steers an iteration whose residual has the full width.  `rate` is
     `System.friction_rates`, left out where nothing is damped, or for stages without an exponential of it a
     function of the position; `parts` are the forces of the slow and the fast springs, for the schemes that
-    part them, and of magnetic fields, which turn velocities at the rates `turns` (n,).  `met` takes the
-    position (..., n) of each evaluation of the force, in their order.  `near` (..., n) is where the step
-    ends, as far as that is known: of several solutions of an implicit stage the one there is found; a force
-    after the last drift is taken there, at the position that an engine has rounded.
+    part them.  `met` takes the position (..., n) of each evaluation of the force, in their order.  `near`
+    (..., n) is where the step ends, as far as that is known: of several solutions of an implicit stage the
+    one there is found; a force after the last drift is taken there, at the position that an engine has
+    rounded.
     """
     width = q.dtype.type
     h, m = width(h), m.astype(width)
@@ -67,7 +66,7 @@ def step(
                 if met is not None:
                     met.append(at)
                 last = acting(kind.evaluates, force, parts)(at, p)
-            setting = Setting(m=m, rate=rate, force=last, turns=turns)
+            setting = Setting(m=m, rate=rate, force=last)
             q, p = kind.act(q, p, number(c, width) * h, setting)
         return q, p
     if not scheme.b:
@@ -95,14 +94,12 @@ def step(
     return weighted_sum(q, weights, velocities), weighted_sum(p, weights, forces)
 
 
-def acting(terms: Acting, force: Force, parts: tuple[Force, ...] | None) -> Force:
+def acting(terms: Acting, force: Force, parts: tuple[Force, Force] | None) -> Force:
     """The force of these terms."""
     if terms == "all":
         return force
     if terms == "potential":
         return lambda q, p: force(q, np.zeros_like(p))
-    if terms == "magnetic":
-        return parts[2] if parts is not None and len(parts) > 2 else lambda q, p: np.zeros_like(p)
     if parts is None:
         raise ValueError("this scheme needs the slow and the fast force apart")
     return parts[terms == "fast"]

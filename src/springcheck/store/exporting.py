@@ -52,8 +52,6 @@ def export(path: str | Path, label: str, out: str | Path) -> list[Damage]:
             arrays["velocity"] = access.array(file, f"{base}/velocity/value", arrays["p"].shape)
         arrays["step"] = access.array(file, f"{base}/q/step", (known.frames,), "i")
         mass = access.array(file, f"{group}/mass", (int(np.max(places)) // 3 + 1,))
-        boxed = "edges" in access.children(file, f"{group}/box")
-        edges = access.array(file, f"{group}/box/edges", (3,))[()].tolist() if boxed else None
         # positions and velocities are written twice, the second time in three dimensions
         size = 8 * sum(x.size * (1 + (x.ndim == 2)) for x in arrays.values()) + 24 * known.frames
         text = 16 * sum(len(str(value)) for value in known.parameters.values())
@@ -70,7 +68,7 @@ def export(path: str | Path, label: str, out: str | Path) -> list[Damage]:
                     particles, layout.UNITS[known.kind, known.units], mass[()], axis, "velocity" in arrays,
                     lambda element, source: _copy_values(arrays[source], element, places),
                 )  # fmt: skip
-                layout.write_box(particles, edges, axis)
+                layout.write_box(particles)
                 extents = merge.list_digests(target)
             merge.seal_checked(made, extents, run)
             files.put(made, out)

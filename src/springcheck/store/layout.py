@@ -20,7 +20,7 @@ from __future__ import annotations
 import contextlib
 import os
 import platform
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
@@ -240,7 +240,7 @@ def _particles(file: Any, label: str, scene: Scene, found: Mapping[str, Column],
     group = file.create_group(f"particles/{label}")
     units = UNITS[scene.kind, scene.units]
     write_particles(group, units, scene.masses.astype("<f8"), axis, "velocity" in found, viewed)
-    write_box(group, scene.box)
+    write_box(group)
 
 
 def write_particles(
@@ -260,24 +260,11 @@ def write_unit(dataset: Any, unit: str, name: str = "") -> None:
     write_attributes(dataset, {"unit": unit, "units": unit, **({"long_name": name} if name else {})})
 
 
-def write_box(group: Any, lengths: Sequence[float] | None, axis: Axis | None = None) -> None:
-    """Write the box of a particle group: three dimensions without borders, or periodic ones of these lengths
-    [L], once or with an axis for each frame, as MDAnalysis expects.
-
-    Positions are unwrapped, so that H5MD's images are all 0 and left out.
-    """
+def write_box(group: Any) -> None:
+    """Write the box of a particle group, which H5MD asks for: three dimensions without borders."""
     box = group.create_group("box")
     box.attrs["dimension"] = 3
-    write_attributes(box, {"boundary": ["periodic" if lengths else "none"] * 3})
-    if not lengths:
-        return
-    if axis is None:
-        box["edges"] = np.array(lengths, "<f8")
-        return
-    element = box.create_group("edges")
-    element["value"] = np.broadcast_to(lengths, (len(axis["time"]), 3))
-    write_unit(element["value"], group["position/value"].attrs["unit"])
-    element.update(axis)
+    write_attributes(box, {"boundary": ["none"] * 3})
 
 
 def axes_of(scene: Scene) -> str:

@@ -5,7 +5,7 @@ They measure how good a scheme is.  A study's own control may fail it; a large e
 
 from __future__ import annotations
 
-from springcheck.studies import census, extremes, faults, precision, run, sampling, stability
+from springcheck.studies import extremes, faults, precision, run, sampling, stability
 from springcheck.studies.study import Study
 
 STUDIES: tuple[Study, ...] = (
@@ -14,7 +14,6 @@ STUDIES: tuple[Study, ...] = (
     precision.STUDY,
     stability.STUDY,
     extremes.STUDY,
-    census.STUDY,
     sampling.STUDY,
 )
 """Every study, in the order in which `--help` names them."""

@@ -9,7 +9,6 @@ from springcheck.engines.contract import (
     ANY_POTENTIAL,
     DRIVEN,
     EVERY_POTENTIAL,
-    FIELD,
     Engine,
     Need,
     by_default,
@@ -63,9 +62,6 @@ ENGINE = Engine(
             _DRIVEN | {"damping"}, Need.DAMPING, one_friction=True,
         ),
         by_name(
-            "boris", "boris", "Boris' rotation by CustomIntegrator", (_DRIVEN - {"morse"}) | FIELD, Need.FIELD
-        ),
-        by_name(
             "nose-hoover", "semi-implicit-euler",
             "NoseHooverIntegrator without a thermostat, handed p0 as it is", _DRIVEN,
         ),
@@ -90,7 +86,6 @@ ENGINE = Engine(
     ),
     atlas=tuple(f"verlet@{place}" for place in ("CPU", "OpenCL-single", "OpenCL-mixed", "OpenCL-double")),
     any_axis=True,
-    periodic=True,
     squares_lengths=True,
     **deferred(f"{__name__}.simulation", "arithmetic", "convention"),
 )  # fmt: skip

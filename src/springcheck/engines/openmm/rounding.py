@@ -30,7 +30,7 @@ _PRECISIONS = {
 "mixed" keeps positions as a float and a float of correction, together 48 bits.  The velocity is the
 displacement of the step times 1/h, so it does not lose the digits of x' - x as on Reference."""
 
-CUSTOM = ("euler", "semi-implicit-euler", "mts", "boris")
+CUSTOM = ("euler", "semi-implicit-euler", "mts")
 """Methods that OpenMM's CustomIntegrator carries out; MTSIntegrator and MTSLangevinIntegrator are such."""
 
 CUSTOM_EXCESS = 2.0**-32

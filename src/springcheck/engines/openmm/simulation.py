@@ -39,7 +39,7 @@ from springcheck.engines.openmm.rounding import CUSTOM, arithmetic, sizes
 from springcheck.engines.openmm.thermostats import thermostat
 from springcheck.errors import MethodError
 from springcheck.physics.arrays import Floats
-from springcheck.physics.driven import timed
+from springcheck.physics.driven import Drive, timed
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Distances, Morse, RadialSpring, WallSpring
 
@@ -53,13 +53,6 @@ CUSTOM_TERMS: dict[str, tuple[str, tuple[str, ...]]] = {
 """Energies as OpenMM reads them, and the parameters in them, the origin last.  No parameter is divided by or
 multiplied with another: GPU-type platforms keep them as float and do that in float, in every mode."""
 
-DRIVEN_ENERGY = {
-    "drive": ("-({amplitude!r})*cos(({frequency!r})*time+({phase!r}))*x", ()),
-    "modulated-spring": ("0.5*k*(1+({depth!r})*cos(({frequency!r})*time+({phase!r})))*(x-at)^2", ("k", "at")),
-}
-"""Energies of terms that depend on the time, as OpenMM reads them; the numbers written into an expression are
-kept as double by every platform."""
-
 SHIFTED = frozenset({"verlet", "langevin-middle", "langevin", "langevin-middle-synchronised"})
 """Methods whose stored velocity is half a kick behind the position, and is synchronised here."""
 
@@ -70,12 +63,7 @@ FAST_STEPS = {"mts": 8}
 CUSTOM_STAGES = {
     "euler": (["v0"], [("v0", "v"), ("v", "v + dt*(f/m)"), ("x", "x + dt*v0")]),
     "semi-implicit-euler": ([], [("v", "v + dt*(f/m)"), ("x", "x + dt*v")]),
-    "boris": (["turn", "half"], [
-        ("x", "x + 0.5*dt*v"), ("v", "v + 0.5*dt*f/m"),
-        ("half", "v + cross(v, turn)"), ("v", "v + cross(half, turn)*2/(1 + dot(turn, turn))"),
-        ("v", "v + 0.5*dt*f/m"), ("x", "x + 0.5*dt*v"),
-    ]),
-}  # fmt: skip
+}
 """Variables and stages of methods by a `CustomIntegrator`."""
 
 ATTENTIVE = 500
@@ -100,21 +88,17 @@ def _system(scene: Scene, origins: Floats) -> tuple[mm.System, Floats]:
     """Particles, then one fixed anchor for each rest point of a term; positions (N, 3)."""
     system = mm.System()
     start = np.zeros((scene.particles, 3))
-    start.reshape(-1)[scene.where] = scene.q - origins - bonds.cells(scene, origins) * scene.periods
+    start.reshape(-1)[scene.where] = scene.q - origins
     for m in scene.masses.tolist():
         system.addParticle(m)
     fixed: list[Any] = []
     fast, slow = mm.HarmonicBondForce(), mm.HarmonicBondForce()
     fast.setForceGroup(1)
-    if scene.box is not None:
-        system.setDefaultPeriodicBoxVectors(*np.diag(scene.box).tolist())
-        for group in (fast, slow):
-            group.setUsesPeriodicBoundaryConditions(True)
     for term in scene.terms:
         try:
             joints = bonds.joints(scene, term, origins)
         except MethodError:
-            if scene.box is not None or not isinstance(term, WallSpring):
+            if not isinstance(term, WallSpring):
                 raise
             # different along its axes: no bond, but a potential of each coordinate
             for force in _custom(scene, term, origins):
@@ -143,8 +127,8 @@ def _system(scene: Scene, origins: Floats) -> tuple[mm.System, Floats]:
         if term.key in CUSTOM_TERMS and not isinstance(term, WallSpring):
             for force in _custom(scene, term, origins):
                 system.addForce(force)
-        elif term.key in DRIVEN_ENERGY:
-            for force in _driven(scene, term, origins):
+        elif isinstance(term, Drive):
+            for force in _driven(scene, term):
                 system.addForce(force)
     return system, np.concatenate([start, np.reshape(fixed, (-1, 3))])
 
@@ -198,20 +182,15 @@ def _of_distances(
     return force, points
 
 
-def _driven(scene: Scene, term: Any, origins: Floats) -> Iterator[mm.Force]:
-    """A drive, or a modulated spring, row by row, as energies of a particle and of the time."""
-    energy, names = DRIVEN_ENERGY[term.key]
-    places = scene.all_places
-    for i, *numbers in term.rows():
-        given = dict(zip((column.field for column in term.columns), numbers, strict=True))
-        particle, axis = divmod(int(places[i]), 3)
-        # a force that is constant in space does not depend on the origin of positions
-        wanted = energy.format(**given).replace("*x", f"*{'xyz'[axis]}").replace("(x-", f"({'xyz'[axis]}-")
-        force = mm.CustomExternalForce(wanted)
+def _driven(scene: Scene, term: Drive) -> Iterator[mm.Force]:
+    """A drive, row by row, as energies of a particle and of the time; every platform keeps the numbers that
+    are written into an expression as double."""
+    for i, amplitude, frequency, phase in term.rows():
+        particle, axis = divmod(int(scene.all_places[i]), 3)
+        wave = f"cos(({frequency!r})*time+({phase!r}))"
+        force = mm.CustomExternalForce(f"-({amplitude!r})*{wave}*{'xyz'[axis]}")
         force.addGlobalParameter("time", 0.0)
-        for name in names:
-            force.addPerParticleParameter(name)
-        force.addParticle(particle, [given[x] - (origins[i] if x == "at" else 0.0) for x in names])
+        force.addParticle(particle, [])
         yield force
 
 
@@ -241,7 +220,7 @@ def _integrator(scene: Scene, name: str, step: float) -> mm.Integrator:
     integrator = mm.CustomIntegrator(step)
     if scene.system.is_driven:
         integrator.addGlobalVariable("done", 0)
-        integrator.addComputeGlobal("time", f"(done+{0.5 * (name == 'boris')})*({signed!r})")
+        integrator.addComputeGlobal("time", f"done*({signed!r})")
         integrator.addComputeGlobal("done", "done+1")
     own, stages = CUSTOM_STAGES[name]
     for variable in own:
@@ -249,18 +228,6 @@ def _integrator(scene: Scene, name: str, step: float) -> mm.Integrator:
     for variable, value in stages:
         integrator.addComputePerDof(variable, value)
     return integrator
-
-
-def _turns(scene: Scene, step: float, particles: int) -> list[mm.Vec3]:
-    """Half of what each field turns a velocity by in a step, about its own axis: (W h/2) along it."""
-    out = np.zeros((particles, 3))
-    assert scene.places is not None
-    for term in scene.terms:
-        for a, b, strength in term.rows() if term.key == "magnetic" else ():
-            (particle, one), (_, other) = (divmod(int(scene.places[x]), 3) for x in (a, b))
-            sign = 1 if (other - one) % 3 == 1 else -1
-            out[particle, 3 - one - other] += sign * strength * step / (2 * scene.m[a])
-    return [mm.Vec3(*row) for row in out.tolist()]
 
 
 def _context(system: mm.System, integrator: mm.Integrator, label: Label) -> mm.Context:
@@ -313,9 +280,6 @@ class _Context:
         else:
             self._integrator = _integrator(scene, method.name, step)
         self._context = _context(system, self._integrator, label)
-        if method.name == "boris":
-            self._integrator.setPerDofVariableByName("turn", _turns(scene, step, len(positions)))
-        origins = origins + bonds.cells(scene, origins) * scene.periods
         self._origins = origins if np.any(origins) else None
         # what OpenMM computes: all but friction
         pull = scene.system.potential_force

@@ -13,17 +13,15 @@ from springcheck.engines.contract import (
     EVERY_FORCE,
     EVERY_KIND,
     EVERY_POTENTIAL,
-    FIELD,
     SPRINGS,
     Engine,
     Method,
     Need,
-    by_name,
     deferred,
     named,
     thermostat,
 )
-from springcheck.schemes import ATTACHED, SCHEMES, Scheme
+from springcheck.schemes import SCHEMES, Scheme
 
 NAMES = {"explicit-euler": "euler"}
 """Methods whose names differ from their scheme's."""
@@ -48,8 +46,7 @@ def _requires(scheme: Scheme) -> frozenset[Need]:
 def _terms(scheme: Scheme) -> frozenset[str]:
     if scheme.has("implicit"):
         return SPRINGS | BRAKES | {"damping"}
-    # to kicks by all forces, and to a tableau, a field is a force like any other
-    return EVERY_FORCE | (FIELD | BRAKES if scheme.has("plain") or scheme.b else frozenset())
+    return EVERY_FORCE | (BRAKES if scheme.has("plain") or scheme.b else frozenset())
 
 
 def _method(scheme: Scheme) -> Method:
@@ -72,12 +69,8 @@ _SCHEMES = sorted(
 ENGINE = Engine(
     name="own",
     title="springcheck",
-    methods=named(
-        *map(_method, _SCHEMES),
-        by_name("boris", "boris", ATTACHED["boris"].title, EVERY_POTENTIAL | DRIVEN | FIELD, Need.FIELD),
-    ),
+    methods=named(*map(_method, _SCHEMES)),
     any_axis=True,
-    periodic=True,
     convention=lambda method: "positions and momenta belong to the same time",
     thermostats=named(
         *(

@@ -12,7 +12,7 @@ from springcheck.engines.own.loops import Slot
 from springcheck.physics.arrays import Floats, Integers
 from springcheck.physics.terms import Damping, Spring, Term, WallSpring, known
 
-KINDS = ("wall-spring", "spring", "quartic", "cosine", "morse", "damping", "drive", "modulated-spring")
+KINDS = ("wall-spring", "spring", "quartic", "cosine", "morse", "damping", "drive")
 """The terms that the kernels have, in the order in which `loops.indexed` takes them."""
 
 NO_INDEX: Integers = np.empty(0, np.int64)

@@ -47,8 +47,8 @@ def indexed(terms: Any, q: Numbers, p: Numbers, f: Numbers) -> None:
     What is driven reads the time off the last coordinate, and is summed as NumPy sums: first over all ends a,
     then over all ends b.
     """
-    walls, springs, quartics, cosines, morses, dampings, drives, modulated = terms
-    driven = len(drives[0]) + len(modulated[0]) > 0
+    walls, springs, quartics, cosines, morses, dampings, drives = terms
+    driven = len(drives[0]) > 0
     for j in range(len(f)):
         f[j] = 0.0
     i, k, at = walls
@@ -82,10 +82,6 @@ def indexed(terms: Any, q: Numbers, p: Numbers, f: Numbers) -> None:
     i, amplitude, frequency, phase = drives
     for s in range(len(i)):
         f[i[s]] += amplitude[s] * cosine(frequency[s] * q[len(q) - 1] + phase[s])
-    i, k, depth, frequency, phase, at = modulated
-    for s in range(len(i)):
-        stiffness = k[s] * (1.0 + depth[s] * cosine(frequency[s] * q[len(q) - 1] + phase[s]))
-        f[i[s]] -= stiffness * (q[i[s]] - at[s])
 
 
 def held(k: Numbers, at: Numbers, q: Numbers, f: Numbers) -> None:

@@ -81,15 +81,15 @@ class Program:
 
 def evaluations(scheme: Scheme, scene: Scene) -> tuple[int, int]:
     """Evaluations of forces in the first step, and in each later one: none where nothing has changed that a
-    force depends on.  The turn by a magnetic field is none."""
+    force depends on."""
     if not scheme.stages:
         return len(scheme.b), len(scheme.b)
     fresh: set[str] = set()
-    counts, braked = [0, 0], scene.system.is_damped or any(x.kind == "magnetic" for x in scene.terms)
+    counts, braked = [0, 0], scene.system.is_damped
     for cycle in range(2):
         for kind in scheme.kinds:
             name = POTENTIAL if kind.evaluates == ALL and not braked else kind.evaluates
-            counts[cycle] += name not in (*fresh, "", "magnetic")
+            counts[cycle] += name not in (*fresh, "")
             fresh.add(name)
             fresh -= fresh if kind.drifts else {ALL, SLOW} if braked else set()
     return counts[0], counts[1]

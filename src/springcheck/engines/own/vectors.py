@@ -25,12 +25,9 @@ class Vectors:
         self._q, self._p = scene.q.astype(np.float64), scene.p.astype(np.float64)
         self._law = Law(scheme=scheme, scene=scene, h=step)
         self._rates = self._law.rates()
-        moving = system.is_damped or bool(self._law.fields)
-        self._force = kept(system.force, moving)
-        self._parts = tuple(
-            kept(system.force_of(part), moving and part is not system.fast)
-            for part in (system.slow, system.fast, *self._law.fields)
-        )
+        self._force = kept(system.force, system.is_damped)
+        slow, fast = system.force_of(system.slow), system.force_of(system.fast)
+        self._parts = kept(slow, system.is_damped), kept(fast, False)
 
     def advance(self, every: int, q: Floats, p: Floats) -> None:
         """Fill q and p (f, n)."""
@@ -42,7 +39,6 @@ class Vectors:
                     a, b = schemes.step(
                         self._scheme, self._q, self._p, h=self._h, m=self._m, force=self._force,
                         rate=self._rates, parts=self._parts, stiffness=self._law.stiffness,
-                        turns=self._law.turns,
                     )  # fmt: skip
                     self._q, self._p = np.asarray(a, np.float64), np.asarray(b, np.float64)
                 q[row], p[row] = self._q[: self._n], self._p[: self._n]

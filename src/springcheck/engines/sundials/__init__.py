@@ -7,7 +7,6 @@ from springcheck.engines.contract import (
     DRIVEN,
     EVERY_FORCE,
     EVERY_KIND,
-    FIELD,
     SPRINGS,
     Engine,
     by_default,
@@ -15,7 +14,7 @@ from springcheck.engines.contract import (
     named,
 )
 
-_TERMS = EVERY_FORCE | DRIVEN | FIELD | BRAKES
+_TERMS = EVERY_FORCE | DRIVEN | BRAKES
 _SOLVER = {"adaptive": True, "kinds": EVERY_KIND}
 
 ENGINE = Engine(

@@ -19,7 +19,7 @@ from springcheck.physics.fields import Units
 from springcheck.physics.scene import Scene
 from springcheck.physics.scenefile import tables
 from springcheck.physics.term import Column, Term
-from springcheck.physics.terms import Damping, Magnetic, OnDistances, Spring, WallSpring
+from springcheck.physics.terms import Damping, OnDistances, Spring, WallSpring
 
 
 class MistakeError(ValueError):
@@ -70,7 +70,7 @@ class _Bodies:
 
 FILE_PATHS = {
     "step": "time.step", "steps": "time.steps", "every": "record.every", "tolerance": "time.tolerance",
-    "quantities": "record.quantities", "include": "methods.include", "box": "box.lengths",
+    "quantities": "record.quantities", "include": "methods.include",
 }  # fmt: skip
 """Path in a scene file of each field of a scene, for messages."""
 
@@ -94,7 +94,7 @@ def scene(table: Any, *, name: str) -> Scene:
         found = Scene(
             m=bodies.m, q=bodies.q, p=bodies.p, places=bodies.places, terms=terms, step=time.step,
             steps=time.steps, every=table.record.every or time.every or 1,
-            box=table.box and table.box.lengths, bath=bath or None, tolerance=time.tolerance, units=units,
+            bath=bath or None, tolerance=time.tolerance, units=units,
             kind=kind, include=table.methods.include, quantities=table.record.quantities, name=name,
             title=table.title, source=table.source,
         )  # fmt: skip
@@ -178,7 +178,6 @@ def _terms(table: Any, bodies: _Bodies) -> Iterator[Term]:
             )
             for x in tables.of_terms()
         ),
-        _magnetic(table.magnetic, bodies),
         _circuit(table, bodies),
     )
     found: dict[tuple[type[Term], bool], list[tuple[float, ...]]] = {}
@@ -236,19 +235,6 @@ def _distances(term: Any, rows: Sequence[Any], bodies: _Bodies) -> _Rows:
                 yield term, False, (*at, *values, j)
             else:
                 yield term.to_points, False, (*at, *values, x, j)
-
-
-def _magnetic(rows: Sequence[Any], bodies: _Bodies) -> _Rows:
-    """The plane perpendicular to each field, its two axes in cyclic order."""
-    for j, row in enumerate(rows):
-        field = f"magnetic[{j}].particle"
-        plane = {"x": "yz", "y": "zx", "z": "xy"}[row.axis]
-        if not set(plane) <= set(bodies.axes[bodies.number(row.particle, field)]):
-            raise MistakeError(
-                f"{field}: a field along {row.axis} needs a particle along {plane[0]} and {plane[1]}"
-            )
-        (one,), (other,) = (bodies.along(field, axis, row.particle) for axis in plane)
-        yield Magnetic, False, (*one, *other, row.strength)
 
 
 def _one_axis(row: str, places: Mapping[str, float], ends: Sequence[tuple[int, ...]]) -> None:

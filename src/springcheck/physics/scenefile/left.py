@@ -5,6 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 LEFT = {
+    "box": "periodic boxes are not part of springcheck",
+    "magnetic": "magnetic fields are not part of springcheck",
+    "modulated-spring": "springs of modulated stiffness are not part of springcheck",
     "rod": "constraints are not part of springcheck",
     "rotor": "rotors and hinges are not part of springcheck",
 }

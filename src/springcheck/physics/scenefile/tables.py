@@ -72,14 +72,6 @@ class SpringTable(SceneTable, frozen=True):
     axis: Axis | None = None
 
 
-class MagneticTable(SceneTable, frozen=True):
-    """A magnetic field along `axis`, its strength charge times field [M/T]: force strength (v_y, -v_x)."""
-
-    particle: int
-    strength: float
-    axis: Axis = "z"
-
-
 class WaveTable(SceneTable, frozen=True):
     """One standing wave of a chain: mode number (1 is the slowest) and amplitude [L]."""
 
@@ -109,12 +101,6 @@ class TimeTable(SceneTable, frozen=True):
     steps: Count
     every: Count | None = None
     tolerance: Annotated[float, msgspec.Meta(gt=0, lt=1)] = 1e-12
-
-
-class BoxTable(SceneTable, frozen=True):
-    """A periodic box: its length [L], or one for each of x, y and z."""
-
-    lengths: Positive | Annotated[tuple[Positive, ...], msgspec.Meta(min_length=3, max_length=3)]
 
 
 class BathTable(SceneTable, frozen=True):
@@ -167,8 +153,6 @@ class SceneBase(SceneTable, frozen=True):
     resistor: tuple[ResistorTable, ...] = ()
     chain: ChainTable | None = None
     spring: tuple[SpringTable, ...] = ()
-    magnetic: tuple[MagneticTable, ...] = ()
-    box: BoxTable | None = None
     bath: BathTable | None = None
     methods: MethodsTable = MethodsTable()
     record: RecordTable = RecordTable()
@@ -207,7 +191,7 @@ def identifier(name: str) -> str:
     return name.replace("-", "_")
 
 
-OWN_TABLES = ("wall-spring", "spring", "magnetic")
+OWN_TABLES = ("wall-spring", "spring")
 """Keys of the terms with tables of their own."""
 
 

@@ -16,7 +16,7 @@ from springcheck.physics.graph import standing
 from springcheck.physics.scenefile.tables import BODIES
 from springcheck.physics.system import System
 from springcheck.physics.term import Term
-from springcheck.physics.terms import Column, Damping, Magnetic, Spring, WallSpring
+from springcheck.physics.terms import Column, Damping, Spring, WallSpring
 
 MOST_WAVES = 64
 """Most standing waves by which the start of a chain is written."""
@@ -37,8 +37,6 @@ def text(system: System[Any]) -> str:
     for term in scene.terms:
         if not (is_chain and isinstance(term, WallSpring | Spring)):
             lines += _rows(scene, term)
-    if scene.box:
-        lines.append(_table("[box]", [("lengths", list(scene.box))]))
     if scene.bath:
         given = {"temperature": scene.bath.temperature, "friction": scene.bath.friction}
         lines.append(_table("[bath]", given.items()))
@@ -115,13 +113,6 @@ def _rows(scene: SceneFields, term: Term) -> Iterator[str]:
             # the name of its origin: wall or rest
             row |= {term.columns[1].name: rest} if rest else {}
             yield _table("[[spring]]", (row | ({"fast": True} if term.fast else {})).items())
-    elif isinstance(term, Magnetic):
-        assert scene.places is not None
-        for a, b, strength in term.rows():
-            (particle, one), (_, other) = (divmod(int(scene.places[x]), 3) for x in (a, b))
-            sign = 1.0 if (other - one) % 3 == 1 else -1.0
-            row = {"particle": particle, "strength": sign * strength, "axis": "xyz"[3 - one - other]}
-            yield _table("[[magnetic]]", row.items())
     elif isinstance(term, Distances):
         yield from _distances(scene, term)
     else:

@@ -16,7 +16,6 @@ from springcheck.checks.seeds import SEEDED
 from springcheck.errors import SceneError, nearest
 from springcheck.physics.builders import spring
 from springcheck.physics.scene import Scene
-from springcheck.physics.scenefile import load_scene
 from springcheck.physics.terms import Drive, Spring
 from springcheck.studies import keeper
 from springcheck.studies.arguments import Progress
@@ -43,12 +42,6 @@ SCENES: Mapping[str, Callable[[], Scene]] = {
         m=np.array([1.3, 0.7, 2.1]), q=np.array([0.2, 1.0, 1.9]), p=np.array([0.4, -0.3, 0.5]), step=0.05,
         terms=(Spring(a=np.arange(2), b=np.arange(1, 3), k=np.array([1.1, 3.7]), rest=np.array([0.9, 1.2])),),
         steps=200),
-    # in the plane, their bond across two borders of a box at the start, which drift
-    "box": lambda: Scene(
-        m=np.array([3.7, 3.7, 1.3, 1.3]), q=np.array([4.0, 0.2, 4.3, -0.1]),
-        p=np.array([2.9, -0.7, 0.4, -1.1]), places=np.array([0, 1, 3, 4]), box=(4.1, 3.3, 5.7), step=0.1,
-        terms=(Spring(a=np.arange(2), b=np.arange(2, 4), k=np.full(2, 2.9), rest=np.zeros(2)),), steps=200),
-    "field": lambda: replace(load_scene("foucault"), steps=200),
     "bath": lambda: baths.springs(40),
     "wide bath": lambda: baths.springs(250),
 }  # fmt: skip

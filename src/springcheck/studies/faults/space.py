@@ -1,5 +1,5 @@
-"""Faults along y and z and in a periodic box, to which a scene along x is blind; of drives at another time or
-with other parameters; and of magnetic fields, with Boris' rotation written out."""
+"""Faults along y and z, to which a scene along x is blind; and of drives at another time or with other
+parameters."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ import numpy as np
 
 from springcheck.physics.arrays import Floats, Reals
 from springcheck.physics.scene import Scene
-from springcheck.physics.terms import Drive, Magnetic, Spring
+from springcheck.physics.terms import Drive
 from springcheck.physics.trajectory import Trajectory
 from springcheck.studies.faults.seeded import FRAME_CHECKS, Case, Fault, each, half_step, single
-from springcheck.studies.faults.steppers import State, Step, textbook
+from springcheck.studies.faults.steppers import Step, textbook
 
 
 def stiffer(c: Case, axis: str) -> Scene:
@@ -90,51 +90,6 @@ AXES = tuple(one if "orientation" in one.caught_by else replace(one, scene="orbi
 """Faults that only a rotation of the scene shows are on a line, the others on an orbit."""
 
 
-def crossed(scene: Scene, q: Reals) -> Reals:
-    """Number of borders of the box that positions (..., n) have crossed; 0 without a box."""
-    return np.zeros_like(q) if scene.box is None else np.floor(q / scene.periods)
-
-
-def imaged(c: Case, q: Reals, p: Reals, nearest: Callable[[Reals, Floats], Reals]) -> Reals:
-    """Force on bonds between wrapped positions, whose images are given by nearest(difference, box)."""
-    box, y = c.scene.periods, q.copy()
-    x = q - box * crossed(c.scene, q)
-    for term in c.scene.terms:
-        if isinstance(term, Spring) and c.scene.box:
-            y[..., term.b] = q[..., term.a] + nearest(x[..., term.b] - x[..., term.a], box[term.a])
-    return c.force(y, p)
-
-
-def swapped_images(c: Case, r: Trajectory) -> Trajectory:
-    """Positions of particles in a plane, unwrapped along each axis by the image counts of the other."""
-    if c.scene.box is None:
-        return r
-    count = crossed(c.scene, r.q)
-    count -= count[:1]
-    other = count.reshape(len(count), -1, 2)[..., ::-1].reshape(count.shape)
-    return replace(r, q=r.q + (other - count) * c.scene.periods)
-
-
-def late_images(c: Case, r: Trajectory) -> Trajectory:
-    """Positions unwrapped by the image counts of the frame before."""
-    count = crossed(c.scene, r.q)
-    return replace(r, q=r.q - np.diff(count, axis=0, prepend=count[:1]) * c.scene.periods)
-
-
-BOX = each(
-    Fault("far-image", "a bond across the border of a periodic box pulls the long way round",
-          force=lambda c, f, q, p: imaged(c, q, p, lambda d, box: d)),
-    Fault("image-to-the-right", "the image of a bond's end is the next one to the right, not the nearest",
-          force=lambda c, f, q, p: imaged(c, q, p, lambda d, box: d - box * np.floor(d / box))),
-    Fault("cubic-box", "images along y are as far apart as those along x",
-          force=lambda c, f, q, p: imaged(c, q, p, lambda d, box: d - box[0] * np.round(d / box[0]))),
-    Fault("swapped-images", "borders crossed along x are counted along y, and those along y along x",
-          reports=swapped_images),
-    Fault("late-image", "a border that is crossed is counted a frame later", reports=late_images),
-    caught_by=(*FRAME_CHECKS, "border"), scene="box",
-)  # fmt: skip
-
-
 def clocked(c: Case, late: float = 0.0, pace: float = 1.0) -> Step:
     """The step with a drive that is late by this part of it, and whose clock goes at this pace."""
     return textbook(c.scene, c.scheme, clock=lambda i: ((i + late) * c.scene.step, pace))
@@ -162,52 +117,4 @@ DRIVES = each(
     Fault("drive-in-cycles", "the angular frequency of the drive is taken for cycles in a unit of time",
           moves=lambda c: other(c.scene, lambda d: replace(d, frequency=d.frequency * (2 * np.pi)))),
     caught_by=(*FRAME_CHECKS, "drive"), scene="driven",
-)  # fmt: skip
-
-
-def cayley(t: float, v: complex) -> complex:
-    """Boris' rotation by -2 atan(t), without transcendental functions."""
-    return v * (1 - 1j * t) / (1 + 1j * t)
-
-
-def turning(
-    c: Case, i: int, q: Floats, p: Floats, turn: Callable[[float, complex], complex] = cayley, *,
-    first: float = 0.5, mass: bool = True,
-) -> State:  # fmt: skip
-    """Boris' scheme with another rotation, as a function of the tangent of half the angle and v_x + i v_y;
-    with another share of the kick before it; or with a field not divided by the mass."""
-    m, h = float(c.scene.m[0]), c.scene.step
-    term = next((term for term in c.scene.terms if isinstance(term, Magnetic)), None)
-    if term is None:
-        return c.right(i, q, p)
-    q = q + h / 2 * p / m
-    kick = h * c.scene.system.potential_force(q, p)
-    x, y = (p + first * kick) / m
-    v = turn(float(term.strength[0]) * h / 2 / (m if mass else 1), complex(x, y))
-    p = m * np.array([v.real, v.imag]) + (1 - first) * kick
-    return q + h / 2 * p / m, p
-
-
-FIELDS = each(
-    Fault("field-sign", "the field turns velocities the other way",
-          step=lambda c, i, q, p: turning(c, i, q, p, lambda t, v: cayley(-t, v))),
-    Fault("field-half-angle", "the field turns velocities by half of the angle",
-          step=lambda c, i, q, p: turning(c, i, q, p, lambda t, v: v * (1 - 1j * t) / abs(1 + 1j * t))),
-    Fault("field-exact-angle", "the field turns velocities by Omega h, not by 2 atan(Omega h/2)",
-          step=lambda c, i, q, p: turning(c, i, q, p, lambda t, v: v * np.exp(-2j * t))),
-    Fault("field-gains-speed", "the field is a force at the start of the step: the speed grows",
-          step=lambda c, i, q, p: turning(c, i, q, p, lambda t, v: v * (1 - 2j * t))),
-    Fault("field-loses-speed", "the second half of the rotation is left out, and its denominator is not",
-          step=lambda c, i, q, p: turning(c, i, q, p, lambda t, v: v / (1 + 1j * t))),
-    Fault("field-speed", "the rotation loses a part of the speed",
-          step=lambda c, i, q, p: turning(c, i, q, p, lambda t, v: cayley(t, v) * (1 - c.x)), size=1e-12),
-    Fault("field-strength", "the field is too strong",
-          step=lambda c, i, q, p: turning(c, i, q, p, lambda t, v: cayley(t * (1 + c.x), v)), size=1e-12),
-    Fault("field-over-mass", "the field is not divided by the mass",
-          step=lambda c, i, q, p: turning(c, i, q, p, mass=False)),
-    Fault("field-after-kick", "the whole kick comes before the rotation",
-          step=lambda c, i, q, p: turning(c, i, q, p, first=1.0)),
-    Fault("field-before-kick", "the whole kick comes after the rotation",
-          step=lambda c, i, q, p: turning(c, i, q, p, first=0.0)),
-    caught_by=("step-defect", "gyration"), scheme="boris", scene="field",
 )  # fmt: skip

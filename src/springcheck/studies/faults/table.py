@@ -24,7 +24,7 @@ from springcheck.studies.faults.seeded import (
     shifted,
     single,
 )
-from springcheck.studies.faults.space import AXES, BOX, DRIVES, FIELDS
+from springcheck.studies.faults.space import AXES, DRIVES
 from springcheck.studies.faults.steppers import State, Step, energies, record, textbook, trajectory
 
 STEP = ("step-defect", "propagator")
@@ -288,6 +288,6 @@ ADAPTIVE = (
 )  # fmt: skip
 
 FAULTS: tuple[Fault, ...] = (
-    *PARAMETERS, *FORCES, *STEPS, *ARITHMETIC, *REPORTS, *AXES, *BOX, *DRIVES, *FIELDS, *ADAPTIVE,
+    *PARAMETERS, *FORCES, *STEPS, *ARITHMETIC, *REPORTS, *AXES, *DRIVES, *ADAPTIVE,
     *OF_NOISE, *THERMAL_STEPS,
 )  # fmt: skip

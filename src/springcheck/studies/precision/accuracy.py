@@ -93,7 +93,7 @@ def truth(scene: Scene) -> Truth:
     if not np.isfinite(w):
         raise SceneError(f"scene {scene.name}: its forces are beyond the range of numbers")
     system = scene.system
-    joined = "magnetic" in system.acting or (system.is_damped and not system.has_modes)
+    joined = system.is_damped and not system.has_modes
     springs = tuple(term for term in scene.terms if isinstance(term, WallSpring | Spring) and not joined)
     rate = system.modes.rate if system.is_damped and not joined else np.zeros(scene.n, np.longdouble)
     return Truth(scene=scene, turning=replace(scene, terms=springs).system.modes, rate=rate, w=w)

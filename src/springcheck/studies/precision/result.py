@@ -204,8 +204,8 @@ class PrecisionStudy(Studied):
 
     @property
     def _lowered(self) -> list[str]:
-        """Methods with an order that friction or a magnetic field in their kicks lowers."""
-        if not any(term.kind in ("friction", "magnetic") for term in self.scene.terms):
+        """Methods with an order that friction in their kicks lowers."""
+        if not any(term.kind == "friction" for term in self.scene.terms):
             return []
         known, fitted = schemes.known(), [m.method for m in self.methods if m.fit]
         found = [(label, known.get(scheme_of(label))) for label in fitted]

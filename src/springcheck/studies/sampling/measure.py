@@ -21,10 +21,10 @@ from springcheck.physics.bath import Bath
 from springcheck.physics.scene import Scene
 from springcheck.studies import keeper
 from springcheck.studies.arguments import Progress
-from springcheck.studies.census.baths import KT, MASS, STIFFNESS, springs, temperatures
 from springcheck.studies.choose import choose
 from springcheck.studies.keeper import How, Keeper, each
 from springcheck.studies.sampling.result import SAMPLED, Sampled, Sampling
+from springcheck.studies.sampling.springs import KT, MASS, STIFFNESS, springs, temperatures
 
 OMEGA = float(np.sqrt(STIFFNESS / MASS))
 

@@ -69,7 +69,6 @@ ENGINE = Engine(
     title="Drake",
     distribution="drake",
     module="pydrake",
-    extra="drake",
     methods=named(
         by_name(
             "prismatic-spring", "semi-implicit-euler", "PrismaticSpring in a discrete plant",

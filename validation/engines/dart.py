@@ -1,4 +1,4 @@
-"""DART through dartpy: bodies on prismatic joints along x, pulled by our force or by the spring of the joint.
+"""DART through dartpy: bodies on prismatic joints along x, pulled by a force or by the spring of the joint.
 
 DART takes joint springs and joint damping implicitly, whatever is asked of them.
 """
@@ -6,9 +6,8 @@ DART takes joint springs and joint damping implicitly, whatever is asked of them
 from __future__ import annotations
 
 import numpy as np
+from bodies import walls
 
-from springcheck.engines import quiet
-from springcheck.engines.bonds import walls
 from springcheck.engines.contract import EVERY_FORCE, Engine, Label, Method, by_name, named, version_of
 from springcheck.errors import MethodError
 from springcheck.physics.arrays import Floats
@@ -36,7 +35,7 @@ class _World:
         for m in scene.m.tolist():
             joint, body = skeleton.createPrismaticJointAndBodyNodePair(None)
             joint.setAxis([1.0, 0.0, 0.0])
-            body.setInertia(dartpy.dynamics.Inertia(m, [0.0] * 3, np.eye(3)))
+            body.setInertia(dartpy.dynamics.Inertia(m, [0.0, 0.0, 0.0], np.eye(3)))
             joints.append(joint)
         self._world.addSkeleton(skeleton)
         skeleton.setPositions(scene.q)
@@ -55,8 +54,7 @@ class _World:
     def advance(self, every: int, q: Floats, p: Floats) -> None:
         world, skeleton, force = self._world, self._skeleton, self._force
         self.force_calls += every * len(q)
-        # DART warns on standard error at every step of numbers that are not finite: the states show them
-        with np.errstate(over="ignore", invalid="ignore"), quiet.caught(2):
+        with np.errstate(over="ignore", invalid="ignore"):
             for row in range(len(q)):
                 for _ in range(every):
                     if force is not None:
@@ -77,7 +75,6 @@ ENGINE = Engine(
     name="dart",
     title="DART (dartpy)",
     distribution="dartpy",
-    extra="dart",
     methods=named(
         by_name("force", "semi-implicit-euler", "Skeleton.setForces before each step", EVERY_FORCE),
         by_name(

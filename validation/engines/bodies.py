@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Iterable, Iterator
 from operator import attrgetter
 from typing import Any, ClassVar
 
 import numpy as np
 
-from springcheck.engines.bonds import walls, within
 from springcheck.engines.contract import Label, Method, Stopped
+from springcheck.errors import MethodError
 from springcheck.physics.arrays import Arithmetic, Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Spring, WallSpring
@@ -19,6 +20,36 @@ def single(label: Label) -> Arithmetic:
     """Single precision, and joints whose lengths are rounded."""
     joints = label.method.endswith("-joint")
     return Arithmetic(name="single", state=2.0**-24, force=2.0**-24, parameters="single", joints=joints)
+
+
+@np.errstate(over="ignore")
+def within(label: Label, sizes: Iterable[tuple[float, str, float, float]]) -> None:
+    """MethodError where a number (least, its name, number, most) is none that an engine computes with."""
+    for lowest, what, size, highest in sizes:
+        if not lowest <= size <= highest:
+            raise MethodError(
+                f"{label}: a {what} of {size:.3g} is outside what it computes with, {lowest:.3g} to "
+                f"{highest:.3g}; the scene in other units, its numbers nearer to 1, is inside"
+            )
+
+
+def walls(scene: Scene, label: Label) -> Iterator[tuple[int, float, float]]:
+    """Particle, stiffness [M/T2] and rest position [L] of each wall spring, for joints that have one spring.
+
+    Springs of stiffness 0 are left out: their joints would be rigid.  Raises MethodError where a particle has
+    two, or a stiffness is negative.
+    """
+    taken: set[int] = set()
+    for term in scene.terms:
+        if isinstance(term, WallSpring):
+            for i, k, at in term.rows():
+                if i in taken or k < 0:
+                    raise MethodError(
+                        f"{label}: a joint has one spring, of stiffness 0 or more; particle {i}"
+                    )
+                taken.add(i)
+                if k:
+                    yield i, k, at
 
 
 class Bodies(ABC):

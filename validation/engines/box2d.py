@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from springcheck.engines.bodies import Bodies, single
-from springcheck.engines.bonds import walls
+from bodies import Bodies, single, walls
+
 from springcheck.engines.contract import EVERY_FORCE, Engine, Label, by_name, installed_version, named
 from springcheck.errors import MethodError
 from springcheck.physics.scene import Scene
@@ -65,7 +65,6 @@ ENGINE = Engine(
     title="Box2D (pybox2d)",
     distribution="box2d",
     module="Box2D",
-    extra="box2d",
     methods=named(
         by_name("force", "semi-implicit-euler", "ApplyForceToCenter before each step", EVERY_FORCE,
             note="the wheel is Box2D of 2013"),

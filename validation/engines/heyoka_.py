@@ -87,7 +87,6 @@ ENGINE = Engine(
     name="heyoka",
     title="heyoka",
     distribution="heyoka",
-    extra="heyoka",
     methods=named(
         by_name(
             "taylor", "heyoka-taylor", "taylor_adaptive of the scene's equations, propagate_until each frame",

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from springcheck.engines.bodies import Bodies
+from bodies import Bodies
+
 from springcheck.engines.contract import EVERY_FORCE, SPRINGS, Engine, Label, by_name, named
 from springcheck.errors import MethodError
 from springcheck.physics.arrays import Arithmetic
@@ -72,7 +73,6 @@ ENGINE = Engine(
     name="pymunk",
     title="pymunk",
     distribution="pymunk",
-    extra="pymunk",
     methods=named(
         by_name("force", "explicit-euler", "Body.force, set before each step", EVERY_FORCE,
             note="a force set before a step acts after the positions have moved"),

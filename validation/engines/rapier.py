@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from springcheck.engines.bodies import Bodies, single
-from springcheck.engines.bonds import walls
+from bodies import Bodies, single, walls
+
 from springcheck.engines.contract import EVERY_FORCE, Engine, Label, by_name, named, version_of
 from springcheck.errors import MethodError
 from springcheck.physics.scene import Scene
@@ -69,7 +69,6 @@ ENGINE = Engine(
     name="rapier",
     title="Rapier",
     distribution="rapier3d",
-    extra="rapier",
     methods=named(
         by_name("force", "force-held-4", "RigidBody.add_force before each step of 4 substeps", EVERY_FORCE,
             note="documented: a force is held over the substeps"),

@@ -118,7 +118,6 @@ ENGINE = Engine(
     name="rebound",
     title="REBOUND",
     distribution="rebound",
-    extra="rebound",
     methods=named(
         by_name("leapfrog", "position-verlet", "additional_forces, integrator leapfrog", EVERY_POTENTIAL),
         by_name("whfast", "position-verlet", "additional_forces, integrator WHFast, G = 0", EVERY_POTENTIAL,
