@@ -210,7 +210,7 @@ def test_a_scene_with_bonds_is_written_and_read_with_the_same_numbers() -> None:
         ("{ends = [0, 1]}", "stiffness"),
         ("{ends = [0, 1], stiffness = 1, rest = -1}", "rest"),
         ("{ends = ['wall', 'wall'], stiffness = 1}", "bond[0].ends: a bond between two walls"),
-        ("{ends = ['wall', 1], stiffness = 1, wall = [1, 2]}", "bond[0].wall: "),
+        ("{ends = ['wall', 1], stiffness = 1, wall = [1, 2, 3, 4]}", "wall"),
     ],
 )
 def test_mistakes_in_bonds_are_said_in_a_line(bond: str, said: str) -> None:
