@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from springcheck import driver, engines
-from springcheck.studies.precision import measure, sweeps, timing
+from springcheck.studies.precision import measure, sweeping
 
 
 class Clock:
@@ -52,6 +52,6 @@ def steady(patch: pytest.MonkeyPatch) -> Clock:
             return _Metered(self._inner.start(scene, method, label, step), clock, each)
 
     patch.setattr(engines, "load", Driver)
-    for module in (driver, measure, sweeps, timing):
+    for module in (driver, measure, sweeping):
         patch.setattr(module, "perf_counter", clock)
     return clock

@@ -21,7 +21,7 @@ import springcheck
 from springcheck import store
 from springcheck.cli import main
 from springcheck.physics.scenefile import folder
-from springcheck.studies.precision import timing
+from springcheck.studies.precision import measure as precision
 
 pytestmark = pytest.mark.usefixtures("own_folder", "tried_here", "sketched")
 
@@ -372,7 +372,7 @@ def test_a_clock_that_runs_backwards_is_said(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     times = itertools.count(0, -1)
-    monkeypatch.setattr(timing, "perf_counter", lambda: float(next(times)))
+    monkeypatch.setattr(precision, "perf_counter", lambda: float(next(times)))
     assert main(["precision", "spring", "--method", "own:euler", "--budget", "1", "-o", "p.h5"]) == 2
     assert "the clock of this machine runs backwards" in capsys.readouterr().err
 

@@ -24,7 +24,6 @@ from springcheck.physics.terms import Morse, Quartic, Spring, WallSpring
 from springcheck.physics.trajectory import Trajectory, Verdict
 from springcheck.studies.faults import steppers
 from springcheck.studies.precision import accuracy, fits
-from springcheck.studies.precision.fits import Point
 from springcheck.studies.run.tally import Tally
 
 SINGLE = Arithmetic(name="single", state=2.0**-24, force=2.0**-24)
@@ -426,24 +425,16 @@ def test_what_is_no_number_stays_in_the_errors_of_a_study() -> None:
     assert np.isnan([found.max_error, found.energy_error, found.phase_error]).all()
 
 
-def point(error: float, seconds: float, size: float = 0.1) -> Point:
-    return Point(
-        method="m", step=size, tolerance=None, steps=10, outcome="complete", run_seconds_repeats=(seconds,),
-        accuracy=accuracy.Accuracy(max_error=error, end_error=error, energy_error=0.0, rounding_error=0.0),
-    )  # fmt: skip
-
-
 def test_points_without_a_number_hide_no_others() -> None:
-    good = [point(1e-3, 2.0), point(1e-5, 3.0)]
-    assert fits.front([point(NAN, 1.0), *good]) == good
-    assert fits.cheapest([point(1e-6, NAN), *good], 1e-2) == good[0]
+    rows = [(None, NAN, 1.0), (None, 1e-6, NAN), (None, 1e-3, 2.0), (None, 1e-5, 3.0)]
+    assert fits.cost([row for row in rows if row[2] > 0], 1e-2) == 2.0
     assert fits.turned([NAN, 1e-3, 1e-5, 1e-4]) == 2
     assert fits.turned([NAN, NAN]) is None
 
 
 def test_an_error_of_exactly_nothing_is_in_no_fit() -> None:
-    exactly = [*(point(0.01 / 4**j, 1.0, size=0.1 / 2**j) for j in range(6)), point(0.0, 1.0, size=1e-3)]
-    fit = fits.order(exactly)
+    steps = [*(0.1 / 2**j for j in range(6)), 1e-3]
+    fit = fits.order(steps, [*(0.01 / 4**j for j in range(6)), 0.0], [None] * 7)
     assert fit is not None
     assert fit.points == 6
     assert fit.order == pytest.approx(2)

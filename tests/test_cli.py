@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import springcheck
-from springcheck import checks, store
+from springcheck import checks, engines, schemes, store
 from springcheck.cli import main, output
 from springcheck.physics import scenefile as scenes
 from springcheck.studies.run import measure as session
@@ -162,6 +162,18 @@ def test_list_has_a_page_for_each_kind(capsys: pytest.CaptureFixture[str]) -> No
         assert set(known) <= set(page.split())
     assert main(["list", "--json"]) == 0
     assert {scene["name"] for scene in document(capsys)["scenes"]} == set(scenes.names())
+
+
+def test_cite_names_what_a_store_used(capsys: pytest.CaptureFixture[str]) -> None:
+    main(["run", "spring", "--method", "own:euler", "--method", "openmm:verlet", "--quiet"])
+    assert main(["cite", "spring.h5"]) == 0
+    said = capsys.readouterr().out
+    assert "@software{springcheck," in said.splitlines()
+    assert engines.engine("openmm").reference in said
+    assert schemes.scheme("velocity-verlet").source in said
+    assert engines.engine("ase").reference not in said
+    assert main(["cite"]) == 0
+    assert engines.engine("ase").reference in capsys.readouterr().out
 
 
 def test_check_and_export(capsys: pytest.CaptureFixture[str]) -> None:

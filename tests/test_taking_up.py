@@ -23,7 +23,7 @@ from springcheck.physics import scenefile as scenes
 from springcheck.studies import keeper
 from springcheck.studies.extremes import measure as extremes
 from springcheck.studies.precision import measure as precision
-from springcheck.studies.precision.fits import POINTS, points_of
+from springcheck.studies.precision.points import POINTS, points_of
 from springcheck.studies.run import measure as session
 from springcheck.studies.stability import measure as stability
 from springcheck.studies.stability.result import Limit
@@ -98,7 +98,7 @@ def test_a_killed_study_of_precision_keeps_its_points(
     begun = killed([*arguments, "--budget", "600"], path, 3)
     kept = {name: POINTS.found(table) for name, table in begun.items()}
     # what the killed call took counts, on a slow machine more
-    budget = 3 + max(float(table.attributes["study_seconds"]) for table in begun.values())
+    budget = 3 + sum(point.spent_seconds for points in kept.values() for point in points)
     assert cli.main([*arguments, "-o", str(path), "--json", "--budget", f"{budget:.0f}"]) == 0
     whole = {name: POINTS.found(table) for name, table in store.tables_of(path).items() if ":" in name}
     assert sum(map(len, kept.values())) >= 3
@@ -112,9 +112,9 @@ def test_a_killed_study_of_precision_keeps_its_points(
 def test_points_are_read_back_as_they_were() -> None:
     scene = scenes.load_scene("anharmonic")
     found = precision.record(scene, [engines.parse(name) for name in OWN[::2]], budget=0.4)
-    assert len(found.methods) == len(OWN[::2])
-    for method in found.methods:
-        points = found.of(method.method)
+    assert len(found.sweeps) == len(OWN[::2])
+    for method in found.sweeps:
+        points = method.points
         # how many there are is a matter of the machine
         assert len(points) > 1
         assert POINTS.found(points_of(scene).table(method.method, points)) == list(points)
@@ -125,7 +125,7 @@ def test_an_interrupted_study_of_precision_goes_on(tmp_path: Path) -> None:
     scene, path = scenes.load_scene("spring-uneven"), tmp_path / "study.h5"
     labels = list(map(engines.parse, OWN))
     with pytest.raises(KeyboardInterrupt):
-        precision.record(scene, labels, path, budget=2.0, progress=raising(12))
+        precision.record(scene, labels, path, budget=2.0, progress=raising(3 + 12))
     assert not path.exists()
     assert not store.summary(path).complete
     done = [point for table in store.tables_of(path).values() for point in POINTS.found(table)]
@@ -152,10 +152,10 @@ def test_a_study_whose_budget_was_spent_when_it_was_killed_measures_nothing_more
         with pytest.raises(StoreError, match="full"):
             precision.record(scene, labels, path, budget=0.5)
     (table,) = [t for name, t in store.tables_of(path).items() if name == "precision/own:euler"]
-    before, seconds = POINTS.found(table), float(table.attributes["study_seconds"])
+    before = POINTS.found(table)
     found = precision.record(scene, labels, path, budget=0.5)
     assert [p for p in found.points if p.complete] == [p for p in before if p.complete]
-    assert found.seconds >= seconds
+    assert found.seconds >= sum(point.spent_seconds for point in before)
 
 
 def test_an_interrupted_study_says_that_the_same_command_goes_on(

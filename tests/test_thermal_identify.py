@@ -14,11 +14,11 @@ import pytest
 import springcheck
 from springcheck import driver
 from springcheck.bath import THERMOSTATS, Law
-from springcheck.bath.collisions import between_collisions
-from springcheck.bath.likelihood import likely_apart
-from springcheck.bath.states import Thermal, identify_thermal
 from springcheck.cli import main
 from springcheck.identify import identify
+from springcheck.identify.bath_collisions import between_collisions
+from springcheck.identify.bath_likelihood import likely_apart
+from springcheck.identify.bath_states import Thermal, identify_thermal
 from springcheck.identify.clock import clock_of
 from springcheck.identify.result import Candidate, Explanation, nothing
 from springcheck.physics import scenefile

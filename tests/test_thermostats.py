@@ -7,7 +7,6 @@ checks allow themselves.
 from __future__ import annotations
 
 import json
-import math
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,7 +17,7 @@ import pytest
 
 import springcheck
 from springcheck import checks, driver, engines
-from springcheck.bath import THERMOSTATS, Stepper, chance
+from springcheck.bath import THERMOSTATS, Stepper
 from springcheck.bath.heat import Heat
 from springcheck.bath.stepper import forces
 from springcheck.cli import file, main
@@ -26,13 +25,11 @@ from springcheck.engines import Label
 from springcheck.engines.own import thermal as own_thermal
 from springcheck.errors import MethodError, SceneError, SpringcheckError
 from springcheck.physics import scenefile
-from springcheck.physics.arrays import Floats
 from springcheck.physics.bath import Bath
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Spring, WallSpring
 from springcheck.physics.trajectory import Trajectory, of_scene
 from springcheck.studies.faults import baths
-from springcheck.studies.faults.seeded import Fault
 from springcheck.studies.run import measure
 
 LABELS = [
@@ -57,11 +54,6 @@ def here(label: str) -> None:
         pytest.skip(reason)
 
 
-def test_there_are_twenty_methods_of_four_engines_at_least() -> None:
-    assert len(LABELS) >= 20
-    assert len({label.partition(":")[0] for label in LABELS}) == 4
-
-
 @pytest.mark.parametrize("label", LABELS)
 def test_a_thermostat_passes_its_checks_and_says_its_seed(label: str) -> None:
     here(label)
@@ -72,17 +64,6 @@ def test_a_thermostat_passes_its_checks_and_says_its_seed(label: str) -> None:
     assert sum(v.passed is True for v in verdicts) >= 6
     assert run.origin["seed"] == "271828"
     assert run.origin["generator"]
-
-
-@pytest.mark.campaign
-@pytest.mark.parametrize("label", LABELS)
-def test_a_seed_is_kept_to_and_another_seed_is_another_run(label: str) -> None:
-    here(label)
-    scene = pair(steps=20, step=0.1)
-    one, same, other = (driver.run(scene, label, seed=seed) for seed in (5, 5, 6))
-    assert np.array_equal(one.q, same.q)
-    assert np.array_equal(one.p, same.p)
-    assert not np.array_equal(one.p, other.p)
 
 
 @pytest.mark.parametrize("name", ["baoab", "obabo", "andersen", "bbk"])
@@ -108,101 +89,6 @@ def test_an_anharmonic_well_leaves_the_direction_of_the_noise_to_rounding(label:
     assert all(v.passed is not False for v in verdicts.values())
 
 
-def test_chances_are_those_of_their_null() -> None:
-    rng = np.random.default_rng(8)
-    x = rng.standard_normal((2000, 60))
-    for of in (chance.mean, chance.variance, chance.shape, chance.neighbours):
-        # a saddlepoint is sought for each, which takes a millisecond
-        found = np.array([of(row).chance for row in (x[:500] if of is chance.shape else x)])
-        for level in (0.5, 0.1, 0.01):
-            off = np.mean(found <= level) - level
-            # of two polynomials the less likely counts, twice
-            assert off < 5 * np.sqrt(level / len(found)), of
-            assert of is chance.shape or off > -5 * np.sqrt(level / len(found)), of
-    for n, p in ((9, 0.3), (1, 0.6)):
-        each = np.array([math.comb(n, i) * p**i * (1 - p) ** (n - i) for i in range(n + 1)])
-        for i in range(n + 1):
-            sides = np.sum(each[: i + 1]), np.sum(each[i:])
-            assert chance.count(i, n, p).chance == pytest.approx(min(1, 2 * min(sides)), rel=1e-12)
-    assert chance.shape(np.sqrt(12) * (rng.random(2000) - 0.5)).chance < 1e-15
-    assert chance.shape(rng.standard_t(3, 2000)).chance < 1e-15
-    assert chance.shape(rng.standard_exponential(2000) - 1).chance < 1e-15
-    assert chance.variance(1.01 * rng.standard_normal(1_000_000)).chance < 1e-30
-    assert chance.neighbours(np.repeat(rng.standard_normal(500), 2)).chance < 1e-15
-    assert np.mean([chance.pairs(rng.standard_normal((300, 5)))[0] <= 0.05 for _ in range(1000)]) < 0.085
-
-
-def test_a_mean_and_a_variance_of_one_coordinate_are_not_made_up_for_by_another() -> None:
-    """Two groups in baths of unlike temperatures whose mean is right passed, and opposite constant forces."""
-    x = np.random.default_rng(12).standard_normal((40_000, 6))
-    for of in (chance.mean, chance.variance):
-        assert of(x).chance > 1e-3
-        chances = np.array([of(y).chance for y in x.reshape(1000, 40, 6)])
-        for level in (0.5, 0.1, 0.01):
-            assert np.mean(chances <= level) < level + 5 * np.sqrt(level / len(chances))
-    unlike = x * np.sqrt([1.12, 1.0, 1.0, 1.0, 1.0, 0.88])
-    found = chance.variance(unlike).found
-    assert found[0] < 1e-15
-    assert "of coordinate 5 where 1 is right, of 240000 draws" in found[1]
-    assert chance.mean(x + 0.05 * np.array([1, 0, 0, 0, 0, -1])).chance < 1e-15
-
-
-def test_draws_alike_all_along_a_run_are_said_to_be_as_often_as_is_said() -> None:
-    """The chances of periodograms are exact, of one number and of few; none is of a single step."""
-    rng = np.random.default_rng(17)
-    for f, c in ((1, 3), (2, 1), (7, 2), (24, 1), (113, 3)):
-        x = rng.standard_normal((2000, f, c))
-        for one, z in ((chance.mean, x), (chance.variance, chance.normal_sizes(x))):
-            found = np.array([chance.steady(one(y), w).chance for y, w in zip(x, z, strict=True)])
-            for level in (0.1, 0.01):
-                off = np.mean(found <= level) - level
-                assert off < 5 * np.sqrt(level / len(found)), (f, c)
-                assert f == 1 or off > -5 * np.sqrt(level / len(found)), (f, c)
-
-
-def test_what_is_known_before_a_draw_foretells_it_as_seldom_as_is_said() -> None:
-    """Momenta that forget slowly, of the draws themselves: their correlation is not normal."""
-    rng = np.random.default_rng(9)
-    found = []
-    for _ in range(4000):
-        x, p = rng.standard_normal(200), np.zeros(200)
-        for i in range(199):
-            p[i + 1] = 0.995 * p[i] + 0.1 * x[i]
-        found.append(chance.foretold(x[None, :, None], p[None, :, None]).chance)
-    for level in (0.5, 0.1, 0.01):
-        assert np.mean(np.array(found) <= level) <= level
-    x, p = rng.standard_normal((2, 1, 4000, 1))
-    assert chance.foretold(x + 0.15 * p, p).chance < 1e-9
-    assert chance.foretold(x, p).chance > 0.1
-    assert chance.foretold(np.where(p > 3, np.inf, x), p).chance == 0.0
-    found = chance.foretold(x * np.sqrt(1 + 0.3 * np.sign(p)), np.concatenate([p, np.abs(p) - 0.8])).found
-    assert found[0] < 1e-9
-    assert "of the size of draws with the momentum before, of 4000 draws" in found[1]
-
-
-@pytest.mark.parametrize(
-    ("where", "what"),
-    [(lambda q, p: np.sign(p), "the momentum"), (lambda q, p: np.sign(q), "the force"),
-     (lambda q, p: np.sign(np.abs(p) - 0.674), "the size of momenta")],
-)  # fmt: skip
-@pytest.mark.parametrize("name", ["baoab", "obabo", "gj-i"])
-def test_noise_whose_strength_depends_on_the_state_is_seen(name: str, where: Any, what: str) -> None:
-    """Too hot by 15 % in one half of the states and too cold in the other; all else of it is right."""
-    scene = replace(scenefile.load_scene("bath-spring"), steps=20_000)
-    stepper = Stepper.of(THERMOSTATS[name], scene, width=np.float64)
-    rng, size, number = np.random.default_rng(7), np.sqrt(scene.m * scene.thermal), THERMOSTATS[name].draws
-    push, states = forces(THERMOSTATS[name], scene.system), [(scene.q, scene.p)]
-    for _ in range(scene.steps):
-        q, p = states[-1]
-        draws = np.sqrt(1 + 0.15 * where(q, p / size)) * rng.standard_normal((number, 1))
-        states.append(stepper(q, p, push, list(draws), False))
-    q, p = (np.array(x, np.float64) for x in zip(*states, strict=True))
-    run = replace(driver.run(scene, f"own:{name}", seed=1), q=q, p=p, energy=scene.system.energy(q, p))
-    (failed,) = (v for v in springcheck.judge(scene, run) if v.passed is False)
-    assert failed.check == "draws-state"
-    assert f"of the size of draws with {what} before" in failed.why
-
-
 DRAG_ALONE = ("baoab", "baoa", "gj-i", "gj-i-half", "bbk", "obabo", "vanden-eijnden-ciccotti", "bussi")
 
 
@@ -221,7 +107,7 @@ def test_a_drag_of_another_friction_than_the_noise_is_seen_in_the_states(name: s
         for (_, right, noise, _), (kind, c, _, number) in both
     ]
     found = {v.check: v for v in checks.judge(scene, _stepped(scene, wrong))}
-    assert found["draws-state"].passed is (factor == 1)
+    assert found["draws-independent"].passed is (factor == 1)
     assert factor != 1 or all(v.passed is not False for v in found.values())
 
 
@@ -232,7 +118,7 @@ def test_a_wrong_force_is_seen_where_draws_reach_every_state(name: str) -> None:
     for other, passed in ((scene, True), (wrong, False)):
         run = _stepped(other, Stepper.of(THERMOSTATS[name], other, width=np.float64))
         run = replace(run, energy=np.asarray(scene.system.energy(run.q, run.p)))
-        (found,) = (v for v in checks.judge(scene, run) if v.check == "draws-state")
+        (found,) = (v for v in checks.judge(scene, run) if v.check == "draws-independent")
         assert found.passed is passed
         assert passed or "the force" in found.why
 
@@ -262,7 +148,7 @@ def _with(scene: Scene, factor: float) -> Scene:
 
 def _stepped(scene: Scene, stepper: Stepper) -> Trajectory:
     rng, scheme = np.random.default_rng(1), stepper.scheme
-    force, states = forces(scheme, scene.system), [(scene.q, scene.p)]
+    force, states = forces(scene.system), [(scene.q, scene.p)]
     carried = list(rng.standard_normal((scheme.carried, scene.n)))
     for fresh in rng.standard_normal((scene.steps, scheme.fresh, scene.n)):
         draws = [*carried, *fresh]
@@ -271,75 +157,6 @@ def _stepped(scene: Scene, stepper: Stepper) -> Trajectory:
     q, p = np.array(states).transpose(1, 0, 2)
     energy = np.asarray(scene.system.energy(q, p))
     return of_scene(scene, q, p, label="drag", scheme=scheme.name, energy=energy)
-
-
-class _Shared:
-    """Normal numbers, one of whose columns are a part of those of another, some steps before."""
-
-    def __init__(self, source: int, to: int, steps: int, part: float) -> None:
-        self._rng, self._kept = np.random.default_rng(3), []  # type: ignore[var-annotated]
-        self._from, self._to, self._steps, self._part = source, to, steps, part
-
-    def standard_normal(self, shape: tuple[int, ...]) -> Floats:
-        x = self._rng.standard_normal(shape)
-        if x.size:
-            self._kept = [*self._kept, x[..., self._from].copy()][-self._steps - 1 :]
-            rest = np.sqrt(1 - self._part**2) * x[..., self._to]
-            if len(self._kept) > self._steps:
-                x[..., self._to] = self._part * self._kept[0] + rest
-        return x
-
-
-@pytest.mark.parametrize(
-    ("to", "steps", "part", "check"),
-    [
-        (2, 0, 1.0, "draws-particles"),
-        (8, 0, 0.3, "draws-particles"),
-        (2, 1, 1.0, "draws-repeat"),
-        (1, 3, 1.0, "draws-repeat"),
-        (8, 1, 0.6, "draws-repeat"),
-    ],
-)
-@pytest.mark.parametrize("name", ["baoab", "obabo", "brownian"])
-def test_noise_that_any_two_particles_share_is_seen_at_once_and_later(
-    name: str, to: int, steps: int, part: float, check: str
-) -> None:
-    n = 9
-    springs = WallSpring(i=np.arange(n), k=np.linspace(1.3, 3.3, n), at=np.zeros(n))
-    m = np.linspace(1.1, 3.7, n)
-    scene = Scene(
-        name="nine", m=m, q=np.zeros(n), p=np.zeros(n), terms=(springs,), step=0.35, steps=4000,
-        bath=Bath(temperature=1.7, friction=0.8),
-    )  # fmt: skip
-    right = checks.judge(scene, driver.run(scene, f"own:{name}", seed=3))
-    assert not [one.why for one in right if one.passed is False]
-    wrong = driver.run(scene, f"own:{name}", seed=_Shared(0, to, steps, part))
-    assert [one.check for one in checks.judge(scene, wrong) if one.passed is False] == [check]
-
-
-@pytest.mark.parametrize("n", [2, 3])
-def test_draws_that_particles_share_in_common_collisions_are_seen(n: int) -> None:
-    """Of two particles nothing else showed them: their collisions are independent of each other."""
-    scene = baths.springs(n, steps=1200)
-    for shared, outcome in ((False, True), (True, False)):
-        fault = Fault(
-            "",
-            "",
-            (),
-            lambda c, shared=shared: baths.played(
-                c, lambda right: np.full(n, right[-1][0]) if shared else right[-1]
-            ),
-            scheme="andersen",
-        )
-        run = fault.run(scene, size=None, seed=5)
-        assert checks.thermal.draws_particles(checks.Case(trajectory=run, scene=scene)).passed is outcome
-    rng = np.random.default_rng(2)
-    for many, hit in ((2, 0.1), (5, 0.3), (12, 0.02)):
-        each = np.where(rng.random((1000, 200, many)) < hit, rng.standard_normal((1000, 200, many)), np.nan)
-        for level in (0.1, 0.01):
-            share = np.mean([chance.pairs(x)[0] <= level for x in each])
-            room = 5 * np.sqrt(level / 1000)
-            assert 0.7 * level - room < share < level + room
 
 
 @pytest.mark.parametrize("name", THERMOSTATS)
@@ -372,8 +189,8 @@ def test_draws_that_do_not_act_again_in_the_next_step_are_rejected(
     with monkeypatch.context() as patch:
         patch.setitem(THERMOSTATS, name, replace(THERMOSTATS[name], carried=0))
         wrong = driver.run(scene, f"own:{name}", seed=3)
-    seen = checks.judge(scene, wrong, [checks.thermal.noise_direction, checks.thermal.draws_neighbours])
-    first = "draws-neighbours" if name.endswith("-half") else "noise-direction"
+    seen = checks.judge(scene, wrong, [checks.bath.noise_direction, checks.bath.draws_independent])
+    first = "draws-independent" if name.endswith("-half") else "noise-direction"
     assert first in {v.check for v in seen if v.passed is False}
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import random
 import re
-from argparse import Namespace
 from collections import Counter
 from pathlib import Path
 
@@ -93,7 +92,7 @@ def test_every_word_of_a_study_of_precision_is_on_every_terminal(
     scene = scenefile.load_scene("spring-uneven")
     found = precision.record(scene, list(engines.match(("own:euler", "own:semi-implicit-euler"))), budget=0.5)
 
-    on_terminals(found.lines(Namespace(points=True)), monkeypatch, capsys)
+    on_terminals(found.lines(), monkeypatch, capsys)
 
 
 def on_terminals(lines: Lines, monkeypatch: Patch, capsys: Captured) -> None:

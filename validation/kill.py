@@ -40,8 +40,7 @@ from springcheck import cli, store
 from springcheck.errors import StoreError
 from springcheck.physics.scene import Scene
 from springcheck.store import adopt, parts, reading
-from springcheck.studies.precision import measure as precision
-from springcheck.studies.precision.fits import POINTS
+from springcheck.studies.precision.points import CUT_OFF, POINTS
 
 LABELS = [f"own:method-{i}" for i in range(6)]
 PHASES = ("part", "collection")
@@ -280,7 +279,7 @@ def finished(path: Path) -> dict[str, object]:
     for name, one in tables.items():
         if name.startswith("precision/") and ":" in name:
             points = POINTS.found(one)
-            found[name] = [point for point in points if point.outcome != precision.CUT_OFF]
+            found[name] = [point for point in points if point.outcome != CUT_OFF]
         elif name != "precision/methods":
             found[name] = {
                 # as text: NaN equals NaN, and every digit counts

@@ -40,8 +40,8 @@ import springcheck
 from arguments import arguments, script
 from springcheck import checks, driver, engines
 from springcheck.bath import THERMOSTATS, Law
-from springcheck.bath.states import identify_thermal
 from springcheck.engines.contract import Label
+from springcheck.identify.bath_states import identify_thermal
 from springcheck.physics.bath import Bath
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import WallSpring

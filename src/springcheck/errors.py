@@ -51,6 +51,10 @@ class MethodError(SpringcheckError):
     """A method label that names nothing, or a method that cannot run here."""
 
 
+class EngineError(MethodError):
+    """An engine that is installed has failed: its code raised, or its library cannot be imported."""
+
+
 class StoreError(SpringcheckError):
     """A file that cannot be read, written or trusted."""
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from springcheck.api.showing import Said, Shelf
 from springcheck.api.taking import Step, needed, path_of, scene_of, spoken, taken
@@ -16,6 +16,7 @@ from springcheck.physics.scene import Scene
 if TYPE_CHECKING:
     from springcheck.studies.extremes.result import Atlas
     from springcheck.studies.faults.result import FaultReport
+    from springcheck.studies.precision.longtime import LongTime
     from springcheck.studies.precision.result import PrecisionStudy
     from springcheck.studies.sampling.result import Sampling
     from springcheck.studies.stability.result import Stability
@@ -23,23 +24,36 @@ if TYPE_CHECKING:
 
 @typed
 def precision(
-    scene: Scene | str | Path, methods: str | Step | Sequence[str | Step] = (), *, budget: float = 75.0,
-    path: str | Path | None = None, force: bool = False, workers: int = 1,
-) -> PrecisionStudy:  # fmt: skip
+    scene: Scene | str | Path, methods: str | Step | Sequence[str | Step] = (), *, budget: float = 45.0,
+    metric: str = "largest", periods: float | None = None,
+    path: str | Path | None = None, force: bool = False,
+) -> PrecisionStudy | LongTime:  # fmt: skip
     """Measure error against run time, down to rounding, in about `budget` seconds, without imports.
 
-    Methods as in `run`.  `path` saves the result in a store; `workers` processes measure errors in parallel.
+    Parameters
+    ----------
+    scene, methods
+        As in `run`; by default the scene's methods, and an own one of every order and kind.
+    metric
+        Which error: largest, end, energy or phase.
+    periods
+        Run over so many periods at the scene's step instead, as 1e6.
+    path, force
+        Save the result in a store, and overwrite it.
     """
-    from springcheck.studies.precision import measure
+    from springcheck.studies.precision import METRICS, longtime, measure
 
     found = scene_of(scene)
-    with taken(methods, force, workers, path) as (named, how):
+    with taken(methods, force, 1, path) as (named, how):
+        if metric not in METRICS:
+            raise SpringcheckError(f"metric={metric!r}: one of {', '.join(METRICS)} is needed")
         if not 0 < (budget := float(budget)) < math.inf:
             raise SpringcheckError(f"budget={budget}: a number of seconds above 0 is needed")
-        from springcheck.studies.choose import choose
-
-        labels, left, _ = choose(found, named)
-        return measure.record(found, labels, path, budget=budget, left=left, **how)
+        labels, left = measure.methods(found, named)
+        if periods is not None:
+            long: Any = {"periods": periods, "budget": budget, "metric": metric, "left": left}
+            return longtime.record(found, labels, path, **long, **how)
+        return measure.record(found, labels, path, budget=budget, metric=metric, left=left, **how)
 
 
 @typed

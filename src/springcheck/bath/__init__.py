@@ -12,11 +12,11 @@ from springcheck import schemes
 from springcheck.bath.catalogue import THERMOSTATS, Thermostat
 
 if TYPE_CHECKING:
-    from springcheck.bath import chance, draws, jointly, rounding
+    from springcheck.bath import draws, evidence, rounding
     from springcheck.bath.laws import Law
     from springcheck.bath.stepper import Stepper
 
-__all__ = ["THERMOSTATS", "Law", "Stepper", "Thermostat", "chance", "draws", "jointly", "rounding"]
+__all__ = ["THERMOSTATS", "Law", "Stepper", "Thermostat", "draws", "evidence", "rounding"]
 
 _LATER = {"Law": "laws", "Stepper": "stepper"} | {x: x for x in __all__ if x.islower()}
 """Names that no run without a bath needs, and the modules that they are imported from on first use."""

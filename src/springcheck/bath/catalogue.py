@@ -83,7 +83,6 @@ class Thermostat(Scheme):
         return any(act.kind == "collide" for act in self.acts)
 
     @property
-    @property
     def rescales_after(self) -> bool:
         """Whether that factor comes after kicks and drifts."""
         return self.rescales and self.acts[0].kind == "kick"

@@ -106,7 +106,7 @@ class _Reader:
         self.scheme, self.scene, self.how, self.rebuilt = scheme, scene, how, rebuilt
         self.stepper = Stepper.of(scheme, scene)
         self.sizer = Stepper.of(scheme, scene, absolute=True)
-        self._force = forces(scheme, scene.system)
+        self._force = forces(scene.system)
         self.roundings = roundings_of(scheme)
         self.directions, self.of_q = (_NONE, False) if scheme.rescales else _directions(scheme, scene)
 
@@ -284,13 +284,3 @@ def _whitened(x: Floats) -> Floats:
         out[i] = last
         below = 0.5 / size
     return out
-
-
-def normal_scores(x: Any) -> Floats:
-    """Uniform draws of variance 1 as the normal numbers of the same rank; beyond their range infinite."""
-    from scipy.special import ndtri
-
-    u = np.asarray(x, np.float64) / np.sqrt(12) + 0.5
-    # the ends of the range are known to a rounding
-    u = np.where((u <= 0) & (u > -1e-9), 1e-12, np.where((u >= 1) & (u < 1 + 1e-9), 1 - 1e-12, u))
-    return np.where((u > 0) & (u < 1), ndtri(np.clip(u, 1e-300, 1 - 2.0**-53)), np.inf)

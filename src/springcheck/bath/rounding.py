@@ -52,7 +52,7 @@ def one_rounding(
 
     # the error of a coarse force is no size of the next: sizes without it come first
     for first in [True, False] if wide else [False]:
-        sizes = forces(sizer.scheme, scene.system, partial(pull, first=first))
+        sizes = forces(scene.system, partial(pull, first=first))
         q, p = sizer(size, np.abs(start[1]), sizes, draws, hit)
     if cancels := max(how.cancels, sizer.scheme.cancels):
         # coefficients of all that is added to q, and of p
@@ -64,7 +64,7 @@ def one_rounding(
     if np.any(half):
         # what decimals take off the state before, which the step carries on, and off this one
         near = None if scene.system.is_linear else start[0]
-        plain = forces(sizer.scheme, scene.system, lambda terms: scene.system.magnitude(near, terms))
+        plain = forces(scene.system, lambda terms: scene.system.magnitude(near, terms))
         off, none = (
             np.stack(sizer(size + x[0], np.abs(start[1]) + x[1], plain, draws, hit)) for x in (half, 0 * half)
         )

@@ -15,10 +15,8 @@ from springcheck.physics.system import System
 from springcheck.physics.term import Term
 
 
-def forces(
-    scheme: Thermostat, system: System[Any], of: Callable[[Sequence[Term]], Force] | None = None
-) -> Any:
-    """What the stages of a scheme push by, as `of` makes it of terms."""
+def forces(system: System[Any], of: Callable[[Sequence[Term]], Force] | None = None) -> Force:
+    """The force of the potential terms of a system, as `of` makes it of terms."""
     of = of or system.force_of
     return of([term for term in system.terms if term.kind == "potential"])
 

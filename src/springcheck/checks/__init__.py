@@ -21,7 +21,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from springcheck.checks import experiments, laws, thermal
+from springcheck.checks import bath, experiments, laws
 from springcheck.checks.bench import Bench, Run
 from springcheck.checks.case import Case
 from springcheck.checks.check import DECADES, Check, over_pieces, shared
@@ -63,10 +63,10 @@ THOROUGH: tuple[Check, ...] = (
 
 ALL: tuple[Check, ...] = (*CHECKS, *THOROUGH)
 
-RANDOM: tuple[Check, ...] = (start, times, grid, energies, *thermal.DRAWN)
+RANDOM: tuple[Check, ...] = (start, times, grid, energies, *bath.DRAWN)
 """Checks of a thermostat's trajectory, to which no law of deterministic motion applies."""
 
-TELLING = frozenset(["identified", *(one.name for one in (*ALL, *thermal.DRAWN) if one.telling)])
+TELLING = frozenset(["identified", *(one.name for one in (*ALL, *bath.DRAWN) if one.telling)])
 """Checks that distinguish the scheme that a method claims from others; `identified` is of a file's states."""
 
 SPECIAL = frozenset(one.name for one in CHECKS if any(REQUIREMENTS[x].special for x in one.requires))

@@ -11,15 +11,14 @@ from math import comb
 
 import numpy as np
 
-from springcheck.bath import THERMOSTATS, chance
+from springcheck.bath import THERMOSTATS
 from springcheck.bath.catalogue import ENERGY_LEFT
 from springcheck.bath.draws import Reading, law_of
 from springcheck.checks import driven, other, stages
+from springcheck.checks.bath import noise_direction, read_frames, reading, rows_a_step, thermostat
 from springcheck.checks.case import Case
-from springcheck.checks.check import FALSE_ALARMS
 from springcheck.checks.requires import MAP, missing
 from springcheck.checks.steps import STANDS_APART, seldom_off, step_defect
-from springcheck.checks.thermal import noise_direction, read_frames, reading, rows_a_step, thermostat
 from springcheck.physics.arrays import Floats
 from springcheck.text.wording import regularly
 
@@ -31,6 +30,9 @@ FEWEST_DRAWS = 50
 
 MOST_SIZES = 6
 """Coordinates whose noise a cause tells."""
+
+MOST_PAIRED = 512
+"""Coordinates that are compared in pairs."""
 
 FIT_ROUNDS = 20
 """Iterations of a fit whose weights are its own variances."""
@@ -316,7 +318,8 @@ def _of_size(case: Case) -> str:
     coordinates share draws."""
     x = reading(case).draws
     of = x**2
-    if chance.pairs(x / np.sqrt(np.mean(of, axis=0)))[0] < FALSE_ALARMS:
+    z = (x / np.sqrt(np.mean(of, axis=0)))[:, :MOST_PAIRED]
+    if np.any(np.abs(np.triu(z.T @ z, 1)) > STANDARD_ERRORS * np.sqrt(len(z))):
         return ""
     mean, error = np.mean(of, axis=0), np.std(of, axis=0) / np.sqrt(len(of))
     asked = "as large as the temperature, the masses and the friction ask"

@@ -15,7 +15,7 @@ from springcheck.physics.trajectory import NOT_KNOWN, Limits, Verdict
 from springcheck.text.wording import described
 
 if TYPE_CHECKING:
-    from springcheck.bath.chance import Statistic
+    from springcheck.bath.evidence import Statistic
 
 BEYOND = 2.0**511
 """Stands for values that fail and are not finite, or larger, so that a verdict and its ratio are finite."""
@@ -85,19 +85,13 @@ def shared(verdicts: Sequence[Verdict], false_alarms: float = FALSE_ALARMS) -> l
 
 
 def over_pieces(worst: Verdict, judged: Sequence[Verdict]) -> Verdict:
-    """The random verdict on a run, from the worst of its pieces and all of them.
-
-    The least of several chances is found so many times as often; the sums over all pieces, where the
-    statistic adds up, are one more test.
-    """
+    """The random verdict on a run of several pieces: that of the sums over all pieces, or else the worst of
+    the pieces, whose chance is found so many times as often."""
     each = [one.statistic for one in judged]
     if len(judged) == 1 or None in each:
         return replace(worst, value=worst.value - float(np.log10(len(judged))))
     whole = Chance.of(sum(each[1:], each[0]))
-    assert whole.statistic is not None
-    why = whole.why if worst.passed or whole.decades >= worst.value else worst.why
-    value = min(max(whole.decades, worst.value), BEYOND) - float(np.log10(whole.statistic.tests))
-    return replace(worst, value=value, why=why, statistic=whole.statistic)
+    return replace(worst, value=min(whole.decades, BEYOND), why=whole.why, statistic=whole.statistic)
 
 
 Judge: TypeAlias = Callable[[Any], Finding | Chance | str]

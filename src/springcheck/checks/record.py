@@ -68,8 +68,8 @@ def grid(case: Case) -> Finding:
 
 
 MOST_DECLARED = {
-    "state": (2.0**-8, "8 bits, those of bfloat16, are the fewest of any format"),
-    "force": (2.0**-8, "8 bits, those of bfloat16, are the fewest of any format"),
+    "state": (2.0**-20, "single precision of positions stored with an origin 16 times as far away"),
+    "force": (2.0**-20, "single precision with 16 roundings is the coarsest force of any engine known"),
     "quantum": (2.0**-32, "the unit of 64-bit fixed point, half of it behind the point"),
     "excess": (2.0**-31, "2**32 for 2**32 - 1 in 64-bit fixed point"),
     "cancels": (2, "a difference of 1 and what is itself taken from a difference"),

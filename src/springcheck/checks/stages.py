@@ -9,8 +9,8 @@ import numpy as np
 
 from springcheck.bath import Thermostat
 from springcheck.bath.decays import Decay
+from springcheck.checks.bath import collisions, noise_direction, read_frames, reading, thermostat
 from springcheck.checks.case import Case
-from springcheck.checks.thermal import collisions, noise_direction, read_frames, reading, thermostat
 
 ROUNDINGS_OF_A_SUM = 4
 """Rounding errors of draws, added up, by which a sum of draws departs from 0 at most."""

@@ -115,7 +115,7 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
         prog="springcheck",
         description="Simulation engines judged to rounding by a mass on a spring.",
         epilog="Exit status: 0 every verdict passed; 1 some verdict failed; "
-        f"2 bad input, or nothing was measured; {interrupts.STATUS} interrupted; "
+        f"2 bad input, nothing was measured, or an engine failed; {interrupts.STATUS} interrupted; "
         f"{interrupts.BROKEN_PIPE} nobody reads the output.",
     )
     version = f"springcheck {springcheck.__version__}"
@@ -162,5 +162,5 @@ def _study(study: Study, options: argparse.Namespace) -> int:
         why = "nothing was measured, or not all could be judged; without --quiet the report says what"
         print(f"springcheck: {why}", file=sys.stderr)
     for why in broke.values():
-        print(f"springcheck: {plain(why)}; mend it, and give the command again", file=sys.stderr)
+        print(f"springcheck: {plain(why)}", file=sys.stderr)
     return status

@@ -80,6 +80,8 @@ def failed(options: Namespace, error: BaseException) -> None:
 
 def cases(command: str, document: dict[str, Any], status: int) -> Iterator[Case]:
     """Every item that a JSON document reports as judged."""
+    for method, why in document.get("broke", {}).items():
+        yield Case(subject=method, name="run", passed=None, why=why, error=True)
     for one in document.get("files", [document]):
         for found in one.get("identifications", [one]):
             yield from _identified(found, one.get("file", ""))
@@ -132,9 +134,9 @@ def _number(x: float | None) -> str:
 
 def sentence(found: Sequence[Case], status: int) -> str:
     """The first sentence of a summary: the failure, or that there is none."""
-    wrong = [x for x in found if x.passed is False] or [x for x in found if x.error]
+    wrong = [x for x in found if x.error] or [x for x in found if x.passed is False]
     if wrong:
-        named = "" if wrong[0].name in ("scheme", "input") else f", {wrong[0].name}"
+        named = "" if wrong[0].name in ("scheme", "input", "run") else f", {wrong[0].name}"
         return f"{wrong[0].subject}{named}: {wrong[0].why}"
     if status == 2:
         return (
@@ -149,9 +151,11 @@ def sentence(found: Sequence[Case], status: int) -> str:
 
 
 def _tally(found: Sequence[Case]) -> str:
-    wrong = sum(x.passed is False or x.error for x in found)
-    passed, skipped = (sum(x.passed is value and not x.error for x in found) for value in (True, None))
-    return f"{count(passed, 'check')} passed, {wrong or 'none'} failed, {skipped} not applicable."
+    judged = [x.passed for x in found if not x.error]
+    passed, wrong, skipped = (judged.count(value) for value in (True, False, None))
+    errors = sum(x.error for x in found)
+    said = f"{count(passed, 'check')} passed, {wrong or 'none'} failed, {skipped} not applicable"
+    return f"{said}, {count(errors, 'error')}." if errors else f"{said}."
 
 
 def junit(command: str, found: Sequence[Case]) -> bytes:
@@ -181,7 +185,9 @@ def summary(command: str, found: Sequence[Case], status: int) -> str:
     """A summary in Markdown; its first sentence is the cause."""
     wrong = [x for x in found if x.passed is False or x.error]
     first, tally = sentence(found, status), _tally(found)
-    lines = [f"### springcheck {command}: {WORDS[status]}", "", _cell(first), ""]
+    judged = any(x.passed is not None for x in found)
+    words = "an error, and some was judged" if status == 2 and judged else WORDS[status]
+    lines = [f"### springcheck {command}: {words}", "", _cell(first), ""]
     if len(wrong) > 1:
         lines += ["| what | check | why |", "|---|---|---|"]
         lines += [f"| {_cell(x.subject)} | {_cell(x.name)} | {_cell(x.why)} |" for x in wrong[:MOST_CASES]]

@@ -109,6 +109,14 @@ def _explain(options: Namespace) -> int:
     return 0
 
 
+def _cite(options: Namespace) -> int:
+    from springcheck.cli import citing
+    from springcheck.text.lines import plain as plain_line
+
+    output.show([plain_line(line) for line in citing.lines(options.store)])
+    return 0
+
+
 def _columns(options: Namespace) -> list[str]:
     return [name.strip() for name in (options.columns or "").split(",") if name.strip()]
 
@@ -301,6 +309,9 @@ COMMANDS = (
     Command("explain", "a check, scheme, fault or finding in words", _explain, (
         argument("word", metavar="NAME", help="a check, scheme, engine:method, fault, finding or term"),
         ENGINE,
+    )),
+    Command("cite", "what to cite for springcheck, its engines and schemes", _cite, (
+        argument("store", metavar="FILE", nargs="?", help="a store: its engines and schemes alone"),
     )),
     Command("identify", "which scheme made a trajectory, ours or anyone's", _identify, (
         argument("files", metavar="FILE", nargs="*", help=f"stores, or files of any program: {FORMATS}"),

@@ -74,7 +74,7 @@ class Judgement:
         """The answer in the first line, then what failed; every verdict with its reason on request."""
         failed = [v for v in self.verdicts if v.passed is False]
         frames = count(self.frames, "frame")
-        out = [self._answer(), plain(f"{self.path}: {frames} of {self.scene}, {self._share()}", "dim")]
+        out: Lines = [self._answer(), plain(f"{self.path}: {frames} of {self.scene}, {self._share()}", "dim")]
         if failed:
             cause, _, remedy = checks.cause_of(self.verdicts).partition(". What to do: ")
             out += [plain(f"Diagnosis: {cause[:1].upper()}{cause[1:].rstrip('.')}.")] if cause else []

@@ -18,13 +18,13 @@ EXAMPLES: Mapping[str, Sequence[str]] = {
     "precision": ("spring --budget 20 --method own:rk4",),
     "stability": ("spring", "multiple-time-steps --method 'openmm:*'"),
     "extremes": ("--quick",),
-    "census": ("--method 'own:*' --against old.json",),
     "sampling": ("--method 'own:*' --method 'openmm:*'",),
     "inspect": ("spring.h5 --verdicts", "spring.h5 --trajectory own:euler --rows 5"),
     "plot": ("spring.h5 -o figures", "orbit.csv"),
     "report": ("spring.h5 -o spring.html",),
     "show": ("spring -o my.toml",),
     "explain": ("velocity-verlet", "step-defect", "openmm:verlet"),
+    "cite": ("", "spring.h5"),
     "identify": ("orbit.csv --mass 3.7", "--stepper mine.py:step"),
     "judge": ("orbit.csv --scene spring --scheme velocity-verlet",),
     "check": ("spring.h5",),
@@ -36,7 +36,7 @@ EXAMPLES: Mapping[str, Sequence[str]] = {
 
 
 GROUPS: Mapping[str, Sequence[str]] = {
-    "input": ("file", "files", "label", "word", "kind", "--trajectory", "--columns", "--from"),
+    "input": ("file", "files", "store", "label", "word", "kind", "--trajectory", "--columns", "--from"),
     "scene": ("scene", "--scene", "--step", "--steps", "--set", "--temperature", "--friction", "--seed"),
     "methods": (
         "--method", "--all", "--engine", "--stepper", "--command", "--scheme", "--timeout", "--fault",

@@ -46,7 +46,7 @@ from springcheck.engines.registry import (
     unusable,
     while_here,
 )  # fmt: skip
-from springcheck.errors import MOST_LIKELY, MethodError, nearest, told
+from springcheck.errors import MOST_LIKELY, EngineError, MethodError, nearest, told
 from springcheck.physics.arrays import Arithmetic, Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Distances
@@ -93,7 +93,7 @@ def load(name: str) -> Engine:
         try:
             said = _imported(found.version)
         except ImportError as error:
-            raise MethodError(f"engine {name!r}, {found.title}, cannot be imported: {told(error)}") from error
+            raise EngineError(f"engine {name!r}, {found.title}, cannot be imported: {told(error)}") from error
     if not isinstance(said, dict):
         kind = type(said).__name__
         raise MethodError(f"engine {name!r}: its version() returned {kind}, not a dict of names and versions")

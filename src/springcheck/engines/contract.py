@@ -150,6 +150,8 @@ class Engine:
     """Random methods by name, for scenes with a bath; their schemes are those of `springcheck.bath`."""
     distribution: str = ""
     """Its library's name on the package index, or "" where it needs none."""
+    reference: str = ""
+    """The publication that its authors ask to be cited."""
     module: str = ""
     """The module whose absence means that the library is missing; the name of the distribution by default."""
     extra: str = ""

@@ -279,6 +279,8 @@ def _layered(scene: Scene, terms: list[WallSpring], origins: Floats) -> list[dic
 ENGINE = Engine(
     name="lammps",
     title="LAMMPS",
+    reference="A. P. Thompson et al., LAMMPS, Comput. Phys. Commun. 271, 108171 (2022), "
+    "doi:10.1016/j.cpc.2021.108171",
     distribution="lammps",
     extra="lammps",
     methods=named(

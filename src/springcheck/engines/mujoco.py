@@ -162,6 +162,7 @@ def _has_motor(label: Label) -> bool:
 ENGINE = Engine(
     name="mujoco",
     title="MuJoCo",
+    reference="E. Todorov, T. Erez, Y. Tassa, MuJoCo, IROS 2012, 5026, doi:10.1109/IROS.2012.6386109",
     distribution="mujoco",
     extra="mujoco",
     methods=named(

@@ -21,7 +21,8 @@ import springcheck
 from springcheck import interrupts, schemes
 from springcheck.bath import THERMOSTATS
 from springcheck.engines.contract import ANY_DISTANCE, ANY_POTENTIAL, Engine, Method, Stopped
-from springcheck.errors import MethodError, SpringcheckError, nearest, told
+from springcheck.engines.restored import restored
+from springcheck.errors import EngineError, MethodError, SpringcheckError, nearest, told
 from springcheck.physics import terms
 
 GROUP = "springcheck.engines"
@@ -104,7 +105,7 @@ def _loaded(name: str, place: str) -> Engine | str:
 
 @contextmanager
 def foreign(name: str, what: str, file: str = "") -> Iterator[None]:
-    """Run foreign code, known by this name: whatever it raises becomes a MethodError "`what`: why".
+    """Run foreign code, known by this name: whatever it raises becomes an EngineError "`what`: why".
 
     Code that has ended an earlier process of this command (`interrupts.supervised`) is not run again: the
     MethodError says how it ended that one.
@@ -115,11 +116,12 @@ def foreign(name: str, what: str, file: str = "") -> Iterator[None]:
     process = os.getpid()
     interrupts.calling(name)
     try:
-        yield
+        with restored():
+            yield
     except (SpringcheckError, Stopped, KeyboardInterrupt):
         raise
     except BaseException as error:
-        raise MethodError(f"{what}: {told(error, file)}") from error
+        raise EngineError(f"{what}: {told(error, file)}") from error
     finally:
         if os.getpid() != process:
             # a fork within foreign code is not the program

@@ -100,6 +100,7 @@ class _Solver:
 ENGINE = Engine(
     name="scipy",
     title="SciPy",
+    reference="P. Virtanen et al., SciPy 1.0, Nature Methods 17, 261 (2020), doi:10.1038/s41592-019-0686-2",
     distribution="scipy",
     methods=named(
         *(

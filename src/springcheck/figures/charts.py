@@ -17,8 +17,9 @@ import numpy as np
 from springcheck.physics.arrays import Floats
 
 GUIDE, EXACTLY, SEPARATRIX, BEGIN, REJECTED = "guide", "exact", "separatrix", "beginning", "failed"
+LOWEST = "lowest"
 """Groups that are no scheme's: guides to a slope or a limit, the exact solution, separatrices, the common
-start, and what some verdict rejects."""
+start, what some verdict rejects, and the lower envelope of all."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -132,6 +133,8 @@ class Bank:
     """Series drawn at first; all by default."""
     columns: int = 0
     """Charts beside each other in a figure; by default as many as suit it."""
+    foot: str = ""
+    """Small print below its figure."""
     size: tuple[float, float] | None = None
     """Size of a chart in a figure [in]; by default what suits it."""
 

@@ -7,7 +7,17 @@ from dataclasses import replace
 import numpy as np
 
 from springcheck.figures import looks
-from springcheck.figures.charts import BEGIN, EXACTLY, GUIDE, REJECTED, SEPARATRIX, Chart, Curve, Naming
+from springcheck.figures.charts import (
+    BEGIN,
+    EXACTLY,
+    GUIDE,
+    LOWEST,
+    REJECTED,
+    SEPARATRIX,
+    Chart,
+    Curve,
+    Naming,
+)
 from springcheck.figures.frames import Frame
 from springcheck.physics.arrays import Floats
 
@@ -22,13 +32,15 @@ a label may find space."""
 Place = tuple[str, str, Floats, Floats]
 
 
-def _named(chart: Chart) -> list[Place]:
-    """Title, group and points, as parts of the picture, of the first curve of each scheme or wrong run."""
+def _named(chart: Chart, *, by_name: bool = False) -> list[Place]:
+    """Title (with `by_name` the curve's name), group and points, as parts of the picture, of the first curve
+    of each scheme or wrong run."""
     firsts: dict[tuple[str, str], Curve] = {}
     for curve in chart.curves:
         joined = (curve.line or curve.dots) and not curve.over and len(curve.x)
-        if joined and curve.group not in (EXACTLY, GUIDE, BEGIN):
-            title = curve.name if curve.group in (REJECTED, SEPARATRIX) else looks.title(curve.group)
+        if joined and curve.group not in (EXACTLY, GUIDE, LOWEST, BEGIN):
+            plain = by_name or curve.group in (REJECTED, SEPARATRIX)
+            title = curve.name if plain else looks.title(curve.group)
             firsts.setdefault((title, curve.group), curve)
     sides = []
     for scale, which in ((chart.x, "x"), (chart.y, "y")):
@@ -80,11 +92,11 @@ def at_ends(chart: Chart, *, height: float = NAME_HIGH) -> Chart:
     return replace(chart, labels=[*out[:MOST_NAMINGS], *beside])
 
 
-def labelled(chart: Chart) -> Chart:
+def labelled(chart: Chart, *, by_name: bool = False) -> Chart:
     """A chart with labels on the curves that are well separated somewhere, each where it is farthest from all
     others."""
     points: dict[tuple[str, str], Floats] = {}
-    for text, group, u, v in _named(chart):
+    for text, group, u, v in _named(chart, by_name=by_name):
         inside = (u > 0.02) & (u < 0.98) & (v > 0.03) & (v < 0.95)
         points[text, group] = np.stack([u[inside], v[inside]], axis=1)
     out: list[Naming] = []
@@ -102,6 +114,9 @@ def labelled(chart: Chart) -> Chart:
             taken = any(abs(y - one.y) < NAME_HIGH and abs(x - one.x) < LETTER * len(text) for one in out)
             if not taken and min(room) > best:
                 best, found = min(room), (x, y)
+        if by_name and found is None and len(mine):
+            # where it ends
+            found = tuple(mine[-1].tolist())
         if found is not None and len(out) < MOST_NAMINGS:
             out.append(Naming(text=text, group=group, x=found[0], y=found[1]))
     return replace(chart, labels=out)

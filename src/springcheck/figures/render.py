@@ -20,6 +20,7 @@ from springcheck.figures.charts import (
     BEGIN,
     EXACTLY,
     GUIDE,
+    LOWEST,
     REJECTED,
     SEPARATRIX,
     Bank,
@@ -61,8 +62,8 @@ LEGEND_LINE = 0.17
 AROUND = [patheffects.withStroke(linewidth=2.5, foreground="white")]
 """White around words and guides, so that lines do not run through them."""
 
-LETTERS, WIDEST = 11.3, 38
-"""Letters of a title per inch; most letters of a line of the legend."""
+LETTERS, SMALL_LETTERS, WIDEST = 11.3, 18, 38
+"""Letters of a title per inch, and of the small print; most letters of a line of the legend."""
 
 MOST_TICKS, MOST_TICKS_UP, EVEN = 8, 12, 40
 """Most values of tiles that are written along x and along y; of more than `EVEN` geometrically spaced ones,
@@ -85,11 +86,14 @@ def picture(bank: Bank) -> Figure:
     wide, high = bank.size or (wide, high)
     handles: list[Any] = _entries([curve for chart in charts for curve in chart.curves])
     handles += _kinds(charts)
-    lines = sum(1 + handle.get_label().count("\n") for handle in handles)
+    # names at the curves take the place of a legend
+    direct = bool(charts[0].labels) and all(_all_named(chart) for chart in charts)
+    lines = 0 if direct else sum(1 + handle.get_label().count("\n") for handle in handles)
     rows = -(-len(charts) // columns)
     # space for the whole legend
     figure = Figure(
-        figsize=(wide * columns + 2.4, max(high * rows, LEGEND_LINE * lines) + 0.6), layout="constrained"
+        figsize=(wide * columns + (0 if direct else 2.4), max(high * rows, LEGEND_LINE * lines) + 0.6),
+        layout="constrained",
     )
     grid = figure.subplots(rows, columns, squeeze=False).ravel()
     for axes in grid[len(charts) :]:
@@ -98,10 +102,20 @@ def picture(bank: Bank) -> Figure:
         _chart(axes, chart, round(wide * LETTERS))
     _shared(list(grid[: len(charts)]), charts, columns)
     _heading(figure, bank.heading or charts[0].title, min(110, max(60, round(wide * columns * LETTERS))))
-    figure.legend(
-        handles=handles, loc="outside right upper", frameon=False, labelspacing=0.7, handlelength=2.6
-    )
+    if not direct:
+        figure.legend(
+            handles=handles, loc="outside right upper", frameon=False, labelspacing=0.7, handlelength=2.6
+        )
+    if bank.foot:
+        print_ = textwrap.fill(bank.foot, min(118, round(figure.get_figwidth() * SMALL_LETTERS)))
+        figure.supxlabel(print_, x=0.02, ha="left", fontsize=6.5, color="#666666")
     return figure
+
+
+def _all_named(chart: Chart) -> bool:
+    """Whether every curve has its name on it."""
+    names = {x.name for x in chart.curves if x.group not in (GUIDE, LOWEST)}
+    return names <= {x.text for x in chart.labels}
 
 
 def _shared(grid: Sequence[Axes], charts: Sequence[Chart], columns: int) -> None:
@@ -155,6 +169,7 @@ def _entries(curves: Sequence[Curve]) -> list[Line2D]:
 OTHER_LINES: dict[str, dict[str, Any]] = {
     EXACTLY: {"color": "#b3b3b3", "linewidth": 4.0, "alpha": 0.7, "zorder": 1},
     SEPARATRIX: {"color": "#666666", "linewidth": 0.9, "linestyle": (0, (2, 2)), "zorder": 1.5},
+    LOWEST: {"color": "#e3e3e3", "linewidth": 7.0, "zorder": 1, "solid_joinstyle": "round"},
     BEGIN: {"color": "k", "linestyle": "none", "marker": "+", "markersize": 9, "zorder": 4},
 }
 """Line styles of what is no scheme's."""

@@ -16,10 +16,10 @@ from typing import Any
 import numpy as np
 
 from springcheck.bath.catalogue import THERMOSTATS
-from springcheck.bath.modes import FREE_OF_NOISE, modes
-from springcheck.bath.residuals import FEWEST, is_of_digits
-from springcheck.bath.states import Thermal, identify_thermal
 from springcheck.errors import IdentificationError
+from springcheck.identify.bath_modes import FREE_OF_NOISE, modes
+from springcheck.identify.bath_residuals import FEWEST, is_of_digits
+from springcheck.identify.bath_states import Thermal, identify_thermal
 from springcheck.identify.clock import clock_of
 from springcheck.identify.evidence import AGREES
 from springcheck.identify.hypothesis import ERRORS, SURE

@@ -18,6 +18,8 @@ _drawn = partial(thermostat, generator="NumPy, PCG64", terms=EVERY_POTENTIAL, re
 ENGINE = Engine(
     name="ase",
     title="ASE",
+    reference="A. H. Larsen et al., The atomic simulation environment, J. Phys.: Condens. Matter 29, 273002 "
+    "(2017), doi:10.1088/1361-648X/aa680e",
     distribution="ase",
     methods=named(
         by_default("velocity-verlet", "velocity-verlet", "ase.md.verlet.VelocityVerlet", EVERY_POTENTIAL),

@@ -34,6 +34,7 @@ _PLATFORMS = ("Reference", "CPU", *(name + precision for name in _GPU for precis
 ENGINE = Engine(
     name="openmm",
     title="OpenMM",
+    reference="P. Eastman et al., OpenMM 8, J. Phys. Chem. B 128, 109 (2024), doi:10.1021/acs.jpcb.3c06662",
     distribution="openmm",
     platforms=_PLATFORMS,
     methods=named(

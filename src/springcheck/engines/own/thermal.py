@@ -24,7 +24,7 @@ class Random:
         self._q, self._p = scene.q.astype(np.float64), scene.p.astype(np.float64)
         self._scheme = THERMOSTATS[scheme]
         self._step = Stepper.of(self._scheme, scene.derived(step=step), width=np.float64)
-        self._force = self._counted(forces(self._scheme, scene.system))
+        self._force = self._counted(forces(scene.system))
         scripted = hasattr(seed, "standard_normal")
         self._rng = seed if scripted else np.random.Generator(np.random.PCG64(seed))
         # collisions take numbers of their own, far along the same sequence

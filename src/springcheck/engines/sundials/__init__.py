@@ -20,6 +20,8 @@ _SOLVER = {"adaptive": True, "kinds": EVERY_KIND}
 ENGINE = Engine(
     name="sundials",
     title="SUNDIALS (scikit-sundae)",
+    reference="A. C. Hindmarsh et al., SUNDIALS, ACM Trans. Math. Softw. 31, 363 (2005), "
+    "doi:10.1145/1089014.1089020",
     distribution="scikit-sundae",
     module="sksundae",
     methods=named(

@@ -40,12 +40,12 @@ def springs(n: int, *, name: str = "bath", steps: int = 1200) -> Scene:
     )  # fmt: skip
 
 
-def subject(fault: Fault, size: float | None, seed: int = 20261122) -> Seeded:
-    """A fault as subject of the experiments with seeds, on three springs."""
-    return Seeded(
-        scene=springs(3), label=fault.name, seed=seed,
-        play=partial(fault.run, size=size),
-    )  # fmt: skip
+def subject(
+    fault: Fault, size: float | None, scene: Scene | None = None, seed: int = 20261122
+) -> Seeded:  # fmt: skip
+    """A fault as subject of the experiments with seeds, on three springs or another scene."""
+    scene = scene or springs(3)
+    return Seeded(scene=scene, label=fault.name, seed=seed, play=partial(fault.run, size=size))
 
 
 def played(
@@ -78,7 +78,7 @@ def played(
         right = scene.system.force_of(terms)
         return lambda q, p: np.asarray(right(q, p) * k)
 
-    force, carried = forces(of, scene.system, stiffer), [drawn() for _ in range(of.carried)]
+    force, carried = forces(scene.system, stiffer), [drawn() for _ in range(of.carried)]
 
     def one(i: int, q: Floats, p: Floats) -> State:
         taken = [*carried, *(drawn() for _ in range(of.fresh))]
@@ -116,22 +116,3 @@ def forgetting(scene: Scene) -> float:
     """gamma h of a scene in a bath."""
     assert scene.bath is not None
     return scene.step * scene.bath.friction
-
-
-def row(seed: Any) -> np.random.Generator:
-    """One stream of numbers for all seeds, each of which starts at an offset of its own."""
-    rng = np.random.default_rng(1)
-    rng.standard_normal(int(seed) % 1000)
-    return rng
-
-
-class Each:
-    """A generator for each particle, seeded by the seed plus the number of the particle."""
-
-    def __init__(self, seed: Any) -> None:
-        self._seed, self._rngs = int(seed), list[np.random.Generator]()
-
-    def standard_normal(self, n: int) -> Floats:
-        """One number from each generator."""
-        self._rngs = self._rngs or [np.random.default_rng(self._seed + i) for i in range(n)]
-        return np.array([rng.standard_normal() for rng in self._rngs])

@@ -50,6 +50,11 @@ class Accuracy:
     energy_error: float = np.nan
     rounding_error: float | None = None
 
+    def error(self, metric: str) -> float:
+        """The error of this name, without its sign; NaN where there is none."""
+        value = getattr(self, {"largest": "max_error"}.get(metric, f"{metric}_error"))
+        return float("nan") if value is None else abs(value)
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Truth:
@@ -103,11 +108,13 @@ class Errors:
     """A sink for `driver.play` that accumulates the errors of one run of steps `h`."""
 
     def __init__(
-        self, known: Truth, h: float, every: int, *, scheme: schemes.Scheme, judged: Scene | None = None
-    ) -> None:
-        """`judged` is the scene with parameters as the engine stores them, for the rounding error alone."""
+        self, known: Truth, h: float, every: int, *, scheme: schemes.Scheme, judged: Scene | None = None,
+        first: int = 0,
+    ) -> None:  # fmt: skip
+        """`judged` is the scene with parameters as the engine stores them, for the rounding error alone;
+        `first` the number of steps at the first frame."""
         self._truth, self._h, self._every = known, h, every
-        self._frame = 0
+        self._step = first
         self._largest = self._end = self._energy = self._phase = self._rounded = 0.0
         modes = known.turning
         u, v = self._turned(known.scene.q[None], known.scene.p[None])
@@ -116,13 +123,13 @@ class Errors:
         # an overdamped mode does not oscillate
         self._clear = (modes.w2 > known.rate**2 / 4) & (size >= self._least) & (size > 0)
         self._last = np.zeros(int(np.count_nonzero(self._clear)), dtype=np.longdouble)
-        self._own = _own_motion(judged or known.scene, scheme, h)
+        self._own = own_motion(judged or known.scene, scheme, h)
 
-    def __call__(self, t: Floats, q: Floats, p: Floats, *_: Floats | None) -> None:
+    def __call__(self, t: Floats, q: Reals, p: Reals, *_: Floats | None) -> None:
         """Accumulate the errors of these frames."""
         known, norm = self._truth, self._truth.scene.system.norm
-        steps = np.arange(self._frame, self._frame + len(t)) * self._every
-        self._frame += len(t)
+        steps = self._step + np.arange(len(t)) * self._every
+        self._step = int(steps[-1]) + self._every
         true_q, true_p = exact.true_motion(known.scene, steps, self._h)
         with np.errstate(over="ignore", invalid="ignore"):
             error = norm(q - true_q, p - true_p)
@@ -159,7 +166,7 @@ class Errors:
         y, v = modes.about_centres(q, p)
         return np.sqrt(np.abs(modes.w2 - half * half)) * y, v + half * y
 
-    def _turn(self, q: Floats, p: Floats, true_q: Extended, true_p: Extended) -> None:
+    def _turn(self, q: Reals, p: Reals, true_q: Extended, true_p: Extended) -> None:
         if not len(self._last):
             return
         (u, v), (true_u, true_v) = self._turned(q, p), self._turned(true_q, true_p)
@@ -176,7 +183,7 @@ class Errors:
             self._phase = float(worst)
 
 
-def _own_motion(scene: Scene, scheme: schemes.Scheme, h: float) -> Motion | None:
+def own_motion(scene: Scene, scheme: schemes.Scheme, h: float) -> Motion | None:
     """The scheme's own motion in exact arithmetic, from which a run departs by rounding alone, at any step.
 
     None for an adaptive solver, and without a closed form that rounds less than the engine.

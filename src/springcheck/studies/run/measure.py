@@ -18,7 +18,7 @@ import numpy as np
 from springcheck import checks, driver, engines, interrupts
 from springcheck.checks import compare
 from springcheck.engines.contract import Label
-from springcheck.errors import MethodError, SpringcheckError, StoreError
+from springcheck.errors import EngineError, MethodError, SpringcheckError, StoreError
 from springcheck.physics import exact, memory
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import NOT_KNOWN, Comparison, Trajectory, Verdict
@@ -101,8 +101,8 @@ def run(
     `thorough` adds the experiments, whose runs are not stored; `faults` adds engines broken on purpose, as
     NAME or NAME=SIZE; `seed` is that of the random methods, drawn by default. Raises SpringcheckError for all
     errors that a user can correct; finished work then stays in the journal, and an existing file is
-    unchanged.  So it is where a method that was requested fails beside others: their report lists it under
-    `broke`.
+    unchanged.  A method that fails next to others is listed under `broke` of their report, which is stored:
+    one that was requested, or one of an engine of springcheck that is installed.
     """
     path = Path(path)
     if seed is not None and not scene.bath:
@@ -112,6 +112,8 @@ def run(
         )
     seeds = {"seed": driver.checked_seed(seed)} if scene.bath else {}
     labels, left, others = choose(scene, methods)
+    globs = [one for one in methods if one != engines.UNNAMED]
+    requested = engines.match(globs, bath=scene.bath is not None, every=True)
     wrong: list[Broken] = []
     if faults:
         from springcheck.studies.run.faulty import broken
@@ -142,7 +144,10 @@ def run(
                 if len(labels) == 1:
                     raise
                 labels.remove(label)
-                if str(label) in methods:
+                fails = isinstance(error, EngineError) and (
+                    label in requested or engines.origin(label.engine).package == engines.OURS
+                )
+                if fails or str(label) in methods:
                     broke[str(label)] = str(error)
                 else:
                     left.append(LeftOut(method=str(label), reason=str(error)))
@@ -161,9 +166,7 @@ def run(
                 more = checks.judge_thoroughly(scene, str(label), driver.run, tried, progress=told, **seeds)
                 report = replace(report, verdicts=(*report.verdicts, *more))
         report = replace(report, verdicts=tuple(checks.shared(report.verdicts)))
-        if broke:
-            journal.fail()
-            return replace(report, broke=broke)
+        report = replace(report, broke=broke)
         journal.commit(scene, comparison=report.comparison, verdicts=report.verdicts)
     return report
 

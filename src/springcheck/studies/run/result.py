@@ -52,7 +52,7 @@ class Report(StudyResult):
     others: tuple[str, ...] = ()
     """Methods that can serve the scene and do not run by default."""
     broke: Mapping[str, str] = field(default_factory=dict)
-    """Methods that were requested and failed, and why: then nothing is stored."""
+    """Methods that failed and should have run, and why: the others are stored and judged."""
     faults: Mapping[str, str] = field(default_factory=dict)
     """The fault of each run of an engine that is broken on purpose."""
 
@@ -84,7 +84,7 @@ class Report(StudyResult):
 
     @property
     def status(self) -> Literal[0, 1, 2]:
-        """Exit status of these verdicts; 2 where a method that was requested failed."""
+        """Exit status of these verdicts; 2 where a method that should have run failed."""
         return 2 if self.broke else checks.status(self.verdicts)
 
     @property
@@ -119,15 +119,13 @@ class Report(StudyResult):
 
     def _summary(self) -> Lines:
         """Counts of the verdicts, the path of the store, and the next command."""
-        if self.broke:
-            # the message gives the reason
-            names = " and ".join(self.broke)
-            return [plain(f"{self.counts}; nothing is stored: {names} did not run", "bold red")]
         failed, left = any(v.passed is False for v in self.verdicts), checks.not_exercised(self.scene)
         out: Lines = [*hanging("", left)] if left and not failed else []
         taken = f"; resumed from an interrupted run: {', '.join(self.resumed)}" if self.resumed else ""
-        look = "bold red" if failed else "bold yellow" if self.not_judged else "bold green"
-        out.append(plain(f"{self.counts}{taken}", look))
+        look = "bold red" if failed or self.broke else "bold yellow" if self.not_judged else "bold green"
+        # standard error has the reasons
+        broke = f"; not run: {', '.join(self.broke)}" if self.broke else ""
+        out.append(plain(f"{self.counts}{broke}{taken}", look))
         if self.path is not None:
             name = shlex.quote(str(self.path))
             out.append(plain(f"Stored in {self.path}", look))

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.polynomial.legendre import Legendre
 
-from springcheck.bath import chance
+from springcheck.bath.evidence import of_normal, shape
 from springcheck.physics.arrays import Floats
 
 FACTOR_LAGS = 20
@@ -25,6 +25,9 @@ EVEN = 1e-4
 NEIGHBOURS_DIFFER = 0.8
 """Mean squared difference of the residuals of neighbouring states, over their variance, below which these
 follow from the state: 2 of noise, 1 of one draw beside none, less than 0.1 of a smooth function."""
+
+FEWEST_AGAIN = 40
+"""Fewest numbers of which an exact repetition shows: their sum of squares is sqrt(40) standard deviations."""
 
 UNIFORM = "uniform, not normal"
 
@@ -59,9 +62,9 @@ def is_added(noisy: Floats, left: Floats, u: Floats, every: int) -> bool:
     made = u - np.mean(u) - left
     large = [np.sign(np.abs(x) - np.median(np.abs(x))) for x in (left, made)]
     after = (np.sign(left * made), left / max(float(np.std(left)), 1e-300))
-    chances = [chance.neighbours(x[j::every, None]).chance for x in after for j in range(every)]
+    chances = [neighbours(x[j::every]) for x in after for j in range(every)]
     chances += [together(x[j::every]) for x in noisy for j in range(every)]
-    return min(chance.mean(large[0] * large[1]).chance, *chances) > EVEN
+    return min(_mean(large[0] * large[1]), *chances) > EVEN
 
 
 def grows(left: Floats, *places: Floats) -> bool:
@@ -69,12 +72,12 @@ def grows(left: Floats, *places: Floats) -> bool:
     random factor: no scheme's noise does."""
     sizes = [np.abs(left), *(np.abs(x - np.mean(x)) for x in places)]
     first, *others = (np.sign(x - np.median(x)) for x in sizes)
-    return min(chance.mean(first * x).chance for x in others) < WHITE
+    return min(_mean(first * x) for x in others) < WHITE
 
 
 def is_white(x: Floats) -> bool:
     """Whether residuals (f,) tell nothing of later ones."""
-    return min(chance.neighbours(x[:, None]).chance, chance.repeats(x[:, None])[0]) > WHITE
+    return min(neighbours(x), recurrence(x)) > WHITE
 
 
 def is_of_digits(x: Floats) -> bool:
@@ -94,13 +97,13 @@ def of_state(left: Floats, x: Floats, u: Floats) -> bool:
 
 def unlike_normal(x: Floats) -> str:
     """How draws (f,) of one size are not normal, in words; "" where none shows that they are not."""
-    unlike, words = chance.shape(x).found
+    unlike, words = shape(x[:, None]).found
     if unlike > WHITE:
         return ""
     # the mean of a Legendre polynomial of degree d has the variance 1/(2 d + 1) over the draws
     u = x / np.max(np.abs(x))
     even = (float(np.mean(Legendre.basis(d)(u))) * math.sqrt((2 * d + 1) * len(u)) for d in (2, 4))
-    return UNIFORM if all(chance.of_normal(z) > WHITE for z in even) else f"not normal: {words}"
+    return UNIFORM if all(of_normal(z) > WHITE for z in even) else f"not normal: {words}"
 
 
 def is_correlated(x: Floats) -> bool:
@@ -118,6 +121,29 @@ def regressed(known: Floats, x: Floats) -> tuple[Floats, Floats, Floats]:
     size = np.linalg.norm(known, axis=0)
     of = np.sqrt(np.diag(np.linalg.inv((known / size).T @ (known / size)))) / size
     return np.asarray(entries), np.asarray(left), np.asarray(np.std(left) * of)
+
+
+def _mean(x: Floats) -> float:
+    """Chance of the mean of x (f,), of variance 1."""
+    return of_normal(float(np.sum(x)) / math.sqrt(len(x)))
+
+
+def neighbours(x: Floats) -> float:
+    """Chance of the correlation of x (f,) with the number before."""
+    products = x[1:] * x[:-1]
+    size = float(np.linalg.norm(products))
+    return of_normal(float(np.sum(products)) / size) if size > 0 else 0.0
+
+
+def recurrence(x: Floats) -> float:
+    """Chance of the largest autocorrelation of x (f,) at any lag; 1 of a few."""
+    lags = np.arange(2, len(x) - FEWEST_AGAIN)
+    if len(x) < 1000 or not np.all(np.isfinite(x)):
+        return 1.0
+    sums = np.fft.irfft(np.abs(np.fft.rfft(x, 2 * len(x))) ** 2)[lags]
+    both = len(x) - lags
+    z = sums / np.sqrt(np.where(lags < both, both * np.mean(x * x), np.cumsum(x * x)[both - 1]))
+    return min(1.0, 10 * len(lags) * of_normal(float(np.max(np.abs(z)))))
 
 
 def together(x: Floats) -> float:

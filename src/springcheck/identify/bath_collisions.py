@@ -8,11 +8,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from springcheck.bath import chance
 from springcheck.bath.catalogue import THERMOSTATS
 from springcheck.bath.laws import Law
-from springcheck.bath.likelihood import Candidate
-from springcheck.bath.residuals import regressed, together
+from springcheck.identify.bath_likelihood import Candidate
+from springcheck.identify.bath_residuals import neighbours, recurrence, regressed, together
 from springcheck.physics.arrays import Floats
 
 TRIPLES = 30000
@@ -55,7 +54,7 @@ def between_collisions(q: Floats, v: Floats, h: float) -> list[Candidate] | None
         return None
     spread = (still - share) / np.sqrt(share * (1 - share))
     drawn, replaced = collide(left[~still], known[~still])
-    if not (chance.neighbours(spread[:, None]).chance > LEAST_CHANCE and drawn) or _is_in_time(~still):
+    if not (neighbours(spread) > LEAST_CHANCE and drawn) or _is_in_time(~still):
         return None
     if not replaced:
         return []
@@ -103,7 +102,7 @@ def _fitted(changes: Floats, known: Floats) -> tuple[bool, Floats, Floats]:
     sizes = np.std(rest, axis=0)
     drawn = len(changes) >= FEWEST_OF_EACH and bool(np.max(sizes) > NO_COLLISION)
     for x in (rest / sizes).T[sizes > NO_COLLISION] if drawn else ():
-        one = min(chance.neighbours(x[:, None]).chance, chance.repeats(x[:, None])[0], together(x))
+        one = min(neighbours(x), recurrence(x), together(x))
         drawn = drawn and one > LEAST_CHANCE
     return drawn, np.asarray(entries), rest
 

@@ -13,7 +13,6 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from documented import words_of
 from springcheck.bath import THERMOSTATS, Law, Stepper
 from springcheck.bath.decays import GJ
 
@@ -25,14 +24,11 @@ NO_TABLE = ("vanden-eijnden-ciccotti",)
 SPRINGS = [(0.35, 3.7, 2.9, 0.8, 1.7), (0.11, 0.4, 31.0, 2.3, 0.02), (1.3, 5.0, 2.0, 0.05, 40.0)]
 """h, m, k, gamma, kT: none of them 1, which hides what is missing."""
 
-FAST = 0.9
-"""Share of fast terms in k, which no scheme heeds but one that takes them apart."""
-
 
 def law(name: str, h: float, m: float, k: float, rate: float, thermal: float) -> Law:
     one, all_k = np.array([m]), np.array([k])
     return Law(
-        scheme=THERMOSTATS[name], h=h, m=one, k=all_k, rate=rate, thermal=thermal, fast=FAST * all_k
+        scheme=THERMOSTATS[name], h=h, m=one, k=all_k, rate=rate, thermal=thermal
     )  # fmt: skip
 
 
@@ -338,7 +334,3 @@ def test_exact_temperatures_are_right_at_extremes_or_not_given(m: float, thermal
             assert np.isnan(value) or value == pytest.approx(exact, rel=2e-6), (name, a, x)
             given += bool(np.isfinite(value))
     assert given > 1.5 * len(EXTREMES)
-
-
-def test_the_linear_schemes_are_as_many_as_are_said() -> None:
-    assert f"{len(LINEAR)} linear random schemes" in words_of("validation/README.md")

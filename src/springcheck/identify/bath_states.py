@@ -14,12 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from springcheck.bath import residuals
 from springcheck.bath.catalogue import THERMOSTATS
-from springcheck.bath.collisions import between_collisions, changed, is_a_factor
 from springcheck.bath.decays import GJ
-from springcheck.bath.likelihood import ODDS, Candidate, likely, likely_apart
-from springcheck.bath.residuals import is_white, regressed, unlike_normal
+from springcheck.identify import bath_residuals as residuals
+from springcheck.identify.bath_collisions import between_collisions, changed, is_a_factor
+from springcheck.identify.bath_likelihood import ODDS, Candidate, likely, likely_apart
+from springcheck.identify.bath_residuals import is_white, regressed, unlike_normal
 from springcheck.physics.arrays import Floats
 
 NOISE = 1e-3
