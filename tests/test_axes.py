@@ -220,7 +220,7 @@ def test_columns_of_a_store_find_their_axes() -> None:
 
 def test_a_report_says_what_a_pass_does_not_cover(tmp_path: Path) -> None:
     for scene, said in (
-        (orbit(), "here: constraints"),
+        (orbit(), "here: friction"),
         (spring(), "here: axes y and z"),
     ):
         report = springcheck.run(scene, "own:euler", path=tmp_path / f"{scene.name}.h5")

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import bathed as baths
 from springcheck import checks, driver, engines
 from springcheck.bath import THERMOSTATS, evidence
 from springcheck.bath.evidence import Known
@@ -24,9 +25,8 @@ from springcheck.cli import main
 from springcheck.physics import scenefile
 from springcheck.physics.arrays import Floats
 from springcheck.physics.trajectory import Trajectory, Verdict
-from springcheck.studies.faults import baths
-from springcheck.studies.faults.seeded import Case as Broken
-from springcheck.studies.faults.seeded import Fault
+from textbook import Case as Broken
+from textbook import Fault
 
 RNG = np.random.default_rng
 

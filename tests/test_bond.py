@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import textbook as steppers
 from springcheck import checks, driver, engines, schemes
 from springcheck.cli import main
 from springcheck.errors import SceneError
@@ -18,7 +19,6 @@ from springcheck.physics import scenefile
 from springcheck.physics.arrays import Floats, Reals
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import RadialSpring, Spring, WallSpring
-from springcheck.studies.faults import steppers
 
 Need = Callable[[str], None]
 VERLET = schemes.SCHEMES["velocity-verlet"]

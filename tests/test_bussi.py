@@ -12,12 +12,12 @@ import mpmath as mp
 import numpy as np
 import pytest
 
+import bathed as baths
 from clean import clean_bath
 from springcheck import checks, driver, engines
 from springcheck.bath import THERMOSTATS, Stepper
 from springcheck.bath.draws import read
-from springcheck.studies.faults import baths
-from springcheck.studies.faults.seeded import Fault
+from textbook import Fault
 
 
 @pytest.mark.parametrize("n", [1, 2, 7])

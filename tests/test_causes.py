@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from springcheck.physics.radial import RadialSpring
 
+import bathed as baths
 import springcheck
 from springcheck import checks, driver, schemes
 from springcheck.bath import THERMOSTATS
@@ -24,8 +25,7 @@ from springcheck.physics.builders import spring
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Quartic, WallSpring
 from springcheck.physics.trajectory import Trajectory, Verdict, of_scene
-from springcheck.studies.faults import baths
-from springcheck.studies.faults.seeded import Case as Broken
+from textbook import Case as Broken
 
 STAGES = {name: one.acts for name, one in THERMOSTATS.items()}
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import clean
+import textbook as steppers
 from onestep import propagator
 from springcheck import checks, driver, schemes
 from springcheck.checks import experiments, laws
@@ -22,7 +23,6 @@ from springcheck.physics.builders import spring
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Morse, Spring, WallSpring
 from springcheck.physics.trajectory import Trajectory
-from springcheck.studies.faults import steppers
 
 Need = Callable[[str], None]
 

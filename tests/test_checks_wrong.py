@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import clean
+import textbook as steppers
 from springcheck import checks, schemes
 from springcheck.checks import compare, experiments, laws
 from springcheck.checks.check import Finding, verdict
@@ -22,7 +23,6 @@ from springcheck.physics.arrays import WIDE, Arithmetic, Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Morse, Quartic, Spring, WallSpring
 from springcheck.physics.trajectory import Trajectory, Verdict
-from springcheck.studies.faults import steppers
 from springcheck.studies.precision import accuracy, fits
 from springcheck.studies.run.tally import Tally
 

@@ -10,12 +10,12 @@ import pytest
 
 import clean
 import springcheck
+import textbook as steppers
 from springcheck import schemes
 from springcheck.checks import compare
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Quartic
 from springcheck.physics.trajectory import Trajectory
-from springcheck.studies.faults import steppers
 
 LABELS = ("own:euler", "own:semi-implicit-euler", "own:implicit-euler", "openmm:leapfrog", "openmm:verlet")
 

@@ -128,7 +128,7 @@ STEP, ROW, COUNT = (
     "        self.force_calls = 0\n",
 )
 HALF = f"self.kick(self.h / 2)\n{STEP}"
-MOVED = "        scene.q.setflags(write=True)\n        scene.q[0] += 1e-3\n"
+MOVED = "        scene.q.base.setflags(write=True)\n        scene.q.base[0] += 1e-3\n"
 
 FAULTS = [
     ("right on", HALF, f"self.kick(self.h)\n{STEP}"),

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import mpmath
 import numpy as np
 import pytest
 
+import fault_table as table
 import springcheck
+import textbook as steppers
 from springcheck import checks, engines, schemes
+from springcheck.cli import file
 from springcheck.doors import function
 from springcheck.engines.own.simulation import prepare
 from springcheck.engines.own.vectors import Vectors
@@ -27,8 +31,7 @@ from springcheck.physics.terms import (
     Term,
     WallSpring,
 )
-from springcheck.studies.faults import measure, space, steppers, table
-from springcheck.studies.faults.seeded import Case
+from textbook import Case
 
 ONE = np.array([0])
 OWN = [f"own:{'euler' if x.name == 'explicit-euler' else x.name}" for x in schemes.SCHEMES.values()
@@ -226,9 +229,62 @@ def test_a_time_that_is_summed_up_is_no_shift() -> None:
     assert "the time of the drive is a sum of steps, rounded at each" in sentence(scene, run)
 
 
+def of_summed_time(scene: Scene) -> Any:
+    """A run of velocity Verlet whose time is `t += h`, with the products of steps as its times."""
+    run = springcheck.simulate(scene, "own:velocity-verlet")
+    force, h, t, states = scene.system.clocked.system.force, scene.step, 0.0, [(scene.q, scene.p)]
+    q, p = states[0]
+
+    def pull(q: Any, p: Any) -> Any:
+        return force(np.append(q, t), np.append(p, 0.0))[: scene.n]
+
+    for _ in range(scene.steps):
+        p = p + h / 2 * pull(q, p)
+        q = q + h * (p / scene.m)
+        t += h
+        p = p + h / 2 * pull(q, p)
+        states.append((q, p))
+    q, p = (np.array(x)[:: scene.every] for x in zip(*states, strict=True))
+    return replace(run, q=q, p=p, energy=None), t
+
+
+@pytest.mark.parametrize("every", [1, 10])
+def test_a_clock_that_adds_up_its_steps_is_said_or_judged_by_its_own_times(every: int) -> None:
+    """At every tenth frame it failed without a cause, and no declaration allowed it."""
+    scene = replace(scenes.load_scene("driven-spring"), steps=400, every=every, quantities=("q", "p"))
+    run, end = of_summed_time(scene)
+    assert end != scene.steps * scene.step
+    assert "the time of the drive is a sum of steps, rounded at each" in sentence(scene, run)
+    times = np.append(0.0, np.cumsum(np.full(scene.steps, scene.step)))[:: scene.every]
+    verdicts = {v.check: v for v in checks.judge(scene, replace(run, t=times))}
+    assert verdicts["step-defect"].passed is True
+    assert verdicts["closed-form"].passed is None
+    assert [name for name, v in verdicts.items() if v.passed is False] == ["times"]
+    # products are no sums, and another motion is none of either
+    off = replace(run, t=times, p=run.p * (1 + 1e-13 * (np.arange(len(run.p)) == 30))[:, None])
+    assert {v.check: v for v in checks.judge(scene, off)}["step-defect"].passed is False
+    right = replace(springcheck.simulate(scene, "own:velocity-verlet"), t=times)
+    assert {v.check: v for v in checks.judge(scene, right)}["step-defect"].passed is False
+
+
+def test_a_file_of_a_clock_that_adds_up_its_steps_is_judged_at_its_times(tmp_path: Path) -> None:
+    scene = replace(scenes.load_scene("driven-spring"), steps=400, quantities=("q", "p"))
+    run, _ = of_summed_time(scene)
+    times = np.append(0.0, np.cumsum(np.full(scene.steps, scene.step)))
+    for name, t, failed in (("sums", times, set[str]()), ("products", run.t, {"step-defect"})):
+        rows = np.column_stack([t, run.q, run.p])
+        path = tmp_path / f"{name}.csv"
+        np.savetxt(path, rows, fmt="%.17g", delimiter=",", header="t,q,p", comments="")
+        found = file.judge(path, scene=scene, scheme="velocity-verlet")
+        wrong = {v.check for v in found.verdicts if v.passed is False}
+        assert bool(wrong) == (name == "products")
+        assert wrong >= failed
+        assert any("sums of steps" in note for note in found.notes) == (name == "sums")
+
+
 @pytest.mark.parametrize("fault", table.DRIVES, ids=lambda fault: fault.name)
 def test_a_drive_that_is_wrong_is_rejected_and_named(fault: Any) -> None:
-    scene = measure.scene(fault.scene)
+    scene = table.scene(fault.scene)
     assert MISPLACED[fault.name] in sentence(scene, fault.run(scene))
 
 
@@ -244,7 +300,7 @@ def test_another_scheme_is_not_taken_for_another_time(scheme: str, other: str, s
     scene = replace(scenes.load_scene("driven-spring"), steps=60)
     law = schemes.SCHEMES[scheme]
     if other == "late":
-        run = steppers.record(scene, law, space.clocked(Case(scene=scene, scheme=law, x=0.0), 1.0))
+        run = steppers.record(scene, law, table.clocked(Case(scene=scene, scheme=law, x=0.0), 1.0))
     else:
         run = steppers.record(scene, law, steppers.textbook(scene, schemes.SCHEMES[other]))
     why = sentence(scene, run)
@@ -460,7 +516,7 @@ def test_a_driven_mode_that_neither_turns_nor_grows_has_no_closed_form_here() ->
 
 
 def test_the_check_of_the_drive_holds_its_tongue_where_the_spring_is_wrong() -> None:
-    scene = measure.scene("driven")
+    scene = table.scene("driven")
     wall = next(term for term in scene.terms if isinstance(term, WallSpring))
     stiffer = scene.derived(
         terms=tuple(replace(x, k=x.k * (1 + 1e-9)) if x is wall else x for x in scene.terms)

@@ -22,8 +22,6 @@ from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory
 from springcheck.schemes.catalogue import ATTACHED
-from springcheck.studies.faults import page as faults_page
-from springcheck.studies.faults.result import FaultReport, Result
 from springcheck.studies.run.page import of_runs
 
 mpl.use("agg")
@@ -544,39 +542,6 @@ def test_a_file_of_any_program_says_what_it_does_and_joins_no_frames_too_far_apa
     assert re.search(
         r"mine.csv: crosses its mean 1[23] times in 400 frames and reaches \d+ % farther", said[0].heading
     )
-
-
-def test_a_fault_is_named_by_the_check_that_sees_it_first() -> None:
-    from springcheck.studies.faults import page
-    from springcheck.studies.faults.result import FaultReport, Result
-
-    def one(name: str, **limits: float) -> Result:
-        return Result(name=name, about="", size=1e-3, rejected_by=tuple(limits), missed_by=(), limits=limits)
-
-    found = FaultReport(results=(one("a", x=1e-9, y=1e-12), one("b", x=1e-6)))
-    chart = page.banks(found)[1].charts[0]
-    first = chart.curves[0]
-    assert dict(zip(first.y, first.notes, strict=True)) == {0.0: "x", 1.0: "y"}
-    assert [label.text for label in chart.labels] == ["x", "y"]
-    # beyond the marks, which they would hide
-    assert all(label.x == 0.99 for label in chart.labels)
-    assert chart.x.shown is not None
-    assert chart.x.shown[1] > 1e5 * max(x for curve in chart.curves for x in curve.x)
-    assert page.banks(found)[0].heading == "2 engines broken on purpose: each is rejected; 2 checks"
-
-
-def test_a_map_of_many_faults_stands_in_columns_with_the_checks_of_each() -> None:
-    results = tuple(
-        Result(
-            name=f"fault-{i}", about="", size=None, rejected_by=(f"check-{i // 30}",), missed_by=(), limits={}
-        )
-        for i in range(100)
-    )
-    (bank,) = faults_page.banks(FaultReport(results=results))
-    assert [chart.y.names[-1] for chart in bank.charts] == ["fault-0", "fault-34", "fault-68"]
-    assert [list(chart.x.names) for chart in bank.charts] == [
-        ["check-0", "check-1"], ["check-1", "check-2"], ["check-2", "check-3"],
-    ]  # fmt: skip
 
 
 def test_frames_that_jump_to_and_fro_are_dots_and_an_exact_line_has_no_chords() -> None:

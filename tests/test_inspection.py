@@ -110,7 +110,7 @@ def test_plot_and_inspect_serve_every_study(stores: Path, capsys: pytest.Capture
     }
     words = {
         "stability": ("limit of h w", "own:implicit-euler", "always stable"),
-        "extremes": ("extreme cases", "right for forces between", "no cell is silently wrong"),
+        "extremes": ("extreme cases", "Right for forces from", "none silently wrong"),
         "precision": ("error against run time", "own:implicit-euler", "of the methods measured"),
     }
     for name, expected in pictures.items():

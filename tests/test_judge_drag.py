@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 import clean
+import textbook as steppers
 from springcheck import checks, driver, schemes
 from springcheck.checks.drag import drag
 from springcheck.physics.arrays import WIDE, Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Quartic, Term
 from springcheck.physics.trajectory import Trajectory
-from springcheck.studies.faults import steppers
 
 pytestmark = pytest.mark.skipif(not WIDE, reason="the reference's own rounding is as large as a velocity's")
 SCHEME = schemes.SCHEMES["semi-implicit-euler"]

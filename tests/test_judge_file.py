@@ -11,6 +11,7 @@ import pytest
 
 import clean
 import springcheck
+import textbook as steppers
 from springcheck import driver, schemes
 from springcheck.cli import file, main
 from springcheck.errors import StoreError
@@ -19,7 +20,6 @@ from springcheck.physics import scenefile, terms
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory, Verdict
-from springcheck.studies.faults import steppers
 
 SCENE = scenefile.load_scene("spring-uneven")
 RUN = driver.run(SCENE, "own:velocity-verlet")

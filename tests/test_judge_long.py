@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 import clean
+import textbook as steppers
 from springcheck import checks, schemes
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Quartic
 from springcheck.physics.trajectory import Outcome
 from springcheck.studies import keeper
-from springcheck.studies.faults import steppers
 from springcheck.studies.run import measure
 from springcheck.studies.run.result import Report
 

@@ -11,6 +11,7 @@ import pytest
 
 import clean
 import springcheck
+import textbook as steppers
 from springcheck import checks, schemes
 from springcheck.errors import SpringcheckError
 from springcheck.physics import scenefile
@@ -18,7 +19,6 @@ from springcheck.physics.arrays import WIDE
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Cosine, Damping, Quartic, Spring, WallSpring
 from springcheck.physics.trajectory import Trajectory
-from springcheck.studies.faults import steppers
 
 EXTENDED = pytest.mark.skipif(not WIDE, reason="so sharp are references of more digits than a double")
 

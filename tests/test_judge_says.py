@@ -13,6 +13,7 @@ import pytest
 
 import clean
 import springcheck
+import textbook as steppers
 from springcheck import checks, driver, engines, schemes
 from springcheck.checks import experiments
 from springcheck.checks.steps import NO_BETTER
@@ -22,7 +23,6 @@ from springcheck.physics.arrays import WIDE
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Cosine, Quartic, WallSpring
 from springcheck.studies.extremes import grid, running
-from springcheck.studies.faults import steppers
 from springcheck.studies.run import measure
 
 Need = Callable[[str], None]

@@ -13,12 +13,12 @@ import numpy as np
 import pytest
 
 import clean
+import textbook as steppers
 from springcheck import checks, schemes
 from springcheck.physics.arrays import WIDE, Floats
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Damping, Spring, Term, WallSpring
 from springcheck.physics.trajectory import Trajectory
-from springcheck.studies.faults import steppers
 
 VALIDATION = Path(__file__).parent.parent / "validation"
 _spec = importlib.util.spec_from_file_location("implicit_forms", VALIDATION / "implicit_forms.py")

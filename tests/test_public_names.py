@@ -19,7 +19,7 @@ from springcheck.physics.trajectory import Comparison
 
 NAMES = [
     "Scene", "Trajectory", "Verdict", "__version__", "chain", "compare", "exact",
-    "explain", "extremes", "faults", "identify", "judge", "load_scene", "methods", "plot", "precision",
+    "explain", "extremes", "identify", "judge", "load_scene", "methods", "plot", "precision",
     "read", "report", "run", "sampling", "simulate", "spring", "stability",
 ]  # fmt: skip
 

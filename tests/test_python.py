@@ -169,10 +169,9 @@ def test_a_study_keeps_a_store_that_it_writes_anew_when_it_is_told_to() -> None:
     assert [path.name for path in Path().iterdir()] == ["s.h5"]
 
 
-def test_an_atlas_and_the_faults_show_themselves() -> None:
+def test_an_atlas_shows_itself() -> None:
     from springcheck.studies.extremes.judging import Cell
     from springcheck.studies.extremes.result import Atlas
-    from springcheck.studies.faults.result import FaultReport, Result
 
     cell = Cell(
         method="own:euler", block="a", parameters={"h_w": 0.1}, outcome="right", reason="", value=0, bound=1
@@ -180,10 +179,6 @@ def test_an_atlas_and_the_faults_show_themselves() -> None:
     atlas = Atlas(cells=(cell, cell), windows=(), left_out=())
     assert repr(atlas) == "Atlas(2 right)"
     assert len(atlas.to_dataframe() if need("pandas") else ()) == 2
-    one = Result(name="a", about="b", size=None, rejected_by=("x",), missed_by=("y",), limits={})
-    faults = FaultReport(results=(one,))
-    assert repr(faults) == "FaultReport(1 fault, 1 missed)"
-    assert list(faults.to_dataframe()["missed_by"]) == [["y"]]
 
 
 def test_methods_and_words_and_pages_are_functions_too() -> None:
@@ -428,7 +423,6 @@ def test_a_scene_is_replaced_by_the_names_of_its_fields() -> None:
     ("name", "arguments", "expected"),
     [
         ("extremes", {"methods": "own:euler", "quick": True}, (None, ["own:euler"], True)),
-        ("faults", {"path": "f.h5"}, ("f.h5",)),
         ("sampling", {"methods": ["own:baoab"]}, (None, ["own:baoab"])),
     ],
 )

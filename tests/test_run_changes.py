@@ -61,10 +61,6 @@ def test_numbers_are_set_as_if_the_file_had_them() -> None:
         (["--steps", "-3"], "springcheck: --steps -3: time.steps = -3: a whole number >= 1 is needed"),
         (["--step", "nan"], "springcheck: --step nan: time.step = nan"),
         (["--set", "spring.0.stiffness=2", "--steps", "0"], "--set spring.0.stiffness=2, --steps 0: "),
-        (["--fault", "stifness"], "did you mean stiffness"),
-        (["--fault", "kcal=2"], "no size"),
-        (["--fault", "mass=-1"], "above 0"),
-        (["--fault", "field-sign"], "nothing on scene spring shows it"),
         (["--set", "particle.-1.mass=2"], "has no such number"),
         (["--set", "...=2"], "has no such number"),
     ],
@@ -75,28 +71,6 @@ def test_what_cannot_be_set_is_refused_in_one_line(given: list[str], words: str,
     assert words in said
     assert len(said.splitlines()) == 1
     assert not list(Path().glob("*.h5"))
-
-
-def test_a_fault_is_a_method_among_the_others_and_is_rejected(capsys: Captured) -> None:
-    command = ["run", "spring-uneven", *EULER, "--fault", "stiffness", "--fault", "mass=1e-6"]
-    assert main([*command, "--json"]) == 1
-    found = json.loads(capsys.readouterr().out)
-    failed = {v["method"]: v["check"] for v in found["verdicts"] if v["passed"] is False}
-    assert set(failed) == set(found["faults"]) == {"fault:stiffness", "fault:mass"}
-    assert found["faults"]["fault:mass"] == "every mass is too large (1e-06)"
-    whole = store.read_one("spring-uneven.h5", "fault:mass")
-    right = driver.run(scenefile.load_scene("spring-uneven"), "ase:velocity-verlet")
-    off = np.max(np.abs(whole.q - right.q))
-    # a phase of 200 steps of h w = 0.0885 with a mass that is 1e-6 too large
-    assert off == pytest.approx(0.3 * 200 * 0.0885 * 0.5e-6, rel=1)
-    assert main([*command, "--force"]) == 1
-    assert (
-        "fault:mass, broken on purpose (every mass is too large (1e-06)): rejected by"
-        in capsys.readouterr().out
-    )
-    assert main(["run", "--from", "spring-uneven.h5"]) == 2
-    assert "broken on purpose" in capsys.readouterr().err
-    assert main(["run", "--from", "spring-uneven.h5", *EULER]) == 0
 
 
 @pytest.mark.skipif(not WIDE, reason="long double is no wider than double here")

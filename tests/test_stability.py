@@ -289,15 +289,15 @@ def test_a_method_that_does_not_start_the_scene_is_left_out_with_its_reason(need
 
 def test_what_is_left_out_is_named_once() -> None:
     reasons = {
-        "own:rods": "own:rods: serves rods alone", "own:a": "no step", "own:b": "no step",
-        **dict.fromkeys(("own:c", "own:d"), "it is for scenes with rods"), "own:e": "it has no rod term",
+        "own:alone": "own:alone: serves baths alone", "own:a": "no step", "own:b": "no step",
+        **dict.fromkeys(("own:c", "own:d"), "it is for scenes with damping"), "own:e": "it has no bond term",
     }  # fmt: skip
     said = left_out([LeftOut(method=method, reason=reason) for method, reason in reasons.items()])
     assert [str(line) for line in said[1:]] == [
-        "Left out own:rods: serves rods alone",
+        "Left out own:alone: serves baths alone",
         "Left out own:a, own:b: no step",
-        "Left out own:c, own:d: each is for scenes with rods",
-        "Left out own:e: it has no rod term",
+        "Left out own:c, own:d: each is for scenes with damping",
+        "Left out own:e: it has no bond term",
     ]
 
 

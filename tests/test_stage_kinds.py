@@ -60,8 +60,8 @@ def test_kinds_are_named_in_the_table_and_by_schemes_alone() -> None:
         for node in ast.walk(ast.parse(path.read_text()))
         if isinstance(node, ast.Constant) and node.value in telling
     }
-    assert {name for name in named if not name.startswith(("identify/", "thermal/"))} == {
+    assert {name for name in named if not name.startswith(("identify/", "bath/"))} == {
         "schemes/kinds.py", "schemes/catalogue.py", "schemes/elsewhere.py",
         # of thermostats, and what the page's loops carry out
-        "studies/faults/heat.py", "checks/stages.py", "cli/explain.py", "cli/page/given.py",
+        "checks/stages.py", "cli/explain.py", "cli/page/given.py",
     }  # fmt: skip

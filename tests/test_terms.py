@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import springcheck
+import textbook as seeded
 from springcheck import checks, driver, store
 from springcheck.checks import laws
 from springcheck.cli import main
@@ -20,7 +21,6 @@ from springcheck.physics import scenefile as scenes
 from springcheck.physics import termcheck, terms
 from springcheck.physics.arrays import Floats, Integers
 from springcheck.physics.terms import Column, OnPairs, OnParticles, Term, known, register
-from springcheck.studies.faults import seeded
 
 Need = Any
 

@@ -15,6 +15,7 @@ import h5py
 import numpy as np
 import pytest
 
+import bathed as baths
 import springcheck
 from springcheck import checks, driver, engines
 from springcheck.bath import THERMOSTATS, Stepper
@@ -29,7 +30,6 @@ from springcheck.physics.bath import Bath
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Spring, WallSpring
 from springcheck.physics.trajectory import Trajectory, of_scene
-from springcheck.studies.faults import baths
 from springcheck.studies.run import measure
 
 LABELS = [
@@ -70,7 +70,7 @@ def test_a_thermostat_passes_its_checks_and_says_its_seed(label: str) -> None:
 def test_numbers_do_not_depend_on_how_many_steps_are_asked_for_at_once(name: str) -> None:
     scene, label = pair(steps=60), Label(engine="own", method=name)
     whole = driver.run(scene, label, seed=3)
-    simulation = engines.start(scene, label, 3)
+    simulation = engines.Started(scene, label, 3)
     q, p = np.empty((2, 60, 2))
     for row in range(0, 60, 4):
         simulation.advance(1, q[row : row + 4], p[row : row + 4])
@@ -336,12 +336,9 @@ def test_map_and_noise_of_letters_are_those_of_the_stages_multiplied_by_hand(let
 @pytest.mark.parametrize(
     "name", [*THERMOSTATS, "noise-direction", "draws-variance", "noise-map", "openmm:andersen"]
 )
-def test_thermostats_and_their_checks_are_explained(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_thermostats_and_their_checks_are_explained(name: str) -> None:
     from springcheck.cli import explain
-    from springcheck.studies.faults import measure
 
-    # what a check sees of each fault is measured elsewhere
-    monkeypatch.setattr(measure, "probe", lambda fault: lambda check, size: True)
     said = list(explain.lines(name))
     assert len(said) >= 3
     if name in THERMOSTATS:

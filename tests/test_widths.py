@@ -13,9 +13,6 @@ import pytest
 from springcheck import store
 from springcheck.cli import main, output
 from springcheck.physics import scenefile
-from springcheck.studies.faults import measure as faults
-from springcheck.studies.faults import result as faults_result
-from springcheck.studies.faults.table import FAULTS
 from springcheck.studies.precision import measure as precision
 from springcheck.studies.run import measure as run_study
 from springcheck.text.lines import COLUMN_GAP, Lines, TextTable, drawn, table
@@ -115,26 +112,11 @@ def test_every_word_of_a_run_with_faults_is_on_every_terminal(
     tmp_path: Path, monkeypatch: Patch, capsys: Captured
 ) -> None:
     scene = scenefile.load_scene("chain")
-    faults = ("action-not-reaction", "mass")
+    faults = ("heating", "mass")
     found = run_study.run(scene, tmp_path / "r.h5", methods=["own:semi-implicit-euler"], faults=faults)
     lines = found.lines()
     # the store's name is as long as its folder's
     on_terminals([line for line in lines if str(tmp_path) not in str(line)], monkeypatch, capsys)
-
-
-def test_every_word_of_the_faults_is_on_every_terminal(monkeypatch: Patch, capsys: Captured) -> None:
-    results = tuple(
-        faults_result.Result(
-            name=fault.name,
-            about=fault.about,
-            size=fault.size,
-            rejected_by=fault.caught_by,
-            missed_by=("step-defect",) if j == 0 else (),
-            limits=dict.fromkeys(fault.caught_by, 1e-15) if fault.size else {},
-        )
-        for j, fault in enumerate(FAULTS)
-    )
-    on_terminals(faults_result.FaultReport(results=results).lines(), monkeypatch, capsys)
 
 
 def rendered(made: TextTable, width: int) -> list[str]:
@@ -182,8 +164,6 @@ def test_a_store_is_named_as_it_is(folder: Path) -> None:
 
 @pytest.mark.parametrize("width", [40, 80])
 def test_explanations_break_between_words(width: int, monkeypatch: Patch, capsys: Captured) -> None:
-    # what a check sees of each fault is measured elsewhere
-    monkeypatch.setattr(faults, "probe", lambda fault: lambda check, size: True)
     whole = shown(["explain", "step-defect"], None, monkeypatch, capsys)
     assert max(map(len, whole.splitlines())) > 200
     folded = shown(["explain", "step-defect"], width, monkeypatch, capsys)

@@ -1,6 +1,6 @@
 """Random scenes for right engines, and the verdicts on them: every alarm is a false one.
 
-`validation/faults.py` runs all of them; tests take some.
+python validation/clean.py        (all of them, in several minutes; tests take some)
 """
 
 from __future__ import annotations
@@ -11,18 +11,21 @@ from functools import partial
 
 import numpy as np
 
+import bathed as baths
+import textbook as steppers
+from arguments import arguments, script
 from springcheck import checks, driver, engines, schemes
 from springcheck.bath import THERMOSTATS
 from springcheck.checks import Check, Run
 from springcheck.checks.seeds import SEEDED
 from springcheck.errors import MethodError
+from springcheck.physics import builders
 from springcheck.physics.arrays import Floats
 from springcheck.physics.bath import Bath
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Spring, Term, WallSpring
 from springcheck.physics.trajectory import Trajectory, Verdict
-from springcheck.studies.faults import baths, measure, steppers
-from springcheck.studies.faults.seeded import Fault
+from textbook import Fault
 
 CLEAN = 320
 """Random scenes for the plain engine; each meets one scheme."""
@@ -44,8 +47,8 @@ FIXED = tuple(
 )
 """Schemes of the plain engine."""
 
-SLOW = tuple(check for check in checks.THOROUGH if check.name in measure.SLOW_CHECKS)
-QUICK = tuple(check for check in checks.THOROUGH if check.name not in measure.SLOW_CHECKS)
+SLOW = tuple(check for check in checks.THOROUGH if check.family == "law")
+QUICK = tuple(check for check in checks.THOROUGH if check.family != "law")
 """Experiments that do not look at the scene, and those that do."""
 
 
@@ -169,7 +172,9 @@ def clean_bath(seed: int) -> Clean:
 
 def clean_laws(name: str) -> Clean:
     """The laws that hold over many runs, for the plain engine and one scheme."""
-    return _judged(measure.scene("spring"), f"plain:{name}", _plain(schemes.SCHEMES[name]), -1, SLOW)
+    return _judged(
+        builders.spring(m=3.7, k=2.9, q=0.3, p=0.7), f"plain:{name}", _plain(schemes.SCHEMES[name]), -1, SLOW
+    )
 
 
 def clean_engine(run: Run, label: str, seed: int) -> Clean:
@@ -235,3 +240,19 @@ def together(found: Sequence[Clean]) -> Clean:
         verdicts=sum(part.verdicts for part in found),
         alarms=tuple(alarm for part in found for alarm in part.alarms),
     )
+
+
+def main() -> int:
+    """Judge all of them; 1 where a right engine is rejected."""
+    arguments(__doc__)
+    found = together([part() for part in parts()])
+    print(
+        f"{found.runs} runs, {found.verdicts} verdicts, {len(found.alarms)} false alarms",
+        *found.alarms,
+        sep="\n",
+    )
+    return int(bool(found.alarms))
+
+
+if __name__ == "__main__":
+    script(main)

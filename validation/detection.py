@@ -22,6 +22,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 import clean
+import textbook as steppers
 from arguments import arguments, script
 from judge_campaign import FIXED, random_scene
 from springcheck import checks, schemes
@@ -31,7 +32,6 @@ from springcheck.physics.scene import Scene
 from springcheck.physics.term import Term
 from springcheck.physics.terms import Damping
 from springcheck.physics.trajectory import Limits, Trajectory, Verdict
-from springcheck.studies.faults import steppers
 
 TURNS = (0.001, 0.01, 0.1, 0.5, 1.0, 1.5, 1.9)
 METHODS = (

@@ -7,10 +7,10 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+import textbook as steppers
 from springcheck import schemes
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
-from springcheck.studies.faults import steppers
 
 State: TypeAlias = tuple[Floats, Floats]
 Step: TypeAlias = Callable[[int, Floats, Floats], State]

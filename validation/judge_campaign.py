@@ -47,6 +47,7 @@ import numpy as np
 import clean
 import explicit_forms
 import implicit_forms
+import textbook as steppers
 from arguments import arguments, script
 from springcheck import checks, driver, engines, schemes
 from springcheck.checks import steps
@@ -55,7 +56,6 @@ from springcheck.physics.scene import Scene
 from springcheck.physics.term import Term
 from springcheck.physics.terms import Cosine, Damping, Morse, Quartic, Spring, WallSpring
 from springcheck.physics.trajectory import Trajectory, Verdict
-from springcheck.studies.faults import steppers
 
 FIXED = tuple(name for name, s in schemes.SCHEMES.items() if s.has("one-step") and not s.has("flow"))
 COUNTED = 20.0

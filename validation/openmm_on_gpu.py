@@ -116,7 +116,7 @@ def alone(label: str, force: float) -> Any:
     """OpenMM's context of one particle at 0 that is pulled by a force, on the platform of a label."""
     import openmm as mm
 
-    # as engines.start makes it: what a platform prints is caught, and its absence one line
+    # as engines.Started makes it: what a platform prints is caught, and its absence one line
     from springcheck.engines.openmm.simulation import _context
 
     system, pull = mm.System(), mm.CustomExternalForce(f"-({force!r})*x")
@@ -151,7 +151,7 @@ def cost(platform: str) -> dict[str, dict[str, float]]:
         for label in ("openmm:verlet", *(f"openmm:verlet@{platform}-{mode}" for mode in MODES)):
             best = np.inf
             for _ in range(3):
-                simulation = engines.start(scene, engines.parse(label))
+                simulation = engines.Started(scene, engines.parse(label))
                 q, p = np.empty((2, 1, len(scene.q)))
                 began = perf_counter()
                 simulation.advance(scene.every, q, p)

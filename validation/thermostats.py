@@ -82,7 +82,7 @@ def draws(label: str, n: int, steps: int) -> None:
     known = law(method.scheme)
     A, g = known.A[0].astype(float), float(known.G[0, 0, 0])
     began, of_processor = perf_counter(), process_time()
-    simulation = engines.start(springs(n, steps, in_space=True), engines.parse(label), 7)
+    simulation = engines.Started(springs(n, steps, in_space=True), engines.parse(label), 7)
     rows = max(1, 300_000 // n)
     q, p = np.empty((2, rows + 1, n))
     q[0], p[0], sums = 0.3, 0.2, np.zeros(3)
@@ -162,7 +162,7 @@ def figure() -> None:
 
     here = [label for label in METHODS if not engines.absence(label.partition(":")[0])]
     with style():
-        drawn = springcheck.sampling(here).figures()["sampling-temperatures"]
+        drawn = springcheck.sampling(here).figures()["sampling"]
         drawn.savefig(FIGURE, dpi=110)
     print(f"  {FIGURE.name} written")
 

@@ -25,7 +25,6 @@ if TYPE_CHECKING:
         exact,
         explain,
         extremes,
-        faults,
         identify,
         judge,
         methods,
@@ -46,7 +45,7 @@ __version__ = "0.1.0"
 
 __all__ = [
     "Scene", "Trajectory", "Verdict", "__version__", "chain", "compare", "exact",
-    "explain", "extremes", "faults", "identify", "judge", "load_scene", "methods", "plot", "precision",
+    "explain", "extremes", "identify", "judge", "load_scene", "methods", "plot", "precision",
     "read", "report", "run", "sampling", "simulate", "spring", "stability",
 ]  # fmt: skip
 

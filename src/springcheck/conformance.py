@@ -241,7 +241,7 @@ def _right(label: Label, scene: Scene) -> None:
 
 def _advanced(scene: Scene, label: Label, every: int, *parts: int) -> Floats:
     """q and p (2, f, n) after every so many steps, asked for in parts of so many rows."""
-    simulation, states = engines.start(scene, label), np.full((2, sum(parts), scene.n), np.nan)
+    simulation, states = engines.Started(scene, label), np.full((2, sum(parts), scene.n), np.nan)
     for some in np.split(states, np.cumsum(parts[:-1]), axis=1):
         simulation.advance(every, *some)
     return states

@@ -16,7 +16,7 @@ from springcheck import engines
 from springcheck.bath import THERMOSTATS
 from springcheck.bath.catalogue import NO_NORMAL_NUMBERS
 from springcheck.engines.contract import Label, Simulation, Stopped
-from springcheck.errors import MethodError
+from springcheck.errors import EngineError, MethodError
 from springcheck.physics import memory
 from springcheck.physics.arrays import Floats
 from springcheck.physics.scene import Scene
@@ -26,8 +26,8 @@ CHUNK = 1 << 16
 """Numbers per array and chunk: 512 KiB, which stays in the cache."""
 
 FIRST, QUICK = 256, 0.1
-"""Rows of the first chunk, and the seconds below which the next one is four times as long: a slow engine
-reports its progress, and notices Ctrl-C, several times a second."""
+"""Rows of the first chunk, and the seconds below which the next one is twice as long, and of which twice as
+many halve it: a slow engine reports its progress, and notices Ctrl-C, several times a second."""
 
 PIECE, WORK = 1 << 16, 1 << 22
 """Steps, and steps times particles, that an engine of fixed step takes in one call where frames lie further
@@ -109,7 +109,7 @@ def play(
     began = perf_counter()
     simulation = engines.Started(ahead, label, seed)
     start_seconds = perf_counter() - began
-    how, origin = engines.arithmetic(label), {**engines.origin_of(label), **origin}
+    how, origin = engines.arithmetic(label), {**simulation.origin, **origin}
 
     rows = max(1, min(CHUNK // scene.n, scene.frames))
     piece = scene.every if method.adaptive else min(scene.every, PIECE, WORK // scene.n or 1)
@@ -132,7 +132,10 @@ def play(
         if ended.status == "diverged" and not method.adaptive:
             # steps to the last frame that is kept: every step costs the same, but for a first force
             calls = before - (before - calls) * good // begun
-        ready = min(rows, 4 * ready) if whole and seconds < QUICK else ready
+        if whole and seconds < QUICK:
+            ready = min(rows, 2 * ready)
+        elif seconds > 2 * QUICK:
+            ready = max(1, ready // 2)
         if good:
             _hand_over(scene, sink, frame, q[:good], p[:good])
         frame += good
@@ -184,7 +187,7 @@ def _advance(
                 told += steps
     except Stopped as stop:
         if stop.rows not in range(len(q) + 1):
-            raise MethodError(f"{simulation.label}: Stopped after {stop.rows!r} rows of {len(q)}") from stop
+            raise EngineError(f"{simulation.label}: Stopped after {stop.rows!r} rows of {len(q)}") from stop
         # a row that is filled before its last piece is no frame
         good, begun = stop.rows if left <= piece else 0, min(stop.rows + 1, begun)
         outcome = Outcome(status="stopped", step=0, message=str(stop), fastest=stop.fastest)
@@ -194,7 +197,7 @@ def _advance(
         good = int(np.argmin(finite))
         untouched = UNTOUCHED.tobytes() * q.shape[1]
         if unfilled := [name for name, x in (("q", q), ("p", p)) if x[good].tobytes() == untouched]:
-            raise MethodError(
+            raise EngineError(
                 f"{simulation.label} failed: its advance(every, q, p) has left row {good} of "
                 f"{' and '.join(unfilled)} as it was; it writes every row into these arrays: q[row] = ..."
             )
@@ -266,11 +269,11 @@ class Bare(NamedTuple):
     force_calls: int
 
 
-def bare(scene: Scene, label: Label, *, copies: int = 1, read: bool = False, planned: int = 0) -> Bare:
+def bare(scene: Scene, label: Label, *, copies: int = 1, planned: int = 0) -> Bare:
     """Time the engine alone: all steps in one call and one row read at the end, nothing recorded.
 
     `copies` fresh runs are timed together, one after the other, where one is too short for the clock.
-    With `read` every step is read, in chunks, and thrown away.  `planned` is how many steps the caller will
+    `planned` is how many steps the caller will
     take in all: an engine that compiles decides by them, not by this one run, so that all runs of a study
     use the same code.  Numbers that are not finite are timed like others: judge them by `play`.
 
@@ -284,17 +287,12 @@ def bare(scene: Scene, label: Label, *, copies: int = 1, read: bool = False, pla
     simulations = [engines.Started(ahead, label, 1) for _ in range(copies)]
     start_seconds = perf_counter() - began
     alone = [one.simulation for one in simulations]
-    rows = min(CHUNK // scene.n or 1, scene.steps) if read else 1
-    q, p = np.empty((rows, scene.n)), np.empty((rows, scene.n))
+    q, p = np.empty((2, 1, scene.n))
 
     def timed() -> float:
         began = perf_counter()
         for simulation in alone:
-            if read:
-                for left in range(scene.steps, 0, -rows):
-                    simulation.advance(1, q[:left], p[:left])
-            else:
-                _advance_unread(simulation, scene.steps, scene.steps if method.adaptive else PIECE, q, p)
+            _advance_unread(simulation, scene.steps, scene.steps if method.adaptive else PIECE, q, p)
         return perf_counter() - began
 
     run_seconds = engines.guarded(label, timed)

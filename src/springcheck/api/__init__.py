@@ -6,7 +6,6 @@ from springcheck.api.showing import Said, Shelf, Verdicts
 from springcheck.api.studies import (
     explain,
     extremes,
-    faults,
     methods,
     precision,
     report,
@@ -15,7 +14,7 @@ from springcheck.api.studies import (
 )
 
 __all__ = [
-    "Said", "Shelf", "Verdicts", "compare", "exact", "explain", "extremes", "faults",
+    "Said", "Shelf", "Verdicts", "compare", "exact", "explain", "extremes",
     "identify", "judge", "methods", "precision", "read", "report", "run", "sampling", "simulate",
     "stability",
 ]  # fmt: skip

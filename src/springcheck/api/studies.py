@@ -15,7 +15,6 @@ from springcheck.physics.scene import Scene
 
 if TYPE_CHECKING:
     from springcheck.studies.extremes.result import Atlas
-    from springcheck.studies.faults.result import FaultReport
     from springcheck.studies.precision.longtime import LongTime
     from springcheck.studies.precision.result import PrecisionStudy
     from springcheck.studies.sampling.result import Sampling
@@ -84,15 +83,6 @@ def extremes(
 
     with taken(methods, force, workers, path) as (named, how):
         return measure.record(path, named, quick=quick, **how)
-
-
-@typed
-def faults(*, path: str | Path | None = None, force: bool = False, workers: int = 1) -> FaultReport:
-    """Engines broken on purpose: which checks reject each, and their detection limits.  It takes minutes."""
-    from springcheck.studies.faults import measure
-
-    with taken((), force, workers, path) as (_, how):
-        return measure.record(path, **how)
 
 
 @typed

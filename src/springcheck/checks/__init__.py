@@ -34,7 +34,7 @@ from springcheck.checks.motion import (
     shadow_energy,
 )
 from springcheck.checks.record import energies, grid, line, start, times
-from springcheck.checks.requires import CONTRACTED, REQUIREMENTS
+from springcheck.checks.requires import CONTRACTED
 from springcheck.checks.solver import tolerance, tolerance_bound
 from springcheck.checks.steps import BLIND, arithmetic, bridges, seldom_off, step_defect
 from springcheck.errors import MethodError
@@ -43,7 +43,7 @@ from springcheck.physics.trajectory import Limits, Trajectory, Verdict
 from springcheck.text.wording import STATES_SHOW, count, few
 
 __all__ = [
-    "ALL", "BLIND", "CHECKS", "CONTRACTED", "RANDOM", "SPECIAL", "STATES_SHOW", "TELLING", "THOROUGH",
+    "ALL", "BLIND", "CHECKS", "CONTRACTED", "RANDOM", "STATES_SHOW", "TELLING", "THOROUGH",
     "Bench", "Case", "Check", "Run", "angular_momentum", "arithmetic", "bridges", "cause_of",
     "closed_form", "energies", "experiments_of", "first_off", "frequency", "judge", "judge_thoroughly",
     "momentum", "not_judged", "shadow_energy", "shared", "start", "status", "step_defect", "summary",
@@ -68,9 +68,6 @@ RANDOM: tuple[Check, ...] = (start, times, grid, energies, *bath.DRAWN)
 
 TELLING = frozenset(["identified", *(one.name for one in (*ALL, *bath.DRAWN) if one.telling)])
 """Checks that distinguish the scheme that a method claims from others; `identified` is of a file's states."""
-
-SPECIAL = frozenset(one.name for one in CHECKS if any(REQUIREMENTS[x].special for x in one.requires))
-"""Checks that apply to few runs."""
 
 MOST_NAMED = 8
 """Most methods or checks that a summary names."""
@@ -205,7 +202,8 @@ def not_exercised(scene: Scene) -> str:
         "friction": bool(system.is_damped or scene.bath),
         "drives": system.is_driven,
     }
-    return f"Not exercised here: {', '.join(name for name, is_so in facts.items() if not is_so)}"
+    names = [name for name, is_so in facts.items() if not is_so]
+    return f"Not exercised here: {', '.join(names)}" if names else ""
 
 
 def worst(pieces: Sequence[Sequence[Verdict]]) -> list[Verdict]:

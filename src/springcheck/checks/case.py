@@ -14,7 +14,7 @@ from springcheck.checks import rounding
 from springcheck.checks.claim import Claim
 from springcheck.checks.stretch import DEVIATIONS, Stretch, follow
 from springcheck.physics.arrays import WIDE, Arithmetic, Extended, Floats, Force, Integers, Reals
-from springcheck.physics.driven import CLOCK
+from springcheck.physics.driven import CLOCK, sums
 from springcheck.physics.term import Term
 from springcheck.physics.trajectory import Trajectory
 
@@ -40,14 +40,26 @@ class Case(Claim):
 
     @cached_property
     def clocked(self) -> Case:
-        """The case with a clock beside the particles, which stands at the time of each frame; itself where no
+        """The case with a clock beside the particles, which shows the time of each frame; itself where no
         force depends on the time."""
         if not self.scene.system.is_driven:
             return self
         run = self.trajectory
-        t = (self.steps * run.step)[:, None]
+        t = (self.sums if self.sums_steps else self.steps * run.step)[:, None]
         q, p = np.hstack([run.q, t]), np.hstack([run.p, np.full_like(t, CLOCK)])
         return replace(self, trajectory=replace(run, q=q, p=p), scene=self.scene.system.clocked)
+
+    @property
+    def sums(self) -> Floats:
+        """The time of each frame as a sum of steps (f,)."""
+        return sums(self.trajectory.step, self.steps)
+
+    @cached_property
+    def sums_steps(self) -> bool:
+        """Whether a driven run records sums of steps as its times: its drives are then judged at these."""
+        run = self.trajectory
+        products = np.array_equal(run.t, self.steps * run.step)
+        return self.scene.system.is_driven and not products and np.array_equal(run.t, self.sums)
 
     @cached_property
     def undriven(self) -> Case:
@@ -128,7 +140,8 @@ class Case(Claim):
         half = run.arithmetic.recorded(self.judged.m, run.step, run.rebuilds_velocity)
         # of both ends
         written = 2 * (half[0] + np.abs(way) * half[1]) / self.roundings
-        return way, np.asarray(run.arithmetic.state * sizes + rounding.SMALLEST + written)
+        least = rounding.SMALLEST + np.abs(way) * rounding.of_underflow(self)
+        return way, np.asarray(run.arithmetic.state * sizes + least + written)
 
     @property
     def _starts(self) -> tuple[Extended, Extended]:

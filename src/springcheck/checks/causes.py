@@ -79,6 +79,8 @@ def found(case: Case, shown: Callable[[int, bool], str] = lambda *_: "") -> str:
     elif run.every == 1 and not missing(case, MAP):
         ways = [_of_differences, driven.found, _of_removal, _of_factor]
         looks = [_of_numbers, *looks, _of_reach]
+    elif not random:
+        ways = [driven.summed]
     vague = ""
     for way in ways + looks:
         said = way(case)

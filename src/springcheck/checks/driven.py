@@ -15,6 +15,7 @@ import numpy as np
 from springcheck.checks.case import Case
 from springcheck.checks.check import Finding, check
 from springcheck.checks.requires import MAP
+from springcheck.checks.steps import step_defect
 from springcheck.physics.arrays import Extended, Reals
 from springcheck.physics.driven import CLOCK
 from springcheck.physics.scene import Scene
@@ -35,7 +36,7 @@ def found(case: Case) -> str:
     driven; every step is recorded."""
     if not case.scene.system.is_driven:
         return ""
-    case = case.clocked
+    sums, case = summed(case), case.clocked
     title, right = case.scheme.title, _abscissae(case)
     clocks = [(s, False) for s in (-1.0, -0.5, 0.5, 1.0)] + [(s, True) for s in (0.0, 0.5, 1.0)]
     for later, held in clocks:
@@ -49,8 +50,8 @@ def found(case: Case) -> str:
     for words, scene in _other_drives(case.scene):
         if _fits(replace(case, scene=scene)):
             return words
-    if _fits(case, summed=True):
-        return "the time of the drive is a sum of steps, rounded at each; take their number times the step"
+    if sums:
+        return sums
     later = _later(case)
     if abs(later) > _delay(case)[1] and _fits(case, later):
         way = f"{'of a step' if abs(later) <= 1 else 'steps'} {'later' if later > 0 else 'earlier'}"
@@ -66,6 +67,16 @@ def found(case: Case) -> str:
     return ""
 
 
+def summed(case: Case) -> str:
+    """The cause where each step is the scheme's, at a time that is a sum of steps; "" elsewhere."""
+    if not case.scene.system.is_driven or case.sums_steps or not np.isfinite(case.sums).all():
+        return ""
+    there = replace(case, trajectory=replace(case.trajectory, t=case.sums))
+    if not (there.sums_steps and step_defect(there).passed):
+        return ""
+    return "the time of the drive is a sum of steps, rounded at each; take their number times the step"
+
+
 def _words(places: set[float]) -> str:
     return " and ".join(PARTS.get(c, f"{c:g}") for c in sorted(places))
 
@@ -79,23 +90,20 @@ def _abscissae(case: Case) -> set[float]:
     return {round((float(at[0, -1]) - first) / case.trajectory.step, 6) + 0.0 for at in met}
 
 
-def _off(case: Case, later: float, *, held: bool = False, summed: bool = False) -> Extended:
+def _off(case: Case, later: float, *, held: bool = False) -> Extended:
     """Distance of the particles from the scheme's step (2, f-1, n) where the time is taken later by a part of
-    a step, and is held over the stages, or is a sum of steps, rounded at each."""
+    a step, and is held over the stages."""
     run = case.trajectory
     q, p = (x[:-1].astype(np.longdouble) for x in (run.q, run.p))
-    if summed:
-        q[:, -1] = np.concatenate([[0.0], np.cumsum(np.full(case.steps[-1], run.step))])[case.steps[:-1]]
     q[:, -1] += later * np.longdouble(run.step)
     p[:, -1] = 0 if held else CLOCK
     off = np.stack(case.step(q, p)) - np.stack([run.q[1:], run.p[1:]])
     return np.asarray(off[..., :-1])
 
 
-def _fits(case: Case, later: float = 0.0, *, held: bool = False, summed: bool = False) -> bool:
-    slack = 1.0 if summed else SLACK
-    allowed = np.stack(case.allowance)[..., :-1] * case.roundings * slack
-    return bool(np.all(np.abs(_off(case, later, held=held, summed=summed)) <= allowed))
+def _fits(case: Case, later: float = 0.0, *, held: bool = False) -> bool:
+    allowed = np.stack(case.allowance)[..., :-1] * case.roundings * SLACK
+    return bool(np.all(np.abs(_off(case, later, held=held)) <= allowed))
 
 
 def _later(case: Case) -> float:

@@ -30,8 +30,6 @@ class Requirement(NamedTuple):
     name: str
     word: str
     lacks: Lacks
-    special: bool = False
-    """Whether few runs meet it, so that its absence is not worth a line."""
 
 
 def _unless(has: Callable[[Any], bool], otherwise: str) -> Lacks:
@@ -84,6 +82,8 @@ def _no_answer(case: Any) -> str | None:
     if case.scheme.has("flow") or case.steps[0] != 0:
         return "the closed form of what a drive adds is that of steps of forces, from the start of the run on"
     found = schemes.rotation(alone.law.propagator)
+    if case.sums_steps:
+        return "the closed form of what a drive adds is that of times that are products, and these are sums"
     if np.any(np.maximum(found.near, found.growth) * case.steps[-1] < CONTRACTED):
         return "a driven mode that neither turns nor grows has no closed form here"
     return None

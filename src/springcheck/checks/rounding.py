@@ -38,25 +38,33 @@ def of_step(
     how = run.arithmetic
     q, p = q.astype(np.longdouble), p.astype(np.longdouble)
     h, m = np.longdouble(abs(run.step)), scene.m.astype(np.longdouble)
+    # the reference step rounds as well
+    state = how.state + ROUNDOFF
+    lost = of_underflow(case, smallest)
     fine: list[Reals] = []
     # of a force that is coarser than the state, first the sizes that it has without its own error
     for way in [how] if how.force <= how.state else [replace(how, force=how.state, quantum=0.0), how]:
         size_q, size_p = schemes.magnitude_step(
             case.scheme, q, p, h=run.step, m=m, rate=case.law.rate,
+            lost=(smallest * (1 + h) / state, lost / state),
             met=_evaluations(case, partial(_force, case, way, fine), places, recorded),
         )  # fmt: skip
-    # the reference step rounds as well
-    state = how.state + ROUNDOFF
     # an engine may count positions from the rest points of springs, and so round those
     of_q, of_p = state * (size_q + case.origins), state * size_p
     if run.rebuilds_velocity and not how.keeps_displacement:
         # as they are counted: from rest
         of_p = of_p + how.state * m * (np.abs(q) + size_q + 2 * case.origins) / h
-    # a force, its product with the step, and a velocity may each underflow; a solver adds up n products
-    lost = smallest * (1 + m + h * scene.system.pulls())
-    if case.scheme.has("implicit"):
-        lost = lost * scene.n
     return np.asarray(of_q + h / m * lost + smallest), np.asarray(of_p + lost)
+
+
+def of_underflow(case: Claim, smallest: np.longdouble = SMALLEST) -> Extended:
+    """What underflow takes off the momenta in a stage (n,).
+
+    A force, its product with the step, and a velocity may each lose `smallest`; a solver adds up n products.
+    """
+    scene, h = case.judged, np.longdouble(abs(case.trajectory.step))
+    lost = smallest * (1 + scene.m.astype(np.longdouble) + h * scene.system.pulls())
+    return np.asarray(lost * scene.n if case.scheme.has("implicit") else lost)
 
 
 def of_recording(case: Claim, q: Reals, p: Reals, places: list[Reals] | None) -> tuple[Extended, Extended]:

@@ -232,9 +232,10 @@ def _check(options: Namespace) -> int:
     for finding in findings:
         print(plain(f"{options.file}: {finding.place}: {finding.what}"))
     if not findings:
-        ended = store.summary(Path(options.file)).complete
-        rest = "" if ended else "; unfinished: the command that writes it goes on when it is given again"
-        print(f"{options.file}: whole; every digest matches{rest}")
+        found = store.summary(Path(options.file))
+        what = "every digest matches" if found.listed else "its arrays match; an older store lists no more"
+        rest = "" if found.complete else "; unfinished: give the command that writes it again to resume it"
+        print(f"{options.file}: whole; {what}{rest}")
     return 1 if findings else 0
 
 

@@ -18,8 +18,7 @@ from springcheck.checks.seeds import SEEDED
 from springcheck.errors import SpringcheckError
 from springcheck.physics import terms
 from springcheck.schemes import Scheme
-from springcheck.studies.faults.seeded import Fault
-from springcheck.studies.faults.table import FAULTS
+from springcheck.studies.run.faulty import FAULTS, Fault
 from springcheck.text.wording import described
 
 if TYPE_CHECKING:
@@ -114,7 +113,7 @@ _CHECKS = {check.name: check for check in (*checks.ALL, *checks.RANDOM, *SEEDED)
 
 
 def check_lines(check: Any) -> Iterator[str]:
-    """What a pass proves, how it is measured, the scope of the check, and the faults that it must reject."""
+    """What a pass proves, how it is measured, and the scope of the check."""
     yield f"{check.name}, a check of the {check.family}"
     first, _, rest = described(check.judge).partition("\n\n")
     yield _line(first)
@@ -123,16 +122,12 @@ def check_lines(check: Any) -> Iterator[str]:
         yield from rest.strip("\n").splitlines()
     yield ""
     yield _line(f"Applies to: {check.needs}")
-    held = [fault for fault in FAULTS if check.name in fault.caught_by]
-    if held:
-        names = (fault.name + ("" if fault.size is None else f" of {fault.size:.0e}") for fault in held)
-        yield _line(f"Must reject, and is held to it: {', '.join(names)}")
 
 
 def _fault(fault: Fault) -> Iterator[str]:
     yield f"{fault.name}: {fault.about}"
     size = "" if fault.size is None else f", size {fault.size:.0e}"
-    yield _line(f"A deliberate fault in {fault.scheme}{size}. Rejected by: {', '.join(fault.caught_by)}")
+    yield _line(f"A deliberate fault in {fault.scheme}{size}: springcheck run SCENE --fault {fault.name}")
 
 
 def meaning_lines(meaning: Meaning) -> Iterator[str]:

@@ -18,6 +18,7 @@ from springcheck.formats import States, is_store, moving, read
 from springcheck.identify import files
 from springcheck.identify.storage import storage
 from springcheck.physics.arrays import AS_WRITTEN, Arithmetic, Floats
+from springcheck.physics.driven import sums
 from springcheck.physics.scene import Scene
 from springcheck.physics.scenefile import load_scene
 from springcheck.physics.trajectory import Outcome, Trajectory, Verdict
@@ -25,6 +26,9 @@ from springcheck.studies import choose, keeper
 from springcheck.studies.text import left_out
 from springcheck.text.lines import Lines, Text, plain, table
 from springcheck.text.wording import count
+
+SUMS = "times are sums of steps, rounded at each; the drive is judged at these times"
+"""What is said where a driven file has such times."""
 
 TIMES = "times were taken as whole numbers of steps from the first frame on"
 NOT_DOUBLE = "(single|mixed|fixed-point force) arithmetic explains every step"
@@ -348,6 +352,14 @@ def _times(
             f"frames lie whole steps of {scene.step:g} apart in scene {scene.name}, as the first two do"
             + "".join(f"; {x}" for x in start.clock(states, scene))
         )
+    if (
+        scene.system.is_driven
+        and np.any(off)
+        and np.array_equal(states.t, sums(scene.step, np.arange(len(t)) * every))
+    ):
+        notes.append(SUMS)
+        taken["times"] = f"{SUMS}; they differ from products by up to {np.max(off):.2g}"
+        return states.t, every
     if np.any(states.t != t):
         notes.append(TIMES)
         taken["times"] = f"{TIMES}; they are up to {np.max(off):.2g} beside them" if np.any(off) else TIMES

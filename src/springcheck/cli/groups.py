@@ -14,7 +14,6 @@ EXAMPLES: Mapping[str, Sequence[str]] = {
         "spring --temperature 300K --seed 1",
         "spring --stepper mine.py:step",
     ),
-    "faults": ("", "-o faults.h5"),
     "precision": ("spring --budget 20 --method own:rk4",),
     "stability": ("spring", "multiple-time-steps --method 'openmm:*'"),
     "extremes": ("--quick",),

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 PIPE_WIDTH = 1 << 16
 """Width of output that is not a terminal's: its reader wraps long lines."""
 
-SCHEMAS = {"faults": 2, "stability": 2}
+SCHEMAS = {"stability": 2}
 """Versions of JSON documents, 1 of the others: raised where a name is removed or changes its meaning, and not
 where one is added."""
 
@@ -69,11 +69,9 @@ def answer(
     if options.json:
         schema = f"springcheck/{name or options.name}/{SCHEMAS.get(name or options.name, 1)}"
         whole = json.dumps({"schema": schema, **data}, allow_nan=False, indent=2)
-        with interrupts.last():
-            print(whole)
+        print(whole)
     elif not getattr(options, "quiet", False) and (said := lines()):
-        with interrupts.last():
-            show(said)
+        show(said)
     return status
 
 

@@ -76,21 +76,17 @@ def _module(name: str) -> ModuleType:
     here = str(Path.cwd())
     sys.path.insert(0, here)
     try:
-        with engines.foreign(name, f"module {name!r} cannot be imported"):
-            return _imported(name)
+        with engines.foreign(f"module {name!r} cannot be imported"):
+            return importlib.import_module(name)
+    except MethodError as failure:
+        missing = failure.__cause__
+        if not isinstance(missing, ModuleNotFoundError):
+            raise
+        if f"{name}.".startswith(f"{missing.name or name}."):
+            raise MethodError(f"no module {name!r} in {here} or among the installed ones") from missing
+        raise MethodError(f"module {name!r} needs {missing.name!r}, which is not installed") from missing
     finally:
         sys.path.remove(here)
-
-
-def _imported(name: str) -> ModuleType:
-    try:
-        return importlib.import_module(name)
-    except ModuleNotFoundError as error:
-        missing = error.name or name
-        if missing == name.split(".", maxsplit=1)[0] or name.startswith(f"{missing}."):
-            here = Path.cwd()
-            raise MethodError(f"no module {name!r} in {here} or among the installed ones") from error
-        raise MethodError(f"module {name!r} needs {missing!r}, which is not installed") from error
 
 
 @contextmanager

@@ -56,7 +56,7 @@ __all__ = [
     "Arithmetic", "Engine", "Label", "Method", "Need", "Simulation", "Started", "Stopped", "absence",
     "bring", "engine",
     "foreign", "from_file", "guarded", "installed_version", "is_brought", "load", "match", "method",
-    "module_name", "module_of", "named", "names", "obstacle", "origin", "parse", "refusal", "start",
+    "module_name", "module_of", "named", "names", "obstacle", "origin", "parse", "refusal",
     "unusable", "while_here",
 ]  # fmt: skip
 
@@ -89,14 +89,14 @@ def load(name: str) -> Engine:
     reason = absence(name)
     if reason:
         raise MethodError(reason)
-    with foreign(name, f"engine {name!r}: its version() failed"):
+    with foreign(f"engine {name!r}: its version() failed"):
         try:
             said = _imported(found.version)
         except ImportError as error:
             raise EngineError(f"engine {name!r}, {found.title}, cannot be imported: {told(error)}") from error
     if not isinstance(said, dict):
         kind = type(said).__name__
-        raise MethodError(f"engine {name!r}: its version() returned {kind}, not a dict of names and versions")
+        raise EngineError(f"engine {name!r}: its version() returned {kind}, not a dict of names and versions")
     return found
 
 
@@ -107,18 +107,18 @@ def _imported(version: Callable[[], object]) -> object:
 
 
 def guarded(label: Label, call: Callable[..., T], *arguments: object, form: str = "") -> T:
-    """Call into an engine.  Whatever it raises becomes a MethodError, with its file and line.
+    """Call into an engine.  Whatever it raises becomes an EngineError, with its file and line.
 
     So does the way in which the engine has ended an earlier process of this command (see `foreign`).  `form`
     is the call as the contract writes it, for the message where a function takes other arguments.
     """
-    with foreign(str(label), f"{label} failed", origin(label.engine).package):
+    with foreign(f"{label} failed", origin(label.engine).package):
         try:
             return call(*arguments)
         except TypeError as error:
             # the call itself failed: no line of the engine was reached
             if form and error.__traceback__ and error.__traceback__.tb_next is None:
-                raise MethodError(f"{label} failed: {error}; it is called as {form}") from error
+                raise EngineError(f"{label} failed: {error}; it is called as {form}") from error
             raise
         finally:
             _reopened()
@@ -134,50 +134,39 @@ def _reopened() -> None:
                 os.dup2(other, stream)
 
 
-def start(scene: Scene, label: Label, seed: Any = None) -> Simulation:
-    """The engine of a label at the scene's start.  MethodError, with the reason, where it cannot start.
-
-    `seed` is that of a random method: a number, or a generator where the method takes one.
-    """
-    driver, run_by = load(label.engine), method(label)
-    made = partial(driver.start, seed=seed) if run_by.generator else driver.start
-    form = f"start(scene, method, label, step{', seed=seed' if run_by.generator else ''})"
-    found: Simulation = guarded(label, made, scene, run_by, label, scene.step, form=form)
-    if not callable(getattr(found, "advance", None)):
-        raise MethodError(f"{label} failed: its start returned {type(found).__name__}, which has no advance")
-    return found
-
-
 def arithmetic(label: Label) -> Arithmetic:
     """The rounding that the engine of a label declares.  MethodError where its own code fails."""
     driver = load(label.engine)
     found: object = guarded(label, driver.arithmetic, label, form="arithmetic(label)")
     if not isinstance(found, Arithmetic):
-        raise MethodError(f"{label} failed: its arithmetic is of type {type(found).__name__}")
+        raise EngineError(f"{label} failed: its arithmetic is of type {type(found).__name__}")
     return found
 
 
-def origin_of(label: Label) -> dict[str, str]:
-    """Provenance of a run in words: the engine's versions, title, method, and how it stores velocities.
-    MethodError where the engine's own code fails."""
-    driver, run_by = load(label.engine), method(label)
-    versions = guarded(label, lambda: {str(key): str(value) for key, value in driver.version().items()})
-    return {
-        **versions,
-        "engine": driver.title,
-        "method": run_by.about,
-        "velocity": str(guarded(label, driver.convention, run_by, form="convention(method)")),
-    }
-
-
 class Started:
-    """A simulation at a scene's start: what its engine raises is a MethodError, what it reports is checked.
+    """A simulation at a scene's start: what its engine raises is an EngineError, what it reports is checked.
 
-    Raises MethodError, with the reason, where it cannot start.
+    `seed` is that of a random method: a number, or a generator where the method takes one.  Raises
+    MethodError, with the reason, where it cannot start.
     """
 
     def __init__(self, scene: Scene, label: Label, seed: Any = None) -> None:
-        self.label, self.simulation = label, start(scene, label, seed)
+        self.label, self._engine, self._method = label, load(label.engine), method(label)
+        seeded = {"seed": seed} if self._method.generator else {}
+        form = f"start(scene, method, label, step{', seed=seed' if seeded else ''})"
+        begin = partial(self._engine.start, **seeded)
+        self.simulation = guarded(label, begin, scene, self._method, label, scene.step, form=form)
+        if not callable(getattr(self.simulation, "advance", None)):
+            kind = type(self.simulation).__name__
+            raise EngineError(f"{label} failed: its start returned {kind}, which has no advance")
+
+    @property
+    def origin(self) -> dict[str, str]:
+        """Provenance in words: the engine's versions, title, method, and how it stores velocities."""
+        versions = guarded(self.label, self._engine.version)
+        how = guarded(self.label, self._engine.convention, self._method, form="convention(method)")
+        said = {"engine": self._engine.title, "method": self._method.about, "velocity": str(how)}
+        return {**{str(key): str(value) for key, value in versions.items()}, **said}
 
     def advance(self, every: int, q: Floats, p: Floats) -> None:
         """Fill rows; `Stopped` passes through."""
@@ -199,7 +188,7 @@ class Started:
         try:
             return taken(said)
         except (TypeError, ValueError, OverflowError):
-            raise MethodError(f"{self.label}: its {name} is {said!r:.60}, not {what}") from None
+            raise EngineError(f"{self.label}: its {name} is {said!r:.60}, not {what}") from None
 
 
 def _count(said: Any) -> int:

@@ -63,7 +63,7 @@ class Curve:
     methods: Sequence[str] = ()
     """Labels of the methods that it stands for, where there are several."""
     band: tuple[Sequence[float] | Floats, Sequence[float] | Floats] | None = None
-    """Smallest and largest of the numbers whose median is y."""
+    """Smallest and largest of the numbers whose median is y; without a line the ends of error bars."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -33,7 +33,7 @@ from springcheck.figures.charts import (
 from springcheck.physics.arrays import Floats
 
 TILES_SHADED = {
-    "good": "#9ecae1", "wild": "#fee391", "limit": "#d94801", "refused": "#bdbdbd", "wrong": "#000000",
+    "good": "#9ecae1", "wild": "#fee391", "limit": "#8c6bb1", "refused": "#bdbdbd", "wrong": "#dd0033",
     "s0": "#fff7d6", "s1": "#fee08b", "s2": "#fdb863", "s3": "#f08a4b", "s4": "#cf4e4e", "s5": "#96295f",
     "s6": "#4b1250",
 }  # fmt: skip
@@ -248,7 +248,10 @@ def _curve(axes: Axes, curve: Curve, number: int, most: int, chart: Chart) -> No
     drawn: dict[str, Any] = {"color": look.color, "label": curve.name, "zorder": 2 + 1.2 * high}
     if curve.band is not None:
         low, top = (_drawable(one, scales[1]) for one in curve.band)
-        axes.fill_between(x, low, top, color=look.color, alpha=0.2, linewidth=0)
+        if curve.line:
+            axes.fill_between(x, low, top, color=look.color, alpha=0.2, linewidth=0)
+        else:
+            axes.vlines(x, low, top, color=look.color, linewidth=1)
     if curve.dots and not curve.over:
         axes.plot(x, y, ".", markersize=3 + 2 * high, **drawn)
         if curve.line:

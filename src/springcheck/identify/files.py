@@ -328,8 +328,8 @@ def of_springs(told: Identification, q: Floats | None, *, stated: bool) -> Ident
         rod = None if fits and stated else rod_of(q, fits=fits)
     if rod and not rod.or_springs:
         raise IdentificationError(
-            f"{rod.statement}; schemes are told by springs: judge it, with a --scene that has the "
-            f"[[rod]]{', or state the --stiffness of springs' if fits else ''}"
+            f"{rod.statement}; constraints are not part of springcheck"
+            f"{'; if springs hold it, state their --stiffness' if fits else ''}"
         )
     return told.noting(rod.statement) if rod else told
 

@@ -58,6 +58,18 @@ class Drive(WithoutPotential):
         return np.abs(self.amplitude) * (1 + np.abs(self.frequency) * time + np.abs(self.phase))
 
 
+MOST_SUMMED = 10**7
+"""Most steps whose sum is worked out, in 0.1 s."""
+
+
+def sums(step: float, steps: Integers) -> Floats:
+    """The times after so many steps (f,) of a clock that adds up its steps, rounded at each; NaN for too
+    many."""
+    if steps[-1] > MOST_SUMMED:
+        return np.full(len(steps), np.nan)
+    return np.append(0.0, np.cumsum(np.full(steps[-1], step)))[steps]
+
+
 def with_clock(scene: Any) -> Any:
     """A scene with a clock, whose position is the time, as last coordinate: states are (..., n + 1)."""
     q, p, m = (np.append(x, y) for x, y in ((scene.q, 0.0), (scene.p, CLOCK), (scene.m, CLOCK)))

@@ -47,9 +47,10 @@ class FrozenArrays:
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
-        for value in state.values():
+        for name, value in state.items():
             if isinstance(value, np.ndarray):
                 value.setflags(write=False)
+                self.__dict__[name] = value.view()
 
 
 class Term(FrozenArrays):
@@ -344,7 +345,8 @@ class OnPairs(Term):
 
 def frozen(values: Any, kind: type, rows: int | None, what: str) -> NDArray[Any]:
     """A read-only copy (s,) of int64 or float64; one number stands for all rows.  Raises SceneError."""
-    is_mine = isinstance(values, np.ndarray) and not values.flags.writeable and values.base is None
+    base = values.base if isinstance(values, np.ndarray) else None
+    is_mine = isinstance(base, np.ndarray) and not (base.flags.writeable or values.flags.writeable)
     if is_mine and values.dtype == kind and values.ndim == 1 and rows in (None, len(values)):
         return cast(NDArray[Any], values)
     try:
@@ -362,7 +364,8 @@ def frozen(values: Any, kind: type, rows: int | None, what: str) -> NDArray[Any]
         wanted = "one row of numbers" if rows is None else f"one number for each of {rows}"
         raise SceneError(f"{what} has the shape {out.shape}: {wanted} is needed")
     out.setflags(write=False)
-    return out
+    # of a view the flag cannot be set back
+    return out.view()
 
 
 def check_sign(values: Floats, sign: str, what: str) -> None:

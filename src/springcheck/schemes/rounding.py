@@ -54,10 +54,12 @@ def magnitude_step(
     m: Reals,
     met: Iterable[Met],
     rate: Reals | None = None,
+    lost: tuple[Reals, Reals] | None = None,
 ) -> tuple[Reals, Reals]:
     """Running error bound of `step` from (q, p): the same step with every difference taken as a sum.
 
-    `met` has one entry for each evaluation of the force, in their order.
+    `met` has one entry for each evaluation of the force, in their order.  `lost` is what underflow adds to
+    the positions and momenta of each stage (n,), which the stages after it carry on.
     """
     start = q, p
     # in extended precision: the square of a step may leave the range of a double
@@ -72,13 +74,15 @@ def magnitude_step(
                 last = last + here.joints
             setting = Setting(m=m, rate=rate, force=last)
             q, p = kind.sizes(q, p, number(c, np.float64) * wide, setting)
+            q, p = (q, p) if lost is None else (q + lost[0], p + lost[1])
         return q, p
-    return _tableau(scheme, start, each, h=wide, m=m, rate=rate)
+    return _tableau(scheme, start, each, h=wide, m=m, rate=rate, lost=lost)
 
 
 def _tableau(
-    scheme: Scheme, start: tuple[Reals, Reals], each: Iterator[Met], *, h: Any, m: Reals, rate: Reals | None
-) -> tuple[Reals, Reals]:
+    scheme: Scheme, start: tuple[Reals, Reals], each: Iterator[Met], *, h: Any, m: Reals, rate: Reals | None,
+    lost: tuple[Reals, Reals] | None,
+) -> tuple[Reals, Reals]:  # fmt: skip
     """The same for a Butcher tableau.
 
     Beside the bounds it carries the states of the stages themselves, signs and all: the bound of a stiff
@@ -93,6 +97,8 @@ def _tableau(
         here = next(each)
         past = [float(c) * h for c in row[: len(forces)]]
         qs, ps = weighted_sum(q, np.abs(past), velocities), weighted_sum(p, np.abs(past), forces)
+        least = 0.0 if lost is None else lost[0]
+        qs, ps = (qs, ps) if lost is None else (qs + least, ps + lost[1])
         own = float(row[len(forces)]) * h
         if here.friction is not None:
             slowing = here.friction[0]
@@ -108,7 +114,7 @@ def _tableau(
                 way = np.abs(end), q + size * fastest / m, fastest
             if here.friction is not None and end is not None:
                 here = here.bent_by(here.friction[1] * end)
-            pull = _implicit_stage(here, way, qs, ps, np.abs(own), m, np.abs(1 + own * slowing))
+            pull = _implicit_stage(here, way, qs, ps, np.abs(own), m, np.abs(1 + own * slowing), least)
             ps = (ps + np.abs(own) * pull) / np.abs(1 + own * slowing)
         else:
             pull = here.magnitude(qs, ps) + here.joints
@@ -119,12 +125,14 @@ def _tableau(
 
 
 def _implicit_stage(
-    here: Met, way: tuple[Reals, Reals, Reals] | None, q: Reals, p: Reals, x: Reals, m: Reals, slowed: Reals
-) -> Reals:
+    here: Met, way: tuple[Reals, Reals, Reals] | None, q: Reals, p: Reals, x: Reals, m: Reals, slowed: Reals,
+    least: Any,
+) -> Reals:  # fmt: skip
     """Bound of the rounding of the force behind the solution of Q = q + x P/m, slowed P = p + x F(Q).
 
     q and p bound what the stage starts from; `way` is |P|, and what positions and momenta the step goes
-    through on its way there, where that is known.  With A = 1 + x**2 K/(m slowed):
+    through on its way there, where that is known; `least` is what underflow takes off Q.  With
+    A = 1 + x**2 K/(m slowed):
 
     * An engine that solves for Q leaves a residual of a few roundings of what the equation adds up, at Q; the
       inverse of A carries it into Q (Higham, Accuracy and Stability of Numerical Algorithms, 7.2), and
@@ -155,6 +163,7 @@ def _implicit_stage(
         way = end, q + x * (2 * p + end) / m, p + end
     else:
         found = np.abs(here.q)
+    found = found + least
     there = here.magnitude(found, way[0])
     residual = right + found + factor * there
     of_velocity = turned(x * (here.magnitude(*way[1:]) + here.joints)) + kicked(q) * m / x

@@ -5,12 +5,11 @@ They measure how good a scheme is.  A study's own control may fail it; a large e
 
 from __future__ import annotations
 
-from springcheck.studies import extremes, faults, precision, run, sampling, stability
+from springcheck.studies import extremes, precision, run, sampling, stability
 from springcheck.studies.study import Study
 
 STUDIES: tuple[Study, ...] = (
     run.STUDY,
-    faults.STUDY,
     precision.STUDY,
     stability.STUDY,
     extremes.STUDY,

@@ -12,7 +12,7 @@ import logging
 import time
 import warnings
 from collections.abc import Callable, Generator, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache
 from itertools import islice
@@ -20,10 +20,13 @@ from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Any, TypeVar
 
+from springcheck import engines
 from springcheck.errors import SpringcheckError, StoreWarning
-from springcheck.studies import provenance
 
 T = TypeVar("T")
+
+PACKAGES = ("springcheck", "numpy", "numba", "scipy")
+"""Packages that numbers depend on, in addition to those of the engines."""
 
 PATIENCE_SECONDS = 60.0
 """Seconds without any answer after which every open piece is given to another worker as well."""
@@ -96,12 +99,29 @@ class Cluster:
                 client.wait_for_workers(1, timeout=WAITING_SECONDS)
                 # the scheduler unpacks what passes through it
                 said = "springcheck is not installed where the scheduler runs: {}"
-                _on_scheduler(client, provenance.versions)
+                _on_scheduler(client, versions)
             except SpringcheckError:
                 raise
             except Exception as error:
                 raise SpringcheckError(f"--cluster {self.place}: {said.format(error)}") from error
             yield client
+
+
+def versions() -> dict[str, str]:
+    """Versions of all that numbers depend on, engines and plug-ins included, as far as installed."""
+    from importlib import metadata
+
+    # engine files of a call have versions, too; they are part of the command
+    engine_names = [name for name in engines.names() if not engines.is_brought(name)]
+    found = {}
+    for name in {
+        *PACKAGES,
+        *(engines.engine(one).distribution for one in engine_names),
+        *(engines.origin(one).package for one in engine_names),
+    }:
+        with suppress(metadata.PackageNotFoundError, ValueError):
+            found[name] = metadata.version(name)
+    return found
 
 
 def _on_scheduler(client: Any, function: Callable[..., T]) -> T:
@@ -152,7 +172,7 @@ def _checked(part: Callable[[], Any], wanted: dict[str, str]) -> Any:
     return part()
 
 
-_here = cache(provenance.versions)
+_here = cache(versions)
 
 
 def _answers(
@@ -161,7 +181,7 @@ def _answers(
     import distributed
     from distributed.comm import CommClosedError
 
-    wanted = provenance.versions()
+    wanted = versions()
     number: dict[Any, int] = {}
     given = [0] * len(parts)
     ended: SimpleQueue[Any] = SimpleQueue()

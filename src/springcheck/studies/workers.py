@@ -16,7 +16,7 @@ from multiprocessing import get_context, parent_process
 from multiprocessing.connection import Connection, wait
 from typing import Any, TypeVar
 
-from springcheck import interrupts
+from springcheck import interrupts, processes
 from springcheck.errors import SpringcheckError
 
 T = TypeVar("T")
@@ -38,7 +38,7 @@ def carried_out(parts: Sequence[Callable[[], T]], workers: int) -> Generator[tup
     team: dict[Any, Any] = {}
     try:
         for _ in range(min(workers, len(parts))):
-            with interrupts.held(), _blocked_sigint():
+            with processes.deferred(), _blocked_sigint():
                 ours, theirs = get_context("spawn").Pipe()
                 process = get_context("spawn").Process(target=_work, args=(theirs,), daemon=True)
                 process.start()
@@ -56,12 +56,11 @@ def carried_out(parts: Sequence[Callable[[], T]], workers: int) -> Generator[tup
                     ours.close()
                     _ended(team.pop(ours))
     finally:
-        with interrupts.held():
-            for process in team.values():
-                process.kill()
-            for ours, process in team.items():
-                _ended(process)
-                ours.close()
+        for process in team.values():
+            process.kill()
+        for ours, process in team.items():
+            _ended(process)
+            ours.close()
 
 
 def _is_a_file(main: Any) -> None:

@@ -1,4 +1,4 @@
-// Charts as SVG: curves or tiles in a box, read by pointer or arrow keys, zoomed by dragging or + and -.
+// Charts as SVG: curves or tiles in a box, read by pointer or arrow keys.
 // A bank is charts with one legend.  springcheck/figures/charts.py describes what is drawn.
 
 const LINE = 12; // pixels from one name to the next below it
@@ -10,17 +10,12 @@ let clips = 0;
 class Chart {
   // spec: {title, x, y, curves, tiles, rules, labels, note, equal}; `on`: the names that are drawn
   constructor(place, spec, on) {
-    Object.assign(this, { on, view: null, at: null, dots: [] });
-    const button = ([sign, name, click]) =>
-      html("button", { type: "button", title: name, "aria-label": `${name}: ${spec.title}`, click }, sign);
+    this.on = on;
     const shape = { class: "plot", tabindex: 0, role: "application", "aria-roledescription": "chart" };
     this.box = html("div", { ...shape, ...this.listeners() });
     this.said = html("output", { class: "reading" });
     this.caption = html("figcaption", {});
-    const tools = [["+", "zoom in", () => this.zoom(0.5)], ["\u2212", "zoom out", () => this.zoom(2)],
-      ["\u25a1", "the whole picture", () => this.draw(null)]].map(button);
-    const read = html("div", { class: "tools" }, ...tools, this.said);
-    this.figure = html("figure", {}, this.box, read, this.caption);
+    this.figure = html("figure", {}, this.box, this.said, this.caption);
     place.append(this.figure);
     this.show(spec);
     new ResizeObserver(() => Math.abs(this.box.clientWidth - this.W) > 8 && this.draw()).observe(this.box);
@@ -51,32 +46,23 @@ class Chart {
     });
   }
 
-  zoom(factor) {
-    const [a, b, c, d] = this.view || this.whole(), { x, y } = this.at || {};
-    const [u, v] = x >= a && x <= b && y >= c && y <= d ? [x, y] : [(a + b) / 2, (c + d) / 2];
-    const view = [...[a, b].map((w) => u + (w - u) * factor), ...[c, d].map((w) => v + (w - v) * factor)];
-    // beyond 12 digits doubles have no neighbours to show
-    const wide = (low, high, least) => high - low > 1e-12 * Math.max(least, Math.abs(low));
-    if (wide(view[0], view[1], 1) && wide(view[2], view[3], 1e-3)) this.draw(view);
-  }
-
-  draw(view = this.view) {
+  draw() {
     const { spec } = this, R = 12, T = 12, W = Math.max(280, this.box.clientWidth || 440);
     // names and numbers are written in full: at the left, and names upwards below
     const all = this.whole(), beyond = (texts, n) => Math.max(0, ...texts.map((text) => text.length - n));
-    const L = 62 + 7 * beyond(ticks(spec.y, ...(view || all).slice(2)).map(([, text]) => text), 4);
+    const L = 62 + 7 * beyond(ticks(spec.y, ...all.slice(2)).map(([, text]) => text), 4);
     const B = 46 + 7.4 * beyond(spec.x.named ? spec.x.values : [], 2);
     const usual = Math.min(420, Math.max(260, Math.round(W * 0.72)));
     const H = spec.y.named ? (all[3] - all[2]) * 14 + T + B : usual;
     const across = W - L - R, up = H - T - B;
-    let [x0, x1, y0, y1] = view || all, [sx, sy] = [across / (x1 - x0), up / (y1 - y0)];
+    let [x0, x1, y0, y1] = all, [sx, sy] = [across / (x1 - x0), up / (y1 - y0)];
     if (spec.equal) {
       sx = sy = Math.min(sx, sy);
       [x0, y0] = [(x0 + x1 - across / sx) / 2, (y0 + y1 - up / sy) / 2];
       [x1, y1] = [x0 + across / sx, y0 + up / sy];
     }
     const x = (this.px = (v) => L + (v - x0) * sx), y = (this.py = (v) => H - B - (v - y0) * sy);
-    Object.assign(this, { W, H, view, fromX: (v) => x0 + (v - L) / sx, fromY: (v) => y0 + (H - B - v) / sy });
+    Object.assign(this, { W, H, fromX: (v) => x0 + (v - L) / sx, fromY: (v) => y0 + (H - B - v) / sy });
     const clip = `clip${clips++}`, box = { x: L, y: T, width: across, height: up };
     const root = element("svg", { viewBox: `0 0 ${W} ${H}`, "aria-hidden": "true" });
     const inside = element("g", { "clip-path": `url(#${clip})` });
@@ -113,8 +99,7 @@ class Chart {
       inside.append(element("text", { class: "name", ...place, ...more, style }, one.text));
     }
     this.ring = element("circle", { class: "ring", r: 6, cx: -99, cy: -99 });
-    this.frame = element("rect", { class: "drag", width: 0, height: 0 });
-    inside.append(this.ring, this.frame);
+    inside.append(this.ring);
     const below = { x: (L + W - R) / 2, y: H - 8, ...MIDDLE };
     root.append(inside, element("rect", { class: "frame", ...box }), element("text", below, spec.x.name),
       element("text", { transform: `translate(14 ${(T + H - B) / 2}) rotate(-90)`, ...MIDDLE }, spec.y.name));
@@ -127,7 +112,7 @@ class Chart {
     }
     const names = spec.tiles ? "all tiles" : this.seen().map((curve) => curve.name).join(", ") || "nothing";
     this.box.setAttribute("aria-label", `${spec.title} ${spec.y.name} over ${spec.x.name}. Shown: ${names}. `
-      + "Arrow keys read it, plus and minus zoom, 0 shows all.");
+      + "Arrow keys read it.");
   }
 
   curve(inside, curve, x, y) {
@@ -169,7 +154,6 @@ class Chart {
 
   say(text, x, y) {
     this.said.textContent = text;
-    this.at = text ? { x, y } : null;
     made(this.ring, { cx: text ? this.px(x) : -99, cy: text ? this.py(y) : -99 });
   }
 
@@ -223,34 +207,14 @@ class Chart {
       const { left, top, width, height } = this.box.getBoundingClientRect();
       return [((clientX - left) * this.W) / width, ((clientY - top) * this.H) / height];
     };
-    // the corners of what is dragged: left, right, top, bottom
-    const sorted = ([a, b], [c, d]) => [Math.min(a, c), Math.max(a, c), Math.min(b, d), Math.max(b, d)];
-    const all = () => this.draw(null), nearer = () => this.zoom(0.5), farther = () => this.zoom(2);
     const acts = {
       ArrowRight: () => this.step(1, 0), ArrowLeft: () => this.step(-1, 0), ArrowUp: () => this.step(0, 1),
-      ArrowDown: () => this.step(0, -1), "+": nearer, "=": nearer, "-": farther, 0: all, Escape: all,
+      ArrowDown: () => this.step(0, -1),
     };
-    let from = null;
+    const read = (event) => this.read(...place(event));
     return {
-      pointerdown: (event) => {
-        if (event.pointerType === "touch" || event.button) return;
-        from = place(event);
-        this.box.setPointerCapture(event.pointerId);
-      },
-      pointermove: (event) => {
-        if (!from) return this.read(...place(event));
-        const [x, right, y, bottom] = sorted(from, place(event));
-        made(this.frame, { x, y, width: right - x, height: bottom - y });
-      },
-      pointerup: (event) => {
-        if (!from) return this.read(...place(event));
-        const [left, right, top, bottom] = sorted(from, place(event));
-        from = null;
-        if (right - left <= 8 || bottom - top <= 8) return this.draw();
-        this.draw([this.fromX(left), this.fromX(right), this.fromY(bottom), this.fromY(top)]);
-      },
-      pointercancel: () => (from = null),
-      dblclick: all,
+      pointermove: read,
+      pointerup: read,
       keydown: (event) => {
         if (!Object.hasOwn(acts, event.key) || event.ctrlKey || event.metaKey || event.altKey) return;
         event.preventDefault();

@@ -1,8 +1,4 @@
-"""Data for the scripts of a page: runs, the numbers of their scene, schemes as their coefficients.
-
-For one particle on a spring in a bath: splittings by their stages, positions of sliders, and covariances by
-`Law` with which the page compares its own.
-"""
+"""Data for the scripts of a page: runs, the numbers of their scene, schemes as their coefficients."""
 
 from __future__ import annotations
 
@@ -48,7 +44,6 @@ def to_scripts(scene: Scene | None, pieces: Sequence[Trajectory], wrong: Collect
         "spring": one,
         "sliders": one and sliders(**one),
         "live": one and charts.plain(_live()),
-        "bath": bath(scene, {piece.scheme for piece in pieces}),
         "linear": linear(scene) if scene else None,
         "laws": laws([*(piece.scheme for piece in pieces), *TRIED.values()]),
         "steps": scene.steps if scene else 0,
@@ -171,55 +166,3 @@ def _stretch(piece: Trajectory, scene: Scene | None) -> float:
     if not area > 0:
         return float(len(piece.t) * piece.every)
     return float(half + math.sqrt(max(half * half - area, 0.0))) / math.sqrt(area)
-
-
-TRIED_STEPS, TRIED_FRICTIONS = (0.3, 1.0, 1.9), (0.05, 1.0, 8.0)
-"""h omega and gamma/omega at which the page is compared with Python, beside the scene's own."""
-
-
-def bath(scene: Scene | None, ran: Collection[str]) -> dict[str, Any] | None:
-    """Data of one particle on a spring in a bath, or None; the schemes `ran` are drawn at first."""
-    if scene is None or scene.bath is None or scene.n != 1 or not scene.system.is_linear:
-        return None
-    from springcheck.bath import THERMOSTATS, Law
-
-    at = np.zeros(1)
-    k, m, rate = float(scene.system.hessian_diagonal(at)[0]), float(scene.m[0]), scene.bath.friction
-    if not 0 < k < math.inf:
-        return None
-    w, h = math.sqrt(k / m), abs(scene.step)
-    splittings = {name: one for name, one in THERMOSTATS.items() if set(name) <= set("abo")}
-    points = [(h, rate), *((x / w, y * w) for x in TRIED_STEPS for y in TRIED_FRICTIONS)]
-
-    def moments(name: str, h: float, rate: float) -> list[float]:
-        law = Law(scheme=splittings[name], h=h, m=scene.m, k=np.array([k]), rate=rate, thermal=scene.thermal)
-        S = law.covariance[0] / scene.thermal
-        return [float(S[0, 0] * k), float(S[0, 1] * w), float(S[1, 1] / m)]
-
-    drawn = [Curve(name="Boltzmann", group=EXACTLY, x=[], y=[], title="the exact stationary distribution")]
-    drawn += [
-        Curve(name=name.upper(), group=name, x=[], y=[], title=one.title) for name, one in splittings.items()
-    ]
-    chart = Chart(
-        title="Standard deviation of states in every direction: the stationary covariance of each step",
-        x=Scale(name="q"), y=Scale(name="v"), curves=drawn,
-    )  # fmt: skip
-    on = [name.upper() for name in splittings if name in ran] or ["BAOAB", "OBABO"]
-    return {
-        "stages": {
-            name: [
-                (act.kind, 1 / one.draws if act.kind == "exchange" else float(act.part))  # type: ignore[arg-type]
-                for act in one.acts
-            ]
-            for name, one in splittings.items()
-        },
-        "own": {"h": h, "g": rate, "T": scene.bath.temperature},
-        "w": w, "q": math.sqrt(scene.thermal / scene.bath.temperature / k),
-        "sliders": {
-            "h": _ratios(0.02 / w, 2.2 / w), "g": _ratios(0.01 * w, 100 * w),
-            "T": _ratios(scene.bath.temperature / 10, scene.bath.temperature * 10),
-        },
-        "unit": "" if scene.units == "reduced" else "K",
-        "values": [[*at, {name: moments(name, *at) for name in splittings}] for at in points],
-        "live": charts.plain(Bank(title="Drawn", charts=[chart], on=["Boltzmann", *on])),
-    }  # fmt: skip

@@ -70,8 +70,7 @@ def html(content: Content) -> str:
         "count": count,
         "words": lambda text: str(text).strip(),
     }
-    names = (*SCRIPTS, "bath.js") if content.data.get("bath") else SCRIPTS
-    script = "\n".join((HERE / name).read_text(encoding="utf-8") for name in names)
+    script = "\n".join((HERE / name).read_text(encoding="utf-8") for name in SCRIPTS)
     style = (HERE / "page.css").read_text(encoding="utf-8")
     return around.get_template("page.html").render(
         content=content,
@@ -145,9 +144,9 @@ def _with_looks(data: Mapping[str, Any]) -> dict[str, Any]:
             for chart in bank["charts"]
         ]}  # fmt: skip
 
-    live, bath = data.get("live"), data.get("bath")
+    live = data.get("live")
     return {
-        **data, "live": live and seen(live), "bath": bath and {**bath, "live": seen(bath["live"])},
+        **data, "live": live and seen(live),
         "banks": {name: seen(bank) for name, bank in data["banks"].items()},
     }  # fmt: skip
 

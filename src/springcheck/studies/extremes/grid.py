@@ -32,6 +32,13 @@ STEP_DECADES = (-300, -150, -100, -30, -10, -3, 0, 3, 10, 30, 100, 150, 300)
 """Powers of ten of steps."""
 
 
+RATIOS = (1e2, 1e4, 1e6, 1e8, 1e10, 1e12)
+"""Stiffness ratios of the stiff cells."""
+
+MOST_CALLS = 20_000
+"""Most force calls of a solver on a stiff cell that are waited for, about a second."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Spec:
     """Parameters of a cell: one spring, one start, one step, one length."""

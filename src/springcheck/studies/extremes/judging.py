@@ -122,14 +122,12 @@ def judge(
         growth, bound = growth_of(case, scene), float(case.roundings)
         low, high = RANGES["single" if how.force >= 2.0**-24 else "double"]
         peaks, too_coarse = np.max(force, axis=0, initial=0), TOO_COARSE.format(how.quantum)
-        far, k = scene.system.far if how.joints else 0.0, np.array([abs(spec.k) for spec in specs])
         # the engine's own displacement, as its forces may be cached
         moved = np.apply_along_axis(least_moved, 0, np.abs(np.diff(q, axis=0)))
         reasons = {
             overflows(how): force >= how.overflow,
             too_coarse: np.broadcast_to(how.quantum > FORCE_RESOLUTION * peaks, moved.shape),
             keeps(how): (how.stale > 0) & (moved <= 2 * how.stale),
-            f"a joint of length {far:.3g} is passed": how.joints & (force >= k * far),
             f"a step forms numbers beyond {high:.1e}": ~(largest <= high),
             f"a step forms numbers below {low:.1e}": smallest < low,
         }

@@ -23,9 +23,9 @@ from springcheck.schemes import scheme
 from springcheck.studies import keeper
 from springcheck.studies.arguments import Progress
 from springcheck.studies.choose import sorted_out
-from springcheck.studies.extremes import grid, running
+from springcheck.studies.extremes import grid, running, stiff
 from springcheck.studies.extremes.judging import Cell
-from springcheck.studies.extremes.result import CELLS, Atlas, Window
+from springcheck.studies.extremes.result import CALM_TURNS, CELLS, Atlas, Window
 from springcheck.studies.keeper import How, Keeper, each
 from springcheck.studies.stability import propagators
 
@@ -34,10 +34,6 @@ def everything() -> tuple[str, ...]:
     """Every method on its first platform, and the platforms that engines declare for the atlas."""
     places = (f"{name}:{place}" for name in engines.names() for place in engines.engine(name).atlas)
     return ("*", *places)
-
-
-CALM_TURNS = (0.01, 1.9)
-"""h w that count for a window: below, hardly any force shows; beyond, stability decides."""
 
 
 def record(
@@ -80,8 +76,6 @@ def absence(label: Label) -> str | None:
     method = engines.method(label)
     if "wall-spring" not in method.terms or "particles" not in method.kinds:
         return "it moves no particles on springs"
-    if method.adaptive:
-        return "it chooses its own steps, and cells are judged step by step"
     if not scheme(method.scheme).has("named"):
         return "its scheme is not known; --scheme NAME states it, and its steps are then judged"
     return propagators.absence(label, 0.5)
@@ -105,8 +99,10 @@ def stored(kept: keeper.Kept) -> Atlas:
 
 
 def of_method(label: Label, *, quick: bool = False) -> list[Cell]:
-    """All cells of one method."""
-    return [cell for specs in groups(label, quick=quick) for cell in running.cells(label, specs)]
+    """All cells of one method; of one that chooses its steps the stiff ones alone."""
+    plane = [] if engines.method(label).adaptive else groups(label, quick=quick)
+    found = [cell for specs in plane for cell in running.cells(label, specs)]
+    return found if on_platform(label) else [*found, *stiff.cells(label)]
 
 
 def groups(label: Label, *, quick: bool = False) -> list[list[grid.Spec]]:
@@ -127,23 +123,14 @@ def windows(cells: Sequence[Cell]) -> list[Window]:
     found = []
     for method in dict.fromkeys(cell.method for cell in cells):
         calm: dict[int, bool] = {}
-        unstable = ""
         for cell in cells:
             within = CALM_TURNS[0] * 0.999 < cell.parameters["h_w"] < CALM_TURNS[1] * 1.001
             if cell.method == method and cell.block == "force" and within:
                 calm[cell.decade] = calm.get(cell.decade, True) and cell.outcome in RIGHT
-                unstable = ", or unstable as theory says" if cell.outcome == RIGHT[1] else unstable
         spans = [list(span) for right, span in groupby(sorted(calm), calm.__getitem__) if right]
         span = next((span for span in spans if any(0 <= x <= 6 for x in span)), None)
-        if span is None:
-            continue
-        name = engines.engine(method.partition(":")[0]).title
-        between = f"1e{span[0]} and 1e{span[-1]} at h w from {CALM_TURNS[0]:g} to {CALM_TURNS[1]:g}"
-        right = f"right for forces between {between}{unstable}"
-        sentence = f"{name} ({method}): {right}, in the scene's unit of force"
-        if len(span) == len(calm):
-            sentence += ", all that was tried there"
-        found.append(Window(method=method, sentence=sentence, low=10.0 ** span[0], high=10.0 ** span[-1]))
+        if span is not None:
+            found.append(Window(method=method, low=10.0 ** span[0], high=10.0 ** span[-1]))
     return found
 
 

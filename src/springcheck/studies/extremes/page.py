@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from springcheck.figures.charts import Bank, Chart, Scale, Tiles
 from springcheck.studies.extremes.judging import Cell
-from springcheck.studies.extremes.result import OUTCOME_LOOKS, OUTCOMES, Atlas
-from springcheck.text.wording import count
+from springcheck.studies.extremes.result import OUTCOME_LOOKS, OUTCOMES, Atlas, named
 
 
 def _filled(row: list[int]) -> list[int]:
@@ -25,19 +25,22 @@ def _filled(row: list[int]) -> list[int]:
 
 
 def banks(atlas: Atlas) -> list[Bank]:
-    """A map for each method; solvers, whose cells are of one h w, have none."""
-    methods = dict.fromkeys(cell.method for cell in atlas.cells)
-    planes = {x: [c for c in atlas.cells if c.method == x and c.block == "force"] for x in methods}
-    turns = {method: {cell.parameters["h_w"] for cell in cells} for method, cells in planes.items()}
-    charts = [_chart(method, cells) for method, cells in planes.items() if len(turns[method]) > 1]
+    """A map for each kind of outcome: methods of one map share it."""
+    alike: dict[str, list[str]] = {}
+    charts: dict[str, Chart] = {}
+    for method in dict.fromkeys(cell.method for cell in atlas.cells if cell.block == "force"):
+        chart = _chart(method, [x for x in atlas.cells if x.method == method and x.block == "force"])
+        assert chart.tiles is not None
+        key = repr(chart.tiles.rows)
+        charts.setdefault(key, chart)
+        alike.setdefault(key, []).append(method)
     if not charts:
         return []
-    wrong = f"{count(len(atlas.wrong), 'case')} silently wrong" if atlas.wrong else "none silently wrong"
-    others = ", ".join(
-        f"{n} {name}" for name, n in atlas.counts().most_common(3) if n and name != "silently wrong"
-    )
-    heading = f"Of {len(atlas.cells)} extreme cases {wrong}: {others}"
-    return [Bank(name="extremes", heading=heading, title="Methods drawn", charts=charts)]
+    drawn = [replace(chart, title=name, short=name) for key, chart in charts.items()
+             for name in [named(alike[key])]]  # fmt: skip
+    wrong = f"{len(atlas.wrong)} silently wrong" if atlas.wrong else "none silently wrong"
+    heading = f"Of {len(atlas.cells):,} extreme cases {wrong}"
+    return [Bank(name="extremes", heading=heading, title="Methods drawn", charts=drawn)]
 
 
 def _chart(method: str, cells: Sequence[Cell]) -> Chart:

@@ -37,9 +37,6 @@ def raw(scene: Scene, label: Label) -> tuple[Floats, Floats, Stopped | None]:
 def cells(label: Label, specs: Sequence[Spec]) -> list[Cell]:
     """Run and judge cells of one step and one length, in as few runs as the engine allows."""
     half = len(specs) // 2
-    if half and engines.arithmetic(label).joints:
-        # all joints of a run are as long as the largest motion needs them
-        return [cell for spec in specs for cell in cells(label, [spec])]
     scene = grid.scene(list(specs), engines.method(label).requires)
     try:
         q, p, stop = raw(scene, label)

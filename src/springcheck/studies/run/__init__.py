@@ -27,7 +27,7 @@ STUDY = Study(
         ),
         repeatable(
             "--fault", "NAME[=SIZE]",
-            "an engine broken on purpose among the others, as `springcheck faults` tells",
+            "an engine broken on purpose among the others; an unknown NAME lists them",
         ),
         argument(
             "--from", dest="source", metavar="FILE", help="run a store's trajectories again and compare"

@@ -27,9 +27,6 @@ if TYPE_CHECKING:
     from springcheck.bath.heat import Heated
     from springcheck.studies.run.drawable import Drawable
 
-FAULT = "fault"
-"""Engine name in the labels of engines broken on purpose."""
-
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class Report(StudyResult):

@@ -236,7 +236,7 @@ def unjudged(verdicts: Sequence[Verdict], store: Path | None) -> Lines:
     alike: dict[str, list[str]] = {}
     for method in checks.not_judged(verdicts):
         mine = (v for v in verdicts if v.method == method and v.passed is None and v.check in checks.TELLING)
-        why = dict.fromkeys(v.why for v in mine if v.check not in checks.SPECIAL)
+        why = dict.fromkeys(v.why for v in mine)
         alike.setdefault("; ".join(why), []).append(method)
     for reason, methods in alike.items():
         line = f"not judged: {', '.join(methods)}: nothing that applied could tell ({reason})"

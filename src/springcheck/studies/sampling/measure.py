@@ -1,4 +1,4 @@
-"""Thermostats on a thousand springs: temperatures, statistical errors and limits, each beside its law."""
+"""Thermostats on a thousand equal springs: temperatures and stability limits, each beside its law."""
 
 from __future__ import annotations
 
@@ -19,46 +19,56 @@ from springcheck.errors import MethodError
 from springcheck.physics.arrays import Floats
 from springcheck.physics.bath import Bath
 from springcheck.physics.scene import Scene
+from springcheck.physics.terms import WallSpring
 from springcheck.studies import keeper
 from springcheck.studies.arguments import Progress
 from springcheck.studies.choose import choose
 from springcheck.studies.keeper import How, Keeper, each
 from springcheck.studies.sampling.result import SAMPLED, Sampled, Sampling
-from springcheck.studies.sampling.springs import KT, MASS, STIFFNESS, springs, temperatures
+
+MASS, STIFFNESS, KT = 3.7, 2.9, 1.7
+"""Mass, stiffness and kT, none of them 1."""
 
 OMEGA = float(np.sqrt(STIFFNESS / MASS))
 
-SAMPLED_TURNS = np.array([0.2, 0.5, 0.8, 1.0, 1.2, 1.4])
-"""h omega at which temperatures are measured."""
-
-RATE = 0.4
-"""Friction over omega at which temperatures are measured."""
-
-AVERAGED_STEPS = np.array([10.0, 20.0, 50.0, 100.0, 200.0, 500.0])
-"""Steps over which <q**2> is averaged, at the second h omega."""
+SAMPLED_TURNS, RATE = np.array([0.2, 0.5, 0.8, 1.0, 1.2, 1.4]), 0.4
+"""h omega, and friction over omega, at which temperatures are measured."""
 
 FRICTIONS = np.array([0.03, 0.1, 0.3, 1.0, 3.0, 10.0])
 """Friction over omega at which limits are measured."""
 
-WIDE, WAIT = 1000, 5.0
-"""Springs side by side, and decay times of the motion and of its variances before frames are used."""
+WIDE, FRAMES, BLOCKS = 1000, 500, 20
+"""Springs side by side, frames of a mean, and blocks of frames for the error of what all springs share."""
 
-SLOWEST_DECAY = 0.002
-"""Least rate of decay a step that is waited for, which takes 2,500 steps."""
+WAIT, SLOWEST_DECAY = 5.0, 0.002
+"""Decay times of the motion and of its variances before frames are used, and the least decay a step."""
 
-LARGEST_H_OMEGA = 8.0
-"""Largest h omega up to which a limit is looked for."""
+LARGEST_H_OMEGA, RESOLVED = 8.0, 5e-5
+"""Largest h omega up to which a limit is looked for, and the largest error of a limit."""
 
 HOTTEST_LAW = 100.0
-"""Largest temperature of a law, over the bath's: above it, motion is not bounded within these steps."""
+"""Largest temperature of a law over the bath's: above it, motion is not bounded within these steps."""
 
-SEED_OF_ALL = 27
-"""Seed of all methods; not tuned."""
+SEED_OF_ALL, SEED_OF_START = 27, 26
+"""Seeds of all methods and of the states at the start; not tuned."""
 
 
-def bathed(scene: Scene, turn: float, friction: float) -> Scene:
-    """Springs at another h omega and friction over omega."""
-    return replace(scene, step=turn / OMEGA, bath=Bath(temperature=KT, friction=friction * OMEGA), every=1)
+def springs(n: int, turn: float, friction: float, steps: int = 1) -> Scene:
+    """Equal springs in a bath at typical thermal states, by h omega and friction over omega."""
+    q, p = np.random.default_rng(SEED_OF_START).standard_normal((2, n))
+    return Scene(
+        m=np.full(n, MASS), q=np.sqrt(KT / STIFFNESS) * q, p=np.sqrt(MASS * KT) * p, step=turn / OMEGA,
+        terms=(WallSpring(i=np.arange(n), k=np.full(n, STIFFNESS), at=np.zeros(n)),), steps=steps,
+        bath=Bath(temperature=KT, friction=friction * OMEGA), quantities=("q", "p"), name="springs",
+    )  # fmt: skip
+
+
+def temperature(squares: Floats) -> tuple[float, float]:
+    """Mean of squares (f, n) over kT, and its standard error: the larger of that across springs as if these
+    were independent, and of that across blocks of frames, which holds what springs share."""
+    alone = float(np.std(np.mean(squares, axis=0))) / np.sqrt(squares.shape[1])
+    blocks = [np.mean(block) for block in np.array_split(squares, BLOCKS)]
+    return float(np.mean(squares)), max(alone, float(np.std(blocks, ddof=1)) / np.sqrt(BLOCKS))
 
 
 def law_at(scheme: str, turn: float, friction: float) -> Law:
@@ -72,110 +82,115 @@ def law_at(scheme: str, turn: float, friction: float) -> Law:
 def measured(label: Label) -> Sampled:
     """Measure one thermostat."""
     method = engines.method(label)
-    linear = not THERMOSTATS[method.scheme].rescales
-    laws = [law_at(method.scheme, turn, RATE) if linear else None for turn in SAMPLED_TURNS]
-    rows, run, q = [], None, np.empty(0)
-    for i, (turn, law) in enumerate(zip(SAMPLED_TURNS, laws, strict=True)):
-        exact = (nan, nan) if law is None else (float(law.configurational[0]), float(law.kinetic[0]))
-        if linear and not max(exact) < HOTTEST_LAW:
+    scheme = THERMOSTATS[method.scheme]
+    rows, run = [], None
+    for turn in SAMPLED_TURNS:
+        law = None if scheme.rescales else law_at(scheme.name, turn, RATE)
+        exact = (float(law.configurational[0]), float(law.kinetic[0])) if law else (nan, nan)
+        if law and not max(exact) < HOTTEST_LAW:
             rows.append((nan,) * 6)
             continue
         # collisions mix maps, so that variances may settle far later than means
-        left = max(law.slowest, float(law.growth[0])) if law else 0.0
-        slowest_decay = max(-np.log(left), SLOWEST_DECAY) if left > 0 else 1.0
-        wait = round(WAIT / slowest_decay) if law else 100
-        made = driver.run(bathed(springs(WIDE, wait + 500), turn, RATE), label, seed=SEED_OF_ALL)
-        found = temperatures(made.q[wait:], made.p[wait:])
-        rows.append((*found[0], exact[0], *found[1], exact[1]))
-        if i <= 1:
-            run, q = made, STIFFNESS * made.q[wait:] ** 2 / KT
+        left = max(law.slowest, float(law.growth[0])) if law else np.exp(-WAIT / 100)
+        wait = round(WAIT / max(-np.log(left), SLOWEST_DECAY)) if left > 0 else 5
+        run = driver.run(springs(WIDE, turn, RATE, wait + FRAMES), label, seed=SEED_OF_ALL)
+        of_q = temperature(STIFFNESS * run.q[wait:] ** 2 / KT)
+        of_p = temperature(run.p[wait:] ** 2 / (MASS * KT))
+        rows.append((*of_q, exact[0], *of_p, exact[1]))
     if run is None:
         raise MethodError(f"{label}: no step is stable from h omega {SAMPLED_TURNS[0]} on")
-    law = laws[1]
-    columns = np.array(rows).T
-    steps = max(run.outcome.step, 1)
+    q, q_error, q_law, p, p_error, p_law = np.array(rows).T
+    none, steps = np.full(len(FRICTIONS), nan), max(run.outcome.step, 1)
+    linear = not scheme.rescales
     return Sampled(
-        method=str(label), scheme=method.scheme, title=schemes.title(method.scheme), turn=SAMPLED_TURNS,
-        configurational=columns[0], configurational_error=columns[1], configurational_law=columns[2],
-        kinetic=columns[3], kinetic_error=columns[4], kinetic_law=columns[5], frames=AVERAGED_STEPS,
-        off=np.array([np.sqrt(np.mean((np.mean(q[: int(n)], axis=0) - 1) ** 2)) for n in AVERAGED_STEPS]),
-        off_law=np.array([_error_of_average(law, int(n)) for n in AVERAGED_STEPS]), friction=FRICTIONS,
-        limit=np.array([_last_stable(partial(_radius_of_engine, label, x), 1e-6) for x in FRICTIONS])
-        if linear and not THERMOSTATS[method.scheme].collides else np.full(len(FRICTIONS), nan),
-        limit_law=np.array([_last_stable(partial(_radius, method.scheme, x), 1e-9) for x in FRICTIONS])
-        if linear else np.full(len(FRICTIONS), nan),
+        method=str(label), scheme=scheme.name, title=schemes.title(scheme.name), turn=SAMPLED_TURNS,
+        configurational=q, configurational_error=q_error, configurational_law=q_law, kinetic=p,
+        kinetic_error=p_error, kinetic_law=p_law, friction=FRICTIONS,
+        limit=np.array([_limit_of_engine(label, float(x)) for x in FRICTIONS])
+        if linear and not scheme.collides else none,
+        limit_law=limits(scheme.name, FRICTIONS) if linear else none,
         force_calls=run.force_calls / steps, seconds=run.timing.run / steps / WIDE,
     )  # fmt: skip
 
 
-def _error_of_average(law: Law | None, frames: int) -> float:
-    """Error of k <q**2>/kT over so many frames: systematic and statistical."""
-    if law is None:
-        return nan
-    ratio = float(law.configurational[0])
-    return float(np.hypot(ratio - 1, ratio * law.error_of_variances(frames)[0, 0]))
-
-
-def _radius(scheme: str, friction: float, turn: float) -> float:
-    """Spectral radius of the law's map of second moments."""
-    with np.errstate(all="ignore"):
-        return float(law_at(scheme, turn, friction).growth[0])
-
-
 def _radius_of_engine(label: Label, friction: float, turn: float) -> float:
     """Spectral radius of second moments under an engine's map; with one seed, three starts cancel noise."""
-    one = bathed(springs(1, 1), turn, friction)
-    rest = np.zeros(1)
+    one, rest = springs(1, turn, friction, 2), np.zeros(1)
     runs = [
-        driver.run(replace(one, q=q, p=p, steps=2), label, seed=SEED_OF_ALL)
+        driver.run(replace(one, q=q, p=p), label, seed=SEED_OF_ALL)
         for q, p in ((rest, rest), (rest + 1, rest), (rest, rest + MASS * OMEGA))
     ]
+    if any(len(run.q) < 3 for run in runs):
+        return np.inf
     # from the first step to the second, because some engines begin with another step
-    (q0, p0), *moved = [(run.q[1:, 0], run.p[1:, 0]) for run in runs]
-    if not all(len(q) == 2 for q, _ in moved) or len(q0) != 2:
+    base, *both = (np.stack([run.q[1:3, 0], run.p[1:3, 0] / (MASS * OMEGA)]) for run in runs)
+    moved = np.array([one - base for one in both])
+    if not np.isfinite(moved).all():
         return np.inf
-    both = np.array([[q - q0, (p - p0) / (MASS * OMEGA)] for q, p in moved])
-    if not np.isfinite(both).all():
-        return np.inf
-    A = np.linalg.lstsq(both[:, :, 0], both[:, :, 1])[0].T
+    A = np.linalg.lstsq(moved[:, :, 0], moved[:, :, 1])[0].T
     return float(np.max(np.abs(np.linalg.eigvals(A)))) ** 2
 
 
-RESOLVED = 5e-5
-"""Largest error of a limit: half of the last decimal that is printed."""
-
-
-def _last_stable(radius: Callable[[float], float], to: float) -> float:
-    """The largest h omega up to which no map grows, `to` this part of it; infinity where none up to 8 does,
-    NaN where growth there is too slow to tell from none.
+def last_stable(radius: Callable[[Floats], Floats], n: int, to: float) -> Floats:
+    """The largest h omega (n,) up to which no map grows, `to` this part of it; infinity where none up to 8
+    does, NaN where growth there is too slow to tell from none.
 
     The rounding of a map is 1e-15; where its two eigenvalues coincide it acts by its square root.
     """
-    slack = 1e-7
+    slack, low, high = 1e-7, np.zeros(n), np.full(n, np.inf)
+    for turn in np.geomspace(0.02, LARGEST_H_OMEGA, 25):
+        going = np.isinf(high)
+        stable = radius(np.full(n, turn)) <= 1 + slack
+        low, high = np.where(going & stable, turn, low), np.where(going & ~stable, turn, high)
+        if not np.any(np.isinf(high)):
+            break
+    endless = np.isinf(high)
+    while np.any(~endless & (high - low > to * high) & (high > 1e-3)):
+        middle = np.where(endless, LARGEST_H_OMEGA, (low + high) / 2)
+        stable = radius(middle) <= 1 + slack
+        low, high = np.where(stable & ~endless, middle, low), np.where(stable, high, middle)
+        high[endless] = np.inf
+    some = high > 1e-3
+    below = np.where(endless, LARGEST_H_OMEGA, np.maximum(low - RESOLVED, 1e-9))
+    decays = radius(np.where(some, below, 1.0)) <= 1 - slack
+    return np.where(some, np.where(decays, np.where(endless, np.inf, low), nan), 0.0)
 
-    def grows(turn: float) -> bool:
-        return not radius(turn) <= 1 + slack
 
-    def decays(turn: float) -> bool:
-        return radius(turn) <= 1 - slack
+def limits(scheme: str, frictions: Floats) -> Floats:
+    """The largest h omega at which the law of a scheme is stable, at frictions over omega (n,)."""
 
+    def radius(turns: Floats) -> Floats:
+        law = Law(
+            scheme=THERMOSTATS[scheme], h=1.0, m=np.ones(len(turns)), k=turns**2, rate=frictions * turns,
+            thermal=1.0,
+        )  # fmt: skip
+        with np.errstate(all="ignore"):
+            return law.growth
+
+    return last_stable(radius, len(frictions), 1e-9)
+
+
+def _limit_of_engine(label: Label, friction: float) -> float:
+    """The same of an engine's own map."""
     try:
-        tried = np.geomspace(0.02, LARGEST_H_OMEGA, 25)
-        first = next((i for i, turn in enumerate(tried) if grows(float(turn))), None)
-        if first is None:
-            return float("inf") if decays(LARGEST_H_OMEGA) else nan
-        low, high = (float(tried[first - 1]), float(tried[first])) if first else (0.0, float(tried[0]))
-        while high - low > to * high and high > 1e-3:
-            middle = (low + high) / 2
-            low, high = (low, middle) if grows(middle) else (middle, high)
-        return 0.0 if high <= 1e-3 else low if decays(low - RESOLVED) else nan
+        found = last_stable(
+            lambda turns: np.array([_radius_of_engine(label, friction, float(x)) for x in turns]), 1, 1e-6
+        )
     except MethodError:
         return nan
+    return float(found[0])
+
+
+def curve(scheme: str, turns: Floats, of: str) -> Floats:
+    """The law's temperature at these h omega, NaN where the step is unstable."""
+    with np.errstate(all="ignore"):
+        found = np.array([float(getattr(law_at(scheme, x, RATE), of)[0]) for x in turns])
+    return np.where(np.isfinite(found), found, nan)
 
 
 def record(path: str | Path | None, methods: Sequence[str] = (), **how: Unpack[How]) -> Sampling:
     """Measure thermostats with these labels or globs, by default the default ones; saved in a store."""
-    labels, left, _ = choose(replace(springs(1, 1), include=("*",)), methods)
+    labels, left, _ = choose(replace(springs(1, 0.5, RATE), include=("*",)), methods)
     pieces = each(labels, "", lambda label: partial(measured, label), SAMPLED)
 
     def measure(kept: Keeper) -> Sampling:
@@ -193,10 +208,3 @@ def perform(options: Namespace, progress: Progress | None) -> Sampling:
 def stored(kept: keeper.Kept) -> Sampling:
     """The study that `record` has saved.  StoreError where the file holds none."""
     return Sampling(methods=kept.listed(SAMPLED, "methods"), left_out=kept.left_out, path=kept.path)
-
-
-def curve(scheme: str, turns: Floats, of: str) -> Floats:
-    """The law's temperature at these h omega, NaN where the step is unstable."""
-    with np.errstate(all="ignore"):
-        found = np.array([float(getattr(law_at(scheme, x, RATE), of)[0]) for x in turns])
-    return np.where(np.isfinite(found), found, nan)

@@ -1,4 +1,4 @@
-"""Thermostats with wrong draws, seeds, parameters or stages."""
+"""Thermostats with wrong draws, seeds, parameters or stages, by the plain engine of `textbook`."""
 
 from __future__ import annotations
 
@@ -20,8 +20,7 @@ from springcheck.physics.scene import Scene
 from springcheck.physics.term import Term
 from springcheck.physics.terms import WallSpring
 from springcheck.physics.trajectory import Trajectory
-from springcheck.studies.faults.seeded import Case, Fault
-from springcheck.studies.faults.steppers import State, record
+from textbook import Case, Fault, State, record
 
 Draws: TypeAlias = Callable[[Sequence[Floats]], Any]
 """Correct draws so far, each (n,), the last one due -> the draw that is used in place of the last."""

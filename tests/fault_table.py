@@ -1,31 +1,73 @@
-"""The faults, a row each.  Most are bugs that integrators have shipped with.
+"""The negative controls, a row each: a fault, its scene, and the checks that must reject it.
 
-The sized ones are relative errors; the smallest size that a check still sees is its detection limit.
+Most are bugs that integrators have shipped with.  The sized ones are relative errors.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import cache, partial
+from typing import Any
 
 import numpy as np
 
+import bathed as baths
+from bathed import by, forgetting, heavy, of_rank, played
 from springcheck import schemes
+from springcheck.bath import THERMOSTATS
+from springcheck.bath.catalogue import HALF, ONE, Act
 from springcheck.physics import exact
 from springcheck.physics.arrays import Arithmetic, Floats, Reals
+from springcheck.physics.builders import spring
+from springcheck.physics.scene import Scene
+from springcheck.physics.terms import Drive, Spring
 from springcheck.physics.trajectory import Outcome, Trajectory
-from springcheck.studies.faults.heat import OF_NOISE, THERMAL_STEPS
-from springcheck.studies.faults.seeded import (
+from textbook import (
     FRAME_CHECKS,
     Case,
     Fault,
+    State,
+    Step,
     braked,
     each,
+    energies,
     half_step,
+    record,
     shifted,
     single,
+    textbook,
+    trajectory,
 )
-from springcheck.studies.faults.space import AXES, DRIVES
-from springcheck.studies.faults.steppers import State, Step, energies, record, textbook, trajectory
+
+
+def alone(**other: Any) -> Scene:
+    """One mass on a spring."""
+    return spring(**{"m": 3.7, "k": 2.9, "q": 0.3, "p": 0.7, "title": "", **other})
+
+
+DRIVE = Drive(i=np.array([0]), amplitude=np.array([0.43]), frequency=np.array([0.87]), phase=np.array([0.6]))
+
+SCENES: Mapping[str, Callable[[], Scene]] = {
+    "spring": alone,
+    "long spring": partial(alone, steps=2100),
+    "orbit": partial(alone, q=[0.3, -0.5, 0.8], p=[0.7, 1.1, -0.4], places=np.arange(3)),
+    "driven": lambda: replace(one := alone(c=0.11), terms=(*one.terms, DRIVE)),
+    "chain": lambda: Scene(
+        m=np.array([1.3, 0.7, 2.1]), q=np.array([0.2, 1.0, 1.9]), p=np.array([0.4, -0.3, 0.5]), step=0.05,
+        terms=(Spring(a=np.arange(2), b=np.arange(1, 3), k=np.array([1.1, 3.7]), rest=np.array([0.9, 1.2])),),
+        steps=200),
+    "bath": lambda: baths.springs(40),
+    "wide bath": lambda: baths.springs(250),
+}  # fmt: skip
+"""The scenes of the faults: no mass, stiffness, rest point or step is 1, and h w is about 0.1."""
+
+
+@cache
+def scene(where: str) -> Scene:
+    """A scene by its name."""
+    return replace(SCENES[where](), name=where)
+
 
 STEP = ("step-defect", "propagator")
 MOTION = ("step-defect", "closed-form", "frequency", "propagator")
@@ -287,7 +329,214 @@ ADAPTIVE = (
           ("tolerance",), lambda c: slow_time(c, c.x * c.scene.tolerance), size=1e6, scheme="bdf"),
 )  # fmt: skip
 
+
+def stiffer(c: Case, axis: str) -> Scene:
+    """The scene with springs too stiff by a fraction along one axis."""
+    factor = np.where(c.on(axis), 1 + c.x, 1.0)
+    return c.scene.derived(terms=tuple(term.scaled(factor[term.particles[0]]) for term in c.scene.terms))
+
+
+def swapped(c: Case, x: Reals, one: int, other: int) -> Floats:
+    """Numbers of coordinates (..., n) with two axes exchanged."""
+    order = np.arange(c.scene.n)
+    order[c.axes[one]], order[c.axes[other]] = c.axes[other], c.axes[one]
+    return np.asarray(x[..., order], np.float64)
+
+
+def turned(c: Case, x: Reals, to: Reals, part: float) -> Floats:
+    """Vectors (..., n) plus a part of others rotated by 90 degrees in the plane of x and y."""
+    out, (i, j, _) = x.astype(np.float64), c.axes
+    out[..., i] -= part * to[..., j]
+    out[..., j] += part * to[..., i]
+    return out
+
+
+def wrapped(c: Case, r: Trajectory) -> Trajectory:
+    """Positions along y in a box of half of their span."""
+    box = max(float(np.ptp(r.q)) / 2, 1e-300)
+    return replace(r, q=np.where(c.on("y"), r.q - box * np.round(r.q / box), r.q))
+
+
+def nearest_image(c: Case, f: Reals, q: Reals, p: Reals) -> Reals:
+    """The force of the nearest image of the wall, in a box of the amplitude."""
+    box = 1.5 * float(np.max(c.scene.system.amplitudes[0]))
+    return c.force(q - box * np.round(q / box), p)
+
+
+_IN_SPACE = each(
+    Fault("stiff-y", "forces along y are too large", moves=lambda c: stiffer(c, "y"), size=1e-11),
+    Fault("stiff-z-alone",
+          "forces along z are too large, along which nothing moves until the scene is turned",
+          ("orientation",), moves=lambda c: stiffer(c, "z"), size=1e-12),
+    Fault("heavy-y", "the mass along y is too large, as in a mass matrix that is not isotropic",
+          moves=lambda c: c.scene.derived(m=c.scene.m * (1 + c.x * c.on("y"))), size=1e-11),
+    Fault("flat", "forces along z are left out",
+          force=lambda c, f, q, p: np.where(c.on("z"), 0 * f, f)),
+    Fault("flat-turned", "forces along y are left out, along which nothing moves until the scene is turned",
+          ("orientation",), force=lambda c, f, q, p: np.where(c.on("y"), 0 * f, f)),
+    Fault("mirrored-y", "the force along y has the wrong sign",
+          force=lambda c, f, q, p: np.where(c.on("y"), -f, f)),
+    Fault("single-z", "forces along z in single precision", FRAME_CHECKS,
+          force=lambda c, f, q, p: np.where(c.on("z"), single(f), f)),
+    Fault("swapped-axes", "the force along y acts along z, and that along z along y",
+          force=lambda c, f, q, p: swapped(c, f, 1, 2)),
+    Fault("velocity-order", "the momenta are written in the order y, x, z",
+          ("start", "step-defect", "angular-momentum"),
+          reports=lambda c, r: replace(r, p=swapped(c, r.p, 0, 1))),
+    Fault("torque", "a force at right angles to the position turns the orbit",
+          ("step-defect", "angular-momentum"), size=1e-11, force=lambda c, f, q, p: turned(
+              c, f, q, c.x * float(c.scene.system.hessian_diagonal(c.scene.q)[0]))),
+    Fault("coriolis", "momenta turn a little at every step, as in a rotating frame", FRAME_CHECKS,
+          after=lambda c, i, q, p: (q, turned(c, p, p, c.x)), size=1e-12),
+    Fault("wrapped", "positions along y are wrapped into a box", FRAME_CHECKS, reports=wrapped),
+    Fault("nearest-image", "the force is that of the nearest image in a box that the orbit leaves",
+          FRAME_CHECKS, force=nearest_image),
+    Fault("late-z", "the momentum along z is that of half a step before", FRAME_CHECKS,
+          reports=lambda c, r: replace(r, p=np.where(c.on("z"), half_step(c, -1, r).p, r.p))),
+    Fault("still-z", "the position along z is written as it was at the start",
+          reports=lambda c, r: replace(r, q=np.where(c.on("z"), r.q[0], r.q))),
+    Fault("planar-friction", "momenta along x and y lose a fraction at every step, along z they do not",
+          ("step-defect", "angular-momentum"), size=1e-12,
+          after=lambda c, i, q, p: (q, np.where(c.on("z"), p, p * (1 - c.x)))),
+    caught_by=(*FRAME_CHECKS, "angular-momentum"),
+)  # fmt: skip
+AXES = tuple(one if "orientation" in one.caught_by else replace(one, scene="orbit") for one in _IN_SPACE)
+"""Faults that only a rotation of the scene shows are on a line, the others on an orbit."""
+
+
+def clocked(c: Case, late: float = 0.0, pace: float = 1.0) -> Step:
+    """The step with a drive that is late by this part of it, and whose clock goes at this pace."""
+    return textbook(c.scene, c.scheme, clock=lambda i: ((i + late) * c.scene.step, pace))
+
+
+def other(scene: Scene, change: Callable[[Drive], Drive]) -> Scene:
+    """The scene with every drive changed."""
+    return replace(scene, terms=tuple(change(x) if isinstance(x, Drive) else x for x in scene.terms))
+
+
+DRIVES = each(
+    Fault("late-drive", "the drive is taken later by a part of the step",
+          textbook=lambda c: clocked(c, c.x), size=1e-9),
+    Fault("held-drive", "the drive of the step's start is held over its stages",
+          textbook=lambda c: clocked(c, pace=0.0)),
+    Fault("drive-of-the-step-before", "the drive is that of the step before, as of a callback that is late",
+          textbook=lambda c: clocked(c, -1.0)),
+    Fault("drive-phase", "the phase of the drive has the wrong sign",
+          moves=lambda c: other(c.scene, lambda d: replace(d, phase=-d.phase))),
+    Fault("drive-over-mass", "the amplitude of the drive is divided by the mass",
+          moves=lambda c: other(
+              c.scene, lambda d: replace(d, amplitude=d.amplitude * (1 / c.scene.m)))),
+    Fault("drive-in-degrees", "the phase of the drive is taken for degrees",
+          moves=lambda c: other(c.scene, lambda d: replace(d, phase=d.phase * (np.pi / 180)))),
+    Fault("drive-in-cycles", "the angular frequency of the drive is taken for cycles in a unit of time",
+          moves=lambda c: other(c.scene, lambda d: replace(d, frequency=d.frequency * (2 * np.pi)))),
+    caught_by=(*FRAME_CHECKS, "drive"), scene="driven",
+)  # fmt: skip
+
+
+_DIRECTION, _MATRIX, _MAP = ("noise-direction",), ("noise-matrix",), ("noise-map",)
+_VARIANCE, _SHAPE, _SCALE = ("draws-variance",), ("draws-shape",), ("draws-variance", "noise-size")
+_PAST, _TIES = ("draws-independent",), ("draws-differ",)
+
+A, B = Act("drift", HALF), Act("kick", HALF)
+O = THERMOSTATS["baoab"].acts[2]  # noqa: E741 - the letter of the literature
+
+
+def _runs(other: str, claimed: str, caught_by: tuple[str, ...]) -> Fault:
+    about = f"the thermostat {other} under the name of {claimed}"
+    return Fault(f"{other}-for-{claimed}", about, caught_by, lambda c: played(c, runs=other), scheme=claimed)
+
+
+OF_NOISE = each(
+    Fault("mass-not-in-noise", "the noise lacks the root of the mass", _SCALE,
+          lambda c: played(c, by(1 / np.sqrt(c.scene.m)))),
+    Fault("mass-for-its-root", "the noise has the mass in the place of its root", _SCALE,
+          lambda c: played(c, by(np.sqrt(c.scene.m)))),
+    Fault("noise-size", "the noise is too large", _VARIANCE, lambda c: played(c, by(1 + c.x)), size=0.01,
+          scene="wide bath"),
+    Fault("temperature", "the temperature is too high", _MATRIX, lambda c: played(c, thermal=1 + c.x),
+          size=2e-12),
+    Fault("temperature-power", "the noise grows with another power of the temperature than 1/2",
+          ("noise-size",), lambda c: played(c, thermal=c.scene.thermal**c.x), size=1e-11),
+    Fault("decay-of-variance", "noise of 1 - c in the place of 1 - c**2", _VARIANCE,
+          lambda c: played(c, by(1 / np.sqrt(1 + np.exp(-forgetting(c.scene)))))),
+    Fault("calories", "calories for joules", _VARIANCE, lambda c: played(c, thermal=4.184)),
+    Fault("boltzmann", "Boltzmann's constant of five digits", _MATRIX,
+          lambda c: played(c, thermal=8.3145 / 8.31446261815324)),
+    Fault("uniform-draws", "uniform draws", _SHAPE,
+          lambda c: played(c, of_rank(lambda u: np.sqrt(12) * (u - 0.5)))),
+    Fault("coins", "draws of 1 or -1", (*_SHAPE, *_TIES),
+          lambda c: played(c, of_rank(lambda u: np.sign(u - 0.5)))),
+    Fault("heavy-tails", "draws of Student's distribution with five degrees of freedom", _SHAPE,
+          lambda c: played(c, of_rank(heavy))),
+    Fault("cut-draws", "draws are cut off at 2", (*_VARIANCE, *_TIES),
+          lambda c: played(c, lambda right: np.clip(right[-1], -2, 2))),
+    Fault("off-centre", "draws are not centred", _PAST,
+          lambda c: played(c, lambda right: right[-1] + c.x), size=0.05),
+    Fault("draws-twice", "each draw is used in two steps", _TIES,
+          lambda c: played(c, lambda right: right[(len(right) - 1) // 2 * 2])),
+    Fault("antithetic", "every other draw is the opposite of the one before", (*_PAST, *_TIES),
+          lambda c: played(c, lambda right: -right[-2] if len(right) % 2 == 0 else right[-1])),
+    Fault("coloured", "a part of each draw is that of the step before", _PAST, size=0.1,
+          make=lambda c: played(c, lambda right: (
+              (right[-1] + c.x * right[-2]) / np.sqrt(1 + c.x * c.x) if right[1:] else right[-1]))),
+    Fault("restart-64", "the generator begins anew every 64 steps", _TIES,
+          lambda c: played(c, lambda right: right[(len(right) - 1) % 64])),
+    Fault("restart-500", "the generator begins anew every 500 steps", _TIES,
+          lambda c: played(c, lambda right: right[(len(right) - 1) % 500])),
+    Fault("one-draw", "one draw for all particles", (*_PAST, *_TIES),
+          lambda c: played(c, lambda right: np.full(c.scene.n, right[-1][0]))),
+    Fault("draw-for-two", "one draw for each two particles", (*_PAST, *_TIES),
+          lambda c: played(c, lambda right: np.repeat(right[-1][::2], 2)[: c.scene.n])),
+    scheme="baoab", scene="bath",
+)  # fmt: skip
+
+THERMAL_STEPS = each(
+    _runs("baoa", "baoab", _DIRECTION), _runs("gj-i-half", "gj-i", _DIRECTION),
+    _runs("aboba", "baoab", _DIRECTION), _runs("obabo", "baoab", _DIRECTION), _runs("baoab", "obabo", _PAST),
+    _runs("gj-ii", "baoab", _DIRECTION), _runs("gj-i", "baoab", _MAP), _runs("baoab", "gj-ii", _DIRECTION),
+    _runs("lammps-langevin", "bbk", _MAP), _runs("bbk", "lammps-langevin", _MAP),
+    _runs("andersen-leapfrog", "andersen", _DIRECTION), _runs("andersen", "andersen-after", _DIRECTION),
+    Fault("collision-after-kick", "Andersen's collision after the first half kick, which is lost", _VARIANCE,
+          lambda c: played(c, runs="andersen-after-kick"), scheme="andersen", scene="wide bath"),
+    Fault("collision-chance", "collisions with the chance gamma h", ("collisions",), lambda c: played(
+        c, collision=forgetting(c.scene) / -np.expm1(-forgetting(c.scene))), scheme="andersen"),
+    Fault("collision-mass", "collisions without the root of the mass", _VARIANCE,
+          lambda c: played(c, by(1 / np.sqrt(c.scene.m))), scheme="andersen"),
+    _runs("bussi-after", "bussi", _DIRECTION),
+    Fault("degrees-of-freedom", "a factor counts one degree of freedom too many", _MATRIX,
+          lambda c: played(c, lambda right: np.append(right[-1], right[-1][0])), scheme="bussi"),
+    Fault("energy-for-momentum", "kinetic energies forget as momenta should", (*_MATRIX, *_VARIANCE),
+          lambda c: played(c, rate=0.5), scheme="bussi"),
+    Fault("target-energy", "the kinetic energy aimed at is too large", _MATRIX,
+          lambda c: played(c, thermal=1 + c.x), scheme="bussi", size=1e-11),
+    Fault("friction-of-half", "the friction of half a step for the whole", _VARIANCE,
+          lambda c: played(c, rate=0.5)),
+    Fault("bath-friction", "the friction of the bath is too large", _MAP,
+          lambda c: played(c, rate=1 + c.x), size=1e-9),
+    Fault("drag-alone", "the drag is too strong for its noise", _PAST, lambda c: played(
+        c, by(np.sqrt(np.expm1(-2 * (x := forgetting(c.scene))) / np.expm1(-2 * x * (1 + c.x)))),
+        rate=1 + c.x), size=0.2, scene="wide bath"),
+    Fault("force-with-two-draws", "every force is too large beside draws that reach every state",
+          _PAST, lambda c: played(c, k=1 + c.x), scheme="obabo", size=0.1, scene="wide bath"),
+    Fault("half-kick-lost", "the last half kick is left out", _DIRECTION,
+          lambda c: played(c, runs=(B, A, O, A))),
+    Fault("half-kick-old", "the last half kick has the old force", _DIRECTION,
+          lambda c: played(c, runs=(B, A, O, A, Act("held", HALF)))),
+    Fault("whole-drifts", "two whole drifts in the place of half ones", _DIRECTION,
+          lambda c: played(c, runs=(B, Act("drift", ONE), O, Act("drift", ONE), B))),
+    Fault("noise-in-position", "noise acts on positions too", _DIRECTION,
+          lambda c: played(c, runs=(B, A, O, A, B, Act("jump", lambda x: c.x * x))), size=1e-9),
+    Fault("bath-step", "every step in a bath is too long", _DIRECTION, lambda c: played(c, h=1 + c.x),
+          size=1e-9),
+    Fault("bath-stiffness", "every force in a bath is too large", _DIRECTION,
+          lambda c: played(c, k=1 + c.x), size=1e-9),
+    Fault("bath-masses", "all masses of the step are 1", _DIRECTION,
+          lambda c: played(c, m=1 / c.scene.m)),
+    scheme="baoab", scene="bath",
+)  # fmt: skip
+
+
 FAULTS: tuple[Fault, ...] = (
-    *PARAMETERS, *FORCES, *STEPS, *ARITHMETIC, *REPORTS, *AXES, *DRIVES, *ADAPTIVE,
-    *OF_NOISE, *THERMAL_STEPS,
+    *PARAMETERS, *FORCES, *STEPS, *ARITHMETIC, *REPORTS, *AXES, *DRIVES, *ADAPTIVE, *OF_NOISE, *THERMAL_STEPS,
 )  # fmt: skip
