@@ -102,15 +102,6 @@ class System(Generic[Fields]):
         rate = self.friction_rates
         return bool(np.ptp(rate) <= 2.0**-52 * np.max(rate))
 
-    @cached_property
-    def acting(self) -> dict[str, NDArray[np.bool_]]:
-        """For the key of each term, the particles on which such a term acts (n,)."""
-        out: dict[str, NDArray[np.bool_]] = {}
-        for term in self.terms:
-            for index in term.particles:
-                out.setdefault(term.key, np.zeros(self.n, dtype=bool))[index] = True
-        return out
-
     def pulls(self, terms: Iterable[Term] | None = None) -> Integers:
         """Number of rows of these terms, or of all, on each particle (n,)."""
         return self._of_rows(lambda term: 1, np.zeros(self.n), terms).astype(np.int64)
