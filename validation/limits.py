@@ -1,14 +1,13 @@
 """Limits of stability and largest steps by a second route: matrices in mpmath with 40 digits.
 
-Claim: the limit of every splitting of kicks and drifts in the catalogue is where half the trace of its step on
-a spring first leaves -1 to 1, in narrow windows too; RK4 and the other tableaux grow where their polynomial
-does; and the largest step of r-RESPA on `multiple-time-steps` is where an eigenvalue of the product of its
-parts first exceeds 1.  The printed numbers are these, rounded down.
+Claim: the limit of every explicit scheme of the catalogue is the first h w at which an eigenvalue of its step
+on a spring exceeds 1; and the largest step of r-RESPA on `multiple-time-steps` is where an eigenvalue of the
+product of its parts does.  The printed numbers are these, rounded down.
 
 Command: python validation/limits.py        (half a minute)
 
-Expected: every line agrees to 1e-9: 2 for the Verlet family, 1.573 for Forest-Ruth and Yoshida, 2.828 for RK4;
-0.34679839 for r-RESPA and 0.22297405 for velocity Verlet on `multiple-time-steps`.
+Expected: every line agrees to 1e-9: 2 for the Verlet family, 1.5734019 for Forest-Ruth and Yoshida, 2.8284271
+for RK4, 2.5074811 for Ruth's third order, and 0.34679839 for r-RESPA.
 """
 
 from __future__ import annotations
