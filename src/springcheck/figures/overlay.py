@@ -203,7 +203,11 @@ class Runs:
 def short(said: str) -> str:
     """The first findings of a sentence, as many as a title holds; "" where not even one fits."""
     out = ""
-    for part in said.partition(" (phase")[0].split("; "):
+    for whole in said.partition(" (phase")[0].split("; "):
+        part = whole
+        if not out and len(whole) > MOST_LETTERS:
+            # without whose the numbers are
+            part = "".join(x.rpartition(")")[2] if i else x for i, x in enumerate(whole.split(" (")))
         longer = f"{out}; {part}" if out else part
         if len(longer) > MOST_LETTERS:
             break
