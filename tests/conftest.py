@@ -5,9 +5,11 @@ from __future__ import annotations
 import gc
 import os
 import signal
+import subprocess
 import sys
 from collections import defaultdict
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -22,16 +24,15 @@ from matplotlib.lines import Line2D
 
 import browser
 import clock
-import forked
 from springcheck import engines
 from springcheck.figures import style
-from springcheck.store import apart, trust
+from springcheck.store import apart
 
 # hundreds of processes that tests start would compile the whole package each
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
 
-# `power` counts what is brought to the disk, and what a loss of power leaves of it: no test waits for a disk
+# no test waits for a disk
 os.fsync = lambda handle: None
 
 # what is imported and collected lives as long as the process: nobody need look for garbage in it
@@ -150,18 +151,25 @@ def whole(request: pytest.FixtureRequest) -> bool:
     return bool(request.config.getoption("--whole"))
 
 
-@pytest.fixture(scope="session")
-def server() -> Iterator[forked.Warm]:
-    """A process that forks one for each command, which then neither starts Python nor imports anything."""
-    begun = forked.Warm()
-    yield begun
-    begun.close()
+@dataclass(frozen=True)
+class Ended:
+    """What a program did."""
+
+    status: int
+    out: str
+    err: str
 
 
 @pytest.fixture
-def program(server: forked.Warm, tmp_path: Path) -> Callable[..., forked.Result]:
+def program(tmp_path: Path) -> Callable[..., Ended]:
     """Carry a command out as a program of its own, in the folder of the test."""
-    return lambda *words: server(words, tmp_path, str(tmp_path)).results()[0]
+
+    def called(*words: str) -> Ended:
+        command = [sys.executable, "-m", "springcheck", *words]
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False)
+        return Ended(done.returncode, done.stdout, done.stderr)
+
+    return called
 
 
 @pytest.fixture(scope="session")
@@ -195,7 +203,6 @@ def tried_here(monkeypatch: pytest.MonkeyPatch) -> None:
     """Files of strangers are read in this process, which takes no interpreter of its own for each."""
 
     monkeypatch.setattr(apart, "read", lambda *given: apart.heard(apart.answer(*given)))
-    monkeypatch.setattr(trust, "_tried", trust._tried.__wrapped__)
 
 
 @pytest.fixture

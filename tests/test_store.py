@@ -17,6 +17,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+import springcheck
 from springcheck import store
 from springcheck.errors import StoreError
 from springcheck.physics.trajectory import Comparison, Timing, Verdict
@@ -133,15 +134,57 @@ def test_positions_and_velocities_cost_no_bytes_and_have_the_right_units(tmp_pat
     assert (tmp_path / "s.h5").stat().st_size < arrays + 50_000
 
 
-def test_a_reduced_scene_says_that_its_units_are_placeholders(tmp_path: Path) -> None:
-    written(tmp_path / "s.h5", scene(units="reduced"))
-    with h5py.File(tmp_path / "s.h5", "r+") as file:
-        assert file["observables/own:euler"].attrs["units_are"].startswith("reduced")
-        assert file["observables/own:euler/p/value"].attrs["unit"] == "1"
-        # readers of H5MD ask for a unit
-        assert file["particles/own:euler/position/value"].attrs["unit"] == "nm"
-        file["observables/own:euler/p/value"].attrs.update(unit="u nm ps-1", units="u nm ps-1")
-    assert not [one for one in store.check(tmp_path / "s.h5") if "unit" in one.what]
+def test_a_reduced_scene_has_no_units_but_for_readers_of_h5md(tmp_path: Path) -> None:
+    made = written(tmp_path / "s.h5", scene(units="reduced"))["own:euler"]
+    with h5py.File(tmp_path / "s.h5") as file:
+        base, group = file["observables/own:euler"], file["particles/own:euler"]
+        assert base.attrs["units_are"].startswith("reduced")
+        assert [base[name].attrs["unit"] for name in ("p/value", "q/time", "energy/value")] == ["1"] * 3
+        # which ask for one
+        assert [group[name].attrs["unit"] for name in ("position/value", "position/time")] == ["nm", "ps"]
+        assert np.array_equal(group["position/time"][()], made.t)
+
+
+def test_the_exact_solution_and_the_errors_are_in_the_file(tmp_path: Path) -> None:
+    found = springcheck.run("spring-uneven", ["own:euler", "own:rk4"], path=tmp_path / "s.h5")
+    with h5py.File(tmp_path / "s.h5") as file:
+        base, exact = file["observables/own:euler"], file["observables/exact"]
+        t, q, error = base["error/time"][()], base["q/value"][()], base["error/value"][()]
+        known = springcheck.load_scene("spring-uneven")
+        distance = np.asarray(known.system.norm(q - exact["q/value"], base["p/value"][()] - exact["p/value"]))
+        assert np.array_equal(t, exact["q/time"][()])
+        np.testing.assert_allclose(error, distance.astype(float), rtol=1e-9, atol=1e-15)
+        largest = file["comparison/max_difference"][0, 1]
+        assert file["comparison/labels"].asstr()[1] == "own:euler"
+        assert np.max(error) == largest > 0
+        assert exact["q/value"].attrs["unit"] == base["q/value"].attrs["unit"]
+    assert list(store.read(tmp_path / "s.h5")) == ["own:euler", "own:rk4"]
+    assert found is not None
+
+
+def test_times_are_scales_and_species_are_there(tmp_path: Path) -> None:
+    s = scene()
+    written(tmp_path / "s.h5", s)
+    with h5py.File(tmp_path / "s.h5") as file:
+        for name in (
+            "observables/own:euler/p",
+            "particles/own:euler/position",
+            "particles/own:euler/species",
+        ):
+            element = file[name]
+            assert element["value"].dims[0]["time"] == element["time"]
+        assert element["value"].shape == (s.frames, s.n)
+        assert not element["value"][()].any()
+        assert element["value"].id.get_storage_size() == 0
+
+
+def test_digests_are_a_dataset_and_no_large_attribute(tmp_path: Path) -> None:
+    written(tmp_path / "s.h5", scene())
+    with h5py.File(tmp_path / "s.h5") as file:
+        listed = dict(zip(file["digests/path"].asstr()[()], file["digests/sha256"].asstr()[()], strict=True))
+        assert all(len(one) == 64 for one in listed.values())
+        assert {"/", "/h5md", "/observables/own:euler/q/value", "/parameters/own:euler"} <= set(listed)
+        assert all(len(str(value)) < 4000 for value in file.attrs.values())
 
 
 def test_the_root_says_what_every_group_is(tmp_path: Path) -> None:
@@ -291,14 +334,12 @@ def test_a_store_of_studies_alone_needs_no_trajectory(tmp_path: Path) -> None:
     assert store.check(tmp_path / "s.h5") == []
 
 
-def test_tables_and_pieces_without_rows_are_stored(tmp_path: Path) -> None:
+def test_tables_without_rows_are_stored(tmp_path: Path) -> None:
     """Pairs and vectors of a result that has none are columns of shape (0, 2)."""
     path = tmp_path / "s.h5"
     columns = {"number": np.empty(0), "pair": np.empty((0, 2))}
     with store.open_new(path, "nothing") as journal:
         journal.add(store.Table(name="of/none", columns=columns))
-        for piece in ("joined/1", "joined/2"):
-            journal.add(store.Table(name=piece, columns=columns), rows=True)
         journal.commit()
     assert store.check(path) == []
     for table in store.tables_of(path).values():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import fcntl
 import json
 import os
 import signal
@@ -45,9 +44,6 @@ def killed(arguments: Sequence[str], path: Path, tables: int) -> dict[str, store
             time.sleep(0.002)
         process.send_signal(signal.SIGKILL)
     assert process.returncode == -signal.SIGKILL, "it ended before it could be killed"
-    # the program that it waited for ends with it, as soon as it hears of that, and lets go of the store
-    with (parts / "lock").open("rb") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
     return dict(store.tables_of(path))
 
 

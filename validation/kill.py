@@ -3,14 +3,13 @@
     python validation/kill.py [kills]
 
 A writer stores trajectories and tables, with a commit at the end, and reports each as soon as it is stored.
-It is killed (SIGKILL) at a random moment of a part or of the commit, 400 times over, long parts adopted in
-every other round; then before every third of the system calls on files that a round makes (all of them with
-1200 kills).  After each kill everything reported must be there with its digest, and every file must pass
-`check`.  Then the commands themselves, `run`, `precision`, `stability` and `extremes`, killed at random
-moments a quarter as often and started again until they end: every trajectory, table and point that one of
-them had finished must be in the store at the end, bit for bit, so none is lost and none measured twice.
-Then: a full disk at forty sizes, a read-only folder, a reader that holds the file open through a commit, and
-two writers.
+It is killed (SIGKILL) at a random moment of a part or of the commit, 200 times over; then before every third
+of the system calls on files that a round makes (all of them with 600 kills).  After each kill everything
+reported must be there with its digest, and every file must pass `check`.  Then the commands themselves,
+`run`, `precision`, `stability` and `extremes`, killed at random moments a quarter as often and started again
+until they end: every trajectory, table and point that one of them had finished must be in the store at the
+end, bit for bit, so none is lost and none measured twice.
+Then: a full disk at forty sizes, a reader that holds the file open through a commit, and two writers.
 
 Kills show that no order of operations loses anything; that fsync reaches the disk is the system's word.
 
@@ -39,7 +38,7 @@ from arguments import arguments, script
 from springcheck import cli, store
 from springcheck.errors import StoreError
 from springcheck.physics.scene import Scene
-from springcheck.store import adopt, parts, reading
+from springcheck.store import parts, reading
 from springcheck.studies.precision.points import CUT_OFF, POINTS
 
 LABELS = [f"own:method-{i}" for i in range(6)]
@@ -106,7 +105,7 @@ def lost(path: Path, seed: int, stored: dict[str, str], listed: set[str]) -> lis
     missing = []
     try:
         with store.open_new(path, f"command {seed}") as journal:
-            found, named = journal.sources(), set(journal.tables())
+            found, named = journal.finished(), set(journal.tables())
             digests = {label: digest(source, label) for label, source in found.items()}
     except StoreError as error:
         if "exists" not in str(error):
@@ -116,7 +115,7 @@ def lost(path: Path, seed: int, stored: dict[str, str], listed: set[str]) -> lis
         named = set(dict(store.tables_of(path)))
     missing += [label for label, expected in stored.items() if digests.get(label) != expected]
     missing += sorted(listed - named)
-    if path.is_file() or parts.parts_folder(path).is_dir():
+    if path.is_file() or parts.folder_of(path).is_dir():
         missing += [f"{finding.place}: {finding.what}" for finding in found_by_check(path)]
     return missing
 
@@ -188,7 +187,6 @@ def random_kills(folder: Path, kills: int) -> int:
     duration = {"part": 0.02, "collection": 0.04}
     path, ledger = folder / "random.h5", Ledger()
     while sum(counts.values()) < kills:
-        adopt.LARGE = 0 if seed % 2 else 1 << 28
         phase = PHASES[sum(counts.values()) % 2]
         pid, pipe = child(partial(write, path, seed=seed))
         lines = reports(pipe, f"phase {phase}")
@@ -207,10 +205,10 @@ def random_kills(folder: Path, kills: int) -> int:
         if gone:
             losses += len(gone)
             print("  lost:", gone)
-        if done or (path.is_file() and not parts.parts_folder(path).is_dir()):
+        if done or (path.is_file() and not parts.folder_of(path).is_dir()):
             reported += len(ledger.stored) + len(ledger.listed)
             path.unlink(missing_ok=True)
-            shutil.rmtree(parts.parts_folder(path), ignore_errors=True)
+            shutil.rmtree(parts.folder_of(path), ignore_errors=True)
             ledger, seed = Ledger(), seed + 1
     spread = ", ".join(f"{number} in a {phase}" for phase, number in counts.items())
     print(f"random kills: {sum(counts.values())} ({spread}), {reported} reports, lost {losses}")
@@ -267,7 +265,7 @@ def command(words: list[str], say: Callable[[str], None]) -> None:
 
 def finished(path: Path) -> dict[str, object]:
     """What a store and its journal hold: digests of trajectories, points of precision, columns of tables."""
-    if not path.is_file() and not parts.parts_folder(path).is_dir():
+    if not path.is_file() and not parts.folder_of(path).is_dir():
         return {}
     try:
         found: dict[str, object] = {label: digest(file, label) for label, file in store.sources(path).items()}
@@ -311,34 +309,32 @@ def dies_before(call: int) -> Callable[..., None]:
 
 
 def every_call(folder: Path, stride: int) -> int:
-    """A kill before each system call of a whole round, long parts copied and adopted -> losses."""
+    """A kill before each system call of a whole round -> losses."""
     losses, kills = 0, 0
-    for large in (0, 1 << 28):
-        adopt.LARGE = large
-        call, done = 1 + (large > 0) * stride // 2, False
-        while not done:
-            path = folder / f"call-{large}-{call}.h5"
+    call, done = 1, False
+    while not done:
+        path = folder / f"call-{call}.h5"
 
-            def work(say: Callable[[str], None], path: Path = path, call: int = call) -> None:
-                sys.setprofile(dies_before(call))
-                write(path, say, 0)
-                sys.setprofile(None)
+        def work(say: Callable[[str], None], path: Path = path, call: int = call) -> None:
+            sys.setprofile(dies_before(call))
+            write(path, say, 0)
+            sys.setprofile(None)
 
-            pid, pipe = child(work)
-            ledger = Ledger()
-            lines = reports(pipe)
-            ledger.add(lines)
-            os.waitpid(pid, 0)
-            os.close(pipe)
-            done = "done" in lines
-            kills += not done
-            gone = lost(path, 0, ledger.stored, ledger.listed) + ledger.failed
-            if gone:
-                losses += len(gone)
-                print(f"  before call {call}, lost:", gone)
-            path.unlink(missing_ok=True)
-            shutil.rmtree(parts.parts_folder(path), ignore_errors=True)
-            call += stride
+        pid, pipe = child(work)
+        ledger = Ledger()
+        lines = reports(pipe)
+        ledger.add(lines)
+        os.waitpid(pid, 0)
+        os.close(pipe)
+        done = "done" in lines
+        kills += not done
+        gone = lost(path, 0, ledger.stored, ledger.listed) + ledger.failed
+        if gone:
+            losses += len(gone)
+            print(f"  before call {call}, lost:", gone)
+        path.unlink(missing_ok=True)
+        shutil.rmtree(parts.folder_of(path), ignore_errors=True)
+        call += stride
     print(f"kills before each system call: {kills}, lost {losses}")
     return losses
 
@@ -375,28 +371,6 @@ def full_disk(folder: Path) -> int:
     return losses
 
 
-def read_only(folder: Path) -> int:
-    """A folder that cannot be written: told, and what is in it stays."""
-    place = folder / "read-only"
-    place.mkdir()
-    place.chmod(0o555)
-    pid, pipe = child(lambda say: _refused(place / "x.h5", say))
-    lines = reports(pipe)
-    os.waitpid(pid, 0)
-    place.chmod(0o755)
-    print(f"read-only folder: {lines[-1]}, lost {len(list(place.iterdir()))}")
-    return int(not lines[-1].startswith("told") or any(place.iterdir()))
-
-
-def _refused(path: Path, say: Callable[[str], None]) -> None:
-    if os.geteuid() == 0:
-        os.setuid(65534)  # root may write anywhere
-    try:
-        write(path, say, 0)
-    except StoreError as error:
-        say(f"told: {error}")
-
-
 def reader_and_writers(folder: Path) -> int:
     """A reader holds the old file through a commit; a second writer is refused."""
     path = folder / "shared.h5"
@@ -424,14 +398,13 @@ def main() -> int:
     if sys.argv[1:2] == ["--limited"]:
         limited(Path(sys.argv[2]), int(sys.argv[3]))
         return 0
-    kills = arguments(__doc__, kills=400).kills
+    kills = arguments(__doc__, kills=200).kills
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         folder.chmod(0o755)
-        total = random_kills(folder, kills) + every_call(folder, max(1, 1200 // kills))
-        adopt.LARGE = 1 << 28
+        total = random_kills(folder, kills) + every_call(folder, max(1, 600 // kills))
         total += commands(folder, kills)
-        total += full_disk(folder) + read_only(folder) + reader_and_writers(folder)
+        total += full_disk(folder) + reader_and_writers(folder)
     return int(total > 0)
 
 

@@ -26,8 +26,8 @@ CHUNK = 1 << 16
 """Numbers per array and chunk: 512 KiB, which stays in the cache."""
 
 FIRST, QUICK = 256, 0.1
-"""Rows of the first chunk, and the seconds below which the next one is four times as long: a slow engine
-reports its progress, and notices Ctrl-C, several times a second."""
+"""Rows of the first chunk, and the seconds below which the next one is twice as long, and of which twice as
+many halve it: a slow engine reports its progress, and notices Ctrl-C, several times a second."""
 
 PIECE, WORK = 1 << 16, 1 << 22
 """Steps, and steps times particles, that an engine of fixed step takes in one call where frames lie further
@@ -132,7 +132,10 @@ def play(
         if ended.status == "diverged" and not method.adaptive:
             # steps to the last frame that is kept: every step costs the same, but for a first force
             calls = before - (before - calls) * good // begun
-        ready = min(rows, 4 * ready) if whole and seconds < QUICK else ready
+        if whole and seconds < QUICK:
+            ready = min(rows, 2 * ready)
+        elif seconds > 2 * QUICK:
+            ready = max(1, ready // 2)
         if good:
             _hand_over(scene, sink, frame, q[:good], p[:good])
         frame += good

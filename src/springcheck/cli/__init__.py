@@ -68,8 +68,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return status
     except BaseException as error:
         # a library that was interrupted may raise an error of its own
-        if isinstance(error, KeyboardInterrupt) or interrupts.seen():
-            interrupts.say()
+        if interrupts.seen():
+            raise
+        if isinstance(error, KeyboardInterrupt):
+            print(f"springcheck: interrupted; {what}", file=sys.stderr)
             return interrupts.STATUS
         if isinstance(error, SpringcheckError | OSError):
             return _mistake(error)
@@ -116,7 +118,7 @@ def _parser(words: Sequence[str]) -> argparse.ArgumentParser:
         description="Simulation engines judged to rounding by a mass on a spring.",
         epilog="Exit status: 0 every verdict passed; 1 some verdict failed; "
         f"2 bad input, nothing was measured, or an engine failed; {interrupts.STATUS} interrupted; "
-        f"{interrupts.BROKEN_PIPE} nobody reads the output.",
+        "141 nobody reads the output.",
     )
     version = f"springcheck {springcheck.__version__}"
     parser.add_argument("--version", action="version", version=version, help="print the version and exit")

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from springcheck import interrupts
 from springcheck.errors import SpringcheckError, plain
 from springcheck.store import files
 from springcheck.studies.arguments import REPORT_FORMS
@@ -185,8 +184,9 @@ def summary(command: str, found: Sequence[Case], status: int) -> str:
     """A summary in Markdown; its first sentence is the cause."""
     wrong = [x for x in found if x.passed is False or x.error]
     first, tally = sentence(found, status), _tally(found)
-    judged = any(x.passed is not None for x in found)
-    words = "an error, and some was judged" if status == 2 and judged else WORDS[status]
+    words = WORDS[status]
+    if status == 2 and any(x.passed is not None for x in found):
+        words = "error" if any(x.error for x in found) else "not everything judged"
     lines = [f"### springcheck {command}: {words}", "", _cell(first), ""]
     if len(wrong) > 1:
         lines += ["| what | check | why |", "|---|---|---|"]
@@ -211,7 +211,7 @@ def _write(options: Namespace, found: list[Case], status: int) -> None:
     if options.summary:
         text = summary(options.name, found, status).encode()
         where = Path(options.summary)
-        with files.told(where, "write"), interrupts.held(), where.open("ab") as file:
+        with files.told(where, "write"), where.open("ab") as file:
             file.write(text)
 
 

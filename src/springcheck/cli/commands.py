@@ -232,9 +232,10 @@ def _check(options: Namespace) -> int:
     for finding in findings:
         print(plain(f"{options.file}: {finding.place}: {finding.what}"))
     if not findings:
-        ended = store.summary(Path(options.file)).complete
-        rest = "" if ended else "; unfinished: the command that writes it goes on when it is given again"
-        print(f"{options.file}: whole; every digest matches{rest}")
+        found = store.summary(Path(options.file))
+        what = "every digest matches" if found.listed else "its arrays match; an older store lists no more"
+        rest = "" if found.complete else "; unfinished: give the command that writes it again to resume it"
+        print(f"{options.file}: whole; {what}{rest}")
     return 1 if findings else 0
 
 
@@ -276,7 +277,7 @@ KINDS = ("scenes", "methods", "checks", "terms", "schemes")
 _FILE = argument("file", metavar="FILE")
 _GROUP = argument("--trajectory", metavar="LABEL", help="one trajectory or particle group of the file")
 _NAMES = argument("--columns", metavar="NAMES", help="a table's columns, as t,q,v; of HDF5 as t=a,q=b,v=c")
-_STEPS = argument("--step", type=float, metavar="H", help="the time step of a file that counts steps")
+_STEPS = argument("--step", "--dt", type=float, metavar="H", help="the time step of a file that counts steps")
 
 COMMANDS = (
     Command("inspect", "what is in a store", _inspect, (
@@ -321,7 +322,7 @@ COMMANDS = (
         argument("--mass", type=float, metavar="M",
                  help="mass of every particle in the file's unit (default: the file's)"),
         _NAMES,
-        argument("--step", type=float, metavar="H", help="is this the time step?"),
+        argument("--step", "--dt", type=float, metavar="H", help="is this the time step?"),
         argument("--scheme", metavar="NAME", help="is this the scheme?"),
         argument("--stepper", dest="integrator", metavar="FILE.py:FUNCTION",
                   help="judge a Python function step(q, p, h, force, mass) -> (q, p)"),

@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 import platform
 from collections.abc import Iterator
+from contextlib import suppress
+from importlib import metadata
 from typing import Any
 
 import numpy as np
@@ -14,7 +16,6 @@ from springcheck import engines
 from springcheck.errors import MethodError
 from springcheck.physics import scenefile
 from springcheck.physics.arrays import WIDE
-from springcheck.studies import provenance
 from springcheck.text.lines import Lines, plain
 
 LIBRARIES = ("numpy", "scipy", "h5py", "numba", "matplotlib", "jinja2", "rich", "msgspec", "pandas", "xarray")
@@ -35,10 +36,16 @@ def found() -> dict[str, Any]:
             if WIDE
             else "no wider than double here: bounds are wider, and `extremes` does not run",
         },
-        "libraries": dict.fromkeys(LIBRARIES) | provenance.installed(LIBRARIES),
+        "libraries": {name: _version(name) for name in LIBRARIES},
         "engines": [_engine(name) for name in engines.names()],
         "unusable_engines": engines.unusable(),
     }
+
+
+def _version(name: str) -> str | None:
+    with suppress(metadata.PackageNotFoundError):
+        return metadata.version(name)
+    return None
 
 
 def _engine(name: str) -> dict[str, Any]:

@@ -140,7 +140,6 @@ def document(summary: store.Summary, options: Namespace) -> dict[str, Any]:
             for run in summary.runs
         ],
         tables=summary.tables,
-        measured_on=keeper.who(summary.path),
         studies=documents,
         **kept,
         trajectory=shown,

@@ -69,11 +69,9 @@ def answer(
     if options.json:
         schema = f"springcheck/{name or options.name}/{SCHEMAS.get(name or options.name, 1)}"
         whole = json.dumps({"schema": schema, **data}, allow_nan=False, indent=2)
-        with interrupts.last():
-            print(whole)
+        print(whole)
     elif not getattr(options, "quiet", False) and (said := lines()):
-        with interrupts.last():
-            show(said)
+        show(said)
     return status
 
 

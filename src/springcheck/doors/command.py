@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from springcheck import interrupts, schemes
+from springcheck import processes, schemes
 from springcheck.engines import BRAKES, DRIVEN, EVERY_FORCE, Engine, Label, Method, Simulation
 from springcheck.errors import MethodError, StoreError
 from springcheck.physics.arrays import Floats
@@ -130,12 +130,12 @@ class _Command:
         return MethodError(f"command {self._name}{what}")
 
     def _run(self, every: int) -> tuple[Floats, Floats]:
-        with interrupts.folder(prefix="springcheck-") as folder:
+        with processes.folder(prefix="springcheck-") as folder:
             scene, out = folder / "scene.json", folder / "out"
             scene.write_text(json.dumps(as_json(self._scene, self._h, every)))
             words = [word.replace("{scene}", str(scene)).replace("{out}", str(out)) for word in self._words]
             try:
-                done = interrupts.called(words, self._seconds)
+                done = processes.called(words, self._seconds)
             except subprocess.TimeoutExpired as error:
                 said = f" did not end within {self._seconds:g} s; --timeout gives it more"
                 raise self._failed(said) from error

@@ -76,7 +76,7 @@ def _module(name: str) -> ModuleType:
     here = str(Path.cwd())
     sys.path.insert(0, here)
     try:
-        with engines.foreign(name, f"module {name!r} cannot be imported"):
+        with engines.foreign(f"module {name!r} cannot be imported"):
             return importlib.import_module(name)
     except MethodError as failure:
         missing = failure.__cause__

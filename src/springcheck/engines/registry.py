@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import os
+import sys
 from collections.abc import Iterator, Mapping, Set
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -18,9 +19,9 @@ from types import ModuleType
 from typing import NamedTuple
 
 import springcheck
-from springcheck import interrupts, schemes
+from springcheck import schemes
 from springcheck.bath import THERMOSTATS
-from springcheck.engines.contract import ANY_POTENTIAL, Engine, Method, Stopped
+from springcheck.engines.contract import ANY_DISTANCE, ANY_POTENTIAL, Engine, Method, Stopped
 from springcheck.engines.restored import restored
 from springcheck.errors import EngineError, MethodError, SpringcheckError, nearest, told
 from springcheck.physics import terms
@@ -97,24 +98,17 @@ def _loaded(name: str, place: str) -> Engine | str:
     """The engine at a place, or why there is none, whatever its code raises."""
     module, _, attribute = place.partition(":")
     try:
-        with foreign(place, f"{place} cannot be loaded"):
+        with foreign(f"{place} cannot be loaded"):
             return _checked(attrgetter(attribute)(importlib.import_module(module)), name)
     except SpringcheckError as error:
         return str(error)
 
 
 @contextmanager
-def foreign(name: str, what: str, file: str = "") -> Iterator[None]:
-    """Run foreign code, known by this name: whatever it raises becomes an EngineError "`what`: why".
-
-    Code that has ended an earlier process of this command (`interrupts.supervised`) is not run again: the
-    MethodError says how it ended that one.
-    """
-    before = interrupts.ended_by(name)
-    if before:
-        raise EngineError(f"{what}: {before}")
-    process = os.getpid()
-    interrupts.calling(name)
+def foreign(what: str, file: str = "") -> Iterator[None]:
+    """Run foreign code: whatever it raises becomes an EngineError "`what`: why", and `os._exit` raises."""
+    process, leave = os.getpid(), os._exit
+    os._exit = sys.exit  # type: ignore[assignment]
     try:
         with restored():
             yield
@@ -123,10 +117,10 @@ def foreign(name: str, what: str, file: str = "") -> Iterator[None]:
     except BaseException as error:
         raise EngineError(f"{what}: {told(error, file)}") from error
     finally:
+        os._exit = leave
         if os.getpid() != process:
             # a fork within foreign code is not the program
             os._exit(1)
-        interrupts.calling("")
 
 
 def _plain(what: str, name: object) -> None:
@@ -153,7 +147,7 @@ def _checked(found: object, name: str = "") -> Engine:
             )
     if not (found.methods or found.thermostats):
         raise MethodError("it has no methods and no thermostats")
-    known = (*terms.known(), ANY_POTENTIAL)
+    known = (*terms.known(), ANY_POTENTIAL, ANY_DISTANCE)
     for scheme in found.schemes:
         schemes.bring(scheme)
     for key, one in (*found.methods.items(), *found.thermostats.items()):
@@ -289,7 +283,7 @@ def module_of(path: Path) -> ModuleType:
     if spec is None or spec.loader is None:
         raise MethodError(f"{path} is not a Python file: its name must end in .py")
     module = importlib.util.module_from_spec(spec)
-    with foreign(str(path), f"{path} cannot be imported", str(path)):
+    with foreign(f"{path} cannot be imported", str(path)):
         # the loader would take bytecode of a text of the same length and second for that of this one
         exec(compile(path.read_bytes(), str(path), "exec", dont_inherit=True), vars(module))
     return module

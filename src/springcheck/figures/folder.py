@@ -59,9 +59,11 @@ def write(content: Mapping[str, bytes], folder: Path) -> list[Path]:
 
 def _known(folder: Path) -> dict[str, list[str]]:
     """The store, then the digests, of each figure in a folder."""
+    index = folder / FIGURES
     try:
-        with files.own(folder / FIGURES) as file:
-            found = json.loads(file.read())
+        if index.exists() and not files.is_plain(index):
+            raise ValueError("a link, or no file")
+        found = json.loads(index.read_bytes())
         return {str(name): [str(one) for one in known] for name, known in found.items() if known}
     except FileNotFoundError:
         return {}

@@ -12,7 +12,7 @@ from springcheck.errors import StoreError
 from springcheck.formats.columns import Floats, States, fitting, kind
 from springcheck.formats.lines import MOST_NUMBERS
 from springcheck.formats.numbers import states_of
-from springcheck.store import access, layout, trust
+from springcheck.store import access, apart, checking, layout
 
 MOST_FRAMES = 1 << 21
 """Frames of one particle group that are read, however many it declares."""
@@ -23,9 +23,9 @@ DEEPEST = 4
 def is_foreign(path: str | Path) -> bool:
     """Whether an HDF5 file is no store of ours.  StoreError where it cannot be read."""
     path = Path(path)
-    trust.trust(path, __name__)
+    apart.trust(path, __name__)
     with access.for_reading(path) as file:
-        return access.attribute(file, "format") not in (layout.FORMAT, layout.OLDER)
+        return access.attribute(file, "format") not in (layout.FORMAT, *layout.OLDER)
 
 
 def read_hdf5(path: Path, columns: Sequence[str] = (), most: int | None = None) -> dict[str, States]:
@@ -35,7 +35,7 @@ def read_hdf5(path: Path, columns: Sequence[str] = (), most: int | None = None) 
     every group with datasets of times and positions is one; or `columns` name the datasets, as
     ``t=run/clock,q=run/x,v=run/dx``.  Raises StoreError where there is none.
     """
-    trust.trust(path, __name__)
+    apart.trust(path, __name__)
     if columns:
         wanted = {text.rpartition("=")[2].strip("/") for text in columns}
         names = [text.replace("=/", "=").removeprefix("/") for text in columns]
@@ -70,7 +70,11 @@ def _name_of(place: str) -> str:
 
 
 def tried(path: Path) -> bytes:
-    """Read everything that `read_hdf5` might, in a child process (see `springcheck.store.trust`)."""
+    """Read everything that `read_hdf5` might, in a child process (see `springcheck.store.apart`)."""
+    with access.for_reading(path) as file:
+        ours = access.attribute(file, "format") in (layout.FORMAT, *layout.OLDER)
+    if ours:
+        return checking.tried(path)
     for _ in arrays(path, lambda place: True):
         pass
     particle_groups(path)

@@ -6,11 +6,12 @@ Writing: ``with open_new(path, command) as journal`` and `Journal`.  Reading: `r
 
 from springcheck.errors import StoreError, StoreWarning
 from springcheck.store.checking import Damage, check, doubts
+from springcheck.store.collection import Solution
 from springcheck.store.draft import Draft
 from springcheck.store.exporting import export
 from springcheck.store.files import need_space
 from springcheck.store.journal import Journal, open_new
-from springcheck.store.layout import machine, size
+from springcheck.store.layout import size
 from springcheck.store.reading import (
     Summary,
     comparison,
@@ -18,7 +19,6 @@ from springcheck.store.reading import (
     digest,
     document,
     end,
-    measured_by,
     read,
     read_one,
     scene_text,
@@ -29,12 +29,12 @@ from springcheck.store.reading import (
     verdicts,
     windows,
 )
-from springcheck.store.records import Run, attributes
+from springcheck.store.records import Run, attributes, machine
 from springcheck.store.tables import Table
 
 __all__ = [
-    "Draft", "Damage", "Journal", "Run", "StoreError", "StoreWarning", "Summary", "Table", "attributes",
-    "check", "comparison", "decoded", "digest", "document", "doubts", "end", "export", "machine",
-    "measured_by", "need_space", "open_new", "read", "read_one", "scene_text", "size", "sources", "strided",
+    "Draft", "Damage", "Journal", "Run", "Solution", "StoreError", "StoreWarning", "Summary", "Table",
+    "attributes", "check", "comparison", "decoded", "digest", "document", "doubts", "end", "export",
+    "machine", "need_space", "open_new", "read", "read_one", "scene_text", "size", "sources", "strided",
     "summary", "tables_of", "verdicts", "windows",
 ]  # fmt: skip

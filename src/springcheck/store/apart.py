@@ -1,7 +1,8 @@
-"""Files of other programs, read in a child process with limited memory and time, whose end is never ours.
+"""Files are first read in a child process with limited memory and time, whose end is never ours.
 
 Libraries that read them (libhdf5, pandas, MDAnalysis, ASE ...) crash, hang and fill the memory on files that
-are damaged, or were made to do so.
+are damaged, or were made to do so.  Nothing in a file can say that it is harmless: only files that this
+process has written itself are opened without a trial.
 """
 
 from __future__ import annotations
@@ -10,22 +11,68 @@ import contextlib
 import os
 import subprocess
 import sys
+from functools import lru_cache
 from importlib import import_module
 from pathlib import Path
 
 from springcheck.errors import StoreError
-from springcheck.interrupts import called
+from springcheck.processes import called
+from springcheck.store import files
 
-LIMIT, SPEED = 8.0, 1e8
-"""Seconds that reading a file may take, whatever its size, and bytes a second on top."""
+LIMIT, LONGEST, SPEED = 8.0, 20.0, 1e8
+"""Seconds of processor time that reading a file may take: of a small one, and of any; bytes a second."""
 MEMORY = 1 << 30
 """Bytes of memory that it may take."""
 REFUSED = b"refused "
 """Prefix of a reader's message on a file that it refuses."""
 
+_harmless: set[tuple[int, ...]] = set()
+"""States of the files that this process has written, or whose trial has ended well."""
+
 
 class EndedError(Exception):
     """The child process crashed or exceeded its limits: the message says which."""
+
+
+def trust(path: Path, module: str) -> None:
+    """Return if this process can open a file with libhdf5; raise StoreError otherwise.
+
+    The function `tried` of the module reads all of it in a child process.
+    """
+    with files.told(path, "read"):
+        if state(path) in _harmless:
+            return
+        tried(path, module)
+
+
+def tried(path: Path, module: str) -> bytes:
+    """What a trial of a file has found.  StoreError where it did not end well."""
+    found, why = _tried(path.absolute(), module, state(path))
+    if why:
+        raise StoreError(why)
+    know(path)
+    return found
+
+
+@lru_cache(maxsize=256)
+def _tried(path: Path, module: str, state: tuple[int, ...]) -> tuple[bytes, str]:
+    try:
+        return read(module, "tried", path), ""
+    except StoreError as error:
+        return b"", str(error)
+    except EndedError as error:
+        return b"", f"cannot read {path}: it is damaged, reading it {error}"
+
+
+def know(path: Path) -> None:
+    """Remember that a file, as it is now, can be opened."""
+    _harmless.add(state(path))
+
+
+def state(path: Path) -> tuple[int, ...]:
+    """What changes when a file is written or replaced."""
+    found = path.stat()
+    return found.st_dev, found.st_ino, found.st_mtime_ns, found.st_size
 
 
 def read(module: str, function: str, path: Path, *words: str) -> bytes:
@@ -35,15 +82,17 @@ def read(module: str, function: str, path: Path, *words: str) -> bytes:
     paths = os.pathsep.join(filter(None, [root, os.environ.get("PYTHONPATH")]))
     # BLAS would take memory for a thread of each core
     threads = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
-    limit = LIMIT + path.stat().st_size / SPEED
+    limit = min(LONGEST, LIMIT + path.stat().st_size / SPEED)
     begin = "from springcheck.store import apart; apart.perform()"
     limits = (str(int(limit) + 1), str(MEMORY))
     command = [sys.executable, "-P", "-c", begin, *limits, module, function, str(path), *words]
     try:
         # on a busy machine it waits longer than it works, and work is what is limited
-        done = called(command, 6 * limit, env={**os.environ, **threads, "PYTHONPATH": paths})
+        done = called(command, 6 * limit, most=MEMORY, env={**os.environ, **threads, "PYTHONPATH": paths})
     except subprocess.TimeoutExpired:
         raise EndedError("does not end") from None
+    except OSError as error:
+        raise StoreError(f"cannot read {path}: no process can be started ({files.cause(error)})") from error
     if done.returncode:
         raise EndedError(
             f"crashes its library, or asks for more than {limit:.0f} s or {MEMORY >> 30} GiB of memory"
@@ -60,11 +109,11 @@ def answer(module: str, function: str, path: Path, *words: str) -> bytes:
     return found
 
 
-def heard(said: bytes) -> bytes:
+def heard(answer: bytes) -> bytes:
     """The result that a child process has written; its StoreError is raised again."""
-    if said.startswith(REFUSED):
-        raise StoreError(said.removeprefix(REFUSED).decode("utf-8", "backslashreplace"))
-    return said
+    if answer.startswith(REFUSED):
+        raise StoreError(answer.removeprefix(REFUSED).decode("utf-8", "backslashreplace"))
+    return answer
 
 
 def perform() -> None:

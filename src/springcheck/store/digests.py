@@ -1,35 +1,63 @@
-"""The sha256 of every array, group, table and document of a collection, and the list of them.
-
-The seal (see `seal`) ends with the first edit by another program.  These digests stay, and show what was
-changed and what was not.  They can be written without a key: they find accidents and careless edits, not a
-forger.
+"""The sha256 of every array, group, table and document of a store, listed in its table `digests`.
 
 A recorded array carries the sha256 of its numbers as an attribute, which `Draft` computes while it writes
-them and the seal repeats.  The digest here is of its attributes, shape, type and storage, and so covers that
-one.
+them; its digest here is of its attributes, shape and type, and so covers that one.  Digests can be written
+without a key: they find accidents and careless edits, not a forger.
 """
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any, BinaryIO, NamedTuple
 
 import h5py
 
+from springcheck.errors import StoreError
 from springcheck.store import access, tables
 from springcheck.store.layout import QUANTITIES
-from springcheck.store.seal import Extent
 
-KEY = "digests"
-"""The attribute of the root that keeps the digests."""
-
-LAID_OUT = ("h5md", "observables", "particles")
-"""Groups of the root whose members have a digest each; stores of earlier formats list none of them."""
+NAME = "digests"
 MOST_OBJECTS = 64 * access.MOST_MEMBERS
-DEEPEST = 4
-"""Bounds on the objects below these groups, and on their depth: the needs of a store with the most
-trajectories."""
+DEEPEST = 10
+BLOCK = 1 << 20
+"""Bytes that are hashed at a time."""
+HOLES = 64
+"""Largest ratio of the bytes that arrays claim to those that their file takes on the disk."""
+_SCALES = {"CLASS", "NAME", "REFERENCE_LIST", "DIMENSION_LIST"}
+"""Attributes of dimension scales: addresses in the file, which a copy changes."""
+
+
+class Extent(NamedTuple):
+    """The bytes of a recorded array: its path, offset and size [B], and its sha256."""
+
+    name: str
+    offset: int
+    size: int
+    sha256: str
+
+
+def blocks(file: BinaryIO, start: int, size: int) -> Iterator[bytes]:
+    """The bytes of a range, block by block; stops early where the file ends."""
+    file.seek(start)
+    while size > 0 and (block := file.read(min(BLOCK, size))):
+        size -= len(block)
+        yield block
+
+
+def sha256(file: BinaryIO, start: int, size: int) -> str:
+    """sha256 of a range of bytes, in bounded memory."""
+    total = hashlib.sha256()
+    for block in blocks(file, start, size):
+        total.update(block)
+    return total.hexdigest()
+
+
+def broken(path: Path, extents: Iterable[Extent]) -> list[str]:
+    """Names of the arrays whose bytes do not match their sha256."""
+    with path.open("rb") as file:
+        return [one.name for one in extents if sha256(file, one.offset, one.size) != one.sha256]
 
 
 def combined(digests: Mapping[str, str], arrays: Mapping[str, Any]) -> str:
@@ -43,73 +71,76 @@ def combined(digests: Mapping[str, str], arrays: Mapping[str, Any]) -> str:
     return hashlib.sha256("\n".join(lines).encode()).hexdigest()
 
 
-def of_table(group: Any) -> str:
-    """sha256 of a table: its columns with names, shapes, values and attributes, and its own attributes."""
-    total = hashlib.sha256(_attributes(group, "sha256"))
-    for name, dataset in sorted(access.columns(group).items()):
-        text = access.is_text(dataset)
-        kind = "|O" if text else dataset.dtype.str
-        total.update(f"{name} {dataset.shape} {kind}\n".encode() + _attributes(dataset))
-        values = access.column(dataset)
-        if text:
-            total.update("\0".join(map(str, values.ravel())).encode("utf-8", "surrogatepass"))
-        else:
-            total.update(values.tobytes())
-    return total.hexdigest()
-
-
-def of_run(file: Any, label: str) -> str:
-    """sha256 of everything known of a trajectory: metadata, the digest of its numbers, and its masses."""
-    total = hashlib.sha256(_attributes(access.group_at(file, f"parameters/{label}")))
-    mass = f"particles/{label}/mass"
-    if access.find(file, mass) is not None:
-        total.update(access.column(access.dataset_at(file, mass)).tobytes())
-    return total.hexdigest()
-
-
 def contents(file: Any) -> tuple[dict[str, str], list[Extent]]:
-    """sha256 of every object of a collection by its path, and its recorded arrays as the seal lists them."""
-    found = {"/": hashlib.sha256(_attributes(file, KEY)).hexdigest()}
+    """sha256 of every object of a file by its path, and its recorded arrays.
+
+    An object that is refused has none.  StoreError where arrays claim the same bytes twice.
+    """
+    found = {"/": _sha256(file, b"")}
     extents: list[Extent] = []
     known: dict[int, str] = {}
-    for below, at, node in access.walk(file, MOST_OBJECTS, DEEPEST, lambda place, node: _is_laid_out(place)):
-        if _is_laid_out(below):
-            # times and steps are one array under many names
-            if at not in known:
-                known[at] = _of_object(below, file[below] if node is None else node, extents)
-            found[f"/{below}"] = known[at]
-    for label in access.children(file, "parameters"):
-        found[f"/parameters/{label}"] = of_run(file, label)
-    every_store_has = {"comparison", "verdicts"} & {*access.members(file)}
-    for name in (*tables.names(file), *sorted(every_store_has)):
-        found[f"/{name}"] = of_table(access.group_at(file, name))
-    for name in access.children(file, "documents"):
-        text = access.text(file, f"documents/{name}")
-        found[f"/documents/{name}"] = hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()
+    for place, at, node in access.walk(file, MOST_OBJECTS, DEEPEST, lambda place, node: place != NAME):
+        if place == NAME:
+            continue
+        # times and steps are one array under many names
+        if at not in known:
+            try:
+                known[at] = _of(file, place, file[place] if node is None else node, extents)
+            except StoreError as error:
+                known[at] = f"none: {error}"
+        found[f"/{place}"] = known[at]
+    end = 0
+    for one in sorted(extents, key=lambda one: one.offset):
+        if one.offset < end:
+            raise StoreError(f"cannot read {file.filename}: {one.name} overlaps another array")
+        end = one.offset + one.size
+    # a file of holes would be hashed for hours
+    blocks = getattr(Path(file.filename).stat(), "st_blocks", end) if file.mode == "r" else end
+    if end > HOLES * 512 * blocks:
+        raise StoreError(f"cannot read {file.filename}: its arrays are holes, which take no room on the disk")
     return found, extents
 
 
-def _is_laid_out(place: str) -> bool:
-    return place.partition("/")[0] in LAID_OUT
+def _of(file: Any, place: str, node: Any, extents: list[Extent]) -> str:
+    """The digest of an object; a recorded array is also appended to `extents`."""
+    if not isinstance(node, h5py.Dataset):
+        return _sha256(node, b"")
+    node = access.dataset_at(file, place, packed=True) if node.size and _is_written(node) else node
+    how, recorded = access.storage(node), access.attribute(node, "sha256")
+    about = f"{node.shape} {node.dtype.str} {how.layout} {how.views}".encode("utf-8", "surrogatepass")
+    if isinstance(recorded, str) and how.layout == access.CONTIGUOUS:
+        size = node.size * node.dtype.itemsize
+        extents.append(Extent(f"/{place}", node.id.get_offset() or 0, size, recorded))
+    elif how.layout not in (access.CHUNKED, access.VIRTUAL):
+        values = access.column(node)
+        words = "\0".join(map(str, values.ravel())).encode("utf-8", "surrogatepass")
+        about += words if values.dtype == object else values.tobytes()
+    return _sha256(node, about)
 
 
-def _of_object(place: str, node: Any, extents: list[Extent]) -> str:
-    """The digest of a group or dataset; a recorded array is also appended to `extents`."""
-    attributes = access.attributes(node)
-    total = hashlib.sha256(_listed(attributes))
-    if isinstance(node, h5py.Dataset):
-        how, said = access.StoredAs.of(node), attributes.get("sha256")
-        text = f"{node.shape} {node.dtype.str} {how.layout} {how.chunk} {how.views}"
-        total.update(text.encode("utf-8", "surrogatepass"))
-        if how.layout == h5py.h5d.CONTIGUOUS and isinstance(said, str):
-            size = node.size * node.dtype.itemsize
-            extents.append(Extent(name=f"/{place}", offset=node.id.get_offset() or 0, size=size, sha256=said))
-    return total.hexdigest()
+def _is_written(node: Any) -> bool:
+    """Whether a dataset has more than a fill value."""
+    return bool(node.id.get_storage_size()) or access.storage(node).layout == access.VIRTUAL
 
 
-def _attributes(node: Any, *left_out: str) -> bytes:
-    return _listed({key: value for key, value in access.attributes(node).items() if key not in left_out})
+def _sha256(node: Any, content: bytes) -> str:
+    known = {name: x for name, x in access.attributes(node).items() if name not in _SCALES}
+    return hashlib.sha256(repr(sorted(known.items())).encode("utf-8", "surrogatepass") + content).hexdigest()
 
 
-def _listed(attributes: Mapping[str, Any]) -> bytes:
-    return repr(sorted(attributes.items())).encode("utf-8", "surrogatepass")
+def write(file: Any) -> tuple[dict[str, str], list[Extent]]:
+    """Add the table of digests to a complete file -> what it lists, and the recorded arrays."""
+    found, extents = contents(file)
+    about = {"about": "sha256 of the attributes and content of every object; of arrays see their attribute"}
+    columns = {"path": [*found], "sha256": [*found.values()]}
+    tables.write(file, tables.Table(name=NAME, columns=columns, attributes=about))
+    return found, extents
+
+
+def read(file: Any) -> dict[str, str]:
+    """The digests that a file lists.  StoreError where it has no such table."""
+    group = access.group_at(file, NAME)
+    if group is None:
+        raise StoreError(f"cannot read {file.filename}: the list of its digests is missing")
+    found = tables.read(group, NAME).columns
+    return dict(zip(map(str, found.get("path", ())), map(str, found.get("sha256", ())), strict=False))

@@ -11,8 +11,11 @@ import numpy as np
 
 from springcheck.errors import StoreError
 from springcheck.physics.arrays import Integers
-from springcheck.store import access, checking, files, layout, merge, parts, reading
+from springcheck.store import access, checking, digests, files, layout, parts, reading
 from springcheck.store.checking import Damage
+
+CHUNK = 1 << 20
+"""Bytes of a chunk of an exported array."""
 
 
 def export(path: str | Path, label: str, out: str | Path) -> list[Damage]:
@@ -53,24 +56,28 @@ def export(path: str | Path, label: str, out: str | Path) -> list[Damage]:
         arrays["step"] = access.array(file, f"{base}/q/step", (known.frames,), "i")
         mass = access.array(file, f"{group}/mass", (int(np.max(places)) // 3 + 1,))
         # positions and velocities are written twice, the second time in three dimensions
-        size = 8 * sum(x.size * (1 + (x.ndim == 2)) for x in arrays.values()) + 24 * known.frames
+        size = 8 * sum(x.size * (1 + (x.ndim == 2)) for x in arrays.values()) + 16 * known.frames
         text = 16 * sum(len(str(value)) for value in known.parameters.values())
-        run = os.urandom(16).hex()
-        root = {"run": run, "complete": True, "scene": known.scene, "scene_name": known.scene_name}
+        root = {"run": os.urandom(16).hex(), "complete": True, "scene": known.scene,
+                "scene_name": known.scene_name, "units": known.units}  # fmt: skip
         with files.told(out, "write"), files.unfinished(files.temporary(out)) as made:
             with layout.fresh(made, size + text) as target:
                 layout.begin(target)
-                layout.write_attributes(target, {**root, "units": known.units})
+                layout.write_attributes(target, root)
                 layout.write_attributes(target.create_group(f"parameters/{label}"), known.parameters)
                 axis = _observables(file[base], target.create_group(base), arrays)
                 particles = target.create_group("particles/trajectory")
+                if known.units == "reduced":
+                    axis = {**axis, "time": particles.create_dataset("position/time", data=axis["time"][()])}
+                    layout.write_unit(axis["time"], "ps")
                 layout.write_particles(
                     particles, layout.UNITS[known.kind, known.units], mass[()], axis, "velocity" in arrays,
                     lambda element, source: _copy_values(arrays[source], element, places),
                 )  # fmt: skip
-                layout.write_box(particles)
-                extents = merge.list_digests(target)
-            merge.seal_checked(made, extents, run)
+                layout.attach_scales(target)
+                extents = digests.write(target)[1]
+            for name in digests.broken(made, extents):
+                raise StoreError(f"{name} was damaged on its way into {out}: check disk and memory")
             files.put(made, out)
     return found
 
@@ -89,13 +96,17 @@ def _observables(source: Any, target: Any, arrays: dict[str, Any]) -> dict[str, 
         for kind in ("time", "step"):
             h5py.h5o.copy(arrays[kind].id, b".", element.id, kind.encode())
             axis[kind] = element[kind]
+    for node in [*axis.values(), *(target[name]["value"] for name in target)]:
+        # they lead to the scales of the store
+        for old in {"REFERENCE_LIST", "DIMENSION_LIST", "CLASS", "NAME"} & set(node.attrs):
+            del node.attrs[old]
     return axis
 
 
 def _copy_values(source: Any, target: Any, places: Integers) -> Any:
     """Copy (frames, n) to its places in (frames, particles, 3), in pieces; the rest keeps the fill value."""
     frames, particles = source.shape[0], int(np.max(places)) // 3 + 1
-    rows = max(1, min(frames, layout.CHUNK // (8 * particles)))
+    rows = max(1, min(frames, CHUNK // (8 * particles)))
     shape = (frames, particles, 3)
     made = target.create_dataset("value", shape, "<f8", chunks=(rows, particles, 1), fillvalue=0.0)
     for start in range(0, frames, rows):

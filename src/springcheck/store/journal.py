@@ -1,8 +1,9 @@
 """The journal of a store that is being written: no reported number is ever lost.
 
 Finished trajectories and tables are files of their own in ``<file>.parts/``, put there by os.replace and
-fsync.  `Journal.commit` writes a collection of all parts, checks the digests, puts it in place by os.replace,
-and only then removes the parts.  No file that holds reported numbers is ever changed.  A process that is
+fsync.  `Journal.commit` writes one file of all parts, checks the digests, puts it in place by os.replace,
+and only then removes the parts.  No file that holds reported numbers is ever changed: appending to one HDF5
+file in place would lose them, because a kill between two writes leaves its structure torn.  A process that is
 killed at any point finds everything when it is started again.
 """
 
@@ -11,27 +12,25 @@ from __future__ import annotations
 import contextlib
 import os
 import re
-import traceback
 import warnings
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import nullcontext
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from urllib.parse import quote
-
-import h5py
-import msgspec
 
 from springcheck import interrupts
 from springcheck.errors import StoreError, StoreWarning, plain
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Comparison, Trajectory, Verdict
-from springcheck.store import access, adopt, files, layout, merge, pieces, reading, records, seal, tables
+from springcheck.store import access, apart, checking, collection, files, layout, reading, records, tables
 from springcheck.store.access import Scalar
 from springcheck.store.draft import Draft
-from springcheck.store.parts import JournalClaim, Parts, claim, name_of, opened, parts_folder, parts_in
+from springcheck.store.parts import TRIAL, Claim, Parts, claim, folder_of, name_of, opened, parts_in
 from springcheck.store.tables import Table
 
-COLLECTION = "collection.new"
+_NAMES = re.compile(rf"lock|command|collection\.new|(run|table)-.*\.h5|{files.TEMPORARY.pattern}")
+"""Names of the files of a journal: no other file of its folder is ever touched."""
+_WORK = "springcheck", "collection", "run", "table"
+"""Beginnings of the names of all of them but the lock and the claim."""
 
 
 def open_new(path: str | Path, command: str, *, force: bool = False) -> Journal:
@@ -56,11 +55,11 @@ def open_new(path: str | Path, command: str, *, force: bool = False) -> Journal:
         raise StoreError(f"cannot write {path}: it is a device or a pipe, a store is a file")
     if path.suffix == ".toml":
         raise StoreError(f"cannot write {path}: a name in .toml is a scene's, not a store's")
-    parts = parts_folder(path)
+    parts = folder_of(path)
     with files.told(path, "write"):
         if not _is_free(parts):
             raise StoreError(f"cannot write {path}: {parts} stands where its journal goes; move it away")
-        if path.exists() and not _is_ours(path):
+        if path.exists() and not _is_store(path):
             raise StoreError(
                 f"{path} is no store of springcheck, and is not replaced; -o writes another file"
             )
@@ -69,7 +68,7 @@ def open_new(path: str | Path, command: str, *, force: bool = False) -> Journal:
         lock = files.Lock(parts / "lock")
     try:
         with files.told(parts, "write"):
-            run = _claim(path, parts, command, force=force)
+            run = _claimed(path, parts, command, force=force)
     except BaseException:
         _leave(parts, "lock")
         lock.release()
@@ -77,70 +76,63 @@ def open_new(path: str | Path, command: str, *, force: bool = False) -> Journal:
     return Journal(path, run, lock)
 
 
-_NAMES = re.compile(rf"lock|command|undo|collection\.new|(run|table|rows)-.*\.h5|{files.TEMPORARY.pattern}")
-"""Names of the files of a journal: no other file of its folder is ever touched."""
-
-
 def _is_free(parts: Path) -> bool:
-    """Whether a journal may be created here: the folder is missing, or recognisably one of ours."""
+    """Whether a journal may be created here: the folder is missing, or holds no file of another name."""
     if not os.path.lexists(parts):
         return True
     if parts.is_symlink() or not parts.is_dir():
         return False
-    known = {entry.name for entry in parts.iterdir()}
-    if "command" in known:
-        with contextlib.suppress(StoreError):
-            return claim(parts) is not None
-        return False
-    # left by a kill or a loss of power at the very beginning or end; the lock is looked at as it is taken
-    return all(
-        name == "lock"
-        or files.TEMPORARY.fullmatch(name)
-        or (_NAMES.fullmatch(name) and files.is_plain(parts / name) and _is_ours(parts / name))
-        for name in known
-    )
+    with contextlib.suppress(StoreError):
+        # without a claim a kill or a loss of power has left it at the very beginning or end
+        return claim(parts) is not None or all(map(_is_mine, parts.iterdir()))
+    return False
 
 
-def _is_ours(path: Path) -> bool:
+def _is_mine(entry: Path) -> bool:
+    """Whether a file is recognisably one of a journal: an empty lock, a temporary file, or a store."""
+    if entry.name == "lock":
+        return files.is_plain(entry) and entry.stat().st_size == 0
+    known = _NAMES.fullmatch(entry.name) and files.is_plain(entry)
+    return bool(known) and (files.TEMPORARY.fullmatch(entry.name) is not None or _is_store(entry))
+
+
+def _is_store(path: Path) -> bool:
     """Whether a file is a store of ours, whole or damaged, or empty."""
     with path.open("rb") as file:
         start = file.read(1 << 20)
-    hdf5 = start.startswith(b"\x89HDF\r\n\x1a\n") and b"springcheck store " in start
-    return not start or hdf5 or start.startswith(b'{"name": "run-')
+    return not start or (start.startswith(b"\x89HDF\r\n\x1a\n") and b"springcheck store " in start)
 
 
-def _claim(path: Path, parts: Path, command: str, *, force: bool) -> str:
+def _claimed(path: Path, parts: Path, command: str, *, force: bool) -> str:
     """The run id of the journal, resumed or new."""
     known = claim(parts)
     if known is not None and path.is_file() and _run_of(path) == known.run:
         # killed as it tidied up: the store is complete
-        _remove(parts, lambda name: name != "lock")
+        _remove(parts, "command")
         known = None
+    if known is None:
+        _remove(parts, *_WORK)
     if known is not None and (not force or known.forced):
         if known.command == command:
-            adopt.recover(parts, parts / COLLECTION, known.run)
-            _remove(parts, lambda name: name.endswith(".new"))
+            _remove(parts, "springcheck", "collection")
             _look_at_parts(parts, known.run)
             return known.run
-        if not force and not known.failed:
+        if not force:
             raise StoreError(
                 f"{parts} holds finished work of another command, or of other versions of what it runs: "
                 "give that command again to complete it, or --force to discard it"
             )
     if path.exists() and not force:
         raise StoreError(f"{path} exists: --force writes it anew, -o writes another file")
-    _remove(parts, lambda name: name not in {"lock", "command"})
+    _remove(parts, *_WORK)
     run = os.urandom(16).hex()
-    JournalClaim(run=run, command=command, forced=force).write(parts)
+    Claim(run=run, command=command, forced=force).write(parts)
     files.sync_folder(path.absolute().parent)
     return run
 
 
 def _run_of(path: Path) -> str:
     """The run that wrote a store; "" where it does not say."""
-    found = seal.find(path)
-    if found is not None:
-        return found.run
     with contextlib.suppress(StoreError), opened(path) as file:
         return str(access.attribute(file, "run"))
     return ""
@@ -148,77 +140,55 @@ def _run_of(path: Path) -> str:
 
 def _look_at_parts(parts: Path, run: str) -> None:
     """Remove the damaged parts of a run, with a warning: they alone are measured again."""
-    for part in parts_in(parts):
-        name = name_of(part)
-        known = seal.find(part)
-        if known is not None and known.run != run:
-            said = f"{part} is a part of another run and is left out: {name} is measured again"
-        elif known is None or not seal.is_whole(part, known) or seal.broken(part, known.extents):
-            part.unlink()
-            said = f"{part} was damaged and is removed: {name} is measured again"
-        else:
-            continue
-        warnings.warn(said, StoreWarning, stacklevel=5)
+    there = [one for listed in parts_in(parts) for one in listed]
+    with contextlib.suppress(StoreError):
+        # all of them in one child process
+        apart.trust(parts, TRIAL)
+        for part in there:
+            apart.know(part)
+    for part in there:
+        if not checking.check_file(part):
+            with opened(part) as file:
+                if access.attribute(file, "run") == run:
+                    continue
+        part.unlink()
+        why = f"{part} was damaged and is removed: {name_of(part)} is measured again"
+        warnings.warn(why, StoreWarning, stacklevel=5)
 
 
-def _remove(parts: Path, which: Callable[[str], bool]) -> None:
-    """Delete files of a journal, those of its names alone."""
+def _remove(parts: Path, *beginnings: str) -> None:
+    """Delete files of a journal whose names begin like this, and no other files."""
     for entry in parts.iterdir():
-        if _NAMES.fullmatch(entry.name) and which(entry.name):
+        if _NAMES.fullmatch(entry.name) and entry.name.startswith(beginnings):
             entry.unlink(missing_ok=True)
 
 
-def _end(parts: Path) -> None:
-    """Remove a journal: its claim first, so that a kill leaves an empty folder at worst."""
-    (parts / "command").unlink(missing_ok=True)
-    _remove(parts, lambda _: True)
-    with contextlib.suppress(OSError):
-        # files that a user has put into it stay
-        parts.rmdir()
-
-
 def _leave(parts: Path, *empty: str) -> None:
-    """Remove a journal that holds no more than these files."""
-    with interrupts.held(), contextlib.suppress(OSError):
+    """Remove a journal that holds no more than these files; its claim first."""
+    with contextlib.suppress(OSError):
         if {entry.name for entry in parts.iterdir()} <= {*empty}:
-            _end(parts)
-
-
-def _give_up(temporary: Path, run: str) -> None:
-    """Undo a failed commit: the adopted part is restored, the disk space freed.
-
-    Not while libhdf5 still has the file open, which it might write to later; then the next writer does it.
-    """
-    held = h5py.h5f.get_obj_ids(h5py.h5f.OBJ_ALL, h5py.h5f.OBJ_FILE)
-    if not any(Path(h5py.h5f.get_name(one).decode()) == temporary for one in held):
-        with contextlib.suppress(OSError, StoreError):
-            adopt.recover(temporary.parent, temporary, run)
-            temporary.unlink(missing_ok=True)
+            _remove(parts, "command")
+            _remove(parts, *empty)
+            # files that a user has put into it stay
+            parts.rmdir()
 
 
 class Journal:
     """The only writer of a store: drafts, tables, commits.  A context manager that releases the lock."""
 
     def __init__(self, path: Path, run: str, lock: files.Lock) -> None:
-        self.path, self.run = path, run
-        self.folder = parts_folder(path)
+        self.path, self.run, self.folder = path, run, folder_of(path)
         self._lock = lock
         self._sequence = 0
 
-    def sources(self) -> dict[str, Path]:
-        """Label of each finished trajectory -> the file that holds it (part or collection)."""
-        return reading.sources(self.path, self.run)
-
-    def finished(self) -> tuple[str, ...]:
-        """Labels of the trajectories that are finished and need no second run."""
-        return tuple(self.sources())
+    def finished(self) -> dict[str, Path]:
+        """Label of each trajectory that is finished and needs no second run -> the part that holds it."""
+        return reading.in_order(Parts.of(self.path, writing=True))
 
     def draft(self, label: str, scene: Scene) -> Draft:
-        """A writer of one trajectory (see `Draft`)."""
-        # the one writer need look at what is there only once
-        self._sequence = (self._sequence or len(self.sources())) + 1
-        path = self._part("run", label)
-        return Draft(path, label, scene, sequence=self._sequence, run=self.run)
+        """Start to store a trajectory of this scene."""
+        self._sequence = (self._sequence or len(Parts.of(self.path, writing=True).runs)) + 1
+        return Draft(self._part("run", label), label, scene, sequence=self._sequence, run=self.run)
 
     def save(self, trajectory: Trajectory, scene: Scene) -> str:
         """Store a trajectory that is at hand in full -> digest."""
@@ -226,29 +196,18 @@ class Journal:
             draft.append(*(getattr(trajectory, x) for x in ("t", *layout.QUANTITIES)))
             return draft.finish(records.attributes(trajectory))
 
-    def add(self, table: Table, *, by: Sequence[pieces.Worker] = (), rows: bool = False) -> None:
-        """Store one table; once this returns it survives crashes.  `by` says who measured it.
-
-        With `rows` it is a piece ``<table>/<piece>`` of a table: the final collection joins the rows of all
-        pieces into one table, in the order of their names.
-        """
+    def add(self, table: Table) -> None:
+        """Store one table; once this returns it survives crashes."""
         if table.name.split("/")[0] in layout.RESERVED:
             raise ValueError(f"a table cannot be called {table.name!r}")
-        image = merge.image({"part": table.name, "run": self.run, **pieces.by_text(by)}, [table])
+        part = self._part("table", table.name)
         with files.told(self.folder, "write"):
-            files.put_bytes(image, self._part("rows" if rows else "table", table.name))
+            files.put_bytes(collection.image({"part": table.name, "run": self.run}, table), part)
+            apart.know(part)
 
     def tables(self) -> Mapping[str, Table]:
-        """The finished tables, and pieces of tables, by name; each is read on access."""
-        return reading.tables_of(self.path, self.run, rows=True)
-
-    def measured_by(self, name: str) -> list[dict[str, str]]:
-        """Who measured a finished table that is not yet in the collection."""
-        for kind in ("table", "rows"):
-            if (part := self._part(kind, name)).is_file():
-                with opened(part) as file:
-                    return pieces.by_of(file)
-        return []
+        """The finished tables by name; each is read on access."""
+        return reading.Tables({name_of(one): one for one in Parts.of(self.path, writing=True).tables})
 
     def commit(
         self,
@@ -257,49 +216,32 @@ class Journal:
         comparison: Comparison | None = None,
         verdicts: Sequence[Verdict] = (),
         documents: Mapping[str, str] | None = None,
+        solution: collection.Solution | None = None,
     ) -> None:
-        """Write a collection of everything finished in the place of the store; the journal ends."""
-        extra: list[Table] = []
-        if comparison is not None:
-            extra.append(tables.of_comparison(comparison))
+        """Write a file of everything finished in the place of the store; the journal ends."""
+        extra = [] if comparison is None else [tables.of_comparison(comparison)]
         if verdicts:
             extra.append(tables.of_verdicts(verdicts))
         root: dict[str, Scalar] = {"run": self.run, "complete": True}
         if scene is not None:
             root |= {"scene": scene.to_toml(), "scene_name": scene.name, "units": scene.units}
-        found = Parts.of(self.path, self.run)
-        temporary = self.folder / COLLECTION
-        # an adopted part no longer exists on its own
-        copied = adopt.choice(found.runs) is None
-        with files.told(self.path, "write"), files.unfinished(temporary) if copied else nullcontext():
-            try:
-                temporary.unlink(missing_ok=True)
-                merge.collection(temporary, found, root, extra, documents or {})
-                files.sync(temporary)
-            except BaseException as error:
-                # an interrupt as the file was opened leaves it to a frame, which holds it open
-                traceback.clear_frames(error.__traceback__)
-                _give_up(temporary, self.run)
-                raise
-            # whole once begun, in milliseconds: no interrupt leaves a complete store beside its journal
-            with interrupts.held():
-                files.move(temporary, self.path)
-                adopt.settled(self.folder)
-                for part in found.everything:
-                    part.unlink(missing_ok=True)
-                _end(self.folder)
-                # the store is complete: the same command would refuse to overwrite it
-                interrupts.announce(plain(f"interrupted; {self.path} is complete"))
+        found = Parts.of(self.path, writing=True)
+        with files.told(self.path, "write"), files.unfinished(self.folder / "collection.new") as made:
+            made.unlink(missing_ok=True)
+            collection.write(made, found.everything, root, extra, documents or {}, solution)
+            files.put(made, self.path)
+            apart.know(self.path)
+            # the store is complete: the same command would refuse to overwrite it
+            interrupts.announce(plain(f"interrupted; {self.path} is complete"))
+            # the claim first: what a kill leaves of the journal then is no store
+            _remove(self.folder, "command")
+            _remove(self.folder, "")
+            with contextlib.suppress(OSError):
+                # files that a user has put into it stay
+                self.folder.rmdir()
 
     def _part(self, kind: str, name: str) -> Path:
         return self.folder / f"{kind}-{quote(name, safe='@-._')}.h5"
-
-    def fail(self) -> None:
-        """Note that a method of this command failed.  The same command resumes what is finished; any other,
-        such as the corrected one, may replace it."""
-        if known := claim(self.folder):
-            with files.told(self.folder, "write"):
-                msgspec.structs.replace(known, failed=True).write(self.folder)
 
     def close(self) -> None:
         """Release the lock; what is finished stays for the next writer."""

@@ -3,23 +3,25 @@
 ::
 
     /h5md                      version, author, creator, modules/units
-    /particles/<label>/        position and velocity (frames, n, 3), mass; scenes of particles only
-    /observables/<label>/      q, p (frames, n), energy (frames,), velocity: elements {step, time, value}
+    /particles/<label>/        position and velocity (frames, n, 3), mass, species; scenes of particles only
+    /observables/<label>/      q, p (frames, n), energy, error (frames,), velocity: {step, time, value}
+    /observables/exact/        q, p (frames, n) of the exact solution, where it is known
     /parameters/<label>        attributes: scene, method, versions, machine, outcome, digest
     /comparison /verdicts      tables of one column per dataset
+    /digests                   the path of every object and its sha256
     /plots                     NXentry of NXdata; root @default leads there
 
 The numbers are stored once, contiguous, as little-endian float64, and neither compressed nor chunked:
 trajectories are noise to gzip (validation/long_runs.py), and a contiguous array is written past
 libhdf5 at the speed of the disk.  /particles holds virtual datasets of three dimensions over them; axes along
-which nothing moves are a fill value and cost no bytes.  `time` and `step` are hard links to one array each.
+which nothing moves are a fill value and cost no bytes.  `time` and `step` are hard links to one array each,
+and `time` is a dimension scale.  A reduced scene has no units; only /particles names those of H5MD.
 """
 
 from __future__ import annotations
 
 import contextlib
 import os
-import platform
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache
 from pathlib import Path
@@ -33,47 +35,47 @@ from springcheck.errors import StoreError, plain
 from springcheck.physics.arrays import Floats, Integers
 from springcheck.physics.scene import Scene
 from springcheck.store import access, files
-from springcheck.store.access import Scalar
 
-FORMAT = "springcheck store 2"
-OLDER = "springcheck store 1"
-"""Format of a store, and of one by an older version."""
+FORMAT = "springcheck store 3"
+OLDER = ("springcheck store 2",)
+"""Format of a store, and of those by older versions that are still read."""
 LIBVER = ("v110", "v110")
 """Smaller than the oldest format, with checksums in its structure, and read by h5dump 1.10 and H5Web."""
 
 MARGIN = 1 << 16
 """Bytes reserved beyond the arrays, for groups and attributes."""
-CHUNK = 1 << 20
-"""Bytes of a chunk of an exported array."""
 
-RESERVED = ("h5md", "particles", "observables", "parameters", "comparison", "verdicts", "documents", "plots")
+RESERVED = (
+    "h5md", "particles", "observables", "parameters", "comparison", "verdicts", "documents", "digests",
+    "plots",
+)  # fmt: skip
 QUANTITIES = ("q", "p", "energy")
-"""Quantities of a trajectory that may be stored beside its times."""
+"""Quantities of a trajectory that may be stored in addition to its times."""
+EXACT = "exact"
+"""Name of the exact solution among the observables."""
 _STRING = h5py.string_dtype("utf-8")
 
-_MD = {
-    "q": "nm", "p": "u nm ps-1", "energy": "kJ mol-1", "velocity": "nm ps-1", "time": "ps", "mass": "u",
-}  # fmt: skip
-_SI = {
-    "q": "m", "p": "kg m s-1", "energy": "J", "velocity": "m s-1", "time": "s", "mass": "kg",
-}  # fmt: skip
-_SI_CIRCUIT = {**_SI, "q": "C", "p": "Wb", "velocity": "A", "mass": "H"}
+_NAMES = "q", "p", "energy", "velocity", "time", "mass"
+_MD = dict(zip(_NAMES, ("nm", "u nm ps-1", "kJ mol-1", "nm ps-1", "ps", "u"), strict=True))
+_SI = dict(zip(_NAMES, ("m", "kg m s-1", "J", "m s-1", "s", "kg"), strict=True))
 _BARE = dict.fromkeys(_MD, "1")
 UnitsOf: TypeAlias = Mapping[str, str]
 Axis: TypeAlias = Mapping[str, Any]
 """The datasets `time` and `step`, which all elements of a trajectory share."""
 UNITS: Mapping[tuple[str, str], UnitsOf] = {
-    **dict.fromkeys([("particles", "md"), ("particles", "reduced")], _MD),
-    **dict.fromkeys([("circuit", "md"), ("circuit", "reduced")], _BARE),
+    ("particles", "md"): _MD,
+    ("particles", "reduced"): _MD,
     ("particles", "si"): _SI,
-    ("circuit", "si"): _SI_CIRCUIT,
+    ("circuit", "si"): {**_SI, "q": "C", "p": "Wb", "velocity": "A", "mass": "H"},
 }
-REDUCED = "reduced: the numbers carry no unit; nm, ps, u and kJ/mol stand for 1"
+"""Units in /particles by kind and units of the scene; others have none."""
+REDUCED = "reduced: the numbers carry no unit; nm, ps, u and kJ/mol stand for 1 in /particles"
 ABOUT_GROUPS = (
     "Motion by simulation engines, judged to rounding. observables: q, p and energy of each method, bit for "
-    "bit; particles: the same for readers of H5MD; parameters: how each was made; verdicts: value, bound and "
-    "reason of each check; comparison: largest differences of pairs; plots: what viewers draw; documents, "
-    "and groups by their names: studies. Read and checked by springcheck"
+    "bit, its error, and the exact solution; particles: the same for readers of H5MD; parameters: how each "
+    "was made; verdicts: value, bound and reason of each check; comparison: largest differences of pairs; "
+    "digests: sha256 of every object; plots: what viewers draw; documents, and groups by their names: "
+    "studies. Read and checked by springcheck"
 )
 """The root's attribute `about`."""
 HOME_PAGE = ""  # OWNER: the project's address, once there is one; it follows in `about`
@@ -94,10 +96,10 @@ class Column(NamedTuple):
 
 def check_label(label: str) -> None:
     """Raise StoreError for a label that cannot be the name of a group."""
-    if not access.is_name(label) or "/" in label or label in {".", ".."}:
+    if not access.is_name(label) or "/" in label or label in {".", "..", EXACT}:
         raise StoreError(
             f"{label!r} cannot name a trajectory: it is empty, longer than {access.LONGEST_NAME} characters, "
-            "not printable, or holds '/' or is '.' or '..'"
+            f"not printable, holds '/', or is one of '.', '..' and {EXACT!r}"
         )
 
 
@@ -120,7 +122,7 @@ def columns(label: str, scene: Scene, frames: int) -> dict[str, Column]:
 
 def size(scene: Scene) -> int:
     """Bytes that one trajectory of a scene takes."""
-    return sum(column.size for column in columns("label", scene, scene.frames).values()) + 2**16
+    return sum(column.size for column in columns("label", scene, scene.frames).values()) + MARGIN
 
 
 def write_attributes(node: Any, values: Mapping[str, Any]) -> None:
@@ -177,41 +179,32 @@ def reopened(path: Path, size: int) -> Iterator[Any]:
         yield file
 
 
-def recorded(kind: str, of: str) -> UnitsOf:
-    """Unit of an array of /observables: "1" for reduced numbers, except times, which /particles shares."""
-    found = UNITS[kind, of]
-    return {name: "1" if of == "reduced" and name != "time" else unit for name, unit in found.items()}
-
-
 def skeleton(file: Any, label: str, scene: Scene, found: Mapping[str, Column]) -> dict[str, int]:
     """Create a trajectory's groups and arrays without their numbers -> offset of each array [B]."""
-    unit = recorded(scene.kind, scene.units)
+    unit = _BARE if scene.units == "reduced" else UNITS.get((scene.kind, scene.units), _BARE)
     base = file.create_group(f"observables/{label}")
     if scene.units == "reduced":
         write_attributes(base, {"units_are": REDUCED})
     arrays = {name: _contiguous(file, column) for name, column in found.items()}
     axis = {name: arrays[name] for name in ("time", "step")}
-    write_unit(axis["time"], unit["time"], _named("t", unit["time"], scene))
+    write_unit(axis["time"], unit["time"], "t")
     for name, array in arrays.items():
-        if name in axis:
-            continue
-        element = base[name]
-        two = len(found[name].shape) == 2
-        axes = ["time", "."] if two else ["time"]
-        write_attributes(element, {"NX_class": "NXdata", "signal": "value", "axes": axes})
-        if two:
-            write_attributes(element, {"default_slice": [".", "0"]})
-        write_unit(array, unit[name], _named(f"{name} of {label}", unit[name], scene))
-        if name != "q":
-            element.update(axis)
+        if name not in axis:
+            as_element(base[name], array.ndim)
+            write_unit(array, unit[name], f"{name} of {label}")
+            if name != "q":
+                base[name].update(axis)
     if scene.kind == "particles":
         _particles(file, label, scene, found, axis)
     return {name: int(array.id.get_offset()) for name, array in arrays.items()}
 
 
-def _named(text: str, unit: str, scene: Scene) -> str:
-    """Axis label for viewers: H5Web adds no unit to a long_name, and reduced numbers carry none."""
-    return text if scene.units == "reduced" or unit == "1" else f"{text} ({unit})"
+def as_element(element: Any, dimensions: int) -> None:
+    """Say how viewers draw an element: its value, against time."""
+    axes = ["time", "."][:dimensions]
+    write_attributes(element, {"NX_class": "NXdata", "signal": "value", "axes": axes})
+    if dimensions == 2:
+        write_attributes(element, {"default_slice": [".", "0"]})
 
 
 def _contiguous(file: Any, column: Column) -> Any:
@@ -238,33 +231,59 @@ def _particles(file: Any, label: str, scene: Scene, found: Mapping[str, Column],
         return element.create_virtual_dataset("value", view, fillvalue=0.0)
 
     group = file.create_group(f"particles/{label}")
-    units = UNITS[scene.kind, scene.units]
+    if scene.units == "reduced":
+        # readers of H5MD ask for a unit of time, which the numbers themselves do not have
+        column = found["time"]
+        view = h5py.VirtualLayout(column.shape, "<f8")
+        view[:] = h5py.VirtualSource(".", column.path, column.shape, "<f8")
+        axis = {**axis, "time": group.create_group("position").create_virtual_dataset("time", view)}
+        write_unit(axis["time"], _MD["time"])
+    units = UNITS.get((scene.kind, scene.units), _BARE)
     write_particles(group, units, scene.masses.astype("<f8"), axis, "velocity" in found, viewed)
-    write_box(group)
 
 
 def write_particles(
     group: Any, unit: UnitsOf, mass: Floats, axis: Axis, have_velocity: bool, write: Callable[[Any, str], Any]
 ) -> None:
-    """A particle group without its box.  `write(element, source)` writes the values (frames, particles, 3) of
+    """The elements of a particle group.  `write(element, source)` writes the values (frames, particles, 3) of
     one of the observables and returns them."""
+    frames = len(axis["time"])
     for name, source in (("position", "q"), ("velocity", "velocity" if have_velocity else "p")):
-        element = group.create_group(name)
+        element = group.require_group(name)
         write_unit(write(element, source), unit["q" if name == "position" else "velocity"])
-        element.update(axis)
+        _on(element, axis)
     write_unit(group.create_dataset("mass", data=mass), unit["mass"])
+    # no element of the periodic table: a fill value alone, which costs no bytes
+    species = group.create_group("species")
+    species.create_dataset("value", (frames, len(mass)), "<i4", chunks=(min(frames, 4096), 1), fillvalue=0)
+    _on(species, axis)
+    box = group.create_group("box")
+    box.attrs["dimension"] = 3
+    write_attributes(box, {"boundary": ["none"] * 3})
+
+
+def _on(element: Any, axis: Axis) -> None:
+    element.update({name: one for name, one in axis.items() if name not in element})
 
 
 def write_unit(dataset: Any, unit: str, name: str = "") -> None:
     """Write the unit under the names of H5MD and of NeXus, and the name that viewers write at an axis."""
-    write_attributes(dataset, {"unit": unit, "units": unit, **({"long_name": name} if name else {})})
+    # H5Web adds no unit to a long_name
+    named = {"long_name": name if unit == "1" else f"{name} ({unit})"} if name else {}
+    write_attributes(dataset, {"unit": unit, "units": unit, **named})
 
 
-def write_box(group: Any) -> None:
-    """Write the box of a particle group, which H5MD asks for: three dimensions without borders."""
-    box = group.create_group("box")
-    box.attrs["dimension"] = 3
-    write_attributes(box, {"boundary": ["none"] * 3})
+def attach_scales(file: Any) -> None:
+    """Attach the times of each element to its values, so that xarray names their dimension."""
+    for tree in ("observables", "particles"):
+        for label in file.get(tree, ()):
+            for element in file[tree][label].values():
+                if isinstance(element, h5py.Group) and {"time", "value"} <= set(element):
+                    time = element["time"]
+                    if not time.is_scale:
+                        time.make_scale("time")
+                        element["step"].dims[0].attach_scale(time)
+                    element["value"].dims[0].attach_scale(time)
 
 
 def axes_of(scene: Scene) -> str:
@@ -301,37 +320,3 @@ def lines(places: Integers) -> Iterator[tuple[slice, slice, int]]:
 def _even(index: Integers) -> slice:
     step = int(index[1] - index[0]) if len(index) > 1 else 1
     return slice(int(index[0]), int(index[-1]) + 1, step)
-
-
-@cache
-def machine() -> dict[str, Scalar]:
-    """Provenance: software, versions and machine."""
-    return {
-        "springcheck": springcheck.__version__,
-        "machine": platform.machine(),
-        "processor": _processor(),
-        "cores": os.cpu_count() or 0,
-        "system": _system(),
-        "host": platform.node(),
-        "python": platform.python_version(),
-        "numpy": np.__version__,
-        "h5py": h5py.__version__,
-        "hdf5": h5py.version.hdf5_version,
-    }
-
-
-def _system() -> str:
-    """The system as `platform.platform` names it, which on Linux starts a program to ask for the
-    processor."""
-    if platform.system() != "Linux":
-        return platform.platform()
-    libc = "".join(platform.libc_ver())
-    return f"Linux-{platform.release()}-{platform.machine()}-with-{libc}"
-
-
-def _processor() -> str:
-    with contextlib.suppress(OSError), open("/proc/cpuinfo", encoding="utf-8", errors="replace") as lines:
-        for line in lines:
-            if line.startswith("model name"):
-                return line.split(":", 1)[1].strip()
-    return platform.processor() or "unknown"

@@ -15,7 +15,7 @@ import numpy as np
 from springcheck.errors import StoreError, nearest
 from springcheck.physics.arrays import Floats
 from springcheck.physics.trajectory import Comparison, Outcome, Trajectory, Verdict
-from springcheck.store import access, digests, files, layout, parts, pieces, records, seal, tables
+from springcheck.store import access, digests, files, layout, parts, records, tables
 from springcheck.store.access import Scalar
 from springcheck.store.parts import Parts, opened
 from springcheck.store.records import Run
@@ -27,25 +27,26 @@ PIECE = 1 << 20
 """Rows of a window by default."""
 
 
-def sources(path: Path, run: str | None = None) -> dict[str, Path]:
+def sources(path: Path) -> dict[str, Path]:
     """Label of each trajectory -> the file that holds it, in the order in which they were started."""
-    found = Parts.of(path, run)
-    if not found.everything and run is None:
+    found = Parts.of(path)
+    if not found.everything:
         with files.told(path, "read"), path.open("rb"):
             pass
+    return in_order(found)
+
+
+def in_order(found: Parts) -> dict[str, Path]:
+    """Label of each trajectory of these files -> the file that holds it."""
     listed: list[tuple[int, str, Path]] = []
     for part in found.runs:
         with opened(part) as file:
             labels = access.children(file, "parameters") if found.complete else [parts.name_of(part)]
-            listed += [(_sequence(file, label), label, part) for label in labels]
+            for label in labels:
+                group = access.group_at(file, f"parameters/{label}")
+                sequence = None if group is None else access.attribute(group, "sequence")
+                listed.append((sequence if isinstance(sequence, int) else 0, label, part))
     return {label: source for _, label, source in sorted(listed)}
-
-
-def _sequence(file: Any, label: str) -> int:
-    """Position of a trajectory in its run's order; 0 where it is not recorded."""
-    group = access.group_at(file, f"parameters/{label}")
-    found = None if group is None else access.attribute(group, "sequence")
-    return found if isinstance(found, int) else 0
 
 
 def run_and_arrays(file: Any, label: str) -> tuple[Run, dict[str, Any]]:
@@ -100,8 +101,8 @@ def read_one(path: str | Path, label: str) -> Trajectory:
 def digest(path: str | Path, label: str) -> str:
     """The digest of the numbers of a trajectory as they are now (see `digests.combined`)."""
     with _held(path, label) as (_, arrays), open(arrays["time"].file.filename, "rb") as raw:
-        places = {name: (x.id.get_offset(), x.size * x.dtype.itemsize) for name, x in arrays.items()}
-        return digests.combined({name: seal.digest(raw, place) for name, place in places.items()}, arrays)
+        sizes = {name: (x.id.get_offset(), x.size * x.dtype.itemsize) for name, x in arrays.items()}
+        return digests.combined({name: digests.sha256(raw, *at) for name, at in sizes.items()}, arrays)
 
 
 def windows(path: str | Path, label: str, rows: int = PIECE, stride: int = 1) -> Iterator[Trajectory]:
@@ -160,6 +161,11 @@ class Summary:
     tables: tuple[str, ...]
     documents: tuple[str, ...]
 
+    @property
+    def listed(self) -> bool:
+        """Whether it lists digests of all its objects: an older store has only those of arrays."""
+        return self.root.get("format") not in layout.OLDER
+
 
 def summary(path: str | Path) -> Summary:
     """Contents of a store, at a cost that does not grow with its length."""
@@ -174,27 +180,25 @@ def summary(path: str | Path) -> Summary:
         with opened(path) as file:
             root = access.attributes(file)
             documents = tuple(access.children(file, "documents"))
-    found = Parts.of(path, None)
-    names = _tables(path) if found.complete else map(parts.table_of, found.tables)
+    found = Parts.of(path)
     return Summary(
         path=path,
         size=sum(part.stat().st_size for part in found.everything),
         complete=root.get("complete") is True and parts.claimed_by(path) in (None, root.get("run")),
         root=root,
         runs=tuple(runs),
-        tables=tuple(dict.fromkeys(names)),
+        tables=tuple(tables_of(path)),
         documents=documents,
     )
 
 
-def _tables(path: Path, run: str | None = None, *, rows: bool = False) -> dict[str, Path]:
-    """The tables of a collection, and the parts that hold a table or rows of one."""
-    found = Parts.of(path, run)
-    if found.complete:
-        with opened(path) as file:
-            return dict.fromkeys(tables.names(file), path)
-    whole = [part for part in found.tables if rows or not part.name.startswith(parts.ROWS)]
-    return {parts.name_of(part): part for part in whole}
+def tables_of(path: str | Path) -> Mapping[str, Table]:
+    """The tables of a store by name, without comparison and verdicts; each is read on access."""
+    found = Parts.of(Path(path))
+    if not found.complete:
+        return Tables({parts.name_of(part): part for part in found.tables})
+    with opened(Path(path)) as file:
+        return Tables(dict.fromkeys(tables.names(file), Path(path)))
 
 
 def _table(path: str | Path, name: str) -> Table | None:
@@ -204,7 +208,7 @@ def _table(path: str | Path, name: str) -> Table | None:
         return None if group is None else tables.read(group, name)
 
 
-class _Tables(UserDict[str, Any]):
+class Tables(UserDict[str, Any]):
     """Files by the names of the tables that they hold; an item is the table, read from its file."""
 
     def __getitem__(self, name: str) -> Table:
@@ -212,21 +216,6 @@ class _Tables(UserDict[str, Any]):
         if found is None:
             raise StoreError(f"{self.data[name]} holds no {name}")
         return found
-
-
-def tables_of(path: str | Path, run: str | None = None, *, rows: bool = False) -> Mapping[str, Table]:
-    """The tables of a store by name, without comparison and verdicts; each is read on access.
-
-    With `rows` also the pieces of tables that an unfinished store holds.
-    """
-    return _Tables(_tables(Path(path), run, rows=rows))
-
-
-def measured_by(path: str | Path) -> list[tuple[str, dict[str, str]]]:
-    """Each piece of a study in a store, and who measured it; nothing where the store does not say."""
-    found = tables_of(path)
-    given = {name: found[name] for name in (pieces.WORKERS, pieces.PIECES) if name in found}
-    return list(pieces.measured(given))
 
 
 def verdicts(path: str | Path) -> tuple[Verdict, ...]:

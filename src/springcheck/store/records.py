@@ -1,15 +1,22 @@
-"""Metadata of a trajectory: attributes, read back with types and limits."""
+"""Metadata of a trajectory: attributes, read back with types and limits, and of the machine."""
 
 from __future__ import annotations
 
+import contextlib
 import math
+import os
+import platform
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from operator import attrgetter
 from typing import Annotated, Any, Literal, get_type_hints
 
+import h5py
 import msgspec
+import numpy as np
 
+import springcheck
 from springcheck.errors import StoreError
 from springcheck.physics.arrays import Arithmetic, Floats
 from springcheck.physics.fields import Units
@@ -123,3 +130,37 @@ def trajectory(run: Run, arrays: Mapping[str, Floats], stride: int = 1) -> Traje
         origin={key[7:]: str(value) for key, value in run.parameters.items() if key.startswith("origin.")},
         **parts[""],
     )
+
+
+@cache
+def machine() -> dict[str, Scalar]:
+    """Provenance: software, versions and machine."""
+    return {
+        "springcheck": springcheck.__version__,
+        "machine": platform.machine(),
+        "processor": _processor(),
+        "cores": os.cpu_count() or 0,
+        "system": _system(),
+        "host": platform.node(),
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "h5py": h5py.__version__,
+        "hdf5": h5py.version.hdf5_version,
+    }
+
+
+def _system() -> str:
+    """The system as `platform.platform` names it, which on Linux starts a program to ask for the
+    processor."""
+    if platform.system() != "Linux":
+        return platform.platform()
+    libc = "".join(platform.libc_ver())
+    return f"Linux-{platform.release()}-{platform.machine()}-with-{libc}"
+
+
+def _processor() -> str:
+    with contextlib.suppress(OSError), open("/proc/cpuinfo", encoding="utf-8", errors="replace") as lines:
+        for line in lines:
+            if line.startswith("model name"):
+                return line.split(":", 1)[1].strip()
+    return platform.processor() or "unknown"

@@ -7,7 +7,7 @@ from argparse import Namespace
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager, nullcontext
 from dataclasses import dataclass, replace
-from functools import cache, partial, wraps
+from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypedDict, TypeVar, Unpack
 
@@ -20,8 +20,7 @@ from springcheck.errors import StoreError
 from springcheck.physics import scenefile
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Trajectory
-from springcheck.store import Draft, Table
-from springcheck.studies import provenance
+from springcheck.store import Draft, Solution, Table
 from springcheck.studies import team as teams
 from springcheck.studies.arguments import Progress
 from springcheck.studies.choose import LeftOut
@@ -31,8 +30,8 @@ if TYPE_CHECKING:
     from springcheck.studies.tables import Form
 
 __all__ = [
-    "Draft", "Keeper", "Kept", "Piece", "Table", "command", "each", "kept", "origin", "plain", "read",
-    "restoring", "study",
+    "Draft", "Keeper", "Kept", "Piece", "Solution", "Table", "command", "each", "kept", "origin", "plain",
+    "read", "restoring", "study",
 ]  # fmt: skip
 
 T = TypeVar("T")
@@ -88,7 +87,6 @@ class Keeper:
 
     def __post_init__(self) -> None:
         self._finished = self._journal.tables() if self._journal else {}
-        self._by: dict[str, list[dict[str, str]]] = {}
 
     def finished(self, form: Form[Any], key: str) -> Any:
         """The result that an earlier call has saved under this key, or None."""
@@ -99,26 +97,9 @@ class Keeper:
         """An attribute of such a table."""
         return self._finished[form.beginning + key].attributes[name]
 
-    def keep(
-        self, form: Form[Any], key: str, found: Any, by: Mapping[str, str] | None = None, **attributes: Any
-    ) -> None:
-        """Save a result under its key, replacing an earlier one; from here on it survives a crash.
-
-        `by` identifies the worker that measured it (default: this process).  The workers of a result that is
-        replaced stay recorded with it.
-        """
-        if self._journal is None:
-            return
-        table = form.table(key, found, **attributes)
-        by = record() if by is None else by
-        before = self._by.get(table.name)
-        if before is None:
-            before = self._journal.measured_by(table.name) if table.name in self._finished else []
-        if dict(by) not in before:
-            before = [*before, dict(by)]
-        if not form.joined:
-            self._by[table.name] = before
-        self._journal.add(table, by=before, rows=form.joined)
+    def keep(self, form: Form[Any], key: str, found: Any, **attributes: Any) -> None:
+        """Save a result under its key, replacing an earlier one; from here on it survives a crash."""
+        self.add(form.table(key, found, **attributes))
 
     def add(self, table: Table) -> None:
         """Save a table that is no result."""
@@ -145,18 +126,15 @@ class Keeper:
         done = len(pieces) - len(left)
         self._tell(done, pieces, left[:1])
         with closing(self.carried_out([piece.measure for piece in left])) as measured:
-            for count, (j, result, by) in enumerate(measured, 1):
-                self.keep(left[j].form, left[j].key, result, by)
+            for count, (j, result) in enumerate(measured, 1):
+                self.keep(left[j].form, left[j].key, result)
                 self._tell(done + count, pieces, left[count : count + 1])
                 yield left[j], result
 
-    def carried_out(
-        self, parts: Sequence[Callable[[], T]]
-    ) -> Generator[tuple[int, T, Mapping[str, str]], None, None]:
-        """Index and result of each part, as the team finishes them, and who measured it."""
-        with closing(self.team.carried_out([partial(_measured, part) for part in parts])) as found:
-            for j, (result, by) in found:
-                yield j, result, by
+    def carried_out(self, parts: Sequence[Callable[[], T]]) -> Generator[tuple[int, T], None, None]:
+        """Index and result of each part, as the team finishes them."""
+        with closing(self.team.carried_out(parts)) as found:
+            yield from found
 
     def _tell(self, done: int, pieces: Sequence[Piece], following: Sequence[Piece]) -> None:
         if self.progress:
@@ -249,22 +227,6 @@ def restoring(name: str) -> Callable[[Callable[[Kept], T]], Callable[[str | Path
         return stored
 
     return reader
-
-
-@cache
-def record() -> Mapping[str, str]:
-    """Identity of this process: the machine, the versions, and digests of its arithmetic."""
-    machine = {name: str(value) for name, value in store.machine().items()}
-    return {**machine, **provenance.versions(), **provenance.bits()}
-
-
-def _measured(work: Callable[[], T]) -> tuple[T, dict[str, str]]:
-    return work(), dict(record())
-
-
-def who(path: Path) -> list[str]:
-    """Notes on the machines that measured the pieces of a store; none where they were of one kind."""
-    return provenance.sentences(store.measured_by(path))
 
 
 def stored_scene(path: Path) -> Scene:

@@ -134,11 +134,9 @@ class Study:
         where: Path | None = path or getattr(found, "path", None)
         if self.trajectories or where is None:
             return found.lines(options)
-        from springcheck.studies import keeper
         from springcheck.text.lines import plain
 
-        said = [] if path else [f"Stored in {where}"]
-        return [*found.lines(options), *map(plain, [*said, *keeper.who(where)])]
+        return [*found.lines(options), *([] if path else [plain(f"Stored in {where}")])]
 
     def held(self, summary: Summary) -> bool:
         """Whether a store holds a study of this kind."""

@@ -35,8 +35,6 @@ class Form(Generic[T]):
     auxiliary: tuple[str, ...] = ()
     log: tuple[str, ...] = ()
     about: str = ""
-    joined: bool = False
-    """Whether results are rows of one table: <table> holds those of the keys <table>/<piece>."""
     extra: Callable[[T], Mapping[str, Any]] = lambda found: {}
     """Columns for viewers that follow from the others; they are not read back."""
 

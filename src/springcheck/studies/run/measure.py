@@ -15,11 +15,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from springcheck import checks, driver, engines, interrupts
+from springcheck import checks, driver, engines, processes
 from springcheck.checks import compare
 from springcheck.engines.contract import Label
 from springcheck.errors import EngineError, MethodError, SpringcheckError, StoreError
 from springcheck.physics import exact, memory
+from springcheck.physics.arrays import Extended
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import NOT_KNOWN, Comparison, Trajectory, Verdict
 from springcheck.studies import keeper
@@ -49,6 +50,9 @@ MOST_NUMBERS = 1 << 24
 at 1 us a number, two minutes for a single one.  Of a longer run pieces are judged, and none of these
 passes it."""
 
+MOST_ERRORS = 1 << 23
+"""Numbers of the exact solution and of the errors of all methods that are gathered for the store, 64 MiB."""
+
 LONG_PIECE = PIECE_NUMBERS // 4
 """Numbers per array in each of them.  Judging takes 8 us a frame, a hundred times as long as making it: two
 seconds in all."""
@@ -66,16 +70,26 @@ def perform(options: Namespace, progress: Progress | None) -> Report | Repeats:
     if options.source is not None:
         return Repeats(repeats=tuple(repeat(Path(options.source), methods=options.method, progress=progress)))
     scene = changed(options)
+    path = Path(options.output or f"{scene.name}.h5")
+    ours = options.output is None and _holds_runs(path)
     return run(
         scene,
-        Path(options.output or f"{scene.name}.h5"),
+        path,
         methods=["*"] if options.all else options.method,
-        force=options.force,
+        force=options.force or ours,
         thorough=options.thorough,
         faults=options.fault,
         progress=progress,
         seed=options.seed,
     )
+
+
+def _holds_runs(path: Path) -> bool:
+    """Whether a file is a store of runs, which under its default name is written anew."""
+    try:
+        return path.is_file() and bool(keeper.summary(path).runs)
+    except SpringcheckError:
+        return False
 
 
 def stored(path: Path) -> Stored:
@@ -157,8 +171,10 @@ def run(
                 with journal.draft(one.label, scene) as draft:
                     one.play(scene, draft)
         names = (*(str(label) for label in labels), *(one.label for one in wrong))
-        sources = journal.sources()
-        report = judge(scene, path, {name: sources[name] for name in names}, left, resumed=resumed)
+        sources = journal.finished()
+        gathered = _Exact(scene, names)
+        mine = {name: sources[name] for name in names}
+        report = judge(scene, path, mine, left, resumed=[*resumed], gathered=gathered)
         report = replace(report, faults={one.label: one.about for one in wrong}, others=others)
         if thorough:
             tried = checks.experiments_of(scene)
@@ -168,7 +184,9 @@ def run(
                 report = replace(report, verdicts=(*report.verdicts, *more))
         report = replace(report, verdicts=tuple(checks.shared(report.verdicts)))
         report = replace(report, broke=broke)
-        journal.commit(scene, comparison=report.comparison, verdicts=report.verdicts)
+        journal.commit(
+            scene, comparison=report.comparison, verdicts=report.verdicts, solution=gathered.solution()
+        )
     return report
 
 
@@ -201,8 +219,10 @@ def judge(
     left: Sequence[LeftOut],
     *,
     resumed: Sequence[str] = (),
+    gathered: _Exact | None = None,
 ) -> Report:
-    """The report on stored trajectories, read in pieces of bounded size."""
+    """The report on stored trajectories, read in pieces of bounded size; the exact solution is `gathered`
+    where it is known at all of their frames."""
     rows, stride = _pieces(scene, sources)
     judged_frames = dict.fromkeys(sources, 0)
     verdicts: dict[str, list[list[Verdict]]] = {name: [] for name in sources}
@@ -215,6 +235,8 @@ def judge(
     for _, same in groupby(heapq.merge(*streams, key=first), first):
         pieces = {piece.label: piece for _, piece in same}
         known = compare.solution(scene, pieces.values()) if exact.has_true_motion(scene) else None
+        if gathered and known and stride == 1:
+            gathered.add(known, pieces)
         for name, piece in pieces.items():
             judged_frames[name] += len(piece.t)
             verdicts[name].append(checks.judge(scene, piece, piece=True))
@@ -248,6 +270,37 @@ def judge(
         judged_frames=min(frames, scene.frames) if stride > 1 else scene.frames,
         resumed=tuple(name for name in resumed if name in sources),
     )
+
+
+class _Exact:
+    """The exact solution and the errors of all methods, gathered piece by piece."""
+
+    def __init__(self, scene: Scene, labels: Sequence[str]) -> None:
+        self._norm = scene.system.norm
+        self._fits = scene.frames * (2 * scene.n + 1 + len(labels)) <= MOST_ERRORS
+        self._states: list[tuple[np.ndarray, ...]] = []
+        self._errors: dict[str, list[np.ndarray]] = {label: [] for label in labels}
+
+    def add(self, known: tuple[Extended, Extended], pieces: Mapping[str, Trajectory]) -> None:
+        """Add the exact states at the frames of the longest of these pieces, which follow the last ones."""
+        if not self._fits:
+            return
+        longest = max(pieces.values(), key=lambda piece: len(piece.t))
+        # consecutive pieces share a frame
+        new = slice(1 if self._states else 0, None)
+        self._states.append(tuple(np.asarray(x, np.float64)[new] for x in (longest.t, *known)))
+        for label, piece in pieces.items():
+            q, p = (x[: len(piece.t)] for x in known)
+            error = self._norm(piece.q - q, piece.p - p)
+            self._errors[label].append(np.asarray(error, np.float64)[new])
+
+    def solution(self) -> keeper.Solution | None:
+        """All of it; None where it is not known, or longer than what is gathered in memory."""
+        if not self._states:
+            return None
+        t, q, p = (np.concatenate(parts) for parts in zip(*self._states, strict=True))
+        errors = {label: np.concatenate(parts) for label, parts in self._errors.items() if parts}
+        return keeper.Solution(t=t, q=q, p=p, errors=errors)
 
 
 def _begun(scene: Scene, pieces: Iterable[Trajectory]) -> Iterator[tuple[int, Trajectory]]:
@@ -310,7 +363,7 @@ def repeat(path: Path, *, methods: Sequence[str] = (), progress: Progress | None
     beside = path.absolute().parent
     # beside the store there is space for its repetition, unless that folder is read-only
     place = beside if os.access(beside, os.W_OK) else None
-    with interrupts.folder(dir=place, prefix=".springcheck-") as folder:
+    with processes.folder(dir=place, prefix=".springcheck-") as folder:
         again = folder / "again.h5"
         with keeper.open_new(again, "repeat") as journal:
             bar = _Bar(progress, len(chosen))
@@ -324,7 +377,7 @@ def repeat(path: Path, *, methods: Sequence[str] = (), progress: Progress | None
                     seed = _seed(path, name, before.get("origin.seed")) if scene.bath else None
                     record = driver.play(mine, label, draft.append, progress=told, seed=seed)
                     digest = draft.finish(keeper.attributes(record))
-                source = journal.sources()[name]
+                source = journal.finished()[name]
                 found.append(
                     Repeat(
                         method=name,
