@@ -209,7 +209,8 @@ def test_a_scene_with_bonds_is_written_and_read_with_the_same_numbers() -> None:
         ("{ends = [0, 2], stiffness = 1}", "the two move along"),
         ("{ends = [0, 1]}", "stiffness"),
         ("{ends = [0, 1], stiffness = 1, rest = -1}", "rest"),
-        ("{ends = ['wall', 1], stiffness = 1}", "ends"),
+        ("{ends = ['wall', 'wall'], stiffness = 1}", "bond[0].ends: a bond between two walls"),
+        ("{ends = ['wall', 1], stiffness = 1, wall = [1, 2, 3, 4]}", "wall"),
     ],
 )
 def test_mistakes_in_bonds_are_said_in_a_line(bond: str, said: str) -> None:

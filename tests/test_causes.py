@@ -21,7 +21,7 @@ from springcheck.identify import files
 from springcheck.physics import scenefile
 from springcheck.physics.bath import Bath
 from springcheck.physics.builders import spring
-from springcheck.physics.radial import RadialSpring
+from springcheck.physics.distance import RadialSpring
 from springcheck.physics.scene import Scene
 from springcheck.physics.terms import Quartic, WallSpring
 from springcheck.physics.trajectory import Trajectory, Verdict, of_scene

@@ -173,8 +173,8 @@ steps = 5
         ("[[particle]]", "title = 5\n[[particle]]", "title = 5: text in quotes is needed"),
         (
             "[time]",
-            "[[bond]]\nends = ['wall', 0]\n[time]",
-            "bond[0].ends[0] = 'wall': a whole number is needed",
+            "[[kepler]]\nends = ['wall', 0]\nstrength = 1\n[time]",
+            "wall-kepler: the distance u at the start is 0",
         ),
         ("mass = 1", "mass = 0,25", "(at line 3, column 9): mass = 0,25; numbers are written as 0.25"),
         ("steps = 5", "[time]", "Cannot declare [time] twice (at line 10, column 6): [time]"),

@@ -16,7 +16,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import references
 from springcheck import checks, driver, engines
 from springcheck.checks.steps import fastest
 from springcheck.cli import listing, main
@@ -130,11 +129,6 @@ def test_a_method_that_cannot_start_is_left_out_unless_it_was_asked_for(tmp_path
     assert any("one friction rate" in left.reason for left in found.left_out)
     with pytest.raises(MethodError, match="one friction rate"):
         session.run(scene, tmp_path / "y.h5", methods=["own:euler", "openmm:langevin-middle"])
-
-
-def test_the_script_of_the_references_compares_those_that_there_are() -> None:
-    """It ended at the first scene in a bath, of which there is none."""
-    assert references.named() == sorted(path.stem for path in REFERENCES.glob("*.json"))
 
 
 def test_every_scene_has_a_reference() -> None:

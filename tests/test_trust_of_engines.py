@@ -134,3 +134,8 @@ def test_an_engine_that_changes_the_process_changes_nothing_for_others(folder: P
         )  # fmt: skip
     assert after == before
     assert np.array_equal(driver.run(scene, "own:rk4").q, right.q)
+
+
+def test_a_command_that_prints_endlessly_is_ended(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["run", "spring", "--command", "x=yes {scene} {out}", "--method", "command:x"]) == 2
+    assert "more than 64 MiB of output" in capsys.readouterr().err

@@ -10,7 +10,7 @@ row with another combination is rejected, and the numbers that it depends on are
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import product
 from math import inf, log, nan, sqrt
 
@@ -197,16 +197,16 @@ def fit(scheme: Thermostat, seen: Noise) -> Fitted | None:
                 s * t * float(_score(scheme, seen, (at + s * d[0] + t * d[1])[None])[0][0])
                 for s, t in product((1, -1), repeat=2)
             ) / 36e-6  # fmt: skip
-        inverse = np.linalg.pinv(H)
+        sound = bool(np.isfinite(H).all()) and bool(np.all(np.linalg.eigvalsh(H) > 0))
+        inverse = np.linalg.inv(H) if sound else np.full(H.shape, nan)
         slope = np.log(up[1] / down[1]) / 6e-3
         spread, of_heat = ways.T @ inverse @ ways, of_heat + float(slope @ inverse @ slope)
     w, rate = sqrt(float(np.exp(at[0]))) / seen.h, float(np.exp(at[1])) / seen.h
-    errors = np.sqrt(np.where(np.diag(spread) >= 0, np.diag(spread), nan))
-    thermal = thermal / seen.h**2
+    errors, thermal = np.sqrt(np.diag(spread)), thermal / seen.h**2
     return Fitted(
         scheme=scheme.name, omega=w, omega_error=w * float(errors[0]) / 2, friction=rate,
-        friction_error=rate * float(errors[1]), thermal=thermal, thermal_error=thermal * sqrt(of_heat),
-        nats=nats, known=known,
+        friction_error=rate * float(errors[1]), thermal=thermal,
+        thermal_error=thermal * float(np.sqrt(of_heat)), nats=nats, known=known,
     )  # fmt: skip
 
 
@@ -234,12 +234,13 @@ def thermostats(q: Floats, v: Floats, h: float) -> list[Fitted] | None:
     if (found := _in_two_halves(seen)) is not None or (found := _collided(seen)) is not None:
         return found
     one = seen.misfit < ONE_DRAW
+    rows = list(DRAWN_ONCE) if one else [x for x in THERMOSTATS.values() if x.full_rank and not x.carried]
     if not _are_draws(seen.left[:, 1:], seen.z[:-1]):
         # a draw that acts in two steps colours what a map leaves
-        rows = [x for x in DRAWN_ONCE if x.carried] if one else []
-        return [replace(y, known=False) for x in rows if (y := fit(x, seen))] or None
-    rows = list(DRAWN_ONCE) if one else [x for x in THERMOSTATS.values() if x.full_rank and not x.carried]
-    fits = [y for x in rows if not x.carried and (y := fit(x, seen))]
+        rows = [x for x in rows if x.carried]
+        if not rows:
+            return None
+    fits = [y for x in rows if (y := fit(x, seen))]
     return sorted(fits, key=lambda y: y.nats)
 
 
@@ -293,7 +294,7 @@ def _collided(seen: Noise) -> list[Fitted] | None:
     hits, share = ~still, float(np.mean(still))
     if not FEWEST_OF_EACH <= np.sum(still) <= n - FEWEST_OF_EACH:
         return None
-    times = np.where(hits, 1 - share, -share)[:, None]
+    times = np.where(hits, share, share - 1)[:, None]
     B = np.linalg.lstsq(known[still], after[still], rcond=None)[0]
     A = (B[:2].T * np.std(seen.z, axis=0)[:, None]) / np.std(seen.z, axis=0)
     if (
@@ -304,6 +305,12 @@ def _collided(seen: Noise) -> list[Fitted] | None:
         return None
     centre = np.linalg.solve(np.eye(2) - A, B[2] * np.std(seen.z, axis=0))
     start, end = (seen.z[:-1] - centre)[hits], (seen.z[1:] - centre)[hits]
+    # kicks in time, or of one size, are no collisions
+    kicks = np.linalg.norm(end - start @ A.T, axis=1)
+    if np.ptp(np.diff(np.flatnonzero(hits))) == 0 or np.median(np.diff(np.sort(kicks))) < room * np.mean(
+        kicks
+    ):
+        return None
     a, x, out = 2 - float(np.trace(A)), -log(share), []
     for scheme in (one for one in THERMOSTATS.values() if one.collides and a > 0):
         law = Law(scheme=scheme, h=1.0, m=np.ones(1), k=np.array([a]), rate=x, thermal=1.0)

@@ -184,8 +184,9 @@ def summary(command: str, found: Sequence[Case], status: int) -> str:
     """A summary in Markdown; its first sentence is the cause."""
     wrong = [x for x in found if x.passed is False or x.error]
     first, tally = sentence(found, status), _tally(found)
-    judged = any(x.passed is not None for x in found)
-    words = "an error, and some was judged" if status == 2 and judged else WORDS[status]
+    words = WORDS[status]
+    if status == 2 and any(x.passed is not None for x in found):
+        words = "error" if any(x.error for x in found) else "not everything judged"
     lines = [f"### springcheck {command}: {words}", "", _cell(first), ""]
     if len(wrong) > 1:
         lines += ["| what | check | why |", "|---|---|---|"]

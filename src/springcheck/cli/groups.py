@@ -43,7 +43,8 @@ GROUPS: Mapping[str, Sequence[str]] = {
     "known of the motion": ("--mass", "--stiffness", "--differences", "--arithmetic"),
     "how much is measured": ("--thorough", "--partial", "--budget", "--quick", "--workers", "--cluster"),
     "figures": ("--particle",),
-    "output": ("output", "--output", "--force", "--json", "--quiet", "--verdicts", "--rows", "--points"),
+    "output": ("output", "--output", "--force", "--json", "--quiet", "--verdicts", "--left-out", "--rows",
+               "--points"),
     "continuous integration": tuple(f"--{name}" for name in REPORT_FORMS),
 }  # fmt: skip
 """Headings in the order of the help, with the arguments below each."""

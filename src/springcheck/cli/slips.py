@@ -108,6 +108,8 @@ def _has_room() -> None:
 
 def _is_file(name: str) -> None:
     path = Path(name)
+    if not path.exists() and (store := path.with_name(f"{path.name}.h5")).is_file():
+        raise SpringcheckError(f"{name}: no such file, did you mean {store}?")
     if path.is_dir():
         raise SpringcheckError(f"{name}: it is a folder, a file is needed")
     if path.exists() and not path.is_file():

@@ -18,6 +18,7 @@ from typing import Any, TypeVar
 from springcheck import schemes
 from springcheck.bath import THERMOSTATS
 from springcheck.engines.contract import (
+    ANY_DISTANCE,
     ANY_POTENTIAL,
     BRAKES,
     DRIVEN,
@@ -48,10 +49,12 @@ from springcheck.engines.registry import (
 from springcheck.errors import MOST_LIKELY, EngineError, MethodError, nearest, told
 from springcheck.physics.arrays import Arithmetic, Floats
 from springcheck.physics.scene import Scene
+from springcheck.physics.terms import Distances
 
 __all__ = [
-    "ANY_POTENTIAL", "BRAKES", "UNNAMED", "DRIVEN", "EVERY_FORCE", "EVERY_POTENTIAL", "OURS", "Arithmetic",
-    "Engine", "Label", "Method", "Need", "Simulation", "Started", "Stopped", "absence", "bring", "engine",
+    "ANY_DISTANCE", "ANY_POTENTIAL", "BRAKES", "UNNAMED", "DRIVEN", "EVERY_FORCE", "EVERY_POTENTIAL", "OURS",
+    "Arithmetic", "Engine", "Label", "Method", "Need", "Simulation", "Started", "Stopped", "absence",
+    "bring", "engine",
     "foreign", "from_file", "guarded", "installed_version", "is_brought", "load", "match", "method",
     "module_name", "module_of", "named", "names", "obstacle", "origin", "parse", "refusal",
     "unusable", "while_here",
@@ -315,7 +318,11 @@ def refusal(scene: Scene, label: Label) -> str | None:
         return f"{who} moves {moved}, not {PLURAL[scene.kind]}"
     if scene.places is not None and not engine(label.engine).any_axis:
         return f"{engine(label.engine).title} is given particles along x here, and the scene has other axes"
-    unknown = (term for term in scene.terms if not (term.kind == "potential" and ANY_POTENTIAL in what.terms))
+    whole = ANY_POTENTIAL in what.terms, ANY_DISTANCE in what.terms
+    unknown = (
+        term for term in scene.terms
+        if not (whole[0] and term.kind == "potential") and not (whole[1] and isinstance(term, Distances))
+    )  # fmt: skip
     missing = sorted({term.key for term in unknown} - what.terms)
     if missing:
         return f"it has no {' and no '.join(missing)} term"

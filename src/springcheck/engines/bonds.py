@@ -14,7 +14,7 @@ from springcheck.physics import graph
 from springcheck.physics.arrays import Floats, Integers
 from springcheck.physics.scene import Scene
 from springcheck.physics.term import Term
-from springcheck.physics.terms import Morse, RadialSpring, Spring, WallSpring
+from springcheck.physics.terms import Distances, Morse, RadialSpring, Spring, WallSpring
 from springcheck.schemes import scheme
 
 Tie: TypeAlias = tuple[tuple[int, ...], float, float, tuple[float, ...] | None]
@@ -80,7 +80,7 @@ def rests(scene: Scene, label: Label) -> Floats:
     Such a bond pulls along each axis by itself, independent of noise across the line.  MethodError where
     springs have no common rest, or that noise turns a bond.
     """
-    if scene.n < 3 * scene.particles and any(isinstance(term, RadialSpring) for term in scene.terms):
+    if scene.n < 3 * scene.particles and any(isinstance(term, Distances) for term in scene.terms):
         raise MethodError(
             f"{label}: its noise acts along x, y and z, and turns a bond; the scene's particles move "
             f"along {' and '.join(scene.axes)}"

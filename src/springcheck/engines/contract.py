@@ -31,6 +31,9 @@ class Need(Enum):
 ANY_POTENTIAL = "any potential"
 """Among the terms of a method: it takes the force of every potential as a function."""
 
+ANY_DISTANCE = "any distance"
+"""Among the terms of a method: it takes the formula of every potential of a distance."""
+
 EVERY_POTENTIAL = frozenset({ANY_POTENTIAL, "wall-spring", "spring", "quartic", "cosine", "morse", "weight"})
 """The terms of a method that takes the force as a function: the potentials that are known, and all others."""
 

@@ -21,7 +21,7 @@ from typing import NamedTuple
 import springcheck
 from springcheck import schemes
 from springcheck.bath import THERMOSTATS
-from springcheck.engines.contract import ANY_POTENTIAL, Engine, Method, Stopped
+from springcheck.engines.contract import ANY_DISTANCE, ANY_POTENTIAL, Engine, Method, Stopped
 from springcheck.engines.restored import restored
 from springcheck.errors import EngineError, MethodError, SpringcheckError, nearest, told
 from springcheck.physics import terms
@@ -147,7 +147,7 @@ def _checked(found: object, name: str = "") -> Engine:
             )
     if not (found.methods or found.thermostats):
         raise MethodError("it has no methods and no thermostats")
-    known = (*terms.known(), ANY_POTENTIAL)
+    known = (*terms.known(), ANY_POTENTIAL, ANY_DISTANCE)
     for scheme in found.schemes:
         schemes.bring(scheme)
     for key, one in (*found.methods.items(), *found.thermostats.items()):

@@ -9,8 +9,9 @@ import numpy as np
 
 from springcheck.errors import SceneError
 from springcheck.physics.arrays import Floats, Integers
+from springcheck.physics.distance import Distances
 from springcheck.physics.term import Term
-from springcheck.physics.terms import RadialSpring, Spring, WallSpring, Weight
+from springcheck.physics.terms import Spring, WallSpring, Weight
 
 
 def is_uniform_chain(system: Any) -> bool:
@@ -42,7 +43,7 @@ def free_groups(system: Any) -> tuple[Integers, ...]:
 
 def _holds(term: Term) -> Any:
     """Which rows of a term have a stiffness."""
-    return term.rigidity > 0
+    return term.joins
 
 
 def lowest_joined(n: int, terms: Sequence[Term]) -> Integers:
@@ -100,7 +101,7 @@ def alike(system: Any) -> tuple[tuple[Integers, Integers], ...]:
     their plane.
     """
     places, parts = system.scene.places, system.terms
-    kept = ((x.is_linear and not isinstance(x, Weight)) or isinstance(x, RadialSpring) for x in parts)
+    kept = ((x.is_linear and not isinstance(x, Weight)) or isinstance(x, Distances) for x in parts)
     if places is None or not all(kept) or any(x.origin and np.any(getattr(x, x.origin)) for x in parts):
         return ()
     found = []

@@ -33,6 +33,8 @@ class Norm:
 
     m: Floats
     terms: Sequence[Term]
+    stiffness: Sequence[Floats]
+    """|k| of the rows of each term (s,); of a law without a rest that at the start."""
     groups: tuple[Integers, ...]
     duration: float
     unit: np.longdouble
@@ -70,9 +72,9 @@ class Norm:
     def _energy(self, dq: Reals, dp: Reals, stretch: Callable[[Term, Reals], Reals]) -> Reals:
         def whole(dq: Reals, dp: Reals) -> Reals:
             total = kinetic_energy(self.m, dp)
-            for term in self.terms:
+            for term, k in zip(self.terms, self.stiffness, strict=True):
                 du = stretch(term, dq)
-                total = total + 0.5 * np.sum(term.rigidity * du * du, axis=-1)
+                total = total + 0.5 * np.sum(k * du * du, axis=-1)
             for group in self.groups:
                 m = self.m[group]
                 centre = np.sum(m * dq[..., group], axis=-1) / np.sum(m)

@@ -15,6 +15,7 @@ from springcheck.errors import SceneError, nearest
 from springcheck.physics.arguments import of_kind
 from springcheck.physics.arrays import Integers
 from springcheck.physics.bath import Bath
+from springcheck.physics.distance import Distances
 from springcheck.physics.exact.solution import SolvedSystem
 from springcheck.physics.fields import Kind, Quantity, SceneFields, Units
 from springcheck.physics.term import Term, check_sign, frozen
@@ -35,6 +36,8 @@ class Scene(SceneFields):
     def __post_init__(self) -> None:
         for field, value in _checked(self):
             object.__setattr__(self, field, value)
+        for term in (x for x in self.terms if isinstance(x, Distances)):
+            term.check_start(self.q)
 
     def __repr__(self) -> str:
         terms = ", ".join(f"{len(term)} {term.key}" for term in self.terms) or "free"

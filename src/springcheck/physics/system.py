@@ -71,8 +71,8 @@ class System(Generic[Fields]):
 
     @cached_property
     def is_separate(self) -> bool:
-        """Whether no term joins two particles: n independent systems side by side."""
-        return all(term.bodies == 1 for term in self.terms)
+        """Whether no term joins two coordinates: n independent systems side by side."""
+        return all(term.bodies == 1 and term.is_by_axes for term in self.terms)
 
     @cached_property
     def is_damped(self) -> bool:
@@ -101,15 +101,6 @@ class System(Generic[Fields]):
         """Whether every particle has the same friction rate, to a rounding of c/m."""
         rate = self.friction_rates
         return bool(np.ptp(rate) <= 2.0**-52 * np.max(rate))
-
-    @cached_property
-    def acting(self) -> dict[str, NDArray[np.bool_]]:
-        """For the key of each term, the particles on which such a term acts (n,)."""
-        out: dict[str, NDArray[np.bool_]] = {}
-        for term in self.terms:
-            for index in term.particles:
-                out.setdefault(term.key, np.zeros(self.n, dtype=bool))[index] = True
-        return out
 
     def pulls(self, terms: Iterable[Term] | None = None) -> Integers:
         """Number of rows of these terms, or of all, on each particle (n,)."""
@@ -267,7 +258,7 @@ class System(Generic[Fields]):
     @cached_property
     def rigidity(self) -> Floats:
         """The bound of `gershgorin` from the terms' absolute curvature at rest alone (n,) [M/T2]."""
-        return self._of_rows(lambda term: term.rigidity * term.bodies, np.zeros(self.n))
+        return self._of_rows(lambda term: term.stiffness(self.q) * term.bodies, np.zeros(self.n))
 
     # energies and sizes
 
@@ -299,6 +290,7 @@ class System(Generic[Fields]):
         return Norm(
             m=self.m,
             terms=self.terms,
+            stiffness=[term.stiffness(self.q) for term in self.terms],
             groups=self.free_groups,
             duration=self.duration,
             unit=np.longdouble(np.sqrt(unit or self.gained or 1.0)),

@@ -248,6 +248,16 @@ class Term(FrozenArrays):
         zero = np.zeros(len(self))
         return np.asarray(np.abs(self.second(zero, *self.parameters)) + zero)
 
+    def stiffness(self, q: Reals) -> Floats:
+        """`rigidity`, or of a law without a rest that at the start q (n,) -> (s,) [M/T2]."""
+        return self.rigidity
+
+    @property
+    def joins(self) -> NDArray[np.bool_]:
+        """Which rows act on their ends at all (s,)."""
+        # a law that is flat at its rest joins its ends too
+        return np.asarray((self.rigidity > 0) | ((self.bodies == 2) & (self.parameters[0] != 0)))
+
     def scaled(self, factor: float | Floats) -> Self:
         """Copy with energy and force multiplied by a factor: one number, or one for each row (s,)."""
         strength = self.columns[0].field

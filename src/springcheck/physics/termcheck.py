@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 
-from springcheck.physics.arrays import Reals
+from springcheck.physics.arrays import ROUNDOFF, WIDE, Reals
+from springcheck.physics.distance import Distances
 from springcheck.physics.term import Term
 
 SPACING = 2.0**-7
@@ -29,15 +31,18 @@ RESERVED_WORDS = (
 def check(term: type[Term]) -> None:
     """Raise TypeError where the class lacks a part, ValueError where its functions are inconsistent.
 
-    Tested at 64 elongations between -0.5 and 0.5, with parameters between 0.5 and 1.5: slope and second are
-    the derivatives of potential and slope, potential and slope are proportional to the first parameter and 0
-    at rest, and the error of slope in single precision is within `rounding`.
+    Tested at 64 elongations between -0.5 and 0.5 (distances: 1.5 to 2.5), with parameters from 0.5 to 1.5:
+    slope and second are the derivatives of potential and slope, potential and slope are proportional to the
+    first parameter and 0 at rest, the error of slope in single precision is within `rounding`, and in
+    extended precision no function rounds to double precision.  The formula of a distance gives its potential.
     """
     _check_parts(term)
     rng = np.random.default_rng(1)
-    count = len([column for column in term.columns if column.field != term.origin])
-    parameters = [x.astype(np.float32).astype(np.longdouble) for x in rng.uniform(0.5, 1.5, (count, 64))]
-    u = rng.uniform(-0.5, 0.5, 64).astype(np.float32).astype(np.longdouble)
+    in_space = issubclass(term, Distances)
+    count = len([column for column in term.columns if column.field not in (term.origin, "number")])
+    whole = np.ldexp(np.rint(np.ldexp(rng.uniform(0.5, 1.5, (count, 64)), 52)), -52).astype(np.longdouble)
+    parameters = [x.astype(np.float32).astype(np.longdouble) for x in whole]
+    u = rng.uniform(-0.5, 0.5, 64).astype(np.float32).astype(np.longdouble) + (2.0 if in_space else 0.0)
     functions: Any = term
     for lower, upper in (("potential", "slope"), ("slope", "second")):
         of, slope = getattr(functions, lower), getattr(functions, upper)
@@ -49,11 +54,51 @@ def check(term: type[Term]) -> None:
         of = getattr(functions, name)
         wrong = f"{name} is not proportional to its first parameter, the strength"
         _agree(term, wrong, of(u, *double), 2 * of(u, *parameters))
-        _agree(term, f"{name} is not 0 at rest", of(0 * u, *parameters), 0 * u)
+        if not in_space:
+            _agree(term, f"{name} is not 0 at rest", of(0 * u, *parameters), 0 * u)
     narrow = functions.slope(u.astype(np.float32), *(x.astype(np.float32) for x in parameters))
     bound = FORMULA_ROUNDINGS * 2.0**-24 * np.abs(functions.rounding(np.abs(u), u, *parameters))
     if not np.all(np.abs(narrow - functions.slope(u, *parameters)) <= bound):
         raise ValueError(f"{term.__name__}: slope rounds more than rounding(size, u, ...) says")
+    for name in ("potential", "slope", "second"):
+        # digits beyond a double's, of which every one counts
+        fine = u + np.ldexp(rng.integers(0, 1024, 64).astype(np.longdouble), -60)
+        if WIDE and not _is_wide(getattr(functions, name), fine, whole):
+            raise ValueError(
+                f"{term.__name__}: {name} rounds to double precision; write it with NumPy's functions of its "
+                "arguments alone, which keep their precision"
+            )
+    if in_space:
+        names = [column.field for column in term.columns if column.field not in (term.origin, "number")]
+        given = dict(zip(names, parameters, strict=True)) | {
+            "u": u,
+            "exp": np.exp,
+            "log": np.log,
+            "sqrt": np.sqrt,
+        }
+        try:
+            found = eval(term.formula, {"__builtins__": {}}, given)
+        except Exception as error:
+            raise ValueError(f"{term.__name__}: its formula cannot be evaluated: {error}") from None
+        _agree(term, "its formula is not its potential", found, functions.potential(u, *parameters))
+
+
+DIFFERENCES = 12
+"""Order of the difference in which a smooth function vanishes and its rounding remains."""
+CLOSE = 2.0**-10
+"""Spacing of its points: a law that varies over a twentieth leaves (CLOSE 20)**12, below 1e-20."""
+
+
+def _is_wide(of: Any, u: Reals, parameters: Reals) -> bool:
+    """Whether a function is smooth to extended precision where u and all parameters change together."""
+    steps = CLOSE * np.arange(DIFFERENCES + 1)[:, None]
+    # parameters are doubles, and u moves by digits beyond a double's as well
+    fine = np.ldexp(np.longdouble(421), -62) / CLOSE
+    with np.errstate(all="ignore"):
+        values = np.stack([of(u + x * (1 + fine), *(parameters + x)) + 0 * u for x in steps])
+    rest = np.abs(np.diff(values, DIFFERENCES, axis=0)[0])
+    size = np.max(np.abs(values), axis=0) * np.sqrt(float(math.comb(2 * DIFFERENCES, DIFFERENCES)))
+    return bool(np.median(rest / np.where(size > 0, size, 1)) <= FORMULA_ROUNDINGS * ROUNDOFF)
 
 
 def _check_parts(term: type[Term]) -> None:

@@ -14,14 +14,21 @@ import numpy as np
 
 from springcheck.physics import termcheck
 from springcheck.physics.arrays import Floats, Integers, Reals
+from springcheck.physics.distance import (
+    Distances,
+    Kepler,
+    LennardJones,
+    OnDistances,
+    RadialMorse,
+    RadialSpring,
+)
 from springcheck.physics.driven import Drive
-from springcheck.physics.radial import RadialSpring
 from springcheck.physics.term import Column, LinearLaw, OnPairs, OnParticles, Origin, Term, WithoutPotential
 
 __all__ = [
-    "Column", "Cosine", "Damping", "Drive", "Morse", "OnPairs", "OnParticles",
-    "Quartic", "RadialSpring", "Spring", "Term", "VanDerPol", "WallSpring", "Weight",
-    "known", "register",
+    "Column", "Cosine", "Damping", "Distances", "Drive", "Kepler", "LennardJones", "Morse", "OnDistances",
+    "OnPairs", "OnParticles", "Quartic", "RadialMorse", "RadialSpring", "Spring", "Term", "VanDerPol",
+    "WallSpring", "Weight", "known", "register",
 ]  # fmt: skip
 
 
@@ -238,6 +245,9 @@ class VanDerPol(WithoutPotential):
 _KNOWN: dict[str, type[Term]] = {
     term.key: term for term in (
         WallSpring, Spring, Quartic, Cosine, Weight, Morse, RadialSpring, Damping, VanDerPol, Drive,
+        RadialSpring.to_points, *(
+            each for pair in (Kepler, LennardJones, RadialMorse) for each in (pair, pair.to_points)
+        ),
     )
 }  # fmt: skip
 
@@ -256,6 +266,8 @@ def register(term: T) -> T:
         raise TypeError(f"{term.__name__}: the key {term.key!r} is taken by {taken.__name__}")
     termcheck.check(term)
     _KNOWN[term.key] = term
+    if issubclass(term, OnDistances):
+        _KNOWN[term.to_points.key] = term.to_points
     return term
 
 

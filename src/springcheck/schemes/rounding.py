@@ -54,7 +54,7 @@ def magnitude_step(
     m: Reals,
     met: Iterable[Met],
     rate: Reals | None = None,
-    lost: tuple[Reals, Reals] | None = None,
+    lost: tuple[Any, Reals] | None = None,
 ) -> tuple[Reals, Reals]:
     """Running error bound of `step` from (q, p): the same step with every difference taken as a sum.
 
@@ -81,7 +81,7 @@ def magnitude_step(
 
 def _tableau(
     scheme: Scheme, start: tuple[Reals, Reals], each: Iterator[Met], *, h: Any, m: Reals, rate: Reals | None,
-    lost: tuple[Reals, Reals] | None,
+    lost: tuple[Any, Reals] | None,
 ) -> tuple[Reals, Reals]:  # fmt: skip
     """The same for a Butcher tableau.
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import partial
 
 from springcheck.engines.contract import (
+    ANY_DISTANCE,
     ANY_POTENTIAL,
     DRIVEN,
     EVERY_POTENTIAL,
@@ -17,7 +18,7 @@ from springcheck.engines.contract import (
     thermostat,
 )
 
-_TERMS = EVERY_POTENTIAL - {ANY_POTENTIAL} | {"bond"}
+_TERMS = EVERY_POTENTIAL - {ANY_POTENTIAL} | {ANY_DISTANCE}
 _DRIVEN = _TERMS | DRIVEN
 
 _ON_A_LINE = _TERMS - {"morse"}

@@ -25,6 +25,8 @@ itself, from the number of its step.
 from __future__ import annotations
 
 import contextlib
+import itertools
+import re
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -39,7 +41,7 @@ from springcheck.errors import MethodError
 from springcheck.physics.arrays import Floats
 from springcheck.physics.driven import Drive, timed
 from springcheck.physics.scene import Scene
-from springcheck.physics.terms import Morse, WallSpring
+from springcheck.physics.terms import Distances, Morse, RadialSpring, WallSpring
 
 CUSTOM_TERMS: dict[str, tuple[str, tuple[str, ...]]] = {
     "wall-spring": ("0.5*k*(x-at)^2", ("k", "at")),
@@ -114,6 +116,12 @@ def _system(scene: Scene, origins: Floats) -> tuple[mm.System, Floats]:
         if group.getNumBonds():
             system.addForce(group)
     for term in scene.terms:
+        if isinstance(term, Distances) and not isinstance(term, RadialSpring):
+            force, points = _of_distances(scene, term, origins, scene.particles + len(fixed))
+            for point in points:
+                system.addParticle(0.0)
+                fixed.append(point)
+            system.addForce(force)
         if isinstance(term, Morse):
             _stays_right_way_round(scene, term)
         if term.key in CUSTOM_TERMS and not isinstance(term, WallSpring):
@@ -151,6 +159,27 @@ def _custom(scene: Scene, term: Any, origins: Floats) -> Iterator[mm.Force]:
         for particles, values in zip(ends[rows].tolist(), columns[rows].tolist(), strict=True):
             add(*particles, values)
         yield force
+
+
+def _of_distances(
+    scene: Scene, term: Distances, origins: Floats, anchor: int
+) -> tuple[mm.Force, list[tuple[float, ...]]]:
+    """A term of distances by its own formula, and its fixed points, as particles from `anchor` on."""
+    force = mm.CustomBondForce(re.sub(r"\bu\b", "r", term.formula).replace("**", "^"))
+    names = [c.field for c in term.columns if c.field not in (term.origin, "number")]
+    for name in names:
+        force.addPerBondParameter(name)
+    places, points = scene.all_places, []
+    for first, last in itertools.pairwise([*term.firsts.tolist(), len(term)]):
+        ends = [int(places[index[first]]) // 3 for index in term.particles]
+        if term.bodies == 1:
+            point = np.zeros(3)
+            i = term.particles[0][first:last]
+            point[places[i] % 3] = getattr(term, term.origin)[first:last] - origins[i]
+            ends.append(anchor + len(points))
+            points.append(tuple(point.tolist()))
+        force.addBond(*ends, [float(getattr(term, name)[first]) for name in names])
+    return force, points
 
 
 def _driven(scene: Scene, term: Drive) -> Iterator[mm.Force]:

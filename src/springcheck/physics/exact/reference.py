@@ -29,7 +29,7 @@ STAGES, FEWER_STAGES = 20, 16
 """Stages of the integration that counts, and of the one that it is compared with."""
 NOISE = 32
 """Largest share of the last two Legendre coefficients of a step, in units of rounding."""
-FELT = 8
+FELT = 6
 """The stated error in units of the largest difference of both integrations."""
 FELT_ROUNDING = 4 * EPS
 """The least stated error, relative to the largest size so far and to the time: roundings of the constants of

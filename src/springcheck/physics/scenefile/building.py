@@ -19,7 +19,7 @@ from springcheck.physics.fields import Units
 from springcheck.physics.scene import Scene
 from springcheck.physics.scenefile import tables
 from springcheck.physics.term import Column, Term
-from springcheck.physics.terms import Damping, RadialSpring, Spring, WallSpring
+from springcheck.physics.terms import Damping, OnDistances, Spring, WallSpring
 
 
 class MistakeError(ValueError):
@@ -172,8 +172,12 @@ def _terms(table: Any, bodies: _Bodies) -> Iterator[Term]:
     yield from bodies.terms
     rows = itertools.chain(
         _springs(table.spring, bodies),
-        *(_by_columns(x, getattr(table, tables.identifier(x.key)), bodies) for x in tables.of_terms()),
-        _bonds(table.bond, bodies),
+        *(
+            (_distances if issubclass(x, OnDistances) else _by_columns)(
+                x, getattr(table, tables.identifier(x.key)), bodies
+            )
+            for x in tables.of_terms()
+        ),
         _circuit(table, bodies),
     )
     found: dict[tuple[type[Term], bool], list[tuple[float, ...]]] = {}
@@ -191,7 +195,7 @@ _Rows: TypeAlias = Iterator[tuple[type[Term], bool, tuple[float, ...]]]
 
 def _springs(springs: Sequence[Any], bodies: _Bodies) -> _Rows:
     for j, spring in enumerate(springs):
-        numbers = _loose_ends(j, spring, bodies)
+        numbers = _loose_ends(f"spring[{j}]", spring, bodies)
         rest = spring.rest
         if len(numbers) == 1:
             rest = spring.wall + rest if spring.ends[0] == "wall" else spring.wall - rest
@@ -201,28 +205,36 @@ def _springs(springs: Sequence[Any], bodies: _Bodies) -> _Rows:
             yield WallSpring if len(at) == 1 else Spring, spring.fast, (*at, spring.stiffness, rest)
 
 
-def _loose_ends(j: int, row: Any, bodies: _Bodies) -> list[int]:
-    """The ends of a spring that are no wall, one or two bodies.  MistakeError."""
-    field = f"spring[{j}].ends"
+def _loose_ends(where: str, row: Any, bodies: _Bodies) -> list[int]:
+    """The ends of a row that are no wall, one or two bodies.  MistakeError."""
+    field = f"{where}.ends"
     numbers = [bodies.number(end, field) for end in row.ends if end != "wall"]
     if not numbers:
-        raise MistakeError(f"{field}: a spring between two walls moves nothing")
+        raise MistakeError(f"{field}: a {where.partition('[')[0]} between two walls moves nothing")
     if len(numbers) == 2:
         _two_ends(numbers[0], numbers[1], field)
         if row.wall:
-            raise MistakeError(f"spring[{j}].wall is given, but no end of it is a wall")
+            raise MistakeError(f"{where}.wall is given, but no end of it is a wall")
     return numbers
 
 
-def _bonds(bonds: Sequence[Any], bodies: _Bodies) -> _Rows:
-    """A row for each axis of the two particles of a bond."""
-    for j, bond in enumerate(bonds):
+def _distances(term: Any, rows: Sequence[Any], bodies: _Bodies) -> _Rows:
+    """A row for each axis of the two particles, or of a particle and a fixed point."""
+    for j, row in enumerate(rows):
+        where = f"{term.key}[{j}]"
         if bodies.name not in ("particle", "chain"):
-            raise MistakeError(f"bond[{j}]: a bond joins particles")
-        one, other = bond.ends
-        _two_ends(one, other, f"bond[{j}].ends")
-        for at in bodies.along(f"bond[{j}].ends", None, one, other):
-            yield RadialSpring, False, (*at, bond.stiffness, bond.rest, j)
+            raise MistakeError(f"{where}: a {term.key} joins particles")
+        numbers = _loose_ends(where, row, bodies)
+        values = [_value(term, column, j, row) for column in term.columns[:-1]]
+        found = bodies.along(f"{where}.ends", None, *numbers)
+        wall = row.wall if isinstance(row.wall, tuple) else (row.wall,) * (1 if row.wall else len(found))
+        if len(wall) != len(found):
+            raise MistakeError(f"{where}.wall: {len(found)} for its axes are needed, not {len(wall)}")
+        for at, x in zip(found, wall, strict=True):
+            if len(at) == 2:
+                yield term, False, (*at, *values, j)
+            else:
+                yield term.to_points, False, (*at, *values, x, j)
 
 
 def _one_axis(row: str, places: Mapping[str, float], ends: Sequence[tuple[int, ...]]) -> None:

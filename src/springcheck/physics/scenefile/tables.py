@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal, NamedTuple, cast, get_args
 import msgspec
 
 from springcheck.physics import terms
+from springcheck.physics.distance import ToPoints
 from springcheck.physics.fields import Kind, Quantity, Units
 
 Positive = Annotated[float, msgspec.Meta(gt=0)]
@@ -69,14 +70,6 @@ class SpringTable(SceneTable, frozen=True):
     wall: float = 0.0
     fast: bool = False
     axis: Axis | None = None
-
-
-class BondTable(SceneTable, frozen=True):
-    """A bond of two particles in any direction: k/2 (length - rest)**2, k [M/T2], rest [L]."""
-
-    ends: tuple[int, int]
-    stiffness: float
-    rest: NonNegative = 0.0
 
 
 class WaveTable(SceneTable, frozen=True):
@@ -160,7 +153,6 @@ class SceneBase(SceneTable, frozen=True):
     resistor: tuple[ResistorTable, ...] = ()
     chain: ChainTable | None = None
     spring: tuple[SpringTable, ...] = ()
-    bond: tuple[BondTable, ...] = ()
     bath: BathTable | None = None
     methods: MethodsTable = MethodsTable()
     record: RecordTable = RecordTable()
@@ -173,7 +165,10 @@ def _of_term(term: Any) -> type[SceneTable]:
     """The table of a term: its particle or two ends, its axis, and its columns."""
     fields: list[Any] = [("particle", int) if len(term.ends) == 1 else ("ends", tuple[int, int])]
     names = {}
-    for column in term.columns:
+    in_space = issubclass(term, terms.OnDistances)
+    if in_space:
+        fields = [("ends", tuple[End, End]), ("wall", float | PerAxis, 0.0)]
+    for column in term.columns[: -1 if in_space else None]:
         kind: Any = _SIGNS[column.sign]
         name = identifier(column.name)
         names[name] = column.name
@@ -182,7 +177,8 @@ def _of_term(term: Any) -> type[SceneTable]:
             fields += [(name, kind | None, None), (column.field, kind | None, None)]
             continue
         fields.append((name, kind) if column.default is None else (name, kind, column.default))
-    fields.append(("axis", Axis | None, None))
+    if not in_space:
+        fields.append(("axis", Axis | None, None))
     table = msgspec.defstruct(
         f"{term.__name__}SceneTable", fields, bases=(SceneTable,), frozen=True, kw_only=True, rename=names,
         namespace={"__doc__": term.__doc__},
@@ -195,13 +191,14 @@ def identifier(name: str) -> str:
     return name.replace("-", "_")
 
 
-OWN_TABLES = ("wall-spring", "spring", "bond")
+OWN_TABLES = ("wall-spring", "spring")
 """Keys of the terms with tables of their own."""
 
 
 def of_terms() -> tuple[Any, ...]:
     """Terms that are read by their columns alone."""
-    return tuple(term for key, term in terms.known().items() if key not in OWN_TABLES)
+    every = terms.known().items()
+    return tuple(x for key, x in every if key not in OWN_TABLES and not issubclass(x, ToPoints))
 
 
 def scene_table() -> Any:

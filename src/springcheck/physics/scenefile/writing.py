@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 
 from springcheck.physics.arrays import Floats
+from springcheck.physics.distance import Distances
 from springcheck.physics.fields import SceneFields
 from springcheck.physics.graph import standing
 from springcheck.physics.scenefile.tables import BODIES
 from springcheck.physics.system import System
 from springcheck.physics.term import Term
-from springcheck.physics.terms import Damping, RadialSpring, Spring, WallSpring
+from springcheck.physics.terms import Column, Damping, Spring, WallSpring
 
 MOST_WAVES = 64
 """Most standing waves by which the start of a chain is written."""
@@ -112,11 +113,33 @@ def _rows(scene: SceneFields, term: Term) -> Iterator[str]:
             # the name of its origin: wall or rest
             row |= {term.columns[1].name: rest} if rest else {}
             yield _table("[[spring]]", (row | ({"fast": True} if term.fast else {})).items())
-    elif isinstance(term, RadialSpring):
-        for a, b, k, rest in {number: row for *row, number in term.rows()}.values():
-            yield _table("[[bond]]", {"ends": _ends(scene, [a, b])[0], "stiffness": k, "rest": rest}.items())
+    elif isinstance(term, Distances):
+        yield from _distances(scene, term)
     else:
         yield from _by_columns(scene, term)
+
+
+def _distances(scene: SceneFields, term: Distances) -> Iterator[str]:
+    """One table for the rows of each distance."""
+    for first, last in itertools.pairwise([*term.firsts.tolist(), len(term)]):
+        ends, _ = _ends(scene, [int(index[first]) for index in term.particles])
+        row: dict[str, Any] = {"ends": ["wall", *ends][-2:]}
+        for column in term.columns:
+            if column.field not in (term.origin, "number"):
+                row |= [_given(term, column, first)]
+        if term.origin and np.any(at := getattr(term, term.origin)[first:last]):
+            row["wall"] = at.tolist()
+        yield _table(f"[[{term.key.removeprefix('wall-')}]]", row.items())
+
+
+def _given(term: Term, column: Column, j: int) -> tuple[str, float]:
+    """Name and value of a column in a file: the inverse where it has the same number as its inverse."""
+    value = float(getattr(term, column.field)[j])
+    inverse = 1 / value if column.inverse and abs(value) > 1e-307 else 0.0
+    # the inverse of an inverse is often, not always, the same number
+    if inverse and 1 / inverse == value:
+        return column.name, inverse
+    return column.field if column.inverse else column.name, value
 
 
 def _ends(scene: SceneFields, coordinates: Sequence[int]) -> tuple[list[int], dict[str, str]]:
@@ -140,14 +163,7 @@ def _by_columns(scene: SceneFields, term: Term) -> Iterator[str]:
         ends, axis = _ends(scene, at)
         row: dict[str, Any] = {"particle": ends[0]} if len(ends) == 1 else {"ends": ends}
         row |= axis
-        for column in term.columns:
-            value = float(getattr(term, column.field)[j])
-            inverse = 1 / value if column.inverse and abs(value) > 1e-307 else 0.0
-            # the inverse of an inverse is often, not always, the same number
-            if inverse and 1 / inverse == value:
-                row[column.name] = inverse
-            else:
-                row[column.field if column.inverse else column.name] = value
+        row |= [_given(term, column, j) for column in term.columns]
         yield _table(f"[[{term.key}]]", row.items())
 
 

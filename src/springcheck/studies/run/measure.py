@@ -70,16 +70,26 @@ def perform(options: Namespace, progress: Progress | None) -> Report | Repeats:
     if options.source is not None:
         return Repeats(repeats=tuple(repeat(Path(options.source), methods=options.method, progress=progress)))
     scene = changed(options)
+    path = Path(options.output or f"{scene.name}.h5")
+    ours = options.output is None and _holds_runs(path)
     return run(
         scene,
-        Path(options.output or f"{scene.name}.h5"),
+        path,
         methods=["*"] if options.all else options.method,
-        force=options.force,
+        force=options.force or ours,
         thorough=options.thorough,
         faults=options.fault,
         progress=progress,
         seed=options.seed,
     )
+
+
+def _holds_runs(path: Path) -> bool:
+    """Whether a file is a store of runs, which under its default name is written anew."""
+    try:
+        return path.is_file() and bool(keeper.summary(path).runs)
+    except SpringcheckError:
+        return False
 
 
 def stored(path: Path) -> Stored:

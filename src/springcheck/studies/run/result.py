@@ -21,7 +21,7 @@ from springcheck.studies.run.tally import MethodRun
 from springcheck.studies.study import StudyResult
 from springcheck.studies.text import left_out
 from springcheck.text.lines import Lines, Text, hanging, plain
-from springcheck.text.wording import count, few
+from springcheck.text.wording import count
 
 if TYPE_CHECKING:
     from springcheck.bath.heat import Heated
@@ -94,6 +94,7 @@ class Report(StudyResult):
         size = "" if scene.n == 1 else f", {scene.size}"
         out = [
             plain(f"{scene.title}: {scene.stepping}{size}", "bold"),
+            *self._summary(),
             plain(),
             *text.methods(scene, self.runs),
             *text.same_motions(self.same),
@@ -102,22 +103,30 @@ class Report(StudyResult):
             *text.failures(v for v in verdicts if v.method not in self.faults),
             *text.faults(self.faults, verdicts),
             *text.beyond(scene, self.runs),
-            *left_out(self.left_out),
         ]
-        if self.others:
-            others = few(self.others, 8)
-            out.append(plain(f"Left out {others}: not among the default methods; --all runs every one"))
         if self.judged_frames < scene.frames:
             which = "pieces at equal distances, the first and the last"
             of = f"Judged on {self.judged_frames} of {scene.frames} frames: {which}"
             out.append(plain(f"{of}; error, energy and same motion are of these"))
-        out += [plain(), *text.unjudged(verdicts, self.path), *self._summary()]
+        out += text.unjudged(verdicts, self.path)
+        failed = any(v.passed is False for v in verdicts)
+        if (left := checks.not_exercised(scene)) and not failed:
+            out += hanging("", left)
+        out += self._left(all_of_them=getattr(options, "left_out", False))
         return [*out, *text.in_full(verdicts, options)]
+
+    def _left(self, *, all_of_them: bool) -> Lines:
+        """How many methods did not run, or each of them with its reason."""
+        count_of = len(self.left_out) + len(self.others)
+        if not all_of_them:
+            said = f"{count(count_of, 'method')} left out: --left-out says why, --all runs all that can"
+            return [plain(said, "dim")] if count_of else []
+        others = [plain(f"Left out {', '.join(self.others)}: not default methods; --all runs them")]
+        return [*left_out(self.left_out), *others * bool(self.others)]
 
     def _summary(self) -> Lines:
         """Counts of the verdicts, the path of the store, and the next command."""
-        failed, left = any(v.passed is False for v in self.verdicts), checks.not_exercised(self.scene)
-        out: Lines = [*hanging("", left)] if left and not failed else []
+        failed, out = any(v.passed is False for v in self.verdicts), list[Any]()
         taken = f"; resumed from an interrupted run: {', '.join(self.resumed)}" if self.resumed else ""
         look = "bold red" if failed or self.broke else "bold yellow" if self.not_judged else "bold green"
         # standard error has the reasons
@@ -125,8 +134,7 @@ class Report(StudyResult):
         out.append(plain(f"{self.counts}{broke}{taken}", look))
         if self.path is not None:
             name = shlex.quote(str(self.path))
-            out.append(plain(f"Stored in {self.path}", look))
-            out.append(plain(f"next: springcheck plot {name}, or springcheck report {name}", "dim"))
+            out.append(plain(f"Stored in {self.path}; next: springcheck plot {name}", "dim"))
         return out
 
     def document(self) -> dict[str, Any]:
