@@ -95,7 +95,7 @@ def test_numbers_that_are_none_are_words(spring: Path, content: page.Content) ->
 
 def test_its_headline_and_its_card_are_what_was_found(content: page.Content) -> None:
     text = page.html(content)
-    found = "Mass on a spring: explicit Euler spirals out; 2 keep to their orbits"
+    found = "Mass on a spring: explicit Euler gains energy; 2 conserve it on average"
     assert f"<h1>{found}</h1>" in text
     assert f'<meta property="og:title" content="{found}">' in text
     assert f'<meta property="og:description" content="{content.summary_line}">' in text

@@ -145,6 +145,7 @@ def run(
         from springcheck.studies.run.faulty import broken
 
         wrong = [broken(text) for text in dict.fromkeys(faults)]
+    keeper.need_names(len(labels) + len(wrong))
     memory.need(
         scene.n * (RUN_BYTES + MORE_BYTES * (len(labels) - 1)),
         f"scene {scene.name}: judging {scene.n} particles by {len(labels)} methods would",
