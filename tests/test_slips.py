@@ -250,8 +250,7 @@ def test_a_mistake_of_ours_is_one_line_and_shows_its_place_when_asked(
         raise ZeroDivisionError("division\nby zero")
 
     monkeypatch.setattr(cli, "main", wrong)
-    for name in ("install", "finish"):
-        monkeypatch.setattr(interrupts, name, lambda: None)
+    monkeypatch.setattr(interrupts, "install", lambda: None)
     assert __main__._main() == 2
     said = capsys.readouterr().err
     assert said.startswith(

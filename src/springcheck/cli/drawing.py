@@ -26,9 +26,12 @@ FEWEST_PERIOD_FRAMES, SAME_REACH = 12, 0.02
 
 
 def need_matplotlib() -> None:
-    """SpringcheckError where matplotlib cannot be imported: the environment asks for an unknown backend."""
+    """SpringcheckError where matplotlib is missing, or the environment asks for an unknown backend."""
     try:
         import_module("matplotlib")
+    except ImportError as error:
+        how = "python -m pip install matplotlib"
+        raise SpringcheckError(f"figures need matplotlib, which cannot be imported: {how}") from error
     except ValueError as error:
         asked = os.environ.get("MPLBACKEND")
         raise SpringcheckError(

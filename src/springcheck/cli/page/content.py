@@ -120,7 +120,7 @@ class Content:
     def finding(self) -> str:
         """Heading of its first chart, or else its title."""
         banks = iter(self.data["banks"].values())
-        found = str(self.data["banks"].get("motion", next(banks, {})).get("heading", ""))
+        found = str(self.data["banks"].get("motion", next(banks, {})).get("foot", ""))
         return found.partition(" (phase portrait")[0] or self.title
 
     @property
@@ -191,7 +191,8 @@ def _motion(run: Stored, most: int) -> dict[str, Any] | None:
         replace(
             chart,
             # what is said of modes is of the last, the fastest
-            title=f"{bank.heading}. " * (chart is bank.charts[-(bank.name == "modes")]) + chart.title,
+            title=f"{bank.foot or bank.heading}. " * (chart is bank.charts[-(bank.name == "modes")])
+            + chart.title,
             curves=[replace(curve, x=few(curve.x), y=few(curve.y)) for curve in chart.curves],
         )
         for bank in found
@@ -199,7 +200,13 @@ def _motion(run: Stored, most: int) -> dict[str, Any] | None:
     ]
     on = [curve.name for curve in curves if not curve.over] + [chart.title for chart in charts]
     return charts_as_data(
-        Bank(title="Methods drawn", heading=found[0].heading, charts=charts, on=list(dict.fromkeys(on)))
+        Bank(
+            title="Methods drawn",
+            heading=found[0].heading,
+            foot=found[0].foot,
+            charts=charts,
+            on=list(dict.fromkeys(on)),
+        )
     )
 
 

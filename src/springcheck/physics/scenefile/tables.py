@@ -143,7 +143,7 @@ class SceneBase(SceneTable, frozen=True):
     """A scene file without the tables of the terms that are defined by their columns alone."""
 
     time: TimeTable
-    title: str = ""
+    title: Annotated[str, msgspec.Meta(max_length=1000)] = ""
     source: str = ""
     units: Units | None = None
     kind: Kind | None = None

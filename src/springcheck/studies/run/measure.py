@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import heapq
+import json
 import os
 from argparse import Namespace
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -18,7 +19,7 @@ import numpy as np
 from springcheck import checks, driver, engines, processes
 from springcheck.checks import compare
 from springcheck.engines.contract import Label
-from springcheck.errors import EngineError, MethodError, SpringcheckError, StoreError
+from springcheck.errors import EngineError, MethodError, SceneError, SpringcheckError, StoreError
 from springcheck.physics import exact, memory
 from springcheck.physics.arrays import Extended
 from springcheck.physics.scene import Scene
@@ -28,7 +29,7 @@ from springcheck.studies.arguments import Progress
 from springcheck.studies.choose import LeftOut, choose
 from springcheck.studies.run.changes import changed
 from springcheck.studies.run.faulty import FAULT
-from springcheck.studies.run.result import Repeat, Repeats, Report, Stored
+from springcheck.studies.run.result import Repeat, Repeats, Report, Stored, restored
 from springcheck.studies.run.tally import Tally, line
 
 if TYPE_CHECKING:
@@ -97,7 +98,17 @@ def stored(path: Path) -> Stored:
     # an unfinished run has trajectories in its journal, and no file yet
     if not path.is_file():
         return Stored(path=path, verdicts=(), comparison=None)
-    return Stored(path=path, verdicts=keeper.verdicts(path), comparison=keeper.comparison(path))
+    verdicts, comparison = keeper.verdicts(path), keeper.comparison(path)
+    found = Stored(path=path, verdicts=verdicts, comparison=comparison)
+    if comparison is None or "run" not in keeper.summary(path).documents:
+        return found
+    try:
+        scene = keeper.stored_scene(path)
+    except SceneError:
+        # one of a subject that springcheck no longer has
+        return found
+    known = keeper.decoded(path, "run")
+    return replace(found, report=restored(path, scene, known, verdicts, comparison))
 
 
 def run(
@@ -134,6 +145,7 @@ def run(
         from springcheck.studies.run.faulty import broken
 
         wrong = [broken(text) for text in dict.fromkeys(faults)]
+    keeper.need_names(len(labels) + len(wrong))
     memory.need(
         scene.n * (RUN_BYTES + MORE_BYTES * (len(labels) - 1)),
         f"scene {scene.name}: judging {scene.n} particles by {len(labels)} methods would",
@@ -185,8 +197,9 @@ def run(
         report = replace(report, verdicts=tuple(checks.shared(report.verdicts)))
         report = replace(report, broke=broke)
         journal.commit(
-            scene, comparison=report.comparison, verdicts=report.verdicts, solution=gathered.solution()
-        )
+            scene, comparison=report.comparison, verdicts=report.verdicts, solution=gathered.solution(),
+            documents={"run": json.dumps(report.kept_document(), allow_nan=False)},
+        )  # fmt: skip
     return report
 
 
