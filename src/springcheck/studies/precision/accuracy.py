@@ -85,7 +85,7 @@ def truth(scene: Scene) -> Truth:
     """Prepare the exact solution of a scene.
 
     Raises:
-        SceneError: forces overflow, there is no reference solution, or the scene rests, so that errors have no unit.
+        SceneError: forces overflow, there is no reference solution, or the scene rests: errors have no unit.
     """
     w = fastest(scene)
     if not exact.has_true_motion(scene):
