@@ -18,7 +18,7 @@ import springcheck
 from springcheck import checks, engines, schemes, store
 from springcheck.cli import main, output
 from springcheck.physics import scenefile as scenes
-from springcheck.studies.run import measure as session
+from springcheck.studies.run import judging
 from springcheck.text.lines import table
 
 pytestmark = pytest.mark.usefixtures("own_folder")
@@ -344,9 +344,9 @@ def test_extreme_numbers_make_a_report_and_no_warnings(
 def test_of_a_long_run_some_pieces_are_judged_and_it_is_said(
     steps: int, judged: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(session, "PIECE_NUMBERS", 16)
-    monkeypatch.setattr(session, "LONG_PIECE", 4)
-    monkeypatch.setattr(session, "MOST_PIECES", 4)
+    monkeypatch.setattr(judging, "PIECE_NUMBERS", 16)
+    monkeypatch.setattr(judging, "LONG_PIECE", 4)
+    monkeypatch.setattr(judging, "MOST_PIECES", 4)
     text = (scenes.folder() / "spring-uneven.toml").read_text().replace("steps = 200", f"steps = {steps}")
     Path("long.toml").write_text(text)
     assert main(["run", "long.toml", "--method", "own:euler", "--json"]) == 0

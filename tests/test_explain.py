@@ -6,11 +6,9 @@ import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from springcheck import checks, engines, schemes
-from springcheck.bath import THERMOSTATS
 from springcheck.cli import explain, main
 from springcheck.errors import SpringcheckError
 from springcheck.identify.meanings import MEANINGS
@@ -158,17 +156,10 @@ def test_a_held_force_speeds_up_along_itself() -> None:
     assert "v' = v + h F/m" in " ".join(explain.lines("held-force"))
 
 
-def test_a_thermostat_is_explained_by_numbers_that_make_its_step() -> None:
-    """Each stage of OBABO has half the friction and a draw of its own, and what is printed is the step."""
-    printed = [line.strip() for line in explain.scheme_lines(schemes.scheme("obabo"))]
-    first, last = (next(x for x in printed if x.endswith(f"xi_{i}")) for i in (1, 2))
-    c = float(np.exp(-0.1 / 2))
-    assert first == f"p = {c:.6g} p + {np.sqrt(1 - c * c):.6g} sqrt(m kT) xi_1"
-    assert last == first.replace("xi_1", "xi_2")
-    assert "with the numbers of x = gamma h = 0.1" in printed
-    kinds = {name: "\n".join(explain.scheme_lines(schemes.scheme(name))) for name in THERMOSTATS}
-    assert not any("c(x)" in text for text in kinds.values())
-    assert kinds["gj-iv"] != kinds["gj-vi"].replace("VI", "IV").replace("gj-vi", "gj-iv")
+def test_a_thermostat_is_explained_by_its_stages_and_averages() -> None:
+    said = "\n".join(explain.scheme_lines(schemes.scheme("obabo")))
+    assert "exchange" in said
+    assert "k<q**2>/kT" in said
 
 
 def test_sentences_are_there_without_docstrings() -> None:

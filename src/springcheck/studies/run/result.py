@@ -7,11 +7,13 @@ from argparse import Namespace
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from math import nan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from springcheck import checks
 from springcheck.checks.compare import Same
+from springcheck.errors import StoreError
 from springcheck.physics.scene import Scene
 from springcheck.physics.trajectory import Comparison, Trajectory, Verdict
 from springcheck.studies.choose import LeftOut
@@ -137,6 +139,11 @@ class Report(StudyResult):
             out.append(plain(f"Stored in {self.path}; next: springcheck plot {name}", "dim"))
         return out
 
+    def kept_document(self) -> dict[str, Any]:
+        """What a store holds of it beyond trajectories, verdicts and comparison, for `inspect`."""
+        names = ("runs", "left_out", "same", "temperatures", "judged_frames", "others", "faults", "broke")
+        return document(**{name: getattr(self, name) for name in names})
+
     def document(self) -> dict[str, Any]:
         """The report as plain data for JSON."""
         return document(
@@ -154,6 +161,29 @@ class Report(StudyResult):
             others=self.others,
             **({"temperatures": self.temperatures} if self.temperatures else {}),
         )
+
+
+def restored(
+    path: Path, scene: Scene, known: Any, verdicts: tuple[Verdict, ...], comparison: Comparison
+) -> Report:
+    """The report whose `kept_document` this is.  StoreError where a part of it is missing."""
+    from springcheck.bath.heat import Heated
+
+    def each(kind: Any, name: str) -> tuple[Any, ...]:
+        rows = [{x: nan if y is None else y for x, y in row.items()} for row in known[name]]
+        return tuple(
+            kind(**{x: tuple(y) if isinstance(y, list) else y for x, y in row.items()}) for row in rows
+        )
+
+    try:
+        return Report(
+            scene=scene, path=path, verdicts=verdicts, comparison=comparison, runs=each(MethodRun, "runs"),
+            left_out=each(LeftOut, "left_out"), same=each(Same, "same"), others=tuple(known["others"]),
+            temperatures=each(Heated, "temperatures"), judged_frames=known["judged_frames"],
+            faults=dict(known["faults"]), broke=dict(known["broke"]),
+        )  # fmt: skip
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise StoreError(f"{path}: its report lacks {error}") from error
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -208,6 +238,8 @@ class Stored(StudyResult):
     verdicts: tuple[Verdict, ...]
     comparison: Comparison | None
     status: int = 0
+    report: Report | None = None
+    """The report of the run; None in a store of an earlier version."""
 
     @cached_property
     def drawable(self) -> Drawable:
@@ -222,8 +254,8 @@ class Stored(StudyResult):
         return self.drawable.notes
 
     def lines(self, options: Namespace | None = None) -> Lines:
-        out: Lines = []
-        if self.verdicts:
+        out: Lines = [] if self.report is None else self.report.lines(options)
+        if self.verdicts and self.report is None:
             out += [*text.fractions(self.verdicts), *text.failures(self.verdicts)]
             out += [*text.unjudged(self.verdicts, self.path), *text.in_full(self.verdicts, options)]
         if self.comparison is not None:
