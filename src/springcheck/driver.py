@@ -12,7 +12,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from springcheck import engines
+from springcheck import engines, interrupts
 from springcheck.bath import THERMOSTATS
 from springcheck.bath.catalogue import NO_NORMAL_NUMBERS
 from springcheck.engines.contract import Label, Stopped
@@ -179,6 +179,9 @@ def _advance(
         for left in range(every, 0, -piece):
             steps = min(left, piece)
             simulation.advance(steps, q, p)
+            if interrupts.seen():
+                # a library may have swallowed it in a callback
+                raise KeyboardInterrupt
             if progress and left > piece:
                 progress(steps)
                 told += steps
