@@ -307,15 +307,6 @@ def test_a_study_brings_its_charts_and_its_tables(studies: dict[str, Path], name
     }
 
 
-def test_charts_hold_the_stored_doubles(studies: dict[str, Path]) -> None:
-    points = store.tables_of(studies["precision"])["precision/own:euler"].columns["max_error"]
-    banks = _data(page.html(page.gather(studies["precision"])))["banks"].values()
-    charts = [chart for bank in banks for chart in bank["charts"]]
-    drawn_errors = next(x["y"] for one in charts for x in one["curves"] if x["name"] == "own:euler")
-    assert set(drawn_errors) <= set(np.asarray(points, np.float64).tolist())
-    assert len(drawn_errors) >= 2
-
-
 def test_every_cell_of_the_atlas_stands_in_its_map(studies: dict[str, Path]) -> None:
     (chart,) = _data(page.html(page.gather(studies["extremes"])))["banks"]["extremes-0"]["charts"]
     tiles = chart["tiles"]
