@@ -128,11 +128,6 @@ def test_messages_speak_of_arguments_and_not_of_options() -> None:
     springcheck.run("spring", "own:euler", path="x.h5", force=True)
 
 
-def test_a_method_that_is_not_one_is_answered_with_the_nearest() -> None:
-    with pytest.raises(MethodError, match=r"did you mean [a-z]+:verlet"):
-        springcheck.simulate("spring", "verlet")
-
-
 def shown(result: Any, name: str) -> Any:
     """The table of a result, after a look at its line and its HTML."""
     pandas = need("pandas")
@@ -167,18 +162,6 @@ def test_a_study_keeps_a_store_that_it_writes_anew_when_it_is_told_to() -> None:
     again = springcheck.stability("spring", "own:euler", path="s.h5", force=True, workers=np.int64(2))
     assert again.document() == kept.document()
     assert [path.name for path in Path().iterdir()] == ["s.h5"]
-
-
-def test_an_atlas_shows_itself() -> None:
-    from springcheck.studies.extremes.judging import Cell
-    from springcheck.studies.extremes.result import Atlas
-
-    cell = Cell(
-        method="own:euler", block="a", parameters={"h_w": 0.1}, outcome="right", reason="", value=0, bound=1
-    )
-    atlas = Atlas(cells=(cell, cell), windows=(), left_out=())
-    assert repr(atlas) == "Atlas(2 right)"
-    assert len(atlas.to_dataframe() if need("pandas") else ()) == 2
 
 
 def test_methods_and_words_and_pages_are_functions_too() -> None:
@@ -419,28 +402,6 @@ def test_a_scene_is_replaced_by_the_names_of_its_fields() -> None:
         scene.replace(steps=-1)
 
 
-@pytest.mark.parametrize(
-    ("name", "arguments", "expected"),
-    [
-        ("extremes", {"methods": "own:euler", "quick": True}, (None, ["own:euler"], True)),
-        ("sampling", {"methods": ["own:baoab"]}, (None, ["own:baoab"])),
-    ],
-)
-def test_a_study_hands_what_it_is_told_to_its_record(
-    monkeypatch: pytest.MonkeyPatch, name: str, arguments: dict[str, Any], expected: tuple[Any, ...]
-) -> None:
-    told: dict[str, Any] = {}
-
-    def record(*given: Any, quick: bool | None = None, **how: Any) -> str:
-        told.update(how, given=given if quick is None else (*given, quick))
-        return "found"
-
-    monkeypatch.setattr(f"springcheck.studies.{name}.measure.record", record)
-    assert getattr(springcheck, name)(**arguments, force=True, workers=2) == "found"
-    assert told["given"] == expected
-    assert (told["force"], told["team"].workers) == (True, 2)
-
-
 def test_judge_says_what_the_states_show_as_the_command_does(tmp_path: Path) -> None:
     scene = springcheck.load_scene("spring-uneven")
 
@@ -489,11 +450,6 @@ def test_judge_without_a_scheme_says_in_a_line_how_to_find_it() -> None:
     assert "forest-ruth" not in str(error.value)
     with pytest.raises(SpringcheckError, match=r"did you mean velocity-verlet or position-verlet[?]"):
         springcheck.judge(scene, replace(made, scheme="verlet"))
-
-
-def test_an_argument_that_a_function_has_not_is_answered_with_its_name() -> None:
-    with pytest.raises(TypeError, match=r"^run\(\) got an unexpected keyword argument 'workers'"):
-        springcheck.run("spring", "own:euler", workers=2)  # type: ignore[call-arg]
 
 
 @pytest.mark.parametrize(("name", "writer"), [("a.csv", "savetxt"), ("a.npz", "savez")])

@@ -13,7 +13,6 @@ import numpy as np
 
 from springcheck import checks, engines, schemes
 from springcheck.bath import THERMOSTATS, Law
-from springcheck.bath.catalogue import Act
 from springcheck.checks.seeds import SEEDED
 from springcheck.errors import SpringcheckError
 from springcheck.physics import terms
@@ -174,48 +173,18 @@ def scheme_lines(scheme: Scheme) -> Iterator[str]:
         yield _line(f"Source: {scheme.source}")
 
 
-_ACTS = {
-    "kick": "p = p + {c}h F", "slow": "p = p + {c}h F of slow terms",
-    "fast": "p = p + {c}h F of fast terms", "held": "p = p + {c}h F, as it was last evaluated",
-    "drift": "q = q + {c}h p/m",
-    "exchange": "p = {c}p + {rest:.6g} sqrt(m kT) {xi}", "damp": "p = (1 - {c}) p",
-    "undamp": "p = p / (1 + {c})", "noise": "p = p + {c}sqrt(2 x m kT) {xi}",
-    "jump": "q = q + {c}h sqrt(2 x kT/m) {xi}", "creep": "q = q + {c}h**2 F/m", "rebuild": "p = m (q' - q)/h",
-    "rescale": "p = alpha p: alpha**2 = b ((xi_1 + sqrt(c/b))**2 + xi_2**2 + ...), c = exp(-2 x), "
-               "b = (1 - c) kT / sum p**2/m; alpha has the sign of xi_1 + sqrt(c/b)",
-    "scale": "p = |alpha| p: alpha**2 = b ((xi_1 + sqrt(c/b))**2 + xi_2**2 + ...), c = exp(-2 x), "
-             "b = (1 - c) kT / sum p**2/m",
-    "chain": "p = p exp(-{c}h s0/Q0) and the like, s0' = 2K - N kT - s0 s1/Q1, s1' = s0**2/Q0 - kT ...",
-    "collide": "with the chance 1 - exp(-x): p = sqrt(m kT) xi",
-}  # fmt: skip
-
 SHOWN = 0.5, 0.1
-"""h omega, and x = gamma h, at which numbers of a thermostat are shown."""
-
-
-def _act(act: Act, draws: int) -> str:
-    """A stage of a thermostat, with a coefficient that depends on x as a number."""
-    c = float(act.part(np.float64(SHOWN[1]))) if callable(act.part) else float(act.part)
-    if act.kind == "kick" and c == 0:
-        return "F is evaluated at q"
-    share = f"{c:.6g}" if callable(act.part) else str(act.part)
-    rest = math.sqrt(max(1 - c * c, 0.0)) if act.kind == "exchange" else 0.0
-    xi = f"xi_{act.draw + 1}" if draws > 1 else "xi"
-    whole = act.kind in ("damp", "undamp")
-    return _ACTS[act.kind].format(c=share if whole else "" if c == 1 else f"{share} ", rest=rest, xi=xi)
+"""h omega and gamma h at which the averages of a thermostat are shown."""
 
 
 def _thermostat(name: str) -> Iterator[str]:
-    """Stages of a random scheme, and numbers of its law on a spring."""
+    """Stages of a random scheme, and its averages on a spring."""
     scheme = THERMOSTATS[name]
-    for act in scheme.acts:
-        yield f"  {_act(act, scheme.draws)}"
-    if any(callable(act.part) for act in scheme.acts):
-        yield f"  with the numbers of x = gamma h = {SHOWN[1]}"
-    if scheme.carried:
-        yield "  the first draw xi_1 of a step is the last of the step before"
+    fixed = [act.kind if callable(act.part) or act.part == 1 else f"{act.kind} {act.part}"
+             for act in scheme.acts]  # fmt: skip
+    yield f"  Stages: {', '.join(fixed)}"
     if scheme.rescales:
-        yield "No linear map: kinetic energies are noncentral chi-squared, whose ranks are judged"
+        yield "Not linear: each kinetic energy is judged by its noncentral chi-squared distribution"
         return
     turn, x = SHOWN
     of = Law(scheme=scheme, h=turn, m=np.ones(1), k=np.ones(1), rate=x / turn, thermal=1.0)
@@ -224,7 +193,7 @@ def _thermostat(name: str) -> Iterator[str]:
         f"{of.kinetic[0]:.6f}; of a free particle D m gamma/kT {of.diffusion[0]:.6f}"
     )
     if not scheme.synchronised:
-        yield "Its velocities are of another time than its positions"
+        yield "Its velocities belong to another time than its positions"
 
 
 def _tableau(a: Sequence[Sequence[Fraction]], b: Sequence[Fraction]) -> Iterator[str]:
