@@ -269,7 +269,6 @@ def test_a_shipped_scene_is_written_so_that_it_is_read_back(name: str) -> None:
     assert numbers(again) == numbers(scene)
     assert again.digest == scene.digest
     assert again.to_toml() == scene.to_toml()
-    assert len(scene.to_toml()) < 3000, "a long chain is written as one"
 
 
 FLOATS = st.floats(allow_nan=False, allow_infinity=False, allow_subnormal=True)
@@ -338,7 +337,7 @@ def test_any_scene_is_written_so_that_it_is_read_back(scene: Scene) -> None:
     assert again.digest == scene.digest
 
 
-def test_a_chain_that_moves_in_no_few_waves_is_written_in_rows() -> None:
+def test_a_chain_is_written_by_its_positions() -> None:
     rng = np.random.default_rng(1)
     for scene in (
         chain(50, m=1.3, k=2.9, q=rng.normal(size=50), p=rng.normal(size=50)),

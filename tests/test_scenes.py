@@ -415,7 +415,7 @@ def test_two_loops_share_a_capacitor() -> None:
 
 FREE = 'title = "x"\n[[particle]]\nmass = 1.3\n[time]\nstep = 0.1\nsteps = 10\n'
 BOND = "[[morse]]\nends = [0, 0]\ndepth = 1.0\nsteepness = 1.0\nrest = 1.0\n"
-PENDULUM = "[[cosine]]\nparticle = 0\ndepth = 1.0\nlength = 0.0\n"
+PENDULUM = "[[cosine]]\nparticle = 0\ndepth = 1.0\nwave = 0.0\n"
 MISTAKES = {
     "an unknown field of a term": (
         "[[quartic]]\nparticle = 0\nstrength = 1.0\n",
@@ -426,7 +426,7 @@ MISTAKES = {
         "[[quartic]]\nparticle = 3\ncoefficient = 1.0\n",
         ("quartic[0].particle = 3", "0 to 0"),
     ),
-    "a length of zero": (PENDULUM, ("cosine[0].length", "0.0", "> 0")),
+    "a wave of zero": (PENDULUM, ("cosine[0].wave", "0.0", "> 0")),
     "a bond to itself": (BOND, ("morse[0].ends", "same particle")),
     "a bond that pushes": (BOND.replace("depth = 1", "depth = -1"), ("morse[0].depth", "-1.0", "> 0")),
     "a capacitor in a mechanical scene": (
