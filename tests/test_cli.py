@@ -68,7 +68,7 @@ def test_the_main_job_runs_every_engine_and_passes(
 def test_the_text_names_methods_motions_and_the_store(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["run", "spring", *OWN, "-o", "some.h5"]) == 0
     text = capsys.readouterr().out
-    for word in ("own:euler", "own:semi-implicit-euler", "complete", "0 failed", "next: springcheck plot some.h5"):
+    for word in ("own:euler", "own:semi-implicit-euler", "complete", "0 failed", "plot some.h5"):
         assert word in text
     assert max(len(line) for line in text.splitlines()) <= 80
 

@@ -289,7 +289,7 @@ def test_wrong_arguments_are_answered_in_words() -> None:
         (lambda: springcheck.compare(scene, 5), "a Trajectory is needed, not int"),
         (lambda: springcheck.chain(3, waves=[1]), "pairs of a mode and an amplitude are needed"),
         (lambda: springcheck.simulate(scene, lambda q, p, h, force, mass: (q + 1j, p)), "real numbers"),
-        (lambda: springcheck.precision(scene, "own:rk4", workers=0), "number of processes"),
+        (lambda: springcheck.stability(scene, "own:rk4", workers=0), "number of processes"),
     ):
         with pytest.raises(SpringcheckError, match=words):
             call()
