@@ -8,7 +8,6 @@ import os
 import shutil
 import subprocess
 import sys
-from argparse import Namespace
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -16,7 +15,6 @@ import pytest
 
 from springcheck.cli import ci, main
 from springcheck.store import files
-from springcheck.studies.arguments import reported
 
 HERE = Path(__file__).parent
 EXAMPLES = HERE / "ci-examples"
@@ -278,8 +276,3 @@ def test_a_scheme_that_is_not_the_one_asked_for_fails(
     assert unlike == "these states are not classical Runge-Kutta (RK4), but explicit Euler"
     assert main(["identify", store, "--scheme", "rk44"]) == 2
     assert "neither in the catalogue" in capsys.readouterr().err
-
-
-def test_nothing_is_made_where_nothing_is_asked_for() -> None:
-    assert not reported(Namespace(junit=None, badge=None, summary=None))
-    assert not reported(Namespace())

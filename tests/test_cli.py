@@ -68,14 +68,9 @@ def test_the_main_job_runs_every_engine_and_passes(
 def test_the_text_names_methods_motions_and_the_store(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["run", "spring", *OWN, "-o", "some.h5"]) == 0
     text = capsys.readouterr().out
-    for word in ("own:euler", "own:semi-implicit-euler", "complete", "0 failed", "some.h5"):
+    for word in ("own:euler", "own:semi-implicit-euler", "complete", "0 failed", "plot some.h5"):
         assert word in text
     assert max(len(line) for line in text.splitlines()) <= 80
-
-
-def test_quiet_prints_nothing(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["run", "spring", *OWN, "--quiet"]) == 0
-    assert capsys.readouterr().out == ""
 
 
 def test_a_scene_of_ones_own_runs_by_its_path(capsys: pytest.CaptureFixture[str]) -> None:
@@ -324,13 +319,3 @@ def test_of_a_long_run_some_pieces_are_judged_and_it_is_said(
     assert main(["run", "long.toml", "--method", "own:euler", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["judged_frames"] == judged
-
-
-def test_a_run_s_report_has_the_place_of_the_store_on_a_line_of_its_own(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    assert main(["run", "spring", "--method", "own:euler"]) == 0
-    _, said, stored, *_ = capsys.readouterr().out.splitlines()
-    assert "passed, 0 failed" in said
-    assert stored == "Stored in spring.h5; next: springcheck plot spring.h5"

@@ -73,10 +73,9 @@ def checks_of(engine: Engine) -> list[Check]:
     for label in labels:
         scenes = _served(label)
         found += [Check(f"right on {scene.name}", label, partial(_right, scene=scene)) for scene in scenes]
+        tests = TESTS if scenes else {"serves a scene": _serves_none}
         if label.method not in engine.methods:
             tests = {"seeds": _seeds} if scenes else {}
-        else:
-            tests = TESTS if scenes else {"serves a scene": _serves_none}
         found += [Check(name, label, test) for name, test in tests.items()]
     return found
 
@@ -175,7 +174,8 @@ def odd_scenes(scene: Scene) -> list[Scene]:
     """A scene with the terms that engines lose or change: particles out of order, two springs to walls of one
     particle, two between one pair with ends swapped, a rest length or stiffness below 0, one friction."""
     i, x = np.arange(scene.n), np.array
-    wall = WallSpring(i=i[::-1], k=1.3 + 0.4 * i, at=0.2 * i - 0.1)
+    count = i.astype(np.float64)
+    wall = WallSpring(i=i[::-1], k=1.3 + 0.4 * count, at=0.2 * count - 0.1)
     odd = {
         "out-of-order": (),
         "two-walls": (WallSpring(i=i[:1], k=x([0.7]), at=x([0.5])),),

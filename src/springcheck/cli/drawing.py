@@ -105,7 +105,7 @@ def draw_foreign(
     solid = [name for name, look in looks.LOOKS.items() if look.linestyle == looks.SOLID]
 
     def curves(x: Any, y: Any, *, joined: bool) -> list[Curve]:
-        how = {"dots": few, "line": joined or not few}
+        how: Any = {"dots": few, "line": joined or not few}
         return [
             Curve(
                 name=f"coordinate {i}", group=solid[i % len(solid)], x=x[:, i % x.shape[1]], y=y[:, i], **how
