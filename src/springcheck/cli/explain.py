@@ -85,7 +85,7 @@ def lines(name: str) -> Iterator[str]:
     asked = [check for check in _CHECKS.values() if name in (check.name, check.short)]
     parts[:0] = [check_lines(check) for check in asked]
     parts += [meaning_lines(MEANINGS[name])] if name in MEANINGS else []
-    parts += [iter([_line(f"{name}, a term: {described(of_terms[name])}")])] if name in of_terms else []
+    parts += [_term(of_terms[name])] if name in of_terms else []
     if said := word(name):
         parts.append(iter([f"{said[0]}: {said[1]}"]))
     if parts:
@@ -138,6 +138,17 @@ def meaning_lines(meaning: Meaning) -> Iterator[str]:
     yield _line(f"Does not see: {meaning.misses}")
     if meaning.source:
         yield _line(f"Source: {meaning.source}")
+
+
+def _term(term: Any) -> Iterator[str]:
+    """A term: its law, and the fields of its table."""
+    yield _line(f"{term.key}, a term: {described(term)}")
+    yield f"  energy   {term.formula}"
+    for column in (x for x in term.columns if x.field != "number"):
+        default = "" if column.default is None else f", {column.default:g} by default"
+        sign = {"any": "any number", "positive": "above 0", "nonnegative": "0 or more"}[column.sign]
+        inverse = f", or its inverse {column.field}" if column.inverse else ""
+        yield f"  {column.name}: {sign}{default}{inverse}"
 
 
 def _method(name: str) -> Iterator[str]:
